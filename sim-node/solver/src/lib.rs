@@ -1,0 +1,44 @@
+//! Particles and constraints, stepped at a fixed rate with the same bits on every machine.
+//!
+//! A [`Scene`] is checked text; a [`Solver`] made from it is the running state. Commands change it
+//! at the boundary before a step, [`Solver::step`] makes one step, and [`Solver::state_hash`] names
+//! the result. The particles and the [`Keyframe`] of one step are together the complete state.
+//!
+//! ```
+//! use sim_solver::{Grip, Scene, Solver, builtin};
+//!
+//! let scene = Scene::from_toml(builtin::text("curtain").unwrap(), "curtain")?;
+//! let mut solver = Solver::new(&scene);
+//! solver.grab(7, Grip { particle: 90, target: [0.5, 0.2, 0.3], over_s: 0.1 })?;
+//! for _ in 0..240 {
+//!     solver.step();
+//! }
+//! assert_eq!(solver.particle(90).position, [0.5, 0.2, 0.3]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! There is no process, clock, file or message in this crate.
+#![forbid(unsafe_code)]
+
+pub mod builtin;
+mod commands;
+mod constraints;
+mod drive;
+mod hash;
+mod keyframe;
+mod order;
+mod particles;
+pub mod scene;
+mod solver;
+mod step;
+
+pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Rejection};
+pub use constraints::{Constraint, ConstraintKind};
+pub use keyframe::{Keyframe, KeyframeError, RestoreError};
+pub use particles::{Particle, flag};
+pub use scene::{Method, Scene, SceneError, SolverSettings};
+pub use solver::Solver;
+
+/// Version of the arithmetic. It changes with any change of the bits that a step produces, and a
+/// recording is re-simulated only by the version that made it.
+pub const SOLVER_VERSION: u32 = 1;

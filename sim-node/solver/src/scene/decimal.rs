@@ -1,0 +1,30 @@
+//! f32 in TOML with the fewest digits that read back as the same bits.
+
+use serde::{Serialize, Serializer};
+
+/// The f64 whose shortest text is that of the f32: 0.1, not 0.10000000149011612.
+fn shortest(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or_else(|_| f64::from(value))
+}
+
+/// `#[serde(with = "decimal::number")]` for an f32 field.
+pub(crate) mod number {
+    use super::{Serializer, shortest};
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    pub(crate) fn serialize<S: Serializer>(value: &f32, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_f64(shortest(*value))
+    }
+}
+
+/// `#[serde(with = "decimal::vector")]` for a field of three f32.
+pub(crate) mod vector {
+    use super::{Serialize, Serializer, shortest};
+
+    pub(crate) fn serialize<S: Serializer>(
+        value: &[f32; 3],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.map(shortest).serialize(serializer)
+    }
+}

@@ -1,0 +1,89 @@
+//! What a scene expands to: every particle, constraint and triangle.
+
+use super::{Scene, SceneParticle};
+use crate::constraints::Constraint;
+
+/// Distance from the scene's origin beyond which f32 positions make a scene at rest tremble.
+const NEAR_ORIGIN: f32 = 100.0;
+/// Ratio of masses beyond which small steps converge visibly slower.
+const MASS_RATIO_LARGE: f32 = 1e3;
+
+/// Every particle, constraint and triangle of a scene; immutable from load to load.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Model {
+    pub(crate) particles: Vec<SceneParticle>,
+    /// By index.
+    pub(crate) constraints: Vec<Constraint>,
+    /// Constraint by constraint: the group of independent constraints that its shape declares.
+    pub(crate) families: Vec<Option<u32>>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+impl Model {
+    /// Explicit particles first, then those of each generator; constraints alike.
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let mut model = Self { particles: scene.particles.clone(), ..Self::default() };
+        for constraint in &scene.constraints {
+            let [a, b] = constraint.particles;
+            let compliance = constraint.softness.value();
+            let (rest_length, kind) = (constraint.rest_length, constraint.kind);
+            model.push(Constraint { a, b, rest_length, compliance, kind }, None);
+        }
+        for generator in &scene.generators {
+            generator.build(&mut model);
+        }
+        model
+    }
+
+    pub(crate) fn push(&mut self, constraint: Constraint, family: Option<u32>) {
+        self.constraints.push(constraint);
+        self.families.push(family);
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]
+    pub(crate) fn particle_count(&self) -> u32 {
+        self.particles.len() as u32
+    }
+
+    pub(crate) fn pair(&self, constraint: u32) -> [u32; 2] {
+        let Constraint { a, b, .. } = self.constraints[constraint as usize];
+        [a, b]
+    }
+
+    /// The distance of two particles in f32, as a step would measure it.
+    pub(crate) fn distance(&self, a: u32, b: u32) -> f32 {
+        let (a, b) = (self.particles[a as usize].position, self.particles[b as usize].position);
+        let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+        (x * x + y * y + z * z).sqrt()
+    }
+}
+
+/// What works, but probably not as meant.
+pub(crate) fn warnings(scene: &Scene) -> Vec<String> {
+    let model = scene.model();
+    let mut warnings = Vec::new();
+    let coordinates = model.particles.iter().flat_map(|one| one.position);
+    let farthest =
+        coordinates.fold(0.0, |most: f32, one| if one.abs() > most { one.abs() } else { most });
+    if farthest > NEAR_ORIGIN {
+        warnings.push(format!(
+            "a coordinate reaches {farthest} {unit} from the origin: beyond {NEAR_ORIGIN} {unit} a \
+             scene at rest trembles; put the distance into `origin`",
+            unit = scene.unit
+        ));
+    }
+    let masses = || model.particles.iter().map(|one| one.mass);
+    let heaviest = masses().fold(0.0, |most: f32, one| if one > most { one } else { most });
+    let lightest = masses().fold(f32::INFINITY, |least, one| if one < least { one } else { least });
+    if heaviest / lightest > MASS_RATIO_LARGE {
+        warnings.push(format!(
+            "masses from {lightest} to {heaviest} kg: constraints between light and heavy particles \
+             converge slowly; use more substeps"
+        ));
+    }
+    if scene.solver.order == super::ConstraintOrder::Listed && scene.solver.iterations == 1 {
+        warnings
+            .push("order = \"listed\" with one iteration gains energy; use \"grouped\"".to_owned());
+    }
+    warnings
+}

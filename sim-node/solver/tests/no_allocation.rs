@@ -1,0 +1,49 @@
+//! The step allocates nothing: a counting allocator watches it, commands included.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use sim_solver::{Grip, Scene, Solver, builtin};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call goes on to the system's allocator unchanged; counting touches no memory of it.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `alloc`, which is the system's.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the pointer came from `System.alloc` with this layout, as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+// The only test of this binary: another one beside it would count as well.
+#[test]
+fn neither_steps_nor_commands_allocate() {
+    let scene = Scene::from_toml(builtin::text("curtain").unwrap(), "curtain").unwrap();
+    let mut solver = Solver::new(&scene);
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    for round in 0..100_u8 {
+        let particle = 20 + u32::from(round);
+        let target = [0.0, f32::from(round) * 0.01, 0.1];
+        solver.grab(1, Grip { particle, target, over_s: 0.02 }).unwrap();
+        solver.step();
+        solver.release(1, particle).unwrap();
+        solver.pin(particle).unwrap();
+        solver.step();
+    }
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+    // The counter does count.
+    drop(std::hint::black_box(vec![0_u8; 100]));
+    assert!(ALLOCATIONS.load(Ordering::Relaxed) > before);
+}
