@@ -1,1 +1,35 @@
-fn main() {}
+//! `sim-node`: solves particles and constraints at a fixed rate, publishes every state in shared
+//! memory and takes commands from any process.
+#![forbid(unsafe_code)]
+
+mod args;
+mod check;
+mod clock;
+mod commands;
+mod ctl;
+mod exit;
+mod node;
+mod pace;
+mod publish;
+mod run;
+mod scene_source;
+mod statistics;
+mod stop;
+
+use clap::Parser;
+
+use args::{Args, Verb};
+use exit::Exit;
+
+fn main() -> Exit {
+    let args = Args::parse();
+    let result = match args.verb {
+        None => run::run(&args.run),
+        Some(Verb::Run(run)) => run::run(&run),
+        Some(Verb::Scenes(list)) => check::scenes(&list),
+        Some(Verb::Show(show)) => check::show(&show),
+        Some(Verb::Check(check)) => check::check(&check),
+        Some(Verb::Ctl(ctl)) => ctl::ctl(&ctl),
+    };
+    exit::of(result)
+}

@@ -1,0 +1,188 @@
+//! From the commands that clients send to changes of the solver, in an order that is logged.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use sim_contract::{Action, COMMANDS_PER_STEP_MAX, Command, Reason};
+use sim_solver::{Grip, Rejection, Solver};
+
+/// Commands that have arrived and wait for their turn, by client.
+///
+/// A turn goes round the clients in ascending id and takes one command of each, in its sequence,
+/// so that no client can starve another.
+#[derive(Debug, Default)]
+pub(crate) struct Inbox {
+    queues: BTreeMap<u64, VecDeque<Command>>,
+    count: usize,
+}
+
+/// The inbox takes no more while it holds this many: the rest waits in shared memory, where each
+/// client has a bounded queue.
+const INBOX_MAX: usize = 16 * COMMANDS_PER_STEP_MAX;
+
+impl Inbox {
+    /// Whether there is room for what has arrived.
+    pub(crate) fn has_room(&self) -> bool {
+        self.count < INBOX_MAX
+    }
+
+    /// Adds commands in their order of arrival.
+    pub(crate) fn add(&mut self, commands: impl IntoIterator<Item = Command>) {
+        for command in commands {
+            let queue = self.queues.entry(command.client_id).or_default();
+            // Sorted by sequence. Equal ones keep their order; mostly this appends.
+            let place = queue.partition_point(|queued| queued.sequence <= command.sequence);
+            queue.insert(place, command);
+            self.count += 1;
+        }
+    }
+
+    /// The commands of one boundary, in the order of application.
+    pub(crate) fn take_turn(&mut self) -> Vec<Command> {
+        let mut turn = Vec::new();
+        while self.count > 0 && turn.len() < COMMANDS_PER_STEP_MAX {
+            let room = COMMANDS_PER_STEP_MAX - turn.len();
+            let fronts = self.queues.values_mut().take(room).filter_map(VecDeque::pop_front);
+            let before = turn.len();
+            turn.extend(fronts);
+            self.count -= turn.len() - before;
+            self.queues.retain(|_, queue| !queue.is_empty());
+        }
+        turn
+    }
+}
+
+/// Whether and how long the node goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Progress {
+    pub(crate) is_paused: bool,
+    /// Steps to make while paused.
+    pub(crate) steps_due: u64,
+}
+
+impl Progress {
+    pub(crate) fn is_stepping(self) -> bool {
+        !self.is_paused || self.steps_due > 0
+    }
+}
+
+/// Applies one action at the boundary before a step. A rejected one changes nothing.
+pub(crate) fn apply(
+    client_id: u64,
+    action: Action,
+    solver: &mut Solver,
+    progress: &mut Progress,
+) -> Result<(), Reason> {
+    match action {
+        Action::Pin { particle } => solver.pin(particle).map_err(reason),
+        Action::Unpin { particle } => solver.unpin(particle).map_err(reason),
+        Action::Grab { particle, target, over_s } => {
+            solver.grab(client_id, Grip { particle, target, over_s }).map_err(reason)
+        }
+        Action::Move { particle, target, over_s } => {
+            solver.move_grabbed(client_id, Grip { particle, target, over_s }).map_err(reason)
+        }
+        Action::Release { particle } => solver.release(client_id, particle).map_err(reason),
+        Action::Reset => {
+            solver.reset();
+            // Even a paused node makes the step that shows it.
+            progress.steps_due += u64::from(progress.is_paused);
+            Ok(())
+        }
+        Action::Pause => {
+            *progress = Progress { is_paused: true, steps_due: 0 };
+            Ok(())
+        }
+        Action::Resume => {
+            *progress = Progress { is_paused: false, steps_due: 0 };
+            Ok(())
+        }
+        Action::Step { count: 0 } => Err(Reason::OutOfRange),
+        Action::Step { count } if progress.is_paused => {
+            progress.steps_due += u64::from(count);
+            Ok(())
+        }
+        // A running node needs no `step`; other kinds are of another version.
+        _ => Err(Reason::NoEffectHere),
+    }
+}
+
+fn reason(rejection: Rejection) -> Reason {
+    Reason::from_name(rejection.name()).unwrap_or(Reason::NoEffectHere)
+}
+
+#[cfg(test)]
+mod tests {
+    //! The order of a turn, and the control of the loop; what the solver does has tests of its own.
+    use sim_solver::Scene;
+
+    use super::*;
+
+    fn pin(client_id: u64, sequence: u64) -> Command {
+        Command::new(client_id, sequence, Action::Pin { particle: 0 })
+    }
+
+    fn order(turn: &[Command]) -> Vec<(u64, u64)> {
+        turn.iter().map(|command| (command.client_id, command.sequence)).collect()
+    }
+
+    #[test]
+    fn a_turn_goes_round_the_clients_and_keeps_their_sequences() {
+        let mut inbox = Inbox::default();
+        inbox.add([pin(9, 1), pin(9, 2), pin(4, 7), pin(9, 3), pin(4, 6)]);
+        assert_eq!(order(&inbox.take_turn()), [(4, 6), (9, 1), (4, 7), (9, 2), (9, 3)]);
+        assert!(inbox.take_turn().is_empty());
+    }
+
+    #[test]
+    fn what_exceeds_a_turn_waits_for_the_next_one() {
+        let mut inbox = Inbox::default();
+        inbox.add((0..1500).map(|sequence| pin(1, sequence)));
+        inbox.add([pin(2, 0)]);
+        let first = order(&inbox.take_turn());
+        assert_eq!(first.len(), COMMANDS_PER_STEP_MAX);
+        assert_eq!(first[..3], [(1, 0), (2, 0), (1, 1)]);
+        let rest = order(&inbox.take_turn());
+        assert_eq!((rest.len(), rest[0]), (1501 - COMMANDS_PER_STEP_MAX, (1, 1023)));
+    }
+
+    #[test]
+    fn the_inbox_takes_no_more_than_its_limit() {
+        let mut inbox = Inbox::default();
+        inbox.add((0..INBOX_MAX as u64).map(|sequence| pin(1, sequence)));
+        assert!(!inbox.has_room());
+        inbox.take_turn();
+        assert!(inbox.has_room());
+    }
+
+    #[test]
+    fn every_rejection_of_the_solver_is_a_reason_of_the_contract() {
+        for rejection in [
+            Rejection::NonFinite,
+            Rejection::OutOfRange,
+            Rejection::UnknownParticle,
+            Rejection::NotGrabbed,
+            Rejection::GrabbedByOther,
+            Rejection::NoEffectHere,
+        ] {
+            assert_eq!(reason(rejection).name(), rejection.name());
+        }
+    }
+
+    #[test]
+    fn steps_are_for_a_paused_node_only() {
+        let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
+        let mut progress = Progress { is_paused: false, steps_due: 0 };
+        let mut apply = |action| apply(1, action, &mut solver, &mut progress).map(|()| progress);
+        assert_eq!(apply(Action::Step { count: 3 }), Err(Reason::NoEffectHere));
+        assert_eq!(apply(Action::Pause), Ok(Progress { is_paused: true, steps_due: 0 }));
+        assert_eq!(apply(Action::Step { count: 0 }), Err(Reason::OutOfRange));
+        assert_eq!(
+            apply(Action::Step { count: 3 }),
+            Ok(Progress { is_paused: true, steps_due: 3 })
+        );
+        assert_eq!(apply(Action::Reset), Ok(Progress { is_paused: true, steps_due: 4 }));
+        assert_eq!(apply(Action::Resume), Ok(Progress { is_paused: false, steps_due: 0 }));
+        assert_eq!(apply(Action::Reset), Ok(Progress { is_paused: false, steps_due: 0 }));
+        assert_eq!(apply(Action::Unknown { number: 99 }), Err(Reason::NoEffectHere));
+    }
+}

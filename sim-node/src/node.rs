@@ -1,0 +1,171 @@
+//! The loop: wait for the deadline, apply commands, step, publish, observe.
+
+use sim_contract::{Command, Endpoint};
+use sim_solver::{Scene, Solver};
+
+use crate::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use crate::commands::{Inbox, Progress, apply};
+use crate::pace::Pace;
+use crate::publish::{Position, Publisher, StepTimes};
+use crate::statistics::Statistics;
+use crate::stop::Stop;
+
+/// Longest time between two status messages: 10 Hz.
+const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
+/// Longest wait of a paused node before it looks for commands.
+const PAUSED_POLL_NS: u64 = SECOND_NS / 200;
+
+/// What a run is told.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Options {
+    /// Steps after which the run ends.
+    pub(crate) steps: Option<u64>,
+    pub(crate) starts_paused: bool,
+    pub(crate) waits_for_time: bool,
+    /// Every how many steps a snapshot is published.
+    pub(crate) every: u64,
+}
+
+/// A running simulation.
+#[derive(Debug)]
+pub(crate) struct Node {
+    pub(crate) scene: Scene,
+    pub(crate) solver: Solver,
+    options: Options,
+    publisher: Publisher,
+    inbox: Inbox,
+    /// Reused by every boundary.
+    arrived: Vec<Command>,
+    progress: Progress,
+    pace: Pace,
+    pub(crate) statistics: Statistics,
+    pub(crate) step: u64,
+    /// When the run began, on CLOCK_MONOTONIC.
+    start_ns: u64,
+    /// How long it was paused.
+    idle_ns: u64,
+    next_status_ns: u64,
+}
+
+impl Node {
+    /// Takes the name and publishes the scene; the run has not begun.
+    pub(crate) fn new(endpoint: &Endpoint, scene: Scene, options: Options) -> anyhow::Result<Self> {
+        let solver = Solver::new(&scene);
+        let publisher = Publisher::new(endpoint, &scene, &solver, options.every)?;
+        let now_ns = monotonic_ns();
+        Ok(Self {
+            options,
+            publisher,
+            inbox: Inbox::default(),
+            arrived: Vec::new(),
+            progress: Progress { is_paused: options.starts_paused, steps_due: 0 },
+            pace: Pace::new(scene.solver.rate_hz, now_ns),
+            statistics: Statistics::new(now_ns)?,
+            step: 0,
+            start_ns: now_ns,
+            idle_ns: 0,
+            next_status_ns: now_ns,
+            scene,
+            solver,
+        })
+    }
+
+    /// Runs until the last step or until asked to stop. `observer` is called once a second.
+    pub(crate) fn run(&mut self, stop: &Stop, observer: impl Fn(&Self)) -> anyhow::Result<()> {
+        self.start_ns = monotonic_ns();
+        self.pace.restart(self.start_ns);
+        self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
+        self.observe(&observer)?;
+        while !stop.is_asked() && !self.is_done() {
+            let wake_late_ns = self.wait();
+            if stop.is_asked() {
+                break;
+            }
+            self.apply_commands();
+            if self.progress.is_stepping() {
+                self.make_step(wake_late_ns)?;
+            } else {
+                self.publisher.publish_between(&self.solver, self.position())?;
+            }
+            self.observe(&observer)?;
+        }
+        Ok(())
+    }
+
+    fn is_done(&self) -> bool {
+        self.options.steps.is_some_and(|steps| self.step >= steps)
+    }
+
+    /// Waits for the deadline of the next step, or, paused, a little; returns how late it is.
+    fn wait(&mut self) -> u64 {
+        if !self.progress.is_stepping() {
+            let before_ns = monotonic_ns();
+            sleep_until(before_ns + PAUSED_POLL_NS.min(self.pace.period_ns()));
+            let now_ns = monotonic_ns();
+            self.idle_ns += now_ns - before_ns;
+            self.pace.restart(now_ns);
+            return 0;
+        }
+        if !self.options.waits_for_time {
+            return 0;
+        }
+        sleep_until(self.pace.deadline_ns());
+        self.pace.meet(monotonic_ns())
+    }
+
+    /// Applies the commands that have arrived, at the boundary before the next step.
+    fn apply_commands(&mut self) {
+        if self.inbox.has_room() {
+            self.publisher.receive_commands(&mut self.arrived);
+            self.inbox.add(self.arrived.drain(..));
+        }
+        for command in self.inbox.take_turn() {
+            // Whoever commanded and then asks for the status finds the effect in it.
+            self.next_status_ns = 0;
+            let action = command.action();
+            let result = apply(command.client_id, action, &mut self.solver, &mut self.progress);
+            self.publisher.add_outcome(self.step + 1, command, result);
+        }
+    }
+
+    fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
+        let before_ns = monotonic_ns();
+        self.solver.step();
+        let solve_ns = monotonic_ns() - before_ns;
+        self.step += 1;
+        self.progress.steps_due = self.progress.steps_due.saturating_sub(1);
+        self.statistics.record(wake_late_ns, solve_ns, self.pace.period_ns());
+        self.statistics.skipped_periods = self.pace.skipped_periods;
+        let times = StepTimes { wake_late_ns, solve_ns };
+        self.publisher.publish_step(&self.solver, self.position(), times)
+    }
+
+    /// Keeps late joiners served, and tells how the node does.
+    fn observe(&mut self, observer: &impl Fn(&Self)) -> anyhow::Result<()> {
+        self.publisher.refresh();
+        let now_ns = monotonic_ns();
+        if self.statistics.turn(now_ns, self.scene.solver.rate_hz) {
+            observer(self);
+        }
+        if now_ns >= self.next_status_ns {
+            self.next_status_ns = now_ns + STATUS_PERIOD_NS;
+            self.publisher.publish_status(&self.status())?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn status(&self) -> sim_contract::NodeStatus {
+        self.publisher.status(&self.scene, &self.solver, self.position(), &self.statistics)
+    }
+
+    /// Simulated time per wall-clock time of the whole run, pauses apart.
+    pub(crate) fn real_time_factor(&self) -> f64 {
+        let run_ns = monotonic_ns() - self.start_ns - self.idle_ns;
+        let simulated_s = self.step as f64 / f64::from(self.scene.solver.rate_hz);
+        simulated_s / (run_ns.max(1) as f64 / SECOND_NS as f64)
+    }
+
+    fn position(&self) -> Position {
+        Position { step: self.step, is_paused: self.progress.is_paused }
+    }
+}

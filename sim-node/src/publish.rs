@@ -1,0 +1,272 @@
+//! From the solver's state to what other processes read.
+
+use anyhow::Context;
+use bytemuck::cast;
+use sim_contract::{
+    CONTRACT_VERSION, Command, ConstraintState, Endpoint, KeyframeHeader, Load, LoadHeader,
+    NodeStatus, Outcome, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
+    Triangle, Wake,
+};
+use sim_solver::{Method, SOLVER_VERSION, Scene, Solver};
+
+use crate::clock::{SECOND_NS, monotonic_ns};
+use crate::statistics::Statistics;
+
+/// How long a step took and how late it began.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct StepTimes {
+    pub(crate) wake_late_ns: u64,
+    pub(crate) solve_ns: u64,
+}
+
+/// Where the run stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Position {
+    pub(crate) step: u64,
+    pub(crate) is_paused: bool,
+}
+
+/// Writes snapshots, keyframes, outcomes and status.
+#[derive(Debug)]
+pub(crate) struct Publisher {
+    owner: Owner,
+    run_id: u64,
+    rate_hz: u32,
+    /// Every how many steps a snapshot is published.
+    every: u64,
+    /// Header of the newest published snapshot.
+    last: SnapshotHeader,
+    /// A keyframe is to go with the next snapshot.
+    is_keyframe_due: bool,
+    keyframe_step: u64,
+    keyframe_readers: usize,
+    /// Outcomes of the boundary that is waiting, not yet published.
+    outcomes: Vec<Outcome>,
+    outcome_count: u64,
+    rejected_count: u64,
+}
+
+impl Publisher {
+    /// Takes the name and publishes the scene.
+    pub(crate) fn new(
+        endpoint: &Endpoint,
+        scene: &Scene,
+        solver: &Solver,
+        every: u64,
+    ) -> anyhow::Result<Self> {
+        let run_id = getrandom::u64().context("no random number for the run")?;
+        let constraints: Vec<_> = solver.constraints().map(to_state).collect();
+        let triangles: Vec<_> =
+            solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
+        let text = scene.to_toml();
+        let load = Load {
+            header: load_header(scene, solver, run_id),
+            scene: text.as_bytes(),
+            constraints: &constraints,
+            triangles: &triangles,
+            keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
+        };
+        Ok(Self {
+            owner: Owner::create(endpoint, &load)?,
+            run_id,
+            rate_hz: scene.solver.rate_hz,
+            every,
+            last: SnapshotHeader::default(),
+            is_keyframe_due: true,
+            keyframe_step: 0,
+            keyframe_readers: 0,
+            outcomes: Vec::new(),
+            outcome_count: 0,
+            rejected_count: 0,
+        })
+    }
+
+    /// Appends the commands that have arrived.
+    pub(crate) fn receive_commands(&self, commands: &mut Vec<Command>) {
+        self.owner.receive_commands(commands);
+    }
+
+    /// Logs what became of a command at the boundary before `step`.
+    pub(crate) fn add_outcome(&mut self, step: u64, command: Command, result: Result<(), Reason>) {
+        self.outcomes.push(Outcome::new(self.outcome_count, step, command, result));
+        self.outcome_count += 1;
+        self.rejected_count += u64::from(result.is_err());
+        let is_move = matches!(command.action(), sim_contract::Action::Move { .. });
+        self.is_keyframe_due |= result.is_ok() && !is_move;
+    }
+
+    /// Publishes what belongs to a step, the particles last, and wakes the readers.
+    pub(crate) fn publish_step(
+        &mut self,
+        solver: &Solver,
+        position: Position,
+        times: StepTimes,
+    ) -> anyhow::Result<()> {
+        if !position.step.is_multiple_of(self.every) {
+            return self.publish_outcomes();
+        }
+        self.watch_keyframe_readers();
+        self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
+        if self.is_keyframe_due {
+            self.publish_keyframe(solver, position)?;
+        }
+        self.publish_outcomes()?;
+        self.last = self.header(solver, position, times);
+        let particle = |index| cast::<_, ParticleState>(solver.particle(index));
+        self.owner.publish_particles(&self.last, particle)?;
+        self.owner.wake(Wake::Frame);
+        Ok(())
+    }
+
+    /// Publishes what can be published while the node waits: outcomes, and a keyframe of the last
+    /// snapshot for a reader that has joined since. Once a command has touched the state that
+    /// waits, there is no keyframe of that snapshot any more, and the reader gets the next one.
+    pub(crate) fn publish_between(
+        &mut self,
+        solver: &Solver,
+        position: Position,
+    ) -> anyhow::Result<()> {
+        self.watch_keyframe_readers();
+        let is_untouched =
+            self.last.step == position.step && self.last.outcome_count == self.outcome_count;
+        if self.is_keyframe_due && is_untouched {
+            self.publish_keyframe(solver, position)?;
+            self.owner.wake(Wake::Frame);
+        }
+        self.publish_outcomes()
+    }
+
+    fn publish_outcomes(&mut self) -> anyhow::Result<()> {
+        if self.outcomes.is_empty() {
+            return Ok(());
+        }
+        for outcome in self.outcomes.drain(..) {
+            self.owner.publish_outcome(&outcome)?;
+        }
+        self.owner.wake(Wake::Outcome);
+        Ok(())
+    }
+
+    fn watch_keyframe_readers(&mut self) {
+        let readers = self.owner.keyframe_reader_count();
+        self.is_keyframe_due |= readers > self.keyframe_readers;
+        self.keyframe_readers = readers;
+    }
+
+    fn publish_keyframe(&mut self, solver: &Solver, position: Position) -> anyhow::Result<()> {
+        let mut keyframe = solver.keyframe();
+        keyframe.paused = position.is_paused;
+        let bytes = keyframe.encode();
+        let header = KeyframeHeader {
+            run_id: self.run_id,
+            step: position.step,
+            size_bytes: bytes.len() as u64,
+        };
+        self.owner.publish_keyframe(header, &bytes)?;
+        self.is_keyframe_due = false;
+        self.keyframe_step = position.step;
+        Ok(())
+    }
+
+    fn header(&self, solver: &Solver, position: Position, times: StepTimes) -> SnapshotHeader {
+        SnapshotHeader {
+            contract_version: CONTRACT_VERSION,
+            solver_version: SOLVER_VERSION,
+            run_id: self.run_id,
+            step: position.step,
+            scene_step: solver.scene_step(),
+            keyframe_step: self.keyframe_step,
+            sim_time_ns: time_of_step_ns(position.step, self.rate_hz),
+            publish_monotonic_ns: monotonic_ns(),
+            state_hash: solver.state_hash(),
+            outcome_count: self.outcome_count,
+            wake_late_ns: times.wake_late_ns,
+            solve_ns: times.solve_ns,
+            topology_revision: 0,
+            torn_count: count(solver.torn().len()),
+            particle_count: count(solver.particle_count()),
+            flags: if position.is_paused { SnapshotFlags::PAUSED } else { 0 },
+        }
+    }
+
+    /// Lets late joiners have what is written seldom.
+    pub(crate) fn refresh(&self) {
+        self.owner.refresh();
+    }
+
+    pub(crate) fn publish_status(&self, status: &NodeStatus) -> anyhow::Result<()> {
+        self.owner.publish_status(status)?;
+        self.owner.wake(Wake::Status);
+        Ok(())
+    }
+
+    /// How the node does.
+    pub(crate) fn status(
+        &self,
+        scene: &Scene,
+        solver: &Solver,
+        position: Position,
+        statistics: &Statistics,
+    ) -> NodeStatus {
+        let last = &statistics.last;
+        let mut status = NodeStatus {
+            contract_version: CONTRACT_VERSION,
+            solver_version: SOLVER_VERSION,
+            run_id: self.run_id,
+            step: position.step,
+            real_time_factor: if position.is_paused { 0.0 } else { statistics.real_time_factor },
+            wake_late_ns_p50: last.wake_late_ns(0.5),
+            wake_late_ns_p99: last.wake_late_ns(0.99),
+            solve_ns_p50: last.solve_ns(0.5),
+            solve_ns_p99: last.solve_ns(0.99),
+            late_steps: statistics.late_steps,
+            skipped_periods: statistics.skipped_periods,
+            outcome_count: self.outcome_count,
+            rejected_count: self.rejected_count,
+            rate_hz: self.rate_hz,
+            particle_count: count(solver.particle_count()),
+            constraint_count: count(solver.constraint_count()),
+            reader_count: count(self.owner.reader_count()),
+            process_id: std::process::id(),
+            flags: if position.is_paused { StatusFlags::PAUSED } else { 0 },
+            ..NodeStatus::default()
+        };
+        status.set_scene_name(&scene.name);
+        status
+    }
+}
+
+fn to_state(constraint: sim_solver::Constraint) -> ConstraintState {
+    ConstraintState {
+        a: constraint.a,
+        b: constraint.b,
+        rest_length: constraint.rest_length,
+        compliance: constraint.compliance,
+        kind: constraint.kind as u32,
+    }
+}
+
+fn load_header(scene: &Scene, solver: &Solver, run_id: u64) -> LoadHeader {
+    LoadHeader {
+        run_id,
+        origin: scene.origin,
+        particle_count: count(solver.particle_count()),
+        rate_hz: scene.solver.rate_hz,
+        method: match scene.solver.method {
+            Method::Xpbd => 0,
+            Method::Pbd => 1,
+        },
+        ..LoadHeader::default()
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 of anything")]
+fn count(length: usize) -> u32 {
+    length as u32
+}
+
+/// step / rate in nanoseconds, rounded down; whole seconds apart, so that nothing overflows.
+fn time_of_step_ns(step: u64, rate_hz: u32) -> u64 {
+    let rate_hz = u64::from(rate_hz);
+    step / rate_hz * SECOND_NS + step % rate_hz * SECOND_NS / rate_hz
+}

@@ -1,0 +1,141 @@
+//! `run`: the node with its messages for the user.
+
+use std::io::{IsTerminal, Write, stderr};
+use std::time::Duration;
+
+use anyhow::anyhow;
+use serde::Serialize;
+use sim_contract::Endpoint;
+use sim_solver::Scene;
+
+use crate::args::RunArgs;
+use crate::node::{Node, Options};
+use crate::scene_source;
+use crate::stop::Stop;
+
+/// What is said at the end of a run.
+#[derive(Debug, Serialize)]
+struct Summary {
+    scene: String,
+    rate_hz: u32,
+    steps: u64,
+    real_time_factor: f64,
+    late_steps: u64,
+    skipped_periods: u64,
+    rejected_commands: u64,
+    wake_late_ns_p50: u64,
+    wake_late_ns_p99: u64,
+    solve_ns_p50: u64,
+    solve_ns_p99: u64,
+    state_hash: String,
+}
+
+/// Runs a scene.
+pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
+    let mut scene = scene_source::load(&args.scene)?;
+    scene.override_solver(args.rate, args.substeps).map_err(|problem| anyhow!("--{problem}"))?;
+    let endpoint = Endpoint::new(args.endpoint.domain.as_deref(), &args.endpoint.name)?;
+    let options = Options {
+        steps: args.steps.or(args.duration.map(|time| steps_in(time, scene.solver.rate_hz))),
+        starts_paused: args.paused,
+        waits_for_time: !args.as_fast_as_possible,
+        every: args.every,
+    };
+    warn(&scene);
+    let stop = Stop::install()?;
+    let mut node = Node::new(&endpoint, scene, options)?;
+    say_ready(&endpoint, &node);
+    let is_terminal = stderr().is_terminal();
+    let shows_status = is_terminal && !args.json;
+    let result = node.run(&stop, |node| {
+        if shows_status {
+            show_status(node);
+        }
+    });
+    let summary = Summary::new(&node);
+    // The ports go before the summary is written: who reads it may start the next node.
+    drop(node);
+    result?;
+    summary.print(args.json, shows_status)
+}
+
+/// Steps in a simulated time, rounded up.
+fn steps_in(time: Duration, rate_hz: u32) -> u64 {
+    let steps = (time.as_nanos() * u128::from(rate_hz)).div_ceil(1_000_000_000);
+    u64::try_from(steps).unwrap_or(u64::MAX)
+}
+
+#[allow(clippy::print_stderr, reason = "messages to the user")]
+fn warn(scene: &Scene) {
+    for warning in scene.warnings() {
+        eprintln!("warning: {warning}");
+    }
+}
+
+#[allow(clippy::print_stderr, reason = "messages to the user")]
+fn say_ready(endpoint: &Endpoint, node: &Node) {
+    let settings = &node.scene.solver;
+    eprintln!(
+        "ready: {endpoint}: scene {}, {} particles, {} constraints, {} Hz x {} substeps",
+        node.scene.name,
+        node.solver.particle_count(),
+        node.solver.constraint_count(),
+        settings.rate_hz,
+        settings.substeps,
+    );
+}
+
+/// One line on the terminal, over the one before.
+fn show_status(node: &Node) {
+    let status = node.status();
+    let micros = |ns: u64| ns as f64 / 1000.0;
+    // A status line that cannot be shown is not worth ending a simulation for.
+    let _unshown = write!(
+        stderr(),
+        "\r\x1b[Kstep {} {} x{:.3} real time | step time p50 {:.1} us p99 {:.1} us | {} late | {} readers",
+        status.step,
+        if status.is_paused() { "paused" } else { "at" },
+        status.real_time_factor,
+        micros(status.solve_ns_p50),
+        micros(status.solve_ns_p99),
+        status.late_steps,
+        status.reader_count,
+    );
+}
+
+impl Summary {
+    fn new(node: &Node) -> Self {
+        let (status, run) = (node.status(), &node.statistics.run);
+        Self {
+            scene: node.scene.name.clone(),
+            rate_hz: node.scene.solver.rate_hz,
+            steps: node.step,
+            real_time_factor: node.real_time_factor(),
+            late_steps: status.late_steps,
+            skipped_periods: status.skipped_periods,
+            rejected_commands: status.rejected_count,
+            wake_late_ns_p50: run.wake_late_ns(0.5),
+            wake_late_ns_p99: run.wake_late_ns(0.99),
+            solve_ns_p50: run.solve_ns(0.5),
+            solve_ns_p99: run.solve_ns(0.99),
+            state_hash: format!("{:016x}", node.solver.state_hash()),
+        }
+    }
+
+    #[allow(clippy::print_stdout, reason = "the result of the command")]
+    #[allow(clippy::print_stderr, reason = "messages to the user")]
+    fn print(&self, as_json: bool, is_after_status: bool) -> anyhow::Result<()> {
+        if as_json {
+            println!("{}", serde_json::to_string(self)?);
+            return Ok(());
+        }
+        if is_after_status {
+            eprintln!();
+        }
+        eprintln!(
+            "done: {} steps, x{:.3} real time, {} late, state hash {}",
+            self.steps, self.real_time_factor, self.late_steps, self.state_hash
+        );
+        Ok(())
+    }
+}
