@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
+use sim_contract::{Endpoint, EndpointError};
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
@@ -51,6 +52,11 @@ pub(crate) struct EndpointArgs {
     /// Domain that keeps services apart from others on this host [default: that of iceoryx2]
     #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN")]
     pub(crate) domain: Option<String>,
+}
+
+/// The node of that name; an empty domain is the default one.
+pub(crate) fn endpoint(domain: Option<&str>, name: &str) -> Result<Endpoint, EndpointError> {
+    Endpoint::new(domain.filter(|domain| !domain.is_empty()), name)
 }
 
 #[derive(Debug, ClapArgs)]

@@ -2,15 +2,13 @@
 
 use anyhow::{Context, bail};
 use serde::Serialize;
-use sim_contract::{
-    Action, CONSOLE_CLIENT_ID, Client, Endpoint, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome,
-};
+use sim_contract::{Action, CONSOLE_CLIENT_ID, Client, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome};
 
-use crate::args::{CtlArgs, CtlVerb, TargetArgs};
+use crate::args::{CtlArgs, CtlVerb, TargetArgs, endpoint};
 
 /// Sends one command, or asks one question.
 pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<()> {
-    let endpoint = Endpoint::new(args.domain.as_deref(), &args.name)?;
+    let endpoint = endpoint(args.domain.as_deref(), &args.name)?;
     let mut client = Client::attach_as(&endpoint, CONSOLE_CLIENT_ID)?;
     match args.verb {
         CtlVerb::Pin { particle } => command(&mut client, args, Action::Pin { particle }),

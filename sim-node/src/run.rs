@@ -8,7 +8,7 @@ use serde::Serialize;
 use sim_contract::Endpoint;
 use sim_solver::Scene;
 
-use crate::args::RunArgs;
+use crate::args::{RunArgs, endpoint};
 use crate::node::{Node, Options};
 use crate::scene_source;
 use crate::stop::Stop;
@@ -34,7 +34,7 @@ struct Summary {
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     let mut scene = scene_source::load(&args.scene)?;
     scene.override_solver(args.rate, args.substeps).map_err(|problem| anyhow!("--{problem}"))?;
-    let endpoint = Endpoint::new(args.endpoint.domain.as_deref(), &args.endpoint.name)?;
+    let endpoint = endpoint(args.endpoint.domain.as_deref(), &args.endpoint.name)?;
     let options = Options {
         steps: args.steps.or(args.duration.map(|time| steps_in(time, scene.solver.rate_hz))),
         starts_paused: args.paused,

@@ -1,0 +1,65 @@
+//! What separates one domain from another: the prefix and the directory of iceoryx2's files.
+
+use std::path::PathBuf;
+
+use iceoryx2::prelude::{Config, FileName, Path, SemanticString, SemanticStringError};
+
+/// Longest directory and prefix together, in bytes. A listener binds the Unix socket
+/// `<directory>/<prefix><id>.event`: at most 107 bytes, of which an id takes up to 39.
+const DIRECTORY_AND_PREFIX_MAX: usize = 60;
+
+/// The iceoryx2 configuration of a domain; `None` is iceoryx2's own.
+///
+/// Both the prefix and the directory differ: shared memory is told apart by the prefix, nodes and
+/// services by the directory.
+pub(crate) fn configuration(domain: Option<&str>) -> Result<Config, SemanticStringError> {
+    let Some(domain) = domain else {
+        return Ok(Config::global_config().clone());
+    };
+    let mut config = Config::default();
+    config.global.prefix = FileName::new(prefix(domain).as_bytes())?;
+    let directory = directory(domain);
+    config.global.set_root_path(&Path::new(directory.as_os_str().as_encoded_bytes())?);
+    Ok(config)
+}
+
+/// What the names of the domain's files in `/dev/shm` begin with.
+pub(crate) fn prefix(domain: &str) -> String {
+    format!("{domain}_")
+}
+
+/// The directory of the domain's other files: of this user only, and short enough for a socket.
+pub(crate) fn directory(domain: &str) -> PathBuf {
+    let user = rustix::process::getuid().as_raw();
+    let readable = format!("/tmp/catenary-{user}-{domain}");
+    if readable.len() + prefix(domain).len() <= DIRECTORY_AND_PREFIX_MAX {
+        PathBuf::from(readable)
+    } else {
+        PathBuf::from(format!("/tmp/catenary-{user}-{:08x}", fnv1a(domain)))
+    }
+}
+
+/// FNV-1a, 32 bits: the same in every program and version, unlike the hash of the standard library.
+fn fnv1a(text: &str) -> u32 {
+    text.bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directory_and_prefix_of_the_longest_domain_fit_a_socket_path() {
+        let domain = "abcdefghijklmnopqrstuvwx";
+        let length = directory(domain).as_os_str().len() + prefix(domain).len();
+        assert!(length <= DIRECTORY_AND_PREFIX_MAX, "{length}");
+        assert_ne!(directory(domain), directory("abcdefghijklmnopqrstuvwy"));
+    }
+
+    #[test]
+    fn two_domains_share_neither_prefix_nor_directory() {
+        let configurations = ["a", "b"].map(|domain| configuration(Some(domain)).unwrap().global);
+        assert_ne!(configurations[0].prefix, configurations[1].prefix);
+        assert_ne!(configurations[0].root_path(), configurations[1].root_path());
+    }
+}

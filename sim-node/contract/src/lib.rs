@@ -1,0 +1,65 @@
+//! The messages, services and client API shared by `sim-node` and every process beside it.
+//!
+//! A node publishes each state as one [`SnapshotHeader`] and a slice of [`ParticleState`] in
+//! shared memory; any process reads it without a copy and sends [`Action`]s back. Sending is not
+//! delivery: only the [`Outcome`] proves that a command took effect, and at which step.
+//!
+//! ```no_run
+//! use std::time::Duration;
+//! use sim_contract::{Action, Client, Endpoint};
+//!
+//! let mut client = Client::attach(&Endpoint::default())?;
+//! if let Some(snapshot) = client.next_snapshot(Duration::from_secs(1))? {
+//!     println!("step {} of {} particles", snapshot.header().step, snapshot.particles().len());
+//! }
+//! let outcome = client.request(Action::Pin { particle: 3 }, Duration::from_secs(1))?;
+//! println!("pinned at step {}", outcome.step);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! There is no solver here, and no iceoryx2 outside of this crate.
+#![forbid(unsafe_code)]
+
+mod client;
+mod clock;
+mod command;
+mod domain;
+mod endpoint;
+mod limits;
+mod outcome;
+mod owner;
+mod plain_number;
+mod ports;
+mod reader;
+mod request;
+mod service;
+mod services;
+mod session;
+mod snapshot;
+mod status;
+mod tap;
+pub mod testing;
+mod topology;
+mod wake;
+mod watch;
+mod writer;
+
+pub use client::{Client, Snapshot, Surface, Topology};
+pub use command::{Action, CONSOLE_CLIENT_ID, Command, GRAB_OVER_S_DEFAULT};
+pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
+pub use limits::*;
+pub use outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus, Reason};
+pub use owner::{Load, Owner, OwnerError};
+pub use plain_number::PlainF32;
+pub use reader::ReadError;
+pub use request::{OwnerSeen, RequestError};
+pub use service::ServiceError;
+pub use services::AttachError;
+pub use snapshot::{ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader};
+pub use status::{NodeStatus, StatusFlags};
+pub use tap::{Tap, Update};
+pub use topology::{
+    ConstraintKind, ConstraintState, KeyframeHeader, LoadHeader, TearsHeader, Triangle,
+};
+pub use wake::Wake;
+pub use writer::PublishError;

@@ -1,0 +1,112 @@
+//! Numbers in JSON that may be non-finite: "nan", "inf" and "-inf" stand where a number stands.
+
+use std::fmt;
+
+use serde::de::{self, Deserializer, Visitor};
+use serde::{Deserialize, Serialize, Serializer};
+
+/// An f32 that survives JSON bit for bit (any NaN becomes the one NaN).
+///
+/// A finite value is written with the fewest digits that read back as the same f32, a non-finite
+/// one as the string "nan", "inf" or "-inf".
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlainF32(pub f32);
+
+impl Serialize for PlainF32 {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let value = self.0;
+        if value.is_nan() {
+            return serializer.serialize_str("nan");
+        }
+        if value.is_infinite() {
+            return serializer.serialize_str(if value > 0.0 { "inf" } else { "-inf" });
+        }
+        // Readers parse to f64 and round to f32 after it. Where that double rounding would miss,
+        // the exact f64 is written instead of the shortest f32.
+        let exact = f64::from(value);
+        let is_shortest_safe = value.to_string().parse::<f64>().is_ok_and(|read| same(read, value));
+        if is_shortest_safe {
+            serializer.serialize_f32(value)
+        } else {
+            serializer.serialize_f64(exact)
+        }
+    }
+}
+
+fn same(read: f64, value: f32) -> bool {
+    to_f32(read).to_bits() == value.to_bits()
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "this is the one rounding to f32")]
+fn to_f32(value: f64) -> f32 {
+    value as f32
+}
+
+impl<'de> Deserialize<'de> for PlainF32 {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(PlainVisitor)
+    }
+}
+
+struct PlainVisitor;
+
+impl Visitor<'_> for PlainVisitor {
+    type Value = PlainF32;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a number, \"nan\", \"inf\" or \"-inf\"")
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<PlainF32, E> {
+        Ok(PlainF32(to_f32(value)))
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<PlainF32, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<PlainF32, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<PlainF32, E> {
+        match text {
+            "nan" => Ok(PlainF32(f32::NAN)),
+            "inf" => Ok(PlainF32(f32::INFINITY)),
+            "-inf" => Ok(PlainF32(f32::NEG_INFINITY)),
+            _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+        }
+    }
+}
+
+/// `#[serde(with = "number")]` for an f32 field.
+pub(crate) mod number {
+    use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer};
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    pub(crate) fn serialize<S: Serializer>(value: &f32, serializer: S) -> Result<S::Ok, S::Error> {
+        PlainF32(*value).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+        PlainF32::deserialize(deserializer).map(|number| number.0)
+    }
+}
+
+/// `#[serde(with = "vector")]` for a field of three f32.
+pub(crate) mod vector {
+    use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer};
+
+    pub(crate) fn serialize<S: Serializer>(
+        value: &[f32; 3],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.map(PlainF32).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<[f32; 3], D::Error> {
+        <[PlainF32; 3]>::deserialize(deserializer).map(|numbers| numbers.map(|number| number.0))
+    }
+}

@@ -1,0 +1,92 @@
+//! What a node publishes after every step.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// One particle after a step: 32 bytes, alignment 4; `particles` is `particle_count` of them.
+/// Written by the node (or a replay), read by everyone.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.ParticleState")]
+pub struct ParticleState {
+    /// Position relative to the scene's origin, in the scene's unit (m).
+    pub position: [f32; 3],
+    /// 1/mass in 1/kg as the step used it: 0 for pinned, grabbed, anchored and frozen particles.
+    pub inverse_mass: f32,
+    /// Velocity in m/s; 0 for pinned and frozen particles.
+    pub velocity: [f32; 3],
+    /// [`ParticleFlags`] bits.
+    pub flags: u32,
+}
+
+const _: () = assert!(size_of::<ParticleState>() == 32 && align_of::<ParticleState>() == 4);
+
+/// The bits of [`ParticleState::flags`]; all others are 0.
+#[derive(Debug)]
+pub struct ParticleFlags;
+
+impl ParticleFlags {
+    /// Held where it stands.
+    pub const PINNED: u32 = 1;
+    /// Driven to a client's target.
+    pub const GRABBED: u32 = 1 << 1;
+    /// Driven by an anchor's motion.
+    pub const ANCHORED: u32 = 1 << 2;
+    /// Taken out of the simulation because its state was no longer finite.
+    pub const FROZEN: u32 = 1 << 3;
+}
+
+/// The header of each `particles` sample: 104 bytes, alignment 8. The snapshot and the keyframe of
+/// one step are together the complete state of the solver after that step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.SnapshotHeader")]
+pub struct SnapshotHeader {
+    /// [`crate::CONTRACT_VERSION`] of the writer.
+    pub contract_version: u32,
+    /// Version of the solver's arithmetic: it changes with any change of bits.
+    pub solver_version: u32,
+    /// Random number of this run of the node, or of this pass of a replay.
+    pub run_id: u64,
+    /// The step that this is the state after; 0 is the scene as loaded. Never goes back or jumps
+    /// within a run, though a reader may miss some.
+    pub step: u64,
+    /// Steps since the scene was last loaded, reset or restored.
+    pub scene_step: u64,
+    /// Step of the newest published keyframe.
+    pub keyframe_step: u64,
+    /// step / rate in nanoseconds, rounded down.
+    pub sim_time_ns: u64,
+    /// `CLOCK_MONOTONIC` at publication, in nanoseconds.
+    pub publish_monotonic_ns: u64,
+    /// XXH3-64 over the payload; its seed is 0 while nothing is torn, else the XXH3-64 of the torn
+    /// indices, ascending, as little-endian u32.
+    pub state_hash: u64,
+    /// Outcomes issued in this run so far: those with an index below it are part of this state.
+    pub outcome_count: u64,
+    /// How late the step began after its deadline, in nanoseconds.
+    pub wake_late_ns: u64,
+    /// How long the solver took for this step, in nanoseconds.
+    pub solve_ns: u64,
+    /// Counts the loads of a scene in this run; topology, surface and scene carry the same.
+    pub topology_revision: u32,
+    /// Constraints torn since the load.
+    pub torn_count: u32,
+    /// Length of the payload.
+    pub particle_count: u32,
+    /// [`SnapshotFlags`] bits.
+    pub flags: u32,
+}
+
+const _: () = assert!(size_of::<SnapshotHeader>() == 104 && align_of::<SnapshotHeader>() == 8);
+
+/// The bits of [`SnapshotHeader::flags`]; all others are 0.
+#[derive(Debug)]
+pub struct SnapshotFlags;
+
+impl SnapshotFlags {
+    /// The node was paused when it made this step (on a `step` or `reset` command).
+    pub const PAUSED: u32 = 1;
+    /// A recording is being played; this is not a live node.
+    pub const REPLAY: u32 = 1 << 1;
+}

@@ -1,0 +1,165 @@
+//! Commands reach the owner, and outcomes their sender. Where both sides have to act, the owner
+//! does so in the test's thread until the client's thread has ended.
+
+use std::thread;
+
+use sim_contract::testing::TestDomain;
+use sim_contract::{
+    Action, COMMANDS_BUFFERED, CONSOLE_CLIENT_ID, Client, Endpoint, Outcome, Owner, OwnerSeen,
+    RequestError,
+};
+
+use crate::support::{DEADLINE, MOMENT, answer_commands, create_owner, publish_step};
+
+const PIN: Action = Action::Pin { particle: 3 };
+const RELEASE: Action = Action::Release { particle: 3 };
+
+/// Runs `client` beside an owner that answers at step 9 what it is asked.
+fn beside_an_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send + 'static) -> T {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    publish_step(&owner, 8);
+    let endpoint = domain.endpoint();
+    let client = thread::spawn(move || client(endpoint));
+    let mut outcome_count = 0;
+    while !client.is_finished() {
+        answer_commands(&owner, 9, &mut outcome_count);
+        thread::yield_now();
+    }
+    client.join().unwrap()
+}
+
+fn received(owner: &Owner) -> Vec<(u64, u64, Action)> {
+    let mut commands = Vec::new();
+    owner.receive_commands(&mut commands);
+    commands.iter().map(|command| (command.client_id, command.sequence, command.action())).collect()
+}
+
+#[test]
+fn a_request_returns_the_outcome_applied_or_rejected() {
+    let outcomes = beside_an_owner(|endpoint| {
+        let mut client = Client::attach(&endpoint).unwrap();
+        assert!((1..1 << 53).contains(&client.client_id()));
+        [PIN, RELEASE].map(|action| client.request(action, DEADLINE).unwrap())
+    });
+    let [pin, release] = outcomes;
+    assert!(pin.is_applied() && !release.is_applied());
+    assert_eq!((pin.step, pin.command.sequence, pin.command.action()), (9, 1, PIN));
+    assert_eq!((release.command.sequence, release.reason_name()), (2, "not_grabbed"));
+}
+
+#[test]
+fn outcomes_come_in_order_and_only_to_their_sender() {
+    beside_an_owner(|endpoint| {
+        let mut other = Client::attach(&endpoint).unwrap();
+        let mut client = Client::attach_as(&endpoint, 5).unwrap();
+        for _ in 0..3 {
+            other.send(RELEASE).unwrap();
+            client.send(PIN).unwrap();
+        }
+        // The answer to a later command does not lose those of earlier ones.
+        assert_eq!(client.request(PIN, DEADLINE).unwrap().command.sequence, 4);
+        let mut next = || client.next_outcome(DEADLINE).unwrap().unwrap();
+        let sequences = [next(), next(), next()].map(|outcome: Outcome| {
+            assert_eq!(outcome.command.client_id, 5);
+            outcome.command.sequence
+        });
+        assert_eq!(sequences, [1, 2, 3]);
+        assert!(client.next_outcome(MOMENT).unwrap().is_none());
+    });
+}
+
+#[test]
+fn processes_that_share_the_console_are_told_apart_by_ascending_numbers() {
+    beside_an_owner(|endpoint| {
+        let mut consoles =
+            [(); 2].map(|()| Client::attach_as(&endpoint, CONSOLE_CLIENT_ID).unwrap());
+        let mut sequences = Vec::new();
+        for _ in 0..3 {
+            for console in &mut consoles {
+                sequences.push(console.request(PIN, DEADLINE).unwrap().command.sequence);
+            }
+        }
+        assert!(sequences.is_sorted_by(|a, b| a < b), "{sequences:?}");
+        assert!(sequences.iter().all(|sequence| (1 << 50..1 << 53).contains(sequence)));
+        assert!(consoles[0].next_outcome(MOMENT).unwrap().is_none());
+    });
+}
+
+#[test]
+fn a_command_that_nobody_takes_times_out_and_says_that_no_node_answers() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    let error = client.request(PIN, MOMENT).unwrap_err();
+    let (name, process) = (domain.name(), std::process::id());
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "command 1 has no outcome after at most 20ms: no node answers, although process {process} \
+             runs as 'sim' in domain '{name}' (is it stopped, or overloaded?)"
+        )
+    );
+    drop(owner);
+    let error = client.request(PIN, MOMENT).unwrap_err();
+    let RequestError::NobodyListens { owner: OwnerSeen::Gone { .. } } = &error else {
+        panic!("{error}");
+    };
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "the command was not sent: no node answers, none runs as 'sim' in domain '{name}' any \
+             more (start one with `sim-node run --domain {name}`)"
+        )
+    );
+}
+
+#[test]
+fn a_command_that_cannot_be_queued_is_an_error_and_those_before_it_are_kept() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach_as(&domain.endpoint(), 5).unwrap();
+    for _ in 0..COMMANDS_BUFFERED {
+        client.send(PIN).unwrap();
+    }
+    let error = client.send(RELEASE).unwrap_err();
+    assert!(matches!(error, RequestError::QueueFull { owner: OwnerSeen::Alive { .. } }), "{error}");
+    let commands = received(&owner);
+    let expected: Vec<_> = (1..=COMMANDS_BUFFERED as u64).map(|number| (5, number, PIN)).collect();
+    assert_eq!(commands, expected);
+    assert_eq!(client.send(RELEASE).unwrap(), 257);
+    assert_eq!(received(&owner), [(5, 257, RELEASE)]);
+}
+
+#[test]
+fn dropping_a_client_waits_until_its_commands_are_answered() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let endpoint = domain.endpoint();
+    let sender = thread::spawn(move || {
+        Client::attach_as(&endpoint, 5).unwrap().send(PIN).unwrap();
+    });
+    // The client is gone after this; if it did not wait, its command would be too.
+    let mut commands = Vec::new();
+    while commands.is_empty() && !sender.is_finished() {
+        commands = received(&owner);
+        thread::yield_now();
+    }
+    sender.join().unwrap();
+    assert_eq!(commands, [(5, 1, PIN)]);
+}
+
+#[test]
+fn a_client_that_commands_takes_no_place_among_the_readers_and_the_other_way_round() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    publish_step(&owner, 0);
+    let mut commander = Client::attach(&domain.endpoint()).unwrap();
+    commander.send(PIN).unwrap();
+    assert_eq!(owner.reader_count(), 0);
+    // More watchers than there are places for clients that command, one after another.
+    let mut watcher = Client::attach(&domain.endpoint()).unwrap();
+    assert!(watcher.next_snapshot(MOMENT).unwrap().is_none());
+    assert_eq!(owner.reader_count(), 1);
+    assert!(watcher.next_outcome(MOMENT).unwrap().is_none());
+}

@@ -1,0 +1,100 @@
+//! Who comes late is told at once what is latched. The owner acts in the test's own thread and
+//! only before or beside the reader, so what the reader gets was there when it came.
+
+use std::thread;
+
+use sim_contract::testing::TestDomain;
+use sim_contract::{Client, Tap, Update};
+
+use crate::support::{
+    DEADLINE, MOMENT, PARTICLE_COUNT, SCENE, constraints, create_owner, particle,
+    publish_everything, publish_step, triangles,
+};
+
+#[test]
+fn a_late_joiner_gets_topology_surface_scene_and_the_last_snapshot() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    publish_everything(&owner, 0);
+    publish_everything(&owner, 1);
+
+    let endpoint = domain.endpoint();
+    let reader = thread::spawn(move || {
+        let mut client = Client::attach(&endpoint).unwrap();
+        let topology = client.topology(DEADLINE).unwrap().unwrap();
+        assert_eq!(topology.constraints, constraints());
+        assert_eq!(topology.header.count, 3);
+        let surface = client.surface(DEADLINE).unwrap().unwrap();
+        assert_eq!(surface.triangles, triangles());
+        assert_eq!(surface.header.particle_count, PARTICLE_COUNT);
+        assert_eq!(client.scene(DEADLINE).unwrap().unwrap(), SCENE);
+        assert_eq!(client.status(DEADLINE).unwrap().unwrap().step, 1);
+        let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
+        assert_eq!(snapshot.header().step, 1);
+        assert_eq!(snapshot.particles().len(), PARTICLE_COUNT as usize);
+        assert_eq!(snapshot.particles()[3], particle(1, 3));
+        // What was latched can be asked for again; a snapshot is read once.
+        assert_eq!(client.topology(MOMENT).unwrap().unwrap(), topology);
+        assert!(client.next_snapshot(MOMENT).unwrap().is_none());
+    });
+    // A paused node: it publishes nothing, but looks after its readers.
+    while !reader.is_finished() {
+        owner.refresh();
+        thread::yield_now();
+    }
+    reader.join().unwrap();
+}
+
+#[test]
+fn a_tap_that_comes_late_gets_every_kind_of_message() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    publish_everything(&owner, 5);
+
+    let mut tap = Tap::attach(&domain.endpoint()).unwrap();
+    assert_eq!((owner.reader_count(), owner.keyframe_reader_count()), (1, 1));
+    owner.refresh();
+    tap.wait(DEADLINE);
+    let mut steps = Vec::new();
+    let count = tap
+        .drain_particles(|header, particles| {
+            assert_eq!(particles[2], particle(header.step, 2));
+            steps.push(header.step);
+        })
+        .unwrap();
+    assert_eq!((count, steps), (1, vec![5]));
+
+    let mut kinds = Vec::new();
+    let count = tap
+        .drain_updates(|update| {
+            kinds.push(match update {
+                Update::Scene(_, text) if text == SCENE.as_bytes() => "scene",
+                Update::Topology(_, all) if all == constraints() => "topology",
+                Update::Surface(_, all) if all == triangles() => "surface",
+                Update::Tears(header, [2]) if header.count == 1 => "tears",
+                Update::Keyframe(header, b"keyframe") if header.size_bytes == 8 => "keyframe",
+                Update::Status(status) if status.step == 5 => "status",
+                update => panic!("{update:?}"),
+            });
+        })
+        .unwrap();
+    assert_eq!(kinds, ["scene", "topology", "surface", "tears", "keyframe", "status"]);
+    assert_eq!(count, kinds.len());
+}
+
+#[test]
+fn a_reader_that_falls_behind_gets_the_newest_and_knows_what_it_missed() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    publish_step(&owner, 0);
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    // Takes its place; the owner notices it with the next step.
+    assert!(client.next_snapshot(MOMENT).unwrap().is_none());
+    for step in 1..=200 {
+        publish_step(&owner, step);
+    }
+    let oldest = client.next_snapshot(MOMENT).unwrap().unwrap().header().step;
+    assert_eq!(oldest, 201 - sim_contract::SNAPSHOTS_BUFFERED as u64);
+    assert_eq!(client.latest_snapshot(MOMENT).unwrap().unwrap().header().step, 200);
+    assert!(client.latest_snapshot(MOMENT).unwrap().is_none());
+}

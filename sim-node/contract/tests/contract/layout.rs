@@ -1,0 +1,145 @@
+//! Freezes what other programs and languages build on: sizes, alignments, offsets and type names
+//! of everything in shared memory, the limits, the service names and the event ids, as one text.
+//! A change of it is a change of the contract's version.
+
+use std::fmt::Write as _;
+use std::mem::offset_of;
+
+use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
+use sim_contract::{
+    Command, ConstraintState, KeyframeHeader, LoadHeader, NodeStatus, Outcome, ParticleState,
+    SnapshotHeader, TearsHeader, Triangle, Wake,
+};
+
+macro_rules! layout {
+    ($text:ident, $type:ident { $($field:ident),+ $(,)? }) => {{
+        // Names every field: one that is added and not listed here does not compile.
+        let $type { $($field: _),+ } = $type::default();
+        writeln!(
+            $text,
+            "{} size {} alignment {}",
+            TypeDetail::new::<$type>(TypeVariant::FixedSize).type_name(),
+            size_of::<$type>(),
+            align_of::<$type>(),
+        )
+        .unwrap();
+        $(writeln!($text, "  {:>3} {}", offset_of!($type, $field), stringify!($field)).unwrap();)+
+    }};
+}
+
+macro_rules! constants {
+    ($text:ident, $($name:ident),+ $(,)?) => {
+        $(writeln!($text, "{} = {}", stringify!($name), sim_contract::$name).unwrap();)+
+    };
+}
+
+#[test]
+fn the_layout_of_shared_memory_is_frozen() {
+    let mut text = String::new();
+    layout!(text, ParticleState { position, inverse_mass, velocity, flags });
+    layout!(
+        text,
+        SnapshotHeader {
+            contract_version,
+            solver_version,
+            run_id,
+            step,
+            scene_step,
+            keyframe_step,
+            sim_time_ns,
+            publish_monotonic_ns,
+            state_hash,
+            outcome_count,
+            wake_late_ns,
+            solve_ns,
+            topology_revision,
+            torn_count,
+            particle_count,
+            flags,
+        }
+    );
+    layout!(text, ConstraintState { a, b, rest_length, compliance, kind });
+    layout!(text, Triangle { corners });
+    layout!(
+        text,
+        LoadHeader {
+            run_id,
+            step,
+            origin,
+            topology_revision,
+            count,
+            particle_count,
+            rate_hz,
+            method,
+            spare,
+        }
+    );
+    layout!(text, TearsHeader { run_id, step, new_count, count });
+    layout!(text, KeyframeHeader { run_id, step, size_bytes });
+    layout!(text, Command { kind, particle, client_id, sequence, target, over_s, count, spare });
+    layout!(text, Outcome { index, step, status, reason, flags, spare, command });
+    layout!(
+        text,
+        NodeStatus {
+            contract_version,
+            solver_version,
+            run_id,
+            step,
+            real_time_factor,
+            wake_late_ns_p50,
+            wake_late_ns_p99,
+            solve_ns_p50,
+            solve_ns_p99,
+            late_steps,
+            skipped_periods,
+            outcome_count,
+            rejected_count,
+            rate_hz,
+            particle_count,
+            constraint_count,
+            reader_count,
+            process_id,
+            flags,
+            scene_name,
+            spare,
+        }
+    );
+    insta::assert_snapshot!("layout", text);
+}
+
+#[test]
+fn the_limits_are_frozen() {
+    let mut text = String::new();
+    constants!(
+        text,
+        CONTRACT_VERSION,
+        ELEMENTS_MAX,
+        SCENE_SIZE_BYTES_MAX,
+        COMMANDS_PER_STEP_MAX,
+        OWNER_PUBLISHERS_MAX,
+        READERS_MAX,
+        BORROWED_SAMPLES_MAX,
+        SNAPSHOTS_BUFFERED,
+        UPDATES_BUFFERED,
+        OUTCOMES_BUFFERED,
+        CLIENTS_MAX,
+        COMMANDS_BUFFERED,
+        OUTCOME_READERS_MAX,
+        COMMAND_READERS_MAX,
+        STATUS_PUBLISHERS_MAX,
+        LISTENERS_MAX,
+        PARTICIPANTS_MAX,
+    );
+    insta::assert_snapshot!("limits", text);
+}
+
+#[test]
+fn the_event_ids_are_frozen() {
+    let events =
+        [Wake::Frame, Wake::Load, Wake::Tears, Wake::Outcome, Wake::Status, Wake::OwnerGone];
+    let mut text = String::new();
+    for event in events {
+        writeln!(text, "{} {event:?}", event as u32).unwrap();
+    }
+    insta::assert_snapshot!("events", text);
+}

@@ -1,0 +1,9 @@
+//! What programs may rely on when they use the crate: each file says what it proves and how.
+#![allow(clippy::unwrap_used, reason = "an error fails the test, in its helpers as well")]
+
+mod commands;
+mod late_joiner;
+mod layout;
+mod ownership;
+mod readers;
+mod support;

@@ -1,0 +1,96 @@
+//! A small scene, and an owner of it that acts step by step as a node would.
+
+use std::time::Duration;
+
+use sim_contract::{
+    CONTRACT_VERSION, ConstraintState, Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus,
+    Outcome, Owner, OwnerError, ParticleState, Reason, SnapshotHeader, TearsHeader, Triangle, Wake,
+};
+
+/// Longer than anything here takes; tests wait for what happens, not for this.
+pub(crate) const DEADLINE: Duration = Duration::from_secs(10);
+/// Long enough for an answer that is there already, short where none will come.
+pub(crate) const MOMENT: Duration = Duration::from_millis(20);
+
+pub(crate) const RUN_ID: u64 = 77;
+pub(crate) const PARTICLE_COUNT: u32 = 4;
+pub(crate) const SCENE: &str = "version = 1 # gemütlich";
+
+pub(crate) fn load_header() -> LoadHeader {
+    LoadHeader {
+        run_id: RUN_ID,
+        particle_count: PARTICLE_COUNT,
+        rate_hz: 240,
+        topology_revision: 1,
+        ..LoadHeader::default()
+    }
+}
+
+pub(crate) fn constraints() -> Vec<ConstraintState> {
+    let joins = |a: u32| ConstraintState { a, b: a + 1, rest_length: 0.1, ..Default::default() };
+    (0..PARTICLE_COUNT - 1).map(joins).collect()
+}
+
+pub(crate) fn triangles() -> Vec<Triangle> {
+    vec![Triangle { corners: [0, 1, 2] }, Triangle { corners: [1, 2, 3] }]
+}
+
+pub(crate) fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
+    let load = Load {
+        header: load_header(),
+        scene: SCENE.as_bytes(),
+        constraints: &constraints(),
+        triangles: &triangles(),
+        keyframe_size_bytes_max: 16,
+    };
+    Owner::create(endpoint, &load)
+}
+
+pub(crate) fn snapshot_header(step: u64) -> SnapshotHeader {
+    SnapshotHeader {
+        contract_version: CONTRACT_VERSION,
+        run_id: RUN_ID,
+        step,
+        particle_count: PARTICLE_COUNT,
+        ..SnapshotHeader::default()
+    }
+}
+
+/// The particle `index` of the state after `step`.
+#[allow(clippy::cast_possible_truncation, reason = "steps and indices of tests are small")]
+pub(crate) fn particle(step: u64, index: usize) -> ParticleState {
+    ParticleState { position: [step as f32, index as f32, 0.5], ..ParticleState::default() }
+}
+
+pub(crate) fn publish_step(owner: &Owner, step: u64) {
+    let header = snapshot_header(step);
+    owner.publish_particles(&header, |index| particle(step, index)).unwrap();
+    owner.wake(Wake::Frame);
+    owner.refresh();
+}
+
+/// Publishes everything that has a message of its own, with the particles of `step` last.
+pub(crate) fn publish_everything(owner: &Owner, step: u64) {
+    let tears = TearsHeader { run_id: RUN_ID, step, new_count: 1, count: 0 };
+    owner.publish_tears(tears, &[2]).unwrap();
+    let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0 };
+    owner.publish_keyframe(keyframe, b"keyframe").unwrap();
+    owner.publish_status(&NodeStatus { step, ..NodeStatus::default() }).unwrap();
+    publish_step(owner, step);
+}
+
+/// Answers the commands that have come: `pin` is applied at `step`, everything else is rejected.
+pub(crate) fn answer_commands(owner: &Owner, step: u64, outcome_count: &mut u64) {
+    let mut commands = Vec::new();
+    owner.receive_commands(&mut commands);
+    for command in commands {
+        let result = match command.action() {
+            sim_contract::Action::Pin { .. } => Ok(()),
+            _ => Err(Reason::NotGrabbed),
+        };
+        owner.publish_outcome(&Outcome::new(*outcome_count, step, command, result)).unwrap();
+        *outcome_count += 1;
+        owner.wake(Wake::Outcome);
+    }
+    owner.refresh();
+}

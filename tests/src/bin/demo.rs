@@ -1,0 +1,65 @@
+//! `cargo demo`: a node and a recorder as processes, until Ctrl-C; then what was recorded.
+//!
+//! Drag the curtain from another terminal meanwhile: `cargo run --release -- ctl grab 90 0.5 0.2 0.3`.
+#![forbid(unsafe_code)]
+#![allow(clippy::print_stderr, clippy::print_stdout, reason = "it talks to the user")]
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use anyhow::{Context, bail};
+use integration_tests::{Process, Program};
+use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint};
+
+/// How long the demo waits for news before it looks for Ctrl-C again.
+const POLL: Duration = Duration::from_millis(200);
+
+fn main() -> anyhow::Result<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&stop))?;
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    let domain = std::env::var(DOMAIN_VARIABLE).unwrap_or_default();
+    let file = std::env::temp_dir().join(format!("catenary-demo-{}.mcap", seconds_since_1970()));
+    let file = file.to_str().context("the temporary folder's path is not UTF-8")?;
+
+    let mut node = Process::start_in(Program::SimNode, &domain, &["run", "curtain"]);
+    node.wait_for_stderr("ready");
+    let mut recorder = Process::start_in(Program::Recorder, &domain, &["record", "-o", file]);
+    recorder.wait_for_stderr("ready");
+    eprintln!("the curtain hangs, and everything is recorded; Ctrl-C ends the demo");
+    eprintln!("drag it:  cargo run --release -- ctl grab 90 0.5 0.2 0.3");
+
+    watch(&stop, &mut node, &domain)?;
+    let recorded = recorder.interrupt();
+    let ended = node.interrupt();
+    eprint!("{}{}", recorded.stderr, ended.stderr);
+    if recorded.code != Some(0) {
+        bail!("the recorder failed");
+    }
+    println!("{file}");
+    let info = Process::start_in(Program::Recorder, &domain, &["info", file]).wait();
+    print!("{}", info.stdout);
+    Ok(())
+}
+
+/// Shows how the node does until Ctrl-C, or until it ends by itself.
+fn watch(stop: &AtomicBool, node: &mut Process, domain: &str) -> anyhow::Result<()> {
+    let domain = Some(domain).filter(|domain| !domain.is_empty());
+    let endpoint = Endpoint::new(domain, sim_contract::NAME_DEFAULT)?;
+    let mut client = Client::attach(&endpoint)?;
+    while !stop.load(Ordering::Relaxed) && node.is_running() {
+        if let Some(status) = client.status(POLL)? {
+            eprint!("\rstep {:>8}  x{:.3} real time ", status.step, status.real_time_factor);
+        }
+    }
+    eprintln!();
+    Ok(())
+}
+
+#[allow(clippy::disallowed_methods, reason = "a name for the file, no time of the simulation")]
+fn seconds_since_1970() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs())
+}

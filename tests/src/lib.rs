@@ -1,0 +1,15 @@
+//! The harness: it builds the programs once, starts them as processes in a domain of their own,
+//! waits for conditions with a deadline, and leaves nothing behind.
+#![forbid(unsafe_code)]
+#![allow(clippy::expect_used, clippy::panic, reason = "a panic is how a test fails")]
+
+mod process;
+mod programs;
+mod sandbox;
+mod wait;
+
+pub use process::{Finished, Process};
+pub use programs::Program;
+pub use rustix::process::Signal;
+pub use sandbox::Sandbox;
+pub use wait::{DEADLINE, wait_for};

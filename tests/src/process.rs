@@ -1,0 +1,223 @@
+//! A child process that cannot outlive its test.
+
+use std::fmt;
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use rustix::process::{Pid, Signal, kill_process};
+use sim_contract::DOMAIN_VARIABLE;
+
+use crate::{Program, Sandbox, wait_for};
+
+/// A running program. Dropping it kills it, and prints what it wrote if the test is failing.
+pub struct Process {
+    title: String,
+    child: Child,
+    stdout: Captured,
+    stderr: Captured,
+}
+
+/// What a program wrote until it ended.
+#[derive(Debug, Clone)]
+pub struct Finished {
+    /// Exit code; `None` after a signal.
+    pub code: Option<i32>,
+    /// Everything on stdout.
+    pub stdout: String,
+    /// Everything on stderr.
+    pub stderr: String,
+}
+
+impl fmt::Debug for Process {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("Process").field("title", &self.title).finish_non_exhaustive()
+    }
+}
+
+impl Process {
+    /// Starts a program in a domain.
+    ///
+    /// # Panics
+    /// If it does not start.
+    pub fn start(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
+        Self::spawn(program, sandbox.domain(), args)
+    }
+
+    /// Starts a program in the domain of that name; "" is the default one.
+    ///
+    /// # Panics
+    /// If it does not start.
+    pub fn start_in(program: Program, domain: &str, args: &[&str]) -> Self {
+        Self::spawn(program, domain, args)
+    }
+
+    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
+    fn spawn(program: Program, domain: &str, args: &[&str]) -> Self {
+        let mut command = Command::new(program.path());
+        // Away from the terminal: Ctrl-C reaches only the program that started it, which ends it
+        // in good order.
+        command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let title = format!("{program:?} {}", args.join(" "));
+        let mut child = command.spawn().unwrap_or_else(|error| panic!("{title}: {error}"));
+        let stdout = Captured::new(child.stdout.take().expect("a piped stdout"));
+        let stderr = Captured::new(child.stderr.take().expect("a piped stderr"));
+        Self { title, child, stdout, stderr }
+    }
+
+    /// Starts a program and waits for its line `ready ...`.
+    ///
+    /// # Panics
+    /// If it ends before, or the deadline passes.
+    pub fn start_ready(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
+        let mut process = Self::start(program, sandbox, args);
+        process.wait_for_stderr("ready");
+        process
+    }
+
+    /// Runs a program to its end.
+    ///
+    /// # Panics
+    /// If it does not end before the deadline.
+    pub fn run(program: Program, sandbox: &Sandbox, args: &[&str]) -> Finished {
+        Self::start(program, sandbox, args).wait()
+    }
+
+    /// Waits until its stderr has a text.
+    ///
+    /// # Panics
+    /// If it ends before, or the deadline passes.
+    pub fn wait_for_stderr(&mut self, text: &str) {
+        let what = format!("\"{text}\" from {}", self.title);
+        wait_for(&what, || {
+            if self.stderr.text().contains(text) {
+                return Some(());
+            }
+            let ended = self.child.try_wait().expect("a child");
+            // It may have written the text just before it ended.
+            assert!(
+                ended.is_none() || {
+                    self.stderr.join();
+                    self.stderr.text().contains(text)
+                },
+                "{} ended before it wrote \"{text}\"",
+                self.title
+            );
+            None
+        });
+    }
+
+    /// Sends a signal.
+    ///
+    /// # Panics
+    /// If the process is gone.
+    pub fn signal(&self, signal: Signal) {
+        let pid = Pid::from_child(&self.child);
+        kill_process(pid, signal).unwrap_or_else(|error| panic!("{}: {error}", self.title));
+    }
+
+    /// Asks it to end as Ctrl-C does, and waits.
+    ///
+    /// # Panics
+    /// If it does not end before the deadline.
+    pub fn interrupt(self) -> Finished {
+        self.signal(Signal::INT);
+        self.wait()
+    }
+
+    /// Waits for its end.
+    ///
+    /// # Panics
+    /// If it does not end before the deadline.
+    pub fn wait(mut self) -> Finished {
+        let status: ExitStatus = wait_for(&format!("the end of {}", self.title), || {
+            self.child.try_wait().expect("a child")
+        });
+        self.stdout.join();
+        self.stderr.join();
+        Finished { code: status.code(), stdout: self.stdout.text(), stderr: self.stderr.text() }
+    }
+
+    /// Whether it still runs.
+    ///
+    /// # Panics
+    /// Never in practice: a child can always be asked.
+    pub fn is_running(&mut self) -> bool {
+        self.child.try_wait().expect("a child").is_none()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // An error means that it has ended already.
+        let _ended = self.child.kill();
+        let _ended = self.child.wait();
+        if std::thread::panicking() {
+            self.stdout.join();
+            self.stderr.join();
+            show_failure(&self.title, &self.stdout.text(), &self.stderr.text());
+        }
+    }
+}
+
+#[allow(clippy::print_stderr, reason = "what a failing test shows")]
+fn show_failure(title: &str, stdout: &str, stderr: &str) {
+    eprintln!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---");
+}
+
+impl Finished {
+    /// The stdout of a program that must have ended well.
+    ///
+    /// # Panics
+    /// If it did not.
+    pub fn success(self) -> String {
+        assert_eq!(self.code, Some(0), "stdout: {}\nstderr: {}", self.stdout, self.stderr);
+        self.stdout
+    }
+
+    /// The JSON object on the stdout of a program that must have ended well.
+    ///
+    /// # Panics
+    /// If it did not, or that is not JSON.
+    pub fn json(self) -> serde_json::Value {
+        let text = self.success();
+        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error} in {text}"))
+    }
+}
+
+/// One output of a child, read by a thread so that the child never waits for us.
+struct Captured {
+    text: Arc<Mutex<String>>,
+    reader: Option<JoinHandle<()>>,
+}
+
+impl Captured {
+    fn new(output: impl Read + Send + 'static) -> Self {
+        let text = Arc::new(Mutex::new(String::new()));
+        let shared = Arc::clone(&text);
+        let reader = std::thread::spawn(move || {
+            let mut lines = BufReader::new(output);
+            let mut line = Vec::new();
+            while lines.read_until(b'\n', &mut line).is_ok_and(|length| length > 0) {
+                let mut text = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                text.push_str(&String::from_utf8_lossy(&line));
+                line.clear();
+            }
+        });
+        Self { text, reader: Some(reader) }
+    }
+
+    fn text(&self) -> String {
+        self.text.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Waits for the end of the output.
+    fn join(&mut self) {
+        if let Some(reader) = self.reader.take() {
+            let _panicked = reader.join();
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! A domain for one test, with a scratch folder, which leaves no file behind.
+
+use std::fs;
+use std::path::PathBuf;
+
+use sim_contract::Endpoint;
+use sim_contract::testing::TestDomain;
+
+/// A domain that no other test uses, and a folder for its files. Both go when it is dropped.
+#[derive(Debug)]
+pub struct Sandbox {
+    domain: TestDomain,
+    folder: PathBuf,
+}
+
+impl Default for Sandbox {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Sandbox {
+    /// A fresh domain and an empty folder.
+    ///
+    /// # Panics
+    /// If there is no room for the folder.
+    pub fn new() -> Self {
+        let domain = TestDomain::new();
+        let folder = std::env::temp_dir().join(format!("catenary-{}", domain.name()));
+        fs::create_dir_all(&folder).expect("a scratch folder");
+        Self { domain, folder }
+    }
+
+    /// The name of the domain, for `--domain`.
+    pub fn domain(&self) -> &str {
+        self.domain.name()
+    }
+
+    /// The endpoint of a node with the default name.
+    pub fn endpoint(&self) -> Endpoint {
+        self.domain.endpoint()
+    }
+
+    /// A path in the folder, as text for command lines.
+    ///
+    /// # Panics
+    /// If the temporary folder's path is not UTF-8.
+    pub fn path(&self, file: &str) -> String {
+        self.folder.join(file).to_str().expect("a path in UTF-8").to_owned()
+    }
+
+    /// Writes a file into the folder and returns its path.
+    ///
+    /// # Panics
+    /// If it cannot be written.
+    pub fn write(&self, file: &str, content: &str) -> String {
+        let path = self.path(file);
+        fs::write(&path, content).expect("a scratch file");
+        path
+    }
+}
+
+impl Drop for Sandbox {
+    fn drop(&mut self) {
+        // A folder that cannot be removed fails no test.
+        let _left = fs::remove_dir_all(&self.folder);
+    }
+}

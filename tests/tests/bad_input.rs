@@ -1,0 +1,80 @@
+//! Bad input of the node: each is refused with an exit code, the place and the cure.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use integration_tests::{Finished, Process, Program, Sandbox};
+
+fn run(sandbox: &Sandbox, args: &[&str]) -> Finished {
+    Process::run(Program::SimNode, sandbox, args)
+}
+
+/// Exit code, and words that stderr must have.
+fn assert_refused(finished: &Finished, code: i32, words: &[&str]) {
+    assert_eq!(finished.code, Some(code), "{}", finished.stderr);
+    assert_eq!(finished.stdout, "");
+    for word in words {
+        assert!(finished.stderr.contains(word), "no \"{word}\" in: {}", finished.stderr);
+    }
+}
+
+#[test]
+fn unknown_scenes_and_files_are_named_with_what_there_is() {
+    let sandbox = Sandbox::new();
+    assert_refused(&run(&sandbox, &["run", "courtain"]), 1, &["'courtain'", "curtain, rope"]);
+    assert_refused(&run(&sandbox, &["check", "./none.toml"]), 1, &["./none.toml", "No such file"]);
+    let folder = sandbox.path("");
+    assert_refused(&run(&sandbox, &["run", &folder]), 1, &[&folder]);
+}
+
+#[test]
+fn a_wrong_scene_file_is_named_with_line_field_and_cure_before_anything_runs() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.write("wrong.toml", "version = 1\n[solver]\nrate_hz = 0\n");
+    for verb in ["run", "check", "show"] {
+        let finished = run(&sandbox, &[verb, &file]);
+        assert_refused(&finished, 1, &[]);
+        let expected =
+            format!("error: {file}:3: solver.rate_hz: 0 is out of range (allowed: 1 to 100000)\n");
+        assert_eq!(finished.stderr, expected);
+    }
+}
+
+#[test]
+fn wrong_options_exit_with_2_and_wrong_rates_name_the_range() {
+    let sandbox = Sandbox::new();
+    for args in
+        [&["run", "--speed", "3"][..], &["run", "--every", "0"], &["ctl", "grab", "90"], &["ctl"]]
+    {
+        assert_eq!(run(&sandbox, args).code, Some(2), "{args:?}");
+    }
+    assert_refused(&run(&sandbox, &["run", "--rate", "0"]), 1, &["--rate", "1 to 100000"]);
+    assert_refused(&run(&sandbox, &["run", "--substeps", "0"]), 1, &["--substeps", "1 to 1000"]);
+    assert_refused(&run(&sandbox, &["run", "--name", "a/b"]), 1, &["a/b"]);
+    assert_refused(&run(&sandbox, &["run", "--domain", "Big Domain"]), 1, &["Big Domain"]);
+}
+
+#[test]
+fn a_missing_node_is_named_with_its_domain_and_how_to_start_it() {
+    let sandbox = Sandbox::new();
+    for args in [&["ctl", "status"][..], &["ctl", "pin", "3"], &["ctl", "hash"]] {
+        let finished = run(&sandbox, args);
+        assert_refused(&finished, 1, &["sim/status", sandbox.domain(), "sim-node run"]);
+    }
+}
+
+#[test]
+fn scenes_lists_and_show_prints_what_check_accepts() {
+    let sandbox = Sandbox::new();
+    let listed = run(&sandbox, &["scenes", "--json"]).json();
+    let curtain = listed.as_array().unwrap().iter().find(|one| one["name"] == "curtain").unwrap();
+    assert_eq!((&curtain["particles"], &curtain["constraints"]), (&168.into(), &596.into()));
+    assert_eq!(curtain["pins"], 14);
+    assert!(!curtain["text"].as_str().unwrap().is_empty());
+    for name in listed.as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()) {
+        let shown = run(&sandbox, &["show", name]).success();
+        let file = sandbox.write("shown.toml", &shown);
+        let checked = run(&sandbox, &["check", "--json", &file]).json();
+        assert_eq!(checked["name"], name);
+        assert_eq!(checked["warnings"].as_array().unwrap().len(), 0);
+        assert_eq!(run(&sandbox, &["show", &file]).success(), shown);
+    }
+}

@@ -1,0 +1,42 @@
+//! The contract's examples do what their first lines say, against a running node.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use integration_tests::{Process, Program, Sandbox};
+
+#[test]
+fn watch_prints_as_many_snapshots_as_asked() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let printed = Process::run(Program::Watch, &sandbox, &["25"]).success();
+    let steps = printed.lines().map(|line| {
+        assert!(line.contains(": 168 particles, lowest "), "{line}");
+        line.split([' ', ':']).nth(1).unwrap().parse::<u64>().unwrap()
+    });
+    let steps: Vec<_> = steps.collect();
+    assert_eq!(steps.len(), 25);
+    assert!(steps.is_sorted_by(|one, next| one < next), "{steps:?}");
+}
+
+#[test]
+fn drag_moves_a_particle_and_lets_it_go() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let printed = Process::run(Program::Drag, &sandbox, &["90"]).success();
+    assert!(printed.starts_with("released at step "), "{printed}");
+    let status = Process::run(Program::SimNode, &sandbox, &["ctl", "status", "--json"]).json();
+    // A grab, 120 moves and a release, all applied.
+    assert_eq!(
+        (status["outcomes"].as_u64(), status["rejected_commands"].as_u64()),
+        (Some(122), Some(0))
+    );
+}
+
+#[test]
+fn both_examples_stay_short() {
+    for source in [
+        include_str!("../../sim-node/contract/examples/watch.rs"),
+        include_str!("../../sim-node/contract/examples/drag.rs"),
+    ] {
+        assert!(source.lines().count() <= 50);
+    }
+}

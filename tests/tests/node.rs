@@ -1,0 +1,252 @@
+//! The node as other processes see it: late joiners, commands, pauses, a second node, stubborn
+//! readers, many short-lived clients.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::time::Duration;
+
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal};
+use serde_json::Value;
+use sim_contract::{Action, Client, ParticleFlags, Snapshot};
+
+fn ctl(sandbox: &Sandbox, args: &[&str]) -> Value {
+    let args: Vec<_> = ["ctl", "--json"].iter().chain(args).copied().collect();
+    Process::run(Program::SimNode, sandbox, &args).json()
+}
+
+fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
+    Process::start_ready(Program::SimNode, sandbox, args)
+}
+
+fn attach(sandbox: &Sandbox) -> Client {
+    Client::attach(&sandbox.endpoint()).unwrap()
+}
+
+/// The first snapshot of that step or a later one.
+fn snapshot_of(client: &mut Client, step: u64) -> Snapshot {
+    loop {
+        let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
+        if snapshot.header().step >= step {
+            return snapshot;
+        }
+    }
+}
+
+#[test]
+fn a_late_joiner_gets_the_scene_and_the_last_snapshot_at_once() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    ctl(&sandbox, &["step", "7"]);
+    // The node stands still: all of this was published before this reader came.
+    let mut client = attach(&sandbox);
+    let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
+    assert_eq!((snapshot.header().step, snapshot.particles().len()), (7, 168));
+    assert_eq!(client.topology(DEADLINE).unwrap().unwrap().constraints.len(), 596);
+    assert_eq!(client.surface(DEADLINE).unwrap().unwrap().triangles.len(), 286);
+    assert!(client.scene(DEADLINE).unwrap().unwrap().contains("curtain"));
+}
+
+#[test]
+fn a_drag_by_one_process_moves_the_particle_that_another_one_reads() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain"]);
+    let mut reader = attach(&sandbox);
+    let outcome = ctl(&sandbox, &["grab", "90", "0.5", "-0.2", "0.3", "--over", "0.1"]);
+    assert_eq!(outcome["status"], "applied");
+    let step = outcome["step"].as_u64().unwrap();
+    // 0.1 s are 24 steps of 240 Hz, the first of them the one that the outcome names.
+    let before = snapshot_of(&mut reader, step + 22).particles()[90];
+    assert_ne!(before.position, [0.5, -0.2, 0.3]);
+    let there = snapshot_of(&mut reader, step + 23);
+    assert_eq!(there.particles()[90].position, [0.5, -0.2, 0.3]);
+    assert_eq!(there.particles()[90].flags, ParticleFlags::GRABBED);
+    // A third process of the same console lets go.
+    assert_eq!(ctl(&sandbox, &["release", "90"])["status"], "applied");
+}
+
+#[test]
+fn a_paused_node_makes_exactly_the_steps_it_is_told() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    assert_eq!(ctl(&sandbox, &["hash"])["step"], 0);
+    assert_eq!(ctl(&sandbox, &["step", "13"])["step"], 1);
+    assert_eq!(ctl(&sandbox, &["hash"])["step"], 13);
+    assert_eq!(ctl(&sandbox, &["step"])["step"], 14);
+    assert_eq!(ctl(&sandbox, &["status"])["step"], 14);
+    // A reset makes the one step that shows it.
+    assert_eq!(ctl(&sandbox, &["reset"])["step"], 15);
+    let mut client = attach(&sandbox);
+    let header = *snapshot_of(&mut client, 15).header();
+    assert_eq!((header.step, header.scene_step), (15, 0));
+    assert!(client.next_snapshot(Duration::from_millis(200)).unwrap().is_none());
+    assert_eq!(ctl(&sandbox, &["resume"])["status"], "applied");
+    snapshot_of(&mut client, 20);
+}
+
+#[test]
+fn commands_of_a_paused_node_are_answered_with_the_step_that_will_show_them() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    for index in 0..3 {
+        let outcome = ctl(&sandbox, &["pin", "100"]);
+        assert_eq!((outcome["step"].as_u64(), outcome["index"].as_u64()), (Some(1), Some(index)));
+    }
+    ctl(&sandbox, &["step"]);
+    let snapshot = snapshot_of(&mut attach(&sandbox), 1);
+    assert_eq!(snapshot.particles()[100].flags, ParticleFlags::PINNED);
+    assert_eq!(snapshot.header().outcome_count, 4);
+}
+
+#[test]
+fn rejected_commands_name_their_reason_and_change_no_bit() {
+    let run = |commands: &[&[&str]]| {
+        let sandbox = Sandbox::new();
+        let node = node(&sandbox, &["run", "curtain", "--paused", "--steps", "50", "--json"]);
+        for command in commands {
+            assert_eq!(ctl(&sandbox, command)["status"], "rejected", "{command:?}");
+        }
+        ctl(&sandbox, &["step", "50"]);
+        node.wait().json()["state_hash"].clone()
+    };
+    let rejected: &[&[&str]] = &[
+        &["grab", "90", "nan", "0", "0"],
+        &["grab", "90", "0", "inf", "0"],
+        &["grab", "90", "0", "0", "2e7"],
+        &["grab", "168", "0", "0", "0"],
+        &["pin", "4000000000"],
+        &["move", "90", "0", "0", "0"],
+        &["release", "90"],
+        &["step", "0"],
+    ];
+    assert_eq!(run(rejected), run(&[]));
+}
+
+#[test]
+fn a_second_node_of_a_name_is_refused_with_the_process_of_the_first() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain"]);
+    let process_id = ctl(&sandbox, &["status"])["process_id"].to_string();
+    let second = Process::run(Program::SimNode, &sandbox, &["run", "rope"]);
+    assert_eq!(second.code, Some(1));
+    assert!(second.stderr.contains("running already"), "{}", second.stderr);
+    assert!(second.stderr.contains(&process_id), "{}", second.stderr);
+    // Beside it, under another name, it runs.
+    let _other = node(&sandbox, &["run", "rope", "--name", "other"]);
+    assert_eq!(ctl(&sandbox, &["status", "--name", "other"])["scene"], "rope");
+    assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain");
+}
+
+#[test]
+fn a_killed_node_is_replaced_and_its_readers_go_on() {
+    let sandbox = Sandbox::new();
+    let first = node(&sandbox, &["run", "curtain"]);
+    let mut client = attach(&sandbox);
+    let run_id = snapshot_of(&mut client, 1).header().run_id;
+    first.signal(Signal::KILL);
+    assert_eq!(first.wait().code, None);
+    let _second = node(&sandbox, &["run", "curtain"]);
+    integration_tests::wait_for("a snapshot of the second run", || {
+        let snapshot = client.next_snapshot(Duration::from_millis(100)).unwrap()?;
+        (snapshot.header().run_id != run_id).then_some(())
+    });
+}
+
+#[test]
+fn readers_that_hold_their_samples_and_stand_still_do_not_change_or_stop_the_node() {
+    let run = |with_reader: bool| {
+        let sandbox = Sandbox::new();
+        let args =
+            ["run", "curtain", "--paused", "--steps", "5000", "--as-fast-as-possible", "--json"];
+        let node = node(&sandbox, &args);
+        let readers: Vec<_> = (0..if with_reader { 2 } else { 0 })
+            .map(|_| Process::start_ready(Program::StubbornReader, &sandbox, &[]))
+            .collect();
+        for reader in &readers {
+            reader.signal(Signal::STOP);
+        }
+        ctl(&sandbox, &["resume"]);
+        node.wait().json()
+    };
+    let (alone, watched) = (run(false), run(true));
+    assert_eq!(alone["steps"], 5000);
+    assert_eq!(watched["state_hash"], alone["state_hash"]);
+}
+
+/// 200 processes that each pin another particle and end; each must have its outcome and its pin.
+fn pin_by_200_processes(rate: &str) {
+    let sandbox = Sandbox::new();
+    let cloth = "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 20\nrows = 20\nspacing = 0.1\npinned = \"none\"\n";
+    let scene = sandbox.write("cloth.toml", cloth);
+    let _node = node(&sandbox, &["run", &scene, "--rate", rate]);
+    let mut last_step = 0;
+    let mut indices = Vec::new();
+    let particles: Vec<String> = (100..300).map(|particle: u32| particle.to_string()).collect();
+    for batch in particles.chunks(8) {
+        let start = |particle: &String| {
+            Process::start(Program::SimNode, &sandbox, &["ctl", "--json", "pin", particle])
+        };
+        let processes: Vec<_> = batch.iter().map(start).collect();
+        for process in processes {
+            let outcome = process.wait().json();
+            assert_eq!(outcome["status"], "applied");
+            indices.push(outcome["index"].as_u64().unwrap());
+            last_step = last_step.max(outcome["step"].as_u64().unwrap());
+        }
+    }
+    indices.sort_unstable();
+    assert_eq!(indices, (0..200).collect::<Vec<_>>());
+    let snapshot = snapshot_of(&mut attach(&sandbox), last_step);
+    let pinned = |range: std::ops::Range<usize>| {
+        let flags = snapshot.particles()[range].iter().map(|one| one.flags);
+        flags.filter(|flags| *flags == ParticleFlags::PINNED).count()
+    };
+    assert_eq!((pinned(0..100), pinned(100..300), pinned(300..400)), (0, 200, 0));
+}
+
+#[test]
+fn two_hundred_short_lived_processes_pin_at_1_khz() {
+    pin_by_200_processes("1000");
+}
+
+#[test]
+fn two_hundred_short_lived_processes_pin_at_10_hz() {
+    pin_by_200_processes("10");
+}
+
+#[test]
+fn another_client_cannot_move_what_the_console_holds() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain"]);
+    ctl(&sandbox, &["grab", "90", "0", "0", "0"]);
+    let mut client = attach(&sandbox);
+    let outcome = client.request(Action::Release { particle: 90 }, DEADLINE).unwrap();
+    assert_eq!(outcome.reason_name(), "grabbed_by_other");
+}
+
+#[test]
+fn a_run_ends_by_itself_and_reports_in_json() {
+    let sandbox = Sandbox::new();
+    let args =
+        ["run", "rope", "--rate", "500", "--duration", "0.2s", "--as-fast-as-possible", "--json"];
+    let summary = Process::run(Program::SimNode, &sandbox, &args).json();
+    assert_eq!((summary["steps"].as_u64(), summary["rate_hz"].as_u64()), (Some(100), Some(500)));
+    for key in
+        ["real_time_factor", "late_steps", "solve_ns_p50", "solve_ns_p99", "wake_late_ns_p50"]
+    {
+        assert!(summary[key].is_number(), "{key} in {summary}");
+    }
+    assert_eq!(summary["state_hash"].as_str().unwrap().len(), 16);
+}
+
+#[test]
+fn ctrl_c_and_sigterm_end_a_node_cleanly() {
+    for signal in [Signal::INT, Signal::TERM] {
+        let sandbox = Sandbox::new();
+        let node = node(&sandbox, &["run", "curtain"]);
+        node.signal(signal);
+        let finished = node.wait();
+        assert_eq!(finished.code, Some(0), "{}", finished.stderr);
+        assert!(finished.stderr.contains("done: "), "{}", finished.stderr);
+        let gone = Process::run(Program::SimNode, &sandbox, &["ctl", "status"]);
+        assert_eq!(gone.code, Some(1));
+    }
+}

@@ -1,0 +1,61 @@
+//! The structure of the repository: which crate may know which, and who names which library.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use cargo_metadata::{DependencyKind, MetadataCommand};
+
+/// The allowed arrows: crate -> workspace crates and restricted libraries that it may name.
+const ARROWS: [(&str, &[&str]); 5] = [
+    ("sim-solver", &[]),
+    ("sim-contract", &["iceoryx2"]),
+    ("sim-node", &["sim-contract", "sim-solver"]),
+    ("recorder", &["mcap", "sim-contract", "sim-solver"]),
+    ("integration-tests", &["recorder", "sim-contract"]),
+];
+
+/// Longest source file: more than one concept hides in a longer one.
+const LINES_MAX: usize = 500;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+#[test]
+fn dependencies_between_crates_are_those_of_the_architecture() {
+    let manifest = root().join("Cargo.toml");
+    let metadata = MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap();
+    let watched: BTreeSet<&str> = ARROWS
+        .iter()
+        .flat_map(|(name, arrows)| [*name].into_iter().chain(arrows.iter().copied()))
+        .collect();
+    let mut found = BTreeMap::new();
+    for package in &metadata.packages {
+        let normal = package.dependencies.iter().filter(|one| one.kind == DependencyKind::Normal);
+        let names = normal.map(|one| one.name.as_str()).filter(|name| watched.contains(name));
+        found.insert(package.name.as_str(), names.collect::<BTreeSet<_>>());
+    }
+    let allowed: BTreeMap<_, BTreeSet<_>> =
+        ARROWS.iter().map(|(name, arrows)| (*name, arrows.iter().copied().collect())).collect();
+    assert_eq!(found, allowed);
+}
+
+#[test]
+fn no_source_file_hides_several_concepts() {
+    let mut folders: Vec<_> =
+        ["sim-node", "recorder", "tests"].iter().map(|folder| root().join(folder)).collect();
+    let mut count = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in folder.read_dir().unwrap().map(|entry| entry.unwrap().path()) {
+            if entry.is_dir() {
+                folders.push(entry);
+            } else if entry.extension().is_some_and(|extension| extension == "rs") {
+                let lines = std::fs::read_to_string(&entry).unwrap().lines().count();
+                assert!(lines <= LINES_MAX, "{} has {lines} lines", entry.display());
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 30, "only {count} source files found");
+}
