@@ -17,18 +17,20 @@ pub enum Program {
     Watch,
     /// The contract's example that drags a particle.
     Drag,
+    /// The Python of `.venv`, which `.ci/run` makes.
+    Python,
 }
 
 impl Program {
     /// Its path; builds all programs if this process has not done so yet.
     pub fn path(self) -> PathBuf {
-        let folder = built();
         match self {
-            Self::SimNode => folder.join("sim-node"),
-            Self::Recorder => folder.join("recorder"),
-            Self::StubbornReader => folder.join("stubborn-reader"),
-            Self::Watch => folder.join("examples/watch"),
-            Self::Drag => folder.join("examples/drag"),
+            Self::SimNode => built().join("sim-node"),
+            Self::Recorder => built().join("recorder"),
+            Self::StubbornReader => built().join("stubborn-reader"),
+            Self::Watch => built().join("examples/watch"),
+            Self::Drag => built().join("examples/drag"),
+            Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),
         }
     }
 }

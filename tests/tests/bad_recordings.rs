@@ -1,0 +1,93 @@
+//! Bad input of the recorder: files that are none, nodes that are not there, wrong options.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use integration_tests::{Finished, Process, Program, Sandbox};
+
+fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
+    Process::run(Program::Recorder, sandbox, args)
+}
+
+fn assert_refused(finished: &Finished, words: &[&str]) {
+    assert_eq!(finished.code, Some(1), "{}{}", finished.stdout, finished.stderr);
+    for word in words {
+        assert!(finished.stderr.contains(word), "no \"{word}\" in: {}", finished.stderr);
+    }
+}
+
+#[test]
+fn files_that_are_no_recordings_are_named() {
+    let sandbox = Sandbox::new();
+    let text = sandbox.write("text.mcap", "this is no recording, but long enough to be looked at");
+    let empty = sandbox.write("empty.mcap", "");
+    let missing = sandbox.path("missing.mcap");
+    for verb in ["info", "play", "verify"] {
+        for file in [&text, &empty, &missing] {
+            assert_refused(&recorder(&sandbox, &[verb, file]), &[file]);
+        }
+    }
+}
+
+#[test]
+fn a_truncated_recording_is_read_as_far_as_it_goes_and_said_to_be_truncated() {
+    let sandbox = Sandbox::new();
+    let whole = sandbox.path("whole.mcap");
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "2400", "-o", &whole]).success();
+    let bytes = std::fs::read(&whole).unwrap();
+    let cut = sandbox.path("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() * 6 / 10]).unwrap();
+    for verb in ["info", "verify"] {
+        let finished = recorder(&sandbox, &[verb, &cut]);
+        assert_eq!(finished.code, Some(3), "{verb}: {}{}", finished.stdout, finished.stderr);
+        let said = finished.stdout + &finished.stderr;
+        assert!(said.contains("truncated"), "{verb}: {said}");
+    }
+    let played = recorder(&sandbox, &["play", &cut, "--rate", "50"]);
+    assert_eq!(played.code, Some(3), "{}", played.stderr);
+    assert!(played.stderr.contains("truncated"), "{}", played.stderr);
+}
+
+#[test]
+fn a_missing_node_is_named_with_its_domain_and_how_to_start_it() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let finished = recorder(&sandbox, &["record", "-o", &file]);
+    assert_refused(&finished, &["sim/status", sandbox.domain(), "sim-node run"]);
+    assert!(!std::path::Path::new(&file).exists());
+    assert!(!std::path::Path::new(&format!("{file}.part")).exists());
+}
+
+#[test]
+fn nothing_is_overwritten_unless_told() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.write("run.mcap", "precious");
+    let args = ["simulate", "curtain", "--steps", "3", "-o", &file];
+    assert_refused(&recorder(&sandbox, &args), &["exists", "--overwrite"]);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "precious");
+    let args: Vec<_> = args.into_iter().chain(["--overwrite"]).collect();
+    recorder(&sandbox, &args).success();
+    recorder(&sandbox, &["info", &file]).success();
+}
+
+#[test]
+fn a_wrong_command_file_is_named_with_line_and_field_and_nothing_is_written() {
+    let sandbox = Sandbox::new();
+    let lines = "{\"step\":1,\"kind\":\"reset\"}\n{\"step\":2,\"kind\":\"pin\"}\n";
+    let commands = sandbox.write("bad.jsonl", lines);
+    let file = sandbox.path("out.mcap");
+    let args = ["simulate", "curtain", "--steps", "3", "--commands", &commands, "-o", &file];
+    let finished = recorder(&sandbox, &args);
+    let expected = format!("error: {commands}:2: particle: ");
+    assert_refused(&finished, &[]);
+    assert!(finished.stderr.starts_with(&expected), "{}", finished.stderr);
+    assert!(!std::path::Path::new(&file).exists());
+}
+
+#[test]
+fn wrong_options_exit_with_2() {
+    let sandbox = Sandbox::new();
+    for args in
+        [&["simulate", "curtain"][..], &["play"], &["play", "x.mcap", "--rate", "-1"], &["dance"]]
+    {
+        assert_eq!(recorder(&sandbox, args).code, Some(2), "{args:?}");
+    }
+}

@@ -1,0 +1,67 @@
+//! Independent readers: the stock Python MCAP reader finds the published bits in a recording, and
+//! the iceoryx2 package reads a running node. They need the virtual environment of `.ci/run`.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use integration_tests::{DEADLINE, Process, Program, Sandbox};
+use serde_json::Value;
+use sim_contract::Client;
+
+/// Runs a script of `tests/python`.
+fn python(sandbox: &Sandbox, script: &str, args: &[&str]) -> Value {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let script: PathBuf = folder.join("python").join(script);
+    let args: Vec<_> = [script.to_str().unwrap()].into_iter().chain(args.iter().copied()).collect();
+    Process::run(Program::Python, sandbox, &args).json()
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn the_stock_python_reader_finds_the_published_bits() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
+    let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let mut published = String::new();
+    let ctl = |args: &[&str]| {
+        Process::run(Program::SimNode, &sandbox, &[&["ctl"], args].concat()).success()
+    };
+    ctl(&["grab", "90", "0.5", "0.2", "0.3"]);
+    ctl(&["step", "60"]);
+    while let Some(snapshot) = client.next_snapshot(DEADLINE).unwrap() {
+        let step = snapshot.header().step;
+        write!(published, "{step} ").unwrap();
+        for byte in bytemuck::cast_slice::<_, u8>(snapshot.particles()) {
+            write!(published, "{byte:02x}").unwrap();
+        }
+        published.push('\n');
+        if step == 60 {
+            break;
+        }
+    }
+    assert_eq!(recording.interrupt().code, Some(0));
+    let published = sandbox.write("published.txt", &published);
+    let result = python(&sandbox, "read_recording.py", &[&file, &published]);
+    assert_eq!(result["counts"]["/particles"], 61);
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn the_iceoryx2_python_package_reads_a_running_node() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
+    let prefix = format!("{}_", sandbox.domain());
+    let root = format!("/tmp/catenary-{}-{}", rustix::process::getuid().as_raw(), sandbox.domain());
+    let read = python(&sandbox, "read_live.py", &[&prefix, &root]);
+    assert_eq!((&read["step"], &read["particle_count"]), (&0.into(), &168.into()));
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
+    for (index, position) in read["first"].as_array().unwrap().iter().enumerate() {
+        let position: Vec<f64> = serde_json::from_value(position.clone()).unwrap();
+        let expected = snapshot.particles()[index].position.map(f64::from);
+        assert_eq!(position, expected);
+    }
+}
