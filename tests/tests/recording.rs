@@ -231,7 +231,7 @@ fn a_recording_plays_back_and_records_again_byte_for_byte() {
         assert_eq!(one.row, two.row);
         assert_eq!(
             bytemuck::cast_slice::<_, u8>(&one.particles),
-            bytemuck::cast_slice(&two.particles)
+            bytemuck::cast_slice::<_, u8>(&two.particles)
         );
     }
     assert_eq!(two.len(), 151);

@@ -63,3 +63,8 @@ pub use topology::{
 };
 pub use wake::Wake;
 pub use writer::PublishError;
+
+/// The README's programs compile.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct ReadmeDoctests;
