@@ -104,7 +104,7 @@ fn rewrite_with_another_target(from: &str, to: &str) -> u64 {
     let mut log = LogReader::open(Path::new(from)).unwrap();
     let out = File::create(to).unwrap();
     let mut copy =
-        LogWriter::create(out, LogOptions::default(), log.run(), &log.scene().to_vec(), 0).unwrap();
+        LogWriter::create(out, LogOptions::default(), log.run(), log.scene(), 0).unwrap();
     let mut changed = None;
     let mut grab_count = 0;
     while let Some(logged) = log.next_message().unwrap() {

@@ -25,6 +25,7 @@ fn main() -> anyhow::Result<()> {
     let file = std::env::temp_dir().join(format!("catenary-demo-{}.mcap", seconds_since_1970()));
     let file = file.to_str().context("the temporary folder's path is not UTF-8")?;
 
+    eprintln!("building the programs ...");
     let mut node = Process::start_in(Program::SimNode, &domain, &["run", "curtain"]);
     node.wait_for_stderr("ready");
     let mut recorder = Process::start_in(Program::Recorder, &domain, &["record", "-o", file]);
