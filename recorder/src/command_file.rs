@@ -1,0 +1,254 @@
+//! Command files: one JSON object a line, as people write them and as `/outcomes` holds them.
+
+use serde_json::{Map, Value};
+use sim_contract::{Action, PlainF32};
+
+/// A command and when it takes effect.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TimedCommand {
+    /// The first step that shows its effect.
+    pub(crate) step: u64,
+    /// Its place in the log that it comes from.
+    pub(crate) index: Option<u64>,
+    pub(crate) client_id: u64,
+    pub(crate) sequence: u64,
+    pub(crate) action: Action,
+}
+
+/// What is wrong with a command file, and where.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{label}:{line}: {field}: {what} (allowed: {allowed})")]
+pub(crate) struct CommandFileError {
+    label: String,
+    /// From 1.
+    line: usize,
+    field: String,
+    what: String,
+    allowed: String,
+}
+
+/// What is wrong with one line: field, what, allowed.
+type Wrong = (String, String, String);
+
+/// The kinds with their fields; those behind the number of required ones are optional.
+const KINDS: [(&str, &[&str], usize); 10] = [
+    ("pin", &["particle"], 1),
+    ("unpin", &["particle"], 1),
+    ("grab", &["particle", "target", "over_s"], 2),
+    ("move", &["particle", "target", "over_s"], 2),
+    ("release", &["particle"], 1),
+    ("pause", &[], 0),
+    ("resume", &[], 0),
+    ("step", &["count"], 1),
+    ("reset", &[], 0),
+    // What a log holds for a command of another version.
+    ("unknown", &["number"], 1),
+];
+
+/// The fields of every line; `status` and `reason` are those of a log and say nothing here.
+const ENVELOPE: [&str; 7] = ["step", "kind", "client_id", "sequence", "index", "status", "reason"];
+
+/// Reads commands in the order of their application. `label` is what errors call the text.
+pub(crate) fn parse(text: &str, label: &str) -> Result<Vec<TimedCommand>, CommandFileError> {
+    let mut commands = Vec::new();
+    for (line, text) in (1..).zip(text.lines()) {
+        if text.trim().is_empty() {
+            continue;
+        }
+        let command = parse_line(text, line).map_err(|(field, what, allowed)| {
+            let label = label.to_owned();
+            CommandFileError { label, line, field, what, allowed }
+        })?;
+        commands.push(command);
+    }
+    sort(&mut commands);
+    Ok(commands)
+}
+
+/// By step; within one by index where there is one, else by client and sequence.
+pub(crate) fn sort(commands: &mut [TimedCommand]) {
+    commands.sort_by_key(|command| {
+        let index = command.index.unwrap_or(u64::MAX);
+        (command.step, index, command.client_id, command.sequence)
+    });
+}
+
+fn parse_line(text: &str, line: usize) -> Result<TimedCommand, Wrong> {
+    let Ok(Value::Object(fields)) = serde_json::from_str(text) else {
+        let example = r#"an object such as {"step":1,"kind":"pin","particle":0}"#;
+        return Err(wrong("line", "is not a JSON object", example));
+    };
+    let step = integer(&fields, "step", 1)?;
+    Ok(TimedCommand {
+        step: step.ok_or_else(|| missing("step", "whole numbers from 1"))?,
+        index: integer(&fields, "index", 0)?,
+        client_id: integer(&fields, "client_id", 0)?.unwrap_or(0),
+        sequence: integer(&fields, "sequence", 0)?.unwrap_or(line as u64),
+        action: action(&fields)?,
+    })
+}
+
+fn action(fields: &Map<String, Value>) -> Result<Action, Wrong> {
+    let Some(kind) = fields.get("kind") else {
+        return Err(missing("kind", &kind_names()));
+    };
+    let known = KINDS.iter().find(|(name, ..)| kind.as_str() == Some(name));
+    let (_, names, required_count) =
+        known.ok_or_else(|| wrong("kind", &format!("{kind} is unknown"), &kind_names()))?;
+    let is_own = |name: &str| names.contains(&name);
+    let is_known = |name: &str| is_own(name) || ENVELOPE.contains(&name);
+    if let Some(name) = fields.keys().find(|name| !is_known(name)) {
+        let allowed: Vec<_> = names.iter().chain(&ENVELOPE).copied().collect();
+        return Err(wrong(name, &format!("is no field of {kind}"), &allowed.join(", ")));
+    }
+    for (count, name) in names.iter().enumerate() {
+        match fields.get(*name) {
+            Some(value) if is_value_of(name, value) => {}
+            Some(value) => return Err(wrong(name, &format!("{value} is wrong"), values_of(name))),
+            None if count < *required_count => return Err(missing(name, values_of(name))),
+            None => {}
+        }
+    }
+    let own_fields = fields.iter().filter(|(name, _)| *name == "kind" || is_own(name));
+    let object = own_fields.map(|(name, value)| (name.clone(), value.clone())).collect();
+    serde_json::from_value(Value::Object(object))
+        .map_err(|error| wrong("kind", &error.to_string(), &kind_names()))
+}
+
+fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u64>, Wrong> {
+    let Some(value) = fields.get(name) else { return Ok(None) };
+    match value.as_u64() {
+        Some(number) if number >= min => Ok(Some(number)),
+        _ => {
+            let allowed = format!("whole numbers from {min}");
+            Err(wrong(name, &format!("{value} is wrong"), &allowed))
+        }
+    }
+}
+
+fn is_value_of(name: &str, value: &Value) -> bool {
+    let is_number = |value: &Value| serde_json::from_value::<PlainF32>(value.clone()).is_ok();
+    match name {
+        "target" => value.as_array().is_some_and(|t| t.len() == 3 && t.iter().all(is_number)),
+        "over_s" => is_number(value),
+        _ => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
+    }
+}
+
+fn values_of(name: &str) -> &'static str {
+    match name {
+        "target" => "three numbers in m",
+        "over_s" => "a number of seconds",
+        _ => "whole numbers 0..=4294967295",
+    }
+}
+
+fn kind_names() -> String {
+    let names: Vec<_> = KINDS.iter().map(|(name, ..)| *name).filter(|n| *n != "unknown").collect();
+    names.join(", ")
+}
+
+fn missing(field: &str, allowed: &str) -> Wrong {
+    wrong(field, "is missing", allowed)
+}
+
+fn wrong(field: &str, what: &str, allowed: &str) -> Wrong {
+    (field.to_owned(), what.to_owned(), allowed.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        parse(text, "drag.jsonl").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn commands_come_in_the_order_of_their_application() {
+        let text = r#"
+            {"step":9,"kind":"reset"}
+            {"step":3,"kind":"pin","particle":4,"client_id":7}
+            {"step":3,"kind":"unpin","particle":4,"client_id":7}
+            {"step":3,"kind":"pause","client_id":2,"sequence":99}
+            {"step":5,"kind":"release","particle":1,"index":8,"status":"applied","reason":""}
+            {"step":5,"kind":"step","count":2,"index":7,"status":"rejected","reason":"x"}"#;
+        let commands = parse(text, "x").unwrap();
+        let order: Vec<_> = commands.iter().map(|c| (c.step, c.client_id, c.sequence)).collect();
+        assert_eq!(order, [(3, 2, 99), (3, 7, 3), (3, 7, 4), (5, 0, 7), (5, 0, 6), (9, 0, 2)]);
+        assert_eq!(commands[0].action, Action::Pause);
+        assert_eq!(commands[3].action, Action::Step { count: 2 });
+    }
+
+    #[test]
+    fn a_log_line_is_a_command_line() {
+        let line = r#"{"step":3,"client_id":7,"sequence":8,"index":0,"kind":"grab","particle":1,"target":["-inf",0.1,-0.0],"over_s":0.25,"status":"rejected","reason":"non_finite"}"#;
+        let commands = parse(line, "x").unwrap();
+        let target = [f32::NEG_INFINITY, 0.1, -0.0];
+        let action = Action::Grab { particle: 1, target, over_s: 0.25 };
+        let expected = TimedCommand { step: 3, index: Some(0), client_id: 7, sequence: 8, action };
+        assert_eq!(commands, [expected]);
+    }
+
+    #[test]
+    fn the_table_of_kinds_is_that_of_the_contract() {
+        let particle = 1;
+        let (target, over_s) = ([0.5; 3], 0.1);
+        let actions = [
+            Action::Pin { particle },
+            Action::Unpin { particle },
+            Action::Grab { particle, target, over_s },
+            Action::Move { particle, target, over_s },
+            Action::Release { particle },
+            Action::Pause,
+            Action::Resume,
+            Action::Step { count: 3 },
+            Action::Reset,
+            Action::Unknown { number: 77 },
+        ];
+        for ((name, names, _), action) in KINDS.iter().zip(actions) {
+            let Value::Object(mut fields) = serde_json::to_value(action).unwrap() else {
+                panic!("{action:?} is no object");
+            };
+            assert_eq!(fields["kind"], *name);
+            assert_eq!(fields.len(), names.len() + 1, "{name}");
+            assert!(names.iter().all(|field| fields.contains_key(*field)), "{name}");
+            fields.insert("step".to_owned(), 1.into());
+            let read = parse(&Value::Object(fields).to_string(), "x").unwrap();
+            assert_eq!(read[0].action, action);
+        }
+    }
+
+    #[test]
+    fn every_mistake_is_named_with_its_line_and_field() {
+        let wrong = [
+            "nonsense",
+            "[1]",
+            r#"{"kind":"pin","particle":1}"#,
+            r#"{"step":0,"kind":"pin","particle":1}"#,
+            r#"{"step":1.5,"kind":"pause"}"#,
+            r#"{"step":1,"particle":1}"#,
+            r#"{"step":1,"kind":"dance"}"#,
+            r#"{"step":1,"kind":"pin"}"#,
+            r#"{"step":1,"kind":"pin","particle":-1}"#,
+            r#"{"step":1,"kind":"pin","particle":1,"colour":"red"}"#,
+            r#"{"step":1,"kind":"grab","particle":1,"target":[0,1]}"#,
+            r#"{"step":1,"kind":"grab","particle":1,"target":[0,1,2],"over_s":"soon"}"#,
+        ];
+        let errors: Vec<_> = wrong.map(|line| error(&format!("\n{line}"))).into();
+        insta::assert_snapshot!(errors.join("\n"), @r#"
+        drag.jsonl:2: line: is not a JSON object (allowed: an object such as {"step":1,"kind":"pin","particle":0})
+        drag.jsonl:2: line: is not a JSON object (allowed: an object such as {"step":1,"kind":"pin","particle":0})
+        drag.jsonl:2: step: is missing (allowed: whole numbers from 1)
+        drag.jsonl:2: step: 0 is wrong (allowed: whole numbers from 1)
+        drag.jsonl:2: step: 1.5 is wrong (allowed: whole numbers from 1)
+        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset)
+        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset)
+        drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
+        drag.jsonl:2: particle: -1 is wrong (allowed: whole numbers 0..=4294967295)
+        drag.jsonl:2: colour: is no field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason)
+        drag.jsonl:2: target: [0,1] is wrong (allowed: three numbers in m)
+        drag.jsonl:2: over_s: "soon" is wrong (allowed: a number of seconds)
+        "#);
+    }
+}

@@ -1,0 +1,282 @@
+//! From a scene to a recording and back: what is simulated twice is byte-equal, what is verified
+//! is bit-identical, and whatever is changed in a recording is found at its step.
+//!
+//! Recordings are made in memory; changed ones are rebuilt message by message.
+
+use std::ops::ControlFlow;
+
+use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message};
+use sim_contract::Action;
+use sim_solver::{Scene, Solver, builtin};
+
+use crate::command_file::{self, TimedCommand};
+use crate::simulation::{Job, Outcomes, simulate};
+use crate::verify::{Report, Verdict, verify};
+
+const COMMANDS: &str = r#"
+    {"step":10,"kind":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.1}
+    {"step":10,"kind":"grab","particle":90,"target":[0,0,0],"client_id":5}
+    {"step":14,"kind":"move","particle":90,"target":[0.4,0.25,0.35]}
+    {"step":20,"kind":"pause"}
+    {"step":50,"kind":"pin","particle":160}
+    {"step":70,"kind":"release","particle":90}
+    {"step":90,"kind":"unpin","particle":160}
+    {"step":100,"kind":"reset"}
+    {"step":110,"kind":"pin","particle":4000}
+"#;
+
+fn job(scene: &str, commands: &str, steps: u64) -> Job {
+    let scene = Scene::from_toml(builtin::text(scene).unwrap(), scene).unwrap();
+    Job { scene, commands: command_file::parse(commands, "test").unwrap(), steps }
+}
+
+fn record(job: &Job) -> (Vec<u8>, Outcomes) {
+    let solver = Solver::new(&job.scene);
+    let (run, scene) = (job.description(&solver), job.scene.to_toml());
+    // Small chunks, so that a cut leaves something.
+    let options = LogOptions { chunk_size_bytes: 100_000, ..LogOptions::default() };
+    let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
+    let outcomes = simulate(job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    (log.finish(&Closing::default()).unwrap(), outcomes)
+}
+
+fn check(file: &[u8]) -> (Report, Option<LogEnd>) {
+    verify(LogReader::new(file).unwrap(), "test.mcap", |_| false).unwrap()
+}
+
+/// The same recording with each message changed, or left out where `None` comes back.
+fn rebuild(file: &[u8], mut change: impl FnMut(Message) -> Option<Message>) -> Vec<u8> {
+    let mut old = LogReader::new(file).unwrap();
+    let (run, scene) = (old.run().clone(), old.scene().to_vec());
+    let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
+    while let Some(logged) = old.next_message().unwrap() {
+        if let Some(message) = change(logged.message) {
+            new.write(&message, logged.log_time_ns).unwrap();
+        }
+    }
+    new.finish(&Closing::default()).unwrap()
+}
+
+#[test]
+fn equal_inputs_give_equal_files_and_other_inputs_another_run() {
+    let job_of = |commands| job("curtain", commands, 300);
+    let (file, outcomes) = record(&job_of(COMMANDS));
+    assert_eq!(record(&job_of(COMMANDS)), (file.clone(), outcomes));
+    assert_eq!((outcomes.applied_count, outcomes.rejected_count), (7, 2));
+    let run_id = |file: &[u8]| LogReader::new(file).unwrap().run().run_id;
+    let (other, _) = record(&job_of(r#"{"step":10,"kind":"reset"}"#));
+    assert_ne!(run_id(&file), run_id(&other));
+}
+
+#[test]
+fn a_simulated_recording_is_whole_and_bit_identical() {
+    for scene in ["curtain", "rope"] {
+        let (file, outcomes) = record(&job(scene, COMMANDS, 300));
+        let (report, end) = check(&file);
+        assert_eq!(report.to_string(), "300 steps bit-identical (0..=300)");
+        assert_eq!((report.verdict, end), (Verdict::Identical, None));
+        assert_eq!(outcomes.steps, 300);
+    }
+}
+
+#[test]
+fn the_outcomes_of_a_recording_are_commands_that_reproduce_it() {
+    let (file, _) = record(&job("curtain", COMMANDS, 200));
+    let mut lines = String::new();
+    rebuild(&file, |message| {
+        if let Message::Outcome(row) = &message {
+            lines += &serde_json::to_string(row).unwrap();
+            lines += "\n";
+        }
+        Some(message)
+    });
+    let (again, _) = record(&job("curtain", &lines, 200));
+    assert!(again == file, "the files differ");
+}
+
+#[test]
+fn commands_are_applied_in_the_order_of_their_index() {
+    let pin_then_unpin = r#"
+        {"step":5,"kind":"unpin","particle":90,"index":1}
+        {"step":5,"kind":"pin","particle":90,"index":0}"#;
+    let (_, both) = record(&job("curtain", pin_then_unpin, 50));
+    let unpin_then_pin = r#"
+        {"step":5,"kind":"unpin","particle":90,"index":0}
+        {"step":5,"kind":"pin","particle":90,"index":1}"#;
+    let (_, pinned) = record(&job("curtain", unpin_then_pin, 50));
+    assert_ne!(both.state_hash, pinned.state_hash);
+}
+
+#[test]
+fn a_changed_command_is_found_at_its_step() {
+    let (file, _) = record(&job("curtain", COMMANDS, 200));
+    let changed = rebuild(&file, |message| match message {
+        Message::Outcome(mut row) if row.step == 50 => {
+            row.action = Action::Pin { particle: 161 };
+            Some(Message::Outcome(row))
+        }
+        other => Some(other),
+    });
+    let (report, _) = check(&changed);
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(50)));
+    assert!(report.difference.is_some(), "{report}");
+}
+
+#[test]
+fn another_outcome_than_the_recorded_one_is_found() {
+    let (file, _) = record(&job("curtain", COMMANDS, 200));
+    let changed = rebuild(&file, |message| match message {
+        Message::Outcome(mut row) if row.step == 110 => {
+            row.action = Action::Pin { particle: 4 };
+            Some(Message::Outcome(row))
+        }
+        other => Some(other),
+    });
+    assert_eq!(
+        check(&changed).0.to_string(),
+        "step 110 differs: outcome 8: recorded rejected unknown_particle, simulated applied  \
+         (109 steps before it bit-identical)"
+    );
+}
+
+#[test]
+fn one_flipped_bit_of_a_payload_is_found_with_its_particle_and_field() {
+    let (file, _) = record(&job("curtain", COMMANDS, 100));
+    for (at, earlier) in [(0, 0), (37, 36), (100, 99)] {
+        let changed = rebuild(&file, |mut message| {
+            if let Message::Particles { step, particles } = &mut message
+                && *step == at
+            {
+                let y = &mut particles[77].velocity[1];
+                *y = f32::from_bits(y.to_bits() ^ 1);
+            }
+            Some(message)
+        });
+        let (report, _) = check(&changed);
+        assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(at)));
+        assert_eq!(report.steps_identical, earlier);
+        let difference = report.difference.unwrap();
+        assert_eq!((difference.particle, difference.field), (77, "velocity y"));
+    }
+}
+
+#[test]
+fn a_changed_hash_of_a_step_is_found() {
+    let (file, _) = record(&job("curtain", "", 20));
+    let changed = rebuild(&file, |mut message| {
+        if let Message::Step(row) = &mut message
+            && row.step == 7
+        {
+            row.state_hash ^= 1;
+        }
+        Some(message)
+    });
+    let (report, _) = check(&changed);
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(7)));
+    assert!(report.to_string().contains("its row in /steps has the hash"), "{report}");
+}
+
+#[test]
+fn a_missing_outcome_is_reported_and_the_solver_is_not_blamed() {
+    let (file, _) = record(&job("curtain", COMMANDS, 200));
+    for (missing_index, step) in [(0, 10), (4, 50), (8, 110)] {
+        let changed = rebuild(&file, |message| match message {
+            Message::Outcome(row) if row.index == missing_index => None,
+            other => Some(other),
+        });
+        let (report, _) = check(&changed);
+        assert_eq!((report.verdict, report.step), (Verdict::OutcomeLogIncomplete, Some(step)));
+        let text = report.to_string();
+        assert!(text.starts_with(&format!("outcome log incomplete from step {step}: ")), "{text}");
+    }
+}
+
+#[test]
+fn outcomes_that_stand_elsewhere_in_the_file_are_still_applied_in_order() {
+    let (file, _) = record(&job("curtain", COMMANDS, 60));
+    let mut first = None;
+    let swapped = rebuild(&file, |message| match message {
+        Message::Outcome(row) if row.index == 0 => {
+            first = Some(Message::Outcome(row));
+            None
+        }
+        Message::Outcome(row) if row.index == 1 => Some(Message::Outcome(row)),
+        other => Some(other),
+    });
+    // The one that was left out goes behind the other: same step, smaller index.
+    let mut log = LogReader::new(swapped.as_slice()).unwrap();
+    let (run, scene) = (log.run().clone(), log.scene().to_vec());
+    let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
+    while let Some(logged) = log.next_message().unwrap() {
+        let is_place = matches!(&logged.message, Message::Outcome(row) if row.index == 1);
+        new.write(&logged.message, 0).unwrap();
+        if is_place {
+            new.write(&first.take().unwrap(), 0).unwrap();
+        }
+    }
+    let (report, _) = check(&new.finish(&Closing::default()).unwrap());
+    assert_eq!(report.verdict, Verdict::Identical, "{report}");
+}
+
+#[test]
+fn a_recording_that_starts_later_and_lacks_snapshots_is_bit_identical_where_it_is() {
+    let (file, _) = record(&job("curtain", COMMANDS, 400));
+    let partial = rebuild(&file, |message| {
+        let is_snapshot = matches!(message, Message::Step(_) | Message::Particles { .. });
+        let is_left_out = is_snapshot && message.step() % 5 != 0;
+        (message.step() >= 37 && !is_left_out).then_some(message)
+    });
+    let (report, _) = check(&partial);
+    // The pin at step 50 has the first keyframe; every fifth step follows.
+    assert_eq!(report.to_string(), "70 steps bit-identical (50..=400)");
+}
+
+#[test]
+fn a_recording_without_a_keyframe_says_so() {
+    let (file, _) = record(&job("curtain", "", 10));
+    let without =
+        rebuild(&file, |message| (!matches!(message, Message::Keyframe { .. })).then_some(message));
+    let error = verify(LogReader::new(without.as_slice()).unwrap(), "x.mcap", |_| false);
+    let error = error.unwrap_err().to_string();
+    assert_eq!(error, "x.mcap: has no snapshot with a keyframe to start from");
+}
+
+#[test]
+fn a_recording_of_another_solver_version_is_refused() {
+    let job = job("curtain", "", 1);
+    let solver = Solver::new(&job.scene);
+    let mut run = job.description(&solver);
+    run.solver_version += 1;
+    let scene = job.scene.to_toml();
+    let log = LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0);
+    let file = log.unwrap().finish(&Closing::default()).unwrap();
+    let error = verify(LogReader::new(file.as_slice()).unwrap(), "x.mcap", |_| false);
+    let error = error.unwrap_err().to_string();
+    assert!(
+        error.contains("recorded with solver version 2, this program has version 1"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_truncated_recording_is_verified_as_far_as_it_goes() {
+    let (file, _) = record(&job("curtain", COMMANDS, 400));
+    let (report, end) = check(&file[..file.len() / 2]);
+    assert_eq!(report.verdict, Verdict::Identical);
+    assert!((20..390).contains(&report.steps_identical), "{report}");
+    assert!(matches!(end, Some(LogEnd::Truncated { .. })));
+}
+
+#[test]
+fn commands_beyond_the_end_are_counted() {
+    let mut job = job("curtain", COMMANDS, 60);
+    assert_eq!(job.commands_beyond_the_end(), 4);
+    job.commands.push(TimedCommand {
+        step: 61,
+        index: None,
+        client_id: 0,
+        sequence: 0,
+        action: Action::Reset,
+    });
+    assert_eq!(job.commands_beyond_the_end(), 5);
+}

@@ -1,0 +1,315 @@
+//! From what arrives in shared memory to what is written: where a recording starts, in which order
+//! it goes on, where it ends, and what is missing.
+
+use std::collections::BTreeMap;
+
+use recorder::{AllCounts, Message, OutcomeRow, RunDescription, StepRow, Topic};
+use sim_contract::{KeyframeHeader, LoadHeader, SnapshotHeader};
+use sim_solver::{Scene, SceneError};
+
+use super::queue::Content;
+use super::round::{Round, Snapshot};
+
+/// The head of a recording.
+#[derive(Debug)]
+pub(crate) struct Head {
+    pub(crate) run: RunDescription,
+    pub(crate) scene: Vec<u8>,
+}
+
+/// Clocks at a round, in nanoseconds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Now {
+    /// Since 1970.
+    pub(crate) realtime_ns: u64,
+    /// CLOCK_MONOTONIC.
+    pub(crate) monotonic_ns: u64,
+}
+
+/// Why a run that goes on cannot be recorded any further in this file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RunEnd {
+    /// The owner has begun another run.
+    NewRun,
+    /// Another scene was loaded.
+    NewLoad,
+}
+
+/// Why a run cannot be recorded at all.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum IntakeError {
+    #[error("the node's scene is not text")]
+    NotText,
+    #[error("the node's scene cannot be read: {0}")]
+    Scene(#[from] SceneError),
+}
+
+/// Takes in a run from the first snapshot that is a complete state with its keyframe.
+#[derive(Debug, Default)]
+pub(crate) struct Intake {
+    load: Round,
+    /// The newest snapshot and keyframe, until a pair of one step has come.
+    candidate: Option<Snapshot>,
+    candidate_keyframe: Option<(KeyframeHeader, Vec<u8>)>,
+    started: Option<Started>,
+    counts: AllCounts,
+}
+
+/// The run that is being recorded.
+#[derive(Debug)]
+struct Started {
+    run_id: u64,
+    topology_revision: u32,
+    first_step: u64,
+    last: SnapshotHeader,
+    next_outcome: u64,
+    newest_keyframe: u64,
+    /// How often each distance between two snapshots occurred, in steps.
+    distances: BTreeMap<u64, u64>,
+}
+
+/// What came of a round.
+#[derive(Debug, Default)]
+pub(crate) struct Taken {
+    /// The head, in the round in which the recording starts.
+    pub(crate) head: Option<Head>,
+    /// In the order of publication.
+    pub(crate) contents: Vec<Content>,
+    pub(crate) end: Option<RunEnd>,
+}
+
+impl Intake {
+    /// Takes in a round.
+    pub(crate) fn take(&mut self, mut round: Round, now: Now) -> Result<Taken, IntakeError> {
+        let mut taken = Taken::default();
+        self.keep_load(&mut round);
+        if self.started.is_none() {
+            self.try_start(&mut round, now, &mut taken)?;
+        }
+        if let Some(started) = &mut self.started {
+            started.take(round, &mut self.counts, &mut taken);
+        }
+        Ok(taken)
+    }
+
+    /// The step that the recording starts with, once it has.
+    pub(crate) fn first_step(&self) -> Option<u64> {
+        self.started.as_ref().map(|started| started.first_step)
+    }
+
+    /// What was received, and what never came.
+    pub(crate) fn counts(&self) -> AllCounts {
+        let mut counts = self.counts;
+        if let Some(started) = &self.started {
+            let gaps = started.snapshot_gaps();
+            counts.of_mut(Topic::Particles).gaps = gaps;
+            counts.of_mut(Topic::Steps).gaps = gaps;
+            counts.of_mut(Topic::Outcomes).gaps +=
+                started.last.outcome_count.saturating_sub(started.next_outcome);
+        }
+        counts
+    }
+
+    fn keep_load(&mut self, round: &mut Round) {
+        let load = &mut self.load;
+        load.scene = round.scene.take().or(load.scene.take());
+        load.topology = round.topology.take().or(load.topology.take());
+        load.surface = round.surface.take().or(load.surface.take());
+    }
+
+    /// Starts at the first snapshot of this round, or the newest before it, that has a keyframe of
+    /// its step; what is older is dropped.
+    fn try_start(
+        &mut self,
+        round: &mut Round,
+        now: Now,
+        taken: &mut Taken,
+    ) -> Result<(), IntakeError> {
+        let snapshots = self.candidate.take().into_iter().chain(round.snapshots.drain(..));
+        let snapshots: Vec<_> = snapshots.collect();
+        let keyframes = self.candidate_keyframe.take().into_iter().chain(round.keyframes.drain(..));
+        let keyframes: Vec<_> = keyframes.collect();
+        let is_of = |header: &SnapshotHeader, keyframe: &KeyframeHeader| {
+            (keyframe.run_id, keyframe.step) == (header.run_id, header.step)
+        };
+        let start = snapshots
+            .iter()
+            .position(|one| keyframes.iter().any(|(of, _)| is_of(&one.header, of)))
+            .filter(|place| self.has_load_of(&snapshots[*place].header));
+        // An outcome may come before the keyframe of the snapshot that it follows.
+        round.outcomes.splice(..0, self.load.outcomes.drain(..));
+        let Some(place) = start else {
+            self.candidate = snapshots.into_iter().next_back();
+            self.candidate_keyframe = keyframes.into_iter().next_back();
+            let known = self.candidate.as_ref().map_or(u64::MAX, |one| one.header.outcome_count);
+            self.load.outcomes.extend(round.outcomes.drain(..).filter(|row| row.index >= known));
+            return Ok(());
+        };
+        let first = &snapshots[place];
+        taken.head = Some(self.head(&first.header, now)?);
+        self.started = Some(Started::new(&first.header));
+        for message in self.load_rows() {
+            self.counts.of_mut(message.topic()).received += 1;
+            taken.contents.push(Content::Update(message));
+        }
+        round.keyframes = keyframes;
+        round.snapshots = snapshots.into_iter().skip(place).collect();
+        Ok(())
+    }
+
+    fn has_load_of(&self, header: &SnapshotHeader) -> bool {
+        let is_of = |load: &LoadHeader| {
+            (load.run_id, load.topology_revision) == (header.run_id, header.topology_revision)
+        };
+        let Round { scene, topology, surface, .. } = &self.load;
+        scene.as_ref().is_some_and(|(load, _)| is_of(load))
+            && topology.as_ref().is_some_and(|(load, _)| is_of(load))
+            && surface.as_ref().is_some_and(|(load, _)| is_of(load))
+    }
+
+    fn load_rows(&mut self) -> Vec<Message> {
+        let topology = self.load.topology.take().map(|(_, row)| Message::Topology(row));
+        let surface = self.load.surface.take().map(|(_, row)| Message::Surface(row));
+        topology.into_iter().chain(surface).collect()
+    }
+
+    fn head(&self, header: &SnapshotHeader, now: Now) -> Result<Head, IntakeError> {
+        let (load, text) = self.load.scene.clone().unwrap_or_default();
+        // Read with all its checks: the name stands nowhere else, and a scene that cannot be read
+        // makes a recording that cannot be verified.
+        let scene = std::str::from_utf8(&text).map_err(|_| IntakeError::NotText)?;
+        let scene = Scene::from_toml(scene, "scene.toml")?;
+        let constraint_count = self.load.topology.as_ref().map_or(0, |(load, _)| load.count);
+        let mut run = RunDescription {
+            run_id: header.run_id,
+            epoch_ns: 0,
+            scene_name: scene.name,
+            origin: load.origin,
+            rate_hz: scene.solver.rate_hz,
+            method: load.method,
+            particle_count: header.particle_count,
+            constraint_count,
+            solver_version: header.solver_version,
+            contract_version: header.contract_version,
+            recorder_version: env!("CARGO_PKG_VERSION").to_owned(),
+        };
+        let age_ns = now.monotonic_ns.saturating_sub(header.publish_monotonic_ns);
+        let published_ns = now.realtime_ns.saturating_sub(age_ns);
+        run.epoch_ns = published_ns.saturating_sub(run.time_of_step_ns(header.step));
+        Ok(Head { run, scene: text })
+    }
+}
+
+impl Started {
+    fn new(first: &SnapshotHeader) -> Self {
+        Self {
+            run_id: first.run_id,
+            topology_revision: first.topology_revision,
+            first_step: first.step,
+            last: *first,
+            // Those before are part of the first state.
+            next_outcome: first.outcome_count,
+            newest_keyframe: 0,
+            distances: BTreeMap::new(),
+        }
+    }
+
+    fn take(&mut self, round: Round, counts: &mut AllCounts, taken: &mut Taken) {
+        let mut arrived: Vec<Content> = Vec::new();
+        for snapshot in round.snapshots {
+            taken.end = self.end_at(&snapshot.header);
+            if taken.end.is_some() {
+                break;
+            }
+            arrived.push(self.take_snapshot(snapshot, &round.keyframes, counts));
+        }
+        let keyframes = round
+            .keyframes
+            .into_iter()
+            .filter(|(header, _)| header.run_id == self.run_id && header.step >= self.first_step);
+        let keyframes = keyframes.map(|(header, bytes)| {
+            self.newest_keyframe = self.newest_keyframe.max(header.step);
+            Message::Keyframe { step: header.step, bytes }
+        });
+        let keyframes: Vec<_> = keyframes.collect();
+        let outcomes = self.take_outcomes(round.outcomes, taken.end, counts);
+        let updates = round.updates.into_iter().filter(|update| update.step() >= self.first_step);
+        for update in updates.chain(keyframes).chain(outcomes) {
+            counts.of_mut(update.topic()).received += 1;
+            arrived.push(Content::Update(update));
+        }
+        arrived.sort_by_key(place);
+        taken.contents.append(&mut arrived);
+    }
+
+    fn end_at(&self, header: &SnapshotHeader) -> Option<RunEnd> {
+        if header.run_id != self.run_id {
+            Some(RunEnd::NewRun)
+        } else if header.topology_revision != self.topology_revision {
+            Some(RunEnd::NewLoad)
+        } else {
+            None
+        }
+    }
+
+    fn take_snapshot(
+        &mut self,
+        snapshot: Snapshot,
+        keyframes: &[(KeyframeHeader, Vec<u8>)],
+        counts: &mut AllCounts,
+    ) -> Content {
+        let Snapshot { header, particles } = snapshot;
+        let distance = header.step.saturating_sub(self.last.step);
+        if distance > 0 {
+            *self.distances.entry(distance).or_default() += 1;
+        }
+        let named = header.keyframe_step;
+        let is_here = keyframes.iter().any(|(keyframe, _)| keyframe.step == named);
+        if named > self.newest_keyframe && named >= self.first_step {
+            self.newest_keyframe = named;
+            counts.of_mut(Topic::Keyframe).gaps += u64::from(!is_here);
+        }
+        self.last = header;
+        counts.of_mut(Topic::Steps).received += 1;
+        counts.of_mut(Topic::Particles).received += 1;
+        Content::Snapshot(StepRow::from(&header), particles)
+    }
+
+    /// Once another run has begun, only those that the last snapshot counts are of this one.
+    fn take_outcomes(
+        &mut self,
+        outcomes: Vec<OutcomeRow>,
+        end: Option<RunEnd>,
+        counts: &mut AllCounts,
+    ) -> Vec<Message> {
+        let mut kept = Vec::new();
+        for row in outcomes {
+            let is_foreign = end.is_some() && row.index >= self.last.outcome_count;
+            if row.index < self.next_outcome || is_foreign {
+                continue;
+            }
+            counts.of_mut(Topic::Outcomes).gaps += row.index - self.next_outcome;
+            self.next_outcome = row.index + 1;
+            kept.push(Message::Outcome(row));
+        }
+        kept
+    }
+
+    /// Snapshots that never came. A node publishes every k-th step, and k is the smallest distance
+    /// that occurred.
+    fn snapshot_gaps(&self) -> u64 {
+        let Some((stride, _)) = self.distances.first_key_value() else { return 0 };
+        self.distances.iter().map(|(distance, count)| (distance / stride - 1) * count).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests;
+
+/// By step, then in the order of publication.
+fn place(content: &Content) -> (u64, Topic) {
+    match content {
+        Content::Update(message) => (message.step(), message.topic()),
+        Content::Snapshot(row, _) => (row.step, Topic::Steps),
+    }
+}

@@ -1,0 +1,221 @@
+//! Where a recording starts and ends, in which order it goes on, and that whatever is missing is
+//! counted. Rounds are put together by hand.
+
+use sim_contract::{
+    Action, Command, ConstraintState, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, ParticleState,
+    Update,
+};
+
+use super::*;
+
+const RUN_ID: u64 = 77;
+const NOW: Now = Now { realtime_ns: 5_000_000_000, monotonic_ns: 2_000_000_000 };
+
+fn header(step: u64, outcome_count: u64) -> SnapshotHeader {
+    SnapshotHeader {
+        run_id: RUN_ID,
+        step,
+        outcome_count,
+        particle_count: 1,
+        // One second before now.
+        publish_monotonic_ns: 1_000_000_000,
+        ..SnapshotHeader::default()
+    }
+}
+
+fn add_load(round: &mut Round) {
+    let load = LoadHeader { run_id: RUN_ID, rate_hz: 10, count: 1, ..LoadHeader::default() };
+    round.add_update(Update::Scene(&load, b"version = 1\nname = \"dot\"\nsolver.rate_hz = 10\n"));
+    round.add_update(Update::Topology(&load, &[ConstraintState::default()]));
+    round.add_update(Update::Surface(&load, &[]));
+}
+
+fn add_snapshot(round: &mut Round, header: &SnapshotHeader) {
+    round.add_snapshot(header, &[ParticleState::default()]);
+}
+
+fn add_keyframe(round: &mut Round, step: u64) {
+    let header = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 1 };
+    round.add_update(Update::Keyframe(&header, &[1]));
+}
+
+fn outcome(index: u64, step: u64) -> Outcome {
+    Outcome::new(index, step, Command::new(1, index, Action::Reset), Ok(()))
+}
+
+/// "snapshot 3", "/keyframe 3", ...
+fn names(taken: &Taken) -> Vec<String> {
+    let name = |content: &Content| match content {
+        Content::Snapshot(row, _) => format!("snapshot {}", row.step),
+        Content::Update(message) => format!("{} {}", message.topic().name(), message.step()),
+    };
+    taken.contents.iter().map(name).collect()
+}
+
+/// An intake that has started at step 4, with two outcomes before it.
+fn started() -> Intake {
+    let mut intake = Intake::default();
+    let mut round = Round::default();
+    add_load(&mut round);
+    add_snapshot(&mut round, &header(4, 2));
+    add_keyframe(&mut round, 4);
+    assert!(intake.take(round, NOW).unwrap().head.is_some());
+    intake
+}
+
+#[test]
+fn it_starts_at_the_first_snapshot_that_has_its_keyframe() {
+    let mut intake = Intake::default();
+    let mut round = Round::default();
+    add_load(&mut round);
+    add_keyframe(&mut round, 1);
+    add_snapshot(&mut round, &header(2, 0));
+    assert!(names(&intake.take(round, NOW).unwrap()).is_empty());
+
+    let mut round = Round::default();
+    for step in 3..6 {
+        add_snapshot(&mut round, &header(step, 0));
+    }
+    add_keyframe(&mut round, 4);
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!(
+        names(&taken),
+        ["/topology 0", "/surface 0", "/keyframe 4", "snapshot 4", "snapshot 5"]
+    );
+    let run = taken.head.unwrap().run;
+    assert_eq!((run.scene_name.as_str(), run.rate_hz, run.constraint_count), ("dot", 10, 1));
+    // Published at 4 s of the wall, at step 4 of 10 Hz.
+    assert_eq!(run.epoch_ns, 4_000_000_000 - 400_000_000);
+    assert_eq!(intake.first_step(), Some(4));
+}
+
+#[test]
+fn a_keyframe_that_comes_after_its_snapshot_starts_it_too() {
+    let mut intake = Intake::default();
+    let mut round = Round::default();
+    add_load(&mut round);
+    add_snapshot(&mut round, &header(9, 0));
+    round.add_update(Update::Outcome(&outcome(0, 10)));
+    assert!(names(&intake.take(round, NOW).unwrap()).is_empty());
+    let mut round = Round::default();
+    add_keyframe(&mut round, 9);
+    let taken = intake.take(round, NOW).unwrap();
+    let expected = ["/topology 0", "/surface 0", "/keyframe 9", "snapshot 9", "/outcomes 10"];
+    assert_eq!(names(&taken), expected);
+}
+
+#[test]
+fn a_round_is_written_in_the_order_of_publication() {
+    let mut intake = started();
+    let mut round = Round::default();
+    add_snapshot(&mut round, &header(5, 3));
+    add_snapshot(&mut round, &header(6, 4));
+    let status = NodeStatus { step: 5, ..NodeStatus::default() };
+    round.add_update(Update::Status(&status));
+    for step in [5, 6, 7] {
+        add_keyframe(&mut round, step);
+    }
+    for (index, step) in [(2, 5), (3, 6), (4, 7)] {
+        round.add_update(Update::Outcome(&outcome(index, step)));
+    }
+    let expected = [
+        "/keyframe 5",
+        "/outcomes 5",
+        "/status 5",
+        "snapshot 5",
+        "/keyframe 6",
+        "/outcomes 6",
+        "snapshot 6",
+        "/keyframe 7",
+        "/outcomes 7",
+    ];
+    assert_eq!(names(&intake.take(round, NOW).unwrap()), expected);
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn outcomes_of_the_first_state_and_answers_of_a_replay_are_left_out() {
+    let mut intake = started();
+    let mut round = Round::default();
+    round.add_update(Update::Outcome(&outcome(1, 4)));
+    let control = Outcome { flags: OUTCOME_FLAG_CONTROL, ..outcome(2, 5) };
+    round.add_update(Update::Outcome(&control));
+    assert!(names(&intake.take(round, NOW).unwrap()).is_empty());
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn missing_outcomes_are_counted() {
+    let mut intake = started();
+    let mut round = Round::default();
+    add_snapshot(&mut round, &header(5, 4));
+    round.add_update(Update::Outcome(&outcome(3, 5)));
+    intake.take(round, NOW).unwrap();
+    assert_eq!(intake.counts().of(Topic::Outcomes).gaps, 1);
+    let mut round = Round::default();
+    add_snapshot(&mut round, &header(6, 9));
+    intake.take(round, NOW).unwrap();
+    assert_eq!(intake.counts().of(Topic::Outcomes).gaps, 6, "also those at the very end");
+}
+
+#[test]
+fn missing_snapshots_are_counted_by_the_stride_of_the_node() {
+    let mut intake = started();
+    let mut round = Round::default();
+    for step in [8, 12, 16, 28, 32, 40] {
+        add_snapshot(&mut round, &header(step, 2));
+    }
+    intake.take(round, NOW).unwrap();
+    let counts = intake.counts();
+    assert_eq!(counts.of(Topic::Particles).gaps, 3);
+    assert_eq!((counts.of(Topic::Particles).received, counts.of(Topic::Steps).received), (7, 7));
+}
+
+#[test]
+fn missing_keyframes_are_counted() {
+    let mut intake = started();
+    let mut round = Round::default();
+    for (step, keyframe_step) in [(5, 4), (6, 6), (7, 7), (8, 7)] {
+        add_snapshot(&mut round, &SnapshotHeader { keyframe_step, ..header(step, 2) });
+    }
+    add_keyframe(&mut round, 7);
+    intake.take(round, NOW).unwrap();
+    assert_eq!(intake.counts().of(Topic::Keyframe).gaps, 1);
+}
+
+#[test]
+fn another_run_ends_it_and_nothing_of_that_is_taken() {
+    let mut intake = started();
+    let mut round = Round::default();
+    add_snapshot(&mut round, &header(5, 3));
+    add_snapshot(&mut round, &SnapshotHeader { run_id: 78, ..header(0, 0) });
+    round.add_update(Update::Outcome(&outcome(2, 5)));
+    round.add_update(Update::Outcome(&outcome(3, 7)));
+    let other = KeyframeHeader { run_id: 78, step: 9, size_bytes: 1 };
+    round.add_update(Update::Keyframe(&other, &[1]));
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!(names(&taken), ["/outcomes 5", "snapshot 5"]);
+    assert_eq!(taken.end, Some(RunEnd::NewRun));
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn another_load_ends_it() {
+    let mut intake = started();
+    let mut round = Round::default();
+    add_snapshot(&mut round, &SnapshotHeader { topology_revision: 1, ..header(5, 2) });
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!((names(&taken).len(), taken.end), (0, Some(RunEnd::NewLoad)));
+}
+
+#[test]
+fn a_scene_that_cannot_be_read_is_refused() {
+    let mut intake = Intake::default();
+    let mut round = Round::default();
+    add_load(&mut round);
+    let load = LoadHeader { run_id: RUN_ID, ..LoadHeader::default() };
+    round.add_update(Update::Scene(&load, b"version = 99"));
+    add_snapshot(&mut round, &header(0, 0));
+    add_keyframe(&mut round, 0);
+    assert!(matches!(intake.take(round, NOW), Err(IntakeError::Scene(_))));
+}

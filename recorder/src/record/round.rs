@@ -1,0 +1,55 @@
+//! What arrives between two waits, copied out of shared memory at once.
+
+use recorder::{Message, OutcomeRow, StatusRow, SurfaceRow, TearsRow, TopologyRow};
+use sim_contract::{
+    KeyframeHeader, LoadHeader, OUTCOME_FLAG_CONTROL, ParticleState, SnapshotHeader, Update,
+};
+
+/// What arrived in one round, out of shared memory.
+#[derive(Debug, Default)]
+pub(crate) struct Round {
+    pub(crate) snapshots: Vec<Snapshot>,
+    pub(crate) updates: Vec<Message>,
+    /// Newest load, if one came.
+    pub(crate) scene: Option<(LoadHeader, Vec<u8>)>,
+    pub(crate) topology: Option<(LoadHeader, TopologyRow)>,
+    pub(crate) surface: Option<(LoadHeader, SurfaceRow)>,
+    pub(crate) keyframes: Vec<(KeyframeHeader, Vec<u8>)>,
+    pub(crate) outcomes: Vec<OutcomeRow>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Snapshot {
+    pub(crate) header: SnapshotHeader,
+    pub(crate) particles: Vec<ParticleState>,
+}
+
+impl Round {
+    /// Copies a snapshot.
+    pub(crate) fn add_snapshot(&mut self, header: &SnapshotHeader, particles: &[ParticleState]) {
+        self.snapshots.push(Snapshot { header: *header, particles: particles.to_vec() });
+    }
+
+    /// Copies anything else. Answers to those who control a replay are not part of its run.
+    pub(crate) fn add_update(&mut self, update: Update<'_>) {
+        match update {
+            Update::Scene(header, bytes) => self.scene = Some((*header, bytes.to_vec())),
+            Update::Topology(header, constraints) => {
+                self.topology = Some((*header, TopologyRow::new(header, constraints)));
+            }
+            Update::Surface(header, triangles) => {
+                self.surface = Some((*header, SurfaceRow::new(header, triangles)));
+            }
+            Update::Keyframe(header, bytes) => self.keyframes.push((*header, bytes.to_vec())),
+            Update::Outcome(outcome) if outcome.flags & OUTCOME_FLAG_CONTROL != 0 => {}
+            Update::Outcome(outcome) => self.outcomes.push(OutcomeRow::from(outcome)),
+            Update::Status(status) => self.updates.push(Message::Status(StatusRow::from(status))),
+            Update::Tears(header, torn) => {
+                let new_count = (header.new_count as usize).min(torn.len());
+                let constraints = torn[torn.len() - new_count..].to_vec();
+                let row = TearsRow { step: header.step, constraints, causes: Vec::new() };
+                self.updates.push(Message::Tears(row));
+            }
+        }
+    }
+}

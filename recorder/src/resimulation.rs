@@ -1,0 +1,214 @@
+//! Simulates a recording again and compares every recorded step, from the file alone.
+
+use std::collections::BTreeMap;
+
+use recorder::{Frame, Message, OutcomeRow, StepRow};
+use sim_contract::{Outcome, ParticleState};
+use sim_solver::{Keyframe, Scene, Solver};
+use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
+
+use crate::apply::{apply, is_control};
+use crate::difference::{Difference, first_difference};
+
+/// What the comparison of one snapshot found. The texts are for people.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Finding {
+    /// Every bit is as recorded.
+    Identical,
+    /// The same commands do not lead to what is recorded.
+    Diverged {
+        /// The first step that differs.
+        step: u64,
+        what: String,
+        difference: Option<Difference>,
+    },
+    /// The log lacks outcomes: whether the solver agrees cannot be said.
+    Incomplete {
+        /// The first step that may lack one.
+        step: u64,
+        what: String,
+    },
+}
+
+/// Why a recording cannot be simulated again.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum StartError {
+    #[error("the keyframe of step {step}: {cause}")]
+    Keyframe { step: u64, cause: sim_solver::KeyframeError },
+    #[error("the state of step {step}: {cause}")]
+    State { step: u64, cause: sim_solver::RestoreError },
+}
+
+/// A recording that is being simulated again.
+#[derive(Debug)]
+pub(crate) struct Resimulation {
+    scene: Scene,
+    solver: Solver,
+    /// The step that the solver is at.
+    step: u64,
+    /// Index of the next outcome to apply.
+    next_index: u64,
+    /// Outcomes that have been read and not applied, by index.
+    waiting: BTreeMap<u64, OutcomeRow>,
+}
+
+impl Resimulation {
+    /// Starts at a snapshot that has its keyframe; `None` if it has none.
+    pub(crate) fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, StartError> {
+        let step = frame.row.step;
+        let own_keyframe = frame.updates.iter().rev().find_map(|update| match update {
+            Message::Keyframe { step: of, bytes } if *of == step => Some(bytes),
+            _ => None,
+        });
+        let Some(bytes) = own_keyframe else { return Ok(None) };
+        let keyframe =
+            Keyframe::decode(bytes).map_err(|cause| StartError::Keyframe { step, cause })?;
+        let mut solver = Solver::new(scene);
+        solver
+            .restore(bytemuck::cast_slice(&frame.particles), &keyframe)
+            .map_err(|cause| StartError::State { step, cause })?;
+        let next_index = frame.row.outcome_count;
+        let mut start =
+            Self { scene: scene.clone(), solver, step, next_index, waiting: BTreeMap::new() };
+        start.take_outcomes(&frame.updates);
+        Ok(Some(start))
+    }
+
+    /// Compares the snapshot that it started from with its own header, and step 0 with the scene.
+    pub(crate) fn compare_start(&self, frame: &Frame) -> Finding {
+        if self.step == 0 {
+            return compare(&Solver::new(&self.scene), frame);
+        }
+        compare(&self.solver, frame)
+    }
+
+    /// Steps to the next snapshot and compares it.
+    pub(crate) fn advance(&mut self, frame: &Frame) -> Finding {
+        self.take_outcomes(&frame.updates);
+        let row = &frame.row;
+        if row.step <= self.step {
+            let what = format!("it follows step {} in the file", self.step);
+            return Finding::Diverged { step: row.step, what, difference: None };
+        }
+        if let Some(finding) = self.find_gap(row) {
+            return finding;
+        }
+        while self.step < row.step {
+            if let Some(finding) = self.make_step() {
+                return finding;
+            }
+        }
+        // Whatever the header counts has been applied, or its step is another one.
+        if self.next_index != row.outcome_count {
+            return self.misplaced(row.step, "its step is not one of those it counts for");
+        }
+        compare(&self.solver, frame)
+    }
+
+    fn take_outcomes(&mut self, updates: &[Message]) {
+        let outcomes = updates.iter().filter_map(|update| match update {
+            // Those below are part of the state that this started from.
+            Message::Outcome(row) if row.index >= self.next_index => Some(row),
+            _ => None,
+        });
+        self.waiting.extend(outcomes.map(|row| (row.index, row.clone())));
+    }
+
+    /// Every outcome that is part of the snapshot must be in the log.
+    fn find_gap(&self, row: &StepRow) -> Option<Finding> {
+        let present = self.waiting.range(self.next_index..).map(|(index, _)| *index);
+        let expected = self.next_index..row.outcome_count;
+        let missing = expected.zip(present.map(Some).chain(std::iter::repeat(None)));
+        let (index, _) = missing.into_iter().find(|(index, found)| *found != Some(*index))?;
+        let before = index.checked_sub(1).and_then(|before| self.waiting.get(&before));
+        let step = before.map_or(self.step + 1, |before| before.step.max(self.step + 1));
+        let what = format!(
+            "outcome {index} is missing; the snapshot of step {} counts {} outcomes",
+            row.step, row.outcome_count
+        );
+        Some(Finding::Incomplete { step, what })
+    }
+
+    /// Applies the outcomes of the next step, in the order of their index, and makes it.
+    fn make_step(&mut self) -> Option<Finding> {
+        let step = self.step + 1;
+        while let Some(entry) = self.waiting.first_entry().filter(|entry| entry.get().step <= step)
+        {
+            let row = entry.remove();
+            if row.index != self.next_index || row.step != step {
+                return Some(self.misplaced(row.step, "the order of the log is another one"));
+            }
+            self.next_index += 1;
+            if let Some(finding) = self.apply(&row) {
+                return Some(finding);
+            }
+        }
+        self.solver.step();
+        self.step = step;
+        None
+    }
+
+    /// Pause, resume and step say when steps were made; whether a node took them is not repeated.
+    fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
+        let result = apply(&mut self.solver, row.client_id, row.action);
+        let again = Outcome::new(row.index, row.step, Outcome::from(row).command, result);
+        let again = OutcomeRow::from(&again);
+        if is_control(row.action) || (again.status == row.status && again.reason == row.reason) {
+            return None;
+        }
+        let what = format!(
+            "outcome {}: recorded {} {}, simulated {} {}",
+            row.index, row.status, row.reason, again.status, again.reason
+        );
+        Some(Finding::Diverged { step: row.step, what, difference: None })
+    }
+
+    fn misplaced(&self, step: u64, why: &str) -> Finding {
+        let what = format!("outcome {} is not where it belongs: {why}", self.next_index);
+        Finding::Diverged { step, what, difference: None }
+    }
+}
+
+/// The recorded header, the recorded payload and the simulated state must be one.
+fn compare(solver: &Solver, frame: &Frame) -> Finding {
+    let Frame { row, particles, .. } = frame;
+    let diverged =
+        |what: String, difference| Finding::Diverged { step: row.step, what, difference };
+    let expected_count = solver.particle_count();
+    if particles.len() != expected_count {
+        let what = format!("recorded {} particles, simulated {expected_count}", particles.len());
+        return diverged(what, None);
+    }
+    let simulated_hash = solver.state_hash();
+    if payload_hash(solver, particles) != simulated_hash {
+        let simulated: Vec<ParticleState> =
+            (0..expected_count).map(|index| bytemuck::cast(solver.particle(index))).collect();
+        let difference = first_difference(particles, &simulated);
+        let what = difference.as_ref().map_or_else(
+            || "the recorded hash is of other torn constraints".to_owned(),
+            ToString::to_string,
+        );
+        return diverged(what, difference);
+    }
+    if row.state_hash != simulated_hash {
+        let what = format!(
+            "its row in /steps has the hash {:016x}, its particles have {simulated_hash:016x}",
+            row.state_hash
+        );
+        return diverged(what, None);
+    }
+    if row.scene_step != solver.scene_step() {
+        let what =
+            format!("scene_step: recorded {}, simulated {}", row.scene_step, solver.scene_step());
+        return diverged(what, None);
+    }
+    Finding::Identical
+}
+
+/// The hash that the recorded bytes have, by the rule for the state hash.
+fn payload_hash(solver: &Solver, particles: &[ParticleState]) -> u64 {
+    let mut torn = solver.torn().to_vec();
+    torn.sort_unstable();
+    let seed = if torn.is_empty() { 0 } else { xxh3_64(bytemuck::cast_slice(&torn)) };
+    xxh3_64_with_seed(bytemuck::cast_slice(particles), seed)
+}

@@ -1,0 +1,314 @@
+//! Writes a recording: append-only, each chunk whole, and nothing more after the first error.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Write;
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{Attachment, WriteOptions, Writer};
+use schemars::{JsonSchema, schema_for};
+use serde::Serialize;
+
+use crate::descriptor::{FRAME_TRANSFORM, POINT_CLOUD, file_descriptor_set};
+use crate::message::Message;
+use crate::protobuf::{PointCloudEncoder, encode_transform};
+use crate::rows::{EventRow, OutcomeRow, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow};
+use crate::run::{CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT};
+use crate::topic::{AllCounts, Topic};
+
+/// Encoding of `/keyframe`: bytes that only the solver reads.
+pub(crate) const KEYFRAME_ENCODING: &str = "application/octet-stream";
+
+/// How the chunks of a file are compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Compression {
+    /// Not at all: 0.2 ms per 10,000 particles.
+    None,
+    /// LZ4: 0.9 ms per 10,000 particles.
+    Lz4,
+    /// Zstandard level 1: 1.4 ms per 10,000 particles.
+    Zstd,
+}
+
+/// How a file is written.
+#[derive(Debug, Clone, Copy)]
+pub struct LogOptions {
+    /// Compression of the chunks. Default: zstd.
+    pub compression: Compression,
+    /// Size that a chunk has reached when it is closed, uncompressed, in bytes. What is in an
+    /// open chunk is lost when the process is killed. Default: 1 MiB.
+    pub chunk_size_bytes: u64,
+}
+
+impl Default for LogOptions {
+    fn default() -> Self {
+        Self { compression: Compression::Zstd, chunk_size_bytes: 1 << 20 }
+    }
+}
+
+/// Why a file could not be written any further.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The first error; the file ends before it.
+    #[error("cannot write: {0}")]
+    Failed(String),
+    /// Writing went on after an error.
+    #[error("nothing more is written after an error")]
+    Stopped,
+}
+
+impl From<mcap::McapError> for WriteError {
+    fn from(error: mcap::McapError) -> Self {
+        match error {
+            mcap::McapError::Io(cause) => Self::Failed(cause.to_string()),
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+impl From<std::io::Error> for WriteError {
+    fn from(error: std::io::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+impl From<serde_json::Error> for WriteError {
+    fn from(error: serde_json::Error) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// Writes one recording.
+///
+/// The first error is final: a half-written file stays readable up to there, and a file that went
+/// on after an error would claim to be whole. Dropped without [`LogWriter::finish`], it leaves a
+/// file without an end, as a killed process does.
+pub struct LogWriter<W: Write> {
+    /// `None` after an error.
+    file: Option<Writer<NoSeek<W>>>,
+    run: RunDescription,
+    /// Channel of each topic, in their order.
+    channels: [u16; Topic::ALL.len()],
+    point_cloud: PointCloudEncoder,
+    /// The message that is being encoded.
+    scratch: Vec<u8>,
+    /// The newest time of reception: a later message is never earlier.
+    log_time_ns: u64,
+    /// Only `written` is counted here.
+    counts: AllCounts,
+}
+
+impl<W: Write> LogWriter<W> {
+    /// Begins a recording with its head: the scene, the run, the schemas and `/tf`.
+    /// `log_time_ns`: wall clock now, in nanoseconds since 1970.
+    ///
+    /// # Errors
+    /// If the head cannot be written.
+    pub fn create(
+        out: W,
+        options: LogOptions,
+        run: &RunDescription,
+        scene: &[u8],
+        log_time_ns: u64,
+    ) -> Result<Self, WriteError> {
+        let mut file = write_options(options).create(NoSeek::new(out))?;
+        match write_head(&mut file, run, scene, log_time_ns) {
+            Ok(channels) => Ok(Self {
+                file: Some(file),
+                run: run.clone(),
+                channels,
+                point_cloud: PointCloudEncoder::new(),
+                scratch: Vec::new(),
+                log_time_ns,
+                counts: AllCounts::default(),
+            }),
+            Err(error) => {
+                drop(file.into_inner());
+                Err(error)
+            }
+        }
+    }
+
+    /// Appends a message. `log_time_ns`: wall clock of its reception; one earlier than a message
+    /// before is taken as that message's time.
+    ///
+    /// # Errors
+    /// If this or any call before failed.
+    pub fn write(&mut self, message: &Message, log_time_ns: u64) -> Result<(), WriteError> {
+        self.log_time_ns = self.log_time_ns.max(log_time_ns);
+        let publish_time_ns = self.run.time_of_step_ns(message.step());
+        let data = encode(message, publish_time_ns, &mut self.point_cloud, &mut self.scratch)?;
+        let header = MessageHeader {
+            channel_id: self.channels[message.topic().index()],
+            sequence: low_32_bits(message.step()),
+            log_time: self.log_time_ns,
+            publish_time: publish_time_ns,
+        };
+        let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
+        let result = file.write_to_known_channel(&header, data);
+        self.stop_on_error(result)?;
+        self.counts.of_mut(message.topic()).written += 1;
+        Ok(())
+    }
+
+    /// The messages written so far, by topic; nothing else is counted in it.
+    pub fn counts(&self) -> &AllCounts {
+        &self.counts
+    }
+
+    /// Closes the open chunk and hands everything to the operating system, so that it outlives
+    /// this process.
+    ///
+    /// # Errors
+    /// If this or any call before failed.
+    pub fn flush(&mut self) -> Result<(), WriteError> {
+        let result = self.file.as_mut().ok_or(WriteError::Stopped)?.flush();
+        self.stop_on_error(result)
+    }
+
+    /// Writes how the recording ended and the index, and hands back what it was written into.
+    ///
+    /// # Errors
+    /// If this or any call before failed; the file then has no end.
+    pub fn finish(mut self, closing: &Closing) -> Result<W, WriteError> {
+        let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
+        let metadata = Metadata { name: CLOSING_METADATA.to_owned(), metadata: closing.to_map() };
+        let result = file.write_metadata(&metadata).and_then(|()| file.finish().map(drop));
+        self.stop_on_error(result)?;
+        let file = self.file.take().ok_or(WriteError::Stopped)?;
+        let mut out = file.into_inner().into_inner();
+        out.flush()?;
+        Ok(out)
+    }
+
+    fn stop_on_error(&mut self, result: mcap::McapResult<()>) -> Result<(), WriteError> {
+        if result.is_err() {
+            self.abandon();
+        }
+        Ok(result?)
+    }
+
+    /// Lets the file go as it is. Dropping mcap's writer would finish it instead.
+    fn abandon(&mut self) {
+        drop(self.file.take().map(Writer::into_inner));
+    }
+}
+
+impl<W: Write> Drop for LogWriter<W> {
+    fn drop(&mut self) {
+        self.abandon();
+    }
+}
+
+impl<W: Write> std::fmt::Debug for LogWriter<W> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("LogWriter").field("run", &self.run).finish_non_exhaustive()
+    }
+}
+
+fn write_options(options: LogOptions) -> WriteOptions {
+    let compression = match options.compression {
+        Compression::None => None,
+        Compression::Lz4 => Some(mcap::Compression::Lz4),
+        Compression::Zstd => Some(mcap::Compression::Zstd),
+    };
+    let level = u32::from(options.compression == Compression::Zstd);
+    WriteOptions::new()
+        .profile("")
+        .library(format!("recorder/{} {}", env!("CARGO_PKG_VERSION"), mcap::LIBRARY_IDENTIFIER))
+        // A chunk goes out whole, or not at all; every reader understands what is there.
+        .disable_seeking(true)
+        .chunk_size(Some(options.chunk_size_bytes))
+        .compression(compression)
+        .compression_level(level)
+        // The solver has the cores.
+        .compression_threads(0)
+}
+
+fn write_head<W: Write>(
+    file: &mut Writer<NoSeek<W>>,
+    run: &RunDescription,
+    scene: &[u8],
+    log_time_ns: u64,
+) -> Result<[u16; Topic::ALL.len()], WriteError> {
+    file.attach(&Attachment {
+        log_time: log_time_ns,
+        create_time: run.epoch_ns,
+        name: SCENE_ATTACHMENT.to_owned(),
+        media_type: "application/toml".to_owned(),
+        data: Cow::Borrowed(scene),
+    })?;
+    file.write_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_map() })?;
+    let mut channels = [0; Topic::ALL.len()];
+    for topic in Topic::ALL {
+        channels[topic.index()] = add_channel(file, topic)?;
+    }
+    let publish_time = run.time_of_step_ns(0);
+    let channel_id = channels[Topic::Tf.index()];
+    let header = MessageHeader { channel_id, sequence: 0, log_time: log_time_ns, publish_time };
+    file.write_to_known_channel(&header, &encode_transform(publish_time, run.origin))?;
+    Ok(channels)
+}
+
+fn add_channel<W: Write>(file: &mut Writer<NoSeek<W>>, topic: Topic) -> mcap::McapResult<u16> {
+    let mut json = |name: &str, schema: String| {
+        file.add_schema(name, "jsonschema", schema.as_bytes()).map(|id| (id, "json"))
+    };
+    let (schema_id, encoding) = match topic {
+        Topic::Topology => json("catenary.Topology", schema::<TopologyRow>()),
+        Topic::Surface => json("catenary.Surface", schema::<SurfaceRow>()),
+        Topic::Tears => json("catenary.Tears", schema::<TearsRow>()),
+        Topic::Outcomes => json("catenary.Outcome", schema::<OutcomeRow>()),
+        Topic::Status => json("catenary.Status", schema::<StatusRow>()),
+        Topic::Events => json("catenary.Event", schema::<EventRow>()),
+        Topic::Steps => json("catenary.Step", schema::<StepRow>()),
+        Topic::Keyframe => Ok((0, KEYFRAME_ENCODING)),
+        Topic::Tf => protobuf(file, FRAME_TRANSFORM),
+        Topic::Particles => protobuf(file, POINT_CLOUD),
+    }?;
+    file.add_channel(schema_id, topic.name(), encoding, &BTreeMap::new())
+}
+
+fn protobuf<W: Write>(
+    file: &mut Writer<NoSeek<W>>,
+    name: &'static str,
+) -> mcap::McapResult<(u16, &'static str)> {
+    let id = file.add_schema(name, "protobuf", &file_descriptor_set(name))?;
+    Ok((id, "protobuf"))
+}
+
+fn schema<T: JsonSchema>() -> String {
+    schema_for!(T).to_value().to_string()
+}
+
+/// The bytes of a message: its own, or encoded into `scratch`.
+fn encode<'a>(
+    message: &'a Message,
+    time_ns: u64,
+    point_cloud: &mut PointCloudEncoder,
+    scratch: &'a mut Vec<u8>,
+) -> Result<&'a [u8], WriteError> {
+    match message {
+        Message::Topology(row) => json(row, scratch)?,
+        Message::Surface(row) => json(row, scratch)?,
+        Message::Tears(row) => json(row, scratch)?,
+        Message::Outcome(row) => json(row, scratch)?,
+        Message::Status(row) => json(row, scratch)?,
+        Message::Event(row) => json(row, scratch)?,
+        Message::Step(row) => json(row, scratch)?,
+        Message::Keyframe { bytes, .. } => return Ok(bytes),
+        Message::Particles { particles, .. } => point_cloud.encode(time_ns, particles, scratch),
+    }
+    Ok(scratch)
+}
+
+fn json<T: Serialize>(row: &T, scratch: &mut Vec<u8>) -> Result<(), WriteError> {
+    scratch.clear();
+    Ok(serde_json::to_writer(scratch, row)?)
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the low half is what is asked for")]
+fn low_32_bits(step: u64) -> u32 {
+    step as u32
+}

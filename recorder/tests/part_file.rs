@@ -1,0 +1,104 @@
+//! A file bears its name only once it is finished, and nothing is replaced unless told.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by it")]
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use recorder::{Existing, PartFile, PartFileError};
+
+/// A directory of one test, removed at its end.
+struct Directory(PathBuf);
+
+impl Directory {
+    fn new(test: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("part-file-{}-{test}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for Directory {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn write(path: &Path, existing: Existing, text: &str) -> Result<PartFile, PartFileError> {
+    let mut file = PartFile::create(path, existing)?;
+    file.write_all(text.as_bytes()).unwrap();
+    Ok(file)
+}
+
+#[test]
+fn it_has_its_name_only_after_the_end() {
+    let directory = Directory::new("name");
+    let path = directory.file("a.mcap");
+    let file = write(&path, Existing::Refuse, "one").unwrap();
+    assert!(!path.exists());
+    assert_eq!(file.part_path(), directory.file("a.mcap.part"));
+    assert_eq!(file.finish().unwrap(), path);
+    assert_eq!(fs::read_to_string(&path).unwrap(), "one");
+    assert!(!directory.file("a.mcap.part").exists());
+}
+
+#[test]
+fn an_existing_file_is_refused_and_stays() {
+    let directory = Directory::new("refuse");
+    let path = directory.file("a.mcap");
+    fs::write(&path, "old").unwrap();
+    let error = write(&path, Existing::Refuse, "new").unwrap_err();
+    assert_eq!(error.to_string(), format!("{} exists (--overwrite replaces it)", path.display()));
+    assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+    assert!(!directory.file("a.mcap.part").exists());
+}
+
+#[test]
+fn what_a_killed_recorder_left_is_refused_and_stays() {
+    let directory = Directory::new("killed");
+    let path = directory.file("a.mcap");
+    drop(write(&path, Existing::Refuse, "half").unwrap());
+    let error = write(&path, Existing::Refuse, "new").unwrap_err();
+    assert!(matches!(error, PartFileError::PartExists(_)), "{error}");
+    assert_eq!(fs::read_to_string(directory.file("a.mcap.part")).unwrap(), "half");
+}
+
+#[test]
+fn both_are_replaced_when_told() {
+    let directory = Directory::new("overwrite");
+    let path = directory.file("a.mcap");
+    fs::write(&path, "old").unwrap();
+    fs::write(directory.file("a.mcap.part"), "half of something long").unwrap();
+    write(&path, Existing::Overwrite, "new").unwrap().finish().unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+}
+
+#[test]
+fn a_file_that_appeared_meanwhile_is_not_replaced() {
+    let directory = Directory::new("meanwhile");
+    let path = directory.file("a.mcap");
+    let file = write(&path, Existing::Refuse, "new").unwrap();
+    fs::write(&path, "other").unwrap();
+    assert!(matches!(file.finish(), Err(PartFileError::Exists(_))));
+    assert_eq!(fs::read_to_string(&path).unwrap(), "other");
+    assert_eq!(fs::read_to_string(directory.file("a.mcap.part")).unwrap(), "new");
+}
+
+#[test]
+fn a_discarded_file_leaves_nothing() {
+    let directory = Directory::new("discard");
+    let path = directory.file("a.mcap");
+    write(&path, Existing::Refuse, "new").unwrap().discard().unwrap();
+    assert_eq!(fs::read_dir(&directory.0).unwrap().count(), 0);
+}
+
+#[test]
+fn a_directory_that_is_not_there_is_named() {
+    let directory = Directory::new("missing");
+    let error = write(&directory.file("no/a.mcap"), Existing::Refuse, "x").unwrap_err();
+    assert!(error.to_string().contains("no/a.mcap.part: No such file"), "{error}");
+}
