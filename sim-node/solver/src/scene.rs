@@ -1,6 +1,6 @@
 //! Scenes: what is simulated, as checked data and as TOML text.
 //!
-//! [`Scene`] is the complete effective scene, every default filled in; [`Model`] is what it expands
+//! [`Scene`] is the complete effective scene, every default filled in; `Model` is what it expands
 //! to: every particle, constraint and triangle.
 
 mod check;
