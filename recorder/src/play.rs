@@ -43,16 +43,16 @@ pub(crate) struct PlayArgs {
     file: PathBuf,
     #[command(flatten)]
     endpoint: EndpointArgs,
-    /// Recorded time per wall-clock time, above 0 to 1000
+    /// Simulated time per wall-clock time, above 0 to 1000; pauses of the recorded run are left out
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = rate)]
     rate: f64,
     /// Start again at the end, as a new run [default: end]
     #[arg(long = "loop")]
     loops: bool,
-    /// Start this long after the first snapshot, such as 2s or 500ms [default: 0s]
+    /// Start this much simulated time after the first snapshot, such as 2s or 500ms [default: 0s]
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     start: Option<Duration>,
-    /// End this long after the first snapshot [default: the end of the recording]
+    /// End this much simulated time after the first snapshot [default: the end of the recording]
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     end: Option<Duration>,
     /// Wait with the first snapshot for `ctl resume` or `ctl step` [default: go on]
@@ -74,13 +74,22 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     let endpoint = args.endpoint.endpoint()?;
     let path = output::name_of(&args.file);
+    if args.end.is_some_and(|end| end < args.start.unwrap_or_default()) {
+        let problem = "--end is before --start: nothing would be played\n";
+        clap::Error::raw(clap::error::ErrorKind::ValueValidation, problem).exit();
+    }
     let mut is_first = true;
+    let mut is_paused = args.paused;
     loop {
-        let pass = Pass::open(args, &endpoint).with_context(|| path.clone())?;
+        let mut pass = Pass::open(args, &endpoint).with_context(|| path.clone())?;
+        // Whoever pauses the end of a pass finds the next one paused.
+        pass.replay.control = Control::new(is_paused);
+        let readers = if is_first { args.wait_for_readers } else { 0 };
         if is_first {
             output::note(&format!("ready playing {path} as {endpoint}"));
         }
-        let end = pass.play(args, &stop, is_first).with_context(|| path.clone())?;
+        let end = pass.play(readers, &stop).with_context(|| path.clone())?;
+        is_paused = pass.replay.control.is_paused;
         is_first = false;
         if let Some(end) = &end
             && *end != LogEnd::Whole
@@ -118,7 +127,7 @@ impl Pass {
         let start_ns = origin_ns.saturating_add(nanoseconds(args.start.unwrap_or_default()));
         let mut position = Position::default();
         while run.time_of_step_ns(first.row.step) < start_ns {
-            first.updates.iter().for_each(|update| position.follow(update));
+            first.updates.iter().for_each(|update| position.skip(update));
             first = next_frame(&mut frames).context("--start is behind its last snapshot")?;
         }
         let recorded =
@@ -130,18 +139,10 @@ impl Pass {
     }
 
     /// Plays to the end, or until asked to stop. How the file ends, if its end was reached.
-    fn play(
-        mut self,
-        args: &PlayArgs,
-        stop: &Stop,
-        is_first: bool,
-    ) -> anyhow::Result<Option<LogEnd>> {
+    fn play(&mut self, readers: usize, stop: &Stop) -> anyhow::Result<Option<LogEnd>> {
         let first_step = self.first.row.step;
-        if is_first {
-            self.replay.control = Control::new(args.paused);
-            self.wait_for_readers(args.wait_for_readers, first_step, stop)?;
-        }
-        self.replay.publish_torn(first_step)?;
+        self.wait_for_readers(readers, first_step, stop)?;
+        self.replay.publish_latched(first_step)?;
         let mut next = Some(self.first.clone());
         let mut last_step = first_step;
         while let Some(frame) = next {

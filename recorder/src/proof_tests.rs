@@ -177,6 +177,24 @@ fn a_changed_hash_of_a_step_is_found() {
 }
 
 #[test]
+fn a_later_keyframe_of_another_state_is_found() {
+    let (file, _) = record(&job("curtain", COMMANDS, 300));
+    let mut first = None;
+    let changed = rebuild(&file, |message| match message {
+        Message::Keyframe { step: 0, bytes } => {
+            first = Some(bytes.clone());
+            Some(Message::Keyframe { step: 0, bytes })
+        }
+        Message::Keyframe { step: 240, .. } => {
+            Some(Message::Keyframe { step: 240, bytes: first.clone().unwrap() })
+        }
+        other => Some(other),
+    });
+    let (report, _) = check(&changed);
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(240)));
+}
+
+#[test]
 fn a_missing_outcome_is_reported_and_the_solver_is_not_blamed() {
     let (file, _) = record(&job("curtain", COMMANDS, 200));
     for (missing_index, step) in [(0, 10), (4, 50), (8, 110)] {

@@ -26,7 +26,9 @@ pub enum ReadError {
     #[error("is not an MCAP file")]
     NotMcap,
     /// An MCAP file that no recorder of ours wrote.
-    #[error("is an MCAP file of '{library}', not a recording of a simulation (no metadata 'run')")]
+    #[error(
+        "is an MCAP file of '{library}', not a recording of a simulation (no metadata 'run' before its first message)"
+    )]
     Foreign {
         /// What the file says that it was written by.
         library: String,

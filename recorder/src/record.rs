@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
 use recorder::{Closing, Message, PartFile, WriteError};
-use sim_contract::{Endpoint, Tap};
+use sim_contract::{Endpoint, ReadError, Tap};
 
 use crate::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use crate::endpoint_args::EndpointArgs;
@@ -52,8 +52,8 @@ pub(crate) struct RecordArgs {
     /// End this many steps after the first recorded one [default: no limit]
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
-    /// Memory between reading and writing, in bytes, at least 1 MiB; what does not fit is lost and
-    /// counted
+    /// Memory for snapshots between reading and writing, in bytes, at least 1 MiB; those that do
+    /// not fit are lost and counted
     #[arg(long, value_name = "BYTES", default_value_t = 256 << 20, value_parser = clap::value_parser!(u64).range(1 << 20..=1 << 40))]
     queue_bytes: u64,
     #[command(flatten)]
@@ -74,7 +74,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
     let mut recording = Recording {
         tap,
-        intake: Intake::default(),
+        intake: Intake::new(args.steps),
         queue: Arc::new(Queue::new(queue_bytes)),
         file: Some(file),
         writing: None,
@@ -82,7 +82,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         begin_ns: monotonic_ns(),
         next_owner_look_ns: 0,
         is_owner_alive: true,
-        has_warned: false,
+        unreadable: 0,
     };
     let result = recording.run(args, &stop);
     let report = recording.finish(result, &endpoint)?;
@@ -95,7 +95,6 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
 pub(crate) enum StopReason {
     Signal,
     Duration,
-    Steps,
     OwnerGone,
     Run(RunEnd),
     WriteError,
@@ -106,10 +105,10 @@ impl StopReason {
         match self {
             Self::Signal => "signal",
             Self::Duration => "duration reached",
-            Self::Steps => "steps reached",
             Self::OwnerGone => "owner gone",
             Self::Run(RunEnd::NewRun) => "new run",
             Self::Run(RunEnd::NewLoad) => "new scene loaded",
+            Self::Run(RunEnd::EndStep) => "steps reached",
             Self::WriteError => "write error",
         }
     }
@@ -124,13 +123,14 @@ struct Recording {
     /// The file, until it has a head.
     file: Option<PartFile>,
     /// The thread that writes, once there is a head.
-    writing: Option<JoinHandle<Result<LogFile, WriteError>>>,
+    writing: Option<JoinHandle<anyhow::Result<LogFile>>>,
     /// The last step handed over for writing.
     last_step: u64,
     begin_ns: u64,
     next_owner_look_ns: u64,
     is_owner_alive: bool,
-    has_warned: bool,
+    /// Messages that came and could not be read.
+    unreadable: u64,
 }
 
 impl Recording {
@@ -143,8 +143,8 @@ impl Recording {
             let now = Now { realtime_ns: log_time_ns, monotonic_ns: monotonic_ns() };
             let taken = self.intake.take(round, now)?;
             let end = taken.end.map(StopReason::Run);
-            let steps_end = self.hand_over(taken, args, log_time_ns)?;
-            if let Some(reason) = end.or(steps_end).or(reason) {
+            self.hand_over(taken, args, log_time_ns)?;
+            if let Some(reason) = end.or(reason) {
                 return Ok(reason);
             }
             self.tap.wait(WAIT_MAX);
@@ -172,59 +172,53 @@ impl Recording {
     /// Copies out of shared memory: the particles first, so that what belongs to them is there.
     fn read(&mut self) -> (Round, u64) {
         let mut round = Round::default();
-        let result = self
-            .tap
-            .drain_particles(|header, particles| round.add_snapshot(header, particles))
-            .and_then(|_| {
-                for _ in 0..READS_PER_ROUND_MAX {
-                    if self.tap.drain_updates(|update| round.add_update(update))? == 0 {
-                        break;
-                    }
-                }
-                Ok(())
-            });
-        if let Err(error) = result
-            && !self.has_warned
-        {
-            self.has_warned = true;
-            output::note(&format!("warning: a message was not recorded: {error}"));
+        let drained =
+            self.tap.drain_particles(|header, particles| round.add_snapshot(header, particles));
+        self.note_unreadable(&drained.errors);
+        for _ in 0..READS_PER_ROUND_MAX {
+            let drained = self.tap.drain_updates(|update| round.add_update(update));
+            self.note_unreadable(&drained.errors);
+            if drained.count == 0 {
+                break;
+            }
         }
         (round, realtime_ns())
     }
 
-    /// Hands a round to the writing thread, up to the last step that is asked for.
+    /// Counts messages that came and could not be read, and tells of the first.
+    fn note_unreadable(&mut self, errors: &[ReadError]) {
+        if let (Some(error), 0) = (errors.first(), self.unreadable) {
+            output::note(&format!("warning: a message was not recorded: {error}"));
+        }
+        self.unreadable += errors.len() as u64;
+    }
+
+    /// Hands a round to the writing thread.
     fn hand_over(
         &mut self,
         taken: Taken,
         args: &RecordArgs,
         log_time_ns: u64,
-    ) -> anyhow::Result<Option<StopReason>> {
+    ) -> anyhow::Result<()> {
         if let Some(head) = taken.head {
-            self.begin(args, &head, log_time_ns)?;
+            self.begin(args, head, log_time_ns)?;
         }
-        let first_step = self.intake.first_step().unwrap_or(0);
-        let end_step = args.steps.map_or(u64::MAX, |steps| first_step.saturating_add(steps));
         for content in taken.contents {
             if let Content::Snapshot(row, _) = &content {
                 self.last_step = row.step;
             }
             self.queue.push(Item { content, log_time_ns });
-            if self.last_step >= end_step {
-                return Ok(Some(StopReason::Steps));
-            }
         }
-        Ok(None)
+        Ok(())
     }
 
-    fn begin(&mut self, args: &RecordArgs, head: &Head, log_time_ns: u64) -> anyhow::Result<()> {
+    /// Starts the writing thread, which begins with the head: no disk is waited for here.
+    fn begin(&mut self, args: &RecordArgs, head: Head, log_time_ns: u64) -> anyhow::Result<()> {
         let Some(file) = self.file.take() else { return Ok(()) };
-        let log = args.file.begin(file, &head.run, &head.scene, log_time_ns)?;
-        let queue = Arc::clone(&self.queue);
+        let (queue, options) = (CloseOnDrop(Arc::clone(&self.queue)), args.file.clone());
         let writing = thread::Builder::new().name("writer".to_owned()).spawn(move || {
-            let result = write(&queue, log);
-            // After an error, nothing more is taken in, and the reading side sees it.
-            queue.close();
-            result
+            let log = options.begin(file, &head.run, &head.scene, log_time_ns)?;
+            Ok(write(&queue.0, log)?)
         });
         self.writing = Some(writing.context("cannot start the writing thread")?);
         Ok(())
@@ -256,10 +250,20 @@ impl Recording {
         let mut closing = Closing { stop_reason, counts: self.intake.counts() };
         closing.counts.set_written(log.counts());
         closing.counts.set_lost(&self.queue.lost());
-        let path = log.finish(&closing)?.finish()?;
+        let kept = "the recording is whole but for its end, under its name with .part behind it";
+        let path = log.finish(&closing).context(kept)?.finish().context(kept)?;
         result?;
         let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
-        Ok(Report::new(path, closing, steps))
+        Ok(Report::new(path, closing, steps).with_unreadable(self.unreadable))
+    }
+}
+
+/// However the writing thread ends, nothing more is taken in then, and the reading side sees it.
+struct CloseOnDrop(Arc<Queue>);
+
+impl Drop for CloseOnDrop {
+    fn drop(&mut self) {
+        self.0.close();
     }
 }
 

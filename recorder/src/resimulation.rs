@@ -56,11 +56,7 @@ impl Resimulation {
     /// Starts at a snapshot that has its keyframe; `None` if it has none.
     pub(crate) fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, StartError> {
         let step = frame.row.step;
-        let own_keyframe = frame.updates.iter().rev().find_map(|update| match update {
-            Message::Keyframe { step: of, bytes } if *of == step => Some(bytes),
-            _ => None,
-        });
-        let Some(bytes) = own_keyframe else { return Ok(None) };
+        let Some(bytes) = own_keyframe(frame) else { return Ok(None) };
         let keyframe =
             Keyframe::decode(bytes).map_err(|cause| StartError::Keyframe { step, cause })?;
         let mut solver = Solver::new(scene);
@@ -102,7 +98,31 @@ impl Resimulation {
         if self.next_index != row.outcome_count {
             return self.misplaced(row.step, "its step is not one of those it counts for");
         }
-        compare(&self.solver, frame)
+        match compare(&self.solver, frame) {
+            Finding::Identical => self.compare_keyframe(frame),
+            different => different,
+        }
+    }
+
+    /// What particles lack must be as recorded, too, where it is recorded.
+    fn compare_keyframe(&self, frame: &Frame) -> Finding {
+        let step = frame.row.step;
+        let recorded = own_keyframe(frame).map(Keyframe::decode);
+        let mut simulated = self.solver.keyframe();
+        let what = match recorded {
+            None => return Finding::Identical,
+            Some(Err(error)) => format!("its keyframe is damaged: {error}"),
+            Some(Ok(recorded)) => {
+                // Whether the node was paused is not the solver's.
+                simulated.paused = recorded.paused;
+                if recorded == simulated {
+                    return Finding::Identical;
+                }
+                "its keyframe is of another state: other masses, grabs or torn constraints"
+                    .to_owned()
+            }
+        };
+        Finding::Diverged { step, what, difference: None }
     }
 
     fn take_outcomes(&mut self, updates: &[Message]) {
@@ -167,6 +187,14 @@ impl Resimulation {
         let what = format!("outcome {} is not where it belongs: {why}", self.next_index);
         Finding::Diverged { step, what, difference: None }
     }
+}
+
+/// The keyframe that completes a snapshot, if there is one.
+fn own_keyframe(frame: &Frame) -> Option<&[u8]> {
+    frame.updates.iter().rev().find_map(|update| match update {
+        Message::Keyframe { step, bytes } if *step == frame.row.step => Some(bytes.as_slice()),
+        _ => None,
+    })
 }
 
 /// The recorded header, the recorded payload and the simulated state must be one.

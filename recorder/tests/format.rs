@@ -316,7 +316,7 @@ fn other_files_are_named_for_what_they_are() {
     let error = LogReader::new(other.into_inner().into_inner().as_slice()).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "is an MCAP file of 'cat', not a recording of a simulation (no metadata 'run')"
+        "is an MCAP file of 'cat', not a recording of a simulation (no metadata 'run' before its first message)"
     );
 }
 

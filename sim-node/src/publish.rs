@@ -102,11 +102,11 @@ impl Publisher {
         position: Position,
         times: StepTimes,
     ) -> anyhow::Result<()> {
+        self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
         if !position.step.is_multiple_of(self.every) {
             return self.publish_outcomes();
         }
         self.watch_keyframe_readers();
-        self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
         if self.is_keyframe_due {
             self.publish_keyframe(solver, position)?;
         }

@@ -42,6 +42,9 @@ pub(crate) struct Replay {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Position {
     keyframe_step: u64,
+    /// The newest keyframe before the first snapshot that is played: a late joiner of the live
+    /// node would have found it.
+    latched_keyframe: Option<Vec<u8>>,
     /// Whether the node was paused.
     is_paused: bool,
     /// Outcomes so far.
@@ -52,6 +55,14 @@ pub(crate) struct Position {
 }
 
 impl Position {
+    /// Follows what is published before the first snapshot that is played.
+    pub(crate) fn skip(&mut self, update: &Message) {
+        self.follow(update);
+        if let Message::Keyframe { bytes, .. } = update {
+            self.latched_keyframe = Some(bytes.clone());
+        }
+    }
+
     /// Follows what is published before a snapshot.
     pub(crate) fn follow(&mut self, update: &Message) {
         match update {
@@ -122,12 +133,16 @@ impl Replay {
         Ok(Self { owner, run, run_id, control, rate, position, step, status, arrived })
     }
 
-    /// Publishes what tore before the first snapshot of this pass.
-    pub(crate) fn publish_torn(&self, step: u64) -> anyhow::Result<()> {
-        if self.position.torn.is_empty() {
-            return Ok(());
+    /// Publishes what a late joiner of the live node would have found before the first snapshot of
+    /// this pass: what tore, and the newest keyframe.
+    pub(crate) fn publish_latched(&mut self, step: u64) -> anyhow::Result<()> {
+        if !self.position.torn.is_empty() {
+            self.publish_tears(step, 0)?;
         }
-        self.publish_tears(step, 0)
+        if let Some(bytes) = self.position.latched_keyframe.take() {
+            self.publish_keyframe(self.position.keyframe_step, &bytes)?;
+        }
+        Ok(())
     }
 
     /// Publishes a snapshot and all that belongs to it, in the recorded order.
@@ -150,9 +165,7 @@ impl Replay {
     fn publish_update(&mut self, update: &Message) -> anyhow::Result<()> {
         match update {
             Message::Keyframe { step, bytes } => {
-                let size_bytes = bytes.len() as u64;
-                let header = KeyframeHeader { run_id: self.run_id, step: *step, size_bytes };
-                self.owner.publish_keyframe(header, bytes)?;
+                self.publish_keyframe(*step, bytes)?;
             }
             Message::Outcome(row) => {
                 self.owner.publish_outcome(&Outcome::from(row))?;
@@ -168,6 +181,12 @@ impl Replay {
             _ => {}
         }
         Ok(())
+    }
+
+    fn publish_keyframe(&self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
+        let size_bytes = bytes.len() as u64;
+        let header = KeyframeHeader { run_id: self.run_id, step, size_bytes };
+        Ok(self.owner.publish_keyframe(header, bytes)?)
     }
 
     fn publish_tears(&self, step: u64, new_count: u32) -> anyhow::Result<()> {

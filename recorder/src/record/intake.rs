@@ -1,7 +1,7 @@
 //! From what arrives in shared memory to what is written: where a recording starts, in which order
 //! it goes on, where it ends, and what is missing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use recorder::{AllCounts, Message, OutcomeRow, RunDescription, StepRow, Topic};
 use sim_contract::{KeyframeHeader, LoadHeader, SnapshotHeader};
@@ -33,6 +33,8 @@ pub(crate) enum RunEnd {
     NewRun,
     /// Another scene was loaded.
     NewLoad,
+    /// The last step that is wanted is behind it.
+    EndStep,
 }
 
 /// Why a run cannot be recorded at all.
@@ -44,10 +46,18 @@ pub(crate) enum IntakeError {
     Scene(#[from] SceneError),
 }
 
+/// Most outcomes that are kept before the first snapshot; of more, the oldest are forgotten.
+const OUTCOMES_KEPT_MAX: usize = 1 << 16;
+
 /// Takes in a run from the first snapshot that is a complete state with its keyframe.
 #[derive(Debug, Default)]
 pub(crate) struct Intake {
     load: Round,
+    /// The scene of the load, read with all its checks: its name stands nowhere else, and a scene
+    /// that cannot be read makes a recording that cannot be verified.
+    scene: Option<Scene>,
+    /// Steps to record after the first one.
+    steps_max: Option<u64>,
     /// The newest snapshot and keyframe, until a pair of one step has come.
     candidate: Option<Snapshot>,
     candidate_keyframe: Option<(KeyframeHeader, Vec<u8>)>,
@@ -61,9 +71,14 @@ struct Started {
     run_id: u64,
     topology_revision: u32,
     first_step: u64,
+    /// The last step that is wanted.
+    end_step: u64,
     last: SnapshotHeader,
     next_outcome: u64,
-    newest_keyframe: u64,
+    /// The newest keyframe that a snapshot named.
+    named_keyframe: u64,
+    /// Steps of the keyframes that came, above the one named last.
+    keyframes: BTreeSet<u64>,
     /// How often each distance between two snapshots occurred, in steps.
     distances: BTreeMap<u64, u64>,
 }
@@ -79,12 +94,17 @@ pub(crate) struct Taken {
 }
 
 impl Intake {
+    /// Takes in a run, up to `steps_max` steps after the first one.
+    pub(crate) fn new(steps_max: Option<u64>) -> Self {
+        Self { steps_max, ..Self::default() }
+    }
+
     /// Takes in a round.
     pub(crate) fn take(&mut self, mut round: Round, now: Now) -> Result<Taken, IntakeError> {
         let mut taken = Taken::default();
-        self.keep_load(&mut round);
+        self.keep_load(&mut round)?;
         if self.started.is_none() {
-            self.try_start(&mut round, now, &mut taken)?;
+            self.try_start(&mut round, now, &mut taken);
         }
         if let Some(started) = &mut self.started {
             started.take(round, &mut self.counts, &mut taken);
@@ -110,21 +130,23 @@ impl Intake {
         counts
     }
 
-    fn keep_load(&mut self, round: &mut Round) {
+    fn keep_load(&mut self, round: &mut Round) -> Result<(), IntakeError> {
         let load = &mut self.load;
+        if let Some((_, text)) = &round.scene
+            && self.started.is_none()
+        {
+            let text = std::str::from_utf8(text).map_err(|_| IntakeError::NotText)?;
+            self.scene = Some(Scene::from_toml(text, "scene.toml")?);
+        }
         load.scene = round.scene.take().or(load.scene.take());
         load.topology = round.topology.take().or(load.topology.take());
         load.surface = round.surface.take().or(load.surface.take());
+        Ok(())
     }
 
     /// Starts at the first snapshot of this round, or the newest before it, that has a keyframe of
     /// its step; what is older is dropped.
-    fn try_start(
-        &mut self,
-        round: &mut Round,
-        now: Now,
-        taken: &mut Taken,
-    ) -> Result<(), IntakeError> {
+    fn try_start(&mut self, round: &mut Round, now: Now, taken: &mut Taken) {
         let snapshots = self.candidate.take().into_iter().chain(round.snapshots.drain(..));
         let snapshots: Vec<_> = snapshots.collect();
         let keyframes = self.candidate_keyframe.take().into_iter().chain(round.keyframes.drain(..));
@@ -141,20 +163,21 @@ impl Intake {
         let Some(place) = start else {
             self.candidate = snapshots.into_iter().next_back();
             self.candidate_keyframe = keyframes.into_iter().next_back();
-            let known = self.candidate.as_ref().map_or(u64::MAX, |one| one.header.outcome_count);
+            let known = self.candidate.as_ref().map_or(0, |one| one.header.outcome_count);
             self.load.outcomes.extend(round.outcomes.drain(..).filter(|row| row.index >= known));
-            return Ok(());
+            let excess = self.load.outcomes.len().saturating_sub(OUTCOMES_KEPT_MAX);
+            self.load.outcomes.drain(..excess);
+            return;
         };
         let first = &snapshots[place];
-        taken.head = Some(self.head(&first.header, now)?);
-        self.started = Some(Started::new(&first.header));
+        taken.head = self.head(&first.header, now);
+        self.started = Some(Started::new(&first.header, self.steps_max));
         for message in self.load_rows() {
             self.counts.of_mut(message.topic()).received += 1;
             taken.contents.push(Content::Update(message));
         }
         round.keyframes = keyframes;
         round.snapshots = snapshots.into_iter().skip(place).collect();
-        Ok(())
     }
 
     fn has_load_of(&self, header: &SnapshotHeader) -> bool {
@@ -173,12 +196,9 @@ impl Intake {
         topology.into_iter().chain(surface).collect()
     }
 
-    fn head(&self, header: &SnapshotHeader, now: Now) -> Result<Head, IntakeError> {
-        let (load, text) = self.load.scene.clone().unwrap_or_default();
-        // Read with all its checks: the name stands nowhere else, and a scene that cannot be read
-        // makes a recording that cannot be verified.
-        let scene = std::str::from_utf8(&text).map_err(|_| IntakeError::NotText)?;
-        let scene = Scene::from_toml(scene, "scene.toml")?;
+    fn head(&mut self, header: &SnapshotHeader, now: Now) -> Option<Head> {
+        let (load, text) = self.load.scene.take()?;
+        let scene = self.scene.take()?;
         let constraint_count = self.load.topology.as_ref().map_or(0, |(load, _)| load.count);
         let mut run = RunDescription {
             run_id: header.run_id,
@@ -196,44 +216,50 @@ impl Intake {
         let age_ns = now.monotonic_ns.saturating_sub(header.publish_monotonic_ns);
         let published_ns = now.realtime_ns.saturating_sub(age_ns);
         run.epoch_ns = published_ns.saturating_sub(run.time_of_step_ns(header.step));
-        Ok(Head { run, scene: text })
+        Some(Head { run, scene: text })
     }
 }
 
 impl Started {
-    fn new(first: &SnapshotHeader) -> Self {
+    fn new(first: &SnapshotHeader, steps_max: Option<u64>) -> Self {
         Self {
             run_id: first.run_id,
+            end_step: steps_max.map_or(u64::MAX, |steps| first.step.saturating_add(steps)),
             topology_revision: first.topology_revision,
             first_step: first.step,
             last: *first,
             // Those before are part of the first state.
             next_outcome: first.outcome_count,
-            newest_keyframe: 0,
+            named_keyframe: 0,
+            keyframes: BTreeSet::new(),
             distances: BTreeMap::new(),
         }
     }
 
     fn take(&mut self, round: Round, counts: &mut AllCounts, taken: &mut Taken) {
         let mut arrived: Vec<Content> = Vec::new();
+        let (run_id, wanted) = (self.run_id, self.first_step..=self.end_step);
+        let keyframes = round
+            .keyframes
+            .into_iter()
+            .filter(|(header, _)| header.run_id == run_id && wanted.contains(&header.step));
+        let keyframes: Vec<_> = keyframes
+            .map(|(header, bytes)| Message::Keyframe { step: header.step, bytes })
+            .collect();
+        self.keyframes.extend(keyframes.iter().map(Message::step));
         for snapshot in round.snapshots {
             taken.end = self.end_at(&snapshot.header);
             if taken.end.is_some() {
                 break;
             }
-            arrived.push(self.take_snapshot(snapshot, &round.keyframes, counts));
+            arrived.push(self.take_snapshot(snapshot, counts));
         }
-        let keyframes = round
-            .keyframes
-            .into_iter()
-            .filter(|(header, _)| header.run_id == self.run_id && header.step >= self.first_step);
-        let keyframes = keyframes.map(|(header, bytes)| {
-            self.newest_keyframe = self.newest_keyframe.max(header.step);
-            Message::Keyframe { step: header.step, bytes }
-        });
-        let keyframes: Vec<_> = keyframes.collect();
+        if taken.end.is_none() && self.last.step >= self.end_step {
+            taken.end = Some(RunEnd::EndStep);
+        }
         let outcomes = self.take_outcomes(round.outcomes, taken.end, counts);
-        let updates = round.updates.into_iter().filter(|update| update.step() >= self.first_step);
+        let updates = round.updates.into_iter().filter(|(of, _)| *of == run_id);
+        let updates = updates.map(|(_, update)| update).filter(|one| wanted.contains(&one.step()));
         for update in updates.chain(keyframes).chain(outcomes) {
             counts.of_mut(update.topic()).received += 1;
             arrived.push(Content::Update(update));
@@ -247,27 +273,26 @@ impl Started {
             Some(RunEnd::NewRun)
         } else if header.topology_revision != self.topology_revision {
             Some(RunEnd::NewLoad)
+        } else if header.step > self.end_step {
+            Some(RunEnd::EndStep)
         } else {
             None
         }
     }
 
-    fn take_snapshot(
-        &mut self,
-        snapshot: Snapshot,
-        keyframes: &[(KeyframeHeader, Vec<u8>)],
-        counts: &mut AllCounts,
-    ) -> Content {
+    fn take_snapshot(&mut self, snapshot: Snapshot, counts: &mut AllCounts) -> Content {
         let Snapshot { header, particles } = snapshot;
         let distance = header.step.saturating_sub(self.last.step);
         if distance > 0 {
             *self.distances.entry(distance).or_default() += 1;
         }
         let named = header.keyframe_step;
-        let is_here = keyframes.iter().any(|(keyframe, _)| keyframe.step == named);
-        if named > self.newest_keyframe && named >= self.first_step {
-            self.newest_keyframe = named;
-            counts.of_mut(Topic::Keyframe).gaps += u64::from(!is_here);
+        if named > self.named_keyframe && named >= self.first_step {
+            self.named_keyframe = named;
+            // A keyframe is published before the snapshots that name it, and was read after them.
+            let is_missing = !self.keyframes.contains(&named);
+            counts.of_mut(Topic::Keyframe).gaps += u64::from(is_missing);
+            self.keyframes = self.keyframes.split_off(&named);
         }
         self.last = header;
         counts.of_mut(Topic::Steps).received += 1;
@@ -284,7 +309,8 @@ impl Started {
     ) -> Vec<Message> {
         let mut kept = Vec::new();
         for row in outcomes {
-            let is_foreign = end.is_some() && row.index >= self.last.outcome_count;
+            let is_foreign =
+                end.is_some() && row.index >= self.last.outcome_count || row.step > self.end_step;
             if row.index < self.next_outcome || is_foreign {
                 continue;
             }

@@ -26,7 +26,8 @@ pub(crate) struct Item {
 /// A queue that never makes its reader wait: what does not fit is dropped and counted.
 ///
 /// Above the limit no snapshot is taken; the rest, which is small and which every later step
-/// builds on, is taken up to twice the limit.
+/// builds on, is taken up to twice the limit. The load, without which a file is useless, and
+/// whatever finds the queue empty are always taken.
 #[derive(Debug)]
 pub(crate) struct Queue {
     state: Mutex<State>,
@@ -65,7 +66,9 @@ impl Queue {
             Content::Update(message) => (2 * self.limit_bytes, &[message.topic()][..]),
             Content::Snapshot(..) => (self.limit_bytes, &[Topic::Steps, Topic::Particles][..]),
         };
-        if state.is_closed || state.size_bytes + size_bytes > limit_bytes {
+        let is_load = [Topic::Topology, Topic::Surface].contains(&topics[0]);
+        let fits = state.size_bytes + size_bytes <= limit_bytes;
+        if state.is_closed || !(fits || is_load || state.items.is_empty()) {
             for topic in topics {
                 state.lost.of_mut(*topic).lost += 1;
             }
@@ -173,6 +176,17 @@ mod tests {
         assert_eq!(steps, [100, 0, 101, 1, 102, 2, 103, 104, 105, 106, 107, 108, 109]);
         queue.push(snapshot(10));
         assert_eq!(pop_steps(&queue), [10], "an empty queue takes snapshots again");
+    }
+
+    #[test]
+    fn a_snapshot_above_the_limit_is_taken_by_an_empty_queue() {
+        let queue = Queue::new(1000);
+        queue.push(snapshot(1));
+        queue.push(snapshot(2));
+        assert_eq!(queue.lost().of(Topic::Particles).lost, 1);
+        assert_eq!(pop_steps(&queue), [1]);
+        queue.push(snapshot(3));
+        assert_eq!(pop_steps(&queue), [3]);
     }
 
     #[test]

@@ -43,6 +43,14 @@ impl Report {
         }
     }
 
+    /// With messages that came and could not be read, whatever their topic.
+    pub(crate) fn with_unreadable(mut self, count: u64) -> Self {
+        if count > 0 {
+            self.lost.insert("unreadable", count);
+        }
+        self
+    }
+
     /// Whether everything that was published is in the file.
     pub(crate) fn is_complete(&self) -> bool {
         self.lost.is_empty()

@@ -9,7 +9,8 @@ use sim_contract::{
 #[derive(Debug, Default)]
 pub(crate) struct Round {
     pub(crate) snapshots: Vec<Snapshot>,
-    pub(crate) updates: Vec<Message>,
+    /// Each with the run that it is of.
+    pub(crate) updates: Vec<(u64, Message)>,
     /// Newest load, if one came.
     pub(crate) scene: Option<(LoadHeader, Vec<u8>)>,
     pub(crate) topology: Option<(LoadHeader, TopologyRow)>,
@@ -43,12 +44,15 @@ impl Round {
             Update::Keyframe(header, bytes) => self.keyframes.push((*header, bytes.to_vec())),
             Update::Outcome(outcome) if outcome.flags & OUTCOME_FLAG_CONTROL != 0 => {}
             Update::Outcome(outcome) => self.outcomes.push(OutcomeRow::from(outcome)),
-            Update::Status(status) => self.updates.push(Message::Status(StatusRow::from(status))),
+            Update::Status(status) => {
+                let row = Message::Status(StatusRow::from(status));
+                self.updates.push((status.run_id, row));
+            }
             Update::Tears(header, torn) => {
                 let new_count = (header.new_count as usize).min(torn.len());
                 let constraints = torn[torn.len() - new_count..].to_vec();
                 let row = TearsRow { step: header.step, constraints, causes: Vec::new() };
-                self.updates.push(Message::Tears(row));
+                self.updates.push((header.run_id, Message::Tears(row)));
             }
         }
     }

@@ -51,7 +51,7 @@ pub use limits::*;
 pub use outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus, Reason};
 pub use owner::{Load, Owner, OwnerError};
 pub use plain_number::PlainF32;
-pub use reader::ReadError;
+pub use reader::{Drained, ReadError};
 pub use request::{OwnerSeen, RequestError};
 pub use service::ServiceError;
 pub use services::AttachError;

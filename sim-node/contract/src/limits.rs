@@ -17,9 +17,10 @@ pub const OWNER_PUBLISHERS_MAX: usize = 2;
 pub const READERS_MAX: usize = 16;
 /// Samples that one reader may hold at the same time; it takes no more before it gives one back.
 pub const BORROWED_SAMPLES_MAX: usize = 4;
-/// Snapshots that wait for one reader before the oldest is overwritten (64 ms at 1 kHz).
+/// Snapshots that wait for one reader before the oldest is overwritten (64 ms at 1 kHz), and as
+/// many keyframes: each step with commands has one.
 pub const SNAPSHOTS_BUFFERED: usize = 64;
-/// Keyframes, tears and statuses that wait for one reader.
+/// Tears and statuses that wait for one reader.
 pub const UPDATES_BUFFERED: usize = 4;
 /// Outcomes that wait for one reader: two steps' worth of the most that a step can produce.
 pub const OUTCOMES_BUFFERED: usize = 2 * COMMANDS_PER_STEP_MAX;

@@ -39,6 +39,15 @@ pub enum ReadError {
     Service(#[from] ServiceError),
 }
 
+/// What came of reading all that there was.
+#[derive(Debug, Default)]
+pub struct Drained {
+    /// Messages taken, those that could not be read included.
+    pub count: usize,
+    /// Why some could not be read; each of them was dropped.
+    pub errors: Vec<ReadError>,
+}
+
 /// A payload whose header agrees with it, in shared memory.
 pub(crate) type SliceSample<T, H> = Sample<ipc::Service, [T], H>;
 
@@ -83,15 +92,17 @@ impl<T: Debug + ZeroCopySend + 'static, H: Counted> SliceReader<T, H> {
         Ok(newest)
     }
 
-    /// Shows at most one buffer of messages to `sink`, oldest first; returns how many.
-    pub(crate) fn drain(&self, mut sink: impl FnMut(&H, &[T])) -> Result<usize, ReadError> {
-        for count in 0..self.buffered {
-            match self.next()? {
-                Some(sample) => sink(sample.user_header(), sample.payload()),
-                None => return Ok(count),
+    /// Shows at most one buffer of messages to `sink`, oldest first.
+    pub(crate) fn drain(&self, drained: &mut Drained, mut sink: impl FnMut(&H, &[T])) {
+        for _ in 0..self.buffered {
+            match self.next() {
+                Ok(Some(sample)) => sink(sample.user_header(), sample.payload()),
+                Ok(None) => return,
+                // It was dropped; those behind it are as good as ever.
+                Err(error) => drained.errors.push(error),
             }
+            drained.count += 1;
         }
-        Ok(self.buffered)
     }
 }
 
@@ -119,19 +130,25 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
     /// The newest value, if there is any; older ones are dropped.
     pub(crate) fn newest(&self) -> Result<Option<T>, ReadError> {
         let mut newest = None;
-        self.drain(|value| newest = Some(*value))?;
+        for _ in 0..self.buffered {
+            match self.next()? {
+                Some(value) => newest = Some(value),
+                None => break,
+            }
+        }
         Ok(newest)
     }
 
-    /// Shows at most one buffer of values to `sink`, oldest first; returns how many.
-    pub(crate) fn drain(&self, mut sink: impl FnMut(&T)) -> Result<usize, ReadError> {
-        for count in 0..self.buffered {
-            match self.next()? {
-                Some(value) => sink(&value),
-                None => return Ok(count),
+    /// Shows at most one buffer of values to `sink`, oldest first.
+    pub(crate) fn drain(&self, drained: &mut Drained, mut sink: impl FnMut(&T)) {
+        for _ in 0..self.buffered {
+            match self.next() {
+                Ok(Some(value)) => sink(&value),
+                Ok(None) => return,
+                Err(error) => drained.errors.push(error),
             }
+            drained.count += 1;
         }
-        Ok(self.buffered)
     }
 }
 

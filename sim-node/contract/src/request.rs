@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::clock::epoch_microseconds;
 use crate::ports::reader_count;
-use crate::reader::{ReadError, ValueReader};
+use crate::reader::{Drained, ReadError, ValueReader};
 use crate::service::{COMMANDS, OUTCOMES, ServiceError};
 use crate::services::{Attachment, OwnerProcess};
 use crate::writer::{PublishError, ValueWriter};
@@ -162,7 +162,8 @@ impl Commander {
 
     /// Takes in all outcomes that have come, and keeps those of unanswered commands.
     pub(crate) fn collect(&mut self) -> Result<(), ReadError> {
-        self.outcomes.drain(|outcome| {
+        let mut drained = Drained::default();
+        self.outcomes.drain(&mut drained, |outcome| {
             if outcome.command.client_id != self.client_id {
                 return;
             }
@@ -171,7 +172,10 @@ impl Commander {
                 self.unanswered.remove(place);
                 self.answered.push_back(*outcome);
             }
-        })?;
+        });
+        if let Some(error) = drained.errors.pop() {
+            return Err(error);
+        }
         while self.answered.len() > OUTCOMES_BUFFERED {
             self.answered.pop_front();
         }

@@ -53,7 +53,8 @@ const LATCHED: ServiceSpec = ServiceSpec {
 };
 pub(crate) const PARTICLES: ServiceSpec =
     ServiceSpec { suffix: "particles", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
-pub(crate) const KEYFRAME: ServiceSpec = ServiceSpec { suffix: "keyframe", ..LATCHED };
+pub(crate) const KEYFRAME: ServiceSpec =
+    ServiceSpec { suffix: "keyframe", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
 pub(crate) const TOPOLOGY: ServiceSpec = ServiceSpec { suffix: "topology", ..LATCHED };
 pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCHED };
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::reader::{ReadError, SliceReader, ValueReader};
+use crate::reader::{Drained, SliceReader, ValueReader};
 use crate::service::{
     KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
@@ -82,32 +82,29 @@ impl Tap {
     }
 
     /// Shows the snapshots that have come to `sink`, oldest first, at most
-    /// [`crate::SNAPSHOTS_BUFFERED`]; returns how many.
-    ///
-    /// # Errors
-    /// A malformed message, which was dropped: those after it are read by the next call.
+    /// [`crate::SNAPSHOTS_BUFFERED`]. A malformed one is dropped, and named in the result.
     pub fn drain_particles(
         &mut self,
         sink: impl FnMut(&SnapshotHeader, &[ParticleState]),
-    ) -> Result<usize, ReadError> {
-        self.particles.drain(sink)
+    ) -> Drained {
+        let mut drained = Drained::default();
+        self.particles.drain(&mut drained, sink);
+        drained
     }
 
     /// Shows everything else that has come to `sink`, each kind oldest first and at most one buffer
-    /// of it; returns how many.
-    ///
-    /// # Errors
-    /// As [`Tap::drain_particles`].
-    pub fn drain_updates(&mut self, mut sink: impl FnMut(Update<'_>)) -> Result<usize, ReadError> {
-        let mut count = 0;
-        count += self.scene.drain(|header, bytes| sink(Update::Scene(header, bytes)))?;
-        count += self.topology.drain(|header, all| sink(Update::Topology(header, all)))?;
-        count += self.surface.drain(|header, all| sink(Update::Surface(header, all)))?;
-        count += self.tears.drain(|header, all| sink(Update::Tears(header, all)))?;
-        count += self.keyframe.drain(|header, bytes| sink(Update::Keyframe(header, bytes)))?;
-        count += self.outcomes.drain(|outcome| sink(Update::Outcome(outcome)))?;
-        count += self.status.drain(|status| sink(Update::Status(status)))?;
-        Ok(count)
+    /// of it. Malformed messages are dropped, and named in the result.
+    pub fn drain_updates(&mut self, mut sink: impl FnMut(Update<'_>)) -> Drained {
+        let mut drained = Drained::default();
+        let all = &mut drained;
+        self.scene.drain(all, |header, bytes| sink(Update::Scene(header, bytes)));
+        self.topology.drain(all, |header, items| sink(Update::Topology(header, items)));
+        self.surface.drain(all, |header, items| sink(Update::Surface(header, items)));
+        self.tears.drain(all, |header, items| sink(Update::Tears(header, items)));
+        self.keyframe.drain(all, |header, bytes| sink(Update::Keyframe(header, bytes)));
+        self.outcomes.drain(all, |outcome| sink(Update::Outcome(outcome)));
+        self.status.drain(all, |status| sink(Update::Status(status)));
+        drained
     }
 
     /// Waits until the owner wakes its readers, a signal comes, or `timeout` has passed. What

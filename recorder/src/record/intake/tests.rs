@@ -105,13 +105,57 @@ fn a_keyframe_that_comes_after_its_snapshot_starts_it_too() {
 }
 
 #[test]
+fn an_outcome_that_comes_before_any_snapshot_is_kept() {
+    let mut intake = Intake::default();
+    let mut round = Round::default();
+    add_load(&mut round);
+    round.add_update(Update::Outcome(&outcome(0, 1)));
+    assert!(names(&intake.take(round, NOW).unwrap()).is_empty());
+    let mut round = Round::default();
+    add_snapshot(&mut round, &header(0, 0));
+    add_keyframe(&mut round, 0);
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!(names(&taken)[2..], ["/keyframe 0", "snapshot 0", "/outcomes 1"]);
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn it_ends_with_the_last_step_that_is_wanted_and_counts_nothing_beyond() {
+    let mut intake = Intake::new(Some(2));
+    let mut round = Round::default();
+    add_load(&mut round);
+    for step in [0, 1, 2, 5] {
+        add_snapshot(&mut round, &header(step, step));
+        add_keyframe(&mut round, step);
+        round.add_update(Update::Outcome(&outcome(step, step + 1)));
+    }
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!(taken.end, Some(RunEnd::EndStep));
+    let expected = [
+        "/keyframe 0",
+        "snapshot 0",
+        "/keyframe 1",
+        "/outcomes 1",
+        "snapshot 1",
+        "/keyframe 2",
+        "/outcomes 2",
+        "snapshot 2",
+    ];
+    assert_eq!(names(&taken)[2..], expected);
+    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(intake.counts().of(Topic::Particles).received, 3);
+}
+
+#[test]
 fn a_round_is_written_in_the_order_of_publication() {
     let mut intake = started();
     let mut round = Round::default();
     add_snapshot(&mut round, &header(5, 3));
     add_snapshot(&mut round, &header(6, 4));
-    let status = NodeStatus { step: 5, ..NodeStatus::default() };
-    round.add_update(Update::Status(&status));
+    for run_id in [RUN_ID, RUN_ID + 1] {
+        let status = NodeStatus { run_id, step: 5, ..NodeStatus::default() };
+        round.add_update(Update::Status(&status));
+    }
     for step in [5, 6, 7] {
         add_keyframe(&mut round, step);
     }
@@ -179,8 +223,16 @@ fn missing_keyframes_are_counted() {
         add_snapshot(&mut round, &SnapshotHeader { keyframe_step, ..header(step, 2) });
     }
     add_keyframe(&mut round, 7);
+    // Read ahead of its snapshot: it says nothing of those between.
+    add_keyframe(&mut round, 11);
     intake.take(round, NOW).unwrap();
     assert_eq!(intake.counts().of(Topic::Keyframe).gaps, 1);
+    let mut round = Round::default();
+    for (step, keyframe_step) in [(9, 9), (10, 10), (11, 11)] {
+        add_snapshot(&mut round, &SnapshotHeader { keyframe_step, ..header(step, 2) });
+    }
+    intake.take(round, NOW).unwrap();
+    assert_eq!(intake.counts().of(Topic::Keyframe).gaps, 3);
 }
 
 #[test]
