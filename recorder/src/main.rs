@@ -3,7 +3,6 @@
 #![forbid(unsafe_code)]
 
 mod apply;
-mod clock;
 mod command_file;
 mod difference;
 mod endpoint_args;
@@ -18,7 +17,6 @@ mod resimulation;
 mod scene_source;
 mod simulate;
 mod simulation;
-mod stop;
 mod verify;
 
 use clap::{Parser, Subcommand};

@@ -13,13 +13,12 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::{Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow};
-use sim_contract::Endpoint;
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_contract::{Endpoint, Stop};
 
-use crate::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use crate::endpoint_args::EndpointArgs;
 use crate::exit::Exit;
 use crate::output;
-use crate::stop::Stop;
 use control::Control;
 use pace::Pace;
 use replay::{Position, Recorded, Replay};

@@ -12,13 +12,12 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
 use recorder::{Closing, Message, PartFile, WriteError};
-use sim_contract::{Endpoint, ReadError, Tap};
+use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
+use sim_contract::{Endpoint, ReadError, Stop, Tap};
 
-use crate::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use crate::endpoint_args::EndpointArgs;
 use crate::exit::Exit;
 use crate::output::{self, AsJson, FileArgs, LogFile};
-use crate::stop::Stop;
 use intake::{Head, Intake, Now, RunEnd, Taken};
 use queue::{Content, Item, Popped, Queue};
 use report::Report;

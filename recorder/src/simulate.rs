@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use recorder::Closing;
 use serde::Serialize;
+use sim_contract::Stop;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_solver::Solver;
 
-use crate::clock::{SECOND_NS, monotonic_ns};
 use crate::exit::Exit;
 use crate::output::{self, AsJson, FileArgs, LogFile};
 use crate::scene_source::{load_commands, load_scene};
 use crate::simulation::{Job, Outcomes, simulate};
-use crate::stop::Stop;
 
 /// Steps between two looks at the signals and two moves of the progress bar.
 const STEPS_PER_LOOK: u64 = 256;

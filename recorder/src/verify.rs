@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use recorder::{FrameReader, LogEnd, LogReader};
 use serde::Serialize;
+use sim_contract::Stop;
 use sim_solver::SOLVER_VERSION;
 
 use crate::difference::Difference;
@@ -14,7 +15,6 @@ use crate::exit::Exit;
 use crate::output::{self, AsJson};
 use crate::resimulation::{Finding, Resimulation};
 use crate::scene_source::scene_of;
-use crate::stop::Stop;
 
 /// Snapshots between two looks at the signals and two moves of the progress bar.
 const SNAPSHOTS_PER_LOOK: u64 = 64;

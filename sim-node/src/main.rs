@@ -4,7 +4,6 @@
 
 mod args;
 mod check;
-mod clock;
 mod commands;
 mod ctl;
 mod exit;
@@ -14,7 +13,6 @@ mod publish;
 mod run;
 mod scene_source;
 mod statistics;
-mod stop;
 
 use clap::Parser;
 

@@ -1,14 +1,13 @@
 //! The loop: wait for the deadline, apply commands, step, publish, observe.
 
-use sim_contract::{Command, Endpoint};
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_contract::{Command, Endpoint, Stop};
 use sim_solver::{Scene, Solver};
 
-use crate::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use crate::commands::{Inbox, Progress, apply};
 use crate::pace::Pace;
 use crate::publish::{Position, Publisher, StepTimes};
 use crate::statistics::Statistics;
-use crate::stop::Stop;
 
 /// Longest time between two status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;

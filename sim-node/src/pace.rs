@@ -4,7 +4,7 @@
 //! more than [`CATCH_UP_NS_MAX`] behind gives up whole periods and counts them, so that a stall
 //! (a suspended process) does not end in a burst.
 
-use crate::clock::SECOND_NS;
+use sim_contract::clock::SECOND_NS;
 
 /// Most lateness that is caught up: a quarter of a second, or four periods if that is longer.
 const CATCH_UP_NS_MAX: u64 = SECOND_NS / 4;

@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use bytemuck::cast;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, Command, ConstraintState, Endpoint, KeyframeHeader, Load, LoadHeader,
     NodeStatus, Outcome, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
@@ -9,7 +10,6 @@ use sim_contract::{
 };
 use sim_solver::{Method, SOLVER_VERSION, Scene, Solver};
 
-use crate::clock::{SECOND_NS, monotonic_ns};
 use crate::statistics::Statistics;
 
 /// How long a step took and how late it began.

@@ -5,13 +5,12 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use serde::Serialize;
-use sim_contract::Endpoint;
+use sim_contract::{Endpoint, Stop};
 use sim_solver::Scene;
 
 use crate::args::{RunArgs, endpoint};
 use crate::node::{Node, Options};
 use crate::scene_source;
-use crate::stop::Stop;
 
 /// What is said at the end of a run.
 #[derive(Debug, Serialize)]

@@ -2,8 +2,7 @@
 
 use anyhow::Context;
 use hdrhistogram::Histogram;
-
-use crate::clock::SECOND_NS;
+use sim_contract::clock::SECOND_NS;
 
 /// Longest time that the histograms tell apart from longer ones: a minute.
 const TIME_NS_MAX: u64 = 60 * SECOND_NS;

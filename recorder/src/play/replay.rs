@@ -2,6 +2,7 @@
 
 use anyhow::{Context, bail};
 use recorder::{Frame, Message, OutcomeRow, RunDescription, StatusRow, SurfaceRow, TopologyRow};
+use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     Action, CONTRACT_VERSION, Command, Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus,
     Outcome, Owner, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Wake,
@@ -9,7 +10,6 @@ use sim_contract::{
 use sim_solver::Keyframe;
 
 use super::control::Control;
-use crate::clock::monotonic_ns;
 
 /// What a recording has at its head: enough to take a name.
 #[derive(Debug)]

@@ -1,6 +1,39 @@
-//! The only place of this crate that reads a clock.
+//! The clock of the headers, and the only place where a program around a simulation reads one.
 
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
+
+use rustix::thread::clock_nanosleep_absolute;
+use rustix::time::{ClockId, Timespec, clock_gettime};
+
+/// Nanoseconds in a second.
+pub const SECOND_NS: u64 = 1_000_000_000;
+
+/// CLOCK_MONOTONIC in nanoseconds: the clock of [`crate::SnapshotHeader::publish_monotonic_ns`].
+pub fn monotonic_ns() -> u64 {
+    nanoseconds(clock_gettime(ClockId::Monotonic))
+}
+
+/// CLOCK_REALTIME in nanoseconds since 1970.
+pub fn realtime_ns() -> u64 {
+    nanoseconds(clock_gettime(ClockId::Realtime))
+}
+
+/// Sleeps until CLOCK_MONOTONIC reaches `deadline_ns`; a signal ends the sleep early. The deadline
+/// is absolute, so that lateness does not add up over the steps.
+pub fn sleep_until(deadline_ns: u64) {
+    #[allow(clippy::cast_possible_wrap, reason = "centuries since boot fit into i64")]
+    let deadline = Timespec {
+        tv_sec: (deadline_ns / SECOND_NS) as i64,
+        tv_nsec: (deadline_ns % SECOND_NS) as i64,
+    };
+    // The caller looks at the clock and at its stop flag, whatever ended the sleep.
+    let _ended = clock_nanosleep_absolute(ClockId::Monotonic, &deadline);
+}
+
+#[allow(clippy::cast_sign_loss, reason = "the time since boot, or since 1970, is positive")]
+fn nanoseconds(time: Timespec) -> u64 {
+    time.tv_sec as u64 * SECOND_NS + time.tv_nsec as u64
+}
 
 /// The end of a wait, on the monotonic clock.
 #[derive(Debug, Clone, Copy)]
@@ -23,9 +56,7 @@ impl Deadline {
     }
 }
 
-/// Microseconds since the Unix epoch; 0 if the clock stands before it. Below 2^53 until 2255.
-#[allow(clippy::disallowed_methods, reason = "clocks are read here")]
+/// Microseconds since the Unix epoch, below 2^53 until 2255.
 pub(crate) fn epoch_microseconds() -> u64 {
-    let elapsed = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    u64::try_from(elapsed.as_micros()).unwrap_or(u64::MAX)
+    realtime_ns() / 1000
 }

@@ -21,7 +21,7 @@
 #![forbid(unsafe_code)]
 
 mod client;
-mod clock;
+pub mod clock;
 mod command;
 mod domain;
 mod endpoint;
@@ -37,6 +37,7 @@ mod services;
 mod session;
 mod snapshot;
 mod status;
+mod stop;
 mod tap;
 pub mod testing;
 mod topology;
@@ -57,6 +58,7 @@ pub use service::ServiceError;
 pub use services::AttachError;
 pub use snapshot::{ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader};
 pub use status::{NodeStatus, StatusFlags};
+pub use stop::Stop;
 pub use tap::{Tap, Update};
 pub use topology::{
     ConstraintKind, ConstraintState, KeyframeHeader, LoadHeader, TearsHeader, Triangle,

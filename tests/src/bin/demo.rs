@@ -4,25 +4,21 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stderr, clippy::print_stdout, reason = "it talks to the user")]
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use integration_tests::{Process, Program};
-use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint};
+use sim_contract::clock::{SECOND_NS, realtime_ns};
+use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint, Stop};
 
 /// How long the demo waits for news before it looks for Ctrl-C again.
 const POLL: Duration = Duration::from_millis(200);
 
 fn main() -> anyhow::Result<()> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&stop))?;
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
+    let stop = Stop::install()?;
     let domain = std::env::var(DOMAIN_VARIABLE).unwrap_or_default();
-    let file = std::env::temp_dir().join(format!("catenary-demo-{}.mcap", seconds_since_1970()));
+    let file =
+        std::env::temp_dir().join(format!("catenary-demo-{}.mcap", realtime_ns() / SECOND_NS));
     let file = file.to_str().context("the temporary folder's path is not UTF-8")?;
 
     eprintln!("building the programs ...");
@@ -47,20 +43,15 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Shows how the node does until Ctrl-C, or until it ends by itself.
-fn watch(stop: &AtomicBool, node: &mut Process, domain: &str) -> anyhow::Result<()> {
+fn watch(stop: &Stop, node: &mut Process, domain: &str) -> anyhow::Result<()> {
     let domain = Some(domain).filter(|domain| !domain.is_empty());
     let endpoint = Endpoint::new(domain, sim_contract::NAME_DEFAULT)?;
     let mut client = Client::attach(&endpoint)?;
-    while !stop.load(Ordering::Relaxed) && node.is_running() {
+    while !stop.is_asked() && node.is_running() {
         if let Some(status) = client.status(POLL)? {
             eprint!("\rstep {:>8}  x{:.3} real time ", status.step, status.real_time_factor);
         }
     }
     eprintln!();
     Ok(())
-}
-
-#[allow(clippy::disallowed_methods, reason = "a name for the file, no time of the simulation")]
-fn seconds_since_1970() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs())
 }
