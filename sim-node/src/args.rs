@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
-use sim_contract::{Endpoint, EndpointError};
+use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
@@ -47,11 +47,19 @@ pub(crate) enum Verb {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct EndpointArgs {
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
-    #[arg(long, default_value = "sim", value_name = "NAME")]
+    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = name)]
     pub(crate) name: String,
     /// Domain that keeps services apart from others on this host [default: that of iceoryx2]
-    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN")]
+    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = domain)]
     pub(crate) domain: Option<String>,
+}
+
+fn name(text: &str) -> Result<String, EndpointError> {
+    Endpoint::new(None, text).map(|_| text.to_owned())
+}
+
+fn domain(text: &str) -> Result<String, EndpointError> {
+    endpoint(Some(text), NAME_DEFAULT).map(|_| text.to_owned())
 }
 
 /// The node of that name; an empty domain is the default one.
@@ -68,10 +76,10 @@ pub(crate) struct RunArgs {
     #[arg(default_value = "curtain")]
     pub(crate) scene: String,
     /// Steps per second, 1 to 100000 [default: that of the scene]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) rate: Option<u32>,
     /// Substeps of a step, 1 to 1000 [default: that of the scene]
-    #[arg(long)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) substeps: Option<u32>,
     /// End after this many steps [default: run until Ctrl-C]
     #[arg(long, value_name = "N", conflicts_with = "duration")]
@@ -85,7 +93,7 @@ pub(crate) struct RunArgs {
     /// Make steps without waiting for their time
     #[arg(long)]
     pub(crate) as_fast_as_possible: bool,
-    /// Publish every K-th snapshot only
+    /// Publish every K-th snapshot only, and the last one before a wait
     #[arg(long, value_name = "K", default_value_t = 1,
         value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) every: u64,
@@ -140,10 +148,12 @@ pub(crate) struct CtlArgs {
     #[arg(long, global = true)]
     pub(crate) json: bool,
     /// Name of the node
-    #[arg(long, global = true, default_value = "sim", value_name = "NAME")]
+    #[arg(long, global = true, default_value = NAME_DEFAULT, value_name = "NAME",
+        value_parser = name)]
     pub(crate) name: String,
     /// Domain of the node [default: that of iceoryx2]
-    #[arg(long, global = true, env = "CATENARY_DOMAIN", value_name = "DOMAIN")]
+    #[arg(long, global = true, env = "CATENARY_DOMAIN", value_name = "DOMAIN",
+        value_parser = domain)]
     pub(crate) domain: Option<String>,
 }
 

@@ -57,11 +57,22 @@ pub(crate) struct Progress {
     pub(crate) is_paused: bool,
     /// Steps to make while paused.
     pub(crate) steps_due: u64,
+    /// The state was reset: even a paused node makes the one step that shows it.
+    pub(crate) is_reset_due: bool,
 }
 
 impl Progress {
     pub(crate) fn is_stepping(self) -> bool {
-        !self.is_paused || self.steps_due > 0
+        !self.is_paused || self.steps_due > 0 || self.is_reset_due
+    }
+
+    /// A step was made. The one that shows a reset is not one of those asked for.
+    pub(crate) fn count_step(&mut self) {
+        if self.is_reset_due {
+            self.is_reset_due = false;
+        } else {
+            self.steps_due = self.steps_due.saturating_sub(1);
+        }
     }
 }
 
@@ -84,16 +95,15 @@ pub(crate) fn apply(
         Action::Release { particle } => solver.release(client_id, particle).map_err(reason),
         Action::Reset => {
             solver.reset();
-            // Even a paused node makes the step that shows it.
-            progress.steps_due += u64::from(progress.is_paused);
+            progress.is_reset_due = true;
             Ok(())
         }
         Action::Pause => {
-            *progress = Progress { is_paused: true, steps_due: 0 };
+            (progress.is_paused, progress.steps_due) = (true, 0);
             Ok(())
         }
         Action::Resume => {
-            *progress = Progress { is_paused: false, steps_due: 0 };
+            (progress.is_paused, progress.steps_due) = (false, 0);
             Ok(())
         }
         Action::Step { count: 0 } => Err(Reason::OutOfRange),
@@ -168,21 +178,33 @@ mod tests {
         }
     }
 
+    fn progress(is_paused: bool, steps_due: u64, is_reset_due: bool) -> Progress {
+        Progress { is_paused, steps_due, is_reset_due }
+    }
+
     #[test]
     fn steps_are_for_a_paused_node_only() {
         let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
-        let mut progress = Progress { is_paused: false, steps_due: 0 };
-        let mut apply = |action| apply(1, action, &mut solver, &mut progress).map(|()| progress);
+        let mut now = progress(false, 0, false);
+        let mut apply = |action| apply(1, action, &mut solver, &mut now).map(|()| now);
         assert_eq!(apply(Action::Step { count: 3 }), Err(Reason::NoEffectHere));
-        assert_eq!(apply(Action::Pause), Ok(Progress { is_paused: true, steps_due: 0 }));
+        assert_eq!(apply(Action::Pause), Ok(progress(true, 0, false)));
         assert_eq!(apply(Action::Step { count: 0 }), Err(Reason::OutOfRange));
-        assert_eq!(
-            apply(Action::Step { count: 3 }),
-            Ok(Progress { is_paused: true, steps_due: 3 })
-        );
-        assert_eq!(apply(Action::Reset), Ok(Progress { is_paused: true, steps_due: 4 }));
-        assert_eq!(apply(Action::Resume), Ok(Progress { is_paused: false, steps_due: 0 }));
-        assert_eq!(apply(Action::Reset), Ok(Progress { is_paused: false, steps_due: 0 }));
+        assert_eq!(apply(Action::Step { count: 3 }), Ok(progress(true, 3, false)));
+        assert_eq!(apply(Action::Resume), Ok(progress(false, 0, false)));
         assert_eq!(apply(Action::Unknown { number: 99 }), Err(Reason::NoEffectHere));
+    }
+
+    #[test]
+    fn resets_at_one_boundary_make_one_step_even_if_a_pause_follows() {
+        let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
+        let mut now = progress(true, 2, false);
+        for action in [Action::Reset, Action::Reset, Action::Pause] {
+            apply(1, action, &mut solver, &mut now).unwrap();
+        }
+        assert!(now.is_stepping());
+        now.count_step();
+        assert_eq!(now, progress(true, 0, false));
+        assert!(!now.is_stepping());
     }
 }

@@ -1,5 +1,7 @@
 //! The loop: wait for the deadline, apply commands, step, publish, observe.
 
+use std::io::{Write, stderr};
+
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Command, Endpoint, Stop};
 use sim_solver::{Scene, Solver};
@@ -11,8 +13,8 @@ use crate::statistics::Statistics;
 
 /// Longest time between two status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
-/// Longest wait of a paused node before it looks for commands.
-const PAUSED_POLL_NS: u64 = SECOND_NS / 200;
+/// How often a paused node looks for commands.
+const PAUSED_POLL_NS: u64 = SECOND_NS / 500;
 
 /// What a run is told.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +45,8 @@ pub(crate) struct Node {
     start_ns: u64,
     /// How long it was paused.
     idle_ns: u64,
+    /// When it last went on or began to wait for `resume`.
+    mark_ns: u64,
     next_status_ns: u64,
 }
 
@@ -57,12 +61,17 @@ impl Node {
             publisher,
             inbox: Inbox::default(),
             arrived: Vec::new(),
-            progress: Progress { is_paused: options.starts_paused, steps_due: 0 },
+            progress: Progress {
+                is_paused: options.starts_paused,
+                steps_due: 0,
+                is_reset_due: false,
+            },
             pace: Pace::new(scene.solver.rate_hz, now_ns),
             statistics: Statistics::new(now_ns)?,
             step: 0,
             start_ns: now_ns,
             idle_ns: 0,
+            mark_ns: now_ns,
             next_status_ns: now_ns,
             scene,
             solver,
@@ -98,10 +107,10 @@ impl Node {
     /// Waits for the deadline of the next step, or, paused, a little; returns how late it is.
     fn wait(&mut self) -> u64 {
         if !self.progress.is_stepping() {
-            let before_ns = monotonic_ns();
-            sleep_until(before_ns + PAUSED_POLL_NS.min(self.pace.period_ns()));
+            sleep_until(monotonic_ns() + PAUSED_POLL_NS);
             let now_ns = monotonic_ns();
-            self.idle_ns += now_ns - before_ns;
+            self.idle_ns += now_ns - self.mark_ns;
+            self.mark_ns = now_ns;
             self.pace.restart(now_ns);
             return 0;
         }
@@ -129,10 +138,18 @@ impl Node {
 
     fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
         let before_ns = monotonic_ns();
+        let frozen_count = self.solver.frozen_count();
         self.solver.step();
         let solve_ns = monotonic_ns() - before_ns;
+        if self.solver.frozen_count() > frozen_count {
+            warn_of_frozen(self.step + 1, self.solver.frozen_count() - frozen_count);
+        }
         self.step += 1;
-        self.progress.steps_due = self.progress.steps_due.saturating_sub(1);
+        self.progress.count_step();
+        if !self.progress.is_stepping() {
+            // Whoever waited for these steps and then asks for the status finds them in it.
+            self.next_status_ns = 0;
+        }
         self.statistics.record(wake_late_ns, solve_ns, self.pace.period_ns());
         self.statistics.skipped_periods = self.pace.skipped_periods;
         let times = StepTimes { wake_late_ns, solve_ns };
@@ -143,6 +160,9 @@ impl Node {
     fn observe(&mut self, observer: &impl Fn(&Self)) -> anyhow::Result<()> {
         self.publisher.refresh();
         let now_ns = monotonic_ns();
+        if self.progress.is_stepping() {
+            self.mark_ns = now_ns;
+        }
         if self.statistics.turn(now_ns, self.scene.solver.rate_hz) {
             observer(self);
         }
@@ -165,6 +185,17 @@ impl Node {
     }
 
     fn position(&self) -> Position {
-        Position { step: self.step, is_paused: self.progress.is_paused }
+        let is_last = self.is_done() || !self.progress.is_stepping();
+        Position { step: self.step, is_paused: self.progress.is_paused, is_last }
     }
+}
+
+/// A state that blows up is no reason to stop, but must not pass unnoticed.
+fn warn_of_frozen(step: u64, count: u64) {
+    // Whoever has closed stderr wants no warning.
+    let _unheard = writeln!(
+        stderr(),
+        "warning: step {step}: {count} particles are frozen, their state was no longer finite; \
+         `ctl reset` brings them back"
+    );
 }

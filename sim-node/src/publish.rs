@@ -24,6 +24,8 @@ pub(crate) struct StepTimes {
 pub(crate) struct Position {
     pub(crate) step: u64,
     pub(crate) is_paused: bool,
+    /// No further step follows for now: whoever joins is to see this one.
+    pub(crate) is_last: bool,
 }
 
 /// Writes snapshots, keyframes, outcomes and status.
@@ -32,7 +34,7 @@ pub(crate) struct Publisher {
     owner: Owner,
     run_id: u64,
     rate_hz: u32,
-    /// Every how many steps a snapshot is published.
+    /// Every how many steps a snapshot is published; the last one before a wait always is.
     every: u64,
     /// Header of the newest published snapshot.
     last: SnapshotHeader,
@@ -103,7 +105,7 @@ impl Publisher {
         times: StepTimes,
     ) -> anyhow::Result<()> {
         self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
-        if !position.step.is_multiple_of(self.every) {
+        if !(position.step.is_multiple_of(self.every) || position.is_last) {
             return self.publish_outcomes();
         }
         self.watch_keyframe_readers();

@@ -1,4 +1,4 @@
-//! A child process that cannot outlive its test.
+//! A child process that ends with its guard.
 
 use std::fmt;
 use std::io::{BufRead, BufReader, Read};
@@ -74,7 +74,7 @@ impl Process {
     /// If it ends before, or the deadline passes.
     pub fn start_ready(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
         let mut process = Self::start(program, sandbox, args);
-        process.wait_for_stderr("ready");
+        process.wait_until_ready();
         process
     }
 
@@ -86,26 +86,35 @@ impl Process {
         Self::start(program, sandbox, args).wait()
     }
 
-    /// Waits until its stderr has a text.
+    /// Waits until its stderr has a line that starts with "ready".
     ///
     /// # Panics
     /// If it ends before, or the deadline passes.
-    pub fn wait_for_stderr(&mut self, text: &str) {
-        let what = format!("\"{text}\" from {}", self.title);
-        wait_for(&what, || {
-            if self.stderr.text().contains(text) {
+    pub fn wait_until_ready(&mut self) {
+        self.wait_for_line("ready");
+    }
+
+    /// Waits until its stderr has a line that starts like that.
+    ///
+    /// # Panics
+    /// If it ends before, or the deadline passes.
+    pub fn wait_for_line(&mut self, start: &str) {
+        let has_line = |text: &str| text.lines().any(|line| line.starts_with(start));
+        wait_for(&format!("\"{start}\" from {}", self.title), || {
+            if has_line(&self.stderr.text()) {
                 return Some(());
             }
             let ended = self.child.try_wait().expect("a child");
-            // It may have written the text just before it ended.
-            assert!(
-                ended.is_none() || {
-                    self.stderr.join();
-                    self.stderr.text().contains(text)
-                },
-                "{} ended before it wrote \"{text}\"",
-                self.title
-            );
+            if ended.is_some() {
+                // It may have written the line just before it ended.
+                self.stderr.join();
+                assert!(
+                    has_line(&self.stderr.text()),
+                    "{} ended before it wrote \"{start}\": {}",
+                    self.title,
+                    self.stderr.text()
+                );
+            }
             None
         });
     }
@@ -119,12 +128,14 @@ impl Process {
         kill_process(pid, signal).unwrap_or_else(|error| panic!("{}: {error}", self.title));
     }
 
-    /// Asks it to end as Ctrl-C does, and waits.
+    /// Asks it to end as Ctrl-C does, if it has not ended already, and waits.
     ///
     /// # Panics
     /// If it does not end before the deadline.
-    pub fn interrupt(self) -> Finished {
-        self.signal(Signal::INT);
+    pub fn interrupt(mut self) -> Finished {
+        if self.is_running() {
+            self.signal(Signal::INT);
+        }
         self.wait()
     }
 

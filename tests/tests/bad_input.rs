@@ -46,10 +46,14 @@ fn wrong_options_exit_with_2_and_wrong_rates_name_the_range() {
     {
         assert_eq!(run(&sandbox, args).code, Some(2), "{args:?}");
     }
-    assert_refused(&run(&sandbox, &["run", "--rate", "0"]), 1, &["--rate", "1 to 100000"]);
-    assert_refused(&run(&sandbox, &["run", "--substeps", "0"]), 1, &["--substeps", "1 to 1000"]);
-    assert_refused(&run(&sandbox, &["run", "--name", "a/b"]), 1, &["a/b"]);
-    assert_refused(&run(&sandbox, &["run", "--domain", "Big Domain"]), 1, &["Big Domain"]);
+    for rate in ["0", "100001", "-5", "fast"] {
+        let finished = run(&sandbox, &["run", "--rate", rate]);
+        assert_refused(&finished, 2, &["--rate", rate]);
+    }
+    assert_refused(&run(&sandbox, &["run", "--rate", "0"]), 2, &["1..=100000"]);
+    assert_refused(&run(&sandbox, &["run", "--substeps", "0"]), 2, &["1..=1000"]);
+    assert_refused(&run(&sandbox, &["run", "--name", "a/b"]), 2, &["a/b"]);
+    assert_refused(&run(&sandbox, &["run", "--domain", "Big Domain"]), 2, &["Big Domain"]);
 }
 
 #[test]

@@ -98,24 +98,31 @@ fn commands_of_a_paused_node_are_answered_with_the_step_that_will_show_them() {
 
 #[test]
 fn rejected_commands_name_their_reason_and_change_no_bit() {
-    let run = |commands: &[&[&str]]| {
+    let run = |commands: &[(&[&str], &str)]| {
         let sandbox = Sandbox::new();
-        let node = node(&sandbox, &["run", "curtain", "--paused", "--steps", "50", "--json"]);
-        for command in commands {
-            assert_eq!(ctl(&sandbox, command)["status"], "rejected", "{command:?}");
+        let node = node(&sandbox, &["run", "curtain", "--paused"]);
+        for (command, reason) in commands {
+            let outcome = ctl(&sandbox, command);
+            assert_eq!(
+                (&outcome["status"], &outcome["reason"]),
+                (&"rejected".into(), &(*reason).into())
+            );
         }
         ctl(&sandbox, &["step", "50"]);
-        node.wait().json()["state_hash"].clone()
+        let hash = ctl(&sandbox, &["hash"]);
+        node.interrupt().success();
+        assert_eq!(hash["step"], 50);
+        hash["state_hash"].clone()
     };
-    let rejected: &[&[&str]] = &[
-        &["grab", "90", "nan", "0", "0"],
-        &["grab", "90", "0", "inf", "0"],
-        &["grab", "90", "0", "0", "2e7"],
-        &["grab", "168", "0", "0", "0"],
-        &["pin", "4000000000"],
-        &["move", "90", "0", "0", "0"],
-        &["release", "90"],
-        &["step", "0"],
+    let rejected: &[(&[&str], &str)] = &[
+        (&["grab", "90", "nan", "0", "0"], "non_finite"),
+        (&["grab", "90", "0", "inf", "0"], "non_finite"),
+        (&["grab", "90", "0", "0", "2e7"], "out_of_range"),
+        (&["grab", "168", "0", "0", "0"], "unknown_particle"),
+        (&["pin", "4000000000"], "unknown_particle"),
+        (&["move", "90", "0", "0", "0"], "not_grabbed"),
+        (&["release", "90"], "not_grabbed"),
+        (&["step", "0"], "out_of_range"),
     ];
     assert_eq!(run(rejected), run(&[]));
 }
@@ -157,10 +164,16 @@ fn readers_that_hold_their_samples_and_stand_still_do_not_change_or_stop_the_nod
         let args =
             ["run", "curtain", "--paused", "--steps", "5000", "--as-fast-as-possible", "--json"];
         let node = node(&sandbox, &args);
-        let readers: Vec<_> = (0..if with_reader { 2 } else { 0 })
-            .map(|_| Process::start_ready(Program::StubbornReader, &sandbox, &[]))
+        let mut readers: Vec<_> = (0..if with_reader { 2 } else { 0 })
+            .map(|_| Process::start(Program::StubbornReader, &sandbox, &[]))
             .collect();
-        for reader in &readers {
+        for reader in &mut readers {
+            reader.wait_for_line("attached");
+        }
+        // They fill their hands, and stand still with a buffer that fills up behind them.
+        ctl(&sandbox, &["step", "4"]);
+        for reader in &mut readers {
+            reader.wait_until_ready();
             reader.signal(Signal::STOP);
         }
         ctl(&sandbox, &["resume"]);

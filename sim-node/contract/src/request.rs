@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::time::Duration;
 
+use bytemuck::bytes_of;
 use thiserror::Error;
 
 use crate::clock::epoch_microseconds;
@@ -114,8 +115,8 @@ pub(crate) struct Commander {
     client_id: u64,
     /// The sequence number of the last command.
     sequence: u64,
-    /// Numbers of the commands without an outcome, ascending; at most as many as outcomes can wait.
-    unanswered: VecDeque<u64>,
+    /// Commands without an outcome, ascending by number; at most as many as outcomes can wait.
+    unanswered: VecDeque<Command>,
     /// Outcomes that came while another one was waited for, in order; at most as many as above.
     answered: VecDeque<Outcome>,
     commands: ValueWriter<Command>,
@@ -144,7 +145,8 @@ impl Commander {
         // Outcomes of other clients must not crowd out those of this one.
         self.collect()?;
         let sequence = self.next_sequence();
-        let taken = self.commands.write(Command::new(self.client_id, sequence, action))?;
+        let command = Command::new(self.client_id, sequence, action);
+        let taken = self.commands.write(command)?;
         if taken == 0 {
             let owner = OwnerSeen::look(attachment);
             return Err(match reader_count(&attachment.services.commands) {
@@ -153,7 +155,7 @@ impl Commander {
             });
         }
         self.sequence = sequence;
-        self.unanswered.push_back(sequence);
+        self.unanswered.push_back(command);
         if self.unanswered.len() > OUTCOMES_BUFFERED {
             self.unanswered.pop_front();
         }
@@ -164,11 +166,10 @@ impl Commander {
     pub(crate) fn collect(&mut self) -> Result<(), ReadError> {
         let mut drained = Drained::default();
         self.outcomes.drain(&mut drained, |outcome| {
-            if outcome.command.client_id != self.client_id {
-                return;
-            }
-            // The console's other processes have this client id too, with other numbers.
-            if let Ok(place) = self.unanswered.binary_search(&outcome.command.sequence) {
+            // The console's other processes have this client id too, and once in a while the same
+            // number: only the whole command tells whose it was. NaN is compared as its bits.
+            let is_of = |command: &Command| bytes_of(command) == bytes_of(&outcome.command);
+            if let Some(place) = self.unanswered.iter().position(is_of) {
                 self.unanswered.remove(place);
                 self.answered.push_back(*outcome);
             }
@@ -197,7 +198,9 @@ impl Commander {
 
     /// Expects no outcome of that command any more.
     pub(crate) fn give_up(&mut self, sequence: u64) {
-        if let Ok(place) = self.unanswered.binary_search(&sequence) {
+        if let Ok(place) =
+            self.unanswered.binary_search_by_key(&sequence, |command| command.sequence)
+        {
             self.unanswered.remove(place);
         }
     }

@@ -160,7 +160,7 @@ impl Solver {
     /// Whole steps in `over_s`, rounded up, in substeps. A time that is a whole number of steps but
     /// for its rounding to f32 is taken as that number: 1/60 s at 240 Hz is 4 steps, not 5.
     fn substeps_of(&self, over_s: f32) -> u32 {
-        let steps = f64::from(over_s) * f64::from(self.settings.rate_hz) * (1.0 - 1e-6);
+        let steps = f64::from(over_s) * f64::from(self.settings.rate_hz) * (1.0 - 1e-7);
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

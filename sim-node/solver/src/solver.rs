@@ -24,6 +24,8 @@ pub struct Solver {
     /// The state was put in place since the last step: the next step shows it, and integrates
     /// nothing.
     pub(crate) is_restored: bool,
+    /// Particles frozen since this solver was made: for messages, not part of the state.
+    pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
 }
 
@@ -45,6 +47,7 @@ impl Solver {
             grabs: Vec::with_capacity(model.particles.len()),
             scene_step: 0,
             is_restored: false,
+            frozen_count: 0,
             model,
         }
     }
@@ -64,6 +67,12 @@ impl Solver {
     /// Hash of the state after the last step; the same state has the same hash on every machine.
     pub fn state_hash(&self) -> u64 {
         self.state_hash
+    }
+
+    /// Particles that were frozen since this solver was made, because their state was no longer
+    /// finite. Such a particle stands for good, until a reset.
+    pub fn frozen_count(&self) -> u64 {
+        self.frozen_count
     }
 
     /// Number of particles.

@@ -10,7 +10,7 @@ use crate::hash::state_hash;
 use crate::particles::{Particles, flag};
 use crate::scene::{Method, SolverSettings};
 
-/// Largest divisor's worth of protection: below this squared length a pair has no direction.
+/// Below this squared length a pair has no direction to be moved along.
 const LENGTH_SQUARED_MIN: f32 = f32::MIN_POSITIVE;
 
 impl Solver {
@@ -29,7 +29,9 @@ impl Solver {
             for _ in 0..self.settings.substeps {
                 self.substep();
             }
-            freeze_non_finite(&mut self.particles);
+            self.frozen_count += freeze_non_finite(&mut self.particles);
+            let flags = &self.particles.flags;
+            self.grabs.retain(|grab| flags[grab.particle as usize] & flag::GRABBED != 0);
             self.scene_step += 1;
         }
         make_zeros_canonical(&mut self.particles);
@@ -181,11 +183,19 @@ impl Gap {
     fn close(&self, particles: &mut Particles, [a, b]: [u32; 2], lambda: f32) {
         let (a, b) = (a as usize, b as usize);
         let scale = lambda / self.length;
-        let (scale_a, scale_b) =
-            (particles.positions[a][3] * scale, particles.positions[b][3] * scale);
-        for (axis, along) in self.separation.iter().enumerate() {
-            particles.displacements[a][axis] -= scale_a * along;
-            particles.displacements[b][axis] += scale_b * along;
+        let (w_a, w_b) = (particles.positions[a][3], particles.positions[b][3]);
+        let (scale_a, scale_b) = (w_a * scale, w_b * scale);
+        // An end without weight is left out, not moved by 0: a state that blows up gives 0 times
+        // infinity, and must not reach what is held.
+        if w_a != 0.0 {
+            for (axis, along) in self.separation.iter().enumerate() {
+                particles.displacements[a][axis] -= scale_a * along;
+            }
+        }
+        if w_b != 0.0 {
+            for (axis, along) in self.separation.iter().enumerate() {
+                particles.displacements[b][axis] += scale_b * along;
+            }
         }
     }
 }
@@ -202,8 +212,9 @@ fn update(particles: &mut Particles, h: f32) {
 }
 
 /// Takes particles out whose state is no longer finite: they stand where they were at the start of
-/// the step, for good.
-fn freeze_non_finite(particles: &mut Particles) {
+/// the step, for good. Returns how many.
+fn freeze_non_finite(particles: &mut Particles) -> u64 {
+    let mut count = 0;
     for index in 0..particles.count() {
         let state = particles.positions[index].iter().chain(&particles.velocities[index]);
         if state.into_iter().all(|number| number.is_finite()) {
@@ -212,7 +223,9 @@ fn freeze_non_finite(particles: &mut Particles) {
         particles.positions[index] = particles.step_starts[index];
         particles.stop(index);
         particles.change_flags(index, flag::FROZEN, flag::GRABBED);
+        count += 1;
     }
+    count
 }
 
 /// -0 becomes +0, in the state itself: the same numbers have the same bits, and thus the same hash.

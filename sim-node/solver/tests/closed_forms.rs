@@ -47,12 +47,16 @@ fn free_fall_from_rest_is_the_sum_of_its_substeps() {
 
 #[test]
 fn free_fall_is_exact_a_kilometre_from_the_origin_in_tiny_substeps() {
-    let text = "[solver]\nrate_hz = 60\nsubsteps = 20\n[[particle]]\nposition = [0, 1000, 0]\n";
-    let solver = stepped(text, 60);
-    let m = 1200.0;
-    let expected = 9.81 * m * (m + 1.0) / 2.0 / (m * m);
-    let fallen = 1000.0 - f64::from(solver.particle(0).position[1]);
-    assert!((fallen / expected - 1.0).abs() < 1e-3, "{fallen}, not {expected}");
+    for (rate, substeps) in [(60, 20), (240, 20), (1000, 20)] {
+        let text = format!(
+            "[solver]\nrate_hz = {rate}\nsubsteps = {substeps}\n[[particle]]\nposition = [0, 1000, 0]\n"
+        );
+        let solver = stepped(&text, rate);
+        let m = f64::from(rate * substeps);
+        let expected = 9.81 * m * (m + 1.0) / 2.0 / (m * m);
+        let fallen = 1000.0 - f64::from(solver.particle(0).position[1]);
+        assert!((fallen / expected - 1.0).abs() < 1e-3, "{m}: {fallen}, not {expected}");
+    }
 }
 
 #[test]

@@ -190,4 +190,24 @@ fn a_state_that_overflows_freezes_its_particle_where_it_last_stood() {
     }
     assert_eq!(solver.particle(1).flags, flag::FROZEN);
     assert_eq!(solver.pin(1), Err(Rejection::NoEffectHere));
+    assert!(solver.frozen_count() > 0);
+}
+
+#[test]
+fn what_is_held_survives_a_neighbour_that_blows_up_and_the_state_can_be_restored() {
+    // Particle 1 overflows between a pinned and a grabbed one.
+    let text = "version = 1\n[solver]\nmax_speed = 3e38\n[[particle]]\nposition = [0, 0, 0]\npinned = true\n\
+         [[particle]]\nposition = [1, 0, 0]\n[[particle]]\nposition = [2, 0, 0]\n\
+         [[constraint]]\nparticles = [0, 1]\nrest_length = 3e38\n\
+         [[constraint]]\nparticles = [1, 2]\nrest_length = 3e38\n";
+    let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
+    solver.grab(CLIENT, grip(2, [2.0, 1.0, 0.0])).unwrap();
+    step(&mut solver, 20);
+    assert_eq!(solver.particle(1).flags, flag::FROZEN);
+    assert_eq!((solver.particle(0).flags, solver.particle(0).position), (flag::PINNED, [0.0; 3]));
+    assert_eq!(solver.particle(2).position, [2.0, 1.0, 0.0]);
+    let particles: Vec<Particle> = (0..3).map(|index| solver.particle(index)).collect();
+    let keyframe = solver.keyframe();
+    solver.restore(&particles, &keyframe).unwrap();
+    solver.release(CLIENT, 2).unwrap();
 }

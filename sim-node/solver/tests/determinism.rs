@@ -99,7 +99,7 @@ fn the_hash_is_that_of_the_published_bytes() {
 }
 
 #[test]
-fn a_hanging_scene_at_rest_keeps_its_hash() {
+fn a_pinned_scene_keeps_its_hash() {
     let text = "version = 1\n[[particle]]\nposition = [0, 0, 0]\npinned = true\n";
     let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
     let hash = solver.state_hash();

@@ -237,6 +237,14 @@ const WRONG: &[(&str, &str)] = &[
         "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 3\nrows = 3\nspacing = 1\npinned = 5",
         "f.toml:7: generate[0].pinned: expected a word in quotes or a list of indices",
     ),
+    (
+        "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 3\nrows = 3\nspacing = 3e38",
+        "f.toml:3: generate[0]: has a particle at 300000000000000000000000000000000000000 (allowed: -1e7 to 1e7)",
+    ),
+    (
+        "version = 1\n[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]\nto = [1, 0, 0]\ncompliance = { structural = 1e34 }",
+        "f.toml:7: generate[0].compliance.structural: 10000000000000000000000000000000000 is out of range (allowed: 0 to 1e20 m/N)",
+    ),
     ("version = 1\n\n[solver\n", "f.toml:3: scene: "),
 ];
 

@@ -23,9 +23,9 @@ fn main() -> anyhow::Result<()> {
 
     eprintln!("building the programs ...");
     let mut node = Process::start_in(Program::SimNode, &domain, &["run", "curtain"]);
-    node.wait_for_stderr("ready");
+    node.wait_until_ready();
     let mut recorder = Process::start_in(Program::Recorder, &domain, &["record", "-o", file]);
-    recorder.wait_for_stderr("ready");
+    recorder.wait_until_ready();
     eprintln!("the curtain hangs, and everything is recorded; Ctrl-C ends the demo");
     eprintln!("drag it:  cargo run --release -- ctl grab 90 0.5 0.2 0.3");
 
@@ -33,8 +33,9 @@ fn main() -> anyhow::Result<()> {
     let recorded = recorder.interrupt();
     let ended = node.interrupt();
     eprint!("{}{}", recorded.stderr, ended.stderr);
-    if recorded.code != Some(0) {
-        bail!("the recorder failed");
+    // Exit code 3: finished, and it says itself what was lost.
+    if !matches!(recorded.code, Some(0 | 3)) || ended.code != Some(0) {
+        bail!("the recorder ended with {:?}, the node with {:?}", recorded.code, ended.code);
     }
     println!("{file}");
     let info = Process::start_in(Program::Recorder, &domain, &["info", file]).wait();

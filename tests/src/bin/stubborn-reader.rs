@@ -14,10 +14,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     while held.len() < BORROWED_SAMPLES_MAX {
         held.extend(client.next_snapshot(Duration::from_millis(100))?);
         if held.len() == 1 {
-            eprintln!("ready: holding");
+            eprintln!("attached");
         }
     }
-    eprintln!("holding {}", held.len());
+    eprintln!("ready: holding {}", held.len());
     // Never comes back: no status of step u64::MAX is ever published.
     while client.status(Duration::from_secs(1))?.is_none_or(|status| status.step < u64::MAX) {}
     Ok(())

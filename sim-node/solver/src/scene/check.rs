@@ -21,6 +21,9 @@ impl Range32 {
         Self { contains: |value| value >= 0.0, allowed: "a number >= 0" };
     pub(super) const POSITIVE: Self =
         Self { contains: |value| value > 0.0, allowed: "a number > 0" };
+    /// compliance / h^2 must be a number of f32 at the smallest h of 10 ns, too.
+    pub(super) const COMPLIANCE: Self =
+        Self { contains: |value| (0.0..=1e20).contains(&value), allowed: "0 to 1e20 m/N" };
     pub(super) const SHARE: Self =
         Self { contains: |value| (0.0..=1.0).contains(&value), allowed: "0 to 1" };
     /// 1/mass must be a number of f32, too.
@@ -129,7 +132,7 @@ impl Reader<'_> {
 
     pub(super) fn softness(&self, field: &str, number: &Number) -> Result<f32, SceneError> {
         let range = match self.method {
-            Method::Xpbd => Range32::AT_LEAST_ZERO,
+            Method::Xpbd => Range32::COMPLIANCE,
             Method::Pbd => Range32::SHARE,
         };
         self.ranged(field, number, range)

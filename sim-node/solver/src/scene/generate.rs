@@ -95,7 +95,7 @@ pub struct Rope {
 pub enum Pinned {
     /// One of the words of the shape.
     Word(&'static str),
-    /// Indices within the shape.
+    /// Indices within the shape, ascending.
     List(Vec<u32>),
 }
 
@@ -216,7 +216,7 @@ impl Generator {
                 Pinned::Word("last") => index == last,
                 Pinned::Word("both") => index == 0 || index == last,
                 Pinned::Word(_) => false,
-                Pinned::List(list) => list.contains(&index),
+                Pinned::List(list) => list.binary_search(&index).is_ok(),
             };
             model.particles.push(self.particle([along(0), along(1), along(2)], is_pinned));
         }
@@ -252,7 +252,7 @@ impl Generator {
             Pinned::Word("top-even") => is_top && index.is_multiple_of(2),
             Pinned::Word("corners") => index == 0 || index == cloth.columns - 1,
             Pinned::Word(_) => false,
-            Pinned::List(list) => list.contains(&index),
+            Pinned::List(list) => list.binary_search(&index).is_ok(),
         }
     }
 }

@@ -12,6 +12,7 @@ use super::{
     ELEMENTS_MAX, Method, Model, PASSES_MAX, RATE_HZ_MAX, SCENE_VERSION, Scene, SceneConstraint,
     SceneError, SceneParticle, Softness, SolverSettings,
 };
+use crate::COORDINATE_MAX;
 
 /// Reads and checks a scene.
 pub(super) fn scene(text: &str, label: &str) -> Result<Scene, SceneError> {
@@ -42,6 +43,7 @@ pub(super) fn scene(text: &str, label: &str) -> Result<Scene, SceneError> {
     };
     reader.check_size(&scene, &file)?;
     let model = Model::new(&scene);
+    reader.check_generated(&scene, &file, &model)?;
     scene.constraints =
         enumerate(&file.constraint, |index, one| reader.constraint(index, one, &model))?;
     Ok(scene)
@@ -173,6 +175,31 @@ impl Reader<'_> {
             Method::Pbd => Softness::Stiffness(softness),
         };
         Ok(SceneConstraint { particles: [a, b], rest_length, kind: file.kind, softness })
+    }
+
+    /// Refuses shapes that reach beyond the coordinates that a scene may have.
+    fn check_generated(
+        &self,
+        scene: &Scene,
+        file: &FileScene,
+        model: &Model,
+    ) -> Result<(), SceneError> {
+        let mut first = scene.particles.len();
+        for (index, generator) in scene.generators.iter().enumerate() {
+            let count = usize::try_from(generator.particle_count()).unwrap_or(usize::MAX);
+            let positions = model.particles[first..first + count].iter().map(|one| one.position);
+            first += count;
+            for axis in positions.flatten() {
+                // Not a number is no coordinate either.
+                if axis.abs() <= COORDINATE_MAX {
+                    continue;
+                }
+                let problem = format!("has a particle at {axis} (allowed: -1e7 to 1e7)");
+                let span = file.generate[index].shape.span();
+                return self.error(span, &format!("generate[{index}]"), problem);
+            }
+        }
+        Ok(())
     }
 
     /// Refuses a scene that is too big before anything of its size is made.

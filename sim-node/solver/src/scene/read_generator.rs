@@ -168,7 +168,12 @@ impl Fields<'_, '_> {
                 ),
             },
             FilePinned::List(list) => match list.iter().find(|index| u64::from(**index) >= count) {
-                None => return Ok(Pinned::List(list.clone())),
+                None => {
+                    let mut list = list.clone();
+                    list.sort_unstable();
+                    list.dedup();
+                    return Ok(Pinned::List(list));
+                }
                 Some(index) => {
                     format!("the shape has no particle {index} (allowed: 0 to {})", count - 1)
                 }
