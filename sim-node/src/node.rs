@@ -85,7 +85,7 @@ impl Node {
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.observe(&observer)?;
         while !stop.is_asked() && !self.is_done() {
-            let wake_late_ns = self.wait();
+            let wake_late_ns = self.wait(stop, &observer)?;
             if stop.is_asked() {
                 break;
             }
@@ -105,20 +105,26 @@ impl Node {
     }
 
     /// Waits for the deadline of the next step, or, paused, a little; returns how late it is.
-    fn wait(&mut self) -> u64 {
+    fn wait(&mut self, stop: &Stop, observer: &impl Fn(&Self)) -> anyhow::Result<u64> {
         if !self.progress.is_stepping() {
             sleep_until(monotonic_ns() + PAUSED_POLL_NS);
             let now_ns = monotonic_ns();
             self.idle_ns += now_ns - self.mark_ns;
             self.mark_ns = now_ns;
             self.pace.restart(now_ns);
-            return 0;
+            return Ok(0);
         }
         if !self.options.waits_for_time {
-            return 0;
+            return Ok(0);
         }
-        sleep_until(self.pace.deadline_ns());
-        self.pace.meet(monotonic_ns())
+        let deadline_ns = self.pace.deadline_ns();
+        // At a few steps a second, late joiners and the status do not wait for the next one.
+        while monotonic_ns() + STATUS_PERIOD_NS < deadline_ns && !stop.is_asked() {
+            sleep_until(monotonic_ns() + STATUS_PERIOD_NS);
+            self.observe(observer)?;
+        }
+        sleep_until(deadline_ns);
+        Ok(self.pace.meet(monotonic_ns()))
     }
 
     /// Applies the commands that have arrived, at the boundary before the next step.
