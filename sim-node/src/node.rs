@@ -119,8 +119,11 @@ impl Node {
         }
         let deadline_ns = self.pace.deadline_ns();
         // At a few steps a second, late joiners and the status do not wait for the next one.
-        while monotonic_ns() + STATUS_PERIOD_NS < deadline_ns && !stop.is_asked() {
+        while monotonic_ns() + STATUS_PERIOD_NS < deadline_ns {
             sleep_until(monotonic_ns() + STATUS_PERIOD_NS);
+            if stop.is_asked() {
+                return Ok(0);
+            }
             self.observe(observer)?;
         }
         sleep_until(deadline_ns);
