@@ -247,3 +247,18 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_hanging_rope_comes_to_rest_at_every_number_of_substeps() {
+    for substeps in [1, 4, 20] {
+        let text = format!(
+            "[solver]\nrate_hz = 240\nsubsteps = {substeps}\ndamping = 4\n[[generate]]\nshape = \"rope\"\n\
+             count = 21\nfrom = [0, 0, 0]\nto = [0, -1, 0]\nmass = 0.05\n"
+        );
+        let solver = stepped(&text, 240 * 10);
+        let squares = (0..21).flat_map(|index| solver.particle(index).velocity);
+        let sum: f64 = squares.map(|axis| f64::from(axis).powi(2)).sum();
+        let rms = (sum / 21.0).sqrt();
+        assert!(rms < 1e-3, "240 Hz x {substeps}: {rms} m/s");
+    }
+}
