@@ -14,7 +14,24 @@ use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint, Stop};
 /// How long the demo waits for news before it looks for Ctrl-C again.
 const POLL: Duration = Duration::from_millis(200);
 
+/// What `--help` says.
+const HELP: &str =
+    "Run a node with the curtain and a recorder, until Ctrl-C; then say what was recorded.
+
+Usage: cargo demo
+
+CATENARY_DOMAIN keeps it apart from other nodes on this host. The recording goes to the
+temporary folder.";
+
 fn main() -> anyhow::Result<()> {
+    match std::env::args().nth(1).as_deref() {
+        None => {}
+        Some("--help" | "-h") => {
+            println!("{HELP}");
+            return Ok(());
+        }
+        Some(other) => bail!("unexpected argument '{other}'\n\n{HELP}"),
+    }
     let stop = Stop::install()?;
     let domain = std::env::var(DOMAIN_VARIABLE).unwrap_or_default();
     let file =
