@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for step in 0..1000 {
             match step {
                 100 => {
-                    solver.grab(1, Grip { particle: 20, target: [0.3, 0.7, 0.4], over_s: 0.2 })?
+                    solver.grab(1, Grip { particle: 20, target: [0.3, 0.7, 0.4], over_s: 0.2 })?;
                 }
                 300 => solver.pin(30)?,
                 500 => solver.release(1, 20)?,
