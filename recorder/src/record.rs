@@ -33,11 +33,13 @@ const FLUSH_NS: u64 = SECOND_NS;
 const READS_PER_ROUND_MAX: usize = 8;
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Ends cleanly with Ctrl-C, SIGTERM, a limit, or the node.\n\n\
+#[command(
+    after_help = "Ends cleanly with Ctrl-C, SIGTERM, a limit, the node, or another run (as of play --loop).\n\n\
     Exit codes: 0 all recorded; 1 failed; 3 messages lost.\n\nExamples:\n  \
     recorder record -o run.mcap\n  \
     recorder record --name left --duration 10s --compression none\n  \
-    recorder record -o run.mcap --steps 2400 --json")]
+    recorder record -o run.mcap --steps 2400 --json"
+)]
 pub(crate) struct RecordArgs {
     #[command(flatten)]
     endpoint: EndpointArgs,

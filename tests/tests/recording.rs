@@ -270,6 +270,8 @@ fn a_replay_does_not_start_where_a_node_runs_and_takes_its_commands_elsewhere() 
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let first = *client.next_snapshot(DEADLINE).unwrap().unwrap().header();
     assert_eq!(ctl(&sandbox, &["step", "3"])["status"], "applied");
+    // `ctl step` waits for the steps, of a replay as of a node.
+    assert_eq!(ctl(&sandbox, &["hash"])["step"], first.step + 3);
     wait_for("three steps", || {
         let header = *client.next_snapshot(DEADLINE).unwrap()?.header();
         (header.step == first.step + 3).then_some(())
