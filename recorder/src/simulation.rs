@@ -10,7 +10,7 @@ use recorder::{
 use sim_contract::{
     Action, CONTRACT_VERSION, Command, ConstraintState, LoadHeader, Outcome, Triangle,
 };
-use sim_solver::{Method, SOLVER_VERSION, Scene, Solver};
+use sim_solver::{SOLVER_VERSION, Scene, Solver};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::apply::apply;
@@ -51,7 +51,7 @@ impl Job {
             scene_name: self.scene.name.clone(),
             origin: self.scene.origin,
             rate_hz: self.scene.solver.rate_hz,
-            method: method_number(self.scene.solver.method),
+            method: self.scene.solver.method as u32,
             particle_count: count(solver.particle_count()),
             constraint_count: count(solver.constraint_count()),
             solver_version: SOLVER_VERSION,
@@ -204,13 +204,6 @@ fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
         rest_length: constraint.rest_length,
         compliance: constraint.compliance,
         kind: constraint.kind as u32,
-    }
-}
-
-fn method_number(method: Method) -> u32 {
-    match method {
-        Method::Xpbd => 0,
-        Method::Pbd => 1,
     }
 }
 

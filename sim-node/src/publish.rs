@@ -8,7 +8,7 @@ use sim_contract::{
     NodeStatus, Outcome, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
     Triangle, Wake,
 };
-use sim_solver::{Method, SOLVER_VERSION, Scene, Solver};
+use sim_solver::{SOLVER_VERSION, Scene, Solver};
 
 use crate::statistics::Statistics;
 
@@ -254,10 +254,7 @@ fn load_header(scene: &Scene, solver: &Solver, run_id: u64) -> LoadHeader {
         origin: scene.origin,
         particle_count: count(solver.particle_count()),
         rate_hz: scene.solver.rate_hz,
-        method: match scene.solver.method {
-            Method::Xpbd => 0,
-            Method::Pbd => 1,
-        },
+        method: scene.solver.method as u32,
         ..LoadHeader::default()
     }
 }

@@ -122,15 +122,16 @@ impl SolverSettings {
     }
 }
 
-/// What the softness of a constraint means.
+/// What the softness of a constraint means; its number is the one in headers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u32)]
 pub enum Method {
     /// Compliance in m/N: the same stretch at every rate.
     #[default]
-    Xpbd,
+    Xpbd = 0,
     /// Stiffness 0..=1: the share of the error that the passes of a substep take away.
-    Pbd,
+    Pbd = 1,
 }
 
 /// The order in which constraints are projected.
