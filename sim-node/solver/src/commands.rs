@@ -2,8 +2,14 @@
 
 use thiserror::Error;
 
+use glam::Vec3;
+
 use crate::Solver;
+use crate::constraints::ConstraintKind;
+use crate::cut::{Ball, check_finite};
 use crate::drive::Grab;
+use crate::frame::{Frame, Pose};
+use crate::parameters::{Affected, Context, Setting};
 use crate::particles::flag;
 
 /// Largest coordinate that a command may name: f32 resolves 1 m there.
@@ -23,6 +29,17 @@ pub struct Grip {
     pub over_s: f32,
 }
 
+/// A stroke of a brush.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Push {
+    /// What it touches.
+    pub ball: Ball,
+    /// How far the brush moved in a step.
+    pub delta: [f32; 3],
+    /// Largest size of each component of `delta`, >= 0, if there is one.
+    pub limit: Option<f32>,
+}
+
 /// Why a command changed nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum Rejection {
@@ -35,14 +52,29 @@ pub enum Rejection {
     /// There is no such particle.
     #[error("there is no such particle")]
     UnknownParticle,
+    /// There is no such constraint.
+    #[error("there is no such constraint")]
+    UnknownConstraint,
+    /// There is no such anchor.
+    #[error("there is no such anchor")]
+    UnknownAnchor,
+    /// There is no such collider.
+    #[error("there is no such collider")]
+    UnknownCollider,
+    /// There is no such parameter.
+    #[error("there is no such parameter")]
+    UnknownParameter,
+    /// The constraint is torn already.
+    #[error("the constraint is torn already")]
+    AlreadyTorn,
     /// The particle is not grabbed.
     #[error("the particle is not grabbed")]
     NotGrabbed,
     /// Another client holds the particle.
     #[error("another client holds the particle")]
     GrabbedByOther,
-    /// The particle is frozen.
-    #[error("the particle is frozen")]
+    /// The particle is frozen, or the parameter means nothing in this scene.
+    #[error("it has no effect here")]
     NoEffectHere,
 }
 
@@ -53,6 +85,11 @@ impl Rejection {
             Self::NonFinite => "non_finite",
             Self::OutOfRange => "out_of_range",
             Self::UnknownParticle => "unknown_particle",
+            Self::UnknownConstraint => "unknown_constraint",
+            Self::UnknownAnchor => "unknown_anchor",
+            Self::UnknownCollider => "unknown_collider",
+            Self::UnknownParameter => "unknown_parameter",
+            Self::AlreadyTorn => "already_torn",
             Self::NotGrabbed => "not_grabbed",
             Self::GrabbedByOther => "grabbed_by_other",
             Self::NoEffectHere => "no_effect_here",
@@ -67,21 +104,28 @@ impl Solver {
     /// Unknown or frozen particle.
     pub fn pin(&mut self, particle: u32) -> Result<(), Rejection> {
         let index = self.living_particle(particle)?;
+        if self.has_flag(index, flag::PINNED) {
+            return Ok(());
+        }
         self.particles.change_flags(index, flag::PINNED, 0);
         // A grabbed one goes on with the hand that holds it, and stands where it is let go.
         if !self.has_flag(index, flag::GRABBED) {
             self.particles.stop(index);
         }
+        self.tie();
         Ok(())
     }
 
-    /// Frees a pinned particle, from rest. Unpinning a free one is fine.
+    /// Frees a pinned particle, from rest; one that has an anchor goes back to it. Unpinning a free one is fine.
     ///
     /// # Errors
     /// Unknown or frozen particle.
     pub fn unpin(&mut self, particle: u32) -> Result<(), Rejection> {
         let index = self.living_particle(particle)?;
-        self.particles.change_flags(index, 0, flag::PINNED);
+        if self.has_flag(index, flag::PINNED) {
+            self.particles.change_flags(index, 0, flag::PINNED);
+            self.tie();
+        }
         Ok(())
     }
 
@@ -92,9 +136,9 @@ impl Solver {
     pub fn grab(&mut self, client_id: u64, grip: Grip) -> Result<(), Rejection> {
         self.check_target(&grip)?;
         let index = self.living_particle(grip.particle)?;
-        let substeps_left = self.substeps_of(grip.over_s);
+        let steps_left = self.steps_of(grip.over_s);
         let Grip { particle, target, .. } = grip;
-        let grab = Grab { particle, client_id, target, substeps_left };
+        let grab = Grab { particle, client_id, target, steps_left };
         match self.find_grab(particle) {
             Ok(place) if self.grabs[place].client_id != client_id => {
                 return Err(Rejection::GrabbedByOther);
@@ -115,12 +159,12 @@ impl Solver {
         self.living_particle(grip.particle)?;
         let place = self.find_own_grab(client_id, grip.particle)?;
         self.grabs[place].target = grip.target;
-        self.grabs[place].substeps_left = self.substeps_of(grip.over_s);
+        self.grabs[place].steps_left = self.steps_of(grip.over_s);
         Ok(())
     }
 
     /// Lets a grabbed particle go with the velocity of its last motion; a pinned one stays where
-    /// it is.
+    /// it is, an anchored one goes back to its anchor.
     ///
     /// # Errors
     /// Unknown particle, or this client does not hold it.
@@ -133,6 +177,87 @@ impl Solver {
             self.particles.stop(index);
         }
         Ok(())
+    }
+
+    /// Gives every free particle strictly within a ball the velocity of a brush.
+    ///
+    /// # Errors
+    /// A wrong number.
+    pub fn push(&mut self, push: Push) -> Result<(), Rejection> {
+        self.check_ball(&push.ball)?;
+        check_finite(&[push.delta, [push.limit.unwrap_or(0.0), 0.0, 0.0]])?;
+        let limit = push.limit.unwrap_or(COORDINATE_MAX);
+        let is_near = push.delta.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
+        let is_in_plane = !self.is_planar || push.delta[2] == 0.0;
+        if !is_near || !is_in_plane || limit < 0.0 {
+            return Err(Rejection::OutOfRange);
+        }
+        let clamp = |axis: f32| match axis {
+            far if far > limit => limit,
+            far if far < -limit => -limit,
+            near => near,
+        };
+        let [x, y, z] = push.delta.map(|axis| clamp(axis) * self.settings.rate_hz as f32);
+        for (position, velocity) in
+            self.particles.positions.iter().zip(&mut self.particles.velocities)
+        {
+            let [px, py, pz, inverse_mass] = *position;
+            if inverse_mass != 0.0 && push.ball.has(Vec3::new(px, py, pz)) {
+                *velocity = [x, y, z, 0.0];
+            }
+        }
+        Ok(())
+    }
+
+    /// Brings the frame of an anchor to a pose by the end of the next step; from then on it stands.
+    ///
+    /// # Errors
+    /// Unknown anchor, or a wrong number.
+    pub fn move_anchor(&mut self, anchor: u32, pose: Pose) -> Result<(), Rejection> {
+        let frame = Frame::check(&pose, self.is_planar)?;
+        let moved = self.anchors.moved.get_mut(anchor as usize);
+        *moved.ok_or(Rejection::UnknownAnchor)? = Some(frame);
+        Ok(())
+    }
+
+    /// Brings a collider to a pose, against where it was at load, by the end of the next step, with
+    /// the velocity that this implies; from then on it stands. It turns about its own middle;
+    /// bounds do not turn.
+    ///
+    /// # Errors
+    /// Unknown collider, or a wrong number.
+    pub fn move_collider(&mut self, collider: u32, pose: Pose) -> Result<(), Rejection> {
+        let frame = Frame::check(&pose, self.is_planar)?;
+        let moved = self.colliders.get_mut(collider as usize);
+        moved.ok_or(Rejection::UnknownCollider)?.move_to(frame)
+    }
+
+    /// Sets a parameter, one of [`crate::PARAMETERS`], from the next step on; `kind` chooses the
+    /// constraints that `compliance` or `stiffness` is meant for, none is all of them.
+    ///
+    /// The state keeps every bit: nothing jumps, only the forces are other ones from now on.
+    ///
+    /// # Errors
+    /// Unknown parameter, a value of another form or outside of its range, or a softness that is
+    /// not the method's.
+    pub fn set(
+        &mut self,
+        name: &str,
+        setting: Setting,
+        kind: Option<ConstraintKind>,
+    ) -> Result<(), Rejection> {
+        let affected = self.parameters.set(name, setting, kind, self.context())?;
+        if affected != Affected::Nothing {
+            self.configure();
+        }
+        if affected == Affected::RigidPaths {
+            self.tie();
+        }
+        Ok(())
+    }
+
+    pub(crate) fn context(&self) -> Context {
+        Context { method: self.settings.method, is_planar: self.is_planar }
     }
 
     fn living_particle(&self, particle: u32) -> Result<usize, Rejection> {
@@ -157,9 +282,9 @@ impl Solver {
         if is_near && is_in_plane && is_timely { Ok(()) } else { Err(Rejection::OutOfRange) }
     }
 
-    /// Whole steps in `over_s`, rounded up, in substeps. A time that is a whole number of steps but
+    /// Whole steps in `over_s`, rounded up, at least one. A time that is a whole number of steps but
     /// for its rounding to f32 is taken as that number: 1/60 s at 240 Hz is 4 steps, not 5.
-    fn substeps_of(&self, over_s: f32) -> u32 {
+    fn steps_of(&self, over_s: f32) -> u32 {
         let steps = f64::from(over_s) * f64::from(self.settings.rate_hz) * (1.0 - 1e-7);
         #[allow(
             clippy::cast_possible_truncation,
@@ -167,7 +292,7 @@ impl Solver {
             reason = "0 <= over_s <= 0.25 and rate <= 1e5: at most 25,000"
         )]
         let steps = steps.ceil() as u32;
-        steps.max(1) * self.settings.substeps
+        steps.max(1)
     }
 
     /// The place of a particle's grab in the list, or where it would go: ascending by particle.

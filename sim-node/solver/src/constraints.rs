@@ -5,7 +5,9 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::order::Order;
-use crate::scene::{Method, Model, SolverSettings};
+use crate::parameters::Parameters;
+use crate::scene::{Method, Model};
+use crate::tear::TearCause;
 
 /// What a constraint is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -39,38 +41,146 @@ pub struct Constraint {
 }
 
 /// All constraints in projection order: one array per field, each `constraint_count` long.
-/// No two constraints of one group share a particle, except in the serial last one.
+///
+/// A torn constraint is a tether of infinite length: it never pulls, and no kernel needs to know
+/// of it.
 #[derive(Debug, Clone)]
 pub(crate) struct Constraints {
     /// The two particles.
     pub(crate) pairs: Vec<[u32; 2]>,
+    /// Infinite where torn.
     pub(crate) rest_lengths: Vec<f32>,
-    /// xpbd: compliance / h^2, in 1/kg. pbd: the share k' of the error that one pass takes away.
+    /// xpbd: compliance / h^2, in 1/kg. pbd: the share of the error that one pass takes away,
+    /// w k', w being the relaxation factor.
     pub(crate) softness: Vec<f32>,
     /// Whether it acts only when longer than its rest length.
     pub(crate) pull_only: Vec<bool>,
-    /// The multipliers of the running substep, in kg m (xpbd).
+    /// The multipliers of the running substep, in kg m.
     pub(crate) multipliers: Vec<f32>,
     /// Ranges of the arrays above, in the order of projection.
     pub(crate) groups: Vec<Range<usize>>,
+    /// Groups at the beginning in which no two constraints share a particle.
+    pub(crate) independent_count: usize,
+    /// Lengths that none exceeds; no entries where nothing is limited.
+    pub(crate) max_lengths: Vec<f32>,
+    /// Lengths above which they tear; no entries where none tears by its length.
+    pub(crate) tear_lengths: Vec<f32>,
+    /// Which limit `tear_lengths` holds.
+    pub(crate) tear_causes: Vec<TearCause>,
+    /// Multipliers above which they tear, force times h^2; no entries where none tears by force.
+    pub(crate) tear_multipliers: Vec<f32>,
+    /// Slot by slot: the index in the scene.
+    pub(crate) indices: Vec<u32>,
+    /// Index by index: the slot in these arrays.
+    slots: Vec<u32>,
 }
 
 impl Constraints {
-    pub(crate) fn new(model: &Model, order: &Order, settings: &SolverSettings) -> Self {
+    pub(crate) fn new(model: &Model, order: &Order) -> Self {
         let in_order = || order.indices.iter().map(|index| model.constraints[*index as usize]);
-        let softness = |one: Constraint| match settings.method {
-            Method::Xpbd => one.compliance / (settings.h() * settings.h()),
-            Method::Pbd => stiffness_per_pass(one.compliance, settings.iterations),
-        };
+        let mut slots = vec![0; order.indices.len()];
+        for (slot, index) in (0_u32..).zip(&order.indices) {
+            slots[*index as usize] = slot;
+        }
         Self {
             pairs: in_order().map(|one| [one.a, one.b]).collect(),
             rest_lengths: in_order().map(|one| one.rest_length).collect(),
-            softness: in_order().map(softness).collect(),
+            softness: vec![0.0; order.indices.len()],
             pull_only: in_order().map(|one| one.kind == ConstraintKind::Tether).collect(),
-            multipliers: vec![0.0; model.constraints.len()],
+            multipliers: vec![0.0; order.indices.len()],
             groups: order.groups.clone(),
+            independent_count: order.independent_count,
+            max_lengths: Vec::new(),
+            tear_lengths: Vec::new(),
+            tear_causes: Vec::new(),
+            tear_multipliers: Vec::new(),
+            indices: order.indices.clone(),
+            slots,
         }
     }
+
+    /// Works out everything that follows from the parameters.
+    pub(crate) fn configure(&mut self, model: &Model, parameters: &Parameters, setup: Setup) {
+        let h_squared = setup.h * setup.h;
+        for (slot, index) in self.indices.iter().enumerate() {
+            let one = model.constraints[*index as usize];
+            let softness = parameters.softness(one.kind, one.compliance);
+            self.softness[slot] = match setup.method {
+                Method::Xpbd => softness / h_squared,
+                Method::Pbd => {
+                    parameters.relaxation * stiffness_per_pass(softness, parameters.iterations)
+                }
+            };
+        }
+        let limits = parameters.limits();
+        let of = |index: u32| model.limits(index).or(limits);
+        let rest = |index: u32| model.constraints[index as usize].rest_length;
+        self.max_lengths =
+            self.thresholds(|index| ratio_length(of(index).max_stretch, rest(index)));
+        let by_stretch = |index| ratio_length(of(index).tear_stretch, rest(index));
+        let by_distance = |index| distance_length(of(index).tear_distance, rest(index));
+        let is_stretch = |index| by_stretch(index) <= by_distance(index);
+        self.tear_lengths =
+            self.thresholds(
+                |index| {
+                    if is_stretch(index) { by_stretch(index) } else { by_distance(index) }
+                },
+            );
+        self.tear_causes = (self.indices[..self.tear_lengths.len()].iter())
+            .map(|index| if is_stretch(*index) { TearCause::Stretch } else { TearCause::Distance })
+            .collect();
+        self.tear_multipliers =
+            self.thresholds(|index| of(index).tear_force.unwrap_or(f32::INFINITY) * h_squared);
+    }
+
+    /// A number for each slot, infinite for torn ones; none at all where all are infinite.
+    fn thresholds(&self, of: impl Fn(u32) -> f32) -> Vec<f32> {
+        let slots = self.indices.iter().zip(&self.rest_lengths);
+        let values = slots.map(|(index, rest)| if rest.is_infinite() { *rest } else { of(*index) });
+        let values: Vec<_> = values.collect();
+        if values.iter().all(|value| value.is_infinite()) { Vec::new() } else { values }
+    }
+
+    /// The first slot behind the groups in which no two constraints share a particle.
+    pub(crate) fn independent_end(&self) -> usize {
+        self.groups[..self.independent_count].last().map_or(0, |group| group.end)
+    }
+
+    pub(crate) fn is_torn(&self, index: u32) -> bool {
+        self.rest_lengths[self.slots[index as usize] as usize].is_infinite()
+    }
+
+    /// Takes a constraint out for good.
+    pub(crate) fn tear(&mut self, index: u32) {
+        let slot = self.slots[index as usize] as usize;
+        self.rest_lengths[slot] = f32::INFINITY;
+        self.pull_only[slot] = true;
+        for limits in [&mut self.max_lengths, &mut self.tear_lengths, &mut self.tear_multipliers] {
+            if let Some(limit) = limits.get_mut(slot) {
+                *limit = f32::INFINITY;
+            }
+        }
+    }
+}
+
+/// What does not change while a scene runs, or follows from the rate.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setup {
+    pub(crate) method: Method,
+    /// Length of a substep in seconds.
+    pub(crate) h: f32,
+}
+
+/// A ratio says nothing of a constraint without length.
+fn ratio_length(ratio: Option<f32>, rest_length: f32) -> f32 {
+    match ratio {
+        Some(ratio) if rest_length > 0.0 => ratio * rest_length,
+        _ => f32::INFINITY,
+    }
+}
+
+fn distance_length(distance: Option<f32>, rest_length: f32) -> f32 {
+    distance.map_or(f32::INFINITY, |distance| rest_length + distance)
 }
 
 /// k' = 1 - (1 - k)^(1/n): n passes with k' leave the same error as one pass with k.

@@ -1,6 +1,6 @@
 //! The state hash: XXH3-64 over the particles as they are published.
 
-use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+use xxhash_rust::xxh3::Xxh3;
 
 use crate::particles::{Particle, Particles};
 
@@ -9,9 +9,7 @@ const CHUNK: usize = 128;
 
 /// XXH3-64 over 32 bytes a particle. The seed is 0 while nothing is torn, else the XXH3-64 of the
 /// torn indices, ascending, as little-endian u32.
-pub(crate) fn state_hash(particles: &Particles, torn_ascending: &[u32]) -> u64 {
-    let seed =
-        if torn_ascending.is_empty() { 0 } else { xxh3_64(bytemuck::cast_slice(torn_ascending)) };
+pub(crate) fn state_hash(particles: &Particles, seed: u64) -> u64 {
     let mut hasher = Xxh3::with_seed(seed);
     let mut chunk = [Particle::default(); CHUNK];
     let mut index = 0;

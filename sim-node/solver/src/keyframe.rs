@@ -3,13 +3,19 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::Solver;
+use glam::{Quat, Vec3};
+
 use crate::drive::Grab;
+use crate::frame::{Frame, Pose};
 use crate::hash::state_hash;
+use crate::parameters::Parameters;
 use crate::particles::{Particle, flag};
+use crate::tear::TearCause;
+use crate::tethers::{Basis, Tethers};
+use crate::{COORDINATE_MAX, Solver};
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
-const KEYFRAME_VERSION: u32 = 1;
+const KEYFRAME_VERSION: u32 = 2;
 
 /// What the particles of a snapshot lack to be the complete state after the same step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,8 +26,43 @@ pub struct Keyframe {
     /// The masses that fixed particles have when nothing holds them, ascending by particle.
     fixed: Vec<FixedParticle>,
     grabs: Vec<Grab>,
-    /// Torn constraints in the order of tearing.
+    /// Torn constraints in the order of tearing, and why each of them tore.
     torn: Vec<u32>,
+    tear_causes: Vec<TearCause>,
+    /// What the tethers were last worked out from.
+    tethers: Basis,
+    parameters: Parameters,
+    /// Where clients have put anchors and colliders, ascending by index.
+    moved_anchors: Vec<Moved>,
+    moved_colliders: Vec<Moved>,
+}
+
+/// An anchor or a collider that a client has moved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Moved {
+    index: u32,
+    translation: [f32; 3],
+    /// Of length 1.
+    rotation: [f32; 4],
+}
+
+impl Moved {
+    fn all<'a>(frames: impl Iterator<Item = &'a Option<Frame>>) -> Vec<Self> {
+        let moved = (0_u32..).zip(frames).filter_map(|(index, frame)| Some((index, (*frame)?)));
+        let moved = moved.map(|(index, frame)| {
+            let Pose { translation, rotation } = frame.to_pose();
+            Self { index, translation, rotation }
+        });
+        moved.collect()
+    }
+
+    /// The frame as it was, bit for bit: it has length 1 already.
+    fn frame(&self) -> Frame {
+        Frame {
+            translation: Vec3::from_array(self.translation),
+            rotation: Quat::from_array(self.rotation),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -115,15 +156,24 @@ impl Solver {
             fixed,
             grabs: self.grabs.clone(),
             torn: self.torn().to_vec(),
+            tear_causes: self.tear_causes().to_vec(),
+            tethers: self.tethers.basis.clone(),
+            parameters: self.parameters,
+            moved_anchors: Moved::all(self.anchors.moved.iter()),
+            moved_colliders: Moved::all(self.colliders.iter().map(|one| &one.moved)),
         }
     }
 
     /// Most bytes that an encoded keyframe of this scene can have.
     pub fn keyframe_size_bytes_max(&self) -> usize {
         // Variable-length integers: u32 at most 5 bytes, u64 and lengths at most 10.
-        let (fixed, grab, torn) = (5 + 4, 5 + 10 + 12 + 5, 5);
-        let head = 4 + 1 + 10 + 3 * 10;
-        head + self.particle_count() * (fixed + grab) + self.constraint_count() * torn
+        let (fixed, grab, root) = (5 + 4, 5 + 10 + 12 + 5, 5);
+        let (torn, cause, moved) = (5, 5, 5 + 12 + 16);
+        let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 8 * 5;
+        let head = 4 + 1 + 10 + 7 * 10 + 5 + parameters;
+        head + self.particle_count() * (fixed + grab + root)
+            + self.constraint_count() * (torn + cause)
+            + (self.anchor_count() + self.collider_count()) * moved
     }
 
     /// Takes over the state that a snapshot and the keyframe of the same step describe.
@@ -136,6 +186,7 @@ impl Solver {
         keyframe: &Keyframe,
     ) -> Result<(), RestoreError> {
         self.check(particles, keyframe)?;
+        self.reset();
         for (index, particle) in particles.iter().enumerate() {
             self.particles.set(index, particle);
             if particle.inverse_mass != 0.0 {
@@ -145,12 +196,40 @@ impl Solver {
         for one in &keyframe.fixed {
             self.particles.base_inverse_masses[one.particle as usize] = one.base_inverse_mass;
         }
-        self.grabs.clear();
         self.grabs.extend_from_slice(&keyframe.grabs);
         self.scene_step = keyframe.scene_step;
         self.is_restored = false;
-        self.state_hash = state_hash(&self.particles, self.torn());
+        self.parameters = keyframe.parameters;
+        self.restore_constraints(keyframe);
+        self.restore_frames(keyframe);
+        self.state_hash = state_hash(&self.particles, self.torn.hash_seed());
         Ok(())
+    }
+
+    fn restore_constraints(&mut self, keyframe: &Keyframe) {
+        self.configure();
+        self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
+        for index in &keyframe.torn {
+            self.constraints.tear(*index);
+        }
+        if self.settings.tethers {
+            let basis = keyframe.tethers.clone();
+            self.tethers = Tethers::new(&self.model, &self.parameters, basis, &keyframe.torn);
+            self.tethers.drop_torn(&self.constraints);
+        }
+    }
+
+    fn restore_frames(&mut self, keyframe: &Keyframe) {
+        for moved in &keyframe.moved_anchors {
+            self.anchors.moved[moved.index as usize] = Some(moved.frame());
+        }
+        for moved in &keyframe.moved_colliders {
+            self.colliders[moved.index as usize].moved = Some(moved.frame());
+        }
+        let time_s = self.scene_time_s();
+        for collider in &mut self.colliders {
+            collider.place(time_s);
+        }
     }
 
     fn is_fixed(&self, particle: u32) -> bool {
@@ -163,35 +242,83 @@ impl Solver {
             return Err(RestoreError::ParticleCount { expected, found });
         }
         for (particle, state) in particles.iter().enumerate() {
-            check_particle(state).map_err(|what| RestoreError::Particle { particle, what })?;
+            self.check_particle(particle, state)
+                .map_err(|what| RestoreError::Particle { particle, what })?;
         }
-        check_keyframe(particles, keyframe).map_err(|what| RestoreError::Mismatch { what })
+        check_holds(particles, keyframe)
+            .and_then(|()| self.check_keyframe(keyframe))
+            .map_err(|what| RestoreError::Mismatch { what })
+    }
+
+    fn check_particle(&self, index: usize, particle: &Particle) -> Result<(), &'static str> {
+        let is_fixed = particle.flags & flag::FIXED != 0;
+        if !particle.position.iter().chain(&particle.velocity).all(|number| number.is_finite()) {
+            return Err("a number is not finite");
+        }
+        if particle.flags & !flag::KNOWN != 0 {
+            return Err("it has flags that this version does not know");
+        }
+        if (particle.flags ^ self.particles.flags[index]) & flag::ANCHORED != 0 {
+            return Err("other particles follow an anchor in this scene");
+        }
+        if is_fixed != (particle.inverse_mass == 0.0) {
+            return Err("its flags and its inverse mass contradict each other");
+        }
+        if self.is_planar && (particle.position[2] != 0.0 || particle.velocity[2] != 0.0) {
+            return Err("it is out of the plane of a scene of 2 dimensions");
+        }
+        if is_fixed || is_inverse_mass(particle.inverse_mass) {
+            Ok(())
+        } else {
+            Err("its inverse mass is not a positive number")
+        }
+    }
+
+    /// Everything that the scene alone can judge.
+    fn check_keyframe(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
+        let (particles, constraints) = (self.particle_count(), self.constraint_count());
+        if !is_set_below(&keyframe.torn, constraints) {
+            return Err("it has torn constraints that the scene has not, or twice");
+        }
+        if keyframe.tear_causes.len() != keyframe.torn.len() {
+            return Err("not every torn constraint has its cause");
+        }
+        let Basis { roots, torn_count } = &keyframe.tethers;
+        if !is_set_below(roots, particles) || *torn_count as usize > keyframe.torn.len() {
+            return Err("its tethers are not those of the scene");
+        }
+        if !keyframe.parameters.is_valid(self.context()) {
+            return Err("a parameter is out of its range");
+        }
+        let is_frame = |moved: &Moved| {
+            let pose = Pose { translation: moved.translation, rotation: moved.rotation };
+            Frame::check(&pose, self.is_planar).is_ok()
+        };
+        let index = |moved: &Moved| moved.index as usize;
+        let (anchors, colliders) = (&keyframe.moved_anchors, &keyframe.moved_colliders);
+        if anchors.iter().any(|one| index(one) >= self.anchor_count() || !is_frame(one))
+            || colliders.iter().any(|one| index(one) >= self.collider_count() || !is_frame(one))
+        {
+            return Err("it has moved anchors or colliders that the scene has not");
+        }
+        Ok(())
     }
 }
 
-fn check_particle(particle: &Particle) -> Result<(), &'static str> {
-    let is_fixed = particle.flags & flag::FIXED != 0;
-    if !particle.position.iter().chain(&particle.velocity).all(|number| number.is_finite()) {
-        return Err("a number is not finite");
-    }
-    if particle.flags & !flag::KNOWN != 0 {
-        return Err("it has flags that this version does not know");
-    }
-    if is_fixed != (particle.inverse_mass == 0.0) {
-        return Err("its flags and its inverse mass contradict each other");
-    }
-    if is_fixed || is_inverse_mass(particle.inverse_mass) {
-        Ok(())
-    } else {
-        Err("its inverse mass is not a positive number")
-    }
+/// Whether all are below a limit, and none occurs twice.
+fn is_set_below(indices: &[u32], limit: usize) -> bool {
+    let mut ascending = indices.to_vec();
+    ascending.sort_unstable();
+    ascending.windows(2).all(|pair| pair[0] < pair[1])
+        && ascending.last().is_none_or(|last| (*last as usize) < limit)
 }
 
 fn is_inverse_mass(number: f32) -> bool {
     number.is_finite() && number > 0.0
 }
 
-fn check_keyframe(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'static str> {
+/// Snapshot and keyframe say the same of what is held.
+fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'static str> {
     let with = |flags: u32| {
         let indices = (0_u32..).zip(particles);
         indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
@@ -205,8 +332,9 @@ fn check_keyframe(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'s
     if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {
         return Err("a mass is not a positive number");
     }
-    if !keyframe.grabs.iter().all(|grab| grab.target.iter().all(|axis| axis.is_finite())) {
-        return Err("a target is not finite");
+    let is_near = |axis: &f32| axis.is_finite() && axis.abs() <= COORDINATE_MAX;
+    if !keyframe.grabs.iter().all(|grab| grab.target.iter().all(is_near)) {
+        return Err("a target is out of range");
     }
-    if keyframe.torn.is_empty() { Ok(()) } else { Err("it has torn constraints") }
+    Ok(())
 }

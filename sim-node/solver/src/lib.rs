@@ -20,25 +20,40 @@
 //! There is no process, clock, file or message in this crate.
 #![forbid(unsafe_code)]
 
+mod anchors;
 pub mod builtin;
+mod colliders;
 mod commands;
 mod constraints;
+mod contact;
+mod cut;
 mod drive;
+mod frame;
 mod hash;
 mod keyframe;
 mod order;
+mod parameters;
 mod particles;
+mod project;
 pub mod scene;
 mod solver;
 mod step;
+mod tear;
+mod tethers;
+mod wind;
 
-pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Rejection};
+pub use colliders::PlacedCollider;
+pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Push, Rejection};
 pub use constraints::{Constraint, ConstraintKind};
+pub use cut::{Ball, Sweep};
+pub use frame::Pose;
 pub use keyframe::{Keyframe, KeyframeError, RestoreError};
+pub use parameters::{PARAMETERS, Setting};
 pub use particles::{Particle, flag};
 pub use scene::{Method, Scene, SceneError, SolverSettings};
 pub use solver::Solver;
+pub use tear::TearCause;
 
 /// Version of the arithmetic. It changes with any change of the bits that a step produces, and a
 /// recording is re-simulated only by the version that made it.
-pub const SOLVER_VERSION: u32 = 1;
+pub const SOLVER_VERSION: u32 = 2;

@@ -18,24 +18,39 @@ pub(crate) struct Order {
     pub(crate) indices: Vec<u32>,
     /// Ranges of `indices`, none empty.
     pub(crate) groups: Vec<Range<usize>>,
+    /// Groups at the beginning in which no two constraints share a particle; those behind them,
+    /// at most one, are projected one constraint after the other.
+    pub(crate) independent_count: usize,
 }
 
 impl Order {
     pub(crate) fn new(model: &Model, order: ConstraintOrder) -> Self {
         match order {
-            ConstraintOrder::Listed => Self::from_groups(vec![(0..count(model)).collect()]),
-            ConstraintOrder::Grouped => Self::from_groups(group(model)),
+            ConstraintOrder::Listed => Self::from_groups(Vec::new(), (0..count(model)).collect()),
+            ConstraintOrder::Grouped => {
+                let (independent, overflow) = group(model);
+                Self::from_groups(independent, overflow)
+            }
         }
     }
 
-    fn from_groups(groups: Vec<Vec<u32>>) -> Self {
-        let mut order = Self { indices: Vec::new(), groups: Vec::new() };
-        for group in groups.into_iter().filter(|group| !group.is_empty()) {
-            let start = order.indices.len();
-            order.indices.extend(group);
-            order.groups.push(start..order.indices.len());
+    fn from_groups(independent: Vec<Vec<u32>>, serial: Vec<u32>) -> Self {
+        let mut order = Self { indices: Vec::new(), groups: Vec::new(), independent_count: 0 };
+        for group in independent {
+            order.push(group);
         }
+        order.independent_count = order.groups.len();
+        order.push(serial);
         order
+    }
+
+    fn push(&mut self, group: Vec<u32>) {
+        if group.is_empty() {
+            return;
+        }
+        let start = self.indices.len();
+        self.indices.extend(group);
+        self.groups.push(start..self.indices.len());
     }
 }
 
@@ -45,8 +60,9 @@ fn count(model: &Model) -> u32 {
 }
 
 /// Declared families first, each a group of its own; every other constraint goes into the first
-/// later group in which neither of its particles occurs, in index order; then the overflow.
-fn group(model: &Model) -> Vec<Vec<u32>> {
+/// later group in which neither of its particles occurs, in index order. What has no room goes
+/// into the overflow, the second part of the result.
+fn group(model: &Model) -> (Vec<Vec<u32>>, Vec<u32>) {
     let family_count = model.families.iter().flatten().max().map_or(0, |last| *last as usize + 1);
     let mut groups = vec![Vec::new(); family_count];
     let mut overflow = Vec::new();
@@ -71,8 +87,7 @@ fn group(model: &Model) -> Vec<Vec<u32>> {
         groups.resize(groups.len().max(group + 1), Vec::new());
         groups[group].push(index);
     }
-    groups.push(overflow);
-    groups
+    (groups, overflow)
 }
 
 fn lowest_bits(count: usize) -> u32 {
@@ -134,7 +149,7 @@ mod tests {
     fn a_hub_with_many_spokes_overflows_into_one_serial_group() {
         let model = model(&hub(100));
         let order = Order::new(&model, ConstraintOrder::Grouped);
-        assert_eq!(order.groups.len(), GROUPS_MAX + 1);
+        assert_eq!((order.groups.len(), order.independent_count), (GROUPS_MAX + 1, GROUPS_MAX));
         assert!(order.groups[..GROUPS_MAX].iter().all(|group| group.len() == 1));
         assert_eq!(order.indices, (0..100).collect::<Vec<_>>());
     }
@@ -142,6 +157,7 @@ mod tests {
     #[test]
     fn listed_order_is_one_group_in_file_order() {
         let order = Order::new(&model(&hub(5)), ConstraintOrder::Listed);
+        assert_eq!(order.independent_count, 0);
         assert_eq!(
             (order.indices, order.groups),
             ((0..5).collect(), std::iter::once(0..5).collect::<Vec<_>>())

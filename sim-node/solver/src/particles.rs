@@ -31,7 +31,7 @@ pub mod flag {
     /// Taken out because its state was no longer finite.
     pub const FROZEN: u32 = 1 << 3;
     /// All that this version can set.
-    pub(crate) const KNOWN: u32 = PINNED | GRABBED | FROZEN;
+    pub(crate) const KNOWN: u32 = PINNED | GRABBED | ANCHORED | FROZEN;
     /// With any of these, the step uses inverse mass 0.
     pub(crate) const FIXED: u32 = PINNED | GRABBED | ANCHORED | FROZEN;
 }
@@ -55,18 +55,27 @@ pub(crate) struct Particles {
 }
 
 impl Particles {
-    pub(crate) fn new(scene: &[SceneParticle]) -> Self {
+    /// The particles of a scene at its step 0; what follows an anchor is held by that alone.
+    pub(crate) fn new(scene: &[SceneParticle], anchored: impl Iterator<Item = u32>) -> Self {
+        let mut flags: Vec<_> =
+            scene.iter().map(|one| if one.pinned { flag::PINNED } else { 0 }).collect();
+        for particle in anchored {
+            flags[particle as usize] = flag::ANCHORED;
+        }
         let pad = |[x, y, z]: [f32; 3], last| [x + 0.0, y + 0.0, z + 0.0, last];
         let base_inverse_mass = |particle: &SceneParticle| 1.0 / particle.mass;
         let positions: Vec<_> = scene
             .iter()
-            .map(|one| pad(one.position, if one.pinned { 0.0 } else { base_inverse_mass(one) }))
+            .zip(&flags)
+            .map(|(one, flags)| {
+                pad(one.position, if *flags == 0 { base_inverse_mass(one) } else { 0.0 })
+            })
             .collect();
         Self {
             displacements: vec![[0.0; 4]; scene.len()],
             velocities: scene.iter().map(|one| pad(one.velocity, 0.0)).collect(),
             base_inverse_masses: scene.iter().map(base_inverse_mass).collect(),
-            flags: scene.iter().map(|one| if one.pinned { flag::PINNED } else { 0 }).collect(),
+            flags,
             step_starts: positions.clone(),
             positions,
         }

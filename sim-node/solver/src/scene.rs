@@ -3,21 +3,30 @@
 //! [`Scene`] is the complete effective scene, every default filled in; `Model` is what it expands
 //! to: every particle, constraint and triangle.
 
+mod anchor;
 mod check;
+mod collider;
 mod decimal;
 mod error;
 mod file;
 mod generate;
+mod limits;
 mod model;
 mod read;
 mod read_generator;
+mod wind;
 
 use serde::{Deserialize, Serialize};
 
 use crate::constraints::ConstraintKind;
+pub use anchor::{SceneAnchor, Waypoint};
+pub(crate) use check::Range32;
+pub use collider::{ColliderShape, SceneCollider};
 pub use error::SceneError;
 pub use generate::{Cloth, Diagonals, Generator, Pinned, Rope, Shape};
+pub use limits::Limits;
 pub(crate) use model::Model;
+pub use wind::Wind;
 
 /// Most particles, and most constraints, of a scene: their indices are exact in f32.
 pub const ELEMENTS_MAX: u32 = 1 << 24;
@@ -45,12 +54,21 @@ pub struct Scene {
     pub gravity: [f32; 3],
     /// How it is solved.
     pub solver: SolverSettings,
+    /// The air, if it is felt.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wind: Option<Wind>,
     /// The explicit particles; they come first.
     #[serde(rename = "particle")]
     pub particles: Vec<SceneParticle>,
     /// The explicit constraints; they come first, and may use generated particles.
     #[serde(rename = "constraint")]
     pub constraints: Vec<SceneConstraint>,
+    /// What particles bounce off and slide on, in the order in which they act.
+    #[serde(rename = "collider")]
+    pub colliders: Vec<SceneCollider>,
+    /// Particles that follow a moving frame.
+    #[serde(rename = "anchor")]
+    pub anchors: Vec<SceneAnchor>,
     /// Generators of more particles and constraints, in order.
     #[serde(rename = "generate")]
     pub generators: Vec<Generator>,
@@ -89,9 +107,19 @@ pub struct SolverSettings {
     /// gravity / damping. Above 1/h nothing moves.
     #[serde(with = "decimal::number")]
     pub damping: f32,
+    /// Share of each correction that a pass makes, 0 < w < 2; default 1. Above 1 it is successive
+    /// over-relaxation, which pays only with hundreds of iterations.
+    #[serde(with = "decimal::number")]
+    pub relaxation: f32,
+    /// Whether free particles are kept within the length of the shortest rigid path to a fixed
+    /// one; default no.
+    pub tethers: bool,
     /// Largest speed of a particle in unit/s, > 0; default 10000.
     #[serde(with = "decimal::number")]
     pub max_speed: f32,
+    /// When constraints stop stretching, and when they tear; default never.
+    #[serde(flatten)]
+    pub limits: Limits,
 }
 
 /// The range of [`SolverSettings::rate_hz`].
@@ -108,7 +136,10 @@ impl Default for SolverSettings {
             method: Method::Xpbd,
             order: ConstraintOrder::Grouped,
             damping: 0.0,
+            relaxation: 1.0,
+            tethers: false,
             max_speed: 10_000.0,
+            limits: Limits::default(),
         }
     }
 }
@@ -116,10 +147,14 @@ impl Default for SolverSettings {
 impl SolverSettings {
     /// Length of a substep in seconds: 1 / (`rate_hz` `substeps`), rounded once.
     pub fn h(&self) -> f32 {
-        #[allow(clippy::cast_possible_truncation, reason = "the one rounding to the solver's f32")]
-        let h = (1.0 / (f64::from(self.rate_hz) * f64::from(self.substeps))) as f32;
-        h
+        substep_length(self.rate_hz, self.substeps)
     }
+}
+
+/// 1 / (`rate_hz` `substeps`) in seconds, rounded once to the solver's f32.
+#[allow(clippy::cast_possible_truncation, reason = "the one rounding to the solver's f32")]
+pub(crate) fn substep_length(rate_hz: u32, substeps: u32) -> f32 {
+    (1.0 / (f64::from(rate_hz) * f64::from(substeps))) as f32
 }
 
 /// What the softness of a constraint means; its number is the one in headers.
@@ -174,6 +209,9 @@ pub struct SceneConstraint {
     /// How soft it is, in the measure of the scene's method.
     #[serde(flatten)]
     pub softness: Softness,
+    /// Limits that it has instead of the scene's; infinity is off.
+    #[serde(flatten)]
+    pub limits: Limits,
 }
 
 /// How soft a constraint is.
@@ -261,6 +299,8 @@ impl Scene {
             constraints: model.constraints.len(),
             pins: model.particles.iter().filter(|particle| particle.pinned).count(),
             triangles: model.triangles.len(),
+            colliders: self.colliders.len(),
+            anchors: self.anchors.len(),
         }
     }
 
@@ -280,4 +320,8 @@ pub struct SceneCounts {
     pub pins: usize,
     /// Triangles of the surface.
     pub triangles: usize,
+    /// Colliders.
+    pub colliders: usize,
+    /// Anchors.
+    pub anchors: usize,
 }

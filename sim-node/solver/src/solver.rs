@@ -1,23 +1,41 @@
 //! The running state of a scene.
 
-use crate::constraints::{Constraint, Constraints};
+use crate::anchors::Anchors;
+use crate::colliders::{Collider, PlacedCollider};
+use crate::constraints::{Constraint, Constraints, Setup};
+use crate::contact::Contacts;
 use crate::drive::Grab;
 use crate::hash::state_hash;
 use crate::order::Order;
+use crate::parameters::Parameters;
 use crate::particles::{Particle, Particles};
-use crate::scene::{Model, Scene, SolverSettings};
+use crate::scene::{Model, Scene, SceneAnchor, SolverSettings, substep_length};
+use crate::tear::{TearCause, Torn};
+use crate::tethers::Tethers;
+use crate::wind::Air;
 
 /// A scene that runs. Made once per load; nothing is allocated afterwards in [`Self::step`].
 #[derive(Debug, Clone)]
 pub struct Solver {
     /// Immutable from load to load: particles as loaded, constraints by index, triangles.
-    model: Model,
+    pub(crate) model: Model,
+    /// What does not change: rate, method, order, whether there are tethers.
     pub(crate) settings: SolverSettings,
-    pub(crate) gravity: [f32; 3],
+    /// What a client can change, and its values at load.
+    pub(crate) parameters: Parameters,
+    initial_parameters: Parameters,
     /// z is 0 bit for bit.
     pub(crate) is_planar: bool,
     pub(crate) particles: Particles,
     pub(crate) constraints: Constraints,
+    pub(crate) torn: Torn,
+    pub(crate) tethers: Tethers,
+    /// In the order of the scene, which is that of contacts.
+    pub(crate) colliders: Vec<Collider>,
+    pub(crate) contacts: Contacts,
+    pub(crate) anchors: Anchors,
+    scene_anchors: Vec<SceneAnchor>,
+    pub(crate) air: Air,
     /// Ascending by particle.
     pub(crate) grabs: Vec<Grab>,
     pub(crate) scene_step: u64,
@@ -35,28 +53,87 @@ impl Solver {
         let model = scene.model();
         let settings = scene.solver;
         let order = Order::new(&model, settings.order);
-        let particles = Particles::new(&model.particles);
-        Self {
-            state_hash: state_hash(&particles, &[]),
-            constraints: Constraints::new(&model, &order, &settings),
-            gravity: scene.gravity,
+        let particles = new_particles(&model, &scene.anchors);
+        let (particle_count, constraint_count) = (model.particles.len(), model.constraints.len());
+        let contact_count = if scene.colliders.is_empty() { 0 } else { particle_count };
+        let parameters = Parameters::new(scene);
+        let mut solver = Self {
+            state_hash: state_hash(&particles, 0),
+            constraints: Constraints::new(&model, &order),
+            torn: Torn::new(constraint_count),
+            tethers: Tethers::default(),
+            colliders: scene.colliders.iter().map(Collider::new).collect(),
+            contacts: Contacts::new(contact_count),
+            anchors: Anchors::new(&scene.anchors, &model.particles),
+            scene_anchors: scene.anchors.clone(),
+            air: Air::new(scene.wind, settings.rate_hz, particle_count, &model.triangles),
             is_planar: scene.dimensions == 2,
             settings,
+            parameters,
+            initial_parameters: parameters,
             particles,
             // Room for every particle, so that a grab allocates nothing.
-            grabs: Vec::with_capacity(model.particles.len()),
+            grabs: Vec::with_capacity(particle_count),
             scene_step: 0,
             is_restored: false,
             frozen_count: 0,
             model,
+        };
+        solver.configure();
+        solver.tie();
+        solver
+    }
+
+    /// Makes the next step's state the initial one: particles, parameters, colliders and anchors
+    /// as loaded, nothing grabbed, nothing torn.
+    pub fn reset(&mut self) {
+        self.particles = new_particles(&self.model, &self.scene_anchors);
+        self.parameters = self.initial_parameters;
+        self.constraints =
+            Constraints::new(&self.model, &Order::new(&self.model, self.settings.order));
+        self.torn.clear();
+        self.grabs.clear();
+        self.anchors.reset();
+        for collider in &mut self.colliders {
+            collider.moved = None;
+            collider.place(0.0);
+        }
+        self.configure();
+        self.tie();
+        self.is_restored = true;
+    }
+
+    /// Works out what constraints derive from the parameters.
+    pub(crate) fn configure(&mut self) {
+        let setup = Setup { method: self.settings.method, h: self.h() };
+        self.constraints.configure(&self.model, &self.parameters, setup);
+    }
+
+    /// Works out the tethers of the state as it is, where the scene has any.
+    pub(crate) fn tie(&mut self) {
+        if self.settings.tethers {
+            self.tethers = Tethers::of_state(
+                &self.model,
+                &self.parameters,
+                &self.particles,
+                self.torn.order(),
+            );
         }
     }
 
-    /// Makes the next step's state the initial one: particles as loaded, nothing grabbed.
-    pub fn reset(&mut self) {
-        self.particles = Particles::new(&self.model.particles);
-        self.grabs.clear();
-        self.is_restored = true;
+    /// Length of a substep in seconds.
+    pub(crate) fn h(&self) -> f32 {
+        substep_length(self.settings.rate_hz, self.parameters.substeps)
+    }
+
+    /// Length of a step in seconds.
+    pub(crate) fn step_length(&self) -> f32 {
+        substep_length(self.settings.rate_hz, 1)
+    }
+
+    /// Seconds of the scene after `scene_step`.
+    pub(crate) fn scene_time_s(&self) -> f64 {
+        self.scene_step as f64 / f64::from(self.settings.rate_hz)
     }
 
     /// Steps since the scene was loaded or reset.
@@ -103,9 +180,43 @@ impl Solver {
         &self.model.triangles
     }
 
-    /// The constraints torn since the load, in the order of tearing.
-    #[allow(clippy::unused_self, reason = "nothing tears in this version; its readers are ready")]
+    /// The constraints torn since the load, by step and then by index.
     pub fn torn(&self) -> &[u32] {
-        &[]
+        self.torn.order()
     }
+
+    /// Why each of [`Self::torn`] tore.
+    pub fn tear_causes(&self) -> &[TearCause] {
+        self.torn.causes()
+    }
+
+    /// How many at the end of [`Self::torn`] are new in the last step.
+    pub fn new_torn_count(&self) -> usize {
+        self.torn.new_count()
+    }
+
+    /// Number of colliders.
+    pub fn collider_count(&self) -> usize {
+        self.colliders.len()
+    }
+
+    /// Number of anchors.
+    pub fn anchor_count(&self) -> usize {
+        self.anchors.moved.len()
+    }
+
+    /// The colliders where they are after the last step, in the order of the scene.
+    pub fn colliders(&self) -> impl Iterator<Item = PlacedCollider> + '_ {
+        self.colliders.iter().map(Collider::placed)
+    }
+
+    /// Whether a collider is anywhere else than before the last step.
+    pub fn has_moving_colliders(&self) -> bool {
+        self.colliders.iter().any(Collider::is_moving)
+    }
+}
+
+fn new_particles(model: &Model, anchors: &[SceneAnchor]) -> Particles {
+    let anchored = anchors.iter().flat_map(|anchor| anchor.particles.iter().copied());
+    Particles::new(&model.particles, anchored)
 }

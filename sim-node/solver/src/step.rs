@@ -4,14 +4,15 @@
 use std::ops::Range;
 
 use crate::Solver;
+use crate::colliders::Moments;
 use crate::constraints::Constraints;
-use crate::drive::drive_grabbed;
+use crate::contact::ContactStep;
+use crate::drive::{Substep, count_step, drive_grabbed};
 use crate::hash::state_hash;
 use crate::particles::{Particles, flag};
-use crate::scene::{Method, SolverSettings};
-
-/// Below this squared length a pair has no direction to be moved along.
-const LENGTH_SQUARED_MIN: f32 = f32::MIN_POSITIVE;
+use crate::project::{Pass, limit_stretch, project_group};
+use crate::tear::Torn;
+use crate::wind::Breeze;
 
 impl Solver {
     /// Makes one step of 1/rate seconds; right after a reset it shows the state put in place
@@ -25,28 +26,136 @@ impl Solver {
             self.is_restored = false;
             self.scene_step = 0;
         } else {
-            self.particles.step_starts.copy_from_slice(&self.particles.positions);
-            for _ in 0..self.settings.substeps {
-                self.substep();
+            self.begin_step();
+            for index in 0..self.parameters.substeps {
+                self.substep(Substep { index, count: self.parameters.substeps });
             }
-            self.frozen_count += freeze_non_finite(&mut self.particles);
-            let flags = &self.particles.flags;
-            self.grabs.retain(|grab| flags[grab.particle as usize] & flag::GRABBED != 0);
-            self.scene_step += 1;
+            self.end_step();
+        }
+        if self.torn.end_step(&mut self.constraints) {
+            self.tethers.drop_torn(&self.constraints);
         }
         make_zeros_canonical(&mut self.particles);
-        self.state_hash = state_hash(&self.particles, self.torn());
+        self.state_hash = state_hash(&self.particles, self.torn.hash_seed());
     }
 
-    fn substep(&mut self) {
-        let h = self.settings.h();
-        predict(&mut self.particles, &Prediction::new(&self.settings, self.gravity));
-        drive_grabbed(&mut self.particles, &mut self.grabs, self.settings.max_speed * h);
-        self.constraints.multipliers.fill(0.0);
-        for _ in 0..self.settings.iterations {
-            project_constraints(&mut self.particles, &mut self.constraints, self.settings.method);
+    /// Works out where everything that moves by itself is to be at the end of the step.
+    fn begin_step(&mut self) {
+        self.particles.step_starts.copy_from_slice(&self.particles.positions);
+        self.scene_step += 1;
+        let (time_s, dt) = (self.scene_time_s(), self.step_length());
+        self.anchors.begin_step(time_s);
+        for collider in &mut self.colliders {
+            collider.begin_step(time_s, dt);
         }
+    }
+
+    fn substep(&mut self, substep: Substep) {
+        let h = self.h();
+        self.predict(h);
+        self.drive(substep, self.parameters.max_speed * h);
+        self.project();
+        limit_stretch(&mut self.particles, &self.constraints);
+        self.tethers.pull(&mut self.particles);
+        self.collide(substep, h);
         update(&mut self.particles, h);
+        self.contacts.finish(&mut self.particles);
+    }
+
+    /// Everything falls, is slowed down by damping, and is carried along by the wind.
+    fn predict(&mut self, h: f32) {
+        let prediction = Prediction {
+            h,
+            kept: kept_share(self.parameters.damping * h),
+            max_speed: self.parameters.max_speed,
+        };
+        let fall = self.parameters.gravity.map(|axis| h * axis);
+        if !(self.air.has_surface() && self.parameters.wind_drag > 0.0) {
+            predict(&mut self.particles, &prediction, |_| fall);
+            return;
+        }
+        let strength = self.air.strength(self.scene_step);
+        let velocity = self.parameters.wind_velocity.map(|axis| strength * axis);
+        let breeze = Breeze { velocity, drag: self.parameters.wind_drag, h };
+        self.air.blow(&self.particles, &self.model.triangles, &breeze);
+        let gains = &self.air.gains;
+        predict(&mut self.particles, &prediction, |index| {
+            let [x, y, z] = gains[index];
+            [fall[0] + x, fall[1] + y, fall[2] + z]
+        });
+    }
+
+    /// Anchored and grabbed particles go their own way; a hand is stronger than an anchor.
+    fn drive(&mut self, substep: Substep, reach: f32) {
+        self.anchors.drive(&mut self.particles, substep.left(), reach);
+        drive_grabbed(&mut self.particles, &self.grabs, substep, reach);
+    }
+
+    /// The passes of a substep over all constraints, group by group.
+    fn project(&mut self) {
+        let Self { particles, constraints, torn, settings, parameters, .. } = self;
+        let pass = Pass { method: settings.method, relaxation: parameters.relaxation };
+        constraints.multipliers.fill(0.0);
+        for iteration in 0..parameters.iterations {
+            if iteration == 0 && !constraints.tear_lengths.is_empty() {
+                project_measured(particles, constraints, torn, pass);
+                continue;
+            }
+            for group in 0..constraints.groups.len() {
+                let range = constraints.groups[group].clone();
+                project_group(particles, constraints, range, pass);
+            }
+        }
+        if !constraints.tear_multipliers.is_empty() {
+            torn.mark_overloaded(constraints);
+        }
+    }
+
+    /// Contacts come last, so that no published state is inside of a collider.
+    fn collide(&mut self, substep: Substep, h: f32) {
+        let [x, y, z] = self.parameters.gravity;
+        let gravity = (x * x + y * y + z * z).sqrt();
+        let count = substep.count as f32;
+        let moments = Moments {
+            start: substep.index as f32 / count,
+            end: (substep.index + 1) as f32 / count,
+        };
+        let step =
+            ContactStep { h, rest_speed: 2.0 * gravity * h, moments, is_planar: self.is_planar };
+        for collider in &self.colliders {
+            self.contacts.collide(&mut self.particles, collider, &step);
+        }
+    }
+
+    /// Takes out what is no longer finite, and with it the hands that held it.
+    fn end_step(&mut self) {
+        count_step(&mut self.grabs);
+        let frozen_count = freeze_non_finite(&mut self.particles);
+        if frozen_count > 0 {
+            self.frozen_count += frozen_count;
+            let flags = &self.particles.flags;
+            self.grabs.retain(|grab| flags[grab.particle as usize] & flag::GRABBED != 0);
+        }
+    }
+}
+
+/// A pass over all constraints that measures each before it is projected: those that share no
+/// particle together, the others when their turn has come.
+fn project_measured(
+    particles: &mut Particles,
+    constraints: &mut Constraints,
+    torn: &mut Torn,
+    pass: Pass,
+) {
+    let mut project = |range: Range<usize>, constraints: &mut Constraints| {
+        torn.mark_overstretched(particles, constraints, range.clone());
+        project_group(particles, constraints, range, pass);
+    };
+    for group in 0..constraints.independent_count {
+        project(constraints.groups[group].clone(), constraints);
+    }
+    for slot in constraints.independent_end()..constraints.pairs.len() {
+        project(slot..slot + 1, constraints);
     }
 }
 
@@ -54,35 +163,29 @@ impl Solver {
 struct Prediction {
     /// Seconds.
     h: f32,
-    /// The share of the velocity that damping leaves in a substep: max(0, 1 - damping h).
+    /// The share of the velocity that damping leaves in a substep.
     kept: f32,
-    /// Velocity gained in a substep.
-    gain: [f32; 3],
     max_speed: f32,
 }
 
-impl Prediction {
-    fn new(settings: &SolverSettings, acceleration: [f32; 3]) -> Self {
-        let h = settings.h();
-        let kept = 1.0 - settings.damping * h;
-        Self {
-            h,
-            kept: if kept > 0.0 { kept } else { 0.0 },
-            gain: acceleration.map(|axis| h * axis),
-            max_speed: settings.max_speed,
-        }
-    }
+/// max(0, 1 - c h).
+fn kept_share(damping: f32) -> f32 {
+    if damping < 1.0 { 1.0 - damping } else { 0.0 }
 }
 
 /// v = max(0, 1 - c h) v + h a, |v| <= `max_speed`, d = h v; fixed particles: d = 0.
-fn predict(particles: &mut Particles, prediction: &Prediction) {
-    let Prediction { h, kept, gain, max_speed } = *prediction;
+/// `gain` is h a of a particle.
+fn predict(particles: &mut Particles, prediction: &Prediction, gain: impl Fn(usize) -> [f32; 3]) {
+    let Prediction { h, kept, max_speed } = *prediction;
     let states = particles.positions.iter().zip(&mut particles.velocities);
-    for ((position, velocity), displacement) in states.zip(&mut particles.displacements) {
+    for (index, ((position, velocity), displacement)) in
+        states.zip(&mut particles.displacements).enumerate()
+    {
         if position[3] == 0.0 {
             *displacement = [0.0; 4];
             continue;
         }
+        let gain = gain(index);
         let [x, y, z, _] = *velocity;
         let [mut x, mut y, mut z] = [kept * x + gain[0], kept * y + gain[1], kept * z + gain[2]];
         let speed_squared = x * x + y * y + z * z;
@@ -90,113 +193,9 @@ fn predict(particles: &mut Particles, prediction: &Prediction) {
             let scale = max_speed / speed_squared.sqrt();
             (x, y, z) = (x * scale, y * scale, z * scale);
         }
+        // Contacts ask for the predicted velocity.
+        *velocity = [x, y, z, 0.0];
         *displacement = [h * x, h * y, h * z, 0.0];
-    }
-}
-
-/// One pass over all constraints, group by group.
-fn project_constraints(particles: &mut Particles, constraints: &mut Constraints, method: Method) {
-    for group in 0..constraints.groups.len() {
-        let range = constraints.groups[group].clone();
-        match method {
-            Method::Xpbd => project_compliant(particles, constraints, range),
-            Method::Pbd => project_stiff(particles, constraints, range),
-        }
-    }
-}
-
-/// Moves each constrained pair towards its rest length, in array order (Gauss-Seidel).
-///
-/// C = |r| - L with r = (`x_b` - `x_a`) + (`d_b` - `d_a`), w = inverse mass, a = compliance / h^2:
-/// `delta_lambda` = -(C + a lambda) / (`w_a` + `w_b` + a), lambda from 0 in each substep
-/// (XPBD: Macklin, Mueller, Chentanez 2016, equation 18).
-fn project_compliant(
-    particles: &mut Particles,
-    constraints: &mut Constraints,
-    group: Range<usize>,
-) {
-    let rests =
-        constraints.pairs[group.clone()].iter().zip(&constraints.rest_lengths[group.clone()]);
-    let bounds =
-        constraints.softness[group.clone()].iter().zip(&constraints.pull_only[group.clone()]);
-    let multipliers = &mut constraints.multipliers[group];
-    for (((pair, rest_length), (softness, pull_only)), multiplier) in
-        rests.zip(bounds).zip(multipliers)
-    {
-        let Some(gap) = Gap::between(particles, *pair) else { continue };
-        let error = gap.length - *rest_length;
-        if *pull_only && error <= 0.0 {
-            continue;
-        }
-        let delta = -(error + *softness * *multiplier) / (gap.inverse_mass_sum + *softness);
-        *multiplier += delta;
-        gap.close(particles, *pair, delta);
-    }
-}
-
-/// As [`project_compliant`], but takes the share k' of the error away: lambda =
-/// -k' C / (`w_a` + `w_b`)
-/// (Position Based Dynamics: Mueller et al. 2007, section 3.3).
-fn project_stiff(particles: &mut Particles, constraints: &mut Constraints, group: Range<usize>) {
-    let rests =
-        constraints.pairs[group.clone()].iter().zip(&constraints.rest_lengths[group.clone()]);
-    let bounds = constraints.softness[group.clone()].iter().zip(&constraints.pull_only[group]);
-    for ((pair, rest_length), (stiffness, pull_only)) in rests.zip(bounds) {
-        let Some(gap) = Gap::between(particles, *pair) else { continue };
-        let error = gap.length - *rest_length;
-        if *pull_only && error <= 0.0 {
-            continue;
-        }
-        gap.close(particles, *pair, -(*stiffness * error) / gap.inverse_mass_sum);
-    }
-}
-
-/// The way from particle a to particle b in the middle of a substep.
-struct Gap {
-    /// `x_b` - `x_a`, displacements included.
-    separation: [f32; 3],
-    length: f32,
-    inverse_mass_sum: f32,
-}
-
-impl Gap {
-    /// `None` where a projection can do nothing: both ends are fixed, or they coincide and there
-    /// is no direction.
-    #[inline]
-    fn between(particles: &Particles, [a, b]: [u32; 2]) -> Option<Self> {
-        let (a, b) = (a as usize, b as usize);
-        let (position_a, position_b) = (particles.positions[a], particles.positions[b]);
-        let (d_a, d_b) = (particles.displacements[a], particles.displacements[b]);
-        let along = |axis: usize| (position_b[axis] - position_a[axis]) + (d_b[axis] - d_a[axis]);
-        let separation = [along(0), along(1), along(2)];
-        let [x, y, z] = separation;
-        let length_squared = x * x + y * y + z * z;
-        let inverse_mass_sum = position_a[3] + position_b[3];
-        if length_squared < LENGTH_SQUARED_MIN || inverse_mass_sum == 0.0 {
-            return None;
-        }
-        Some(Self { separation, length: length_squared.sqrt(), inverse_mass_sum })
-    }
-
-    /// `d_a` -= `w_a` lambda n, `d_b` += `w_b` lambda n, with n = r/|r|.
-    #[inline]
-    fn close(&self, particles: &mut Particles, [a, b]: [u32; 2], lambda: f32) {
-        let (a, b) = (a as usize, b as usize);
-        let scale = lambda / self.length;
-        let (w_a, w_b) = (particles.positions[a][3], particles.positions[b][3]);
-        let (scale_a, scale_b) = (w_a * scale, w_b * scale);
-        // An end without weight is left out, not moved by 0: a state that blows up gives 0 times
-        // infinity, and must not reach what is held.
-        if w_a != 0.0 {
-            for (axis, along) in self.separation.iter().enumerate() {
-                particles.displacements[a][axis] -= scale_a * along;
-            }
-        }
-        if w_b != 0.0 {
-            for (axis, along) in self.separation.iter().enumerate() {
-                particles.displacements[b][axis] += scale_b * along;
-            }
-        }
     }
 }
 

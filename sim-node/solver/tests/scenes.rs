@@ -12,7 +12,14 @@ fn builtin_scene(name: &str) -> Scene {
 #[test]
 fn the_curtain_has_168_particles_596_sticks_and_14_pins() {
     let counts = builtin_scene("curtain").counts();
-    let expected = SceneCounts { particles: 168, constraints: 596, pins: 14, triangles: 286 };
+    let expected = SceneCounts {
+        particles: 168,
+        constraints: 596,
+        pins: 14,
+        triangles: 286,
+        colliders: 0,
+        anchors: 0,
+    };
     assert_eq!(counts, expected);
 }
 
@@ -37,9 +44,8 @@ fn every_builtin_scene_reads_back_from_its_effective_text() {
     }
 }
 
-#[test]
-fn a_scene_with_every_key_reads_back_from_its_effective_text() {
-    let text = r#"
+/// Every key that a scene can have, none of them at its default.
+const EVERY_KEY: &str = r#"
         version = 1
         name = "all of it"
         origin = [1e9, -2.5, 0.1]
@@ -55,6 +61,48 @@ fn a_scene_with_every_key_reads_back_from_its_effective_text() {
         order = "listed"
         damping = 0.7
         max_speed = 1e4
+        relaxation = 1.3
+        tethers = true
+        max_stretch = 1.1
+        tear_stretch = 1.25
+        tear_distance = 0
+        tear_force = 1e3
+        [wind]
+        velocity = [3, 0, 0.1]
+        drag = 0.3
+        gust = 0.5
+        gust_period = 2
+        [[collider]]
+        shape = "plane"
+        normal = [0, 2, 0.1]
+        offset = -0.3
+        restitution = 0.3
+        friction = 0.5
+        velocity = [0, 0.1, 0]
+        [[collider]]
+        shape = "box"
+        center = [0, 1, 2]
+        half_extents = [0.1, 0.2, 0.3]
+        rotation = [0, 0, 0.5, 0.5]
+        angular_velocity = [0, 1, 0]
+        [[collider]]
+        shape = "sphere"
+        center = [0, 1, 2]
+        radius = 0.1
+        [[collider]]
+        shape = "capsule"
+        a = [0, 1, 2]
+        b = [0, 1, 3]
+        radius = 0.1
+        [[collider]]
+        shape = "bounds"
+        min = [-9, -9, -9]
+        max = [9, 9, 9]
+        [[anchor]]
+        particles = [3, 0]
+        origin = [0, 1, 0]
+        repeat = true
+        path = [{ time = 0 }, { time = 0.3, translation = [0, 0.1, 0], rotation = [0, 0, 0.1, 1] }]
         [[particle]]
         position = [0.1, 0.2, 0.3]
         mass = 0.3
@@ -67,6 +115,10 @@ fn a_scene_with_every_key_reads_back_from_its_effective_text() {
         kind = "tether"
         stiffness = 0.25
         rest_length = 0
+        max_stretch = 1.3
+        tear_stretch = inf
+        tear_distance = 0.2
+        tear_force = 12.5
         [[generate]]
         shape = "rope"
         count = 5
@@ -75,6 +127,7 @@ fn a_scene_with_every_key_reads_back_from_its_effective_text() {
         mass = 0.1
         stiffness = { structural = 0.9, bend = 0.3 }
         pinned = [1, 3]
+        tear_stretch = 1.7
         [[generate]]
         shape = "cloth"
         columns = 3
@@ -87,7 +140,10 @@ fn a_scene_with_every_key_reads_back_from_its_effective_text() {
         diagonals = 1
         pinned = "corners"
     "#;
-    let scene = Scene::from_toml(text, "dir/file.toml").unwrap();
+
+#[test]
+fn a_scene_with_every_key_reads_back_from_its_effective_text() {
+    let scene = Scene::from_toml(EVERY_KEY, "dir/file.toml").unwrap();
     assert_eq!(Scene::from_toml(&scene.to_toml(), "x").unwrap(), scene);
     assert_eq!(scene.particles[0].mass.to_bits(), 0.3_f32.to_bits());
 }

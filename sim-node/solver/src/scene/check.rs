@@ -10,31 +10,57 @@ use super::{Method, SceneError};
 use crate::COORDINATE_MAX;
 
 /// A range of finite numbers, and the words for it.
-#[derive(Clone, Copy)]
-pub(super) struct Range32 {
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Range32 {
     contains: fn(f32) -> bool,
     allowed: &'static str,
 }
 
 impl Range32 {
-    pub(super) const AT_LEAST_ZERO: Self =
+    pub(crate) const AT_LEAST_ZERO: Self =
         Self { contains: |value| value >= 0.0, allowed: "a number >= 0" };
-    pub(super) const POSITIVE: Self =
+    pub(crate) const POSITIVE: Self =
         Self { contains: |value| value > 0.0, allowed: "a number > 0" };
     /// compliance / h^2 must be a number of f32 at the smallest h of 10 ns, too.
-    pub(super) const COMPLIANCE: Self =
+    pub(crate) const COMPLIANCE: Self =
         Self { contains: |value| (0.0..=1e20).contains(&value), allowed: "0 to 1e20 m/N" };
-    pub(super) const SHARE: Self =
+    pub(crate) const SHARE: Self =
         Self { contains: |value| (0.0..=1.0).contains(&value), allowed: "0 to 1" };
     /// 1/mass must be a number of f32, too.
-    pub(super) const MASS: Self = Self {
+    pub(crate) const MASS: Self = Self {
         contains: |value| value > 0.0 && (1.0 / value).is_finite() && 1.0 / value > 0.0,
         allowed: "a number > 0 in kg",
     };
-    pub(super) const COORDINATE: Self = Self {
+    pub(crate) const RELAXATION: Self = Self {
+        contains: |value| value > 0.0 && value < 2.0,
+        allowed: "more than 0, less than 2; 1 is no relaxation",
+    };
+    pub(crate) const RATIO: Self =
+        Self { contains: |value| value > 1.0, allowed: "more than 1, or inf for off" };
+    pub(crate) const DISTANCE_LIMIT: Self =
+        Self { contains: |value| value >= 0.0, allowed: "a number >= 0, or inf for off" };
+    pub(crate) const FORCE_LIMIT: Self =
+        Self { contains: |value| value > 0.0, allowed: "a number > 0 in N, or inf for off" };
+    /// In f32 a coordinate and a size of the same magnitude still add up.
+    pub(crate) const SIZE: Self = Self {
+        contains: |value| value > 0.0 && value <= COORDINATE_MAX,
+        allowed: "more than 0, at most 1e7",
+    };
+    /// A step counts it in whole numbers.
+    pub(crate) const PERIOD: Self = Self {
+        contains: |value| value > 0.0 && value <= 1e6,
+        allowed: "more than 0, at most 1e6 s",
+    };
+    pub(crate) const ANGULAR_VELOCITY: Self =
+        Self { contains: |value| value.abs() <= 1e4, allowed: "-1e4 to 1e4 rad/s" };
+    pub(crate) const COORDINATE: Self = Self {
         contains: |value| value.abs() <= COORDINATE_MAX,
         allowed: "-1e7 to 1e7; put a greater distance into `origin`",
     };
+
+    pub(crate) fn has(self, value: f32) -> bool {
+        (self.contains)(value)
+    }
 }
 
 /// Checks values, and says where in the text a wrong one stands.
@@ -98,7 +124,7 @@ impl Reader<'_> {
         range: Range32,
     ) -> Result<f32, SceneError> {
         let value = self.finite(field, number)?;
-        if (range.contains)(value) {
+        if range.has(value) {
             return Ok(value);
         }
         let problem = format!("{value} is out of range (allowed: {})", range.allowed);

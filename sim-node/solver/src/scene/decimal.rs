@@ -28,3 +28,32 @@ pub(crate) mod vector {
         value.map(shortest).serialize(serializer)
     }
 }
+
+/// `#[serde(with = "decimal::optional")]` for an f32 that may be absent.
+pub(crate) mod optional {
+    use super::{Serialize, Serializer, shortest};
+
+    #[allow(
+        clippy::ref_option,
+        clippy::trivially_copy_pass_by_ref,
+        reason = "the signature that serde asks for"
+    )]
+    pub(crate) fn serialize<S: Serializer>(
+        value: &Option<f32>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.map(shortest).serialize(serializer)
+    }
+}
+
+/// `#[serde(with = "decimal::quaternion")]` for a field of four f32.
+pub(crate) mod quaternion {
+    use super::{Serialize, Serializer, shortest};
+
+    pub(crate) fn serialize<S: Serializer>(
+        value: &[f32; 4],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.map(shortest).serialize(serializer)
+    }
+}

@@ -4,6 +4,9 @@
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::anchor::FileAnchor;
+use super::collider::FileCollider;
+use super::wind::FileWind;
 use super::{ConstraintOrder, Method, Up};
 use crate::constraints::ConstraintKind;
 
@@ -26,10 +29,15 @@ pub(crate) struct FileScene {
     pub(crate) gravity: Option<Vector>,
     #[serde(default)]
     pub(crate) solver: FileSolver,
+    pub(crate) wind: Option<FileWind>,
     #[serde(default)]
     pub(crate) particle: Vec<FileParticle>,
     #[serde(default)]
     pub(crate) constraint: Vec<FileConstraint>,
+    #[serde(default)]
+    pub(crate) collider: Vec<FileCollider>,
+    #[serde(default)]
+    pub(crate) anchor: Vec<FileAnchor>,
     #[serde(default)]
     pub(crate) generate: Vec<FileGenerator>,
 }
@@ -43,7 +51,14 @@ pub(crate) struct FileSolver {
     pub(crate) method: Option<Method>,
     pub(crate) order: Option<ConstraintOrder>,
     pub(crate) damping: Option<Number>,
+    pub(crate) relaxation: Option<Number>,
+    #[serde(default)]
+    pub(crate) tethers: bool,
     pub(crate) max_speed: Option<Number>,
+    pub(crate) max_stretch: Option<Number>,
+    pub(crate) tear_stretch: Option<Number>,
+    pub(crate) tear_distance: Option<Number>,
+    pub(crate) tear_force: Option<Number>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -65,6 +80,10 @@ pub(crate) struct FileConstraint {
     pub(crate) kind: ConstraintKind,
     pub(crate) compliance: Option<Number>,
     pub(crate) stiffness: Option<Number>,
+    pub(crate) max_stretch: Option<Number>,
+    pub(crate) tear_stretch: Option<Number>,
+    pub(crate) tear_distance: Option<Number>,
+    pub(crate) tear_force: Option<Number>,
 }
 
 /// A generator: the keys of all shapes; which of them a shape has is checked later.
@@ -75,6 +94,7 @@ pub(crate) struct FileGenerator {
     pub(crate) mass: Option<Number>,
     pub(crate) compliance: Option<Spanned<FileSoftness>>,
     pub(crate) stiffness: Option<Spanned<FileSoftness>>,
+    pub(crate) tear_stretch: Option<Number>,
     pub(crate) pinned: Option<Spanned<FilePinned>>,
     pub(crate) columns: Option<Whole>,
     pub(crate) rows: Option<Whole>,

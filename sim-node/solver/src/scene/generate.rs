@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::model::Model;
-use super::{Method, SceneParticle, Softness, decimal};
+use super::{Limits, Method, SceneParticle, Softness, decimal};
 use crate::constraints::{Constraint, ConstraintKind};
 
 /// A shape, and what its particles and constraints are like.
@@ -20,6 +20,10 @@ pub struct Generator {
     /// How soft the constraints are.
     #[serde(flatten)]
     pub softness: KindSoftness,
+    /// Length / rest length above which its constraints tear, instead of the scene's; infinity is
+    /// off.
+    #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
+    pub tear_stretch: Option<f32>,
 }
 
 /// The shapes.
@@ -172,6 +176,8 @@ impl Generator {
 
     pub(crate) fn build(&self, model: &mut Model) {
         let first = model.particle_count();
+        let tear_stretch = self.tear_stretch;
+        model.begin_limits(Limits { tear_stretch, ..Limits::default() });
         match &self.shape {
             Shape::Cloth(cloth) => self.build_cloth(cloth, first, model),
             Shape::Rope(rope) => self.build_rope(rope, first, model),

@@ -1,6 +1,6 @@
 //! What a scene expands to: every particle, constraint and triangle.
 
-use super::{Scene, SceneParticle};
+use super::{Limits, Method, Scene, SceneParticle};
 use crate::constraints::Constraint;
 
 /// Distance from the scene's origin beyond which f32 positions make a scene at rest tremble.
@@ -16,17 +16,25 @@ pub(crate) struct Model {
     pub(crate) constraints: Vec<Constraint>,
     /// Constraint by constraint: the group of independent constraints that its shape declares.
     pub(crate) families: Vec<Option<u32>>,
+    /// Limits that stand in place of the scene's.
+    limits: Vec<Limits>,
+    /// Constraint by constraint: its place in `limits`.
+    limits_of: Vec<u32>,
     pub(crate) triangles: Vec<[u32; 3]>,
+    /// What the softness of the constraints means.
+    pub(crate) method: Method,
 }
 
 impl Model {
     /// Explicit particles first, then those of each generator; constraints alike.
     pub(crate) fn new(scene: &Scene) -> Self {
-        let mut model = Self { particles: scene.particles.clone(), ..Self::default() };
+        let method = scene.solver.method;
+        let mut model = Self { particles: scene.particles.clone(), method, ..Self::default() };
         for constraint in &scene.constraints {
             let [a, b] = constraint.particles;
             let compliance = constraint.softness.value();
             let (rest_length, kind) = (constraint.rest_length, constraint.kind);
+            model.begin_limits(constraint.limits);
             model.push(Constraint { a, b, rest_length, compliance, kind }, None);
         }
         for generator in &scene.generators {
@@ -35,9 +43,23 @@ impl Model {
         model
     }
 
+    /// The constraints that follow have these limits of their own.
+    pub(crate) fn begin_limits(&mut self, limits: Limits) {
+        if self.limits.last() != Some(&limits) {
+            self.limits.push(limits);
+        }
+    }
+
+    /// The limits of a constraint in place of the scene's.
+    pub(crate) fn limits(&self, constraint: u32) -> Limits {
+        self.limits[self.limits_of[constraint as usize] as usize]
+    }
+
     pub(crate) fn push(&mut self, constraint: Constraint, family: Option<u32>) {
         self.constraints.push(constraint);
         self.families.push(family);
+        #[allow(clippy::cast_possible_truncation, reason = "at most one per constraint")]
+        self.limits_of.push(self.limits.len() as u32 - 1);
     }
 
     #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]

@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::check::{Range32, Reader};
 use super::error::Place;
-use super::file::{FileConstraint, FileParticle, FileScene, FileSolver, Vector, Whole};
+use super::file::{FileConstraint, FileParticle, FileScene, FileSolver, Number, Vector, Whole};
 use super::{
     ELEMENTS_MAX, Method, Model, PASSES_MAX, RATE_HZ_MAX, SCENE_VERSION, Scene, SceneConstraint,
     SceneError, SceneParticle, Softness, SolverSettings,
@@ -28,6 +28,7 @@ pub(super) fn scene(text: &str, label: &str) -> Result<Scene, SceneError> {
     reader.is_planar = dimensions == 2;
     let particles = enumerate(&file.particle, |index, one| reader.particle(index, one))?;
     let generators = enumerate(&file.generate, |index, one| reader.generator(index, one))?;
+    let colliders = enumerate(&file.collider, |index, one| reader.collider(index, one))?;
     let mut scene = Scene {
         version: SCENE_VERSION,
         name: reader.name(file.name.as_ref())?,
@@ -37,8 +38,11 @@ pub(super) fn scene(text: &str, label: &str) -> Result<Scene, SceneError> {
         unit: file.unit.clone().unwrap_or_else(|| "m".to_owned()),
         gravity: reader.vector_or("gravity", file.gravity.as_ref(), [0.0, -9.81, 0.0])?,
         solver: settings,
+        wind: file.wind.as_ref().map(|wind| reader.wind(wind)).transpose()?,
         particles,
         constraints: Vec::new(),
+        colliders,
+        anchors: Vec::new(),
         generators,
     };
     reader.check_size(&scene, &file)?;
@@ -46,6 +50,9 @@ pub(super) fn scene(text: &str, label: &str) -> Result<Scene, SceneError> {
     reader.check_generated(&scene, &file, &model)?;
     scene.constraints =
         enumerate(&file.constraint, |index, one| reader.constraint(index, one, &model))?;
+    let mut is_taken = vec![false; model.particles.len()];
+    scene.anchors =
+        enumerate(&file.anchor, |index, one| reader.anchor(index, one, &model, &mut is_taken))?;
     Ok(scene)
 }
 
@@ -75,13 +82,8 @@ fn solver(place: &Place<'_>, file: &FileSolver) -> Result<SolverSettings, SceneE
         Some(value) => reader.whole(field, value, 1..=max),
         None => Ok(default),
     };
-    let damping = match &file.damping {
-        Some(number) => reader.ranged("solver.damping", number, Range32::AT_LEAST_ZERO)?,
-        None => default.damping,
-    };
-    let max_speed = match &file.max_speed {
-        Some(number) => reader.ranged("solver.max_speed", number, Range32::POSITIVE)?,
-        None => default.max_speed,
+    let number_or = |field, number: Option<&Number>, range, default| {
+        number.map_or(Ok(default), |number| reader.ranged(field, number, range))
     };
     Ok(SolverSettings {
         rate_hz: passes("solver.rate_hz", file.rate_hz.as_ref(), default.rate_hz, RATE_HZ_MAX)?,
@@ -94,8 +96,26 @@ fn solver(place: &Place<'_>, file: &FileSolver) -> Result<SolverSettings, SceneE
         )?,
         method,
         order: file.order.unwrap_or_default(),
-        damping,
-        max_speed,
+        damping: number_or(
+            "solver.damping",
+            file.damping.as_ref(),
+            Range32::AT_LEAST_ZERO,
+            default.damping,
+        )?,
+        relaxation: number_or(
+            "solver.relaxation",
+            file.relaxation.as_ref(),
+            Range32::RELAXATION,
+            default.relaxation,
+        )?,
+        tethers: file.tethers,
+        max_speed: number_or(
+            "solver.max_speed",
+            file.max_speed.as_ref(),
+            Range32::POSITIVE,
+            default.max_speed,
+        )?,
+        limits: reader.scene_limits(file)?,
     })
 }
 
@@ -148,14 +168,9 @@ impl Reader<'_> {
         model: &Model,
     ) -> Result<SceneConstraint, SceneError> {
         let field = |name: &str| format!("constraint[{index}].{name}");
-        let ends = file.particles.get_ref();
-        let last = model.particle_count().saturating_sub(1);
-        if model.particles.is_empty() {
-            let problem = "the scene has no particles".to_owned();
-            return self.error(file.particles.span(), &field("particles"), problem);
-        }
-        let a = self.whole(&field("particles"), &ends[0], 0..=last)?;
-        let b = self.whole(&field("particles"), &ends[1], 0..=last)?;
+        let [a, b] = file.particles.get_ref();
+        let a = self.particle_index(&field("particles"), a, model)?;
+        let b = self.particle_index(&field("particles"), b, model)?;
         if a == b {
             let problem =
                 format!("joins particle {a} to itself (allowed: two different particles)");
@@ -174,7 +189,21 @@ impl Reader<'_> {
             Method::Xpbd => Softness::Compliance(softness),
             Method::Pbd => Softness::Stiffness(softness),
         };
-        Ok(SceneConstraint { particles: [a, b], rest_length, kind: file.kind, softness })
+        let limits = self.constraint_limits(index, file)?;
+        Ok(SceneConstraint { particles: [a, b], rest_length, kind: file.kind, softness, limits })
+    }
+
+    /// The index of a particle that the scene has.
+    pub(super) fn particle_index(
+        &self,
+        field: &str,
+        index: &Whole,
+        model: &Model,
+    ) -> Result<u32, SceneError> {
+        let Some(last) = model.particle_count().checked_sub(1) else {
+            return self.error(index.span(), field, "the scene has no particles".to_owned());
+        };
+        self.whole(field, index, 0..=last)
     }
 
     /// Refuses shapes that reach beyond the coordinates that a scene may have.

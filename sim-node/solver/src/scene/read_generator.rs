@@ -30,6 +30,12 @@ impl Reader<'_> {
             shape,
             mass: self.mass(&fields.name("mass"), file.mass.as_ref())?,
             pinned: Pinned::Word(words[0]),
+            tear_stretch: match &file.tear_stretch {
+                Some(number) => {
+                    Some(self.limit(&fields.name("tear_stretch"), number, Range32::RATIO)?)
+                }
+                None => None,
+            },
             softness: fields.softness(file)?,
         };
         if let Some(pinned) = &file.pinned {

@@ -1,0 +1,152 @@
+//! Moving frames: where anchors and colliders are, against where they were at load.
+
+use glam::{DQuat, DVec3, Quat, Vec3};
+
+use crate::{COORDINATE_MAX, Rejection};
+
+/// Where a frame is to be, against where it was at load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// In the scene's unit.
+    pub translation: [f32; 3],
+    /// Quaternion x, y, z, w of any length but 0.
+    pub rotation: [f32; 4],
+}
+
+/// A checked pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    pub(crate) translation: Vec3,
+    /// Of length 1.
+    pub(crate) rotation: Quat,
+}
+
+impl Frame {
+    pub(crate) const AT_LOAD: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
+
+    /// From translation and rotation in f64, rounded once.
+    pub(crate) fn new(translation: DVec3, rotation: DQuat) -> Self {
+        Self { translation: translation.as_vec3(), rotation: unit(rotation) }
+    }
+
+    /// From a pose whose rotation is known not to be 0.
+    pub(crate) fn from_pose(pose: &Pose) -> Self {
+        let rotation = DQuat::from_array(pose.rotation.map(f64::from));
+        Self { translation: Vec3::from_array(pose.translation), rotation: unit(rotation) }
+    }
+
+    /// From what a client asks for; in 2-D a frame stays in the plane.
+    pub(crate) fn check(pose: &Pose, is_planar: bool) -> Result<Self, Rejection> {
+        let numbers = || pose.translation.iter().chain(&pose.rotation);
+        if !numbers().all(|number| number.is_finite()) {
+            return Err(Rejection::NonFinite);
+        }
+        let is_near = numbers().all(|number| number.abs() <= COORDINATE_MAX);
+        let [x, y, ..] = pose.rotation;
+        let leaves_plane = pose.translation[2] != 0.0 || x != 0.0 || y != 0.0;
+        if !is_near || pose.rotation == [0.0; 4] || (is_planar && leaves_plane) {
+            return Err(Rejection::OutOfRange);
+        }
+        Ok(Self::from_pose(pose))
+    }
+
+    /// The numbers of this frame, for a keyframe.
+    pub(crate) fn to_pose(self) -> Pose {
+        Pose { translation: self.translation.to_array(), rotation: self.rotation.to_array() }
+    }
+
+    /// Part of the way to another frame: linear, and normalised-linear for the rotation.
+    pub(crate) fn towards(&self, end: &Self, share: f32) -> Self {
+        let same_side = if self.rotation.dot(end.rotation) < 0.0 { -1.0 } else { 1.0 };
+        let from = self.rotation * (same_side * (1.0 - share));
+        Self {
+            translation: self.translation * (1.0 - share) + end.translation * share,
+            rotation: (from + end.rotation * share).normalize(),
+        }
+    }
+}
+
+/// Rounded to f32 after it was brought to length 1.
+fn unit(rotation: DQuat) -> Quat {
+    (rotation * (1.0 / rotation.dot(rotation).sqrt())).as_quat()
+}
+
+/// The rotation by an angle in radians about an axis of length 1.
+pub(crate) fn rotation_about(axis: DVec3, angle: f64) -> DQuat {
+    let (sine, cosine) = sin_cos_of_half_turn(angle / 2.0);
+    DQuat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
+}
+
+/// Sine and cosine, but for their common sign, which a rotation does not notice.
+///
+/// The standard library's may differ between machines; these are sums and products only: the
+/// angle is brought to [-pi/2, pi/2], where 12 terms of the Taylor series reach the last bit.
+fn sin_cos_of_half_turn(angle: f64) -> (f64, f64) {
+    use std::f64::consts::PI;
+    let x = angle - (angle / PI).round() * PI;
+    let (mut sine, mut cosine) = (0.0, 0.0);
+    let mut term = 1.0;
+    for power in 0..24_u8 {
+        match power % 4 {
+            0 => cosine += term,
+            1 => sine += term,
+            2 => cosine -= term,
+            _ => sine -= term,
+        }
+        term *= x / (f64::from(power) + 1.0);
+    }
+    (sine, cosine)
+}
+
+/// The angular velocity that turns one rotation into another in `dt` seconds, in rad/s.
+///
+/// With s = |vector part| = sin(angle / 2), the angle is 2 asin(s); its series is exact to 1e-7 up
+/// to a quarter turn in a step, beyond which "velocity" means little.
+pub(crate) fn angular_velocity(from: Quat, to: Quat, dt: f32) -> Vec3 {
+    let turn = to * from.conjugate();
+    let vector = Vec3::new(turn.x, turn.y, turn.z) * if turn.w < 0.0 { -1.0 } else { 1.0 };
+    let square = vector.dot(vector);
+    let mut series = 0.0;
+    // asin(s)/s = 1 + 1/6 s^2 (1 + 9/20 s^2 (1 + 25/42 s^2 (...))), by Horner from the inside.
+    for term in (1..=12_u8).rev() {
+        let odd = 2.0 * f32::from(term) - 1.0;
+        series = (1.0 + series) * square * odd * odd / ((odd + 1.0) * (odd + 2.0));
+    }
+    vector * (2.0 * (1.0 + series) / dt)
+}
+
+#[cfg(test)]
+mod tests {
+    //! Rotations against the standard library's functions.
+    use super::*;
+
+    #[test]
+    fn sine_and_cosine_agree_with_the_closed_form() {
+        for angle in [-100.0_f64, -3.0, -1.5, -1e-9, 0.0, 0.3, 1.57, 1.58, 3.0, 50.0, 12345.6] {
+            let (sine, cosine) = sin_cos_of_half_turn(angle);
+            let sign = if cosine * angle.cos() + sine * angle.sin() < 0.0 { -1.0 } else { 1.0 };
+            assert!((sign * sine - angle.sin()).abs() < 1e-11, "sin {angle}: {sine}");
+            assert!((sign * cosine - angle.cos()).abs() < 1e-11, "cos {angle}: {cosine}");
+        }
+    }
+
+    #[test]
+    fn the_velocity_of_a_turn_is_its_angle_per_time() {
+        for angle in [0.001_f32, 0.1, 0.5, 1.5] {
+            let turn = rotation_about(DVec3::new(0.6, 0.0, 0.8), f64::from(angle)).as_quat();
+            let start = rotation_about(DVec3::Y, 0.7).as_quat();
+            let found = angular_velocity(start, turn * start, 0.5);
+            let expected = Vec3::new(0.6, 0.0, 0.8) * (angle / 0.5);
+            assert!((found - expected).length() < 1e-4 * expected.length(), "{angle}: {found}");
+        }
+    }
+
+    #[test]
+    fn half_of_the_way_between_two_rotations_is_half_of_their_angle() {
+        let end = Frame::new(DVec3::X, rotation_about(DVec3::Z, 1.0));
+        let middle = Frame::AT_LOAD.towards(&end, 0.5);
+        assert!((middle.translation - Vec3::X * 0.5).length() < 1e-6);
+        let turned = middle.rotation * Vec3::X;
+        assert!((turned - Vec3::new(0.5_f32.cos(), 0.5_f32.sin(), 0.0)).length() < 1e-6);
+    }
+}

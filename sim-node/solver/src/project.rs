@@ -1,0 +1,197 @@
+//! The projection of distance constraints, and the limits of their stretch.
+
+use std::ops::Range;
+
+use crate::constraints::Constraints;
+use crate::particles::Particles;
+use crate::scene::Method;
+
+/// Squared lengths that have a direction and a root. Below them a pair cannot be moved along
+/// itself; above them the state is no longer finite, and must not reach what is joined to it.
+const LENGTH_SQUARED: std::ops::RangeInclusive<f32> = f32::MIN_POSITIVE..=f32::MAX;
+
+/// One pass over a group.
+pub(crate) fn project_group(
+    particles: &mut Particles,
+    constraints: &mut Constraints,
+    group: Range<usize>,
+    pass: Pass,
+) {
+    match pass.method {
+        Method::Xpbd => project_compliant(particles, constraints, group, pass.relaxation),
+        Method::Pbd => project_stiff(particles, constraints, group),
+    }
+}
+
+/// How a pass projects.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pass {
+    pub(crate) method: Method,
+    /// Share of each correction that is made (xpbd; in pbd the softness has it).
+    pub(crate) relaxation: f32,
+}
+
+/// Moves each constrained pair towards its rest length, in array order (Gauss-Seidel).
+///
+/// C = |r| - L with r = (`x_b` - `x_a`) + (`d_b` - `d_a`), w = inverse mass, a = compliance / h^2:
+/// `delta_lambda` = -(C + a lambda) / (`w_a` + `w_b` + a), lambda from 0 in each substep
+/// (XPBD: Macklin, Mueller, Chentanez 2016, equation 18).
+fn project_compliant(
+    particles: &mut Particles,
+    constraints: &mut Constraints,
+    group: Range<usize>,
+    relaxation: f32,
+) {
+    let rests =
+        constraints.pairs[group.clone()].iter().zip(&constraints.rest_lengths[group.clone()]);
+    let bounds =
+        constraints.softness[group.clone()].iter().zip(&constraints.pull_only[group.clone()]);
+    let multipliers = &mut constraints.multipliers[group];
+    for (((pair, rest_length), (softness, pull_only)), multiplier) in
+        rests.zip(bounds).zip(multipliers)
+    {
+        let Some(gap) = Gap::between(particles, *pair) else { continue };
+        if *pull_only && gap.length <= *rest_length {
+            continue;
+        }
+        let error = gap.error(*rest_length);
+        let delta = -(error + *softness * *multiplier) / (gap.inverse_mass_sum + *softness);
+        let delta = relaxation * delta;
+        *multiplier += delta;
+        gap.close(particles, *pair, delta);
+    }
+}
+
+/// As [`project_compliant`], but takes the share k' of the error away: `delta_lambda` =
+/// -k' C / (`w_a` + `w_b`)
+/// (Position Based Dynamics: Mueller et al. 2007, section 3.3).
+fn project_stiff(particles: &mut Particles, constraints: &mut Constraints, group: Range<usize>) {
+    let rests =
+        constraints.pairs[group.clone()].iter().zip(&constraints.rest_lengths[group.clone()]);
+    let bounds =
+        constraints.softness[group.clone()].iter().zip(&constraints.pull_only[group.clone()]);
+    let multipliers = &mut constraints.multipliers[group];
+    for (((pair, rest_length), (share, pull_only)), multiplier) in
+        rests.zip(bounds).zip(multipliers)
+    {
+        let Some(gap) = Gap::between(particles, *pair) else { continue };
+        if *pull_only && gap.length <= *rest_length {
+            continue;
+        }
+        let delta = -(*share * gap.error(*rest_length)) / gap.inverse_mass_sum;
+        *multiplier += delta;
+        gap.close(particles, *pair, delta);
+    }
+}
+
+/// Brings each pair that is longer than its longest length back to it, at full stiffness: one pass
+/// over all groups, after the soft ones.
+pub(crate) fn limit_stretch(particles: &mut Particles, constraints: &Constraints) {
+    for (pair, max_length) in constraints.pairs.iter().zip(&constraints.max_lengths) {
+        let Some(gap) = Gap::between(particles, *pair) else { continue };
+        if gap.length > *max_length {
+            gap.close(particles, *pair, -gap.error(*max_length) / gap.inverse_mass_sum);
+        }
+    }
+}
+
+/// Keeps a particle within a distance of another one, which is not moved.
+pub(crate) fn pull_back(particles: &mut Particles, particle: u32, root: u32, length_max: f32) {
+    let Some(gap) = Gap::between(particles, [root, particle]) else { return };
+    if gap.length <= length_max {
+        return;
+    }
+    let scale = gap.error(length_max) / gap.length;
+    let displacement = &mut particles.displacements[particle as usize];
+    for (axis, along) in gap.separation.iter().enumerate() {
+        displacement[axis] -= scale * along;
+    }
+}
+
+/// The way from particle a to particle b in the middle of a substep.
+pub(crate) struct Gap {
+    /// r = `x_b` - `x_a` + `d_b` - `d_a`.
+    separation: [f32; 3],
+    /// |r|.
+    pub(crate) length: f32,
+    inverse_mass_sum: f32,
+    /// |R|^2 of the way R = `x_b` - `x_a` at the start of the substep.
+    start_squared: f32,
+    /// |r|^2 - |R|^2 = (2 R + D) D, D = `d_b` - `d_a`.
+    change: f32,
+    /// |D|^2.
+    moved_squared: f32,
+}
+
+impl Gap {
+    /// `None` where a projection can do nothing: both ends are fixed, or they coincide and there
+    /// is no direction.
+    #[inline]
+    pub(crate) fn between(particles: &Particles, [a, b]: [u32; 2]) -> Option<Self> {
+        let (a, b) = (a as usize, b as usize);
+        let (position_a, position_b) = (particles.positions[a], particles.positions[b]);
+        let (d_a, d_b) = (particles.displacements[a], particles.displacements[b]);
+        let start = [0, 1, 2].map(|axis| position_b[axis] - position_a[axis]);
+        let moved = [0, 1, 2].map(|axis| d_b[axis] - d_a[axis]);
+        let separation = [0, 1, 2].map(|axis| start[axis] + moved[axis]);
+        let length_squared = dot(separation, separation);
+        let inverse_mass_sum = position_a[3] + position_b[3];
+        if !LENGTH_SQUARED.contains(&length_squared) || inverse_mass_sum == 0.0 {
+            return None;
+        }
+        let both = [0, 1, 2].map(|axis| start[axis] + separation[axis]);
+        Some(Self {
+            separation,
+            length: length_squared.sqrt(),
+            inverse_mass_sum,
+            start_squared: dot(start, start),
+            change: dot(both, moved),
+            moved_squared: dot(moved, moved),
+        })
+    }
+
+    /// C = |r| - L, without what a difference of two rounded lengths loses.
+    ///
+    /// In small substeps h^2 g is of the size of one rounding of |r|, and the force lambda / h^2
+    /// would be noise. So |r|^2 - L^2 = (|R|^2 - L^2) + (2 R + D) D is divided by |r| + L: what the
+    /// substep changes keeps all of its digits. Where D or C is not small against R, the plain
+    /// difference has as many digits, and is safe where R and D cancel.
+    #[inline]
+    fn error(&self, rest_length: f32) -> f32 {
+        let plain = self.length - rest_length;
+        let is_small = 64.0 * self.moved_squared < self.start_squared
+            && 64.0 * (plain * plain) < self.start_squared;
+        if is_small {
+            let difference = (self.start_squared - rest_length * rest_length) + self.change;
+            difference / (self.length + rest_length)
+        } else {
+            plain
+        }
+    }
+
+    /// `d_a` -= `w_a` lambda n, `d_b` += `w_b` lambda n, with n = r/|r|.
+    #[inline]
+    fn close(&self, particles: &mut Particles, [a, b]: [u32; 2], lambda: f32) {
+        let (a, b) = (a as usize, b as usize);
+        let scale = lambda / self.length;
+        let (w_a, w_b) = (particles.positions[a][3], particles.positions[b][3]);
+        let (scale_a, scale_b) = (w_a * scale, w_b * scale);
+        // An end without weight is left out, not moved by 0: a state that blows up gives 0 times
+        // infinity, and must not reach what is held.
+        if w_a != 0.0 {
+            for (axis, along) in self.separation.iter().enumerate() {
+                particles.displacements[a][axis] -= scale_a * along;
+            }
+        }
+        if w_b != 0.0 {
+            for (axis, along) in self.separation.iter().enumerate() {
+                particles.displacements[b][axis] += scale_b * along;
+            }
+        }
+    }
+}
+
+#[inline]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
