@@ -40,6 +40,27 @@ pub struct Constraint {
     pub kind: ConstraintKind,
 }
 
+/// The length that a constraint goes back to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rest {
+    pub(crate) length: f32,
+    /// Its square. Where the length is the distance at load, this is the square of that distance
+    /// before its root was rounded: at load, the error is 0 to the last bit.
+    pub(crate) square: f32,
+}
+
+impl Rest {
+    pub(crate) fn new(length: f32) -> Self {
+        Self { length, square: length * length }
+    }
+}
+
+fn rest_at_load(model: &Model, constraint: Constraint) -> Rest {
+    let square = model.distance_squared(constraint.a, constraint.b);
+    let length = constraint.rest_length;
+    if square.sqrt() == length { Rest { length, square } } else { Rest::new(length) }
+}
+
 /// All constraints in projection order: one array per field, each `constraint_count` long.
 ///
 /// A torn constraint is a tether of infinite length: it never pulls, and no kernel needs to know
@@ -48,8 +69,8 @@ pub struct Constraint {
 pub(crate) struct Constraints {
     /// The two particles.
     pub(crate) pairs: Vec<[u32; 2]>,
-    /// Infinite where torn.
-    pub(crate) rest_lengths: Vec<f32>,
+    /// Of infinite length where torn.
+    pub(crate) rests: Vec<Rest>,
     /// xpbd: compliance / h^2, in 1/kg. pbd: the share of the error that one pass takes away,
     /// w k', w being the relaxation factor.
     pub(crate) softness: Vec<f32>,
@@ -84,7 +105,7 @@ impl Constraints {
         }
         Self {
             pairs: in_order().map(|one| [one.a, one.b]).collect(),
-            rest_lengths: in_order().map(|one| one.rest_length).collect(),
+            rests: in_order().map(|one| rest_at_load(model, one)).collect(),
             softness: vec![0.0; order.indices.len()],
             pull_only: in_order().map(|one| one.kind == ConstraintKind::Tether).collect(),
             multipliers: vec![0.0; order.indices.len()],
@@ -135,8 +156,12 @@ impl Constraints {
 
     /// A number for each slot, infinite for torn ones; none at all where all are infinite.
     fn thresholds(&self, of: impl Fn(u32) -> f32) -> Vec<f32> {
-        let slots = self.indices.iter().zip(&self.rest_lengths);
-        let values = slots.map(|(index, rest)| if rest.is_infinite() { *rest } else { of(*index) });
+        let slots = self.indices.iter().zip(&self.rests);
+        let values = slots.map(
+            |(index, rest)| {
+                if rest.length.is_infinite() { f32::INFINITY } else { of(*index) }
+            },
+        );
         let values: Vec<_> = values.collect();
         if values.iter().all(|value| value.is_infinite()) { Vec::new() } else { values }
     }
@@ -147,13 +172,13 @@ impl Constraints {
     }
 
     pub(crate) fn is_torn(&self, index: u32) -> bool {
-        self.rest_lengths[self.slots[index as usize] as usize].is_infinite()
+        self.rests[self.slots[index as usize] as usize].length.is_infinite()
     }
 
     /// Takes a constraint out for good.
     pub(crate) fn tear(&mut self, index: u32) {
         let slot = self.slots[index as usize] as usize;
-        self.rest_lengths[slot] = f32::INFINITY;
+        self.rests[slot] = Rest::new(f32::INFINITY);
         self.pull_only[slot] = true;
         for limits in [&mut self.max_lengths, &mut self.tear_lengths, &mut self.tear_multipliers] {
             if let Some(limit) = limits.get_mut(slot) {

@@ -17,7 +17,7 @@ pub(crate) struct Contacts {
 
 /// The collider of a contact, in the running substep.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Surface {
+struct Surface {
     linear: Vec3,
     angular: Vec3,
     pivot: Vec3,
@@ -73,68 +73,42 @@ impl Contacts {
         collider: &Collider,
         step: &ContactStep,
     ) {
-        let body = collider.body(step.moments.end);
-        let surface = Surface {
-            linear: collider.linear,
-            angular: collider.angular,
-            pivot: body.pivot(),
-            restitution: collider.restitution,
-            friction: collider.friction,
-            h: step.h,
-            rest_speed: step.rest_speed,
-        };
-        match body {
-            Body::Plane { normal, offset } => {
-                self.touch(particles, &surface, |way| hit_plane(way, normal, offset));
-            }
-            Body::Sphere { center, radius } => {
-                self.touch(particles, &surface, |way| hit_ball(way, center, radius, Vec3::Y));
-            }
-            Body::Capsule { a, b, radius } => {
-                self.touch(particles, &surface, |way| hit_capsule(way, [a, b], radius));
-            }
-            Body::Box { half_extents, .. } => {
-                let now = Axes::of(&body);
-                let before = Axes::of(&collider.body(step.moments.start));
-                let count = if step.is_planar { 2 } else { 3 };
-                let extents = half_extents.to_array();
-                let block = Block::new(&extents[..count], body.pivot());
-                self.touch(particles, &surface, |way| {
-                    let start = before.local(way.start).to_array();
-                    let end = now.local_end(way).to_array();
-                    let (face, depth) = block.hit(&start[..count], &end[..count])?;
-                    Some(Hit { normal: now.face_normal(face), depth })
-                });
-            }
-            Body::Bounds { min, max } => {
-                let axes = [Vec3::X, Vec3::Y, Vec3::Z];
-                let count = if step.is_planar { 2 } else { 3 };
-                for (axis, normal) in axes.into_iter().enumerate().take(count) {
-                    self.touch(particles, &surface, |way| hit_plane(way, normal, min[axis]));
-                    self.touch(particles, &surface, |way| hit_plane(way, -normal, -max[axis]));
+        let surface = Surface::new(collider, step);
+        for solid in solids(collider, step).iter().flatten() {
+            for index in 0..particles.count() {
+                if particles.positions[index][3] == 0.0 {
+                    continue;
+                }
+                let way = Way {
+                    start: vector(particles.positions[index]),
+                    displacement: vector(particles.displacements[index]),
+                };
+                if let Some(hit) = solid.hit(&way) {
+                    self.resolve(particles, index, &way, (&surface, &hit));
                 }
             }
         }
     }
 
-    /// Resolves the contact of each free particle that `hit` finds one for.
-    #[inline]
-    fn touch(
-        &mut self,
+    /// Takes back, from the new positions of what touched something, the rounding by which they
+    /// are still inside of a collider.
+    pub(crate) fn settle(
+        &self,
         particles: &mut Particles,
-        surface: &Surface,
-        hit: impl Fn(&Way) -> Option<Hit>,
+        collider: &Collider,
+        step: &ContactStep,
     ) {
-        for index in 0..particles.count() {
-            if particles.positions[index][3] == 0.0 {
-                continue;
-            }
-            let way = Way {
-                start: vector(particles.positions[index]),
-                displacement: vector(particles.displacements[index]),
-            };
-            if let Some(hit) = hit(&way) {
-                self.resolve(particles, index, &way, (surface, &hit));
+        for solid in solids(collider, step).iter().flatten() {
+            for index in self.touched.iter().map(|index| *index as usize) {
+                let start = vector(particles.positions[index]);
+                let Some(hit) = solid.hit(&Way { start, displacement: Vec3::ZERO }) else {
+                    continue;
+                };
+                let rounding = 4.0 * f32::EPSILON * (start.abs().element_sum() + solid.reach());
+                if hit.depth <= rounding {
+                    let [x, y, z] = (start + hit.normal * hit.depth).to_array();
+                    particles.positions[index][..3].copy_from_slice(&[x, y, z]);
+                }
             }
         }
     }
@@ -185,15 +159,100 @@ impl Contacts {
     }
 }
 
+impl ContactStep {
+    /// The axes that a body has an extent along.
+    fn axis_count(&self) -> usize {
+        if self.is_planar { 2 } else { 3 }
+    }
+}
+
 impl Surface {
+    fn new(collider: &Collider, step: &ContactStep) -> Self {
+        Self {
+            linear: collider.linear,
+            angular: collider.angular,
+            pivot: collider.body(step.moments.end).pivot(),
+            restitution: collider.restitution,
+            friction: collider.friction,
+            h: step.h,
+            rest_speed: step.rest_speed,
+        }
+    }
+
     /// The velocity of the collider's material at a point.
     fn velocity_at(&self, point: Vec3) -> Vec3 {
         self.linear + self.angular.cross(point - self.pivot)
     }
 }
 
+/// Everything that a particle can be inside of, where it is at the end of a substep.
+enum Solid {
+    HalfSpace { normal: Vec3, offset: f32 },
+    Ball { center: Vec3, radius: f32 },
+    Capsule { ends: [Vec3; 2], radius: f32 },
+    Block { block: Block, now: Axes, before: Axes },
+}
+
+/// The solids of a collider: one, or a half-space for each face of bounds.
+fn solids(collider: &Collider, step: &ContactStep) -> [Option<Solid>; 6] {
+    let body = collider.body(step.moments.end);
+    let one = |solid| [Some(solid), None, None, None, None, None];
+    match body {
+        Body::Plane { normal, offset } => one(Solid::HalfSpace { normal, offset }),
+        Body::Sphere { center, radius } => one(Solid::Ball { center, radius }),
+        Body::Capsule { a, b, radius } => one(Solid::Capsule { ends: [a, b], radius }),
+        Body::Box { center, half_extents, rotation } => one(Solid::Block {
+            block: Block::new(half_extents.to_array(), step.axis_count(), center),
+            now: Axes::new(center, rotation),
+            before: match collider.body(step.moments.start) {
+                Body::Box { center, rotation, .. } => Axes::new(center, rotation),
+                _ => Axes::new(center, rotation),
+            },
+        }),
+        Body::Bounds { min, max } => {
+            let face = |axis: usize, normal: Vec3| {
+                let low = Solid::HalfSpace { normal, offset: min[axis] };
+                let high = Solid::HalfSpace { normal: -normal, offset: -max[axis] };
+                if axis < step.axis_count() { [Some(low), Some(high)] } else { [None, None] }
+            };
+            let [a, b] = face(0, Vec3::X);
+            let [c, d] = face(1, Vec3::Y);
+            let [e, f] = face(2, Vec3::Z);
+            [a, b, c, d, e, f]
+        }
+    }
+}
+
+impl Solid {
+    /// Where a particle leaves it, if its way ends inside or, for a box, passes through it.
+    fn hit(&self, way: &Way) -> Option<Hit> {
+        match self {
+            Self::HalfSpace { normal, offset } => hit_half_space(way, *normal, *offset),
+            Self::Ball { center, radius } => hit_ball(way, *center, *radius, Vec3::Y),
+            Self::Capsule { ends, radius } => hit_capsule(way, *ends, *radius),
+            Self::Block { block, now, before } => {
+                let (start, end) = (before.local(way.start), now.local_end(way));
+                let (face, depth) = block.hit(start.to_array(), end.to_array())?;
+                Some(Hit { normal: now.face_normal(face), depth })
+            }
+        }
+    }
+
+    /// The size of its numbers, for what their rounding may be.
+    fn reach(&self) -> f32 {
+        match self {
+            Self::HalfSpace { offset, .. } => offset.abs(),
+            Self::Ball { center, radius } => center.abs().element_sum() + radius,
+            Self::Capsule { ends: [a, b], radius } => {
+                a.abs().element_sum() + b.abs().element_sum() + radius
+            }
+            Self::Block { block, .. } => block.reach,
+        }
+    }
+}
+
 /// The displacement is added last: near the surface, the rest is exact, and it keeps its digits.
-fn hit_plane(way: &Way, normal: Vec3, offset: f32) -> Option<Hit> {
+fn hit_half_space(way: &Way, normal: Vec3, offset: f32) -> Option<Hit> {
     let height = (normal.dot(way.start) - offset) + normal.dot(way.displacement);
     (height < 0.0).then_some(Hit { normal, depth: -height })
 }
@@ -209,7 +268,7 @@ fn hit_ball(way: &Way, center: Vec3, radius: f32, fallback: Vec3) -> Option<Hit>
     }
     let distance = square.sqrt();
     let normal = if square < f32::MIN_POSITIVE { fallback } else { arm / distance };
-    Some(Hit { normal, depth: radius - distance })
+    (distance < radius).then_some(Hit { normal, depth: radius - distance })
 }
 
 fn hit_capsule(way: &Way, [a, b]: [Vec3; 2], radius: f32) -> Option<Hit> {
@@ -235,25 +294,24 @@ struct Face {
 const FACES: [(usize, f32); 6] = [(0, 1.0), (1, 1.0), (2, 1.0), (0, -1.0), (1, -1.0), (2, -1.0)];
 
 /// A box in its own axes, of which a 2-D scene has two.
-struct Block<'a> {
-    extents: &'a [f32],
-    /// What lies less deep than this is on the surface, but for the rounding of its position.
-    skin: f32,
+struct Block {
+    extents: [f32; 3],
+    axis_count: usize,
+    /// The size of its numbers.
+    reach: f32,
 }
 
-impl<'a> Block<'a> {
-    fn new(extents: &'a [f32], center: Vec3) -> Self {
-        let largest = extents.iter().fold(0.0, |most, one| if *one > most { *one } else { most });
-        let reach = largest + center.abs().x + center.abs().y + center.abs().z;
-        Self { extents, skin: 2.0 * f32::EPSILON * reach }
+impl Block {
+    fn new(extents: [f32; 3], axis_count: usize, center: Vec3) -> Self {
+        let reach = Vec3::from_array(extents).element_sum() + center.abs().element_sum();
+        Self { extents, axis_count, reach }
     }
 
     /// Where a way leaves the box: by the face through which it came in, or by the nearest one
     /// where it began inside. Also where it has come out again on another side: nothing passes
     /// through a thin box.
-    fn hit(&self, start: &[f32], end: &[f32]) -> Option<(Face, f32)> {
-        let mut surface = [0.0; 3];
-        let start = self.out_of_skin(start, &mut surface);
+    fn hit(&self, start: [f32; 3], end: [f32; 3]) -> Option<(Face, f32)> {
+        let start = self.out_of_skin(start);
         let face = if !self.is_inside(start) {
             self.entered_face(start, end)?
         } else if self.is_inside(end) {
@@ -267,37 +325,37 @@ impl<'a> Block<'a> {
 
     fn faces(&self) -> impl Iterator<Item = Face> {
         let faces = FACES.into_iter().map(|(axis, sign)| Face { axis, sign });
-        faces.filter(|face| face.axis < self.extents.len())
+        faces.filter(|face| face.axis < self.axis_count)
     }
 
-    fn depth(&self, face: Face, point: &[f32]) -> f32 {
+    fn depth(&self, face: Face, point: [f32; 3]) -> f32 {
         self.extents[face.axis] - face.sign * point[face.axis]
     }
 
-    fn is_inside(&self, point: &[f32]) -> bool {
-        point.iter().zip(self.extents).all(|(one, max)| one.abs() < *max)
+    fn is_inside(&self, point: [f32; 3]) -> bool {
+        (0..self.axis_count).all(|axis| point[axis].abs() < self.extents[axis])
     }
 
-    fn nearest_face(&self, point: &[f32]) -> Option<Face> {
+    fn nearest_face(&self, point: [f32; 3]) -> Option<Face> {
         let depth = |face| self.depth(face, point);
         self.faces().reduce(|best, face| if depth(face) < depth(best) { face } else { best })
     }
 
     /// A point just below the surface, on it: else what lies on a thin box could be pulled through
     /// it from the inside.
-    fn out_of_skin<'p>(&self, point: &'p [f32], surface: &'p mut [f32; 3]) -> &'p [f32] {
-        let nearest = self.nearest_face(point).filter(|_| self.is_inside(point));
-        let Some(face) = nearest.filter(|face| self.depth(*face, point) < self.skin) else {
-            return point;
-        };
-        let surface = &mut surface[..point.len()];
-        surface.copy_from_slice(point);
-        surface[face.axis] = face.sign * self.extents[face.axis];
-        surface
+    fn out_of_skin(&self, mut point: [f32; 3]) -> [f32; 3] {
+        let skin = 2.0 * f32::EPSILON * self.reach;
+        if self.is_inside(point)
+            && let Some(face) = self.nearest_face(point)
+            && self.depth(face, point) < skin
+        {
+            point[face.axis] = face.sign * self.extents[face.axis];
+        }
+        point
     }
 
     /// The face through which a way from outside comes in (slab method: Kay, Kajiya 1986).
-    fn entered_face(&self, start: &[f32], end: &[f32]) -> Option<Face> {
+    fn entered_face(&self, start: [f32; 3], end: [f32; 3]) -> Option<Face> {
         let exit = self.exit_time(start, end)?;
         let mut entry: Option<(Face, f32)> = None;
         for face in self.faces() {
@@ -316,16 +374,16 @@ impl<'a> Block<'a> {
 
     /// The share of a way after which it is beyond the first far side; none where it runs along or
     /// beside the box.
-    fn exit_time(&self, start: &[f32], end: &[f32]) -> Option<f32> {
+    fn exit_time(&self, start: [f32; 3], end: [f32; 3]) -> Option<f32> {
         let mut exit = 1.0;
-        for (axis, extent) in self.extents.iter().enumerate() {
+        for axis in 0..self.axis_count {
             let moved = end[axis] - start[axis];
             if moved == 0.0 {
-                let is_between = start[axis].abs() < *extent;
+                let is_between = start[axis].abs() < self.extents[axis];
                 is_between.then_some(())?;
                 continue;
             }
-            let far = if moved > 0.0 { *extent } else { -extent };
+            let far = if moved > 0.0 { self.extents[axis] } else { -self.extents[axis] };
             let time = (far - start[axis]) / moved;
             if time < exit {
                 exit = time;
@@ -344,14 +402,7 @@ struct Axes {
 }
 
 impl Axes {
-    fn of(body: &Body) -> Self {
-        let Body::Box { center, rotation, .. } = *body else {
-            return Self::of(&Body::Box {
-                center: body.pivot(),
-                half_extents: Vec3::ZERO,
-                rotation: Quat::IDENTITY,
-            });
-        };
+    fn new(center: Vec3, rotation: Quat) -> Self {
         let (back, is_turned) = (rotation.conjugate(), rotation != Quat::IDENTITY);
         Self { center, rotation, back, is_turned }
     }

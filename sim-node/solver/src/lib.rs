@@ -50,7 +50,7 @@ pub use frame::Pose;
 pub use keyframe::{Keyframe, KeyframeError, RestoreError};
 pub use parameters::{PARAMETERS, Setting};
 pub use particles::{Particle, flag};
-pub use scene::{Method, Scene, SceneError, SolverSettings};
+pub use scene::{ColliderShape, Method, Scene, SceneError, SolverSettings};
 pub use solver::Solver;
 pub use tear::TearCause;
 

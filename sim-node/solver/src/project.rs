@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::constraints::Constraints;
+use crate::constraints::{Constraints, Rest};
 use crate::particles::Particles;
 use crate::scene::Method;
 
@@ -42,19 +42,16 @@ fn project_compliant(
     group: Range<usize>,
     relaxation: f32,
 ) {
-    let rests =
-        constraints.pairs[group.clone()].iter().zip(&constraints.rest_lengths[group.clone()]);
+    let rests = constraints.pairs[group.clone()].iter().zip(&constraints.rests[group.clone()]);
     let bounds =
         constraints.softness[group.clone()].iter().zip(&constraints.pull_only[group.clone()]);
     let multipliers = &mut constraints.multipliers[group];
-    for (((pair, rest_length), (softness, pull_only)), multiplier) in
-        rests.zip(bounds).zip(multipliers)
-    {
+    for (((pair, rest), (softness, pull_only)), multiplier) in rests.zip(bounds).zip(multipliers) {
         let Some(gap) = Gap::between(particles, *pair) else { continue };
-        if *pull_only && gap.length <= *rest_length {
+        if *pull_only && gap.length <= rest.length {
             continue;
         }
-        let error = gap.error(*rest_length);
+        let error = gap.error(rest);
         let delta = -(error + *softness * *multiplier) / (gap.inverse_mass_sum + *softness);
         let delta = relaxation * delta;
         *multiplier += delta;
@@ -66,19 +63,16 @@ fn project_compliant(
 /// -k' C / (`w_a` + `w_b`)
 /// (Position Based Dynamics: Mueller et al. 2007, section 3.3).
 fn project_stiff(particles: &mut Particles, constraints: &mut Constraints, group: Range<usize>) {
-    let rests =
-        constraints.pairs[group.clone()].iter().zip(&constraints.rest_lengths[group.clone()]);
+    let rests = constraints.pairs[group.clone()].iter().zip(&constraints.rests[group.clone()]);
     let bounds =
         constraints.softness[group.clone()].iter().zip(&constraints.pull_only[group.clone()]);
     let multipliers = &mut constraints.multipliers[group];
-    for (((pair, rest_length), (share, pull_only)), multiplier) in
-        rests.zip(bounds).zip(multipliers)
-    {
+    for (((pair, rest), (share, pull_only)), multiplier) in rests.zip(bounds).zip(multipliers) {
         let Some(gap) = Gap::between(particles, *pair) else { continue };
-        if *pull_only && gap.length <= *rest_length {
+        if *pull_only && gap.length <= rest.length {
             continue;
         }
-        let delta = -(*share * gap.error(*rest_length)) / gap.inverse_mass_sum;
+        let delta = -(*share * gap.error(rest)) / gap.inverse_mass_sum;
         *multiplier += delta;
         gap.close(particles, *pair, delta);
     }
@@ -90,7 +84,8 @@ pub(crate) fn limit_stretch(particles: &mut Particles, constraints: &Constraints
     for (pair, max_length) in constraints.pairs.iter().zip(&constraints.max_lengths) {
         let Some(gap) = Gap::between(particles, *pair) else { continue };
         if gap.length > *max_length {
-            gap.close(particles, *pair, -gap.error(*max_length) / gap.inverse_mass_sum);
+            let error = gap.error(&Rest::new(*max_length));
+            gap.close(particles, *pair, -error / gap.inverse_mass_sum);
         }
     }
 }
@@ -101,19 +96,30 @@ pub(crate) fn pull_back(particles: &mut Particles, particle: u32, root: u32, len
     if gap.length <= length_max {
         return;
     }
-    let scale = gap.error(length_max) / gap.length;
+    let scale = gap.error(&Rest::new(length_max)) / gap.length;
     let displacement = &mut particles.displacements[particle as usize];
     for (axis, along) in gap.separation.iter().enumerate() {
         displacement[axis] -= scale * along;
     }
 }
 
+/// The length of a constraint in the middle of a substep.
+pub(crate) fn length_between(particles: &Particles, pair: [u32; 2]) -> f32 {
+    let [a, b] = pair.map(|particle| particle as usize);
+    let along = |axis: usize| {
+        (particles.positions[b][axis] - particles.positions[a][axis])
+            + (particles.displacements[b][axis] - particles.displacements[a][axis])
+    };
+    let separation = [0, 1, 2].map(along);
+    dot(separation, separation).sqrt()
+}
+
 /// The way from particle a to particle b in the middle of a substep.
-pub(crate) struct Gap {
+struct Gap {
     /// r = `x_b` - `x_a` + `d_b` - `d_a`.
     separation: [f32; 3],
     /// |r|.
-    pub(crate) length: f32,
+    length: f32,
     inverse_mass_sum: f32,
     /// |R|^2 of the way R = `x_b` - `x_a` at the start of the substep.
     start_squared: f32,
@@ -127,7 +133,7 @@ impl Gap {
     /// `None` where a projection can do nothing: both ends are fixed, or they coincide and there
     /// is no direction.
     #[inline]
-    pub(crate) fn between(particles: &Particles, [a, b]: [u32; 2]) -> Option<Self> {
+    fn between(particles: &Particles, [a, b]: [u32; 2]) -> Option<Self> {
         let (a, b) = (a as usize, b as usize);
         let (position_a, position_b) = (particles.positions[a], particles.positions[b]);
         let (d_a, d_b) = (particles.displacements[a], particles.displacements[b]);
@@ -157,13 +163,12 @@ impl Gap {
     /// substep changes keeps all of its digits. Where D or C is not small against R, the plain
     /// difference has as many digits, and is safe where R and D cancel.
     #[inline]
-    fn error(&self, rest_length: f32) -> f32 {
-        let plain = self.length - rest_length;
+    fn error(&self, rest: &Rest) -> f32 {
+        let plain = self.length - rest.length;
         let is_small = 64.0 * self.moved_squared < self.start_squared
             && 64.0 * (plain * plain) < self.start_squared;
         if is_small {
-            let difference = (self.start_squared - rest_length * rest_length) + self.change;
-            difference / (self.length + rest_length)
+            ((self.start_squared - rest.square) + self.change) / (self.length + rest.length)
         } else {
             plain
         }

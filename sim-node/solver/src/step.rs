@@ -57,9 +57,10 @@ impl Solver {
         self.project();
         limit_stretch(&mut self.particles, &self.constraints);
         self.tethers.pull(&mut self.particles);
-        self.collide(substep, h);
+        let contact_step = self.contact_step(substep);
+        self.collide(&contact_step);
         update(&mut self.particles, h);
-        self.contacts.finish(&mut self.particles);
+        self.part(&contact_step);
     }
 
     /// Everything falls, is slowed down by damping, and is carried along by the wind.
@@ -112,18 +113,31 @@ impl Solver {
     }
 
     /// Contacts come last, so that no published state is inside of a collider.
-    fn collide(&mut self, substep: Substep, h: f32) {
-        let [x, y, z] = self.parameters.gravity;
-        let gravity = (x * x + y * y + z * z).sqrt();
-        let count = substep.count as f32;
-        let moments = Moments {
-            start: substep.index as f32 / count,
-            end: (substep.index + 1) as f32 / count,
-        };
-        let step =
-            ContactStep { h, rest_speed: 2.0 * gravity * h, moments, is_planar: self.is_planar };
+    fn collide(&mut self, step: &ContactStep) {
         for collider in &self.colliders {
-            self.contacts.collide(&mut self.particles, collider, &step);
+            self.contacts.collide(&mut self.particles, collider, step);
+        }
+    }
+
+    /// What touched something goes on with the velocity that its contacts leave it.
+    fn part(&mut self, step: &ContactStep) {
+        for collider in &self.colliders {
+            self.contacts.settle(&mut self.particles, collider, step);
+        }
+        self.contacts.finish(&mut self.particles);
+    }
+
+    fn contact_step(&self, substep: Substep) -> ContactStep {
+        let (h, [x, y, z]) = (self.h(), self.parameters.gravity);
+        let count = substep.count as f32;
+        ContactStep {
+            h,
+            rest_speed: 2.0 * (x * x + y * y + z * z).sqrt() * h,
+            moments: Moments {
+                start: substep.index as f32 / count,
+                end: (substep.index + 1) as f32 / count,
+            },
+            is_planar: self.is_planar,
         }
     }
 

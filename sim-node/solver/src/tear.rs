@@ -8,7 +8,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::constraints::Constraints;
 use crate::particles::Particles;
-use crate::project::Gap;
+use crate::project::length_between;
 
 /// Why a constraint tore.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -110,8 +110,7 @@ impl Torn {
             if tear_length.is_infinite() || self.is_marked[slot] {
                 continue;
             }
-            let Some(gap) = Gap::between(particles, constraints.pairs[slot]) else { continue };
-            if gap.length > tear_length {
+            if length_between(particles, constraints.pairs[slot]) > tear_length {
                 self.mark(constraints, slot, constraints.tear_causes[slot]);
             }
         }

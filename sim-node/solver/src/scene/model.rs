@@ -74,9 +74,13 @@ impl Model {
 
     /// The distance of two particles in f32, as a step would measure it.
     pub(crate) fn distance(&self, a: u32, b: u32) -> f32 {
+        self.distance_squared(a, b).sqrt()
+    }
+
+    pub(crate) fn distance_squared(&self, a: u32, b: u32) -> f32 {
         let (a, b) = (self.particles[a as usize].position, self.particles[b as usize].position);
         let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        (x * x + y * y + z * z).sqrt()
+        x * x + y * y + z * z
     }
 }
 

@@ -1,0 +1,366 @@
+//! Contacts: nothing penetrates, bounces and slopes follow their laws, nothing tunnels.
+
+use proptest::prelude::*;
+use sim_solver::{ColliderShape, Pose, Solver};
+
+use super::{assert_at_most, assert_close, assert_near, position, solver, step, stepped, velocity};
+
+const FLOOR: &str = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n";
+
+fn solver_settings(rate: u32, substeps: u32) -> String {
+    format!("[solver]\nrate_hz = {rate}\nsubsteps = {substeps}\n")
+}
+
+/// The highest point between the next two contacts with the floor.
+fn next_apex(solver: &mut Solver) -> f64 {
+    while velocity(solver, 0)[1] <= 0.0 {
+        step(solver, 1);
+    }
+    let mut apex = 0.0;
+    while velocity(solver, 0)[1] > 0.0 {
+        apex = f64::max(apex, position(solver, 0)[1]);
+        step(solver, 1);
+    }
+    f64::max(apex, position(solver, 0)[1])
+}
+
+#[test]
+fn bounces_reach_e_to_the_2n_of_the_height_alike_at_60_and_61_hz() {
+    for restitution in [0.3, 0.5, 0.8] {
+        for rate in [60, 61] {
+            let text = solver_settings(rate, 20)
+                + "[[particle]]\nposition = [0, 1, 0]\n"
+                + FLOOR
+                + &format!("restitution = {restitution}\n");
+            let mut solver = solver(&text);
+            let mut expected = 1.0;
+            for bounce in 1..=3 {
+                expected *= restitution * restitution;
+                if expected < 0.02 {
+                    // So low that a snapshot at 60 Hz no longer sees the apex.
+                    break;
+                }
+                let what = format!("bounce {bounce}, e {restitution}, {rate} Hz");
+                // A snapshot misses the apex by at most g dt^2 / 8.
+                let unseen = 9.81 / 3600.0 / 8.0;
+                assert_near(&what, expected, next_apex(&mut solver), 0.03 * expected + unseen);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_particle_on_the_floor_comes_to_rest_after_its_bounces() {
+    // sqrt(2 h / g) (1 + e) / (1 - e) seconds.
+    let text = solver_settings(60, 20)
+        + "[[particle]]\nposition = [0, 1, 0]\n"
+        + FLOOR
+        + "restitution = 0.5\n";
+    let rest_s = (2.0 / 9.81_f64).sqrt() * 1.5 / 0.5;
+    let mut solver = stepped(&text, 60 * 2);
+    assert!(rest_s < 2.0);
+    for _ in 0..600 {
+        step(&mut solver, 1);
+        assert_near("height", 0.0, position(&solver, 0)[1], 1e-9);
+        assert_near("speed", 0.0, velocity(&solver, 0)[1], 1e-6);
+    }
+}
+
+#[test]
+fn what_starts_inside_leaves_with_less_than_g_dt() {
+    for substeps in [1, 4, 20] {
+        for shape in [
+            FLOOR,
+            "[[collider]]\nshape = \"box\"\ncenter = [0, -0.5, 0]\nhalf_extents = [5, 0.5, 5]\n",
+            "[[collider]]\nshape = \"sphere\"\ncenter = [0, -9, 0]\nradius = 9\n",
+            "[[collider]]\nshape = \"bounds\"\nmin = [-9, 0, -9]\nmax = [9, 9, 9]\n",
+        ] {
+            let text = solver_settings(60, substeps)
+                + "[[particle]]\nposition = [0, -0.1, 0]\n"
+                + shape
+                + "restitution = 0.9\n";
+            let mut solver = solver(&text);
+            for _ in 0..30 {
+                step(&mut solver, 1);
+                assert_at_most("speed", 9.81 / 60.0, velocity(&solver, 0)[1].abs());
+                assert_near("height", 0.0, position(&solver, 0)[1], 1e-6);
+            }
+        }
+    }
+}
+
+/// A particle on a plane inclined by `angle`, without speed, on the surface.
+fn slope(angle: f64, friction: f64, substeps: u32) -> String {
+    solver_settings(60, substeps)
+        + "[[particle]]\nposition = [0, 0, 0]\n"
+        + &format!(
+            "[[collider]]\nshape = \"plane\"\nnormal = [{}, {}, 0]\noffset = 0\nfriction = {friction}\n",
+            angle.sin(),
+            angle.cos()
+        )
+}
+
+#[test]
+fn a_slope_holds_below_the_angle_of_friction() {
+    for substeps in [1, 4, 20] {
+        for (friction, share) in [(0.3_f64, 0.95), (0.5, 0.95), (1.0, 0.9)] {
+            let angle = friction.atan() * share;
+            let mut solver = stepped(&slope(angle, friction, substeps), 60);
+            let start = position(&solver, 0);
+            step(&mut solver, 600);
+            let end = position(&solver, 0);
+            let drift = ((end[0] - start[0]).powi(2) + (end[1] - start[1]).powi(2)).sqrt();
+            assert_at_most(
+                &format!("drift in 10 s, mu {friction}, {substeps} substeps"),
+                1e-3,
+                drift,
+            );
+            assert_at_most("drift since the start", 1e-3, start[0].abs());
+        }
+    }
+}
+
+#[test]
+fn a_slope_lets_go_above_the_angle_of_friction() {
+    // s = g (sin - mu cos) t^2 / 2, and in m substeps as in a free fall.
+    for substeps in [1, 4, 20] {
+        for (friction, share) in [(0.3_f64, 1.3), (0.5, 1.5), (0.0, 0.0)] {
+            let angle = if friction == 0.0 { 0.3 } else { friction.atan() * share };
+            let solver = stepped(&slope(angle, friction, substeps), 60);
+            let [x, y, _] = position(&solver, 0);
+            let h = 1.0 / 60.0 / f64::from(substeps);
+            let m = 60.0 * f64::from(substeps);
+            let expected =
+                9.81 * (angle.sin() - friction * angle.cos()) * h * h * m * (m + 1.0) / 2.0;
+            let found = (x * x + y * y).sqrt();
+            assert_close(
+                &format!("slide, mu {friction}, {substeps} substeps"),
+                expected,
+                found,
+                0.03,
+            );
+        }
+    }
+}
+
+#[test]
+fn friction_stops_a_slide_after_v2_over_2_mu_g() {
+    let text = solver_settings(240, 4)
+        + "[[particle]]\nposition = [0, 0, 0]\nvelocity = [2, 0, 0]\n"
+        + FLOOR
+        + "friction = 0.4\n";
+    let solver = stepped(&text, 480);
+    assert_close("way", 4.0 / (2.0 * 0.4 * 9.81), position(&solver, 0)[0], 0.03);
+    assert_near("speed", 0.0, velocity(&solver, 0)[0], 1e-6);
+}
+
+#[test]
+fn a_moving_floor_carries_what_lies_on_it_and_lifts_it() {
+    let text = solver_settings(240, 4)
+        + "[[particle]]\nposition = [0, 0, 0]\n"
+        + FLOOR
+        + "friction = 0.9\nvelocity = [0.5, 0.25, 0]\n";
+    let solver = stepped(&text, 240);
+    assert_close("speed along", 0.5, velocity(&solver, 0)[0], 1e-3);
+    assert_close("speed up", 0.25, velocity(&solver, 0)[1], 1e-3);
+    assert_near("height after 1 s", 0.25, position(&solver, 0)[1], 1e-5);
+}
+
+#[test]
+fn a_bat_adds_its_own_speed_to_the_bounce() {
+    // A wall at 3 m/s meets a particle at rest: e = 1 sends it off with 6 m/s.
+    let text = "gravity = [0, 0, 0]\n".to_owned()
+        + &solver_settings(240, 4)
+        + "[[particle]]\nposition = [0.1, 0, 0]\n[[collider]]\nshape = \"plane\"\nnormal = [1, 0, 0]\noffset = 0\n\
+           restitution = 1\nvelocity = [3, 0, 0]\n";
+    assert_close("speed", 6.0, velocity(&stepped(&text, 60), 0)[0], 1e-3);
+}
+
+#[test]
+fn a_turning_box_drags_its_surface_along() {
+    // On the top of a box that turns about y, friction gives the speed omega r of that place.
+    let text = solver_settings(240, 4)
+        + "[[particle]]\nposition = [0.5, 0.2, 0]\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\n\
+           half_extents = [2, 0.2, 2]\nfriction = 1\nangular_velocity = [0, 0.8, 0]\n";
+    let solver = stepped(&text, 120);
+    let [vx, _, vz] = velocity(&solver, 0);
+    assert_close("speed", 0.8 * 0.5, (vx * vx + vz * vz).sqrt(), 0.02);
+    assert_near("height", 0.2, position(&solver, 0)[1], 1e-6);
+}
+
+#[test]
+fn nothing_tunnels_through_a_thin_box_a_plane_or_bounds_at_the_highest_speed() {
+    for shape in [
+        "[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1e5, 1e-3, 1e5]\n",
+        "[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1e-3, 1e5, 1e5]\nrotation = [0, 0, 1, 1]\n",
+        "[[collider]]\nshape = \"plane\"\nnormal = [0, 3, 0]\noffset = 1e-3\n",
+        "[[collider]]\nshape = \"bounds\"\nmin = [-1e6, 1e-3, -1e6]\nmax = [1e6, 1e6, 1e6]\n",
+    ] {
+        let text = solver_settings(60, 1)
+            + "[[particle]]\nposition = [0, 1, 0]\nvelocity = [10, -10000, 3]\n"
+            + shape;
+        let mut solver = solver(&text);
+        for _ in 0..30 {
+            step(&mut solver, 1);
+            assert_near(shape, 1e-3, position(&solver, 0)[1], 1e-5);
+        }
+    }
+}
+
+#[test]
+fn a_fast_moving_box_does_not_pass_over_a_particle() {
+    let text = "gravity = [0, 0, 0]\n".to_owned()
+        + &solver_settings(60, 1)
+        + "[[particle]]\nposition = [0, 0, 0]\n[[collider]]\nshape = \"box\"\ncenter = [-10, 0, 0]\n\
+           half_extents = [0.01, 5, 5]\nvelocity = [900, 0, 0]\n";
+    let solver = stepped(&text, 6);
+    assert_near("pushed by the front", -10.0 + 90.0 + 0.01, position(&solver, 0)[0], 1e-3);
+    assert_close("speed of the front", 900.0, velocity(&solver, 0)[0], 1e-3);
+}
+
+#[test]
+fn what_lies_on_a_thin_box_is_not_pulled_through_it() {
+    let text = solver_settings(240, 4)
+        + "[[particle]]\nposition = [0, 0.3, 0]\n[[particle]]\nposition = [0, -3, 0]\nmass = 100\npinned = true\n\
+           [[constraint]]\nparticles = [0, 1]\nrest_length = 0.5\ncompliance = 1e-5\n\
+           [[collider]]\nshape = \"box\"\ncenter = [0, 0.1, 0]\nhalf_extents = [1, 1e-3, 1]\n";
+    let mut solver = solver(&text);
+    for _ in 0..480 {
+        step(&mut solver, 1);
+        assert_at_most("top of the box", position(&solver, 0)[1], 0.101 - 1e-6);
+    }
+}
+
+#[test]
+fn a_box_pushes_out_by_the_nearest_face_with_ties_in_their_order() {
+    let place = |at: [f64; 3]| {
+        let text = "gravity = [0, 0, 0]\n".to_owned()
+            + &solver_settings(60, 1)
+            + &format!(
+                "[[particle]]\nposition = {at:?}\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1, 1, 1]\n"
+            );
+        stepped(&text, 1).particle(0).position
+    };
+    assert_eq!(place([0.5, 0.25, 0.25]), [1.0, 0.25, 0.25]);
+    assert_eq!(place([0.25, -0.5, 0.25]), [0.25, -1.0, 0.25]);
+    assert_eq!(place([0.5, 0.5, 0.5]), [1.0, 0.5, 0.5]);
+    assert_eq!(place([-0.5, 0.5, -0.5]), [-0.5, 1.0, -0.5]);
+    assert_eq!(place([0.0, 0.0, 0.0]), [1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn the_very_middle_of_a_ball_has_a_way_out() {
+    for shape in [
+        "[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\n",
+        "[[collider]]\nshape = \"capsule\"\na = [-2, 0, 0]\nb = [2, 0, 0]\nradius = 1\n",
+    ] {
+        let text = "gravity = [0, 0, 0]\n".to_owned()
+            + &solver_settings(60, 1)
+            + "[[particle]]\nposition = [0, 0, 0]\n"
+            + shape;
+        let solver = stepped(&text, 1);
+        assert_eq!(solver.particle(0).position, [0.0, 1.0, 0.0]);
+        assert_eq!(solver.particle(0).velocity, [0.0; 3]);
+    }
+}
+
+#[test]
+fn bounds_keep_a_box_of_the_pixel_demonstration_inside_in_every_snapshot() {
+    let text = "dimensions = 2\nup = \"-y\"\nunit = \"px\"\ngravity = [0, 50, 0]\n[solver]\nrate_hz = 60\nsubsteps = 4\n\
+         [[particle]]\nposition = [220, 20, 0]\nvelocity = [90, 0, 0]\n[[particle]]\nposition = [280, 20, 0]\n\
+         [[particle]]\nposition = [280, 60, 0]\n[[particle]]\nposition = [220, 60, 0]\n\
+         [[constraint]]\nparticles = [0, 1]\n[[constraint]]\nparticles = [1, 2]\n\
+         [[constraint]]\nparticles = [2, 3]\n[[constraint]]\nparticles = [3, 0]\n\
+         [[constraint]]\nparticles = [0, 2]\n[[constraint]]\nparticles = [1, 3]\n\
+         [[collider]]\nshape = \"bounds\"\nmin = [0, 0, 0]\nmax = [500, 400, 0]\n";
+    let mut solver = solver(text);
+    for _ in 0..3000 {
+        step(&mut solver, 1);
+        for index in 0..4 {
+            let [x, y, z] = solver.particle(index).position;
+            assert!((0.0..=500.0).contains(&x) && (0.0..=400.0).contains(&y), "{x} {y}");
+            assert_eq!(z.to_bits(), 0);
+        }
+    }
+    let lowest = (0..4).map(|index| solver.particle(index).position[1]).fold(0.0, f32::max);
+    assert_eq!(lowest, 400.0);
+}
+
+#[test]
+fn a_client_moves_a_collider_with_the_velocity_that_its_way_implies() {
+    let text = "gravity = [0, 0, 0]\n".to_owned()
+        + &solver_settings(100, 4)
+        + "[[particle]]\nposition = [0.5, 0, 0]\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [0.4, 1, 1]\n";
+    let mut solver = solver(&text);
+    let no_turn = [0.0, 0.0, 0.0, 1.0];
+    solver.move_collider(0, Pose { translation: [0.2, 0.0, 0.0], rotation: no_turn }).unwrap();
+    step(&mut solver, 1);
+    assert_near("pushed to the face", 0.6, position(&solver, 0)[0], 1e-5);
+    assert_close("speed of the face", 20.0, velocity(&solver, 0)[0], 1e-4);
+    let placed = solver.colliders().next().unwrap();
+    assert!(
+        matches!(placed.shape, ColliderShape::Box { center: [x, ..], .. } if (x - 0.2).abs() < 1e-6)
+    );
+    assert!(solver.has_moving_colliders());
+    // From then on it stands.
+    step(&mut solver, 1);
+    assert!(!solver.has_moving_colliders());
+    assert_eq!(solver.colliders().next().unwrap().velocity, [0.0; 3]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn no_snapshot_is_inside_of_a_plane_or_a_turned_box(
+        normal in prop::array::uniform3(-1.0_f64..1.0),
+        offset in -2.0_f64..2.0,
+        rotation in prop::array::uniform4(-1.0_f64..1.0),
+        velocity in prop::array::uniform3(-20.0_f64..20.0),
+        gravity in prop::array::uniform3(-20.0_f64..20.0),
+    ) {
+        let length = normal.iter().map(|axis| axis * axis).sum::<f64>().sqrt();
+        prop_assume!(length > 0.1 && rotation.iter().map(|part| part * part).sum::<f64>() > 0.1);
+        let solids = [
+            format!("shape = \"plane\"\nnormal = {normal:?}\noffset = {offset}\n"),
+            format!("shape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1, 0.5, 2]\nrotation = {rotation:?}\n"),
+        ];
+        for solid in solids {
+            let text = format!("gravity = {gravity:?}\n") + &solver_settings(60, 4)
+                + &format!("[[particle]]\nposition = [0.1, 0.3, -0.2]\nvelocity = {velocity:?}\n[[collider]]\n{solid}friction = 0.3\nrestitution = 0.5\n");
+            let mut solver = solver(&text);
+            for _ in 0..60 {
+                step(&mut solver, 1);
+                let at = position(&solver, 0);
+                let depth = depth_in(&solver.colliders().next().unwrap().shape, at);
+                let size = at.iter().fold(1.0_f64, |most, axis| most.max(axis.abs()));
+                prop_assert!(depth < 2e-6 * size, "{at:?} is {depth} inside of {solid}");
+            }
+        }
+    }
+}
+
+/// How far a point is inside of a plane or a box, in f64 and by the definition of the shape.
+fn depth_in(shape: &ColliderShape, at: [f64; 3]) -> f64 {
+    match *shape {
+        ColliderShape::Plane { normal, offset } => {
+            let height: f64 = (0..3).map(|axis| f64::from(normal[axis]) * at[axis]).sum();
+            f64::from(offset) - height
+        }
+        ColliderShape::Box { center, half_extents, rotation } => {
+            let [x, y, z, w] = rotation.map(f64::from);
+            let arm: Vec<f64> = (0..3).map(|axis| at[axis] - f64::from(center[axis])).collect();
+            // Columns of the rotation's matrix.
+            let axes = [
+                [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],
+                [2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)],
+                [2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)],
+            ];
+            let depth = |axis: usize| {
+                let along: f64 = (0..3).map(|part| axes[axis][part] * arm[part]).sum();
+                f64::from(half_extents[axis]) - along.abs()
+            };
+            depth(0).min(depth(1)).min(depth(2))
+        }
+        _ => panic!("no plane and no box"),
+    }
+}

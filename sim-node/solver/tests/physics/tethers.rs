@@ -1,0 +1,105 @@
+//! Generated tethers: no rope is longer than its rigid length, and a tear or a pin changes them.
+
+use sim_solver::Solver;
+
+use super::{assert_at_most, assert_near, distance, position, solver, step, stepped};
+
+/// A rope of `count` moving particles and 0.05 m links that hangs straight down.
+fn rope(count: u32, tethers: bool) -> String {
+    format!(
+        "[solver]\nrate_hz = 60\nsubsteps = 4\ndamping = 1\ntethers = {tethers}\n[[generate]]\n\
+         shape = \"rope\"\ncount = {}\nfrom = [0, 0, 0]\nto = [0, -{}, 0]\n",
+        count + 1,
+        f64::from(count) * 0.05,
+    )
+}
+
+#[test]
+fn a_tethered_rope_of_100_stretches_by_at_most_a_thousandth() {
+    let length = |solver: &Solver| -position(solver, 100)[1];
+    let plain = length(&stepped(&rope(100, false), 60 * 30));
+    assert!(plain > 5.0 * 1.1, "without tethers it does stretch: {plain}");
+    let mut tethered = solver(&rope(100, true));
+    for _ in 0..60 * 30 {
+        step(&mut tethered, 1);
+        assert_at_most("length", 5.0 * 1.001, length(&tethered));
+    }
+    assert_near("length at rest", 5.0, length(&tethered), 5e-3);
+}
+
+#[test]
+fn a_swinging_rope_keeps_every_particle_within_its_path() {
+    let text = "[solver]\nrate_hz = 60\nsubsteps = 2\ntethers = true\n[[generate]]\n\
+         shape = \"rope\"\ncount = 41\nfrom = [0, 0, 0]\nto = [2, 0, 0]\n";
+    let mut solver = solver(text);
+    for _ in 0..600 {
+        step(&mut solver, 1);
+        for index in 1..41_u8 {
+            let path = f64::from(index) * 0.05;
+            let found = distance(&solver, 0, usize::from(index));
+            assert!(found <= path * (1.0 + 1e-5), "particle {index}: {found}, path {path}");
+        }
+    }
+}
+
+/// Two pins 1.2 m apart; a particle hangs on a rigid chain of two from the first one, and on one
+/// long rigid link from the second one.
+const FORK: &str = "[solver]\nrate_hz = 60\nsubsteps = 4\ntethers = true\n\
+     [[particle]]\nposition = [0, 0, 0]\npinned = true\n\
+     [[particle]]\nposition = [1.2, 0, 0]\npinned = true\n\
+     [[particle]]\nposition = [0, -0.3, 0]\n[[particle]]\nposition = [0, -0.6, 0]\n\
+     [[constraint]]\nparticles = [0, 2]\n[[constraint]]\nparticles = [2, 3]\n\
+     [[constraint]]\nparticles = [1, 3]\nrest_length = 9\nkind = \"tether\"\n";
+
+#[test]
+fn a_cut_path_drops_its_tethers_and_a_pin_finds_new_ones() {
+    let mut solver = solver(FORK);
+    step(&mut solver, 10);
+    assert_near("hangs from the nearest root", 0.6, distance(&solver, 0, 3), 1e-4);
+    // The upper link goes; the pair falls free of the first pin at once.
+    solver.cut(0).unwrap();
+    let before = position(&solver, 3)[1];
+    step(&mut solver, 6);
+    let fallen = before - position(&solver, 3)[1];
+    let (m, h) = (24.0, 1.0 / 240.0);
+    assert_near("free fall after the cut", 9.81 * h * h * m * (m + 1.0) / 2.0, fallen, 1e-3);
+    // A pin recomputes: the middle particle is the root of the lower one from now on.
+    solver.pin(2).unwrap();
+    step(&mut solver, 60);
+    assert_near("hangs from the new root", 0.3, distance(&solver, 2, 3), 1e-4);
+}
+
+#[test]
+fn bends_compliant_and_torn_constraints_make_no_path() {
+    // Only soft or bend links lead to the root: the particle sags as far as the spring lets it.
+    let text = "[solver]\nrate_hz = 60\nsubsteps = 4\ndamping = 4\ntethers = true\n\
+         [[particle]]\nposition = [0, 0, 0]\npinned = true\n[[particle]]\nposition = [0, -1, 0]\n\
+         [[constraint]]\nparticles = [0, 1]\ncompliance = 0.01\n";
+    assert_near("sag", 1.0 + 0.0981, distance(&stepped(text, 1200), 0, 1), 1e-3);
+    let mut stiff = solver(text);
+    step(&mut stiff, 1200);
+    stiff.set("compliance", sim_solver::Setting::Number(0.0), None).unwrap();
+    step(&mut stiff, 600);
+    assert_near("rigid, so tethered", 1.0, distance(&stiff, 0, 1), 1e-3);
+}
+
+#[test]
+fn a_tethered_state_goes_on_bit_for_bit_from_a_keyframe() {
+    let scene = format!("version = 1\n{}", rope(30, true));
+    let scene = sim_solver::Scene::from_toml(&scene, "test").unwrap();
+    let mut solver = Solver::new(&scene);
+    solver.cut(12).unwrap();
+    step(&mut solver, 20);
+    solver.pin(20).unwrap();
+    step(&mut solver, 20);
+    solver.cut(24).unwrap();
+    step(&mut solver, 20);
+    let particles: Vec<_> = super::particles(&solver).collect();
+    let mut again = Solver::new(&scene);
+    again.restore(&particles, &solver.keyframe()).unwrap();
+    for _ in 0..200 {
+        step(&mut solver, 1);
+        step(&mut again, 1);
+        assert_eq!(solver.state_hash(), again.state_hash());
+    }
+}

@@ -1,0 +1,90 @@
+//! Wind: its force on a triangle, on both faces, and that it never overshoots.
+
+use super::{assert_at_most, assert_close, assert_near, solver, step, stepped, velocity};
+
+/// One triangle of 0.5 m^2 and 3 kg in the plane of x and y, in a wind.
+fn triangle(wind: &str, rate: u32) -> String {
+    // A cloth of 2 x 2 has two triangles.
+    format!(
+        "gravity = [0, 0, 0]\n[solver]\nrate_hz = {rate}\nsubsteps = 1\n[wind]\n{wind}\n\
+         [[generate]]\nshape = \"cloth\"\ncolumns = 2\nrows = 2\nspacing = 1\nmass = 3\npinned = \"none\"\n"
+    )
+}
+
+#[test]
+fn a_sheet_gains_drag_area_speed_squared_over_mass_from_either_side() {
+    // Area 1 m^2, 12 kg: F = drag v^2; the corners of the diagonal take two thirds of it.
+    for wind in [4.0, -4.0] {
+        let h = 1e-3;
+        let solver = stepped(&triangle(&format!("velocity = [0, 0, {wind}]\ndrag = 0.6"), 1000), 1);
+        let force = 0.6 * wind * f64::abs(wind);
+        let momentum: f64 = (0..4).map(|index| 3.0 * velocity(&solver, index)[2]).sum();
+        assert_close("momentum", force * h, momentum, 1e-4);
+    }
+}
+
+#[test]
+fn a_slanting_wind_pushes_along_itself_by_the_share_that_meets_the_face() {
+    let solver = stepped(&triangle("velocity = [3, 0, 4]\ndrag = 0.5", 1000), 1);
+    // F = drag A |u n| u with |u n| = 4.
+    let sum = |axis: usize| (0..4).map(|index| 3.0 * velocity(&solver, index)[axis]).sum::<f64>();
+    assert_close("along x", 0.5 * 4.0 * 3.0 * 1e-3, sum(0), 1e-3);
+    assert_close("along z", 0.5 * 4.0 * 4.0 * 1e-3, sum(2), 1e-3);
+}
+
+#[test]
+fn an_edge_in_the_wind_feels_nothing() {
+    let solver = stepped(&triangle("velocity = [5, 2, 0]\ndrag = 1", 100), 10);
+    for index in 0..4 {
+        assert_near("speed", 0.0, velocity(&solver, index)[0].abs(), 1e-9);
+    }
+}
+
+#[test]
+fn however_strong_it_never_drives_a_sheet_faster_than_itself() {
+    let mut solver = solver(&triangle("velocity = [0, 0, 20]\ndrag = 1e6", 60));
+    for _ in 0..120 {
+        step(&mut solver, 1);
+        for index in 0..4 {
+            assert_at_most("speed", 20.0 * (1.0 + 1e-5), velocity(&solver, index)[2]);
+        }
+    }
+    assert_close("speed in the end", 20.0, velocity(&solver, 0)[2], 1e-3);
+}
+
+#[test]
+fn still_air_brakes_a_falling_sheet_to_its_terminal_speed() {
+    // m g = drag A v^2: 12 kg on 1 m^2.
+    let text =
+        triangle("drag = 0.6", 240).replace("gravity = [0, 0, 0]", "gravity = [0, 0, -9.81]");
+    let solver = stepped(&text, 240 * 20);
+    assert_close("speed", -(12.0 * 9.81 / 0.6_f64).sqrt(), velocity(&solver, 0)[2], 1e-3);
+}
+
+#[test]
+fn a_gust_swells_and_ebbs_with_its_period() {
+    // At a quarter of the period the wind is 1 + gust as fast: its force is the square of that.
+    let text = triangle("velocity = [0, 0, 1]\ndrag = 1e-3\ngust = 0.5\ngust_period = 4", 100);
+    let mut solver = solver(&text);
+    let mut speeds = vec![0.0];
+    for _ in 0..400 {
+        step(&mut solver, 1);
+        speeds.push((0..4).map(|index| velocity(&solver, index)[2]).sum::<f64>());
+    }
+    let gain = |step: usize| speeds[step] - speeds[step - 1];
+    assert_close("at its height", 1.5 * 1.5, gain(100) / gain(200), 1e-2);
+    assert_close("at its lowest", 0.5 * 0.5, gain(300) / gain(400), 1e-2);
+}
+
+#[test]
+fn a_scene_without_wind_feels_no_air() {
+    let text = "gravity = [0, 0, 0]\n[solver]\nsubsteps = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 2\nrows = 2\n\
+         spacing = 1\npinned = \"none\"\n";
+    let mut calm = solver(text);
+    step(&mut calm, 10);
+    assert_eq!(velocity(&calm, 0), [0.0; 3]);
+    calm.set("wind_velocity", sim_solver::Setting::Vector([0.0, 0.0, 2.0]), None).unwrap();
+    calm.set("wind_drag", sim_solver::Setting::Number(1.0), None).unwrap();
+    step(&mut calm, 10);
+    assert!(velocity(&calm, 0)[2] > 0.0);
+}
