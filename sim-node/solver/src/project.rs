@@ -51,7 +51,7 @@ fn project_compliant(
         if *pull_only && gap.length <= rest.length {
             continue;
         }
-        let error = gap.error(rest);
+        let error = gap.error(*rest);
         let delta = -(error + *softness * *multiplier) / (gap.inverse_mass_sum + *softness);
         let delta = relaxation * delta;
         *multiplier += delta;
@@ -72,7 +72,7 @@ fn project_stiff(particles: &mut Particles, constraints: &mut Constraints, group
         if *pull_only && gap.length <= rest.length {
             continue;
         }
-        let delta = -(*share * gap.error(rest)) / gap.inverse_mass_sum;
+        let delta = -(*share * gap.error(*rest)) / gap.inverse_mass_sum;
         *multiplier += delta;
         gap.close(particles, *pair, delta);
     }
@@ -84,7 +84,7 @@ pub(crate) fn limit_stretch(particles: &mut Particles, constraints: &Constraints
     for (pair, max_length) in constraints.pairs.iter().zip(&constraints.max_lengths) {
         let Some(gap) = Gap::between(particles, *pair) else { continue };
         if gap.length > *max_length {
-            let error = gap.error(&Rest::new(*max_length));
+            let error = gap.error(Rest::new(*max_length));
             gap.close(particles, *pair, -error / gap.inverse_mass_sum);
         }
     }
@@ -96,7 +96,7 @@ pub(crate) fn pull_back(particles: &mut Particles, particle: u32, root: u32, len
     if gap.length <= length_max {
         return;
     }
-    let scale = gap.error(&Rest::new(length_max)) / gap.length;
+    let scale = gap.error(Rest::new(length_max)) / gap.length;
     let displacement = &mut particles.displacements[particle as usize];
     for (axis, along) in gap.separation.iter().enumerate() {
         displacement[axis] -= scale * along;
@@ -163,7 +163,7 @@ impl Gap {
     /// substep changes keeps all of its digits. Where D or C is not small against R, the plain
     /// difference has as many digits, and is safe where R and D cancel.
     #[inline]
-    fn error(&self, rest: &Rest) -> f32 {
+    fn error(&self, rest: Rest) -> f32 {
         let plain = self.length - rest.length;
         let is_small = 64.0 * self.moved_squared < self.start_squared
             && 64.0 * (plain * plain) < self.start_squared;

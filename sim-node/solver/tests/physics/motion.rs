@@ -117,7 +117,7 @@ fn pendulum(angle: f64, rate: u32, substeps: u32) -> Solver {
 fn period(angle: f64) -> f64 {
     let (mut a, mut b) = (1.0, (angle / 2.0).cos());
     for _ in 0..20 {
-        (a, b) = (f64::midpoint(a, b), (a * b as f64).sqrt());
+        (a, b) = (f64::midpoint(a, b), f64::sqrt(a * b));
     }
     std::f64::consts::TAU / 9.81_f64.sqrt() / a
 }

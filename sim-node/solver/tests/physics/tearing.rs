@@ -147,8 +147,10 @@ fn tears_of_one_step_stand_by_index_whatever_tore_them() {
     solver.cut(2).unwrap();
     step(&mut solver, 1);
     assert_eq!(solver.torn(), [0, 1, 2, 3]);
-    use TearCause::{Cut, Stretch};
-    assert_eq!(solver.tear_causes(), [Stretch, Stretch, Cut, Stretch]);
+    assert_eq!(
+        solver.tear_causes(),
+        [TearCause::Stretch, TearCause::Stretch, TearCause::Cut, TearCause::Stretch]
+    );
     assert_eq!(solver.new_torn_count(), 4);
     solver.reset();
     step(&mut solver, 1);
