@@ -17,6 +17,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Services
+//! Their names begin with that of the simulation, as `sim/particles`. All but commands, outcomes
+//! and wake are latched: who comes late is given the newest message.
+//!
+//! | service | payload, header | written |
+//! |---|---|---|
+//! | particles | [`ParticleState`]s, [`SnapshotHeader`] | every step |
+//! | keyframe | bytes, [`KeyframeHeader`] | now and then: what particles lack of the state |
+//! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s, [`LoadHeader`] | once per load |
+//! | colliders | [`ColliderState`]s, [`CollidersHeader`] | per load, on change, each step while one moves |
+//! | tears, tear_causes | indices, [`TearCause`]s as bytes, [`TearsHeader`] | per load and on a tear: all of the load |
+//! | commands | [`Command`] | by clients |
+//! | outcomes | [`Outcome`] | for every command |
+//! | status | [`NodeStatus`] | ten times a second |
+//! | wake | [`Wake`] events | with each of the above |
+//!
 //! There is no solver here, and no iceoryx2 outside of this crate.
 #![forbid(unsafe_code)]
 
