@@ -27,7 +27,7 @@
 //! | keyframe | bytes, [`KeyframeHeader`] | now and then: what particles lack of the state |
 //! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s, [`LoadHeader`] | once per load |
 //! | colliders | [`ColliderState`]s, [`CollidersHeader`] | per load, on change, each step while one moves |
-//! | tears, tear_causes | indices, [`TearCause`]s as bytes, [`TearsHeader`] | per load and on a tear: all of the load |
+//! | tears, `tear_causes` | indices, [`TearCause`]s as bytes, [`TearsHeader`] | per load and on a tear: all of the load |
 //! | commands | [`Command`] | by clients |
 //! | outcomes | [`Outcome`] | for every command |
 //! | status | [`NodeStatus`] | ten times a second |

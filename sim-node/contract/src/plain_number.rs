@@ -115,7 +115,11 @@ pub(crate) mod vector {
 pub(crate) mod optional_number {
     use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer};
 
-    #[allow(clippy::ref_option, reason = "the signature that serde asks for")]
+    #[allow(
+        clippy::ref_option,
+        clippy::trivially_copy_pass_by_ref,
+        reason = "the signature that serde asks for"
+    )]
     pub(crate) fn serialize<S: Serializer>(
         value: &Option<f32>,
         serializer: S,

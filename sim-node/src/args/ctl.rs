@@ -244,13 +244,11 @@ pub(crate) enum SettingWord {
 }
 
 fn setting_word(text: &str) -> Result<SettingWord, String> {
-    match text {
-        "off" => Ok(SettingWord::Off),
-        _ => {
-            let number = text.parse().map_err(|_| "neither a number nor \"off\"".to_owned());
-            number.map(SettingWord::Number)
-        }
+    if text == "off" {
+        return Ok(SettingWord::Off);
     }
+    let number = text.parse().map_err(|_| "neither a number nor \"off\"".to_owned());
+    number.map(SettingWord::Number)
 }
 
 impl SetArgs {
