@@ -35,7 +35,7 @@ pub(crate) struct Args {
     pub(crate) run: RunArgs,
 }
 
-/// Reads the command line. Ends the program with code 2 and a usage if it is wrong.
+/// Reads the command line. Ends the program with code 2 and the usage if it is wrong.
 pub(crate) fn parse() -> Args {
     let args = Args::parse();
     // What depends on several arguments is beyond clap.
@@ -43,7 +43,11 @@ pub(crate) fn parse() -> Args {
         && let CtlVerb::Set(set) = &ctl.verb
         && let Err(text) = set.value()
     {
-        Args::command().error(ErrorKind::WrongNumberOfValues, text).exit();
+        let mut command = Args::command();
+        command.build();
+        let ctl = command.find_subcommand_mut("ctl");
+        let set = ctl.and_then(|ctl| ctl.find_subcommand_mut("set")).cloned();
+        set.unwrap_or(command).error(ErrorKind::WrongNumberOfValues, text).exit();
     }
     args
 }

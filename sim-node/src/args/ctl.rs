@@ -77,9 +77,27 @@ pub(crate) enum CtlVerb {
     /// Tear every constraint that crosses a strip.
     CutSegment(CutSegmentArgs),
     /// Take an anchor off its path and into a pose, where it stands.
-    MoveAnchor(PoseArgs),
+    #[command(
+        allow_negative_numbers = true,
+        after_help = "Example: sim-node ctl move-anchor 0 0.2 0 -0.1"
+    )]
+    MoveAnchor {
+        /// Index of the anchor.
+        anchor: u32,
+        #[command(flatten)]
+        pose: PoseArgs,
+    },
     /// Move a collider into a pose, within one step.
-    MoveCollider(PoseArgs),
+    #[command(
+        allow_negative_numbers = true,
+        after_help = "Example: sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8"
+    )]
+    MoveCollider {
+        /// Index of the collider.
+        collider: u32,
+        #[command(flatten)]
+        pose: PoseArgs,
+    },
     /// Give a parameter of the simulation a new value.
     Set(SetArgs),
     /// Replace the scene by another one; the step number goes on.
@@ -122,18 +140,18 @@ pub(crate) struct TargetArgs {
     pub(crate) over: f32,
 }
 
-/// A point in space, as three arguments.
+/// The centre of a ball, as three arguments.
 #[derive(Debug, Clone, Copy, ClapArgs)]
-pub(crate) struct PointArgs {
-    /// Point in m, relative to the scene's origin.
+pub(crate) struct CenterArgs {
+    /// Centre of the ball in m, relative to the scene's origin.
     x: f32,
-    /// Point in m, relative to the scene's origin.
+    /// Centre of the ball in m, relative to the scene's origin.
     y: f32,
-    /// Point in m, relative to the scene's origin.
+    /// Centre of the ball in m, relative to the scene's origin.
     z: f32,
 }
 
-impl PointArgs {
+impl CenterArgs {
     pub(crate) fn vector(self) -> [f32; 3] {
         [self.x, self.y, self.z]
     }
@@ -146,7 +164,7 @@ impl PointArgs {
 )]
 pub(crate) struct PushArgs {
     #[command(flatten)]
-    pub(crate) center: PointArgs,
+    pub(crate) center: CenterArgs,
     /// Radius of the ball in m; what is exactly so far away is outside
     #[arg(long, value_name = "R")]
     pub(crate) radius: f32,
@@ -166,7 +184,7 @@ pub(crate) struct PushArgs {
 )]
 pub(crate) struct CutRadiusArgs {
     #[command(flatten)]
-    pub(crate) center: PointArgs,
+    pub(crate) center: CenterArgs,
     /// Radius of the ball in m; what is exactly so far away is outside
     #[arg(long, value_name = "R")]
     pub(crate) radius: f32,
@@ -192,14 +210,9 @@ pub(crate) struct CutSegmentArgs {
     pub(crate) direction: Vec<f32>,
 }
 
+/// A pose relative to the one at load.
 #[derive(Debug, ClapArgs)]
-#[command(
-    allow_negative_numbers = true,
-    after_help = "Example: sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.7071068 0 0.7071068"
-)]
 pub(crate) struct PoseArgs {
-    /// Index of the anchor or collider.
-    pub(crate) index: u32,
     /// Translation in m, from its pose at load.
     pub(crate) x: f32,
     /// Translation in m, from its pose at load.

@@ -35,13 +35,13 @@ pub(super) fn of(verb: &CtlVerb) -> anyhow::Result<Action> {
             to: numbers(&args.to)?,
             direction: numbers(&args.direction)?,
         },
-        CtlVerb::MoveAnchor(args) => {
-            let (translation, rotation) = pose(args)?;
-            Action::MoveAnchor { anchor: args.index, translation, rotation }
+        CtlVerb::MoveAnchor { anchor, pose } => {
+            let (translation, rotation) = translation_and_rotation(pose)?;
+            Action::MoveAnchor { anchor: *anchor, translation, rotation }
         }
-        CtlVerb::MoveCollider(args) => {
-            let (translation, rotation) = pose(args)?;
-            Action::MoveCollider { collider: args.index, translation, rotation }
+        CtlVerb::MoveCollider { collider, pose } => {
+            let (translation, rotation) = translation_and_rotation(pose)?;
+            Action::MoveCollider { collider: *collider, translation, rotation }
         }
         CtlVerb::Set(args) => Action::Set {
             parameter: text(&args.parameter)?,
@@ -61,8 +61,8 @@ fn target(args: &TargetArgs) -> [f32; 3] {
     [args.x, args.y, args.z]
 }
 
-fn pose(args: &PoseArgs) -> anyhow::Result<([f32; 3], [f32; 4])> {
-    Ok(([args.x, args.y, args.z], numbers(&args.rotation)?))
+fn translation_and_rotation(pose: &PoseArgs) -> anyhow::Result<([f32; 3], [f32; 4])> {
+    Ok(([pose.x, pose.y, pose.z], numbers(&pose.rotation)?))
 }
 
 /// Clap has counted them already.
