@@ -31,7 +31,7 @@ pub(crate) struct CommandFileError {
 type Wrong = (String, String, String);
 
 /// The kinds with their fields; those behind the number of required ones are optional.
-const KINDS: [(&str, &[&str], usize); 10] = [
+const KINDS: [(&str, &[&str], usize); 18] = [
     ("pin", &["particle"], 1),
     ("unpin", &["particle"], 1),
     ("grab", &["particle", "target", "over_s"], 2),
@@ -41,6 +41,14 @@ const KINDS: [(&str, &[&str], usize); 10] = [
     ("resume", &[], 0),
     ("step", &["count"], 1),
     ("reset", &[], 0),
+    ("push", &["center", "radius", "delta", "limit"], 3),
+    ("cut", &["constraint"], 1),
+    ("cut_radius", &["center", "radius"], 2),
+    ("cut_segment", &["from", "to", "direction"], 3),
+    ("move_anchor", &["anchor", "translation", "rotation"], 2),
+    ("move_collider", &["collider", "translation", "rotation"], 2),
+    ("set", &["parameter", "value", "constraint_kind"], 2),
+    ("load", &["scene"], 1),
     // What a log holds for a command of another version.
     ("unknown", &["number"], 1),
 ];
@@ -128,17 +136,31 @@ fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u
 
 fn is_value_of(name: &str, value: &Value) -> bool {
     let is_number = |value: &Value| serde_json::from_value::<PlainF32>(value.clone()).is_ok();
+    let are_numbers =
+        |count| value.as_array().is_some_and(|all| all.len() == count && all.iter().all(is_number));
     match name {
-        "target" => value.as_array().is_some_and(|t| t.len() == 3 && t.iter().all(is_number)),
-        "over_s" => is_number(value),
+        "target" | "center" | "delta" | "from" | "to" | "direction" | "translation" => {
+            are_numbers(3)
+        }
+        "rotation" => are_numbers(4),
+        "over_s" | "radius" | "limit" => is_number(value),
+        "value" => value.is_null() || is_number(value) || are_numbers(3),
+        "parameter" | "constraint_kind" | "scene" => value.is_string(),
         _ => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
     }
 }
 
 fn values_of(name: &str) -> &'static str {
     match name {
-        "target" => "three numbers in m",
+        "target" | "center" | "delta" | "from" | "to" | "translation" => "three numbers in m",
+        "direction" => "three numbers",
+        "rotation" => "four numbers: a quaternion x, y, z, w",
         "over_s" => "a number of seconds",
+        "radius" | "limit" => "a number in m",
+        "value" => "a number, three numbers, or null for off",
+        "parameter" => "the name of a parameter",
+        "constraint_kind" => "structural, shear, bend or tether",
+        "scene" => "the name of a scene",
         _ => "whole numbers 0..=4294967295",
     }
 }
@@ -158,6 +180,8 @@ fn wrong(field: &str, what: &str, allowed: &str) -> Wrong {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::{SettingKind, SettingValue, Text};
+
     use super::*;
 
     fn error(text: &str) -> String {
@@ -193,7 +217,7 @@ mod tests {
     #[test]
     fn the_table_of_kinds_is_that_of_the_contract() {
         let particle = 1;
-        let (target, over_s) = ([0.5; 3], 0.1);
+        let (target, over_s, radius, rotation) = ([0.5; 3], 0.1, 0.2, [0.0, 0.0, 0.0, 1.0]);
         let actions = [
             Action::Pin { particle },
             Action::Unpin { particle },
@@ -204,8 +228,21 @@ mod tests {
             Action::Resume,
             Action::Step { count: 3 },
             Action::Reset,
+            Action::Push { center: target, radius, delta: target, limit: Some(0.1) },
+            Action::Cut { constraint: 1 },
+            Action::CutRadius { center: target, radius },
+            Action::CutSegment { from: target, to: target, direction: [0.0, 0.0, 1.0] },
+            Action::MoveAnchor { anchor: 1, translation: target, rotation },
+            Action::MoveCollider { collider: 1, translation: target, rotation },
+            Action::Set {
+                parameter: Text::new("compliance"),
+                value: SettingValue::Off,
+                constraint_kind: Some(SettingKind::Unknown),
+            },
+            Action::Load { scene: Text::new("rope") },
             Action::Unknown { number: 77 },
         ];
+        assert_eq!(KINDS.len(), actions.len());
         for ((name, names, _), action) in KINDS.iter().zip(actions) {
             let Value::Object(mut fields) = serde_json::to_value(action).unwrap() else {
                 panic!("{action:?} is no object");
@@ -234,6 +271,14 @@ mod tests {
             r#"{"step":1,"kind":"pin","particle":1,"colour":"red"}"#,
             r#"{"step":1,"kind":"grab","particle":1,"target":[0,1]}"#,
             r#"{"step":1,"kind":"grab","particle":1,"target":[0,1,2],"over_s":"soon"}"#,
+            r#"{"step":1,"kind":"cut_radius","center":[0,1,2]}"#,
+            r#"{"step":1,"kind":"push","center":[0,1,2],"radius":1,"delta":[0,1,2],"limit":null}"#,
+            r#"{"step":1,"kind":"move_anchor","anchor":0,"translation":[0,1,2],"rotation":[1]}"#,
+            r#"{"step":1,"kind":"set","parameter":"gravity","value":[0,1]}"#,
+            r#"{"step":1,"kind":"set","parameter":"gravity"}"#,
+            r#"{"step":1,"kind":"set","parameter":7,"value":null}"#,
+            r#"{"step":1,"kind":"set","parameter":"x","value":1,"constraint_kind":0}"#,
+            r#"{"step":1,"kind":"load","scene":null}"#,
         ];
         let errors: Vec<_> = wrong.map(|line| error(&format!("\n{line}"))).into();
         insta::assert_snapshot!(errors.join("\n"), @r#"
@@ -242,13 +287,21 @@ mod tests {
         drag.jsonl:2: step: is missing (allowed: whole numbers from 1)
         drag.jsonl:2: step: 0 is wrong (allowed: whole numbers from 1)
         drag.jsonl:2: step: 1.5 is wrong (allowed: whole numbers from 1)
-        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset)
-        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset)
+        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load)
+        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is wrong (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: colour: is no field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason)
         drag.jsonl:2: target: [0,1] is wrong (allowed: three numbers in m)
         drag.jsonl:2: over_s: "soon" is wrong (allowed: a number of seconds)
+        drag.jsonl:2: radius: is missing (allowed: a number in m)
+        drag.jsonl:2: limit: null is wrong (allowed: a number in m)
+        drag.jsonl:2: rotation: [1] is wrong (allowed: four numbers: a quaternion x, y, z, w)
+        drag.jsonl:2: value: [0,1] is wrong (allowed: a number, three numbers, or null for off)
+        drag.jsonl:2: value: is missing (allowed: a number, three numbers, or null for off)
+        drag.jsonl:2: parameter: 7 is wrong (allowed: the name of a parameter)
+        drag.jsonl:2: constraint_kind: 0 is wrong (allowed: structural, shear, bend or tether)
+        drag.jsonl:2: scene: null is wrong (allowed: the name of a scene)
         "#);
     }
 }

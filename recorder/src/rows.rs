@@ -113,6 +113,47 @@ struct ActionSchema {
     over_s: Option<JsonNumber>,
     #[schemars(default)]
     count: Option<u32>,
+    #[schemars(default)]
+    center: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    radius: Option<JsonNumber>,
+    #[schemars(default)]
+    delta: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    limit: Option<JsonNumber>,
+    #[schemars(default)]
+    constraint: Option<u32>,
+    #[schemars(default)]
+    from: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    to: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    direction: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    anchor: Option<u32>,
+    #[schemars(default)]
+    collider: Option<u32>,
+    #[schemars(default)]
+    translation: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    rotation: Option<[JsonNumber; 4]>,
+    #[schemars(default)]
+    parameter: Option<String>,
+    #[schemars(default)]
+    value: Option<JsonSetting>,
+    #[schemars(default)]
+    constraint_kind: Option<String>,
+    #[schemars(default)]
+    scene: Option<String>,
+}
+
+/// The schema of what a parameter is set to; nothing of it is off.
+#[derive(JsonSchema)]
+#[schemars(untagged)]
+#[allow(dead_code, reason = "only its schema is used")]
+enum JsonSetting {
+    Number(JsonNumber),
+    Vector([JsonNumber; 3]),
 }
 
 /// The constraints of a scene in columns; the place in a column is the constraint's index.
@@ -227,7 +268,7 @@ pub struct TearsRow {
     pub step: u64,
     /// Indices of the constraints, ascending.
     pub constraints: Vec<u32>,
-    /// "stretch" or "cut" for each of them, where that is known.
+    /// "force", "stretch", "distance" or "cut" for each of them, where that is known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub causes: Vec<String>,
 }
@@ -246,7 +287,8 @@ pub struct EventRow {
     pub text: String,
 }
 
-/// How the node was doing; the fields are those of [`NodeStatus`].
+/// How the node was doing; the fields are those of [`NodeStatus`]. Those with a default are not in
+/// recordings of the first version of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[allow(missing_docs, reason = "documented at the fields of NodeStatus")]
 pub struct StatusRow {
@@ -254,6 +296,8 @@ pub struct StatusRow {
     pub paused: bool,
     pub replay: bool,
     pub real_time_factor: f64,
+    #[serde(default = "real_time")]
+    pub time_scale: f64,
     pub wake_late_ns_p50: u64,
     pub wake_late_ns_p99: u64,
     pub solve_ns_p50: u64,
@@ -262,9 +306,13 @@ pub struct StatusRow {
     pub skipped_periods: u64,
     pub outcome_count: u64,
     pub rejected_count: u64,
+    #[serde(default)]
+    pub frozen_count: u64,
     pub rate_hz: u32,
     pub particle_count: u32,
     pub constraint_count: u32,
+    #[serde(default)]
+    pub torn_count: u32,
     pub reader_count: u32,
     pub process_id: u32,
     pub scene_name: String,
@@ -272,12 +320,13 @@ pub struct StatusRow {
 
 impl From<&NodeStatus> for StatusRow {
     fn from(status: &NodeStatus) -> Self {
-        let factor = status.real_time_factor;
+        let finite = |number: f64| if number.is_finite() { number } else { 0.0 };
         Self {
             step: status.step,
             paused: status.is_paused(),
             replay: status.flags & StatusFlags::REPLAY != 0,
-            real_time_factor: if factor.is_finite() { factor } else { 0.0 },
+            real_time_factor: finite(status.real_time_factor),
+            time_scale: finite(status.time_scale),
             wake_late_ns_p50: status.wake_late_ns_p50,
             wake_late_ns_p99: status.wake_late_ns_p99,
             solve_ns_p50: status.solve_ns_p50,
@@ -286,14 +335,21 @@ impl From<&NodeStatus> for StatusRow {
             skipped_periods: status.skipped_periods,
             outcome_count: status.outcome_count,
             rejected_count: status.rejected_count,
+            frozen_count: status.frozen_count,
             rate_hz: status.rate_hz,
             particle_count: status.particle_count,
             constraint_count: status.constraint_count,
+            torn_count: status.torn_count,
             reader_count: status.reader_count,
             process_id: status.process_id,
             scene_name: status.scene_name(),
         }
     }
+}
+
+/// The pace of every node before there was another.
+fn real_time() -> f64 {
+    1.0
 }
 
 /// The schema of a number in any JSON of ours: non-finite ones are strings.

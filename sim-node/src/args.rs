@@ -1,9 +1,14 @@
 //! The command line. Help texts are the doc comments here.
 
+mod ctl;
+
 use std::time::Duration;
 
-use clap::{Args as ClapArgs, Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{Args as ClapArgs, CommandFactory, Parser, Subcommand};
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
+
+pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
@@ -20,6 +25,7 @@ use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
         sim-node run rope --rate 1000               run the rope at 1 kHz\n  \
         sim-node run my.toml --duration 10s --json  run a file for 10 s, then print a summary\n  \
         sim-node ctl grab 90 0.5 0.2 0.3            drag particle 90 of the running node\n  \
+        sim-node ctl set gravity 0 -1.6 0           take the running node to the moon\n  \
         sim-node scenes                             list the built-in scenes"
 )]
 pub(crate) struct Args {
@@ -27,6 +33,23 @@ pub(crate) struct Args {
     pub(crate) verb: Option<Verb>,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+/// Reads the command line. Ends the program with code 2 and the usage if it is wrong.
+pub(crate) fn parse() -> Args {
+    let args = Args::parse();
+    // What depends on several arguments is beyond clap.
+    if let Some(Verb::Ctl(ctl)) = &args.verb
+        && let CtlVerb::Set(set) = &ctl.verb
+        && let Err(text) = set.value()
+    {
+        let mut command = Args::command();
+        command.build();
+        let ctl = command.find_subcommand_mut("ctl");
+        let set = ctl.and_then(|ctl| ctl.find_subcommand_mut("set")).cloned();
+        set.unwrap_or(command).error(ErrorKind::WrongNumberOfValues, text).exit();
+    }
+    args
 }
 
 #[derive(Debug, Subcommand)]
@@ -124,91 +147,4 @@ pub(crate) struct CheckArgs {
     /// Print one object with the counts and the warnings
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-#[derive(Debug, ClapArgs)]
-#[command(
-    arg_required_else_help = true,
-    after_help = "A command takes effect at a step boundary, and its outcome names the first step \
-        that shows it. All calls of `ctl` act as one client: what one grabs, a later one releases.\n\n\
-        Examples:\n  \
-        sim-node ctl grab 90 0.5 0.2 0.3\n  \
-        sim-node ctl move 90 0.5 0.3 -0.1 --over 0.1\n  \
-        sim-node ctl release 90\n  \
-        sim-node ctl pause && sim-node ctl step 10 && sim-node ctl hash"
-)]
-pub(crate) struct CtlArgs {
-    #[command(subcommand)]
-    pub(crate) verb: CtlVerb,
-    /// Wait this long for the node's answer
-    #[arg(long, global = true, value_name = "TIME", default_value = "5s",
-        value_parser = humantime::parse_duration)]
-    pub(crate) timeout: Duration,
-    /// Print one JSON object on stdout
-    #[arg(long, global = true)]
-    pub(crate) json: bool,
-    /// Name of the node
-    #[arg(long, global = true, default_value = NAME_DEFAULT, value_name = "NAME",
-        value_parser = name)]
-    pub(crate) name: String,
-    /// Domain of the node [default: that of iceoryx2]
-    #[arg(long, global = true, env = "CATENARY_DOMAIN", value_name = "DOMAIN",
-        value_parser = domain)]
-    pub(crate) domain: Option<String>,
-}
-
-#[derive(Debug, Subcommand)]
-pub(crate) enum CtlVerb {
-    /// Hold a particle where it stands.
-    Pin {
-        /// Index of the particle.
-        particle: u32,
-    },
-    /// Free a pinned particle, from rest.
-    Unpin {
-        /// Index of the particle.
-        particle: u32,
-    },
-    /// Drive a particle to a target.
-    Grab(TargetArgs),
-    /// Give a grabbed particle a new target.
-    Move(TargetArgs),
-    /// Let a grabbed particle go, with the velocity of its last motion.
-    Release {
-        /// Index of the particle.
-        particle: u32,
-    },
-    /// Stop the node at its next step boundary.
-    Pause,
-    /// Let a paused node go on.
-    Resume,
-    /// Let a paused node make COUNT steps, and wait until they are made.
-    Step {
-        /// Steps to make, at least 1.
-        #[arg(default_value_t = 1)]
-        count: u32,
-    },
-    /// Make the next state the initial one; the step number goes on.
-    Reset,
-    /// Print how the node does.
-    Status,
-    /// Print the step and the state hash of the newest snapshot.
-    Hash,
-}
-
-#[derive(Debug, ClapArgs)]
-#[command(allow_negative_numbers = true)]
-pub(crate) struct TargetArgs {
-    /// Index of the particle.
-    pub(crate) particle: u32,
-    /// Target in m, relative to the scene's origin.
-    pub(crate) x: f32,
-    /// Target in m, relative to the scene's origin.
-    pub(crate) y: f32,
-    /// Target in m, relative to the scene's origin.
-    pub(crate) z: f32,
-    /// Seconds to get there, 0 to 0.25, rounded up to whole steps [default: 1/60]
-    #[arg(long, value_name = "SECONDS", default_value_t = sim_contract::GRAB_OVER_S_DEFAULT,
-        hide_default_value = true)]
-    pub(crate) over: f32,
 }

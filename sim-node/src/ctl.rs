@@ -1,31 +1,21 @@
 //! `ctl`: commands to a running node, and questions.
 
+mod action;
+
 use anyhow::{Context, bail};
 use serde::Serialize;
 use sim_contract::{Action, CONSOLE_CLIENT_ID, Client, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome};
 
-use crate::args::{CtlArgs, CtlVerb, TargetArgs, endpoint};
+use crate::args::{CtlArgs, CtlVerb, endpoint};
 
 /// Sends one command, or asks one question.
 pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<()> {
     let endpoint = endpoint(args.domain.as_deref(), &args.name)?;
     let mut client = Client::attach_as(&endpoint, CONSOLE_CLIENT_ID)?;
     match args.verb {
-        CtlVerb::Pin { particle } => command(&mut client, args, Action::Pin { particle }),
-        CtlVerb::Unpin { particle } => command(&mut client, args, Action::Unpin { particle }),
-        CtlVerb::Grab(TargetArgs { particle, x, y, z, over }) => {
-            command(&mut client, args, Action::Grab { particle, target: [x, y, z], over_s: over })
-        }
-        CtlVerb::Move(TargetArgs { particle, x, y, z, over }) => {
-            command(&mut client, args, Action::Move { particle, target: [x, y, z], over_s: over })
-        }
-        CtlVerb::Release { particle } => command(&mut client, args, Action::Release { particle }),
-        CtlVerb::Pause => command(&mut client, args, Action::Pause),
-        CtlVerb::Resume => command(&mut client, args, Action::Resume),
-        CtlVerb::Step { count } => command(&mut client, args, Action::Step { count }),
-        CtlVerb::Reset => command(&mut client, args, Action::Reset),
         CtlVerb::Status => status(&mut client, args),
         CtlVerb::Hash => hash(&mut client, args),
+        _ => command(&mut client, args, action::of(&args.verb)?),
     }
 }
 
@@ -96,8 +86,11 @@ struct StatusRow {
     paused: bool,
     rate_hz: u32,
     real_time_factor: f64,
+    time_scale: f64,
     particles: u32,
     constraints: u32,
+    torn_constraints: u32,
+    frozen_particles: u64,
     readers: u32,
     outcomes: u64,
     rejected_commands: u64,
@@ -119,8 +112,11 @@ impl StatusRow {
             paused: status.is_paused(),
             rate_hz: status.rate_hz,
             real_time_factor: status.real_time_factor,
+            time_scale: status.time_scale,
             particles: status.particle_count,
             constraints: status.constraint_count,
+            torn_constraints: status.torn_count,
+            frozen_particles: status.frozen_count,
             readers: status.reader_count,
             outcomes: status.outcome_count,
             rejected_commands: status.rejected_count,

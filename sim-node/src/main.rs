@@ -14,13 +14,11 @@ mod run;
 mod scene_source;
 mod statistics;
 
-use clap::Parser;
-
-use args::{Args, Verb};
+use args::Verb;
 use exit::Exit;
 
 fn main() -> Exit {
-    let args = Args::parse();
+    let args = args::parse();
     let result = match args.verb {
         None => run::run(&args.run),
         Some(Verb::Run(run)) => run::run(&run),

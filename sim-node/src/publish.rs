@@ -66,6 +66,7 @@ impl Publisher {
             scene: text.as_bytes(),
             constraints: &constraints,
             triangles: &triangles,
+            collider_count: 0,
             keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
         };
         Ok(Self {
@@ -217,6 +218,7 @@ impl Publisher {
             run_id: self.run_id,
             step: position.step,
             real_time_factor: if position.is_paused { 0.0 } else { statistics.real_time_factor },
+            time_scale: 1.0,
             wake_late_ns_p50: last.wake_late_ns(0.5),
             wake_late_ns_p99: last.wake_late_ns(0.99),
             solve_ns_p50: last.solve_ns(0.5),
@@ -228,6 +230,7 @@ impl Publisher {
             rate_hz: self.rate_hz,
             particle_count: count(solver.particle_count()),
             constraint_count: count(solver.constraint_count()),
+            torn_count: count(solver.torn().len()),
             reader_count: count(self.owner.reader_count()),
             process_id: std::process::id(),
             flags: if position.is_paused { StatusFlags::PAUSED } else { 0 },

@@ -8,12 +8,7 @@ use sim_solver::{Scene, builtin};
 /// Reads and checks a scene. `source` is a path if it contains `/` or ends in `.toml`, else the
 /// name of a built-in scene.
 pub(crate) fn load(source: &str) -> anyhow::Result<Scene> {
-    #[allow(
-        clippy::case_sensitive_file_extension_comparisons,
-        reason = "exactly the documented rule"
-    )]
-    let is_path = source.contains('/') || source.ends_with(".toml");
-    if is_path {
+    if is_path(source) {
         let text = fs::read_to_string(source)
             .with_context(|| format!("{source}: cannot read the scene"))?;
         return Ok(Scene::from_toml(&text, source)?);
@@ -26,4 +21,10 @@ pub(crate) fn load(source: &str) -> anyhow::Result<Scene> {
         );
     };
     Ok(Scene::from_toml(text, source)?)
+}
+
+/// Whether a scene is a file, and not built in.
+#[allow(clippy::case_sensitive_file_extension_comparisons, reason = "exactly the documented rule")]
+pub(crate) fn is_path(source: &str) -> bool {
+    source.contains('/') || source.ends_with(".toml")
 }

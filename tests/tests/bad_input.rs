@@ -46,6 +46,20 @@ fn wrong_options_exit_with_2_and_wrong_rates_name_the_range() {
     {
         assert_eq!(run(&sandbox, args).code, Some(2), "{args:?}");
     }
+    for line in [
+        "set gravity 0 -1.6",
+        "set gravity 0 off 0",
+        "set damping much",
+        "set compliance 1 --kind knot",
+        "push 0 0 0 --radius 1",
+        "cut -1",
+        "cut-segment --from 0 0 0 --to 1 0",
+        "move-anchor 0 0 0 0 --rotation 0 0 1",
+        "load",
+    ] {
+        let args: Vec<_> = ["ctl"].into_iter().chain(line.split(' ')).collect();
+        assert_refused(&run(&sandbox, &args), 2, &["--help"]);
+    }
     for rate in ["0", "100001", "-5", "fast"] {
         let finished = run(&sandbox, &["run", "--rate", rate]);
         assert_refused(&finished, 2, &["--rate", rate]);

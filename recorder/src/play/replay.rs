@@ -1,11 +1,13 @@
 //! Publishes a recording as the node did that was recorded.
 
 use anyhow::{Context, bail};
-use recorder::{Frame, Message, OutcomeRow, RunDescription, StatusRow, SurfaceRow, TopologyRow};
+use recorder::{
+    Frame, Message, OutcomeRow, RunDescription, StatusRow, SurfaceRow, TearsRow, TopologyRow,
+};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     Action, CONTRACT_VERSION, Command, Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus,
-    Outcome, Owner, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Wake,
+    Outcome, Owner, SnapshotFlags, SnapshotHeader, StatusFlags, TearCause, TearsHeader, Wake,
 };
 use sim_solver::Keyframe;
 
@@ -52,7 +54,12 @@ pub(crate) struct Position {
     rejected_count: u64,
     /// All constraints torn so far, in order.
     torn: Vec<u32>,
+    /// Why each of them tore, as numbers of the contract.
+    tear_causes: Vec<u8>,
 }
+
+/// A number of no [`TearCause`]: the recording does not say why.
+const TEAR_CAUSE_NOT_KNOWN: u8 = u8::MAX;
 
 impl Position {
     /// Follows what is published before the first snapshot that is played.
@@ -74,8 +81,16 @@ impl Position {
                 }
             }
             Message::Outcome(row) => self.follow_outcome(row),
-            Message::Tears(row) => self.torn.extend_from_slice(&row.constraints),
+            Message::Tears(row) => self.follow_tears(row),
             _ => {}
+        }
+    }
+
+    fn follow_tears(&mut self, row: &TearsRow) {
+        for (place, constraint) in row.constraints.iter().enumerate() {
+            let cause = row.causes.get(place).and_then(|name| TearCause::from_name(name));
+            self.torn.push(*constraint);
+            self.tear_causes.push(cause.map_or(TEAR_CAUSE_NOT_KNOWN, |cause| cause as u8));
         }
     }
 
@@ -123,6 +138,7 @@ impl Replay {
             scene,
             constraints: &constraints,
             triangles: &triangles,
+            collider_count: 0,
             // More than any keyframe of such a scene takes.
             keyframe_size_bytes_max: 64 + 48 * particles + 8 * links,
         };
@@ -191,7 +207,7 @@ impl Replay {
 
     fn publish_tears(&self, step: u64, new_count: u32) -> anyhow::Result<()> {
         let header = TearsHeader { run_id: self.run_id, step, new_count, count: 0 };
-        Ok(self.owner.publish_tears(header, &self.position.torn)?)
+        Ok(self.owner.publish_tears(header, &self.position.torn, &self.position.tear_causes)?)
     }
 
     fn header(&self, frame: &Frame) -> SnapshotHeader {
@@ -247,11 +263,13 @@ impl Replay {
             run_id: self.run_id,
             step: self.step,
             real_time_factor: if self.control.is_moving() { self.rate } else { 0.0 },
+            time_scale: self.rate,
             outcome_count: self.position.outcome_count,
             rejected_count: self.position.rejected_count,
             rate_hz: self.run.rate_hz,
             particle_count: self.run.particle_count,
             constraint_count: self.run.constraint_count,
+            torn_count: u32::try_from(self.position.torn.len()).unwrap_or(u32::MAX),
             reader_count: u32::try_from(self.reader_count()).unwrap_or(u32::MAX),
             process_id: std::process::id(),
             flags: StatusFlags::REPLAY
@@ -265,6 +283,7 @@ impl Replay {
             status.solve_ns_p99 = row.solve_ns_p99;
             status.late_steps = row.late_steps;
             status.skipped_periods = row.skipped_periods;
+            status.frozen_count = row.frozen_count;
         }
         status.set_scene_name(&self.run.scene_name);
         self.owner.publish_status(&status)?;

@@ -154,6 +154,7 @@ fn a_name_that_is_taken_is_refused() {
         scene: b"",
         constraints: &[],
         triangles: &[],
+        collider_count: 0,
         keyframe_size_bytes_max: 1,
     };
     let error = Owner::create(&domain.endpoint(), &load).unwrap_err();

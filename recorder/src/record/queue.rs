@@ -45,6 +45,7 @@ struct State {
 
 /// What the writing thread gets.
 #[derive(Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "moved once; a box for each item would cost more")]
 pub(crate) enum Popped {
     Item(Item),
     /// Nothing came in the time given.

@@ -48,6 +48,10 @@ impl Round {
                 let row = Message::Status(StatusRow::from(status));
                 self.updates.push((status.run_id, row));
             }
+            // There is no row for these.
+            Update::Colliders(..) | Update::TearCauses(..) => {}
+            // A list that a load begins with, or that a late joiner is given.
+            Update::Tears(header, _) if header.new_count == 0 => {}
             Update::Tears(header, torn) => {
                 let new_count = (header.new_count as usize).min(torn.len());
                 let constraints = torn[torn.len() - new_count..].to_vec();

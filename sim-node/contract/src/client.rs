@@ -1,19 +1,20 @@
 //! What third parties use: reading snapshots and sending commands.
 
-use std::fmt::Debug;
 use std::time::Duration;
 
-use iceoryx2::prelude::ZeroCopySend;
-
-use crate::reader::{ReadError, SliceReader, SliceSample, ValueReader};
+use crate::latch::Latch;
+use crate::reader::{ReadError, SliceReader, ValueReader};
 use crate::request::{Commander, RequestError};
-use crate::service::{PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TOPOLOGY};
+use crate::service::{
+    COLLIDERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEAR_CAUSES, TEARS, TOPOLOGY,
+};
 use crate::services::{AttachError, Attachment};
 use crate::session::Session;
 use crate::watch::Watch;
 use crate::{
-    Action, CONSOLE_CLIENT_ID, ConstraintState, Endpoint, LoadHeader, NodeStatus, Outcome,
-    ParticleState, SnapshotHeader, Triangle,
+    Action, CONSOLE_CLIENT_ID, ColliderState, Colliders, CollidersHeader, ConstraintState,
+    Endpoint, LoadHeader, NodeStatus, Outcome, ParticleState, Snapshot, SnapshotHeader, Surface,
+    TearsHeader, Topology, Torn, Triangle,
 };
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
@@ -29,9 +30,12 @@ pub struct Client {
     id: u64,
     watch: Watch,
     particles: Option<SliceReader<ParticleState, SnapshotHeader>>,
-    topology: Option<Latch<ConstraintState>>,
-    surface: Option<Latch<Triangle>>,
-    scene: Option<Latch<u8>>,
+    topology: Option<Latch<ConstraintState, LoadHeader>>,
+    surface: Option<Latch<Triangle, LoadHeader>>,
+    scene: Option<Latch<u8, LoadHeader>>,
+    tears: Option<Latch<u32, TearsHeader>>,
+    tear_causes: Option<Latch<u8, TearsHeader>>,
+    colliders: Option<Latch<ColliderState, CollidersHeader>>,
     status: Option<ValueReader<NodeStatus>>,
     commander: Option<Commander>,
     // Services and node go last.
@@ -67,6 +71,9 @@ impl Client {
             topology: None,
             surface: None,
             scene: None,
+            tears: None,
+            tear_causes: None,
+            colliders: None,
             status: None,
             commander: None,
             attachment,
@@ -105,8 +112,7 @@ impl Client {
     /// A malformed message, or no place at the service.
     pub fn topology(&mut self, timeout: Duration) -> Result<Option<Topology>, ReadError> {
         let service = &self.attachment.services.topology;
-        let latch =
-            lazily(&mut self.topology, || SliceReader::create(service, &TOPOLOGY).map(Latch::new))?;
+        let latch = lazily(&mut self.topology, || Latch::create(service, &TOPOLOGY))?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| Topology {
                 header: *sample.user_header(),
@@ -121,8 +127,7 @@ impl Client {
     /// As [`Client::topology`].
     pub fn surface(&mut self, timeout: Duration) -> Result<Option<Surface>, ReadError> {
         let service = &self.attachment.services.surface;
-        let latch =
-            lazily(&mut self.surface, || SliceReader::create(service, &SURFACE).map(Latch::new))?;
+        let latch = lazily(&mut self.surface, || Latch::create(service, &SURFACE))?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| Surface {
                 header: *sample.user_header(),
@@ -137,8 +142,7 @@ impl Client {
     /// As [`Client::topology`]; also text that is not UTF-8.
     pub fn scene(&mut self, timeout: Duration) -> Result<Option<String>, ReadError> {
         let service = &self.attachment.services.scene;
-        let latch =
-            lazily(&mut self.scene, || SliceReader::create(service, &SCENE).map(Latch::new))?;
+        let latch = lazily(&mut self.scene, || Latch::create(service, &SCENE))?;
         let bytes = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| sample.payload().to_vec()))
         })?;
@@ -146,6 +150,48 @@ impl Client {
             service: self.attachment.session.service_name(&SCENE),
             detail: error.to_string(),
         })
+    }
+
+    /// All constraints torn since the load, with their causes, however late this client came. Waits
+    /// only if there has been no list at all: an owner publishes the first one, an empty one, with
+    /// the load. Empty if none came within `timeout`.
+    ///
+    /// # Errors
+    /// As [`Client::topology`].
+    pub fn torn(&mut self, timeout: Duration) -> Result<Torn, ReadError> {
+        let services = &self.attachment.services;
+        let tears = lazily(&mut self.tears, || Latch::create(&services.tears, &TEARS))?;
+        let causes =
+            lazily(&mut self.tear_causes, || Latch::create(&services.tear_causes, &TEAR_CAUSES))?;
+        let complete = self.watch.wait_for(&self.attachment, timeout, || {
+            // The causes of a list are published before it. So causes that belong to another list
+            // belong to the next one, which is about to come.
+            let (Some(torn), Some(causes)) = (tears.newest()?, causes.newest()?) else {
+                return Ok(None);
+            };
+            let (header, is_of) = (torn.user_header(), causes.user_header());
+            Ok((header == is_of).then(|| Torn::new(header, torn.payload(), causes.payload())))
+        })?;
+        let without_causes =
+            || tears.held().map(|torn| Torn::new(torn.user_header(), torn.payload(), &[]));
+        Ok(complete.or_else(without_causes).unwrap_or_default())
+    }
+
+    /// The colliders as they stand, each in its newest pose; waits only if they have never been
+    /// published. Empty if they were not within `timeout`.
+    ///
+    /// # Errors
+    /// As [`Client::topology`].
+    pub fn colliders(&mut self, timeout: Duration) -> Result<Colliders, ReadError> {
+        let service = &self.attachment.services.colliders;
+        let latch = lazily(&mut self.colliders, || Latch::create(service, &COLLIDERS))?;
+        let colliders = self.watch.wait_for(&self.attachment, timeout, || {
+            Ok(latch.newest()?.map(|sample| Colliders {
+                header: *sample.user_header(),
+                colliders: sample.payload().to_vec(),
+            }))
+        })?;
+        Ok(colliders.unwrap_or_default())
     }
 
     /// The newest status that was not read yet, or the next one.
@@ -218,60 +264,6 @@ impl Drop for Client {
                 Ok((!commander.awaits_outcomes()).then_some(()))
             });
         }
-    }
-}
-
-/// A snapshot in shared memory: holding it keeps the memory from being reused.
-#[derive(Debug)]
-pub struct Snapshot(SliceSample<ParticleState, SnapshotHeader>);
-
-impl Snapshot {
-    /// When and of what it is.
-    pub fn header(&self) -> &SnapshotHeader {
-        self.0.user_header()
-    }
-
-    /// The particles, `header().particle_count` of them, by index.
-    pub fn particles(&self) -> &[ParticleState] {
-        self.0.payload()
-    }
-}
-
-/// The constraints of a load.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Topology {
-    /// Which load it is.
-    pub header: LoadHeader,
-    /// The constraints, `header.count` of them, by index.
-    pub constraints: Vec<ConstraintState>,
-}
-
-/// The triangles of a load.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Surface {
-    /// Which load it is.
-    pub header: LoadHeader,
-    /// The triangles, `header.count` of them; none if the scene has no surface.
-    pub triangles: Vec<Triangle>,
-}
-
-/// The newest message of a load service, held so that it can be asked for again.
-#[derive(Debug)]
-struct Latch<T: Debug + ZeroCopySend + 'static> {
-    reader: SliceReader<T, LoadHeader>,
-    held: Option<SliceSample<T, LoadHeader>>,
-}
-
-impl<T: Debug + ZeroCopySend + 'static> Latch<T> {
-    fn new(reader: SliceReader<T, LoadHeader>) -> Self {
-        Self { reader, held: None }
-    }
-
-    fn newest(&mut self) -> Result<Option<&SliceSample<T, LoadHeader>>, ReadError> {
-        if let Some(sample) = self.reader.newest()? {
-            self.held = Some(sample);
-        }
-        Ok(self.held.as_ref())
     }
 }
 

@@ -1,103 +1,57 @@
-//! What a client asks of a node: typed as [`Action`], on the wire as [`Command`].
+//! [`Action`] on the wire.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
-use serde::{Deserialize, Serialize};
 
-use crate::plain_number::{number, vector};
-
-/// Seconds that a grabbed particle takes to its target unless told: one frame of a 60 Hz display.
-pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;
-
-/// The client that every `sim-node ctl` speaks for: what one call grabs, a later call releases.
-pub const CONSOLE_CLIENT_ID: u64 = 0;
-
-/// Something to do at the boundary before a step. Its JSON form is a flat object with "kind".
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-#[non_exhaustive]
-pub enum Action {
-    /// Holds a particle where it stands.
-    Pin {
-        /// Index of the particle.
-        particle: u32,
-    },
-    /// Frees a pinned particle, from rest.
-    Unpin {
-        /// Index of the particle.
-        particle: u32,
-    },
-    /// Drives a particle to a target, linearly.
-    Grab {
-        /// Index of the particle.
-        particle: u32,
-        /// Where to, in m, relative to the scene's origin.
-        #[serde(with = "vector")]
-        target: [f32; 3],
-        /// Seconds to get there, 0..=0.25, rounded up to whole steps.
-        #[serde(with = "number", default = "grab_over_s_default")]
-        over_s: f32,
-    },
-    /// Gives a particle that this client grabbed a new target.
-    Move {
-        /// Index of the particle.
-        particle: u32,
-        /// Where to, in m, relative to the scene's origin.
-        #[serde(with = "vector")]
-        target: [f32; 3],
-        /// Seconds to get there, 0..=0.25, rounded up to whole steps.
-        #[serde(with = "number", default = "grab_over_s_default")]
-        over_s: f32,
-    },
-    /// Lets a grabbed particle go, with the velocity of its last motion.
-    Release {
-        /// Index of the particle.
-        particle: u32,
-    },
-    /// Stops the node at this boundary.
-    Pause,
-    /// Lets a paused node go on.
-    Resume,
-    /// Lets a paused node make that many steps.
-    Step {
-        /// Steps to make, at least 1.
-        count: u32,
-    },
-    /// Makes the next step's state the initial one; the step number goes on.
-    Reset,
-    /// What this version does not know, by its number on the wire. Always rejected.
-    Unknown {
-        /// [`Command::kind`] as it came.
-        number: u32,
-    },
-}
-
-fn grab_over_s_default() -> f32 {
-    GRAB_OVER_S_DEFAULT
-}
+use crate::{Action, SettingKind, SettingValue, Text};
 
 /// A command on the wire: 256 bytes, alignment 8. Written by clients, read by the owner of the
-/// name; also the last part of an [`crate::Outcome`]. Fields that a kind does not use are 0.
+/// name; also the last part of an [`crate::Outcome`].
+///
+/// What a kind does not use is 0. Lengths are in m and relative to the scene's origin, times in s.
+///
+/// | kind | `index` | `vectors` | others |
+/// |---|---|---|---|
+/// | 1 pin, 2 unpin, 5 release | particle | | |
+/// | 3 grab, 4 move | particle | target | `number` over_s |
+/// | 6 pause, 7 resume, 9 reset | | | |
+/// | 8 step | | | `count` steps |
+/// | 10 push | | center, delta | `number` radius, `limit` |
+/// | 11 cut | constraint | | |
+/// | 12 cut_radius | | center | `number` radius |
+/// | 13 cut_segment | | from, to, direction | |
+/// | 14 move_anchor | anchor | translation | `rotation` |
+/// | 15 move_collider | collider | translation | `rotation` |
+/// | 16 set | | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
+/// | 17 load | | | `text` scene |
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Command")]
 pub struct Command {
-    /// 1 pin, 2 unpin, 3 grab, 4 move, 5 release, 6 pause, 7 resume, 8 step, 9 reset.
+    /// Which action it is, by the numbers above.
     pub kind: u32,
-    /// Particle of pin, unpin, grab, move and release.
-    pub particle: u32,
+    /// The particle, constraint, anchor or collider.
+    pub index: u32,
     /// Random number of the sender, below 2^53 (exact in JSON); 0 is the console.
     pub client_id: u64,
     /// Number of the command within its client, ascending, below 2^53.
     pub sequence: u64,
-    /// Target of grab and move, in m, relative to the scene's origin.
-    pub target: [f32; 3],
-    /// Seconds of grab and move.
-    pub over_s: f32,
-    /// Steps of step.
+    /// Points, offsets and directions, in the order of the table.
+    pub vectors: [[f32; 3]; 3],
+    /// Quaternion x, y, z, w.
+    pub rotation: [f32; 4],
+    /// Seconds of grab and move, radius of push and `cut_radius`, value of set.
+    pub number: f32,
+    /// Limit of push, if [`CommandOptions::LIMIT`] is set.
+    pub limit: f32,
+    /// Steps of step; [`crate::ConstraintKind`] of set, if [`CommandOptions::CONSTRAINT_KIND`] is.
     pub count: u32,
+    /// [`CommandOptions`] bits.
+    pub options: u32,
+    /// UTF-8, zeros behind it.
+    pub text: [u8; Text::SIZE_BYTES_MAX],
     /// Always 0.
-    pub spare: [u32; 53],
+    pub spare: u32,
 }
 
 const _: () = assert!(size_of::<Command>() == 256 && align_of::<Command>() == 8);
@@ -106,6 +60,25 @@ impl Default for Command {
     fn default() -> Self {
         Self::zeroed()
     }
+}
+
+/// The bits of [`Command::options`]; all others are 0. A set has exactly one bit for its value.
+#[derive(Debug)]
+pub struct CommandOptions;
+
+impl CommandOptions {
+    /// A push has a limit.
+    pub const LIMIT: u32 = 1;
+    /// The value of a set is `number`.
+    pub const VALUE_NUMBER: u32 = 1 << 1;
+    /// The value of a set is the first of `vectors`.
+    pub const VALUE_VECTOR: u32 = 1 << 2;
+    /// A set switches its parameter off.
+    pub const VALUE_OFF: u32 = 1 << 3;
+    /// A set is for one kind of constraints.
+    pub const CONSTRAINT_KIND: u32 = 1 << 4;
+
+    const VALUE_ANY: u32 = Self::VALUE_NUMBER | Self::VALUE_VECTOR | Self::VALUE_OFF;
 }
 
 mod kind {
@@ -118,46 +91,150 @@ mod kind {
     pub(super) const RESUME: u32 = 7;
     pub(super) const STEP: u32 = 8;
     pub(super) const RESET: u32 = 9;
+    pub(super) const PUSH: u32 = 10;
+    pub(super) const CUT: u32 = 11;
+    pub(super) const CUT_RADIUS: u32 = 12;
+    pub(super) const CUT_SEGMENT: u32 = 13;
+    pub(super) const MOVE_ANCHOR: u32 = 14;
+    pub(super) const MOVE_COLLIDER: u32 = 15;
+    pub(super) const SET: u32 = 16;
+    pub(super) const LOAD: u32 = 17;
 }
+
+const ZERO: [f32; 3] = [0.0; 3];
 
 impl Command {
     /// Puts an action on the wire. `client_id` and `sequence` as in the fields of that name.
     pub fn new(client_id: u64, sequence: u64, action: Action) -> Self {
-        let empty = Self { client_id, sequence, ..Self::zeroed() };
-        let of_particle = |kind, particle| Self { kind, particle, ..empty };
+        Self { client_id, sequence, ..Self::unsent(action) }
+    }
+
+    /// The action, without a sender.
+    fn unsent(action: Action) -> Self {
         match action {
-            Action::Pin { particle } => of_particle(kind::PIN, particle),
-            Action::Unpin { particle } => of_particle(kind::UNPIN, particle),
+            Action::Pin { particle } => Self::of(kind::PIN, particle),
+            Action::Unpin { particle } => Self::of(kind::UNPIN, particle),
             Action::Grab { particle, target, over_s } => {
-                Self { target, over_s, ..of_particle(kind::GRAB, particle) }
+                Self::of(kind::GRAB, particle).at(target, over_s)
             }
             Action::Move { particle, target, over_s } => {
-                Self { target, over_s, ..of_particle(kind::MOVE, particle) }
+                Self::of(kind::MOVE, particle).at(target, over_s)
             }
-            Action::Release { particle } => of_particle(kind::RELEASE, particle),
-            Action::Pause => Self { kind: kind::PAUSE, ..empty },
-            Action::Resume => Self { kind: kind::RESUME, ..empty },
-            Action::Step { count } => Self { kind: kind::STEP, count, ..empty },
-            Action::Reset => Self { kind: kind::RESET, ..empty },
-            Action::Unknown { number } => Self { kind: number, ..empty },
+            Action::Release { particle } => Self::of(kind::RELEASE, particle),
+            Action::Pause => Self::of(kind::PAUSE, 0),
+            Action::Resume => Self::of(kind::RESUME, 0),
+            Action::Step { count } => Self { count, ..Self::of(kind::STEP, 0) },
+            Action::Reset => Self::of(kind::RESET, 0),
+            Action::Push { center, radius, delta, limit } => Self {
+                vectors: [center, delta, ZERO],
+                limit: limit.unwrap_or_default(),
+                options: if limit.is_some() { CommandOptions::LIMIT } else { 0 },
+                ..Self::of(kind::PUSH, 0).at(center, radius)
+            },
+            Action::Cut { constraint } => Self::of(kind::CUT, constraint),
+            Action::CutRadius { center, radius } => {
+                Self::of(kind::CUT_RADIUS, 0).at(center, radius)
+            }
+            Action::CutSegment { from, to, direction } => {
+                Self { vectors: [from, to, direction], ..Self::of(kind::CUT_SEGMENT, 0) }
+            }
+            Action::MoveAnchor { anchor, translation, rotation } => {
+                Self { rotation, ..Self::of(kind::MOVE_ANCHOR, anchor).at(translation, 0.0) }
+            }
+            Action::MoveCollider { collider, translation, rotation } => {
+                Self { rotation, ..Self::of(kind::MOVE_COLLIDER, collider).at(translation, 0.0) }
+            }
+            Action::Set { parameter, value, constraint_kind } => {
+                Self { text: parameter.bytes(), ..Self::setting(value, constraint_kind) }
+            }
+            Action::Load { scene } => Self { text: scene.bytes(), ..Self::of(kind::LOAD, 0) },
+            Action::Unknown { number } => Self::of(number, 0),
         }
     }
 
-    /// Reads the action; a kind that this version does not know is [`Action::Unknown`].
-    /// Nothing else is checked here: the solver refuses wrong values with a reason.
+    fn of(kind: u32, index: u32) -> Self {
+        Self { kind, index, ..Self::zeroed() }
+    }
+
+    fn at(self, point: [f32; 3], number: f32) -> Self {
+        Self { vectors: [point, ZERO, ZERO], number, ..self }
+    }
+
+    fn setting(value: SettingValue, constraint_kind: Option<SettingKind>) -> Self {
+        let empty = Self::of(kind::SET, 0);
+        let mut command = match value {
+            SettingValue::Number(number) => {
+                Self { number, options: CommandOptions::VALUE_NUMBER, ..empty }
+            }
+            SettingValue::Vector(vector) => {
+                Self { options: CommandOptions::VALUE_VECTOR, ..empty.at(vector, 0.0) }
+            }
+            SettingValue::Off => Self { options: CommandOptions::VALUE_OFF, ..empty },
+        };
+        if let Some(constraint_kind) = constraint_kind {
+            command.count = constraint_kind.number();
+            command.options |= CommandOptions::CONSTRAINT_KIND;
+        }
+        command
+    }
+
+    /// Reads the action; a kind that this version does not know, and a set without a value, is
+    /// [`Action::Unknown`]. Nothing else is checked here: the solver refuses wrong values with a
+    /// reason.
     pub fn action(&self) -> Action {
-        let Self { particle, target, over_s, count, .. } = *self;
+        let Self { index, number, rotation, count, .. } = *self;
+        let [first, second, third] = self.vectors;
         match self.kind {
-            kind::PIN => Action::Pin { particle },
-            kind::UNPIN => Action::Unpin { particle },
-            kind::GRAB => Action::Grab { particle, target, over_s },
-            kind::MOVE => Action::Move { particle, target, over_s },
-            kind::RELEASE => Action::Release { particle },
+            kind::PIN => Action::Pin { particle: index },
+            kind::UNPIN => Action::Unpin { particle: index },
+            kind::GRAB => Action::Grab { particle: index, target: first, over_s: number },
+            kind::MOVE => Action::Move { particle: index, target: first, over_s: number },
+            kind::RELEASE => Action::Release { particle: index },
             kind::PAUSE => Action::Pause,
             kind::RESUME => Action::Resume,
             kind::STEP => Action::Step { count },
             kind::RESET => Action::Reset,
+            kind::PUSH => Action::Push {
+                center: first,
+                radius: number,
+                delta: second,
+                limit: self.has(CommandOptions::LIMIT).then_some(self.limit),
+            },
+            kind::CUT => Action::Cut { constraint: index },
+            kind::CUT_RADIUS => Action::CutRadius { center: first, radius: number },
+            kind::CUT_SEGMENT => Action::CutSegment { from: first, to: second, direction: third },
+            kind::MOVE_ANCHOR => Action::MoveAnchor { anchor: index, translation: first, rotation },
+            kind::MOVE_COLLIDER => {
+                Action::MoveCollider { collider: index, translation: first, rotation }
+            }
+            kind::SET => match self.value() {
+                Some(value) => self.set(value),
+                None => Action::Unknown { number: kind::SET },
+            },
+            kind::LOAD => Action::Load { scene: Text::from_wire(&self.text) },
             number => Action::Unknown { number },
+        }
+    }
+
+    fn has(&self, option: u32) -> bool {
+        self.options & option != 0
+    }
+
+    fn set(&self, value: SettingValue) -> Action {
+        let is_for_one_kind = self.has(CommandOptions::CONSTRAINT_KIND);
+        Action::Set {
+            parameter: Text::from_wire(&self.text),
+            value,
+            constraint_kind: is_for_one_kind.then(|| SettingKind::from_number(self.count)),
+        }
+    }
+
+    fn value(&self) -> Option<SettingValue> {
+        match self.options & CommandOptions::VALUE_ANY {
+            CommandOptions::VALUE_NUMBER => Some(SettingValue::Number(self.number)),
+            CommandOptions::VALUE_VECTOR => Some(SettingValue::Vector(self.vectors[0])),
+            CommandOptions::VALUE_OFF => Some(SettingValue::Off),
+            _ => None,
         }
     }
 }
@@ -165,76 +242,50 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn all_actions() -> Vec<Action> {
-        let target = [0.1, -2.0, 3.5];
-        vec![
-            Action::Pin { particle: 3 },
-            Action::Unpin { particle: 4 },
-            Action::Grab { particle: 5, target, over_s: 0.1 },
-            Action::Move { particle: 5, target, over_s: 0.0 },
-            Action::Release { particle: 5 },
-            Action::Pause,
-            Action::Resume,
-            Action::Step { count: 7 },
-            Action::Reset,
-            Action::Unknown { number: 99 },
-        ]
-    }
+    use crate::action::tests::all_actions;
 
     #[test]
     fn every_action_survives_the_wire_with_its_sender() {
         for action in all_actions() {
             let command = Command::new(11, 12, action);
             assert_eq!(command.action(), action);
-            assert_eq!((command.client_id, command.sequence), (11, 12));
+            assert_eq!((command.client_id, command.sequence, command.spare), (11, 12, 0));
         }
     }
 
     #[test]
-    fn every_action_survives_json() {
-        for action in all_actions() {
-            let text = serde_json::to_string(&action).unwrap();
-            assert_eq!(serde_json::from_str::<Action>(&text).unwrap(), action, "{text}");
+    fn kinds_have_their_numbers_in_the_order_of_the_actions() {
+        let mut numbers: Vec<_> =
+            all_actions().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
+        numbers.dedup();
+        let expected: Vec<_> = (1..=17).chain([99]).collect();
+        assert_eq!(numbers, expected);
+    }
+
+    #[test]
+    fn a_set_with_no_value_or_with_two_is_unknown() {
+        let value = SettingValue::Number(1.0);
+        let action = Action::Set { parameter: Text::new("damping"), value, constraint_kind: None };
+        let good = Command::new(0, 0, action);
+        for options in [0, CommandOptions::VALUE_NUMBER | CommandOptions::VALUE_OFF] {
+            let command = Command { options, ..good };
+            assert_eq!(command.action(), Action::Unknown { number: kind::SET });
         }
     }
 
     #[test]
-    fn non_finite_numbers_are_strings_in_json() {
-        let action = Action::Grab {
-            particle: 1,
-            target: [f32::NAN, f32::INFINITY, f32::NEG_INFINITY],
-            over_s: 0.1,
-        };
-        let text = serde_json::to_string(&action).unwrap();
-        assert_eq!(
-            text,
-            r#"{"kind":"grab","particle":1,"target":["nan","inf","-inf"],"over_s":0.1}"#
-        );
-        let Action::Grab { target, .. } = serde_json::from_str(&text).unwrap() else {
-            panic!("not a grab: {text}");
-        };
-        assert!(target[0].is_nan());
-        assert_eq!(target[1..], [f32::INFINITY, f32::NEG_INFINITY]);
+    fn a_kind_of_constraints_from_another_version_is_unknown() {
+        let value = SettingValue::Number(1.0);
+        let constraint_kind = Some(SettingKind::Unknown);
+        let action = Action::Set { parameter: Text::new("compliance"), value, constraint_kind };
+        let command = Command { count: 4, ..Command::new(0, 0, action) };
+        assert_eq!(command.action(), action);
     }
 
     #[test]
-    fn over_s_of_a_grab_defaults_to_a_display_frame() {
-        let action = serde_json::from_str(r#"{"kind":"grab","particle":1,"target":[0,1,2]}"#);
-        let expected =
-            Action::Grab { particle: 1, target: [0.0, 1.0, 2.0], over_s: GRAB_OVER_S_DEFAULT };
-        assert_eq!(action.ok(), Some(expected));
-    }
-
-    #[test]
-    fn an_unknown_field_or_kind_is_an_error() {
-        for text in [
-            r#"{"kind":"pin","particle":1,"colour":2}"#,
-            r#"{"kind":"dance"}"#,
-            r#"{"kind":"pin"}"#,
-            r#"{"kind":"pin","particle":-1}"#,
-        ] {
-            assert!(serde_json::from_str::<Action>(text).is_err(), "{text}");
-        }
+    fn a_text_that_is_no_utf8_is_read_as_far_as_it_is() {
+        let mut command = Command::new(0, 0, Action::Load { scene: Text::new("curtain") });
+        command.text[3] = 0x80;
+        assert_eq!(command.action(), Action::Load { scene: Text::new("cur") });
     }
 }

@@ -17,15 +17,35 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Services
+//! Their names begin with that of the simulation, as `sim/particles`. All but commands, outcomes
+//! and wake are latched: who comes late is given the newest message.
+//!
+//! | service | payload, header | written |
+//! |---|---|---|
+//! | particles | [`ParticleState`]s, [`SnapshotHeader`] | every step |
+//! | keyframe | bytes, [`KeyframeHeader`] | now and then: what particles lack of the state |
+//! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s, [`LoadHeader`] | once per load |
+//! | colliders | [`ColliderState`]s, [`CollidersHeader`] | per load, on change, each step while one moves |
+//! | tears, `tear_causes` | indices, [`TearCause`]s as bytes, [`TearsHeader`] | per load and on a tear: all of the load |
+//! | commands | [`Command`] | by clients |
+//! | outcomes | [`Outcome`] | for every command |
+//! | status | [`NodeStatus`] | ten times a second |
+//! | wake | [`Wake`] events | with each of the above |
+//!
 //! There is no solver here, and no iceoryx2 outside of this crate.
 #![forbid(unsafe_code)]
 
+mod action;
 mod client;
 pub mod clock;
+mod collider;
 mod command;
 mod domain;
 mod endpoint;
+mod latch;
 mod limits;
+mod load;
 mod outcome;
 mod owner;
 mod plain_number;
@@ -35,34 +55,43 @@ mod request;
 mod service;
 mod services;
 mod session;
+mod setting;
 mod snapshot;
 mod status;
 mod stop;
 mod tap;
+mod tears;
 pub mod testing;
+mod text;
 mod topology;
+mod views;
 mod wake;
 mod watch;
 mod writer;
 
-pub use client::{Client, Snapshot, Surface, Topology};
-pub use command::{Action, CONSOLE_CLIENT_ID, Command, GRAB_OVER_S_DEFAULT};
+pub use action::{Action, CONSOLE_CLIENT_ID, GRAB_OVER_S_DEFAULT};
+pub use client::Client;
+pub use collider::{ColliderShape, ColliderState, CollidersHeader};
+pub use command::{Command, CommandOptions};
 pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
 pub use limits::*;
+pub use load::Load;
 pub use outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus, Reason};
-pub use owner::{Load, Owner, OwnerError};
+pub use owner::{Owner, OwnerError};
 pub use plain_number::PlainF32;
 pub use reader::{Drained, ReadError};
 pub use request::{OwnerSeen, RequestError};
 pub use service::ServiceError;
 pub use services::AttachError;
+pub use setting::{SettingKind, SettingValue};
 pub use snapshot::{ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader};
 pub use status::{NodeStatus, StatusFlags};
 pub use stop::Stop;
 pub use tap::{Tap, Update};
-pub use topology::{
-    ConstraintKind, ConstraintState, KeyframeHeader, LoadHeader, TearsHeader, Triangle,
-};
+pub use tears::{TearCause, TearsHeader};
+pub use text::Text;
+pub use topology::{ConstraintKind, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+pub use views::{Colliders, Snapshot, Surface, Topology, Torn, TornConstraint};
 pub use wake::Wake;
 pub use writer::PublishError;
 

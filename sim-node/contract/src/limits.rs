@@ -2,17 +2,20 @@
 
 /// Version of the layouts, service names and quality of service; a service attribute, checked by
 /// everyone who opens a service. It changes with any change of the bytes in shared memory.
-pub const CONTRACT_VERSION: u32 = 1;
+pub const CONTRACT_VERSION: u32 = 2;
 
 /// Most particles, and most constraints, of a scene (2^24: their indices are exact in f32).
 pub const ELEMENTS_MAX: usize = 1 << 24;
 /// Longest scene text, in bytes.
 pub const SCENE_SIZE_BYTES_MAX: usize = 16 << 20;
+/// Most colliders of a scene: every free particle meets every one of them in every substep.
+pub const COLLIDERS_MAX: usize = 1 << 16;
 /// Most commands that a node applies at one step boundary; the rest waits for the next one.
 pub const COMMANDS_PER_STEP_MAX: usize = 1024;
 
-/// Publishers of a service that only the owner writes: one, and one spare for a network tunnel.
-pub const OWNER_PUBLISHERS_MAX: usize = 2;
+/// Publishers of a service that only the owner writes: one, a second one while a load replaces the
+/// first, and one spare for a network tunnel.
+pub const OWNER_PUBLISHERS_MAX: usize = 3;
 /// Readers of a service at the same time.
 pub const READERS_MAX: usize = 16;
 /// Samples that one reader may hold at the same time; it takes no more before it gives one back.
@@ -20,7 +23,7 @@ pub const BORROWED_SAMPLES_MAX: usize = 4;
 /// Snapshots that wait for one reader before the oldest is overwritten (64 ms at 1 kHz), and as
 /// many keyframes: each step with commands has one.
 pub const SNAPSHOTS_BUFFERED: usize = 64;
-/// Tears and statuses that wait for one reader.
+/// Tears, colliders and statuses that wait for one reader.
 pub const UPDATES_BUFFERED: usize = 4;
 /// Outcomes that wait for one reader: two steps' worth of the most that a step can produce.
 pub const OUTCOMES_BUFFERED: usize = 2 * COMMANDS_PER_STEP_MAX;

@@ -7,37 +7,20 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
 use thiserror::Error;
 
+use crate::load::{Load, LoadWriters, check_limits, check_shared_memory};
 use crate::ports::{Places, create_port, reader_count};
 use crate::reader::subscribe;
-use crate::service::{
-    KEYFRAME, OUTCOMES, PARTICLES, STATUS, ServiceError, ServiceSpec, TEARS, WAKE,
-};
+use crate::service::{OUTCOMES, STATUS, ServiceError, WAKE};
 use crate::services::{Services, owner};
 use crate::session::{Access, Events, Session, Values};
 use crate::wake::{Wake, WakeSender};
-use crate::writer::{Capacity, SliceWriter, ValueWriter};
+use crate::writer::ValueWriter;
 use crate::{
-    BORROWED_SAMPLES_MAX, CLIENTS_MAX, COMMANDS_BUFFERED, Command, ConstraintState, ELEMENTS_MAX,
-    Endpoint, KeyframeHeader, LoadHeader, NodeStatus, Outcome, ParticleState, PublishError,
-    SCENE_SIZE_BYTES_MAX, SNAPSHOTS_BUFFERED, SnapshotHeader, TearsHeader, Triangle,
+    CLIENTS_MAX, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command, Endpoint,
+    KeyframeHeader, NodeStatus, Outcome, ParticleState, PublishError, SnapshotHeader, TearsHeader,
 };
 
-/// What an owner publishes once per load, and what the sizes of its messages follow from.
-#[derive(Debug, Clone, Copy)]
-pub struct Load<'a> {
-    /// The common part of the headers; `count` is filled in for each service.
-    pub header: LoadHeader,
-    /// The effective scene as TOML, at most [`SCENE_SIZE_BYTES_MAX`].
-    pub scene: &'a [u8],
-    /// All constraints, by index.
-    pub constraints: &'a [ConstraintState],
-    /// The surface; may be empty.
-    pub triangles: &'a [Triangle],
-    /// The longest keyframe of this load, in bytes.
-    pub keyframe_size_bytes_max: usize,
-}
-
-/// Why a name could not be taken.
+/// Why a name could not be taken, or a scene not be loaded.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum OwnerError {
@@ -86,17 +69,14 @@ pub enum OwnerError {
 
 /// The process that owns a name: it publishes everything and takes the commands.
 ///
-/// Nothing here ever waits for a reader. Per step publish tears, keyframe, outcomes, and the
-/// particles last; then [`Owner::wake`] the readers and [`Owner::refresh`] the latched messages.
+/// Nothing here ever waits for a reader. Per step publish colliders, tears, keyframe, outcomes, and
+/// the particles last; then [`Owner::wake`] the readers and [`Owner::refresh`] the latched messages.
 /// Dropping it frees the name and wakes everyone with [`Wake::OwnerGone`].
 #[derive(Debug)]
 pub struct Owner {
     // Dropped in this order: readers first lose what they read, then the name is free, and only
     // then are they woken to find that out.
-    particles: SliceWriter<ParticleState, SnapshotHeader>,
-    keyframe: SliceWriter<u8, KeyframeHeader>,
-    load: LoadWriters,
-    tears: SliceWriter<u32, TearsHeader>,
+    writers: LoadWriters,
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc::Service, Command, ()>,
     status: ValueWriter<NodeStatus>,
@@ -111,11 +91,6 @@ pub struct Owner {
     _session: Session,
 }
 
-/// Snapshots that one reader which has stalled keeps from being overwritten: its full buffer, what
-/// it holds, and beside them the latched one, the one being written and one being handed over.
-const STALLED_SNAPSHOTS: usize = SNAPSHOTS_BUFFERED + BORROWED_SAMPLES_MAX + 3;
-/// Bytes of a message before its payload, beside our header.
-const MESSAGE_HEADER_SIZE_BYTES: usize = 48;
 /// Refreshes that wake a new reader. It is counted a moment before it can be given anything: the
 /// first may come too early. One that is held up longer finds what it was given with a later wake.
 const WAKES_PER_READER: u32 = 2;
@@ -123,7 +98,8 @@ const WAKES_PER_READER: u32 = 2;
 const COMMANDS_TAKEN_MAX: usize = CLIENTS_MAX * COMMANDS_BUFFERED;
 
 impl Owner {
-    /// Takes the name, creates its services and publishes scene, topology and surface.
+    /// Takes the name, creates its services and publishes scene, topology and surface, and that
+    /// nothing is torn; for a scene without colliders also that it has none.
     ///
     /// # Errors
     /// The name is taken, the load is beyond a limit of the contract or of shared memory, or a
@@ -137,24 +113,13 @@ impl Owner {
         let status_service = session.values(&STATUS, Access::Create)?;
         let status = take_name(&session, &status_service)?;
         // By now the memory of a killed predecessor is free again.
-        if let Ok(memory) = rustix::fs::statvfs("/dev/shm") {
-            check_shared_memory(load.header.particle_count, memory.f_bavail * memory.f_frsize)?;
-        }
+        check_shared_memory(load)?;
         let services = Services::access(&session, Access::Create)?;
-        let many =
-            |spec: &ServiceSpec, len_max| Capacity { len_max, samples: spec.samples_in_use_max() };
-        let particle_count = load.header.particle_count as usize;
         let owner = Self {
             wake: wake_sender(&services.wake)?,
             commands: subscribe(&services.commands)?,
             outcomes: ValueWriter::create(&services.outcomes, &OUTCOMES)?,
-            tears: SliceWriter::create(&services.tears, many(&TEARS, load.constraints.len()))?,
-            keyframe: SliceWriter::create(
-                &services.keyframe,
-                many(&KEYFRAME, load.keyframe_size_bytes_max),
-            )?,
-            particles: SliceWriter::create(&services.particles, many(&PARTICLES, particle_count))?,
-            load: LoadWriters::create(&services, load)?,
+            writers: LoadWriters::create(&services, load)?,
             status,
             readers_seen: Cell::new(0),
             wakes_due: Cell::new(0),
@@ -162,9 +127,29 @@ impl Owner {
             status_service,
             _session: session,
         };
-        owner.load.publish(load)?;
+        owner.writers.publish(load)?;
         owner.wake(Wake::Load);
         Ok(owner)
+    }
+
+    /// Publishes another scene under the same name, as [`Owner::create`] does. Readers stay
+    /// connected: after what they have not read of the old load, they are given the new one, and
+    /// who comes later meets nothing else. Publish its colliders and its first snapshot next. The
+    /// old load keeps its memory until this returns, and longer where a reader holds a snapshot.
+    ///
+    /// # Errors
+    /// As [`Owner::create`]: the load is beyond a limit of the contract or of shared memory, or a
+    /// writer could not be created. Then nothing has changed, and the old load can go on.
+    pub fn load(&mut self, load: &Load<'_>) -> Result<(), OwnerError> {
+        check_limits(load)?;
+        check_shared_memory(load)?;
+        // All of them are created before one of the old ones goes, and the old ones go before one
+        // of these says anything: an error leaves the old load as it was, and readers, who empty
+        // the buffers of writers that have gone first, never see the new load before the old.
+        self.writers = LoadWriters::create(&self.services, load)?;
+        self.writers.publish(load)?;
+        self.wake(Wake::Load);
+        Ok(())
     }
 
     /// Publishes a snapshot of `header.particle_count` particles: `particle(0)`, `particle(1)`, ...
@@ -177,7 +162,7 @@ impl Owner {
         header: &SnapshotHeader,
         particle: impl Fn(usize) -> ParticleState,
     ) -> Result<(), PublishError> {
-        self.particles.write(*header, particle)
+        self.writers.particles.write(*header, particle)
     }
 
     /// Publishes the keyframe that completes a published snapshot; `size_bytes` is filled in.
@@ -190,17 +175,38 @@ impl Owner {
         bytes: &[u8],
     ) -> Result<(), PublishError> {
         let size_bytes = bytes.len() as u64;
-        self.keyframe.write(KeyframeHeader { size_bytes, ..header }, |index| bytes[index])
+        self.writers.keyframe.write(KeyframeHeader { size_bytes, ..header }, |index| bytes[index])
     }
 
-    /// Publishes all constraints torn since the load, in the order of tearing; `count` is filled
-    /// in.
+    /// Publishes all constraints torn since the load, in the order of tearing, and why: `causes`
+    /// are [`crate::TearCause`]s as numbers, one for each of `torn`; a number of none of them says
+    /// that the cause is not known. `count` is filled in.
     ///
     /// # Errors
     /// More than there are constraints, or no memory.
-    pub fn publish_tears(&self, header: TearsHeader, torn: &[u32]) -> Result<(), PublishError> {
-        let count = count_of(torn);
-        self.tears.write(TearsHeader { count, ..header }, |index| torn[index])
+    ///
+    /// # Panics
+    /// If `torn` and `causes` differ in length.
+    pub fn publish_tears(
+        &self,
+        header: TearsHeader,
+        torn: &[u32],
+        causes: &[u8],
+    ) -> Result<(), PublishError> {
+        self.writers.publish_tears(header, torn, causes)
+    }
+
+    /// Publishes all colliders in their poses at the end of a step, by index; `count` is filled in.
+    /// To be called after a load with colliders, when one changes, and each step while one moves.
+    ///
+    /// # Errors
+    /// More than announced at load, or no memory.
+    pub fn publish_colliders(
+        &self,
+        header: CollidersHeader,
+        colliders: &[ColliderState],
+    ) -> Result<(), PublishError> {
+        self.writers.publish_colliders(header, colliders)
     }
 
     /// Publishes what became of a command.
@@ -250,14 +256,9 @@ impl Owner {
         if readers != self.readers_seen.replace(readers) {
             self.wakes_due.set(WAKES_PER_READER);
         }
-        self.load.scene.refresh();
-        self.load.topology.refresh();
-        self.load.surface.refresh();
-        self.tears.refresh();
-        self.keyframe.refresh();
         self.outcomes.refresh();
         self.status.refresh();
-        self.particles.refresh();
+        self.writers.refresh();
         if self.wakes_due.get() > 0 {
             self.wakes_due.set(self.wakes_due.get() - 1);
             self.wake(Wake::Load);
@@ -277,41 +278,11 @@ impl Owner {
             + reader_count(&services.surface)
             + reader_count(&services.scene)
             + reader_count(&services.tears)
+            + reader_count(&services.tear_causes)
+            + reader_count(&services.colliders)
             + reader_count(&services.outcomes)
             + reader_count(&self.status_service)
     }
-}
-
-/// The writers whose only message is the load: exactly as long as it, and no memory beside it.
-#[derive(Debug)]
-struct LoadWriters {
-    scene: SliceWriter<u8, LoadHeader>,
-    topology: SliceWriter<ConstraintState, LoadHeader>,
-    surface: SliceWriter<Triangle, LoadHeader>,
-}
-
-impl LoadWriters {
-    fn create(services: &Services, load: &Load<'_>) -> Result<Self, ServiceError> {
-        let single = |len_max| Capacity { len_max, samples: 1 };
-        Ok(Self {
-            scene: SliceWriter::create(&services.scene, single(load.scene.len()))?,
-            topology: SliceWriter::create(&services.topology, single(load.constraints.len()))?,
-            surface: SliceWriter::create(&services.surface, single(load.triangles.len()))?,
-        })
-    }
-
-    fn publish(&self, load: &Load<'_>) -> Result<(), PublishError> {
-        let header = |count| LoadHeader { count, ..load.header };
-        self.scene.write(header(count_of(load.scene)), |index| load.scene[index])?;
-        let constraints = load.constraints;
-        self.topology.write(header(count_of(constraints)), |index| constraints[index])?;
-        self.surface.write(header(count_of(load.triangles)), |index| load.triangles[index])
-    }
-}
-
-/// The length of a payload, which a limit of the contract keeps within u32.
-fn count_of<T>(payload: &[T]) -> u32 {
-    u32::try_from(payload.len()).unwrap_or(u32::MAX)
 }
 
 /// The status publisher is the lock: there can be only one.
@@ -335,50 +306,53 @@ fn wake_sender(service: &Events) -> Result<WakeSender, ServiceError> {
     Ok(WakeSender::new(notifier))
 }
 
-fn check_limits(load: &Load<'_>) -> Result<(), OwnerError> {
-    let limits = [
-        ("particles", load.header.particle_count as usize, ELEMENTS_MAX),
-        ("constraints", load.constraints.len(), ELEMENTS_MAX),
-        ("bytes of text", load.scene.len(), SCENE_SIZE_BYTES_MAX),
-    ];
-    match limits.into_iter().find(|(_, count, max)| count > max) {
-        Some((what, count, max)) => Err(OwnerError::TooLarge { what, count, max }),
-        None => Ok(()),
-    }
-}
-
-/// Shared memory is not reserved when it is created: a writer that runs out of it is killed by
-/// SIGBUS, so whether it can happen is found out before.
-fn check_shared_memory(particle_count: u32, available_bytes: u64) -> Result<(), OwnerError> {
-    let snapshot_size_bytes = MESSAGE_HEADER_SIZE_BYTES
-        + size_of::<SnapshotHeader>()
-        + particle_count as usize * size_of::<ParticleState>();
-    let needed_bytes = (STALLED_SNAPSHOTS * snapshot_size_bytes) as u64;
-    if needed_bytes <= available_bytes {
-        return Ok(());
-    }
-    Err(OwnerError::NotEnoughSharedMemory {
-        particle_count,
-        samples: STALLED_SNAPSHOTS,
-        needed_mib: needed_bytes.div_ceil(1 << 20),
-        available_mib: available_bytes >> 20,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::service::SURFACE;
+    use crate::session::Slices;
+    use crate::testing::TestDomain;
+    use crate::{Client, LoadHeader, OWNER_PUBLISHERS_MAX, Triangle};
+
+    const SOON: std::time::Duration = std::time::Duration::from_secs(10);
+
+    fn load(topology_revision: u32) -> Load<'static> {
+        Load {
+            header: LoadHeader { topology_revision, ..LoadHeader::default() },
+            scene: b"version = 1",
+            constraints: &[],
+            triangles: &[],
+            collider_count: 0,
+            keyframe_size_bytes_max: 8,
+        }
+    }
 
     #[test]
-    fn a_scene_that_one_stalled_reader_could_fill_memory_with_is_refused_with_the_numbers() {
-        let docker_default = 64 << 20;
-        assert_eq!(check_shared_memory(20_000, docker_default), Ok(()));
-        let error = check_shared_memory(100_000, docker_default).unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "100000 particles need 217 MiB of shared memory (71 snapshots for one stalled \
-             reader), but /dev/shm has 64 MiB left: take a smaller scene, or enlarge it (mount \
-             -o remount,size=... /dev/shm; docker run --shm-size ...)"
-        );
+    fn a_load_without_a_place_for_one_of_its_writers_leaves_the_old_one_as_it_was() {
+        let domain = TestDomain::new();
+        let mut owner = Owner::create(&domain.endpoint(), &load(1)).unwrap();
+        let session = Session::join(&domain.endpoint()).unwrap();
+        let service: Slices<Triangle, LoadHeader> = session.slices(&SURFACE, Access::Open).unwrap();
+        // A tunnel has the spare place; something else the one that a load needs.
+        let strangers: Vec<_> = (1..OWNER_PUBLISHERS_MAX)
+            .map(|_| service.publisher_builder().create().unwrap())
+            .collect();
+        let error = owner.load(&load(2)).unwrap_err();
+        assert!(matches!(error, OwnerError::Service(ServiceError::Full { .. })), "{error}");
+
+        let mut client = Client::attach(&domain.endpoint()).unwrap();
+        let revision = |client: &mut Client| {
+            let topology = client.topology(SOON).unwrap();
+            topology.map(|topology| topology.header.topology_revision)
+        };
+        assert!(client.topology(std::time::Duration::ZERO).unwrap().is_none());
+        owner.refresh();
+        assert_eq!(revision(&mut client), Some(1));
+        owner.publish_particles(&SnapshotHeader::default(), |_| unreachable!()).unwrap();
+        owner.publish_keyframe(KeyframeHeader::default(), &[0; 8]).unwrap();
+
+        drop(strangers);
+        owner.load(&load(2)).unwrap();
+        assert_eq!(revision(&mut client), Some(2));
     }
 }

@@ -110,3 +110,45 @@ pub(crate) mod vector {
         <[PlainF32; 3]>::deserialize(deserializer).map(|numbers| numbers.map(|number| number.0))
     }
 }
+
+/// `#[serde(with = "optional_number")]` for an f32 field that may be absent.
+pub(crate) mod optional_number {
+    use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer};
+
+    #[allow(
+        clippy::ref_option,
+        clippy::trivially_copy_pass_by_ref,
+        reason = "the signature that serde asks for"
+    )]
+    pub(crate) fn serialize<S: Serializer>(
+        value: &Option<f32>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.map(PlainF32).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<f32>, D::Error> {
+        let number = Option::<PlainF32>::deserialize(deserializer)?;
+        Ok(number.map(|number| number.0))
+    }
+}
+
+/// `#[serde(with = "rotation")]` for a quaternion.
+pub(crate) mod rotation {
+    use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer};
+
+    pub(crate) fn serialize<S: Serializer>(
+        value: &[f32; 4],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.map(PlainF32).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<[f32; 4], D::Error> {
+        <[PlainF32; 4]>::deserialize(deserializer).map(|numbers| numbers.map(|number| number.0))
+    }
+}

@@ -7,7 +7,7 @@ use iceoryx2::service::port_factory::publish_subscribe;
 
 use crate::service::ServiceError;
 use crate::session::CLEANUP_TIMEOUT;
-use crate::{KeyframeHeader, LoadHeader, SnapshotHeader, TearsHeader};
+use crate::{CollidersHeader, KeyframeHeader, LoadHeader, SnapshotHeader, TearsHeader};
 
 /// A header that says how long its payload is.
 pub(crate) trait Counted: Debug + Default + Copy + ZeroCopySend {
@@ -27,6 +27,12 @@ impl Counted for LoadHeader {
 }
 
 impl Counted for TearsHeader {
+    fn count(&self) -> u64 {
+        self.count.into()
+    }
+}
+
+impl Counted for CollidersHeader {
     fn count(&self) -> u64 {
         self.count.into()
     }

@@ -82,8 +82,9 @@ impl<T: Debug + ZeroCopySend + 'static, H: Counted> SliceReader<T, H> {
     /// The newest message, if there is any; older ones are dropped.
     pub(crate) fn newest(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
         let mut newest = None;
-        // A writer that is faster than this loop does not keep it: one buffer is the most it takes.
-        for _ in 0..self.buffered {
+        // A writer that is faster than this loop does not keep it: the most that it takes is a
+        // buffer of the writer before the last load and one of the present writer.
+        for _ in 0..2 * self.buffered {
             match self.next()? {
                 Some(sample) => newest = Some(sample),
                 None => break,

@@ -59,6 +59,8 @@ pub(crate) const TOPOLOGY: ServiceSpec = ServiceSpec { suffix: "topology", ..LAT
 pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCHED };
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };
 pub(crate) const TEARS: ServiceSpec = ServiceSpec { suffix: "tears", ..LATCHED };
+pub(crate) const TEAR_CAUSES: ServiceSpec = ServiceSpec { suffix: "tear_causes", ..LATCHED };
+pub(crate) const COLLIDERS: ServiceSpec = ServiceSpec { suffix: "colliders", ..LATCHED };
 pub(crate) const STATUS: ServiceSpec =
     ServiceSpec { suffix: "status", publishers_max: STATUS_PUBLISHERS_MAX, ..LATCHED };
 pub(crate) const OUTCOMES: ServiceSpec = ServiceSpec {
@@ -317,8 +319,18 @@ mod tests {
     #[test]
     fn the_service_names_and_their_quality_are_frozen() {
         let all = [
-            &PARTICLES, &KEYFRAME, &TOPOLOGY, &SURFACE, &SCENE, &TEARS, &COMMANDS, &OUTCOMES,
-            &STATUS, &WAKE,
+            &PARTICLES,
+            &KEYFRAME,
+            &TOPOLOGY,
+            &SURFACE,
+            &SCENE,
+            &TEARS,
+            &TEAR_CAUSES,
+            &COLLIDERS,
+            &COMMANDS,
+            &OUTCOMES,
+            &STATUS,
+            &WAKE,
         ];
         let mut text = String::new();
         for spec in all {

@@ -5,12 +5,13 @@ use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory};
 use thiserror::Error;
 
 use crate::service::{
-    COMMANDS, KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
+    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError,
+    TEAR_CAUSES, TEARS, TOPOLOGY,
 };
 use crate::session::{Access, Events, Session, Slices, Values};
 use crate::{
-    Command, ConstraintState, Endpoint, KeyframeHeader, LoadHeader, NodeStatus, Outcome,
-    ParticleState, SnapshotHeader, TearsHeader, Triangle,
+    ColliderState, CollidersHeader, Command, ConstraintState, Endpoint, KeyframeHeader, LoadHeader,
+    NodeStatus, Outcome, ParticleState, SnapshotHeader, TearsHeader, Triangle,
 };
 
 /// The services of a name.
@@ -22,6 +23,8 @@ pub(crate) struct Services {
     pub(crate) surface: Slices<Triangle, LoadHeader>,
     pub(crate) scene: Slices<u8, LoadHeader>,
     pub(crate) tears: Slices<u32, TearsHeader>,
+    pub(crate) tear_causes: Slices<u8, TearsHeader>,
+    pub(crate) colliders: Slices<ColliderState, CollidersHeader>,
     pub(crate) commands: Values<Command>,
     pub(crate) outcomes: Values<Outcome>,
     pub(crate) wake: Events,
@@ -37,6 +40,8 @@ impl Services {
             surface: session.slices(&SURFACE, access)?,
             scene: session.slices(&SCENE, access)?,
             tears: session.slices(&TEARS, access)?,
+            tear_causes: session.slices(&TEAR_CAUSES, access)?,
+            colliders: session.slices(&COLLIDERS, access)?,
             commands: session.values(&COMMANDS, access)?,
             outcomes: session.values(&OUTCOMES, access)?,
             wake: session.events(access)?,
@@ -167,6 +172,7 @@ mod tests {
         scene: b"",
         constraints: &[],
         triangles: &[],
+        collider_count: 0,
         keyframe_size_bytes_max: 0,
     };
 
@@ -181,7 +187,7 @@ mod tests {
         let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "service 'sim/status' has contract version 1, this program has 2: stop every program \
+            "service 'sim/status' has contract version 2, this program has 3: stop every program \
              of the other version, or start this one with another --domain"
         );
     }
@@ -195,8 +201,8 @@ mod tests {
         let new = Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY);
         let error = ServiceError::Version {
             service: "sim/status".to_owned(),
-            found: "1".to_owned(),
-            expected: 2,
+            found: "2".to_owned(),
+            expected: 3,
         };
         assert_eq!(new.unwrap_err(), OwnerError::Service(error));
         // With the last one gone, the name is as good as new.

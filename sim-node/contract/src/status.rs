@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// State of a node or replay: 192 bytes, alignment 8. Written by the owner of the name at 10 Hz.
+/// State of a node or replay: 208 bytes, alignment 8. Written by the owner of the name at 10 Hz.
 /// Percentiles are over the steps of the last second.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -19,6 +19,8 @@ pub struct NodeStatus {
     pub step: u64,
     /// Simulated time made per wall-clock time over the last second; 0 while paused.
     pub real_time_factor: f64,
+    /// The pace that is asked for: simulated time per wall-clock time, 1 for real time.
+    pub time_scale: f64,
     /// Lateness of wake-ups after their deadlines, median, in nanoseconds.
     pub wake_late_ns_p50: u64,
     /// The same, 99th percentile.
@@ -35,25 +37,29 @@ pub struct NodeStatus {
     pub outcome_count: u64,
     /// Rejected commands of this run.
     pub rejected_count: u64,
+    /// Particles that were frozen since the load because their state was no longer finite.
+    pub frozen_count: u64,
     /// Steps per second.
     pub rate_hz: u32,
     /// Particles of the scene.
     pub particle_count: u32,
     /// Constraints of the scene.
     pub constraint_count: u32,
+    /// Constraints torn since the load.
+    pub torn_count: u32,
     /// Readers of `particles`.
     pub reader_count: u32,
     /// Process id of the writer.
     pub process_id: u32,
     /// [`StatusFlags`] bits.
     pub flags: u32,
+    /// Always 0.
+    pub spare: u32,
     /// Name of the scene in UTF-8, cut at 64 bytes, zeros behind it.
     pub scene_name: [u8; 64],
-    /// Always 0.
-    pub spare: [u32; 2],
 }
 
-const _: () = assert!(size_of::<NodeStatus>() == 192 && align_of::<NodeStatus>() == 8);
+const _: () = assert!(size_of::<NodeStatus>() == 208 && align_of::<NodeStatus>() == 8);
 
 impl Default for NodeStatus {
     fn default() -> Self {

@@ -4,15 +4,16 @@ use std::time::Duration;
 
 use crate::reader::{Drained, SliceReader, ValueReader};
 use crate::service::{
-    KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
+    COLLIDERS, KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEAR_CAUSES,
+    TEARS, TOPOLOGY,
 };
 use crate::services::{AttachError, Attachment};
 use crate::session::Session;
 use crate::wake::WakeListener;
 use crate::watch::listen;
 use crate::{
-    ConstraintState, Endpoint, KeyframeHeader, LoadHeader, NodeStatus, Outcome, ParticleState,
-    SnapshotHeader, TearsHeader, Triangle,
+    ColliderState, CollidersHeader, ConstraintState, Endpoint, KeyframeHeader, LoadHeader,
+    NodeStatus, Outcome, ParticleState, SnapshotHeader, TearsHeader, Triangle,
 };
 
 /// Reads everything that an owner publishes, without a copy.
@@ -24,7 +25,9 @@ pub struct Tap {
     listener: WakeListener,
     outcomes: ValueReader<Outcome>,
     status: ValueReader<NodeStatus>,
+    colliders: SliceReader<ColliderState, CollidersHeader>,
     tears: SliceReader<u32, TearsHeader>,
+    tear_causes: SliceReader<u8, TearsHeader>,
     scene: SliceReader<u8, LoadHeader>,
     topology: SliceReader<ConstraintState, LoadHeader>,
     surface: SliceReader<Triangle, LoadHeader>,
@@ -43,8 +46,12 @@ pub enum Update<'a> {
     Topology(&'a LoadHeader, &'a [ConstraintState]),
     /// The triangles of a load; may be none.
     Surface(&'a LoadHeader, &'a [Triangle]),
+    /// All colliders in their poses at the end of a step.
+    Colliders(&'a CollidersHeader, &'a [ColliderState]),
     /// All constraints torn since the load.
     Tears(&'a TearsHeader, &'a [u32]),
+    /// Why they tore: [`crate::TearCause`]s as numbers, under a header equal to that of the list.
+    TearCauses(&'a TearsHeader, &'a [u8]),
     /// What completes a snapshot.
     Keyframe(&'a KeyframeHeader, &'a [u8]),
     /// What became of a command.
@@ -71,7 +78,9 @@ impl Tap {
             listener: listen(&services.wake)?,
             outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?,
             status: ValueReader::create(&attachment.status, &STATUS)?,
+            colliders: SliceReader::create(&services.colliders, &COLLIDERS)?,
             tears: SliceReader::create(&services.tears, &TEARS)?,
+            tear_causes: SliceReader::create(&services.tear_causes, &TEAR_CAUSES)?,
             scene: SliceReader::create(&services.scene, &SCENE)?,
             topology: SliceReader::create(&services.topology, &TOPOLOGY)?,
             surface: SliceReader::create(&services.surface, &SURFACE)?,
@@ -100,7 +109,11 @@ impl Tap {
         self.scene.drain(all, |header, bytes| sink(Update::Scene(header, bytes)));
         self.topology.drain(all, |header, items| sink(Update::Topology(header, items)));
         self.surface.drain(all, |header, items| sink(Update::Surface(header, items)));
+        self.colliders.drain(all, |header, items| sink(Update::Colliders(header, items)));
         self.tears.drain(all, |header, items| sink(Update::Tears(header, items)));
+        // An owner publishes them before the list. Taken after it, they are at least as new: the
+        // causes of every list shown so far have been shown with it.
+        self.tear_causes.drain(all, |header, bytes| sink(Update::TearCauses(header, bytes)));
         self.keyframe.drain(all, |header, bytes| sink(Update::Keyframe(header, bytes)));
         self.outcomes.drain(all, |outcome| sink(Update::Outcome(outcome)));
         self.status.drain(all, |status| sink(Update::Status(status)));

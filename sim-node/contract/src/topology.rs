@@ -1,4 +1,4 @@
-//! What a node publishes once per load, on a tear, and as keyframes.
+//! What a node publishes once per load, and as keyframes.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -37,10 +37,27 @@ pub enum ConstraintKind {
     Tether = 3,
 }
 
+const CONSTRAINT_KINDS: [(ConstraintKind, &str); 4] = [
+    (ConstraintKind::Structural, "structural"),
+    (ConstraintKind::Shear, "shear"),
+    (ConstraintKind::Bend, "bend"),
+    (ConstraintKind::Tether, "tether"),
+];
+
 impl ConstraintKind {
     /// The kind of that number, if there is one.
     pub fn from_number(number: u32) -> Option<Self> {
-        [Self::Structural, Self::Shear, Self::Bend, Self::Tether].get(number as usize).copied()
+        CONSTRAINT_KINDS.get(number as usize).map(|(kind, _)| *kind)
+    }
+
+    /// The kind of that name, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        CONSTRAINT_KINDS.iter().find(|(_, known)| *known == name).map(|(kind, _)| *kind)
+    }
+
+    /// Its word in scenes, commands and logs.
+    pub fn name(self) -> &'static str {
+        CONSTRAINT_KINDS[self as usize].1
     }
 }
 
@@ -82,24 +99,6 @@ pub struct LoadHeader {
 
 const _: () = assert!(size_of::<LoadHeader>() == 64 && align_of::<LoadHeader>() == 8);
 
-/// The header of `tears`, whose payload is all constraints torn since the load, in the order of
-/// tearing: 24 bytes, alignment 8.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[repr(C)]
-#[type_name("catenary.TearsHeader")]
-pub struct TearsHeader {
-    /// As in [`crate::SnapshotHeader`].
-    pub run_id: u64,
-    /// The step that the newest of them tore in.
-    pub step: u64,
-    /// How many at the end of the payload are new in that step.
-    pub new_count: u32,
-    /// Length of the payload.
-    pub count: u32,
-}
-
-const _: () = assert!(size_of::<TearsHeader>() == 24 && align_of::<TearsHeader>() == 8);
-
 /// The header of `keyframe`: 24 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -114,3 +113,18 @@ pub struct KeyframeHeader {
 }
 
 const _: () = assert!(size_of::<KeyframeHeader>() == 24 && align_of::<KeyframeHeader>() == 8);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_constraint_has_one_name_and_one_number() {
+        for (kind, name) in CONSTRAINT_KINDS {
+            assert_eq!(ConstraintKind::from_number(kind as u32), Some(kind));
+            assert_eq!((ConstraintKind::from_name(name), kind.name()), (Some(kind), name));
+        }
+        assert_eq!(ConstraintKind::from_number(4), None);
+        assert_eq!(ConstraintKind::from_name("knot"), None);
+    }
+}

@@ -4,11 +4,11 @@
 use std::thread;
 
 use sim_contract::testing::TestDomain;
-use sim_contract::{Client, Tap, Update};
+use sim_contract::{Client, Tap, TearCause, TearsHeader, TornConstraint, Update};
 
 use crate::support::{
-    DEADLINE, MOMENT, PARTICLE_COUNT, SCENE, constraints, create_owner, particle,
-    publish_everything, publish_step, triangles,
+    DEADLINE, MOMENT, PARTICLE_COUNT, RUN_ID, SCENE, colliders, constraints, create_owner,
+    particle, publish_colliders, publish_everything, publish_step, triangles,
 };
 
 #[test]
@@ -71,6 +71,8 @@ fn a_tap_that_comes_late_gets_every_kind_of_message() {
                 Update::Scene(_, text) if text == SCENE.as_bytes() => "scene",
                 Update::Topology(_, all) if all == constraints() => "topology",
                 Update::Surface(_, all) if all == triangles() => "surface",
+                Update::Colliders(header, all) if all == colliders(header.step) => "colliders",
+                Update::TearCauses(header, [3]) if header.count == 1 => "causes",
                 Update::Tears(header, [2]) if header.count == 1 => "tears",
                 Update::Keyframe(header, b"keyframe") if header.size_bytes == 8 => "keyframe",
                 Update::Status(status) if status.step == 5 => "status",
@@ -78,8 +80,52 @@ fn a_tap_that_comes_late_gets_every_kind_of_message() {
             });
         })
         .count;
-    assert_eq!(kinds, ["scene", "topology", "surface", "tears", "keyframe", "status"]);
+    let expected =
+        ["scene", "topology", "surface", "colliders", "tears", "causes", "keyframe", "status"];
+    assert_eq!(kinds, expected);
     assert_eq!(count, kinds.len());
+}
+
+#[test]
+fn a_late_joiner_knows_all_torn_constraints_with_their_causes_and_where_the_colliders_are() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let publish = |step, new_count, torn: &[u32], causes: &[u8]| {
+        let header = TearsHeader { run_id: RUN_ID, step, new_count, count: 0 };
+        owner.publish_tears(header, torn, causes).unwrap();
+        publish_colliders(&owner, step);
+        owner.refresh();
+    };
+    publish(1, 1, &[2], &[TearCause::Stretch as u8]);
+    publish(3, 2, &[2, 0, 1], &[TearCause::Stretch as u8, TearCause::Cut as u8, 200]);
+
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    // Takes its places; the owner notices it with the next refresh.
+    assert!(client.torn(MOMENT).unwrap().constraints.is_empty());
+    assert!(client.colliders(MOMENT).unwrap().colliders.is_empty());
+    owner.refresh();
+    let torn = client.torn(DEADLINE).unwrap();
+    assert_eq!((torn.header.step, torn.header.new_count, torn.header.count), (3, 2, 3));
+    let one = |constraint, cause| TornConstraint { constraint, cause };
+    let cut = one(0, Some(TearCause::Cut));
+    assert_eq!(torn.constraints, [one(2, Some(TearCause::Stretch)), cut, one(1, None)]);
+    assert_eq!(client.colliders(DEADLINE).unwrap().colliders, colliders(3));
+    // What is latched can be asked for again, and a new list replaces it.
+    assert_eq!(client.torn(MOMENT).unwrap(), torn);
+    publish(4, 0, &[], &[]);
+    assert_eq!(client.torn(MOMENT).unwrap().header.step, 4);
+    assert_eq!(client.colliders(MOMENT).unwrap().header.step, 4);
+}
+
+#[test]
+fn nothing_is_torn_after_a_load_and_every_reader_is_told_so() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    client.torn(MOMENT).unwrap();
+    owner.refresh();
+    let torn = client.torn(DEADLINE).unwrap();
+    assert_eq!((torn.header.run_id, torn.constraints.len()), (RUN_ID, 0));
 }
 
 #[test]

@@ -7,8 +7,8 @@ use std::mem::offset_of;
 
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use sim_contract::{
-    Command, ConstraintState, KeyframeHeader, LoadHeader, NodeStatus, Outcome, ParticleState,
-    SnapshotHeader, TearsHeader, Triangle, Wake,
+    ColliderState, CollidersHeader, Command, ConstraintState, KeyframeHeader, LoadHeader,
+    NodeStatus, Outcome, ParticleState, SnapshotHeader, TearsHeader, Triangle, Wake,
 };
 
 macro_rules! layout {
@@ -36,6 +36,12 @@ macro_rules! constants {
 #[test]
 fn the_layout_of_shared_memory_is_frozen() {
     let mut text = String::new();
+    lay_out_states(&mut text);
+    lay_out_commands_and_status(&mut text);
+    insta::assert_snapshot!("layout", text);
+}
+
+fn lay_out_states(text: &mut String) {
     layout!(text, ParticleState { position, inverse_mass, velocity, flags });
     layout!(
         text,
@@ -75,8 +81,46 @@ fn the_layout_of_shared_memory_is_frozen() {
         }
     );
     layout!(text, TearsHeader { run_id, step, new_count, count });
+    layout!(
+        text,
+        ColliderState {
+            shape,
+            restitution,
+            friction,
+            radius,
+            offset,
+            normal,
+            center,
+            half_extents,
+            rotation,
+            a,
+            b,
+            velocity,
+            angular_velocity,
+        }
+    );
+    layout!(text, CollidersHeader { run_id, step, count, spare });
     layout!(text, KeyframeHeader { run_id, step, size_bytes });
-    layout!(text, Command { kind, particle, client_id, sequence, target, over_s, count, spare });
+}
+
+fn lay_out_commands_and_status(text: &mut String) {
+    layout!(
+        text,
+        Command {
+            kind,
+            index,
+            client_id,
+            sequence,
+            vectors,
+            rotation,
+            number,
+            limit,
+            count,
+            options,
+            text,
+            spare,
+        }
+    );
     layout!(text, Outcome { index, step, status, reason, flags, spare, command });
     layout!(
         text,
@@ -86,6 +130,7 @@ fn the_layout_of_shared_memory_is_frozen() {
             run_id,
             step,
             real_time_factor,
+            time_scale,
             wake_late_ns_p50,
             wake_late_ns_p99,
             solve_ns_p50,
@@ -94,17 +139,18 @@ fn the_layout_of_shared_memory_is_frozen() {
             skipped_periods,
             outcome_count,
             rejected_count,
+            frozen_count,
             rate_hz,
             particle_count,
             constraint_count,
+            torn_count,
             reader_count,
             process_id,
             flags,
-            scene_name,
             spare,
+            scene_name,
         }
     );
-    insta::assert_snapshot!("layout", text);
 }
 
 #[test]
@@ -114,6 +160,7 @@ fn the_limits_are_frozen() {
         text,
         CONTRACT_VERSION,
         ELEMENTS_MAX,
+        COLLIDERS_MAX,
         SCENE_SIZE_BYTES_MAX,
         COMMANDS_PER_STEP_MAX,
         OWNER_PUBLISHERS_MAX,

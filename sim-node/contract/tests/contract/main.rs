@@ -4,6 +4,7 @@
 mod commands;
 mod late_joiner;
 mod layout;
+mod load;
 mod ownership;
 mod readers;
 mod support;

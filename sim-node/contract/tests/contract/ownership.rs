@@ -102,6 +102,7 @@ fn an_owner_can_come_again_while_a_client_stays() {
         scene: b"",
         constraints: &constraints(),
         triangles: &triangles(),
+        collider_count: 0,
         keyframe_size_bytes_max: 0,
     };
     let second = Owner::create(&domain.endpoint(), &load).unwrap();

@@ -3,11 +3,13 @@
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    BORROWED_SAMPLES_MAX, Client, KeyframeHeader, Load, LoadHeader, Owner, PublishError,
-    READERS_MAX, ReadError, SnapshotHeader, Tap, TearsHeader,
+    BORROWED_SAMPLES_MAX, Client, CollidersHeader, KeyframeHeader, Load, LoadHeader, Owner,
+    PublishError, READERS_MAX, ReadError, SnapshotHeader, Tap, TearsHeader,
 };
 
-use crate::support::{MOMENT, create_owner, load_header, publish_everything, publish_step};
+use crate::support::{
+    MOMENT, colliders, create_owner, load_header, publish_everything, publish_step,
+};
 
 #[test]
 fn a_reader_that_never_reads_does_not_block_the_owner() {
@@ -61,12 +63,14 @@ fn a_scene_without_anything_in_it_works() {
         scene: b"",
         constraints: &[],
         triangles: &[],
+        collider_count: 0,
         keyframe_size_bytes_max: 0,
     };
     let owner = Owner::create(&domain.endpoint(), &empty).unwrap();
     let publish = || {
         owner.publish_particles(&SnapshotHeader::default(), |_| unreachable!()).unwrap();
-        owner.publish_tears(TearsHeader::default(), &[]).unwrap();
+        owner.publish_tears(TearsHeader::default(), &[], &[]).unwrap();
+        owner.publish_colliders(CollidersHeader::default(), &[]).unwrap();
         owner.publish_keyframe(KeyframeHeader::default(), &[]).unwrap();
         owner.refresh();
     };
@@ -93,6 +97,9 @@ fn a_message_longer_than_the_load_announced_is_an_error_with_the_numbers() {
         error.to_string(),
         "17 elements do not fit into a message of 'sim/keyframe', which the load limited to 16"
     );
+    let three = [colliders(0)[0]; 3];
+    let error = owner.publish_colliders(CollidersHeader::default(), &three).unwrap_err();
+    assert!(matches!(error, PublishError::TooLong { len: 3, len_max: 2, .. }));
     let header = SnapshotHeader { particle_count: 5, ..SnapshotHeader::default() };
     assert!(owner.publish_particles(&header, |_| unreachable!()).is_err());
 }

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use sim_contract::{
-    CONTRACT_VERSION, ConstraintState, Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus,
-    Outcome, Owner, OwnerError, ParticleState, Reason, SnapshotHeader, TearsHeader, Triangle, Wake,
+    CONTRACT_VERSION, ColliderShape, ColliderState, CollidersHeader, ConstraintState, Endpoint,
+    KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError, ParticleState,
+    Reason, SnapshotHeader, TearCause, TearsHeader, Triangle, Wake,
 };
 
 /// Longer than anything here takes; tests wait for what happens, not for this.
@@ -14,6 +15,7 @@ pub(crate) const MOMENT: Duration = Duration::from_millis(20);
 
 pub(crate) const RUN_ID: u64 = 77;
 pub(crate) const PARTICLE_COUNT: u32 = 4;
+pub(crate) const COLLIDER_COUNT: usize = 2;
 pub(crate) const SCENE: &str = "version = 1 # gemütlich";
 
 pub(crate) fn load_header() -> LoadHeader {
@@ -41,6 +43,7 @@ pub(crate) fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
         scene: SCENE.as_bytes(),
         constraints: &constraints(),
         triangles: &triangles(),
+        collider_count: COLLIDER_COUNT,
         keyframe_size_bytes_max: 16,
     };
     Owner::create(endpoint, &load)
@@ -69,10 +72,28 @@ pub(crate) fn publish_step(owner: &Owner, step: u64) {
     owner.refresh();
 }
 
+/// The colliders at the end of `step`: a sphere that rises with the steps, and a plane.
+pub(crate) fn colliders(step: u64) -> [ColliderState; COLLIDER_COUNT] {
+    let sphere = ColliderState {
+        shape: ColliderShape::Sphere as u32,
+        radius: 0.5,
+        center: particle(0, 0).position.map(|axis| axis + step as f32),
+        ..ColliderState::default()
+    };
+    let plane = ColliderState { normal: [0.0, 1.0, 0.0], ..ColliderState::default() };
+    [sphere, plane]
+}
+
+pub(crate) fn publish_colliders(owner: &Owner, step: u64) {
+    let header = CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() };
+    owner.publish_colliders(header, &colliders(step)).unwrap();
+}
+
 /// Publishes everything that has a message of its own, with the particles of `step` last.
 pub(crate) fn publish_everything(owner: &Owner, step: u64) {
     let tears = TearsHeader { run_id: RUN_ID, step, new_count: 1, count: 0 };
-    owner.publish_tears(tears, &[2]).unwrap();
+    owner.publish_tears(tears, &[2], &[TearCause::Cut as u8]).unwrap();
+    publish_colliders(owner, step);
     let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0 };
     owner.publish_keyframe(keyframe, b"keyframe").unwrap();
     owner.publish_status(&NodeStatus { step, ..NodeStatus::default() }).unwrap();

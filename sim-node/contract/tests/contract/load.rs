@@ -1,0 +1,213 @@
+//! Another scene under the same name: connected readers go on with it, late ones know nothing else,
+//! and a load that cannot be had leaves the old one as it was.
+
+use sim_contract::testing::TestDomain;
+use sim_contract::{
+    COLLIDERS_MAX, Client, ColliderShape, ColliderState, CollidersHeader, ConstraintState,
+    KeyframeHeader, Load, LoadHeader, Owner, ParticleState, SnapshotHeader, Tap, TearCause,
+    TearsHeader, Triangle, Update, Wake,
+};
+
+use crate::support::{
+    DEADLINE, MOMENT, RUN_ID, SCENE, colliders, constraints, create_owner, load_header,
+    publish_everything, publish_step, snapshot_header,
+};
+
+const NEW_SCENE: &str = "version = 1 # another, and a longer one";
+const NEW_COUNT: u32 = 9;
+
+/// A larger scene, that begins to show at step 6.
+fn new_load(use_it: impl FnOnce(&Load<'_>)) {
+    let joins = |a: u32| ConstraintState { a, b: a + 1, rest_length: 0.2, ..Default::default() };
+    let constraints: Vec<_> = (0..NEW_COUNT - 1).map(joins).collect();
+    let header =
+        LoadHeader { step: 6, particle_count: NEW_COUNT, topology_revision: 2, ..load_header() };
+    use_it(&Load {
+        header,
+        scene: NEW_SCENE.as_bytes(),
+        constraints: &constraints,
+        triangles: &[Triangle { corners: [6, 7, 8] }; 3],
+        collider_count: 3,
+        keyframe_size_bytes_max: 64,
+    });
+}
+
+fn load(owner: &mut Owner) {
+    new_load(|load| owner.load(load).unwrap());
+}
+
+/// Publishes a step of the new scene, with all that belongs to it.
+fn publish_new_step(owner: &Owner, step: u64) {
+    let header = CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() };
+    owner.publish_colliders(header, &[sphere(); 3]).unwrap();
+    let tears = TearsHeader { run_id: RUN_ID, step, new_count: 1, count: 0 };
+    owner.publish_tears(tears, &[7], &[TearCause::Force as u8]).unwrap();
+    let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0 };
+    owner.publish_keyframe(keyframe, b"a keyframe longer than any of the old load").unwrap();
+    publish_new_particles(owner, step);
+}
+
+fn publish_new_particles(owner: &Owner, step: u64) {
+    let header =
+        SnapshotHeader { particle_count: NEW_COUNT, topology_revision: 2, ..snapshot_header(step) };
+    owner.publish_particles(&header, |_| ParticleState::default()).unwrap();
+    owner.wake(Wake::Frame);
+    owner.refresh();
+}
+
+fn sphere() -> ColliderState {
+    ColliderState { shape: ColliderShape::Sphere as u32, radius: 2.0, ..ColliderState::default() }
+}
+
+/// Lets a client take all its places, and the owner notice it.
+fn connect(client: &mut Client, owner: &Owner) {
+    client.topology(MOMENT).unwrap();
+    client.surface(MOMENT).unwrap();
+    client.scene(MOMENT).unwrap();
+    client.torn(MOMENT).unwrap();
+    client.colliders(MOMENT).unwrap();
+    client.latest_snapshot(MOMENT).unwrap();
+    owner.refresh();
+}
+
+fn assert_is_new(client: &mut Client) {
+    let topology = client.topology(DEADLINE).unwrap().unwrap();
+    assert_eq!((topology.header.topology_revision, topology.constraints.len()), (2, 8));
+    assert_eq!(client.surface(DEADLINE).unwrap().unwrap().triangles.len(), 3);
+    assert_eq!(client.scene(DEADLINE).unwrap().unwrap(), NEW_SCENE);
+    let snapshot = client.latest_snapshot(DEADLINE).unwrap().unwrap();
+    assert_eq!((snapshot.header().step, snapshot.particles().len()), (6, 9));
+    let torn = client.torn(DEADLINE).unwrap().constraints;
+    assert_eq!((torn[0].constraint, torn[0].cause, torn.len()), (7, Some(TearCause::Force), 1));
+    assert_eq!(client.colliders(DEADLINE).unwrap().colliders, [sphere(); 3]);
+}
+
+#[test]
+fn a_connected_client_goes_on_with_the_new_load() {
+    let domain = TestDomain::new();
+    let mut owner = create_owner(&domain.endpoint()).unwrap();
+    publish_everything(&owner, 5);
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    connect(&mut client, &owner);
+    assert_eq!(client.scene(DEADLINE).unwrap().unwrap(), SCENE);
+    assert_eq!(client.torn(DEADLINE).unwrap().constraints.len(), 1);
+    assert_eq!(client.colliders(DEADLINE).unwrap().colliders, colliders(5));
+    let held = client.latest_snapshot(DEADLINE).unwrap().unwrap();
+
+    load(&mut owner);
+    // Told with the load itself: what had torn is no more.
+    assert!(client.torn(DEADLINE).unwrap().constraints.is_empty());
+    publish_new_step(&owner, 6);
+    assert_is_new(&mut client);
+    // What was read from the old load stays readable.
+    assert_eq!((held.header().step, held.particles().len()), (5, 4));
+}
+
+#[test]
+fn a_reader_gets_what_it_has_not_read_of_the_old_load_before_the_new_one() {
+    let domain = TestDomain::new();
+    let mut owner = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    connect(&mut client, &owner);
+    for step in 1..=5 {
+        publish_everything(&owner, step);
+    }
+    load(&mut owner);
+    publish_new_step(&owner, 6);
+    for step in 1..=6 {
+        assert_eq!(client.next_snapshot(DEADLINE).unwrap().unwrap().header().step, step);
+    }
+    // The newest of those that are held back is the new one, even behind a full buffer.
+    assert_eq!(client.colliders(DEADLINE).unwrap().header.step, 6);
+    assert_eq!(client.torn(DEADLINE).unwrap().header.step, 6);
+    publish_new_particles(&owner, 7);
+    assert_eq!(client.next_snapshot(DEADLINE).unwrap().unwrap().header().step, 7);
+}
+
+#[test]
+fn a_tap_sees_both_loads_in_their_order() {
+    let domain = TestDomain::new();
+    let mut owner = create_owner(&domain.endpoint()).unwrap();
+    let mut tap = Tap::attach(&domain.endpoint()).unwrap();
+    publish_everything(&owner, 5);
+    load(&mut owner);
+    publish_new_step(&owner, 6);
+    let mut steps = Vec::new();
+    tap.drain_particles(|header, all| steps.push((header.step, all.len())));
+    assert_eq!(steps, [(5, 4), (6, 9)]);
+    let (mut scenes, mut tears) = (Vec::new(), Vec::new());
+    let drained = tap.drain_updates(|update| match update {
+        Update::Scene(_, text) => scenes.push(text.to_vec()),
+        Update::Tears(header, torn) => tears.push((header.step, torn.to_vec())),
+        _ => {}
+    });
+    assert!(drained.errors.is_empty());
+    assert_eq!(scenes, [SCENE.as_bytes(), NEW_SCENE.as_bytes()]);
+    // Each load begins with an empty list.
+    assert_eq!(tears, [(0, vec![]), (5, vec![2]), (6, vec![]), (6, vec![7])]);
+}
+
+#[test]
+fn a_late_joiner_is_given_nothing_of_the_old_load() {
+    let domain = TestDomain::new();
+    let mut owner = create_owner(&domain.endpoint()).unwrap();
+    publish_everything(&owner, 5);
+    load(&mut owner);
+    let mut early = Tap::attach(&domain.endpoint()).unwrap();
+    owner.refresh();
+    // Before its first step the new load has a scene, and nothing of the old one stands beside it.
+    assert_eq!(early.drain_particles(|header, _| panic!("step {}", header.step)).count, 0);
+    let mut kinds = Vec::new();
+    early.drain_updates(|update| {
+        kinds.push(match update {
+            Update::Scene(_, text) if text == NEW_SCENE.as_bytes() => "scene",
+            Update::Topology(header, _) if header.topology_revision == 2 => "topology",
+            Update::Surface(header, _) if header.topology_revision == 2 => "surface",
+            Update::Tears(_, []) => "tears",
+            Update::TearCauses(_, []) => "causes",
+            Update::Status(_) => "status",
+            update => panic!("{update:?}"),
+        });
+    });
+    assert_eq!(kinds, ["scene", "topology", "surface", "tears", "causes", "status"]);
+
+    publish_new_step(&owner, 6);
+    let mut late = Client::attach(&domain.endpoint()).unwrap();
+    connect(&mut late, &owner);
+    assert_is_new(&mut late);
+}
+
+#[test]
+fn a_scene_can_be_loaded_many_times_beside_a_reader_that_never_reads() {
+    let domain = TestDomain::new();
+    let mut owner = create_owner(&domain.endpoint()).unwrap();
+    let _idle = Tap::attach(&domain.endpoint()).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    connect(&mut client, &owner);
+    // More often than a reader can keep the buffers of writers that have gone.
+    for _ in 0..200 {
+        load(&mut owner);
+        publish_new_step(&owner, 6);
+    }
+    assert_is_new(&mut client);
+}
+
+#[test]
+fn a_load_beyond_a_limit_leaves_the_old_one_as_it_was() {
+    let domain = TestDomain::new();
+    let mut owner = create_owner(&domain.endpoint()).unwrap();
+    publish_everything(&owner, 5);
+    new_load(|load| {
+        let error = owner.load(&Load { collider_count: COLLIDERS_MAX + 1, ..*load }).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the scene has 65537 colliders, at most 65536 are possible: take a smaller scene"
+        );
+    });
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    connect(&mut client, &owner);
+    assert_eq!(client.topology(DEADLINE).unwrap().unwrap().constraints, constraints());
+    assert_eq!(client.torn(DEADLINE).unwrap().constraints.len(), 1);
+    publish_step(&owner, 6);
+    assert_eq!(client.latest_snapshot(DEADLINE).unwrap().unwrap().header().step, 6);
+}

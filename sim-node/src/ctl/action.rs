@@ -1,0 +1,160 @@
+//! What a verb of `ctl` asks of the node.
+
+use std::path;
+
+use anyhow::{Context, bail};
+use sim_contract::{Action, SettingKind, Text};
+
+use crate::args::{CtlVerb, PoseArgs, TargetArgs};
+use crate::scene_source;
+
+/// The action of a verb; the questions have none.
+pub(super) fn of(verb: &CtlVerb) -> anyhow::Result<Action> {
+    Ok(match verb {
+        CtlVerb::Pin { particle } => Action::Pin { particle: *particle },
+        CtlVerb::Unpin { particle } => Action::Unpin { particle: *particle },
+        CtlVerb::Grab(args) => {
+            Action::Grab { particle: args.particle, target: target(args), over_s: args.over }
+        }
+        CtlVerb::Move(args) => {
+            Action::Move { particle: args.particle, target: target(args), over_s: args.over }
+        }
+        CtlVerb::Release { particle } => Action::Release { particle: *particle },
+        CtlVerb::Push(args) => Action::Push {
+            center: args.center.vector(),
+            radius: args.radius,
+            delta: numbers(&args.delta)?,
+            limit: args.limit,
+        },
+        CtlVerb::Cut { constraint } => Action::Cut { constraint: *constraint },
+        CtlVerb::CutRadius(args) => {
+            Action::CutRadius { center: args.center.vector(), radius: args.radius }
+        }
+        CtlVerb::CutSegment(args) => Action::CutSegment {
+            from: numbers(&args.from)?,
+            to: numbers(&args.to)?,
+            direction: numbers(&args.direction)?,
+        },
+        CtlVerb::MoveAnchor { anchor, pose } => {
+            let (translation, rotation) = translation_and_rotation(pose)?;
+            Action::MoveAnchor { anchor: *anchor, translation, rotation }
+        }
+        CtlVerb::MoveCollider { collider, pose } => {
+            let (translation, rotation) = translation_and_rotation(pose)?;
+            Action::MoveCollider { collider: *collider, translation, rotation }
+        }
+        CtlVerb::Set(args) => Action::Set {
+            parameter: text(&args.parameter)?,
+            value: args.value().map_err(anyhow::Error::msg)?,
+            constraint_kind: args.constraint_kind().map(SettingKind::Known),
+        },
+        CtlVerb::Load { scene } => Action::Load { scene: scene_of(scene)? },
+        CtlVerb::Pause => Action::Pause,
+        CtlVerb::Resume => Action::Resume,
+        CtlVerb::Step { count } => Action::Step { count: *count },
+        CtlVerb::Reset => Action::Reset,
+        CtlVerb::Status | CtlVerb::Hash => bail!("a question is no command"),
+    })
+}
+
+fn target(args: &TargetArgs) -> [f32; 3] {
+    [args.x, args.y, args.z]
+}
+
+fn translation_and_rotation(pose: &PoseArgs) -> anyhow::Result<([f32; 3], [f32; 4])> {
+    Ok(([pose.x, pose.y, pose.z], numbers(&pose.rotation)?))
+}
+
+/// Clap has counted them already.
+fn numbers<const COUNT: usize>(values: &[f32]) -> anyhow::Result<[f32; COUNT]> {
+    <[f32; COUNT]>::try_from(values).with_context(|| format!("{COUNT} numbers are needed"))
+}
+
+/// A file is named as the node finds it, which runs in another folder.
+fn scene_of(source: &str) -> anyhow::Result<Text> {
+    if !scene_source::is_path(source) {
+        return text(source);
+    }
+    let path = path::absolute(source).with_context(|| format!("{source}: no path"))?;
+    text(path.to_str().with_context(|| format!("{}: not UTF-8", path.display()))?)
+}
+
+/// Cut short it would mean something else.
+fn text(text: &str) -> anyhow::Result<Text> {
+    if text.len() > Text::SIZE_BYTES_MAX {
+        let (size, max) = (text.len(), Text::SIZE_BYTES_MAX);
+        bail!("'{text}' has {size} bytes, a command can hold {max}");
+    }
+    Ok(Text::new(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use sim_contract::{ConstraintKind, SettingValue};
+
+    use super::*;
+    use crate::args::{Args, Verb};
+
+    fn action(line: &str) -> Action {
+        let words = ["sim-node", "ctl"].into_iter().chain(line.split_whitespace());
+        let args = Args::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
+        let Some(Verb::Ctl(ctl)) = args.verb else { panic!("{line}: not ctl") };
+        of(&ctl.verb).unwrap()
+    }
+
+    fn set(name: &str, value: SettingValue, kind: Option<ConstraintKind>) -> Action {
+        let constraint_kind = kind.map(SettingKind::Known);
+        Action::Set { parameter: Text::new(name), value, constraint_kind }
+    }
+
+    #[test]
+    fn pushes_and_cuts_take_negative_numbers_and_have_defaults() {
+        let (center, delta) = ([0.5, -0.5, 0.0], [0.0, -1e10, -0.25]);
+        let push = |limit| Action::Push { center, radius: 0.2, delta, limit };
+        let line = "push 0.5 -0.5 0 --radius 0.2 --delta 0 -1e10 -0.25";
+        assert_eq!(action(line), push(None));
+        assert_eq!(action(&format!("{line} --limit -1")), push(Some(-1.0)));
+        assert_eq!(action("cut 7"), Action::Cut { constraint: 7 });
+        let cut = Action::CutRadius { center: [-1.0, -2.0, -3.0], radius: 0.1 };
+        assert_eq!(action("cut-radius -1 -2 -3 --radius 0.1"), cut);
+        let (from, to) = ([0.0, -0.5, 0.0], [-1.0, 0.5, 0.0]);
+        let cut = |direction| Action::CutSegment { from, to, direction };
+        let line = "cut-segment --from 0 -0.5 0 --to -1 0.5 0";
+        assert_eq!(action(line), cut([0.0, 0.0, 1.0]));
+        assert_eq!(action(&format!("{line} --direction 0 -1 0")), cut([0.0, -1.0, 0.0]));
+    }
+
+    #[test]
+    fn a_pose_is_a_translation_and_perhaps_a_rotation() {
+        let translation = [0.0, 0.1, -0.2];
+        let expected =
+            Action::MoveAnchor { anchor: 3, translation, rotation: [0.0, 0.0, 0.0, 1.0] };
+        assert_eq!(action("move-anchor 3 0 0.1 -0.2"), expected);
+        let rotation = [0.0, -0.6, 0.0, 0.8];
+        let expected = Action::MoveCollider { collider: 2, translation, rotation };
+        assert_eq!(action("move-collider 2 0 0.1 -0.2 --rotation 0 -0.6 0 0.8"), expected);
+    }
+
+    #[test]
+    fn a_value_is_a_number_a_vector_or_off() {
+        let gravity = SettingValue::Vector([0.0, -1.6, 0.0]);
+        assert_eq!(action("set gravity 0 -1.6 0"), set("gravity", gravity, None));
+        let number = SettingValue::Number(-1.0);
+        assert_eq!(action("set damping -1 --timeout 1s"), set("damping", number, None));
+        assert_eq!(action("set tear_force off"), set("tear_force", SettingValue::Off, None));
+        let number = SettingValue::Number(1e-4);
+        let expected = set("compliance", number, Some(ConstraintKind::Bend));
+        assert_eq!(action("set compliance 1e-4 --kind bend"), expected);
+    }
+
+    #[test]
+    fn a_scene_is_a_name_or_a_path_that_the_node_finds() {
+        assert_eq!(action("load rope"), Action::Load { scene: Text::new("rope") });
+        let Action::Load { scene } = action("load ./my.toml") else { panic!("no load") };
+        assert!(scene.as_str().starts_with('/') && scene.as_str().ends_with("/my.toml"));
+        let verb = CtlVerb::Load { scene: "x".repeat(161) };
+        let error = of(&verb).unwrap_err().to_string();
+        assert!(error.ends_with("has 161 bytes, a command can hold 160"), "{error}");
+    }
+}
