@@ -46,6 +46,7 @@
 //! mcap's own types stay inside.
 #![forbid(unsafe_code)]
 
+mod collider_rows;
 mod descriptor;
 mod frames;
 mod message;
@@ -58,6 +59,7 @@ mod run;
 mod topic;
 mod writer;
 
+pub use collider_rows::{ColliderRow, CollidersRow, ShapeRow};
 pub use frames::{Frame, FrameReader};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};

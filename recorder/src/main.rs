@@ -7,6 +7,7 @@ mod command_file;
 mod difference;
 mod endpoint_args;
 mod exit;
+mod frozen;
 mod info;
 mod output;
 mod play;
@@ -17,6 +18,7 @@ mod resimulation;
 mod scene_source;
 mod simulate;
 mod simulation;
+mod solver_rows;
 mod verify;
 
 use clap::{Parser, Subcommand};

@@ -2,6 +2,7 @@
 
 use sim_contract::ParticleState;
 
+use crate::collider_rows::{ColliderRow, CollidersRow};
 use crate::rows::{EventRow, OutcomeRow, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow};
 use crate::topic::Topic;
 
@@ -12,6 +13,8 @@ pub enum Message {
     Topology(TopologyRow),
     /// The triangles.
     Surface(SurfaceRow),
+    /// The colliders after a step.
+    Colliders(CollidersRow),
     /// What tore in a step.
     Tears(TearsRow),
     /// What particles lack of the solver's state after a step.
@@ -38,12 +41,16 @@ pub enum Message {
     },
 }
 
+/// Roughly what the name of a cause takes.
+const TEAR_CAUSE_SIZE_BYTES: usize = 32;
+
 impl Message {
     /// The topic that it belongs to.
     pub fn topic(&self) -> Topic {
         match self {
             Self::Topology(_) => Topic::Topology,
             Self::Surface(_) => Topic::Surface,
+            Self::Colliders(_) => Topic::Colliders,
             Self::Tears(_) => Topic::Tears,
             Self::Keyframe { .. } => Topic::Keyframe,
             Self::Outcome(_) => Topic::Outcomes,
@@ -59,6 +66,7 @@ impl Message {
         match self {
             Self::Topology(row) => row.step,
             Self::Surface(row) => row.step,
+            Self::Colliders(row) => row.step,
             Self::Tears(row) => row.step,
             Self::Outcome(row) => row.step,
             Self::Status(row) => row.step,
@@ -73,7 +81,8 @@ impl Message {
         let behind = match self {
             Self::Topology(row) => row.a.len() * (4 * size_of::<u32>() + size_of::<f32>()),
             Self::Surface(row) => size_of_val(row.triangles.as_slice()),
-            Self::Tears(row) => size_of_val(row.constraints.as_slice()),
+            Self::Colliders(row) => row.colliders.len() * size_of::<ColliderRow>(),
+            Self::Tears(row) => row.constraints.len() * (size_of::<u32>() + TEAR_CAUSE_SIZE_BYTES),
             Self::Keyframe { bytes, .. } => bytes.len(),
             Self::Particles { particles, .. } => size_of_val(particles.as_slice()),
             Self::Outcome(_) | Self::Status(_) | Self::Event(_) | Self::Step(_) => 0,

@@ -12,7 +12,8 @@ use crate::message::Message;
 use crate::protobuf::decode_particles;
 use crate::records::{LogEnd, READ_SIZE_BYTES_MAX, RecordReader};
 use crate::run::{
-    CLOSING_METADATA, Closing, FORMAT_VERSION, RUN_METADATA, RunDescription, SCENE_ATTACHMENT,
+    CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
+    SCENE_ATTACHMENT,
 };
 use crate::topic::Topic;
 
@@ -37,7 +38,9 @@ pub enum ReadError {
     #[error("has no readable head: {0}")]
     NoHead(LogEnd),
     /// Written by another version of the recorder.
-    #[error("has format version {found}; this recorder reads version {FORMAT_VERSION}")]
+    #[error(
+        "has format version {found}; this recorder reads versions {FORMAT_VERSION_MIN} to {FORMAT_VERSION}"
+    )]
     Version {
         /// What the file says.
         found: String,
@@ -217,8 +220,11 @@ fn read_head_record(record: Record<'_>, _byte: u64) -> Result<HeadRecord, ReadEr
 }
 
 fn read_run(map: &BTreeMap<String, String>) -> Result<RunDescription, ReadError> {
+    let is_read = |found: &String| {
+        found.parse().is_ok_and(|one| (FORMAT_VERSION_MIN..=FORMAT_VERSION).contains(&one))
+    };
     match map.get("format_version") {
-        Some(found) if *found == FORMAT_VERSION.to_string() => {}
+        Some(found) if is_read(found) => {}
         Some(found) => return Err(ReadError::Version { found: found.clone() }),
         None => return Err(ReadError::BadRun { key: "format_version".to_owned() }),
     }
@@ -237,6 +243,7 @@ fn read_message(
         Topic::Tf => return Ok(None),
         Topic::Topology => Message::Topology(row(data)?),
         Topic::Surface => Message::Surface(row(data)?),
+        Topic::Colliders => Message::Colliders(row(data)?),
         Topic::Tears => Message::Tears(row(data)?),
         Topic::Outcomes => Message::Outcome(row(data)?),
         Topic::Status => Message::Status(row(data)?),

@@ -176,7 +176,8 @@ pub struct TopologyRow {
     pub softness: Softness,
     /// 0 structural, 1 shear, 2 bend, 3 tether.
     pub kind: Vec<u32>,
-    /// Indices of the constraints that were torn at this step.
+    /// Indices of the constraints that were torn before the first snapshot of the file, in the order
+    /// of tearing.
     pub torn: Vec<u32>,
 }
 
@@ -200,7 +201,7 @@ struct SoftnessSchema {
 }
 
 impl TopologyRow {
-    /// The row of a load. Nothing is torn at a load.
+    /// The row of a load, with nothing torn.
     pub fn new(header: &LoadHeader, constraints: &[ConstraintState]) -> Self {
         let softness = constraints.iter().map(|c| PlainF32(c.compliance)).collect();
         Self {
@@ -261,12 +262,12 @@ impl SurfaceRow {
     }
 }
 
-/// What tore in one step.
+/// What tore in one step; also in those before it, where a recorder was not told at once.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct TearsRow {
     /// The step that shows it.
     pub step: u64,
-    /// Indices of the constraints, ascending.
+    /// Indices of the constraints, in the order of tearing.
     pub constraints: Vec<u32>,
     /// "force", "stretch", "distance" or "cut" for each of them, where that is known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -353,7 +354,7 @@ fn real_time() -> f64 {
 }
 
 /// The schema of a number in any JSON of ours: non-finite ones are strings.
-struct JsonNumber;
+pub(crate) struct JsonNumber;
 
 impl JsonSchema for JsonNumber {
     fn schema_name() -> Cow<'static, str> {

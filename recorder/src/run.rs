@@ -7,7 +7,11 @@ use std::str::FromStr;
 use crate::topic::{AllCounts, Topic};
 
 /// Version of what is in a file: topics, rows, metadata. It changes with any change of these.
-pub const FORMAT_VERSION: u32 = 1;
+///
+/// Version 2 has `/colliders`, the causes of tears, and what was torn before in `/topology`.
+pub const FORMAT_VERSION: u32 = 2;
+/// Oldest version that is read: what it lacks has a default.
+pub(crate) const FORMAT_VERSION_MIN: u32 = 1;
 
 /// Name of the metadata record that [`RunDescription`] is written as.
 pub(crate) const RUN_METADATA: &str = "run";

@@ -1,20 +1,18 @@
 //! A scene and commands, stepped in this process and written as a live run would be.
 
+mod writer;
+
 use std::io::Write;
 use std::ops::ControlFlow;
 
-use bytemuck::cast;
-use recorder::{
-    LogWriter, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TopologyRow, WriteError,
-};
-use sim_contract::{
-    Action, CONTRACT_VERSION, Command, ConstraintState, LoadHeader, Outcome, Triangle,
-};
+use recorder::{LogWriter, OutcomeRow, RunDescription, WriteError};
+use sim_contract::{Action, CONTRACT_VERSION, Command, Outcome};
 use sim_solver::{SOLVER_VERSION, Scene, Solver};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::apply::apply;
 use crate::command_file::TimedCommand;
+use writer::{KeyframeDue, StateWriter};
 
 /// What is simulated.
 #[derive(Debug)]
@@ -81,7 +79,7 @@ pub(crate) fn simulate<W: Write>(
     log: Option<&mut LogWriter<W>>,
     mut on_step: impl FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Outcomes, WriteError> {
-    let mut writer = log.map(|log| Writer::new(log, job, &solver)).transpose()?;
+    let mut writer = log.map(|log| StateWriter::new(log, job, &solver)).transpose()?;
     let mut outcomes = Outcomes::at_start(&solver);
     if let Some(writer) = &mut writer {
         writer.write_state(&solver, 0, KeyframeDue::Now)?;
@@ -125,85 +123,6 @@ impl Outcomes {
         self.applied_count += u64::from(outcome.is_applied());
         self.rejected_count += u64::from(!outcome.is_applied());
         outcome
-    }
-}
-
-/// When the state is to be written completely.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum KeyframeDue {
-    /// With this step.
-    Now,
-    /// If this step is a whole second.
-    OnTheSecond,
-}
-
-/// Writes a simulation step by step, in the order in which a node publishes.
-struct Writer<'a, W: Write> {
-    log: &'a mut LogWriter<W>,
-    run: RunDescription,
-    /// Those of the step that comes next.
-    outcomes: Vec<OutcomeRow>,
-    outcome_count: u64,
-}
-
-impl<'a, W: Write> Writer<'a, W> {
-    fn new(log: &'a mut LogWriter<W>, job: &Job, solver: &Solver) -> Result<Self, WriteError> {
-        let run = job.description(solver);
-        let header = LoadHeader { method: run.method, ..LoadHeader::default() };
-        let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
-        let triangles: Vec<_> =
-            solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-        log.write(&Message::Topology(TopologyRow::new(&header, &constraints)), 0)?;
-        log.write(&Message::Surface(SurfaceRow::new(&header, &triangles)), 0)?;
-        Ok(Self { log, run, outcomes: Vec::new(), outcome_count: 0 })
-    }
-
-    fn write_state(
-        &mut self,
-        solver: &Solver,
-        step: u64,
-        keyframe: KeyframeDue,
-    ) -> Result<(), WriteError> {
-        let time_ns = self.run.time_of_step_ns(step);
-        let is_second = step.is_multiple_of(u64::from(self.run.rate_hz));
-        // By simulated seconds, not by those of the wall: equal inputs give equal files.
-        if is_second && step > 0 {
-            self.log.flush()?;
-        }
-        if is_second || keyframe == KeyframeDue::Now {
-            let bytes = solver.keyframe().encode();
-            self.log.write(&Message::Keyframe { step, bytes }, time_ns)?;
-        }
-        for row in self.outcomes.drain(..) {
-            self.outcome_count += 1;
-            self.log.write(&Message::Outcome(row), time_ns)?;
-        }
-        self.log.write(&Message::Step(self.row(solver, step)), time_ns)?;
-        let particles = (0..solver.particle_count()).map(|index| cast(solver.particle(index)));
-        self.log.write(&Message::Particles { step, particles: particles.collect() }, time_ns)
-    }
-
-    fn row(&self, solver: &Solver, step: u64) -> StepRow {
-        StepRow {
-            step,
-            scene_step: solver.scene_step(),
-            state_hash: solver.state_hash(),
-            topology_revision: 0,
-            torn_count: count(solver.torn().len()),
-            outcome_count: self.outcome_count,
-            wake_late_ns: 0,
-            solve_ns: 0,
-        }
-    }
-}
-
-fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
-    ConstraintState {
-        a: constraint.a,
-        b: constraint.b,
-        rest_length: constraint.rest_length,
-        compliance: constraint.compliance,
-        kind: constraint.kind as u32,
     }
 }
 

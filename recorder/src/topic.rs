@@ -10,6 +10,8 @@ pub enum Topic {
     Topology,
     /// [`crate::SurfaceRow`]: the triangles. Once a file.
     Surface,
+    /// [`crate::CollidersRow`]: where colliders are, at first and when it changes.
+    Colliders,
     /// [`crate::TearsRow`]: only for steps in which something tore.
     Tears,
     /// What particles lack of the solver's state, as the solver encodes it.
@@ -28,10 +30,11 @@ pub enum Topic {
 
 impl Topic {
     /// Every topic, in order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Tf,
         Self::Topology,
         Self::Surface,
+        Self::Colliders,
         Self::Tears,
         Self::Keyframe,
         Self::Outcomes,
@@ -47,6 +50,7 @@ impl Topic {
             Self::Tf => "/tf",
             Self::Topology => "/topology",
             Self::Surface => "/surface",
+            Self::Colliders => "/colliders",
             Self::Tears => "/tears",
             Self::Keyframe => "/keyframe",
             Self::Outcomes => "/outcomes",

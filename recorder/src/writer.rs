@@ -10,6 +10,7 @@ use mcap::{Attachment, WriteOptions, Writer};
 use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 
+use crate::collider_rows::CollidersRow;
 use crate::descriptor::{FRAME_TRANSFORM, POINT_CLOUD, file_descriptor_set};
 use crate::message::Message;
 use crate::protobuf::{PointCloudEncoder, encode_transform};
@@ -258,6 +259,7 @@ fn add_channel<W: Write>(file: &mut Writer<NoSeek<W>>, topic: Topic) -> mcap::Mc
     let (schema_id, encoding) = match topic {
         Topic::Topology => json("catenary.Topology", schema::<TopologyRow>()),
         Topic::Surface => json("catenary.Surface", schema::<SurfaceRow>()),
+        Topic::Colliders => json("catenary.Colliders", schema::<CollidersRow>()),
         Topic::Tears => json("catenary.Tears", schema::<TearsRow>()),
         Topic::Outcomes => json("catenary.Outcome", schema::<OutcomeRow>()),
         Topic::Status => json("catenary.Status", schema::<StatusRow>()),
@@ -292,6 +294,7 @@ fn encode<'a>(
     match message {
         Message::Topology(row) => json(row, scratch)?,
         Message::Surface(row) => json(row, scratch)?,
+        Message::Colliders(row) => json(row, scratch)?,
         Message::Tears(row) => json(row, scratch)?,
         Message::Outcome(row) => json(row, scratch)?,
         Message::Status(row) => json(row, scratch)?,

@@ -6,13 +6,13 @@
 use std::io::{Cursor, Read};
 
 use recorder::{
-    Closing, EventRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Logged, Message,
-    OutcomeRow, ReadError, RunDescription, StatusRow, StepRow, SurfaceRow, TearsRow, Topic,
-    TopologyRow, WriteError,
+    Closing, CollidersRow, EventRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Logged,
+    Message, OutcomeRow, ReadError, RunDescription, StatusRow, StepRow, SurfaceRow, TearsRow,
+    Topic, TopologyRow, WriteError,
 };
 use sim_contract::{
-    Action, Command, ConstraintState, LoadHeader, NodeStatus, Outcome, ParticleState, Reason,
-    Triangle,
+    Action, ColliderState, Command, ConstraintState, LoadHeader, NodeStatus, Outcome,
+    ParticleState, Reason, Triangle,
 };
 
 fn run() -> RunDescription {
@@ -67,6 +67,11 @@ fn outcomes() -> [OutcomeRow; 2] {
     ]
 }
 
+fn colliders(step: u64) -> CollidersRow {
+    let floor = ColliderState { normal: [0.0, 1.0, 0.0], friction: 0.5, ..Default::default() };
+    CollidersRow::new(step, &[floor]).unwrap()
+}
+
 fn messages() -> Vec<Message> {
     let load = LoadHeader { particle_count: 2, rate_hz: 240, ..LoadHeader::default() };
     let constraint = ConstraintState { a: 0, b: 1, rest_length: 0.1, compliance: 1e-7, kind: 2 };
@@ -76,6 +81,7 @@ fn messages() -> Vec<Message> {
     let mut messages = vec![
         Message::Topology(TopologyRow::new(&load, &[constraint])),
         Message::Surface(SurfaceRow::new(&load, &[Triangle { corners: [0, 1, 0] }])),
+        Message::Colliders(colliders(2)),
         Message::Tears(TearsRow { step: 2, constraints: vec![0], causes: vec!["cut".to_owned()] }),
         Message::Keyframe { step: 2, bytes: vec![0, 255, 3] },
         Message::Step(step_row(2)),
@@ -177,6 +183,38 @@ fn rows_have_the_documented_form() {
 }
 
 #[test]
+fn rows_beside_the_snapshots_have_the_documented_form() {
+    let expected = [
+        r#"{"step":2,"colliders":[{"shape":"plane","normal":[0.0,1.0,0.0],"offset":0.0,"restitution":0.0,"friction":0.5,"velocity":[0.0,0.0,0.0]}]}"#,
+        r#"{"step":2,"constraints":[0],"causes":["cut"]}"#,
+        r#"{"step":3,"kind":"frozen","particle":1,"text":"particle 1 was not finite"}"#,
+    ];
+    let rows = messages().into_iter().filter_map(|message| match message {
+        Message::Colliders(row) => Some(serde_json::to_string(&row).unwrap()),
+        Message::Tears(row) => Some(serde_json::to_string(&row).unwrap()),
+        Message::Event(row) => Some(serde_json::to_string(&row).unwrap()),
+        _ => None,
+    });
+    assert_eq!(rows.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn a_recording_of_the_first_format_is_read_and_one_of_the_next_is_refused() {
+    let with_version = |version: &str| {
+        let mut file = write(LogOptions::default());
+        let needle = b"format_version\x01\0\0\x002";
+        let place = file.windows(needle.len()).position(|window| window == needle).unwrap();
+        file[place + needle.len() - 1] = version.as_bytes()[0];
+        LogReader::new(Cursor::new(file)).map(|_| ())
+    };
+    assert!(with_version("1").is_ok());
+    assert_eq!(
+        with_version("3").unwrap_err().to_string(),
+        "has format version 3; this recorder reads versions 1 to 2"
+    );
+}
+
+#[test]
 fn log_time_never_goes_back() {
     let mut log = LogWriter::create(Vec::new(), LogOptions::default(), &run(), SCENE, 50).unwrap();
     for (step, log_time_ns) in [(0, 60), (1, 40), (2, 70)] {
@@ -192,7 +230,7 @@ fn frames_hold_what_leads_up_to_a_snapshot() {
     let file = write(LogOptions::default());
     let mut frames = FrameReader::new(LogReader::new(file.as_slice()).unwrap());
     let first = frames.next_frame().unwrap().unwrap();
-    assert_eq!((first.row.step, first.updates.len()), (2, 4));
+    assert_eq!((first.row.step, first.updates.len()), (2, 5));
     let second = frames.next_frame().unwrap().unwrap();
     assert_eq!((second.row.step, second.updates.len()), (3, 4));
     let mut step = 3;
@@ -323,7 +361,7 @@ fn other_files_are_named_for_what_they_are() {
 #[test]
 fn nothing_is_written_after_the_first_error() {
     let shared = SharedOut::default();
-    let full = shared.clone().limited_to(4000);
+    let full = shared.clone().limited_to(10_000);
     let options = LogOptions { chunk_size_bytes: 100, ..LogOptions::default() };
     let mut log = LogWriter::create(full, options, &run(), SCENE, 0).unwrap();
     let error = (0..10_000)

@@ -1,0 +1,68 @@
+//! From the state of a solver to the rows of `/colliders` and `/tears`.
+
+use recorder::{CollidersRow, TearsRow};
+use sim_contract::{ColliderShape, ColliderState, TearCause};
+use sim_solver::{PlacedCollider, Solver};
+
+/// The colliders as they stand after `step`.
+pub(crate) fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
+    let states: Vec<_> = solver.colliders().map(|collider| state(&collider)).collect();
+    // Every shape of this solver has its row.
+    CollidersRow::new(step, &states).unwrap_or(CollidersRow { step, colliders: Vec::new() })
+}
+
+/// What tore in the last step, which is `step`; `None` if nothing did.
+pub(crate) fn new_tears_row(solver: &Solver, step: u64) -> Option<TearsRow> {
+    let count = solver.new_torn_count();
+    (count > 0).then(|| newest_tears_row(solver, step, count))
+}
+
+/// The newest `count` torn constraints, or all if there are fewer.
+pub(crate) fn newest_tears_row(solver: &Solver, step: u64, count: usize) -> TearsRow {
+    let first = solver.torn().len().saturating_sub(count);
+    let causes = solver.tear_causes()[first..].iter();
+    TearsRow {
+        step,
+        constraints: solver.torn()[first..].to_vec(),
+        causes: causes.map(|cause| cause_of(*cause).name().to_owned()).collect(),
+    }
+}
+
+/// The cause as the contract numbers and names it.
+pub(crate) fn cause_of(cause: sim_solver::TearCause) -> TearCause {
+    match cause {
+        sim_solver::TearCause::Force => TearCause::Force,
+        sim_solver::TearCause::Stretch => TearCause::Stretch,
+        sim_solver::TearCause::Distance => TearCause::Distance,
+        sim_solver::TearCause::Cut => TearCause::Cut,
+    }
+}
+
+fn state(collider: &PlacedCollider) -> ColliderState {
+    let PlacedCollider { shape, restitution, friction, velocity, angular_velocity } = *collider;
+    let any = ColliderState {
+        restitution,
+        friction,
+        velocity,
+        angular_velocity,
+        ..ColliderState::default()
+    };
+    let of = |shape: ColliderShape| ColliderState { shape: shape as u32, ..any };
+    match shape {
+        sim_solver::ColliderShape::Plane { normal, offset } => {
+            ColliderState { normal, offset, ..of(ColliderShape::Plane) }
+        }
+        sim_solver::ColliderShape::Box { center, half_extents, rotation } => {
+            ColliderState { center, half_extents, rotation, ..of(ColliderShape::Box) }
+        }
+        sim_solver::ColliderShape::Sphere { center, radius } => {
+            ColliderState { center, radius, ..of(ColliderShape::Sphere) }
+        }
+        sim_solver::ColliderShape::Capsule { a, b, radius } => {
+            ColliderState { a, b, radius, ..of(ColliderShape::Capsule) }
+        }
+        sim_solver::ColliderShape::Bounds { min, max } => {
+            ColliderState { a: min, b: max, ..of(ColliderShape::Bounds) }
+        }
+    }
+}
