@@ -20,6 +20,16 @@ pub struct Frame {
     pub particles: Vec<ParticleState>,
 }
 
+impl Frame {
+    /// The keyframe that completes this snapshot, if there is one.
+    pub fn own_keyframe(&self) -> Option<&[u8]> {
+        self.updates.iter().rev().find_map(|update| match update {
+            Message::Keyframe { step, bytes } if *step == self.row.step => Some(bytes.as_slice()),
+            _ => None,
+        })
+    }
+}
+
 /// Reads a recording snapshot by snapshot.
 #[derive(Debug)]
 pub struct FrameReader<R> {

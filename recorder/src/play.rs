@@ -2,6 +2,7 @@
 
 mod control;
 mod pace;
+mod position;
 mod replay;
 #[cfg(test)]
 mod replay_tests;
@@ -12,16 +13,22 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::{Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow};
+use recorder::{
+    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
+};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Endpoint, Stop};
+use sim_contract::{Endpoint, Stop, TearCause};
+use sim_solver::{Keyframe, Solver};
 
 use crate::endpoint_args::EndpointArgs;
 use crate::exit::Exit;
 use crate::output;
+use crate::scene_source::scene_of;
+use crate::solver_rows::cause_of;
 use control::Control;
 use pace::Pace;
-use replay::{Position, Recorded, Replay};
+use position::Position;
+use replay::{Recorded, Replay};
 
 /// Longest wait before commands, readers and signals are looked at.
 const WAIT_MAX_NS: u64 = SECOND_NS / 100;
@@ -119,18 +126,28 @@ impl Pass {
     fn open(args: &PlayArgs, endpoint: &Endpoint) -> anyhow::Result<Self> {
         let log = LogReader::open(&args.file)?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
+        let mut solver = Solver::new(&scene_of(&log, &output::name_of(&args.file))?);
         let mut frames = FrameReader::new(log);
         let mut first = next_frame(&mut frames)?;
         let (topology, surface) = load_of(&first)?;
+        let colliders = first_colliders(&first).map(|row| row.colliders.len());
+        let collider_count = colliders.unwrap_or_else(|| solver.collider_count());
         let origin_ns = run.time_of_step_ns(first.row.step);
         let start_ns = origin_ns.saturating_add(nanoseconds(args.start.unwrap_or_default()));
-        let mut position = Position::default();
+        let causes = causes_before(&mut solver, &first, &topology.torn);
+        let mut position = Position::new(&topology.torn, causes);
         while run.time_of_step_ns(first.row.step) < start_ns {
-            first.updates.iter().for_each(|update| position.skip(update));
+            position.skip(&first.updates);
             first = next_frame(&mut frames).context("--start is behind its last snapshot")?;
         }
-        let recorded =
-            Recorded { run: &run, scene: &scene, topology: &topology, surface: &surface };
+        let recorded = Recorded {
+            run: &run,
+            scene: &scene,
+            topology: &topology,
+            surface: &surface,
+            collider_count,
+            keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
+        };
         let replay = Replay::new(endpoint, &recorded, position, args.rate)?;
         let end_ns = args.end.map_or(u64::MAX, |end| origin_ns.saturating_add(nanoseconds(end)));
         let pace = Pace::new(args.rate);
@@ -231,6 +248,23 @@ fn load_of(first: &Frame) -> anyhow::Result<(TopologyRow, SurfaceRow)> {
     });
     let topology = topology.context("has no /topology before its first snapshot")?;
     Ok((topology, surface.context("has no /surface before its first snapshot")?))
+}
+
+/// The number of colliders never changes in a recording.
+fn first_colliders(first: &Frame) -> Option<&CollidersRow> {
+    first.updates.iter().find_map(|update| match update {
+        Message::Colliders(row) => Some(row),
+        _ => None,
+    })
+}
+
+/// Why each of `torn` tore before the recording: that stands in the first keyframe only. `None` if
+/// nothing did, or if the keyframe is of another version.
+fn causes_before(solver: &mut Solver, first: &Frame, torn: &[u32]) -> Option<Vec<TearCause>> {
+    let keyframe = Keyframe::decode(first.own_keyframe()?).ok()?;
+    solver.restore(bytemuck::cast_slice(&first.particles), &keyframe).ok()?;
+    let causes = solver.tear_causes().iter().map(|cause| cause_of(*cause));
+    solver.torn().starts_with(torn).then(|| causes.take(torn.len()).collect())
 }
 
 fn nanoseconds(duration: Duration) -> u64 {

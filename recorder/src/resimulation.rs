@@ -1,14 +1,17 @@
 //! Simulates a recording again and compares every recorded step, from the file alone.
 
+mod side_rows;
+
 use std::collections::BTreeMap;
 
 use recorder::{Frame, Message, OutcomeRow, StepRow};
-use sim_contract::{Outcome, ParticleState};
+use sim_contract::{Action, Outcome, ParticleState};
 use sim_solver::{Keyframe, Scene, Solver};
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 use crate::apply::{apply, is_control};
 use crate::difference::{Difference, first_difference};
+use side_rows::SideRows;
 
 /// What the comparison of one snapshot found. The texts are for people.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,13 +53,14 @@ pub(crate) struct Resimulation {
     next_index: u64,
     /// Outcomes that have been read and not applied, by index.
     waiting: BTreeMap<u64, OutcomeRow>,
+    side_rows: SideRows,
 }
 
 impl Resimulation {
     /// Starts at a snapshot that has its keyframe; `None` if it has none.
     pub(crate) fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, StartError> {
         let step = frame.row.step;
-        let Some(bytes) = own_keyframe(frame) else { return Ok(None) };
+        let Some(bytes) = frame.own_keyframe() else { return Ok(None) };
         let keyframe =
             Keyframe::decode(bytes).map_err(|cause| StartError::Keyframe { step, cause })?;
         let mut solver = Solver::new(scene);
@@ -64,9 +68,15 @@ impl Resimulation {
             .restore(bytemuck::cast_slice(&frame.particles), &keyframe)
             .map_err(|cause| StartError::State { step, cause })?;
         let next_index = frame.row.outcome_count;
-        let mut start =
-            Self { scene: scene.clone(), solver, step, next_index, waiting: BTreeMap::new() };
-        start.take_outcomes(&frame.updates);
+        let mut start = Self {
+            scene: scene.clone(),
+            solver,
+            step,
+            next_index,
+            waiting: BTreeMap::new(),
+            side_rows: SideRows::default(),
+        };
+        start.take_updates(frame);
         Ok(Some(start))
     }
 
@@ -80,7 +90,7 @@ impl Resimulation {
 
     /// Steps to the next snapshot and compares it.
     pub(crate) fn advance(&mut self, frame: &Frame) -> Finding {
-        self.take_outcomes(&frame.updates);
+        self.take_updates(frame);
         let row = &frame.row;
         if row.step <= self.step {
             let what = format!("it follows step {} in the file", self.step);
@@ -93,13 +103,25 @@ impl Resimulation {
             if let Some(finding) = self.make_step() {
                 return finding;
             }
+            // Of the snapshot's own step, a particle says more than the rows beside it.
+            if self.step < row.step
+                && let Some(finding) = self.compare_side_rows()
+            {
+                return finding;
+            }
         }
         // Whatever the header counts has been applied, or its step is another one.
         if self.next_index != row.outcome_count {
             return self.misplaced(row.step, "its step is not one of those it counts for");
         }
         match compare(&self.solver, frame) {
-            Finding::Identical => self.compare_keyframe(frame),
+            Finding::Identical => {
+                self.compare_side_rows().unwrap_or_else(|| self.compare_keyframe(frame))
+            }
+            // Other torn constraints, for one: these rows say which.
+            different @ Finding::Diverged { difference: None, .. } => {
+                self.compare_side_rows().unwrap_or(different)
+            }
             different => different,
         }
     }
@@ -107,7 +129,7 @@ impl Resimulation {
     /// What particles lack must be as recorded, too, where it is recorded.
     fn compare_keyframe(&self, frame: &Frame) -> Finding {
         let step = frame.row.step;
-        let recorded = own_keyframe(frame).map(Keyframe::decode);
+        let recorded = frame.own_keyframe().map(Keyframe::decode);
         let mut simulated = self.solver.keyframe();
         let what = match recorded {
             None => return Finding::Identical,
@@ -118,15 +140,24 @@ impl Resimulation {
                 if recorded == simulated {
                     return Finding::Identical;
                 }
-                "its keyframe is of another state: other masses, grabs or torn constraints"
+                "its keyframe is of another state: other masses, grabs, parameters or torn \
+                 constraints, or other moved anchors or colliders"
                     .to_owned()
             }
         };
         Finding::Diverged { step, what, difference: None }
     }
 
-    fn take_outcomes(&mut self, updates: &[Message]) {
-        let outcomes = updates.iter().filter_map(|update| match update {
+    fn compare_side_rows(&mut self) -> Option<Finding> {
+        let step = self.step;
+        let what = self.side_rows.compare(&self.solver, step)?;
+        Some(Finding::Diverged { step, what, difference: None })
+    }
+
+    fn take_updates(&mut self, frame: &Frame) {
+        // What is of the state that this started from has been restored, not simulated.
+        self.side_rows.take(&frame.updates, self.step + 1);
+        let outcomes = frame.updates.iter().filter_map(|update| match update {
             // Those below are part of the state that this started from.
             Message::Outcome(row) if row.index >= self.next_index => Some(row),
             _ => None,
@@ -168,12 +199,17 @@ impl Resimulation {
         None
     }
 
-    /// Pause, resume and step say when steps were made; whether a node took them is not repeated.
+    /// Pause, resume and step say when steps were made, and a refused load changes nothing; whether
+    /// and why a node took them or not is not repeated.
     fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
+        let is_applied = Outcome::from(row).is_applied();
+        if is_control(row.action) || matches!(row.action, Action::Load { .. }) && !is_applied {
+            return None;
+        }
         let result = apply(&mut self.solver, row.client_id, row.action);
         let again = Outcome::new(row.index, row.step, Outcome::from(row).command, result);
         let again = OutcomeRow::from(&again);
-        if is_control(row.action) || (again.status == row.status && again.reason == row.reason) {
+        if again.status == row.status && again.reason == row.reason {
             return None;
         }
         let what = format!(
@@ -187,14 +223,6 @@ impl Resimulation {
         let what = format!("outcome {} is not where it belongs: {why}", self.next_index);
         Finding::Diverged { step, what, difference: None }
     }
-}
-
-/// The keyframe that completes a snapshot, if there is one.
-fn own_keyframe(frame: &Frame) -> Option<&[u8]> {
-    frame.updates.iter().rev().find_map(|update| match update {
-        Message::Keyframe { step, bytes } if *step == frame.row.step => Some(bytes.as_slice()),
-        _ => None,
-    })
 }
 
 /// The recorded header, the recorded payload and the simulated state must be one.
@@ -218,16 +246,19 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
         );
         return diverged(what, difference);
     }
+    let counts = [
+        ("scene_step", row.scene_step, solver.scene_step()),
+        ("torn_count", u64::from(row.torn_count), solver.torn().len() as u64),
+    ];
+    let is_other = |(_, recorded, simulated): &(_, u64, u64)| recorded != simulated;
+    if let Some((name, recorded, simulated)) = counts.into_iter().find(is_other) {
+        return diverged(format!("{name}: recorded {recorded}, simulated {simulated}"), None);
+    }
     if row.state_hash != simulated_hash {
         let what = format!(
             "its row in /steps has the hash {:016x}, its particles have {simulated_hash:016x}",
             row.state_hash
         );
-        return diverged(what, None);
-    }
-    if row.scene_step != solver.scene_step() {
-        let what =
-            format!("scene_step: recorded {}, simulated {}", row.scene_step, solver.scene_step());
         return diverged(what, None);
     }
     Finding::Identical

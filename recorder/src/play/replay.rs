@@ -1,17 +1,15 @@
 //! Publishes a recording as the node did that was recorded.
 
 use anyhow::{Context, bail};
-use recorder::{
-    Frame, Message, OutcomeRow, RunDescription, StatusRow, SurfaceRow, TearsRow, TopologyRow,
-};
+use recorder::{CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    Action, CONTRACT_VERSION, Command, Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus,
-    Outcome, Owner, SnapshotFlags, SnapshotHeader, StatusFlags, TearCause, TearsHeader, Wake,
+    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, Load, LoadHeader,
+    NodeStatus, Outcome, Owner, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Wake,
 };
-use sim_solver::Keyframe;
 
 use super::control::Control;
+use super::position::{Happening, Position, happenings};
 
 /// What a recording has at its head: enough to take a name.
 #[derive(Debug)]
@@ -20,6 +18,9 @@ pub(crate) struct Recorded<'a> {
     pub(crate) scene: &'a [u8],
     pub(crate) topology: &'a TopologyRow,
     pub(crate) surface: &'a SurfaceRow,
+    pub(crate) collider_count: usize,
+    /// The longest keyframe of its scene.
+    pub(crate) keyframe_size_bytes_max: usize,
 }
 
 /// One pass of a recording: a run of its own.
@@ -40,76 +41,6 @@ pub(crate) struct Replay {
     arrived: Vec<Command>,
 }
 
-/// What the headers follow from, as far as it does not stand in `/steps`.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Position {
-    keyframe_step: u64,
-    /// The newest keyframe before the first snapshot that is played: a late joiner of the live
-    /// node would have found it.
-    latched_keyframe: Option<Vec<u8>>,
-    /// Whether the node was paused.
-    is_paused: bool,
-    /// Outcomes so far.
-    outcome_count: u64,
-    rejected_count: u64,
-    /// All constraints torn so far, in order.
-    torn: Vec<u32>,
-    /// Why each of them tore, as numbers of the contract.
-    tear_causes: Vec<u8>,
-}
-
-/// A number of no [`TearCause`]: the recording does not say why.
-const TEAR_CAUSE_NOT_KNOWN: u8 = u8::MAX;
-
-impl Position {
-    /// Follows what is published before the first snapshot that is played.
-    pub(crate) fn skip(&mut self, update: &Message) {
-        self.follow(update);
-        if let Message::Keyframe { bytes, .. } = update {
-            self.latched_keyframe = Some(bytes.clone());
-        }
-    }
-
-    /// Follows what is published before a snapshot.
-    pub(crate) fn follow(&mut self, update: &Message) {
-        match update {
-            Message::Keyframe { step, bytes } => {
-                self.keyframe_step = *step;
-                // One of another version is published all the same; it says nothing here.
-                if let Ok(keyframe) = Keyframe::decode(bytes) {
-                    self.is_paused = keyframe.paused;
-                }
-            }
-            Message::Outcome(row) => self.follow_outcome(row),
-            Message::Tears(row) => self.follow_tears(row),
-            _ => {}
-        }
-    }
-
-    fn follow_tears(&mut self, row: &TearsRow) {
-        for (place, constraint) in row.constraints.iter().enumerate() {
-            let cause = row.causes.get(place).and_then(|name| TearCause::from_name(name));
-            self.torn.push(*constraint);
-            self.tear_causes.push(cause.map_or(TEAR_CAUSE_NOT_KNOWN, |cause| cause as u8));
-        }
-    }
-
-    fn follow_outcome(&mut self, row: &OutcomeRow) {
-        let is_applied = Outcome::from(row).is_applied();
-        self.outcome_count = row.index + 1;
-        self.rejected_count += u64::from(!is_applied);
-        // A keyframe of the same step stands before it in the file and knows better.
-        if !is_applied || row.step <= self.keyframe_step {
-            return;
-        }
-        match row.action {
-            Action::Pause => self.is_paused = true,
-            Action::Resume => self.is_paused = false,
-            _ => {}
-        }
-    }
-}
-
 impl Replay {
     /// Takes the name and publishes the scene.
     pub(crate) fn new(
@@ -118,7 +49,7 @@ impl Replay {
         position: Position,
         rate: f64,
     ) -> anyhow::Result<Self> {
-        let Recorded { run, scene, topology, surface } = *recorded;
+        let Recorded { run, scene, topology, surface, .. } = *recorded;
         let run_id = getrandom::u64().context("no random number for the run")?;
         let constraints = topology.constraints().context("/topology has unequal columns")?;
         let triangles = surface.triangles().context("/surface has half a triangle")?;
@@ -132,15 +63,13 @@ impl Replay {
             method: run.method,
             ..LoadHeader::default()
         };
-        let (particles, links) = (run.particle_count as usize, constraints.len());
         let load = Load {
             header,
             scene,
             constraints: &constraints,
             triangles: &triangles,
-            collider_count: 0,
-            // More than any keyframe of such a scene takes.
-            keyframe_size_bytes_max: 64 + 48 * particles + 8 * links,
+            collider_count: recorded.collider_count,
+            keyframe_size_bytes_max: recorded.keyframe_size_bytes_max,
         };
         let owner = Owner::create(endpoint, &load)?;
         let run = run.clone();
@@ -150,8 +79,11 @@ impl Replay {
     }
 
     /// Publishes what a late joiner of the live node would have found before the first snapshot of
-    /// this pass: what tore, and the newest keyframe.
+    /// this pass: the colliders, what tore, and the newest keyframe.
     pub(crate) fn publish_latched(&mut self, step: u64) -> anyhow::Result<()> {
+        if let Some(row) = self.position.latched_colliders.take() {
+            self.publish_colliders(&row)?;
+        }
         if !self.position.torn.is_empty() {
             self.publish_tears(step, 0)?;
         }
@@ -163,9 +95,12 @@ impl Replay {
 
     /// Publishes a snapshot and all that belongs to it, in the recorded order.
     pub(crate) fn publish(&mut self, frame: &Frame) -> anyhow::Result<()> {
-        for update in &frame.updates {
-            self.position.follow(update);
-            self.publish_update(update)?;
+        for happening in happenings(&frame.updates) {
+            self.position.follow(happening);
+            match happening {
+                Happening::Reset(step) => self.publish_tears(step, 0)?,
+                Happening::Update(update) => self.publish_update(update)?,
+            }
         }
         if frame.particles.len() != self.run.particle_count as usize {
             let (step, count) = (frame.row.step, frame.particles.len());
@@ -187,10 +122,10 @@ impl Replay {
                 self.owner.publish_outcome(&Outcome::from(row))?;
                 self.owner.wake(Wake::Outcome);
             }
+            Message::Colliders(row) => self.publish_colliders(row)?,
             Message::Tears(row) => {
                 let new_count = u32::try_from(row.constraints.len()).unwrap_or(u32::MAX);
                 self.publish_tears(row.step, new_count)?;
-                self.owner.wake(Wake::Tears);
             }
             Message::Status(row) => self.status = Some(row.clone()),
             // The load is published already, and there is no service for the others.
@@ -207,7 +142,14 @@ impl Replay {
 
     fn publish_tears(&self, step: u64, new_count: u32) -> anyhow::Result<()> {
         let header = TearsHeader { run_id: self.run_id, step, new_count, count: 0 };
-        Ok(self.owner.publish_tears(header, &self.position.torn, &self.position.tear_causes)?)
+        self.owner.publish_tears(header, &self.position.torn, &self.position.tear_causes)?;
+        self.owner.wake(Wake::Tears);
+        Ok(())
+    }
+
+    fn publish_colliders(&self, row: &CollidersRow) -> anyhow::Result<()> {
+        let header = CollidersHeader { run_id: self.run_id, step: row.step, count: 0, spare: 0 };
+        Ok(self.owner.publish_colliders(header, &row.states())?)
     }
 
     fn header(&self, frame: &Frame) -> SnapshotHeader {

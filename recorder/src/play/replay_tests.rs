@@ -9,7 +9,8 @@ use sim_contract::{
     Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, Triangle,
 };
 
-use super::replay::{Position, Recorded, Replay};
+use super::position::Position;
+use super::replay::{Recorded, Replay};
 
 /// Long enough on any machine.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -57,6 +58,8 @@ fn replay(domain: &TestDomain) -> Replay {
         scene: b"version = 1",
         topology: &TopologyRow::new(&load, &[ConstraintState { b: 1, ..Default::default() }]),
         surface: &SurfaceRow::new(&load, &[Triangle { corners: [0, 1, 0] }]),
+        collider_count: 1,
+        keyframe_size_bytes_max: 64,
     };
     Replay::new(&domain.endpoint(), &recorded, Position::default(), 1.0).unwrap()
 }
