@@ -1,6 +1,6 @@
 //! One message of a recording, whichever topic it is on.
 
-use sim_contract::ParticleState;
+use sim_contract::{Action, ParticleState};
 
 use crate::collider_rows::{ColliderRow, CollidersRow};
 use crate::rows::{EventRow, OutcomeRow, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow};
@@ -74,6 +74,12 @@ impl Message {
             Self::Step(row) => row.step,
             Self::Keyframe { step, .. } | Self::Particles { step, .. } => *step,
         }
+    }
+
+    /// The step that begins anew from the initial state, if this is the outcome of a reset.
+    pub fn reset_step(&self) -> Option<u64> {
+        let Self::Outcome(row) = self else { return None };
+        (row.action == Action::Reset && row.is_applied()).then_some(row.step)
     }
 
     /// Roughly the memory that it takes, in bytes.

@@ -1,9 +1,11 @@
 //! `recorder record`: everything that a node publishes, into one file.
 
+mod collider_log;
 mod intake;
 mod queue;
 mod report;
 mod round;
+mod tear_log;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -202,8 +202,8 @@ impl Resimulation {
     /// Pause, resume and step say when steps were made, and a refused load changes nothing; whether
     /// and why a node took them or not is not repeated.
     fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
-        let is_applied = Outcome::from(row).is_applied();
-        if is_control(row.action) || matches!(row.action, Action::Load { .. }) && !is_applied {
+        let is_refused_load = matches!(row.action, Action::Load { .. }) && !row.is_applied();
+        if is_control(row.action) || is_refused_load {
             return None;
         }
         let result = apply(&mut self.solver, row.client_id, row.action);

@@ -88,11 +88,18 @@ impl From<&Outcome> for OutcomeRow {
     }
 }
 
+impl OutcomeRow {
+    /// Whether the command took effect.
+    pub fn is_applied(&self) -> bool {
+        self.status == APPLIED
+    }
+}
+
 impl From<&OutcomeRow> for Outcome {
     fn from(row: &OutcomeRow) -> Self {
         let command = Command::new(row.client_id, row.sequence, row.action);
         let mut outcome = Self::new(row.index, row.step, command, Ok(()));
-        if row.status != APPLIED {
+        if !row.is_applied() {
             outcome.status = OutcomeStatus::Rejected as u32;
             outcome.reason = Reason::from_name(&row.reason).map_or(0, |reason| reason as u32);
         }

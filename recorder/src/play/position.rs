@@ -1,7 +1,7 @@
 //! Where a replay stands: what its headers and late readers are told, followed message by message.
 
 use recorder::{CollidersRow, Message, OutcomeRow, TearsRow};
-use sim_contract::{Action, Outcome, TearCause};
+use sim_contract::{Action, TearCause};
 use sim_solver::Keyframe;
 
 /// What the headers follow from, as far as it does not stand in `/steps`.
@@ -38,7 +38,7 @@ pub(crate) enum Happening<'a> {
 /// Updates in their order, and each reset before everything else of its step: what tears in that
 /// step stands in the file before the outcome that says so.
 pub(crate) fn happenings(updates: &[Message]) -> Vec<Happening<'_>> {
-    let mut resets = updates.iter().filter_map(reset_step).peekable();
+    let mut resets = updates.iter().filter_map(Message::reset_step).peekable();
     let mut happenings = Vec::with_capacity(updates.len());
     for update in updates {
         while let Some(step) = resets.next_if(|step| *step <= update.step()) {
@@ -47,12 +47,6 @@ pub(crate) fn happenings(updates: &[Message]) -> Vec<Happening<'_>> {
         happenings.push(Happening::Update(update));
     }
     happenings
-}
-
-fn reset_step(update: &Message) -> Option<u64> {
-    let Message::Outcome(row) = update else { return None };
-    let is_reset = row.action == Action::Reset && Outcome::from(row).is_applied();
-    is_reset.then_some(row.step)
 }
 
 impl Position {
@@ -111,7 +105,7 @@ impl Position {
     }
 
     fn follow_outcome(&mut self, row: &OutcomeRow) {
-        let is_applied = Outcome::from(row).is_applied();
+        let is_applied = row.is_applied();
         self.outcome_count = row.index + 1;
         self.rejected_count += u64::from(!is_applied);
         // A keyframe of the same step stands before it in the file and knows better.

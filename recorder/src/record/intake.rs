@@ -1,14 +1,19 @@
 //! From what arrives in shared memory to what is written: where a recording starts, in which order
 //! it goes on, where it ends, and what is missing.
 
-use std::collections::{BTreeMap, BTreeSet};
+mod started;
 
-use recorder::{AllCounts, Message, OutcomeRow, RunDescription, StepRow, Topic};
+use std::mem::take;
+
+use recorder::{AllCounts, Message, RunDescription, TopologyRow};
 use sim_contract::{KeyframeHeader, LoadHeader, SnapshotHeader};
 use sim_solver::{Scene, SceneError};
 
+use super::collider_log::ColliderLog;
 use super::queue::Content;
 use super::round::{Round, Snapshot};
+use super::tear_log::TearLog;
+use started::Started;
 
 /// The head of a recording.
 #[derive(Debug)]
@@ -61,26 +66,11 @@ pub(crate) struct Intake {
     /// The newest snapshot and keyframe, until a pair of one step has come.
     candidate: Option<Snapshot>,
     candidate_keyframe: Option<(KeyframeHeader, Vec<u8>)>,
+    /// What tore and where colliders were, until the recording has started.
+    tears: TearLog,
+    colliders: ColliderLog,
     started: Option<Started>,
     counts: AllCounts,
-}
-
-/// The run that is being recorded.
-#[derive(Debug)]
-struct Started {
-    run_id: u64,
-    topology_revision: u32,
-    first_step: u64,
-    /// The last step that is wanted.
-    end_step: u64,
-    last: SnapshotHeader,
-    next_outcome: u64,
-    /// The newest keyframe that a snapshot named.
-    named_keyframe: u64,
-    /// Steps of the keyframes that came, above the one named last.
-    keyframes: BTreeSet<u64>,
-    /// How often each distance between two snapshots occurred, in steps.
-    distances: BTreeMap<u64, u64>,
 }
 
 /// What came of a round.
@@ -121,11 +111,7 @@ impl Intake {
     pub(crate) fn counts(&self) -> AllCounts {
         let mut counts = self.counts;
         if let Some(started) = &self.started {
-            let gaps = started.snapshot_gaps();
-            counts.of_mut(Topic::Particles).gaps = gaps;
-            counts.of_mut(Topic::Steps).gaps = gaps;
-            counts.of_mut(Topic::Outcomes).gaps +=
-                started.last.outcome_count.saturating_sub(started.next_outcome);
+            started.add_gaps(&mut counts);
         }
         counts
     }
@@ -147,6 +133,8 @@ impl Intake {
     /// Starts at the first snapshot of this round, or the newest before it, that has a keyframe of
     /// its step; what is older is dropped.
     fn try_start(&mut self, round: &mut Round, now: Now, taken: &mut Taken) {
+        self.tears.add(take(&mut round.tears), take(&mut round.tear_causes));
+        self.colliders.add(take(&mut round.colliders));
         let snapshots = self.candidate.take().into_iter().chain(round.snapshots.drain(..));
         let snapshots: Vec<_> = snapshots.collect();
         let keyframes = self.candidate_keyframe.take().into_iter().chain(round.keyframes.drain(..));
@@ -171,8 +159,11 @@ impl Intake {
         };
         let first = &snapshots[place];
         taken.head = self.head(&first.header, now);
-        self.started = Some(Started::new(&first.header, self.steps_max));
-        for message in self.load_rows() {
+        let (mut tears, mut colliders) = (take(&mut self.tears), take(&mut self.colliders));
+        let torn = tears.begin(&first.header);
+        colliders.begin(&first.header);
+        self.started = Some(Started::new(&first.header, self.steps_max, tears, colliders));
+        for message in self.load_rows(torn) {
             self.counts.of_mut(message.topic()).received += 1;
             taken.contents.push(Content::Update(message));
         }
@@ -188,10 +179,13 @@ impl Intake {
         scene.as_ref().is_some_and(|(load, _)| is_of(load))
             && topology.as_ref().is_some_and(|(load, _)| is_of(load))
             && surface.as_ref().is_some_and(|(load, _)| is_of(load))
+            && self.tears.is_known_at(header)
+            && self.colliders.is_known_in(header.run_id)
     }
 
-    fn load_rows(&mut self) -> Vec<Message> {
-        let topology = self.load.topology.take().map(|(_, row)| Message::Topology(row));
+    fn load_rows(&mut self, torn: Vec<u32>) -> Vec<Message> {
+        let topology = self.load.topology.take();
+        let topology = topology.map(|(_, row)| Message::Topology(TopologyRow { torn, ..row }));
         let surface = self.load.surface.take().map(|(_, row)| Message::Surface(row));
         topology.into_iter().chain(surface).collect()
     }
@@ -220,122 +214,5 @@ impl Intake {
     }
 }
 
-impl Started {
-    fn new(first: &SnapshotHeader, steps_max: Option<u64>) -> Self {
-        Self {
-            run_id: first.run_id,
-            end_step: steps_max.map_or(u64::MAX, |steps| first.step.saturating_add(steps)),
-            topology_revision: first.topology_revision,
-            first_step: first.step,
-            last: *first,
-            // Those before are part of the first state.
-            next_outcome: first.outcome_count,
-            named_keyframe: 0,
-            keyframes: BTreeSet::new(),
-            distances: BTreeMap::new(),
-        }
-    }
-
-    fn take(&mut self, round: Round, counts: &mut AllCounts, taken: &mut Taken) {
-        let mut arrived: Vec<Content> = Vec::new();
-        let (run_id, wanted) = (self.run_id, self.first_step..=self.end_step);
-        let keyframes = round
-            .keyframes
-            .into_iter()
-            .filter(|(header, _)| header.run_id == run_id && wanted.contains(&header.step));
-        let keyframes: Vec<_> = keyframes
-            .map(|(header, bytes)| Message::Keyframe { step: header.step, bytes })
-            .collect();
-        self.keyframes.extend(keyframes.iter().map(Message::step));
-        for snapshot in round.snapshots {
-            taken.end = self.end_at(&snapshot.header);
-            if taken.end.is_some() {
-                break;
-            }
-            arrived.push(self.take_snapshot(snapshot, counts));
-        }
-        if taken.end.is_none() && self.last.step >= self.end_step {
-            taken.end = Some(RunEnd::EndStep);
-        }
-        let outcomes = self.take_outcomes(round.outcomes, taken.end, counts);
-        let updates = round.updates.into_iter().filter(|(of, _)| *of == run_id);
-        let updates = updates.map(|(_, update)| update).filter(|one| wanted.contains(&one.step()));
-        for update in updates.chain(keyframes).chain(outcomes) {
-            counts.of_mut(update.topic()).received += 1;
-            arrived.push(Content::Update(update));
-        }
-        arrived.sort_by_key(place);
-        taken.contents.append(&mut arrived);
-    }
-
-    fn end_at(&self, header: &SnapshotHeader) -> Option<RunEnd> {
-        if header.run_id != self.run_id {
-            Some(RunEnd::NewRun)
-        } else if header.topology_revision != self.topology_revision {
-            Some(RunEnd::NewLoad)
-        } else if header.step > self.end_step {
-            Some(RunEnd::EndStep)
-        } else {
-            None
-        }
-    }
-
-    fn take_snapshot(&mut self, snapshot: Snapshot, counts: &mut AllCounts) -> Content {
-        let Snapshot { header, particles } = snapshot;
-        let distance = header.step.saturating_sub(self.last.step);
-        if distance > 0 {
-            *self.distances.entry(distance).or_default() += 1;
-        }
-        let named = header.keyframe_step;
-        if named > self.named_keyframe && named >= self.first_step {
-            self.named_keyframe = named;
-            // A keyframe is published before the snapshots that name it, and was read after them.
-            let is_missing = !self.keyframes.contains(&named);
-            counts.of_mut(Topic::Keyframe).gaps += u64::from(is_missing);
-            self.keyframes = self.keyframes.split_off(&named);
-        }
-        self.last = header;
-        counts.of_mut(Topic::Steps).received += 1;
-        counts.of_mut(Topic::Particles).received += 1;
-        Content::Snapshot(StepRow::from(&header), particles)
-    }
-
-    /// Once another run has begun, only those that the last snapshot counts are of this one.
-    fn take_outcomes(
-        &mut self,
-        outcomes: Vec<OutcomeRow>,
-        end: Option<RunEnd>,
-        counts: &mut AllCounts,
-    ) -> Vec<Message> {
-        let mut kept = Vec::new();
-        for row in outcomes {
-            let is_foreign =
-                end.is_some() && row.index >= self.last.outcome_count || row.step > self.end_step;
-            if row.index < self.next_outcome || is_foreign {
-                continue;
-            }
-            counts.of_mut(Topic::Outcomes).gaps += row.index - self.next_outcome;
-            self.next_outcome = row.index + 1;
-            kept.push(Message::Outcome(row));
-        }
-        kept
-    }
-
-    /// Snapshots that never came. A node publishes every k-th step, and k is the smallest distance
-    /// that occurred.
-    fn snapshot_gaps(&self) -> u64 {
-        let Some((stride, _)) = self.distances.first_key_value() else { return 0 };
-        self.distances.iter().map(|(distance, count)| (distance / stride - 1) * count).sum()
-    }
-}
-
 #[cfg(test)]
 mod tests;
-
-/// By step, then in the order of publication.
-fn place(content: &Content) -> (u64, Topic) {
-    match content {
-        Content::Update(message) => (message.step(), message.topic()),
-        Content::Snapshot(row, _) => (row.step, Topic::Steps),
-    }
-}

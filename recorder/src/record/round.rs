@@ -1,8 +1,9 @@
 //! What arrives between two waits, copied out of shared memory at once.
 
-use recorder::{Message, OutcomeRow, StatusRow, SurfaceRow, TearsRow, TopologyRow};
+use recorder::{Message, OutcomeRow, StatusRow, SurfaceRow, TopologyRow};
 use sim_contract::{
-    KeyframeHeader, LoadHeader, OUTCOME_FLAG_CONTROL, ParticleState, SnapshotHeader, Update,
+    ColliderState, CollidersHeader, KeyframeHeader, LoadHeader, OUTCOME_FLAG_CONTROL,
+    ParticleState, SnapshotHeader, TearsHeader, Update,
 };
 
 /// What arrived in one round, out of shared memory.
@@ -15,6 +16,10 @@ pub(crate) struct Round {
     pub(crate) scene: Option<(LoadHeader, Vec<u8>)>,
     pub(crate) topology: Option<(LoadHeader, TopologyRow)>,
     pub(crate) surface: Option<(LoadHeader, SurfaceRow)>,
+    pub(crate) colliders: Vec<(CollidersHeader, Vec<ColliderState>)>,
+    /// All that tore since the load, each time, and why.
+    pub(crate) tears: Vec<(TearsHeader, Vec<u32>)>,
+    pub(crate) tear_causes: Vec<(TearsHeader, Vec<u8>)>,
     pub(crate) keyframes: Vec<(KeyframeHeader, Vec<u8>)>,
     pub(crate) outcomes: Vec<OutcomeRow>,
 }
@@ -48,16 +53,9 @@ impl Round {
                 let row = Message::Status(StatusRow::from(status));
                 self.updates.push((status.run_id, row));
             }
-            // There is no row for these.
-            Update::Colliders(..) | Update::TearCauses(..) => {}
-            // A list that a load begins with, or that a late joiner is given.
-            Update::Tears(header, _) if header.new_count == 0 => {}
-            Update::Tears(header, torn) => {
-                let new_count = (header.new_count as usize).min(torn.len());
-                let constraints = torn[torn.len() - new_count..].to_vec();
-                let row = TearsRow { step: header.step, constraints, causes: Vec::new() };
-                self.updates.push((header.run_id, Message::Tears(row)));
-            }
+            Update::Colliders(header, list) => self.colliders.push((*header, list.to_vec())),
+            Update::Tears(header, list) => self.tears.push((*header, list.to_vec())),
+            Update::TearCauses(header, list) => self.tear_causes.push((*header, list.to_vec())),
         }
     }
 }

@@ -2,11 +2,14 @@
 //! counted. Rounds are put together by hand.
 
 use sim_contract::{
-    Action, Command, ConstraintState, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, ParticleState,
-    Update,
+    Action, ColliderState, CollidersHeader, Command, ConstraintState, NodeStatus,
+    OUTCOME_FLAG_CONTROL, Outcome, ParticleFlags, ParticleState, TearCause, TearsHeader, Update,
 };
 
+use recorder::Topic;
+
 use super::*;
+use crate::record::queue::Content;
 
 const RUN_ID: u64 = 77;
 const NOW: Now = Now { realtime_ns: 5_000_000_000, monotonic_ns: 2_000_000_000 };
@@ -28,10 +31,23 @@ fn add_load(round: &mut Round) {
     round.add_update(Update::Scene(&load, b"version = 1\nname = \"dot\"\nsolver.rate_hz = 10\n"));
     round.add_update(Update::Topology(&load, &[ConstraintState::default()]));
     round.add_update(Update::Surface(&load, &[]));
+    round.add_update(Update::Colliders(
+        &CollidersHeader { run_id: RUN_ID, ..Default::default() },
+        &[],
+    ));
+    add_tears(round, 0, &[], 0);
 }
 
 fn add_snapshot(round: &mut Round, header: &SnapshotHeader) {
     round.add_snapshot(header, &[ParticleState::default()]);
+}
+
+/// A list of all that is torn, and that all of it was cut.
+fn add_tears(round: &mut Round, step: u64, torn: &[u32], new_count: u32) {
+    let count = u32::try_from(torn.len()).unwrap();
+    let header = TearsHeader { run_id: RUN_ID, step, new_count, count };
+    round.add_update(Update::Tears(&header, torn));
+    round.add_update(Update::TearCauses(&header, &vec![TearCause::Cut as u8; torn.len()]));
 }
 
 fn add_keyframe(round: &mut Round, step: u64) {
@@ -270,4 +286,111 @@ fn a_scene_that_cannot_be_read_is_refused() {
     add_snapshot(&mut round, &header(0, 0));
     add_keyframe(&mut round, 0);
     assert!(matches!(intake.take(round, NOW), Err(IntakeError::Scene(_))));
+}
+
+/// The rows of tears and events, and the colliders of each step.
+fn side_rows(taken: &Taken) -> Vec<String> {
+    let text = |content: &Content| match content {
+        Content::Update(Message::Topology(row)) => Some(format!("torn {:?}", row.torn)),
+        Content::Update(Message::Tears(row)) => {
+            Some(format!("{}: tore {:?} by {:?}", row.step, row.constraints, row.causes))
+        }
+        Content::Update(Message::Colliders(row)) => {
+            Some(format!("{}: {} colliders", row.step, row.colliders.len()))
+        }
+        Content::Update(Message::Event(row)) => Some(format!("{}: {}", row.step, row.text)),
+        _ => None,
+    };
+    taken.contents.iter().filter_map(text).collect()
+}
+
+fn add_colliders(round: &mut Round, step: u64, count: usize) {
+    let header = CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() };
+    round.add_update(Update::Colliders(&header, &vec![ColliderState::default(); count]));
+}
+
+#[test]
+fn a_late_recording_has_what_was_torn_and_where_colliders_stood_before_it() {
+    let mut intake = Intake::default();
+    let mut round = Round::default();
+    add_load(&mut round);
+    add_tears(&mut round, 3, &[0], 1);
+    for step in [1, 2, 7] {
+        add_colliders(&mut round, step, 2);
+    }
+    for step in [6, 7] {
+        add_snapshot(&mut round, &SnapshotHeader { torn_count: 1, ..header(step, 0) });
+        add_keyframe(&mut round, step);
+    }
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!(side_rows(&taken), ["torn [0]", "2: 2 colliders", "7: 2 colliders"]);
+    assert_eq!(names(&taken)[..3], ["/topology 0", "/surface 0", "/colliders 2"]);
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn it_waits_until_it_knows_what_is_torn() {
+    let mut intake = Intake::default();
+    let torn = |step| SnapshotHeader { torn_count: 1, ..header(step, 0) };
+    let mut round = Round::default();
+    add_load(&mut round);
+    add_snapshot(&mut round, &torn(6));
+    add_keyframe(&mut round, 6);
+    assert!(names(&intake.take(round, NOW).unwrap()).is_empty());
+    let mut round = Round::default();
+    add_tears(&mut round, 5, &[0], 1);
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!(names(&taken), ["/topology 0", "/surface 0", "/keyframe 6", "snapshot 6"]);
+    assert_eq!(side_rows(&taken), ["torn [0]"]);
+}
+
+#[test]
+fn tears_colliders_and_events_come_before_their_snapshot() {
+    let mut intake = started();
+    let mut round = Round::default();
+    let frozen = ParticleState { flags: ParticleFlags::FROZEN, ..ParticleState::default() };
+    round.add_snapshot(&SnapshotHeader { torn_count: 1, ..header(5, 2) }, &[frozen]);
+    add_keyframe(&mut round, 5);
+    add_tears(&mut round, 5, &[0], 1);
+    add_colliders(&mut round, 5, 1);
+    let taken = intake.take(round, NOW).unwrap();
+    let expected = ["/colliders 5", "/tears 5", "/keyframe 5", "/events 5", "snapshot 5"];
+    assert_eq!(names(&taken), expected);
+    let frozen = "5: particle 0 was no longer finite and is frozen";
+    assert_eq!(side_rows(&taken), ["5: 1 colliders", "5: tore [0] by [\"cut\"]", frozen]);
+    let counts = intake.counts();
+    for topic in [Topic::Colliders, Topic::Tears, Topic::Events] {
+        assert_eq!((counts.of(topic).received, counts.of(topic).gaps), (1, 0), "{topic:?}");
+    }
+}
+
+#[test]
+fn what_another_load_begins_with_is_not_of_this_file() {
+    let mut intake = started();
+    let mut round = Round::default();
+    add_snapshot(&mut round, &header(5, 2));
+    add_tears(&mut round, 6, &[], 0);
+    add_colliders(&mut round, 6, 3);
+    assert_eq!(names(&intake.take(round, NOW).unwrap()), ["snapshot 5"]);
+    let mut round = Round::default();
+    add_snapshot(&mut round, &SnapshotHeader { topology_revision: 1, ..header(6, 3) });
+    let taken = intake.take(round, NOW).unwrap();
+    assert_eq!((names(&taken).len(), taken.end), (0, Some(RunEnd::NewLoad)));
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn a_reset_and_the_same_tears_again_are_told_of_twice() {
+    let mut intake = started();
+    for (step, reset) in [(5, None), (9, Some(outcome(2, 8)))] {
+        let outcome_count = 2 + u64::from(reset.is_some());
+        let mut round = Round::default();
+        add_tears(&mut round, step, &[0], 1);
+        let last = SnapshotHeader { torn_count: 1, ..header(step, outcome_count) };
+        add_snapshot(&mut round, &last);
+        reset.iter().for_each(|outcome| round.add_update(Update::Outcome(outcome)));
+        let taken = intake.take(round, NOW).unwrap();
+        assert_eq!(side_rows(&taken), [format!("{step}: tore [0] by [\"cut\"]")]);
+    }
+    assert_eq!(intake.counts().of(Topic::Tears).gaps, 0);
 }
