@@ -3,6 +3,9 @@
 //!
 //! Recordings are made in memory; changed ones are rebuilt message by message.
 
+mod commands;
+mod rows;
+
 use std::ops::ControlFlow;
 
 use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message};

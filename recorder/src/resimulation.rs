@@ -80,12 +80,19 @@ impl Resimulation {
         Ok(Some(start))
     }
 
-    /// Compares the snapshot that it started from with its own header, and step 0 with the scene.
+    /// Compares the snapshot that it started from with its own header and with what the file says
+    /// was torn until then, and step 0 with the scene.
     pub(crate) fn compare_start(&self, frame: &Frame) -> Finding {
-        if self.step == 0 {
-            return compare(&Solver::new(&self.scene), frame);
+        let found = match self.step {
+            0 => compare(&Solver::new(&self.scene), frame),
+            _ => compare(&self.solver, frame),
+        };
+        let is_other = torn_until(frame).is_some_and(|torn| torn != self.solver.torn());
+        if found != Finding::Identical || !is_other {
+            return found;
         }
-        compare(&self.solver, frame)
+        let what = "/topology and /tears have other torn constraints than its keyframe".to_owned();
+        Finding::Diverged { step: self.step, what, difference: None }
     }
 
     /// Steps to the next snapshot and compares it.
@@ -223,6 +230,21 @@ impl Resimulation {
         let what = format!("outcome {} is not where it belongs: {why}", self.next_index);
         Finding::Diverged { step, what, difference: None }
     }
+}
+
+/// What was torn at the first snapshot of a file, as its rows say; `None` of a later snapshot.
+fn torn_until(frame: &Frame) -> Option<Vec<u32>> {
+    let mut updates = frame.updates.iter();
+    let mut torn = updates.find_map(|update| match update {
+        Message::Topology(row) => Some(row.torn.clone()),
+        _ => None,
+    })?;
+    for update in updates {
+        if let Message::Tears(row) = update {
+            torn.extend(&row.constraints);
+        }
+    }
+    Some(torn)
 }
 
 /// The recorded header, the recorded payload and the simulated state must be one.

@@ -388,7 +388,9 @@ fn a_reset_and_the_same_tears_again_are_told_of_twice() {
         add_tears(&mut round, step, &[0], 1);
         let last = SnapshotHeader { torn_count: 1, ..header(step, outcome_count) };
         add_snapshot(&mut round, &last);
-        reset.iter().for_each(|outcome| round.add_update(Update::Outcome(outcome)));
+        if let Some(outcome) = &reset {
+            round.add_update(Update::Outcome(outcome));
+        }
         let taken = intake.take(round, NOW).unwrap();
         assert_eq!(side_rows(&taken), [format!("{step}: tore [0] by [\"cut\"]")]);
     }

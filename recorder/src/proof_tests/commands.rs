@@ -1,0 +1,279 @@
+//! Every kind of command, on a scene with all that there is: recorded, simulated again, repeated
+//! from its own log; a command that is missing or wrong is found.
+
+use recorder::{Message, OutcomeRow};
+use sim_solver::{PARAMETERS, Scene};
+
+use super::{check, rebuild, record};
+use crate::command_file;
+use crate::simulation::Job;
+use crate::verify::Verdict;
+
+/// A cloth between two anchors, in the wind, above a floor, beside a box that turns.
+pub(super) const SCENE: &str = r#"
+version = 1
+[solver]
+tethers = true
+tear_force = 400
+max_stretch = 2
+[wind]
+velocity = [1, 0, 2]
+drag = 0.05
+gust = 0.5
+[[particle]]
+position = [0, 1, 0]
+[[particle]]
+position = [0.7, 1, 0]
+[[anchor]]
+particles = [0, 1]
+repeat = true
+path = [{ time = 0 }, { time = 0.5, translation = [0, 0.1, 0.1] }, { time = 1 }]
+[[generate]]
+shape = "cloth"
+columns = 8
+rows = 8
+spacing = 0.1
+origin = [0, 0.9, 0]
+mass = 0.01
+pinned = "none"
+tear_stretch = 1.4
+compliance = { structural = 1e-5, shear = 1e-4 }
+[[constraint]]
+particles = [0, 2]
+[[constraint]]
+particles = [1, 9]
+tear_distance = 0.3
+compliance = 1e-3
+[[collider]]
+shape = "plane"
+normal = [0, 1, 0]
+offset = -0.1
+friction = 0.4
+[[collider]]
+shape = "box"
+center = [0.35, 0.2, 0.3]
+half_extents = [0.1, 0.1, 0.1]
+angular_velocity = [0, 2, 0]
+[[collider]]
+shape = "sphere"
+center = [0.35, 0.5, -0.3]
+radius = 0.1
+"#;
+
+/// Every kind; the line of a step is found by it below. The last one repeats a client's number, as
+/// two lines may.
+pub(super) const COMMANDS: &str = r#"
+    {"step":3,"kind":"push","center":[0.3,0.5,0],"radius":0.3,"delta":[0,0,0.02],"limit":0.01}
+    {"step":5,"kind":"cut","constraint":40}
+    {"step":7,"kind":"cut_radius","center":[0.7,0.2,0],"radius":0.12}
+    {"step":9,"kind":"cut_segment","from":[-0.05,0.4,0],"to":[0.25,0.4,0],"direction":[0,0,1]}
+    {"step":11,"kind":"move_anchor","anchor":0,"translation":[0.05,0,0.05]}
+    {"step":13,"kind":"move_collider","collider":2,"translation":[0,0,0.4],"rotation":[0,0,1,1]}
+    {"step":15,"kind":"grab","particle":60,"target":[0.5,0.2,0.3],"over_s":0.1}
+    {"step":17,"kind":"move","particle":60,"target":[0.5,0.5,0.8]}
+    {"step":19,"kind":"pause"}
+    {"step":20,"kind":"resume"}
+    {"step":21,"kind":"step","count":3}
+    {"step":22,"kind":"load","scene":"rope"}
+    {"step":30,"kind":"set","parameter":"gravity","value":[0,-5,0]}
+    {"step":31,"kind":"set","parameter":"gravity","value":null}
+    {"step":32,"kind":"set","parameter":"damping","value":0.5}
+    {"step":33,"kind":"set","parameter":"damping","value":null}
+    {"step":34,"kind":"set","parameter":"wind_velocity","value":[3,0,0]}
+    {"step":35,"kind":"set","parameter":"wind_velocity","value":null}
+    {"step":36,"kind":"set","parameter":"wind_drag","value":0.2}
+    {"step":37,"kind":"set","parameter":"wind_drag","value":null}
+    {"step":38,"kind":"set","parameter":"substeps","value":3}
+    {"step":39,"kind":"set","parameter":"iterations","value":2}
+    {"step":40,"kind":"set","parameter":"relaxation","value":0.9}
+    {"step":41,"kind":"set","parameter":"max_stretch","value":1.2}
+    {"step":42,"kind":"set","parameter":"max_stretch","value":null}
+    {"step":43,"kind":"set","parameter":"tear_stretch","value":3}
+    {"step":44,"kind":"set","parameter":"tear_stretch","value":null}
+    {"step":45,"kind":"set","parameter":"tear_distance","value":2}
+    {"step":46,"kind":"set","parameter":"tear_distance","value":null}
+    {"step":47,"kind":"set","parameter":"tear_force","value":300}
+    {"step":48,"kind":"set","parameter":"tear_force","value":null}
+    {"step":49,"kind":"set","parameter":"max_speed","value":200}
+    {"step":50,"kind":"set","parameter":"time_scale","value":0.5}
+    {"step":51,"kind":"set","parameter":"compliance","value":1e-4,"constraint_kind":"structural"}
+    {"step":52,"kind":"set","parameter":"compliance","value":1e-5}
+    {"step":53,"kind":"set","parameter":"stiffness","value":0.5}
+    {"step":60,"kind":"release","particle":60}
+    {"step":70,"kind":"pin","particle":33}
+    {"step":80,"kind":"unpin","particle":33}
+    {"step":90,"kind":"cut","constraint":7}
+    {"step":90,"kind":"reset"}
+    {"step":90,"kind":"cut","constraint":9}
+    {"step":95,"kind":"set","parameter":"gravity","value":[0,-3,0],"client_id":7}
+"#;
+pub(super) const STEPS: u64 = 130;
+
+pub(super) fn job(commands: &str) -> Job {
+    job_of(SCENE, commands)
+}
+
+pub(super) fn job_of(scene: &str, commands: &str) -> Job {
+    let scene = Scene::from_toml(scene, "proof").unwrap();
+    Job { scene, commands: command_file::parse(commands, "test").unwrap(), steps: STEPS }
+}
+
+/// Every message of a recording that `pick` wants.
+pub(super) fn collect<T>(file: &[u8], mut pick: impl FnMut(&Message) -> Option<T>) -> Vec<T> {
+    let mut found = Vec::new();
+    rebuild(file, |message| {
+        found.extend(pick(&message));
+        Some(message)
+    });
+    found
+}
+
+fn outcomes(file: &[u8]) -> Vec<OutcomeRow> {
+    collect(file, |message| match message {
+        Message::Outcome(row) => Some(row.clone()),
+        _ => None,
+    })
+}
+
+#[test]
+fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
+    let (file, summary) = record(&job(COMMANDS));
+    let (report, _) = check(&file);
+    assert_eq!(report.to_string(), format!("{STEPS} steps bit-identical (0..={STEPS})"));
+    assert!(record(&job(COMMANDS)).0 == file, "equal inputs give equal files");
+
+    let rows = outcomes(&file);
+    let rejected = rows.iter().filter(|row| !row.is_applied());
+    let rejected: Vec<_> = rejected.map(|row| (row.step, row.reason.as_str())).collect();
+    // A load is of another file, and this scene has no stiffness.
+    assert_eq!(rejected, [(22, "no_effect_here"), (53, "no_effect_here")]);
+    assert!(PARAMETERS.iter().all(|name| COMMANDS.contains(&format!("\"{name}\""))));
+
+    let lines: Vec<_> = rows.iter().map(|row| serde_json::to_string(row).unwrap()).collect();
+    let (again, repeated) = record(&job(&lines.join("\n")));
+    assert_eq!(repeated, summary);
+    assert!(again == file, "the log repeats its recording");
+}
+
+#[test]
+fn a_command_that_is_missing_is_found_whichever_it_is() {
+    let (file, _) = record(&job(COMMANDS));
+    let rows = outcomes(&file);
+    for missing in rows.iter().filter(|row| row.is_applied()) {
+        let without = rebuild(&file, |message| match message {
+            Message::Outcome(row) if row.index == missing.index => None,
+            other => Some(other),
+        });
+        let (report, _) = check(&without);
+        assert_eq!(report.verdict, Verdict::OutcomeLogIncomplete, "{missing:?}");
+        assert_eq!(report.step, Some(missing.step), "{missing:?}");
+    }
+}
+
+#[test]
+fn a_command_that_never_was_is_found_where_it_shows() {
+    let (file, _) = record(&job(COMMANDS));
+    // The log is closed again around the one that is left out, as a forger would.
+    for left_out in [3, 5, 7, 9, 11, 13, 15, 30, 34, 38, 51, 70, 95] {
+        let mut removed = None;
+        let forged = rebuild(&file, |message| match message {
+            Message::Outcome(row) if row.step == left_out && row.is_applied() => {
+                removed = Some(row.index);
+                None
+            }
+            Message::Outcome(mut row) => {
+                row.index -= u64::from(removed.is_some());
+                Some(Message::Outcome(row))
+            }
+            Message::Step(mut row) => {
+                row.outcome_count -= u64::from(removed.is_some());
+                Some(Message::Step(row))
+            }
+            other => Some(other),
+        });
+        let (report, _) = check(&forged);
+        assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(left_out)), "{report}");
+    }
+}
+
+#[test]
+fn a_load_that_a_node_refused_or_that_ended_the_file_is_no_divergence() {
+    let (file, _) = record(&job(COMMANDS));
+    let refused = rebuild(&file, |message| match message {
+        Message::Outcome(mut row) if row.step == 22 => {
+            row.reason = "out_of_range".to_owned();
+            Some(Message::Outcome(row))
+        }
+        other => Some(other),
+    });
+    assert_eq!(check(&refused).0.verdict, Verdict::Identical);
+    // The snapshot that shows a load is of another file.
+    let ended = rebuild(&file, |message| match message {
+        Message::Outcome(mut row) if row.step == 22 => {
+            (row.status, row.reason) = ("applied".to_owned(), String::new());
+            Some(Message::Outcome(row))
+        }
+        other => (other.step() < 22).then_some(other),
+    });
+    assert_eq!(check(&ended).0.to_string(), "21 steps bit-identical (0..=21)");
+}
+
+#[test]
+fn wrong_values_are_rejected_with_their_reason_and_change_nothing() {
+    let wrong = [
+        (r#""kind":"pin","particle":66"#, "unknown_particle"),
+        (r#""kind":"release","particle":5"#, "not_grabbed"),
+        (r#""kind":"grab","particle":5,"target":["nan",0,0]"#, "non_finite"),
+        (r#""kind":"grab","particle":5,"target":[2e7,0,0]"#, "out_of_range"),
+        (r#""kind":"push","center":[0,0,0],"radius":-1,"delta":[0,0,0]"#, "out_of_range"),
+        (r#""kind":"push","center":[0,0,0],"radius":1,"delta":["inf",0,0]"#, "non_finite"),
+        (r#""kind":"push","center":[0,0,0],"radius":1,"delta":[0,0,0],"limit":-1"#, "out_of_range"),
+        (r#""kind":"cut","constraint":4000"#, "unknown_constraint"),
+        (r#""kind":"cut","constraint":40"#, "already_torn"),
+        (r#""kind":"cut_radius","center":[0,"nan",0],"radius":1"#, "non_finite"),
+        (r#""kind":"cut_radius","center":[0,0,0],"radius":-1"#, "out_of_range"),
+        (r#""kind":"cut_segment","from":[0,0,0],"to":[1,0,0],"direction":[0,0,0]"#, "out_of_range"),
+        (r#""kind":"move_anchor","anchor":1,"translation":[0,0,0]"#, "unknown_anchor"),
+        (
+            r#""kind":"move_anchor","anchor":0,"translation":[0,0,0],"rotation":[0,0,0,0]"#,
+            "out_of_range",
+        ),
+        (r#""kind":"move_collider","collider":3,"translation":[0,0,0]"#, "unknown_collider"),
+        (r#""kind":"move_collider","collider":0,"translation":["inf",0,0]"#, "non_finite"),
+        (r#""kind":"set","parameter":"colour","value":1"#, "unknown_parameter"),
+        (r#""kind":"set","parameter":"gravity","value":1"#, "out_of_range"),
+        (r#""kind":"set","parameter":"gravity","value":["nan",0,0]"#, "non_finite"),
+        (r#""kind":"set","parameter":"substeps","value":1.5"#, "out_of_range"),
+        (r#""kind":"set","parameter":"substeps","value":null"#, "out_of_range"),
+        (r#""kind":"set","parameter":"max_stretch","value":0.5"#, "out_of_range"),
+        (r#""kind":"set","parameter":"time_scale","value":0"#, "out_of_range"),
+        (r#""kind":"set","parameter":"stiffness","value":0.5"#, "no_effect_here"),
+        (
+            r#""kind":"set","parameter":"damping","value":1,"constraint_kind":"bend""#,
+            "out_of_range",
+        ),
+        (
+            r#""kind":"set","parameter":"compliance","value":1,"constraint_kind":"silk""#,
+            "out_of_range",
+        ),
+        (r#""kind":"load","scene":"curtain""#, "no_effect_here"),
+        (r#""kind":"unknown","number":99"#, "no_effect_here"),
+    ];
+    let cut = r#"{"step":1,"kind":"cut","constraint":40}"#;
+    let (clean, _) = record(&job(cut));
+    let lines = wrong.map(|(fields, _)| format!("{{\"step\":2,{fields}}}"));
+    let (file, _) = record(&job(&format!("{cut}\n{}", lines.join("\n"))));
+    let rows = outcomes(&file);
+    assert_eq!(rows.len(), wrong.len() + 1);
+    for (row, (fields, reason)) in rows[1..].iter().zip(wrong) {
+        assert_eq!((row.status.as_str(), row.reason.as_str()), ("rejected", reason), "{fields}");
+    }
+    let hashes = |file: &[u8]| {
+        collect(file, |message| match message {
+            Message::Step(row) => Some(row.state_hash),
+            _ => None,
+        })
+    };
+    assert_eq!(hashes(&file), hashes(&clean));
+    assert_eq!(check(&file).0.verdict, Verdict::Identical);
+}

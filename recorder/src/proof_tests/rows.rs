@@ -1,0 +1,195 @@
+//! What a recording says beside its snapshots: tears with their causes, colliders and events are
+//! those of the simulation, and a changed row is found.
+
+use recorder::{Message, TearsRow, TopologyRow};
+use sim_contract::ParticleFlags;
+
+use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
+use super::{check, rebuild, record};
+use crate::verify::Verdict;
+
+fn tears(file: &[u8]) -> Vec<TearsRow> {
+    collect(file, |message| match message {
+        Message::Tears(row) => Some(row.clone()),
+        _ => None,
+    })
+}
+
+#[test]
+fn what_tore_is_recorded_with_its_cause_and_begins_anew_with_a_reset() {
+    let (file, _) = record(&job(COMMANDS));
+    let rows = tears(&file);
+    assert!(rows.iter().all(|row| row.constraints.len() == row.causes.len()));
+    let find = |step| rows.iter().find(|row| row.step == step).unwrap();
+    assert_eq!(
+        (&find(5).constraints[..], &find(5).causes[..]),
+        (&[40][..], &["cut".to_owned()][..])
+    );
+    assert!(find(7).constraints.len() > 1 && find(9).constraints.len() > 1);
+    assert_eq!(find(90).constraints, [9], "a cut before the reset is gone with it");
+    let causes: Vec<_> = rows.iter().flat_map(|row| &row.causes).collect();
+    for cause in ["cut", "stretch"] {
+        assert!(causes.iter().any(|one| *one == cause), "{causes:?}");
+    }
+    let torn_counts = collect(&file, |message| match message {
+        Message::Step(row) => Some(row.torn_count as usize),
+        _ => None,
+    });
+    let mut torn_count = 0;
+    for (step, found) in (0_u64..).zip(torn_counts) {
+        torn_count = if step == 90 { 0 } else { torn_count };
+        let new = rows.iter().filter(|row| row.step == step);
+        torn_count += new.map(|row| row.constraints.len()).sum::<usize>();
+        assert_eq!(found, torn_count, "step {step}");
+    }
+}
+
+#[test]
+fn colliders_are_recorded_when_they_change() {
+    let steps_of = |scene: &str, commands: &str| {
+        collect(&record(&job_of(scene, commands)).0, |message| match message {
+            Message::Colliders(row) => Some(row.step),
+            _ => None,
+        })
+    };
+    let all: Vec<_> = (0..=STEPS).collect();
+    assert_eq!(steps_of(SCENE, ""), all, "one turns");
+    let still = SCENE.replace("angular_velocity = [0, 2, 0]", "");
+    assert_eq!(steps_of(&still, ""), [0]);
+    let moved = r#"{"step":20,"kind":"move_collider","collider":2,"translation":[0,0,0.4]}
+        {"step":50,"kind":"reset"}"#;
+    assert_eq!(steps_of(&still, moved), [0, 20, 21, 50], "moves, stands, is back");
+    let none = &still[..still.find("[[collider]]").unwrap()];
+    assert_eq!(steps_of(none, ""), [] as [u64; 0]);
+}
+
+#[test]
+fn a_changed_row_of_tears_or_colliders_is_found_with_its_step() {
+    let (file, _) = record(&job(COMMANDS));
+    let with = |change: fn(Message) -> Message| check(&rebuild(&file, |one| Some(change(one)))).0;
+    let report = with(|message| match message {
+        Message::Tears(mut row) if row.step == 5 => {
+            row.constraints[0] = 41;
+            Message::Tears(row)
+        }
+        other => other,
+    });
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(5)));
+    let what = "recorded constraint 41 (cut), simulated constraint 40 (cut)";
+    assert!(report.to_string().contains(what), "{report}");
+    let report = with(|message| match message {
+        Message::Tears(mut row) if row.step == 7 => {
+            row.causes[0] = "force".to_owned();
+            Message::Tears(row)
+        }
+        other => other,
+    });
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(7)), "{report}");
+    let report = with(|message| match message {
+        Message::Tears(mut row) if row.step == 9 => {
+            row.constraints.truncate(1);
+            Message::Tears(row)
+        }
+        other => other,
+    });
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(9)), "{report}");
+    let report = with(|message| match message {
+        Message::Colliders(mut row) if row.step == 17 => {
+            row.colliders[0].friction.0 = 0.5;
+            Message::Colliders(row)
+        }
+        other => other,
+    });
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(17)), "{report}");
+    assert!(report.to_string().contains("collider 0"), "{report}");
+    let report = with(|message| match message {
+        Message::Step(mut row) if row.step == 12 => {
+            row.torn_count += 1;
+            Message::Step(row)
+        }
+        other => other,
+    });
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(12)), "{report}");
+    assert!(report.to_string().contains("torn_count"), "{report}");
+}
+
+#[test]
+fn tears_of_several_steps_in_one_row_are_those_of_a_recorder_that_missed_a_list() {
+    let (file, _) = record(&job(COMMANDS));
+    let mut missed = None;
+    let late = rebuild(&file, |message| match message {
+        Message::Tears(row) if row.step == 5 => {
+            missed = Some(row);
+            None
+        }
+        Message::Tears(mut row) => {
+            if let Some(missed) = missed.take() {
+                row.constraints.splice(..0, missed.constraints);
+                row.causes.splice(..0, missed.causes);
+            }
+            Some(Message::Tears(row))
+        }
+        other => Some(other),
+    });
+    let (report, _) = check(&late);
+    assert_eq!(report.verdict, Verdict::Identical, "{report}");
+}
+
+#[test]
+fn a_particle_that_is_frozen_is_an_event_each_time() {
+    // A stick that is much too long pushes its ends out of what f32 can hold.
+    let text = "version = 1\n[solver]\nmax_speed = 3e38\n\
+        [[particle]]\nposition = [0, 0, 0]\n[[particle]]\nposition = [1, 0, 0]\n\
+        [[constraint]]\nparticles = [0, 1]\nrest_length = 3e38\n";
+    let (file, _) = record(&job_of(text, r#"{"step":60,"kind":"reset"}"#));
+    let events = collect(&file, |message| match message {
+        Message::Event(row) => Some((row.step, row.kind.clone(), row.particle)),
+        _ => None,
+    });
+    let mut before = [0; 2];
+    let expected = collect(&file, |message| match message {
+        Message::Particles { step, particles } => {
+            let flags = [0, 1].map(|index: usize| particles[index].flags & ParticleFlags::FROZEN);
+            let before = std::mem::replace(&mut before, flags);
+            let new = (0..2_u32).filter(|index| {
+                let index = *index as usize;
+                flags[index] != 0 && before[index] == 0
+            });
+            Some(new.map(|index| (*step, "frozen".to_owned(), Some(index))).collect::<Vec<_>>())
+        }
+        _ => None,
+    });
+    assert_eq!(events, expected.concat());
+    assert!(events.iter().any(|(step, ..)| *step < 60), "{events:?}");
+    assert!(events.iter().any(|(step, ..)| *step > 60), "{events:?}");
+    assert_eq!(check(&file).0.verdict, Verdict::Identical);
+}
+
+#[test]
+fn a_recording_that_begins_in_a_torn_scene_is_bit_identical_from_there() {
+    let (file, _) = record(&job(COMMANDS));
+    // The first snapshot with a keyframe behind the cuts, and what tore until then.
+    let torn = |until: u64| {
+        let rows = tears(&file).into_iter().filter(|row| row.step < until);
+        rows.flat_map(|row| row.constraints).collect::<Vec<_>>()
+    };
+    let begin_at = |first_step: u64, torn: Vec<u32>| {
+        let part = rebuild(&file, |message| match message {
+            Message::Topology(row) => {
+                Some(Message::Topology(TopologyRow { torn: torn.clone(), ..row }))
+            }
+            Message::Surface(row) => Some(Message::Surface(row)),
+            other => (other.step() >= first_step).then_some(other),
+        });
+        check(&part).0
+    };
+    for first_step in [9, 13] {
+        let report = begin_at(first_step, torn(first_step));
+        let steps = STEPS - first_step;
+        let expected = format!("{steps} steps bit-identical ({first_step}..={STEPS})");
+        assert_eq!(report.to_string(), expected);
+        let report = begin_at(first_step, Vec::new());
+        assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(first_step)));
+        assert!(report.to_string().contains("other torn constraints"), "{report}");
+    }
+}
