@@ -25,6 +25,13 @@ pub enum ConstraintKind {
     Tether = 3,
 }
 
+impl ConstraintKind {
+    /// The kind of that number, if there is one.
+    pub fn from_number(number: u32) -> Option<Self> {
+        [Self::Structural, Self::Shear, Self::Bend, Self::Tether].get(number as usize).copied()
+    }
+}
+
 /// One constraint as the scene gives it. Its index is its place in the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constraint {
