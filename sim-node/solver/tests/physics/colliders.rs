@@ -265,6 +265,67 @@ fn the_very_middle_of_a_ball_has_a_way_out() {
 }
 
 #[test]
+fn balls_and_capsules_push_to_their_surface_along_the_shortest_way() {
+    let capsule = "shape = \"capsule\"\na = [-1, 0, 0]\nb = [1, 0, 0]\nradius = 0.5\n";
+    let sphere = "shape = \"sphere\"\ncenter = [0, 1, 0]\nradius = 2\n";
+    for (solid, at, expected) in [
+        (sphere, [0.6, 1.8, 0.0], [1.2, 2.6, 0.0]),
+        (sphere, [0.0, 1.0, -0.1], [0.0, 1.0, -2.0]),
+        (sphere, [0.0, 3.5, 0.0], [0.0, 3.5, 0.0]),
+        (capsule, [0.3, 0.0, -0.4], [0.3, 0.0, -0.5]),
+        (capsule, [1.3, 0.0, 0.0], [1.5, 0.0, 0.0]),
+        (capsule, [-1.24, 0.18, 0.0], [-1.4, 0.3, 0.0]),
+        (capsule, [1.4, 0.4, 0.0], [1.4, 0.4, 0.0]),
+    ] {
+        let text = "gravity = [0, 0, 0]\n".to_owned()
+            + &solver_settings(60, 1)
+            + &format!("[[particle]]\nposition = {at:?}\n[[collider]]\n{solid}");
+        let solver = stepped(&text, 1);
+        for axis in 0..3 {
+            assert_near(solid, expected[axis], position(&solver, 0)[axis], 1e-6);
+            assert_near("speed", 0.0, velocity(&solver, 0)[axis], 1e-9);
+        }
+    }
+}
+
+#[test]
+fn an_approach_of_up_to_twice_g_h_ends_at_rest_and_a_faster_one_bounces() {
+    for substeps in [1, 4] {
+        let h = 1.0 / 60.0 / f64::from(substeps);
+        for (share, bounces) in [(0.995, false), (1.005, true)] {
+            // Predicted: its own speed, and what gravity adds in a substep.
+            let speed = share * 9.81 * h;
+            let text = solver_settings(60 * substeps, 1)
+                + &format!("[[particle]]\nposition = [0, 0, 0]\nvelocity = [0, {}, 0]\n", -speed)
+                + FLOOR
+                + "restitution = 0.5\n";
+            let expected = if bounces { 0.5 * (speed + 9.81 * h) } else { 0.0 };
+            assert_near("speed up", expected, velocity(&stepped(&text, 1), 0)[1], 1e-6);
+        }
+    }
+}
+
+#[test]
+fn a_collider_goes_and_turns_with_its_own_velocities() {
+    let text = solver_settings(100, 2)
+        + "[[collider]]\nshape = \"box\"\ncenter = [1, 2, 3]\nhalf_extents = [1, 1, 1]\n\
+           velocity = [0.5, 0, -1]\nangular_velocity = [0, 0, 2]\n";
+    let solver = stepped(&text, 250);
+    let placed = solver.colliders().next().unwrap();
+    let ColliderShape::Box { center, rotation, .. } = placed.shape else { panic!("{placed:?}") };
+    for (axis, expected) in [2.25, 2.0, 0.5].into_iter().enumerate() {
+        assert_near("centre", expected, f64::from(center[axis]), 1e-5);
+    }
+    // Half of the angle of 5 radians; a rotation is the same with all signs changed.
+    let [x, y, z, w] = rotation.map(|part| f64::from(part) * f64::from(rotation[3].signum()));
+    let sign = 2.5_f64.cos().signum();
+    assert_near("z", 2.5_f64.sin() * sign, z, 1e-6);
+    assert_near("w", 2.5_f64.cos() * sign, w, 1e-6);
+    assert_near("x and y", 0.0, x.abs() + y.abs(), 1e-9);
+    assert_eq!((placed.velocity, placed.angular_velocity), ([0.5, 0.0, -1.0], [0.0, 0.0, 2.0]));
+}
+
+#[test]
 fn bounds_keep_a_box_of_the_pixel_demonstration_inside_in_every_snapshot() {
     let text = "dimensions = 2\nup = \"-y\"\nunit = \"px\"\ngravity = [0, 50, 0]\n[solver]\nrate_hz = 60\nsubsteps = 4\n\
          [[particle]]\nposition = [220, 20, 0]\nvelocity = [90, 0, 0]\n[[particle]]\nposition = [280, 20, 0]\n\
