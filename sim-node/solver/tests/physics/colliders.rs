@@ -281,8 +281,8 @@ fn balls_and_capsules_push_to_their_surface_along_the_shortest_way() {
             + &solver_settings(60, 1)
             + &format!("[[particle]]\nposition = {at:?}\n[[collider]]\n{solid}");
         let solver = stepped(&text, 1);
-        for axis in 0..3 {
-            assert_near(solid, expected[axis], position(&solver, 0)[axis], 1e-6);
+        for (axis, expected) in expected.into_iter().enumerate() {
+            assert_near(solid, expected, position(&solver, 0)[axis], 1e-6);
             assert_near("speed", 0.0, velocity(&solver, 0)[axis], 1e-9);
         }
     }
