@@ -11,17 +11,29 @@ fn solver_settings(rate: u32, substeps: u32) -> String {
     format!("[solver]\nrate_hz = {rate}\nsubsteps = {substeps}\n")
 }
 
+/// Steps until a condition holds.
+fn step_until(solver: &mut Solver, condition: impl Fn(&Solver) -> bool) {
+    for _ in 0..10_000 {
+        if condition(solver) {
+            return;
+        }
+        step(solver, 1);
+    }
+    panic!("10,000 steps, and it has not come");
+}
+
 /// The highest point between the next two contacts with the floor.
 fn next_apex(solver: &mut Solver) -> f64 {
-    while velocity(solver, 0)[1] <= 0.0 {
+    step_until(solver, |solver| velocity(solver, 0)[1] > 0.0);
+    let mut apex = position(solver, 0)[1];
+    for _ in 0..10_000 {
+        if velocity(solver, 0)[1] <= 0.0 {
+            break;
+        }
         step(solver, 1);
-    }
-    let mut apex = 0.0;
-    while velocity(solver, 0)[1] > 0.0 {
         apex = f64::max(apex, position(solver, 0)[1]);
-        step(solver, 1);
     }
-    f64::max(apex, position(solver, 0)[1])
+    apex
 }
 
 #[test]

@@ -96,7 +96,7 @@ fn a_box_of_the_pixel_demonstration_falls_340_pixels_in_3_69_seconds() {
          substeps = 1\n[[particle]]\nposition = [220, 60, 0]\n";
     let mut solver = solver(text);
     let mut steps = 0_u32;
-    while position(&solver, 0)[1] < 400.0 {
+    while position(&solver, 0)[1] < 400.0 && steps < 10_000 {
         step(&mut solver, 1);
         steps += 1;
     }
