@@ -246,6 +246,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn eight_passes_share_the_stiffnesses_of_a_spring_cloth() {
+        for (stiffness, expected) in [(0.9, 0.250_106), (0.6, 0.108_220), (0.3, 0.043_605)] {
+            assert!((stiffness_per_pass(stiffness, 8) - expected).abs() < 1e-6, "{stiffness}");
+        }
+    }
+
+    #[test]
     fn stiffness_per_pass_agrees_with_the_closed_form() {
         for stiffness in [0.0_f32, 0.01, 0.3, 0.6, 0.9, 0.999, 1.0] {
             for iterations in [1_u32, 2, 8, 64, 1000] {

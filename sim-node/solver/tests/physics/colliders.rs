@@ -231,6 +231,26 @@ fn a_fast_moving_box_does_not_pass_over_a_particle() {
 }
 
 #[test]
+fn a_box_that_moves_through_a_cloth_carries_it_and_holds_no_particle() {
+    let text = solver_settings(60, 4)
+        + "[[generate]]\nshape = \"cloth\"\ncolumns = 11\nrows = 11\nspacing = 0.2\norigin = [-1, 1, 0]\n\
+           diagonals = 1\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, -2]\nhalf_extents = [0.3, 0.4, 0.3]\n\
+           rotation = [0, 0.2, 0.1, 1]\nvelocity = [0, 0, 1]\nangular_velocity = [0, 0.5, 0]\nfriction = 0.3\n";
+    let mut solver = solver(&text);
+    let mut carried = 0.0;
+    for _ in 0..180 {
+        step(&mut solver, 1);
+        let shape = solver.colliders().next().unwrap().shape;
+        for index in 0..solver.particle_count() {
+            let depth = depth_in(&shape, position(&solver, index));
+            assert!(depth < 1e-5, "particle {index} is {depth} inside");
+            carried = f64::max(carried, position(&solver, index)[2]);
+        }
+    }
+    assert!(carried > 0.5, "the box pushes the cloth in front of it: {carried}");
+}
+
+#[test]
 fn what_lies_on_a_thin_box_is_not_pulled_through_it() {
     let text = solver_settings(240, 4)
         + "[[particle]]\nposition = [0, 0.3, 0]\n[[particle]]\nposition = [0, -3, 0]\nmass = 100\npinned = true\n\
