@@ -82,7 +82,7 @@ fn steps_of_a_hundredth_are_right_after_a_thousand_seconds() {
     assert_close("speed at 10 s", 100.0, velocity(&solver, 0)[0], 1e-5);
     step(&mut solver, 99_000);
     assert_close("position at 1,000 s", 5_000_050.0, position(&solver, 0)[0], 5e-4);
-    assert_close("speed at 1,000 s", 10_000.0, velocity(&solver, 0)[0], 1e-4);
+    assert_close("speed at 1,000 s", 10_000.0, velocity(&solver, 0)[0], 5e-4);
 }
 
 #[test]
