@@ -2,8 +2,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use sim_contract::{Action, COMMANDS_PER_STEP_MAX, Command, Reason};
-use sim_solver::{Grip, Rejection, Solver};
+use sim_contract::{
+    Action, COMMANDS_PER_STEP_MAX, Command, Reason, SettingKind, SettingValue, Text,
+};
+use sim_solver::{Ball, ConstraintKind, Grip, Pose, Push, Rejection, Setting, Solver, Sweep};
 
 /// Commands that have arrived and wait for their turn, by client.
 ///
@@ -51,14 +53,16 @@ impl Inbox {
     }
 }
 
-/// Whether and how long the node goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Whether, how long and how fast the node goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Progress {
     pub(crate) is_paused: bool,
     /// Steps to make while paused.
     pub(crate) steps_due: u64,
-    /// The state was reset: even a paused node makes the one step that shows it.
+    /// The state was reset or loaded: even a paused node makes the one step that shows it.
     pub(crate) is_reset_due: bool,
+    /// The pace against real time.
+    pub(crate) time_scale: f64,
 }
 
 impl Progress {
@@ -83,37 +87,85 @@ pub(crate) fn apply(
     solver: &mut Solver,
     progress: &mut Progress,
 ) -> Result<(), Reason> {
+    if let Some(result) = control(action, progress) {
+        return result;
+    }
     match action {
-        Action::Pin { particle } => solver.pin(particle).map_err(reason),
-        Action::Unpin { particle } => solver.unpin(particle).map_err(reason),
+        Action::Pin { particle } => solver.pin(particle),
+        Action::Unpin { particle } => solver.unpin(particle),
         Action::Grab { particle, target, over_s } => {
-            solver.grab(client_id, Grip { particle, target, over_s }).map_err(reason)
+            solver.grab(client_id, Grip { particle, target, over_s })
         }
         Action::Move { particle, target, over_s } => {
-            solver.move_grabbed(client_id, Grip { particle, target, over_s }).map_err(reason)
+            solver.move_grabbed(client_id, Grip { particle, target, over_s })
         }
-        Action::Release { particle } => solver.release(client_id, particle).map_err(reason),
+        Action::Release { particle } => solver.release(client_id, particle),
+        Action::Push { center, radius, delta, limit } => {
+            solver.push(Push { ball: Ball { center, radius }, delta, limit })
+        }
+        Action::Cut { constraint } => solver.cut(constraint),
+        Action::CutRadius { center, radius } => solver.cut_radius(Ball { center, radius }),
+        Action::CutSegment { from, to, direction } => {
+            solver.cut_segment(Sweep { from, to, direction })
+        }
+        Action::MoveAnchor { anchor, translation, rotation } => {
+            solver.move_anchor(anchor, Pose { translation, rotation })
+        }
+        Action::MoveCollider { collider, translation, rotation } => {
+            solver.move_collider(collider, Pose { translation, rotation })
+        }
+        Action::Set { parameter, value, constraint_kind } => {
+            return set(solver, progress, &parameter, (value, constraint_kind));
+        }
         Action::Reset => {
             solver.reset();
             progress.is_reset_due = true;
             Ok(())
         }
-        Action::Pause => {
-            (progress.is_paused, progress.steps_due) = (true, 0);
-            Ok(())
-        }
-        Action::Resume => {
-            (progress.is_paused, progress.steps_due) = (false, 0);
-            Ok(())
-        }
-        Action::Step { count: 0 } => Err(Reason::OutOfRange),
-        Action::Step { count } if progress.is_paused => {
-            progress.steps_due += u64::from(count);
-            Ok(())
-        }
-        // A running node needs no `step`; other kinds are of another version.
-        _ => Err(Reason::NoEffectHere),
+        // Kinds of another version.
+        _ => return Err(Reason::NoEffectHere),
     }
+    .map_err(reason)
+}
+
+/// What says only when steps are made; none for all else.
+fn control(action: Action, progress: &mut Progress) -> Option<Result<(), Reason>> {
+    match action {
+        Action::Pause => (progress.is_paused, progress.steps_due) = (true, 0),
+        Action::Resume => (progress.is_paused, progress.steps_due) = (false, 0),
+        Action::Step { count: 0 } => return Some(Err(Reason::OutOfRange)),
+        Action::Step { count } if progress.is_paused => progress.steps_due += u64::from(count),
+        // A running node needs none.
+        Action::Step { .. } => return Some(Err(Reason::NoEffectHere)),
+        _ => return None,
+    }
+    Some(Ok(()))
+}
+
+fn set(
+    solver: &mut Solver,
+    progress: &mut Progress,
+    parameter: &Text,
+    (value, kind): (SettingValue, Option<SettingKind>),
+) -> Result<(), Reason> {
+    let setting = match value {
+        SettingValue::Number(number) => Setting::Number(number),
+        SettingValue::Vector(vector) => Setting::Vector(vector),
+        SettingValue::Off => Setting::Off,
+    };
+    let kind = match kind {
+        None => None,
+        Some(SettingKind::Known(kind)) => {
+            Some(ConstraintKind::from_number(kind as u32).ok_or(Reason::OutOfRange)?)
+        }
+        Some(SettingKind::Unknown) => return Err(Reason::OutOfRange),
+    };
+    solver.set(parameter.as_str(), setting, kind).map_err(reason)?;
+    // The pace is not the solver's, which has only checked it.
+    if let ("time_scale", SettingValue::Number(scale)) = (parameter.as_str(), value) {
+        progress.time_scale = f64::from(scale);
+    }
+    Ok(())
 }
 
 fn reason(rejection: Rejection) -> Reason {
@@ -170,6 +222,11 @@ mod tests {
             Rejection::NonFinite,
             Rejection::OutOfRange,
             Rejection::UnknownParticle,
+            Rejection::UnknownConstraint,
+            Rejection::UnknownAnchor,
+            Rejection::UnknownCollider,
+            Rejection::UnknownParameter,
+            Rejection::AlreadyTorn,
             Rejection::NotGrabbed,
             Rejection::GrabbedByOther,
             Rejection::NoEffectHere,
@@ -179,7 +236,7 @@ mod tests {
     }
 
     fn progress(is_paused: bool, steps_due: u64, is_reset_due: bool) -> Progress {
-        Progress { is_paused, steps_due, is_reset_due }
+        Progress { is_paused, steps_due, is_reset_due, time_scale: 1.0 }
     }
 
     #[test]
@@ -193,6 +250,26 @@ mod tests {
         assert_eq!(apply(Action::Step { count: 3 }), Ok(progress(true, 3, false)));
         assert_eq!(apply(Action::Resume), Ok(progress(false, 0, false)));
         assert_eq!(apply(Action::Unknown { number: 99 }), Err(Reason::NoEffectHere));
+    }
+
+    #[test]
+    fn a_time_scale_is_the_pace_of_the_node_and_refused_where_it_is_wrong() {
+        let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
+        let mut now = progress(false, 0, false);
+        let mut set = |value, kind| {
+            let parameter = Text::new("time_scale");
+            let action = Action::Set { parameter, value, constraint_kind: kind };
+            apply(1, action, &mut solver, &mut now).map(|()| now.time_scale)
+        };
+        assert_eq!(set(SettingValue::Number(0.5), None), Ok(0.5));
+        assert_eq!(set(SettingValue::Number(0.0), None), Err(Reason::OutOfRange));
+        assert_eq!(set(SettingValue::Off, None), Err(Reason::OutOfRange));
+        assert_eq!(set(SettingValue::Number(f32::NAN), None), Err(Reason::NonFinite));
+        assert_eq!(
+            set(SettingValue::Number(2.0), Some(SettingKind::Unknown)),
+            Err(Reason::OutOfRange)
+        );
+        assert_eq!(set(SettingValue::Number(2.0), None), Ok(2.0));
     }
 
     #[test]

@@ -3,12 +3,13 @@
 use std::io::{Write, stderr};
 
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Command, Endpoint, Stop};
+use sim_contract::{Action, Command, Endpoint, Reason, Stop};
 use sim_solver::{Scene, Solver};
 
 use crate::commands::{Inbox, Progress, apply};
 use crate::pace::Pace;
 use crate::publish::{Position, Publisher, StepTimes};
+use crate::scene_source;
 use crate::statistics::Statistics;
 
 /// Longest time between two status messages: 10 Hz.
@@ -19,6 +20,9 @@ const PAUSED_POLL_NS: u64 = SECOND_NS / 500;
 /// What a run is told.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Options {
+    /// In place of the scenes' own.
+    pub(crate) rate_hz: Option<u32>,
+    pub(crate) substeps: Option<u32>,
     /// Steps after which the run ends.
     pub(crate) steps: Option<u64>,
     pub(crate) starts_paused: bool,
@@ -65,6 +69,7 @@ impl Node {
                 is_paused: options.starts_paused,
                 steps_due: 0,
                 is_reset_due: false,
+                time_scale: 1.0,
             },
             pace: Pace::new(scene.solver.rate_hz, now_ns),
             statistics: Statistics::new(now_ns)?,
@@ -139,10 +144,36 @@ impl Node {
         for command in self.inbox.take_turn() {
             // Whoever commanded and then asks for the status finds the effect in it.
             self.next_status_ns = 0;
-            let action = command.action();
-            let result = apply(command.client_id, action, &mut self.solver, &mut self.progress);
+            let result = match command.action() {
+                Action::Load { scene } => self.load(scene.as_str()),
+                action => apply(command.client_id, action, &mut self.solver, &mut self.progress),
+            };
             self.publisher.add_outcome(self.step + 1, command, result);
         }
+        self.pace.set_time_scale(self.progress.time_scale);
+    }
+
+    /// Takes another scene; the next step shows its initial state. The rate of a run stays.
+    fn load(&mut self, source: &str) -> Result<(), Reason> {
+        let mut scene = scene_source::load(source).map_err(|error| {
+            warn(&format!("load: {error:#}"));
+            Reason::OutOfRange
+        })?;
+        let Options { rate_hz, substeps, .. } = self.options;
+        scene.override_solver(rate_hz, substeps).map_err(|_| Reason::OutOfRange)?;
+        if scene.solver.rate_hz != self.scene.solver.rate_hz {
+            let (own, other) = (self.scene.solver.rate_hz, scene.solver.rate_hz);
+            warn(&format!("load: {source} runs at {other} Hz, this node at {own} Hz"));
+            return Err(Reason::NoEffectHere);
+        }
+        let solver = Solver::new_in_run(&scene);
+        self.publisher.load(&scene, &solver, self.step + 1).map_err(|error| {
+            warn(&format!("load: {error}"));
+            Reason::NoEffectHere
+        })?;
+        (self.scene, self.solver) = (scene, solver);
+        self.progress.is_reset_due = true;
+        Ok(())
     }
 
     fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
@@ -195,16 +226,20 @@ impl Node {
 
     fn position(&self) -> Position {
         let is_last = self.is_done() || !self.progress.is_stepping();
-        Position { step: self.step, is_paused: self.progress.is_paused, is_last }
+        let Progress { is_paused, time_scale, .. } = self.progress;
+        Position { step: self.step, is_paused, time_scale, is_last }
     }
 }
 
 /// A state that blows up is no reason to stop, but must not pass unnoticed.
 fn warn_of_frozen(step: u64, count: u64) {
+    warn(&format!(
+        "step {step}: {count} particles are frozen, their state was no longer finite; `ctl reset` \
+         brings them back"
+    ));
+}
+
+fn warn(text: &str) {
     // Whoever has closed stderr wants no warning.
-    let _unheard = writeln!(
-        stderr(),
-        "warning: step {step}: {count} particles are frozen, their state was no longer finite; \
-         `ctl reset` brings them back"
-    );
+    let _unheard = writeln!(stderr(), "warning: {text}");
 }

@@ -1,16 +1,19 @@
 //! From the solver's state to what other processes read.
 
+mod load;
+
 use anyhow::Context;
 use bytemuck::cast;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    CONTRACT_VERSION, Command, ConstraintState, Endpoint, KeyframeHeader, Load, LoadHeader,
-    NodeStatus, Outcome, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
-    Triangle, Wake,
+    Action, CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus,
+    Outcome, Owner, OwnerError, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
+    TearsHeader, Wake,
 };
-use sim_solver::{SOLVER_VERSION, Scene, Solver};
+use sim_solver::{PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
 use crate::statistics::Statistics;
+use load::{LoadPlace, count, to_collider_state, with_load};
 
 /// How long a step took and how late it began.
 #[derive(Debug, Clone, Copy, Default)]
@@ -20,10 +23,12 @@ pub(crate) struct StepTimes {
 }
 
 /// Where the run stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Position {
     pub(crate) step: u64,
     pub(crate) is_paused: bool,
+    /// The pace against real time.
+    pub(crate) time_scale: f64,
     /// No further step follows for now: whoever joins is to see this one.
     pub(crate) is_last: bool,
 }
@@ -34,6 +39,8 @@ pub(crate) struct Publisher {
     owner: Owner,
     run_id: u64,
     rate_hz: u32,
+    /// Loads of this run after the first one.
+    topology_revision: u32,
     /// Every how many steps a snapshot is published; the last one before a wait always is.
     every: u64,
     /// Header of the newest published snapshot.
@@ -46,6 +53,9 @@ pub(crate) struct Publisher {
     outcomes: Vec<Outcome>,
     outcome_count: u64,
     rejected_count: u64,
+    /// How many torn constraints, and which colliders, were published last.
+    torn_count: usize,
+    colliders: Vec<PlacedCollider>,
 }
 
 impl Publisher {
@@ -57,22 +67,13 @@ impl Publisher {
         every: u64,
     ) -> anyhow::Result<Self> {
         let run_id = getrandom::u64().context("no random number for the run")?;
-        let constraints: Vec<_> = solver.constraints().map(to_state).collect();
-        let triangles: Vec<_> =
-            solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-        let text = scene.to_toml();
-        let load = Load {
-            header: load_header(scene, solver, run_id),
-            scene: text.as_bytes(),
-            constraints: &constraints,
-            triangles: &triangles,
-            collider_count: 0,
-            keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
-        };
+        let place = LoadPlace { run_id, step: 0, topology_revision: 0 };
+        let owner = with_load(scene, solver, place, |load| Owner::create(endpoint, load))?;
         Ok(Self {
-            owner: Owner::create(endpoint, &load)?,
+            owner,
             run_id,
             rate_hz: scene.solver.rate_hz,
+            topology_revision: 0,
             every,
             last: SnapshotHeader::default(),
             is_keyframe_due: true,
@@ -81,7 +82,28 @@ impl Publisher {
             outcomes: Vec::new(),
             outcome_count: 0,
             rejected_count: 0,
+            torn_count: 0,
+            colliders: Vec::new(),
         })
+    }
+
+    /// Publishes another scene, which `step` is the first to show.
+    ///
+    /// # Errors
+    /// It is beyond a limit of the contract or of shared memory; the old one stays published.
+    pub(crate) fn load(
+        &mut self,
+        scene: &Scene,
+        solver: &Solver,
+        step: u64,
+    ) -> Result<(), OwnerError> {
+        let topology_revision = self.topology_revision + 1;
+        let place = LoadPlace { run_id: self.run_id, step, topology_revision };
+        with_load(scene, solver, place, |load| self.owner.load(load))?;
+        self.topology_revision = topology_revision;
+        self.torn_count = 0;
+        self.colliders.clear();
+        Ok(())
     }
 
     /// Appends the commands that have arrived.
@@ -94,7 +116,7 @@ impl Publisher {
         self.outcomes.push(Outcome::new(self.outcome_count, step, command, result));
         self.outcome_count += 1;
         self.rejected_count += u64::from(result.is_err());
-        let is_move = matches!(command.action(), sim_contract::Action::Move { .. });
+        let is_move = matches!(command.action(), Action::Move { .. });
         self.is_keyframe_due |= result.is_ok() && !is_move;
     }
 
@@ -106,6 +128,8 @@ impl Publisher {
         times: StepTimes,
     ) -> anyhow::Result<()> {
         self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
+        self.publish_colliders(solver, position.step)?;
+        self.publish_tears(solver, position.step)?;
         if !(position.step.is_multiple_of(self.every) || position.is_last) {
             return self.publish_outcomes();
         }
@@ -118,6 +142,37 @@ impl Publisher {
         let particle = |index| cast::<_, ParticleState>(solver.particle(index));
         self.owner.publish_particles(&self.last, particle)?;
         self.owner.wake(Wake::Frame);
+        Ok(())
+    }
+
+    /// Publishes the colliders where they are not what was published last.
+    fn publish_colliders(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
+        if solver.colliders().eq(self.colliders.iter().copied()) {
+            return Ok(());
+        }
+        self.colliders.clear();
+        self.colliders.extend(solver.colliders());
+        let states: Vec<_> = self.colliders.iter().map(to_collider_state).collect();
+        let header = CollidersHeader { run_id: self.run_id, step, ..CollidersHeader::default() };
+        Ok(self.owner.publish_colliders(header, &states)?)
+    }
+
+    /// Publishes all that is torn, where something tore in this step or is whole again.
+    fn publish_tears(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
+        let (torn, new_count) = (solver.torn(), solver.new_torn_count());
+        if new_count == 0 && torn.len() == self.torn_count {
+            return Ok(());
+        }
+        self.torn_count = torn.len();
+        let causes: Vec<_> = solver.tear_causes().iter().map(|cause| *cause as u8).collect();
+        let header = TearsHeader {
+            run_id: self.run_id,
+            step,
+            new_count: count(new_count),
+            ..TearsHeader::default()
+        };
+        self.owner.publish_tears(header, torn, &causes)?;
+        self.owner.wake(Wake::Tears);
         Ok(())
     }
 
@@ -185,7 +240,7 @@ impl Publisher {
             outcome_count: self.outcome_count,
             wake_late_ns: times.wake_late_ns,
             solve_ns: times.solve_ns,
-            topology_revision: 0,
+            topology_revision: self.topology_revision,
             torn_count: count(solver.torn().len()),
             particle_count: count(solver.particle_count()),
             flags: if position.is_paused { SnapshotFlags::PAUSED } else { 0 },
@@ -218,7 +273,6 @@ impl Publisher {
             run_id: self.run_id,
             step: position.step,
             real_time_factor: if position.is_paused { 0.0 } else { statistics.real_time_factor },
-            time_scale: 1.0,
             wake_late_ns_p50: last.wake_late_ns(0.5),
             wake_late_ns_p99: last.wake_late_ns(0.99),
             solve_ns_p50: last.solve_ns(0.5),
@@ -230,41 +284,17 @@ impl Publisher {
             rate_hz: self.rate_hz,
             particle_count: count(solver.particle_count()),
             constraint_count: count(solver.constraint_count()),
-            torn_count: count(solver.torn().len()),
             reader_count: count(self.owner.reader_count()),
             process_id: std::process::id(),
+            time_scale: position.time_scale,
+            frozen_count: solver.frozen_count(),
+            torn_count: count(solver.torn().len()),
             flags: if position.is_paused { StatusFlags::PAUSED } else { 0 },
             ..NodeStatus::default()
         };
         status.set_scene_name(&scene.name);
         status
     }
-}
-
-fn to_state(constraint: sim_solver::Constraint) -> ConstraintState {
-    ConstraintState {
-        a: constraint.a,
-        b: constraint.b,
-        rest_length: constraint.rest_length,
-        compliance: constraint.compliance,
-        kind: constraint.kind as u32,
-    }
-}
-
-fn load_header(scene: &Scene, solver: &Solver, run_id: u64) -> LoadHeader {
-    LoadHeader {
-        run_id,
-        origin: scene.origin,
-        particle_count: count(solver.particle_count()),
-        rate_hz: scene.solver.rate_hz,
-        method: scene.solver.method as u32,
-        ..LoadHeader::default()
-    }
-}
-
-#[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 of anything")]
-fn count(length: usize) -> u32 {
-    length as u32
 }
 
 /// step / rate in nanoseconds, rounded down; whole seconds apart, so that nothing overflows.

@@ -35,6 +35,8 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     scene.override_solver(args.rate, args.substeps).map_err(|problem| anyhow!("--{problem}"))?;
     let endpoint = endpoint(args.endpoint.domain.as_deref(), &args.endpoint.name)?;
     let options = Options {
+        rate_hz: args.rate,
+        substeps: args.substeps,
         steps: args.steps.or(args.duration.map(|time| steps_in(time, scene.solver.rate_hz))),
         starts_paused: args.paused,
         waits_for_time: !args.as_fast_as_possible,

@@ -1,29 +1,75 @@
-//! Prints a state hash of every built-in scene: `cargo run -p sim-solver --example state_hashes`
+//! Prints a state hash of every built-in scene and of two test scenes that use every mechanism:
+//! `cargo run --release -p sim-solver --example state_hashes`
 //!
-//! Each scene makes 1,000 steps with a drag, a pin and a release. Two builds that print the same
-//! lines make the same bits, whatever their optimisation.
+//! Each scene makes 10,000 steps with commands of every kind. Two builds that print the same lines
+//! make the same bits, whatever their optimisation. The lines are also kept in
+//! `tests/state_hashes.txt`, which may change only together with the solver's version.
 #![allow(clippy::print_stdout, reason = "printing is what it is for")]
 
 use std::error::Error;
 
-use sim_solver::{Grip, Scene, Solver, builtin};
+use sim_solver::{Ball, Grip, Pose, Push, SOLVER_VERSION, Scene, Setting, Solver, Sweep, builtin};
+
+/// The test scenes.
+const SCENES: [(&str, &str); 2] = [
+    ("everything", include_str!("../tests/scenes/everything.toml")),
+    ("stiffness", include_str!("../tests/scenes/stiffness.toml")),
+];
+
+const STEPS: u32 = 10_000;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    for name in builtin::names() {
-        let text = builtin::text(name).unwrap_or_default();
-        let mut solver = Solver::new(&Scene::from_toml(text, name)?);
-        for step in 0..1000 {
-            match step {
-                100 => {
-                    solver.grab(1, Grip { particle: 20, target: [0.3, 0.7, 0.4], over_s: 0.2 })?;
-                }
-                300 => solver.pin(30)?,
-                500 => solver.release(1, 20)?,
-                _ => {}
-            }
-            solver.step();
-        }
-        println!("{name} {:016x}", solver.state_hash());
-    }
+    print!("{}", lines()?);
     Ok(())
+}
+
+/// The solver's version, then a line for each scene.
+pub(crate) fn lines() -> Result<String, Box<dyn Error>> {
+    let mut lines = format!("solver_version {SOLVER_VERSION}\n");
+    let built_in = builtin::names().filter_map(|name| Some((name, builtin::text(name)?)));
+    for (name, text) in built_in.chain(SCENES) {
+        let scene = Scene::from_toml(text, name)?;
+        lines += &format!("{name} {:016x}\n", run(&scene));
+    }
+    Ok(lines)
+}
+
+fn run(scene: &Scene) -> u64 {
+    let mut solver = Solver::new(scene);
+    for step in 0..STEPS {
+        // A command that means nothing in a scene is refused by every build alike.
+        let _refused = command(&mut solver, step);
+        solver.step();
+    }
+    solver.state_hash()
+}
+
+fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Rejection> {
+    let [x, y, _] = solver.particle(solver.particle_count() / 2).position;
+    let ball = Ball { center: [x, y, 0.0], radius: 0.3 };
+    let pose = Pose { translation: [0.1, 0.05, 0.0], rotation: [0.0, 0.0, 0.3, 1.0] };
+    match step {
+        100 => solver.grab(1, Grip { particle: 20, target: [0.3, 0.7, 0.0], over_s: 0.2 }),
+        300 => solver.pin(15),
+        500 => solver.release(1, 20),
+        700 => solver.push(Push { ball, delta: [0.01, 0.02, 0.0], limit: Some(0.015) }),
+        900 => solver.cut(17),
+        1000 => solver.cut_segment(Sweep {
+            from: [x - 0.05, y - 0.05, 0.0],
+            to: [x + 0.05, y + 0.1, 0.0],
+            direction: [0.0, 0.0, 1.0],
+        }),
+        1500 => solver.move_anchor(0, pose),
+        2000 => solver.move_collider(1, pose),
+        2500 => solver.set("gravity", Setting::Vector([0.5, -3.0, 0.0]), None),
+        3000 => solver.set("substeps", Setting::Number(4.0), None),
+        3500 => solver.set("wind_velocity", Setting::Vector([-4.0, 0.0, 0.0]), None),
+        4000 => solver.unpin(15),
+        5000 => solver.cut_radius(Ball { radius: 0.15, ..ball }),
+        6000 => {
+            solver.reset();
+            Ok(())
+        }
+        _ => Ok(()),
+    }
 }

@@ -25,6 +25,13 @@ pub enum ConstraintKind {
     Tether = 3,
 }
 
+impl ConstraintKind {
+    /// The kind of that number, if there is one.
+    pub fn from_number(number: u32) -> Option<Self> {
+        [Self::Structural, Self::Shear, Self::Bend, Self::Tether].get(number as usize).copied()
+    }
+}
+
 /// One constraint as the scene gives it. Its index is its place in the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constraint {
@@ -237,6 +244,13 @@ fn to_f32(value: f64) -> f32 {
 mod tests {
     //! The stiffness of a pass against the closed form.
     use super::*;
+
+    #[test]
+    fn eight_passes_share_the_stiffnesses_of_a_spring_cloth() {
+        for (stiffness, expected) in [(0.9, 0.250_106), (0.6, 0.108_220), (0.3, 0.043_605)] {
+            assert!((stiffness_per_pass(stiffness, 8) - expected).abs() < 1e-6, "{stiffness}");
+        }
+    }
 
     #[test]
     fn stiffness_per_pass_agrees_with_the_closed_form() {

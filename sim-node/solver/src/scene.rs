@@ -14,6 +14,7 @@ mod limits;
 mod model;
 mod read;
 mod read_generator;
+mod warnings;
 mod wind;
 
 use serde::{Deserialize, Serialize};
@@ -288,7 +289,7 @@ impl Scene {
 
     /// What works, but probably not as meant: a sentence each.
     pub fn warnings(&self) -> Vec<String> {
-        model::warnings(self)
+        warnings::warnings(self)
     }
 
     /// Particles, constraints and pinned particles, all generated ones included.

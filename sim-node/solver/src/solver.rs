@@ -84,6 +84,12 @@ impl Solver {
         solver
     }
 
+    /// As [`Self::new`], in a run that goes on: the next step shows the initial state, as after a
+    /// reset.
+    pub fn new_in_run(scene: &Scene) -> Self {
+        Self { is_restored: true, ..Self::new(scene) }
+    }
+
     /// Makes the next step's state the initial one: particles, parameters, colliders and anchors
     /// as loaded, nothing grabbed, nothing torn.
     pub fn reset(&mut self) {

@@ -3,7 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use proptest::prelude::*;
-use sim_solver::{Grip, Keyframe, Particle, RestoreError, Scene, Solver, builtin, flag};
+use sim_solver::{
+    Ball, Grip, Keyframe, Particle, Pose, Push, RestoreError, Scene, Setting, Solver, Sweep,
+    builtin, flag,
+};
 
 #[derive(Debug, Clone)]
 enum Wish {
@@ -12,19 +15,47 @@ enum Wish {
     Grab(u32, [f32; 3]),
     Move(u32, [f32; 3]),
     Release(u32),
+    Push([f32; 3]),
+    Cut(u32),
+    CutRadius([f32; 3]),
+    CutSegment([f32; 3], [f32; 3]),
+    MoveAnchor([f32; 3]),
+    MoveCollider(u32, [f32; 3]),
+    Set(usize, f32),
     Reset,
 }
+
+/// Parameters with a number, each with the range that a share of 0 to 1 is spread over.
+const SETTINGS: [(&str, f32, f32); 9] = [
+    ("damping", 0.0, 5.0),
+    ("wind_drag", 0.0, 2.0),
+    ("relaxation", 0.5, 1.5),
+    ("max_stretch", 1.05, 2.0),
+    ("tear_stretch", 1.1, 3.0),
+    ("tear_distance", 0.01, 0.5),
+    ("tear_force", 1.0, 1000.0),
+    ("compliance", 0.0, 1e-3),
+    ("stiffness", 0.1, 1.0),
+];
 
 fn wish() -> impl Strategy<Value = Wish> {
     // A few particles only, so that pins, grabs and releases meet.
     let particle = 80..90_u32;
     let target = prop::array::uniform3(-1.0..1.0_f32);
+    let point = target.clone();
     prop_oneof![
         4 => particle.clone().prop_map(Wish::Pin),
         4 => particle.clone().prop_map(Wish::Unpin),
         6 => (particle.clone(), target.clone()).prop_map(|(one, to)| Wish::Grab(one, to)),
         6 => (particle.clone(), target).prop_map(|(one, to)| Wish::Move(one, to)),
         4 => particle.prop_map(Wish::Release),
+        2 => point.clone().prop_map(Wish::Push),
+        2 => (0..400_u32).prop_map(Wish::Cut),
+        1 => point.clone().prop_map(Wish::CutRadius),
+        1 => (point.clone(), point.clone()).prop_map(|(from, to)| Wish::CutSegment(from, to)),
+        1 => point.clone().prop_map(Wish::MoveAnchor),
+        1 => (0..5_u32, point).prop_map(|(index, to)| Wish::MoveCollider(index, to)),
+        3 => (0..SETTINGS.len(), 0.0..1.0_f32).prop_map(|(which, value)| Wish::Set(which, value)),
         1 => Just(Wish::Reset),
     ]
 }
@@ -38,6 +69,26 @@ fn apply(solver: &mut Solver, wish: &Wish) {
         Wish::Grab(particle, target) => solver.grab(1, grip(particle, target)),
         Wish::Move(particle, target) => solver.move_grabbed(1, grip(particle, target)),
         Wish::Release(particle) => solver.release(1, particle),
+        Wish::Push(center) => solver.push(Push {
+            ball: Ball { center, radius: 0.4 },
+            delta: center,
+            limit: Some(0.01),
+        }),
+        Wish::Cut(constraint) => solver.cut(constraint),
+        Wish::CutRadius(center) => solver.cut_radius(Ball { center, radius: 0.1 }),
+        Wish::CutSegment(from, to) => {
+            solver.cut_segment(Sweep { from, to, direction: [0.0, 0.0, 1.0] })
+        }
+        Wish::MoveAnchor(translation) => {
+            solver.move_anchor(0, Pose { translation, rotation: [0.1, 0.0, 0.2, 1.0] })
+        }
+        Wish::MoveCollider(collider, translation) => {
+            solver.move_collider(collider, Pose { translation, rotation: [0.0, 0.0, 0.0, 1.0] })
+        }
+        Wish::Set(which, share) => {
+            let (name, low, high) = SETTINGS[which];
+            solver.set(name, Setting::Number(low + share * (high - low)), None)
+        }
         Wish::Reset => {
             solver.reset();
             Ok(())
@@ -53,22 +104,38 @@ fn particles(solver: &Solver) -> Vec<Particle> {
     (0..solver.particle_count()).map(|index| solver.particle(index)).collect()
 }
 
+/// A built-in scene, and those that use every mechanism.
+const TEXTS: [&str; 3] = [
+    include_str!("../../scenes/curtain.toml"),
+    include_str!("scenes/everything.toml"),
+    include_str!("scenes/stiffness.toml"),
+];
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig::with_cases(96))]
 
     #[test]
     fn a_snapshot_and_its_keyframe_are_the_complete_state(
         steps in prop::collection::vec(prop::collection::vec(wish(), 0..3), 1..60),
-        cut in 0..60_usize,
+        stop in 0..60_usize,
+        text in 0..TEXTS.len(),
+        is_used in any::<bool>(),
     ) {
-        let mut whole = Solver::new(&scene());
+        let scene = Scene::from_toml(TEXTS[text], "test").unwrap();
+        let mut whole = Solver::new(&scene);
         let mut restored = None;
         for (index, wishes) in steps.iter().enumerate() {
-            if index == cut.min(steps.len() - 1) {
+            if index == stop.min(steps.len() - 1) {
                 let bytes = whole.keyframe().encode();
                 prop_assert!(bytes.len() <= whole.keyframe_size_bytes_max());
                 let keyframe = Keyframe::decode(&bytes).unwrap();
-                let mut solver = Solver::new(&scene());
+                // Nothing of another state may be left, whatever was done before.
+                let mut solver = if is_used { whole.clone() } else { Solver::new(&scene) };
+                if is_used {
+                    solver.cut(3).ok();
+                    solver.set("substeps", Setting::Number(7.0), None).unwrap();
+                    solver.step();
+                }
                 solver.restore(&particles(&whole), &keyframe).unwrap();
                 prop_assert_eq!(solver.state_hash(), whole.state_hash());
                 restored = Some(solver);

@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use sim_solver::{Grip, Scene, Solver, builtin};
+use sim_solver::{Grip, Scene, Setting, Solver, builtin};
 
 struct Counting;
 
@@ -43,6 +43,18 @@ fn neither_steps_nor_commands_allocate() {
         solver.step();
     }
     assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+    // Contacts, wind, anchors and a storm of tears in the middle of a step neither.
+    for text in [include_str!("scenes/everything.toml"), include_str!("scenes/stiffness.toml")] {
+        let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
+        solver.step();
+        solver.set("tear_distance", Setting::Number(0.0), None).unwrap();
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for _ in 0..200 {
+            solver.step();
+        }
+        assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+        assert!(solver.torn().len() > 100, "{} tore", solver.torn().len());
+    }
     // The counter does count.
     drop(std::hint::black_box(vec![0_u8; 100]));
     assert!(ALLOCATIONS.load(Ordering::Relaxed) > before);

@@ -302,6 +302,101 @@ const WRONG: &[(&str, &str)] = &[
         "f.toml:7: generate[0].compliance.structural: 10000000000000000000000000000000000 is out of range (allowed: 0 to 1e20 m/N)",
     ),
     ("version = 1\n\n[solver\n", "f.toml:3: scene: "),
+    (
+        "version = 1\n[solver]\nrelaxation = 2",
+        "f.toml:3: solver.relaxation: 2 is out of range (allowed: more than 0, less than 2",
+    ),
+    (
+        "version = 1\n[solver]\nmax_stretch = 1",
+        "f.toml:3: solver.max_stretch: 1 is out of range (allowed: more than 1, or inf for off)",
+    ),
+    (
+        "version = 1\n[solver]\ntear_distance = -1",
+        "f.toml:3: solver.tear_distance: -1 is out of range (allowed: a number >= 0, or inf",
+    ),
+    (
+        "version = 1\n[solver]\ntear_force = nan",
+        "f.toml:3: solver.tear_force: nan is not a finite number",
+    ),
+    ("version = 1\n[solver]\ntethers = 1", "f.toml:3: solver.tethers: invalid type"),
+    (
+        "version = 1\n[wind]\ngust = 1.5",
+        "f.toml:3: wind.gust: 1.5 is out of range (allowed: 0 to 1)",
+    ),
+    ("version = 1\n[wind]\ngust_period = 0", "f.toml:3: wind.gust_period: 0 is out of range"),
+    ("version = 1\n[wind]\nspeed = 1", "f.toml:3: wind.speed: unknown field"),
+    (
+        "version = 1\n[[collider]]\nshape = \"cone\"",
+        "f.toml:3: collider[0].shape: there is no shape \"cone\" (allowed: plane, box, sphere, capsule, bounds)",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"plane\"",
+        "f.toml:3: collider[0].normal: is missing: a plane needs it",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"plane\"\nnormal = [0, 0, 0]\noffset = 0",
+        "f.toml:4: collider[0].normal: has no direction",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\nradius = 1",
+        "f.toml:6: collider[0].radius: unknown field of a plane (allowed: normal, offset)",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 0",
+        "f.toml:5: collider[0].radius: 0 is out of range",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1, 0, 1]",
+        "f.toml:5: collider[0].half_extents: an extent is not positive",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1, 1, 1]\nrotation = [0, 0, 0, 0]",
+        "f.toml:6: collider[0].rotation: has no direction",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"bounds\"\nmin = [0, 0, 0]\nmax = [1, 0, 1]",
+        "f.toml:5: collider[0].max: is not above min",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\nrestitution = 1.1",
+        "f.toml:6: collider[0].restitution: 1.1 is out of range (allowed: 0 to 1)",
+    ),
+    (
+        "version = 1\n[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\nfriction = -1",
+        "f.toml:6: collider[0].friction: -1 is out of range",
+    ),
+    (
+        "version = 1\n[[anchor]]\nparticles = [0]",
+        "f.toml:3: anchor[0].particles: the scene has no particles",
+    ),
+    (
+        "version = 1\n[[particle]]\nposition = [0, 0, 0]\n[[anchor]]\nparticles = [1]",
+        "f.toml:5: anchor[0].particles: 1 is out of range (allowed: 0)",
+    ),
+    (
+        "version = 1\n[[particle]]\nposition = [0, 0, 0]\n[[anchor]]\nparticles = [0]\n[[anchor]]\nparticles = [0]",
+        "f.toml:7: anchor[1].particles: particle 0 follows an anchor already",
+    ),
+    (
+        "version = 1\n[[anchor]]\nparticles = []\npath = [{ time = 1 }, { time = 1 }]",
+        "f.toml:4: anchor[0].path[1].time: 1 does not come after 1",
+    ),
+    (
+        "version = 1\n[[anchor]]\nparticles = []\npath = [{ time = -1 }]",
+        "f.toml:4: anchor[0].path[0].time: -1 is out of range",
+    ),
+    (
+        "version = 1\n[[anchor]]\nparticles = []\nrepeat = true",
+        "f.toml:4: anchor[0].repeat: a path of fewer than two points",
+    ),
+    (
+        "version = 1\ndimensions = 2\n[[anchor]]\nparticles = []\npath = [{ time = 1, rotation = [1, 0, 0, 1] }]",
+        "f.toml:5: anchor[0].path[0].rotation: turns out of the plane",
+    ),
+    (
+        "version = 1\n[[generate]]\nshape = \"rope\"\ncount = 2\nfrom = [0, 0, 0]\nto = [1, 0, 0]\ntear_stretch = 0.5",
+        "f.toml:7: generate[0].tear_stretch: 0.5 is out of range",
+    ),
 ];
 
 #[test]
@@ -315,4 +410,42 @@ fn every_wrong_value_is_named_with_line_field_and_cure() {
         }
     }
     assert!(misses.is_empty(), "{}", misses.join("\n\n"));
+}
+
+#[test]
+fn what_works_but_hardly_as_meant_is_said() {
+    let pair = "[[particle]]\nposition = [0, 0, 0]\n[[particle]]\nposition = [1, 0, 0]\n[[constraint]]\nparticles = [0, 1]\n";
+    for (text, expected) in [
+        (format!("{pair}tear_stretch = 1.5\n"), "constraint 0 is rigid and tears by stretch"),
+        (
+            format!("{pair}compliance = 1e-3\ntear_stretch = 1.5\nmax_stretch = 1.2\n"),
+            "constraint 0 is kept within max_stretch",
+        ),
+        (
+            format!(
+                "[[anchor]]\nparticles = [1]\n{}",
+                pair.replace("[1, 0, 0]", "[1, 0, 0]\npinned = true")
+            ),
+            "particle 1 is pinned and follows an anchor",
+        ),
+        (format!("[solver]\ntethers = true\n{pair}"), "tethers = true does nothing"),
+        (
+            format!("{}rest_length = 1\n", pair.replace("[1, 0, 0]", "[0, 0, 0]")),
+            "particles 0 and 1 coincide",
+        ),
+        (
+            format!("{pair}[[constraint]]\nparticles = [1, 0]\n"),
+            "two constraints join particles 1 and 0",
+        ),
+        (pair.replace("[1, 0, 0]", "[101, 0, 0]"), "a coordinate reaches 101 m from the origin"),
+        (pair.replace("[1, 0, 0]", "[1, 0, 0]\nmass = 2000"), "masses from 1 to 2000 kg"),
+        (format!("[solver]\norder = \"listed\"\n{pair}"), "order = \"listed\" with one iteration"),
+        (format!("{pair}tear_force = 10\nmax_stretch = 1.2\ntear_stretch = inf\n"), ""),
+    ] {
+        let warnings =
+            Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap().warnings();
+        let is_said = warnings.iter().any(|warning| warning.starts_with(expected));
+        assert_eq!(is_said, !expected.is_empty(), "{text}\n{warnings:?}");
+        assert!(warnings.len() <= 1, "{warnings:?}");
+    }
 }

@@ -3,11 +3,6 @@
 use super::{Limits, Method, Scene, SceneParticle};
 use crate::constraints::Constraint;
 
-/// Distance from the scene's origin beyond which f32 positions make a scene at rest tremble.
-const NEAR_ORIGIN: f32 = 100.0;
-/// Ratio of masses beyond which small steps converge visibly slower.
-const MASS_RATIO_LARGE: f32 = 1e3;
-
 /// Every particle, constraint and triangle of a scene; immutable from load to load.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Model {
@@ -82,34 +77,4 @@ impl Model {
         let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
         x * x + y * y + z * z
     }
-}
-
-/// What works, but probably not as meant.
-pub(crate) fn warnings(scene: &Scene) -> Vec<String> {
-    let model = scene.model();
-    let mut warnings = Vec::new();
-    let coordinates = model.particles.iter().flat_map(|one| one.position);
-    let farthest =
-        coordinates.fold(0.0, |most: f32, one| if one.abs() > most { one.abs() } else { most });
-    if farthest > NEAR_ORIGIN {
-        warnings.push(format!(
-            "a coordinate reaches {farthest} {unit} from the origin: beyond {NEAR_ORIGIN} {unit} a \
-             scene at rest trembles; put the distance into `origin`",
-            unit = scene.unit
-        ));
-    }
-    let masses = || model.particles.iter().map(|one| one.mass);
-    let heaviest = masses().fold(0.0, |most: f32, one| if one > most { one } else { most });
-    let lightest = masses().fold(f32::INFINITY, |least, one| if one < least { one } else { least });
-    if heaviest / lightest > MASS_RATIO_LARGE {
-        warnings.push(format!(
-            "masses from {lightest} to {heaviest} kg: constraints between light and heavy particles \
-             converge slowly; use more substeps"
-        ));
-    }
-    if scene.solver.order == super::ConstraintOrder::Listed && scene.solver.iterations == 1 {
-        warnings
-            .push("order = \"listed\" with one iteration gains energy; use \"grouped\"".to_owned());
-    }
-    warnings
 }

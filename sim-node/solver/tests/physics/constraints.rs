@@ -133,6 +133,29 @@ fn relaxation_makes_its_share_of_each_correction() {
     }
 }
 
+#[test]
+fn with_many_passes_over_relaxation_converges_faster() {
+    // A chain of 20 links, pulled out to half again its length, in one substep of many passes.
+    let residual = |relaxation: f64, passes: u32| {
+        let text = format!(
+            "gravity = [0, 0, 0]\n[solver]\nrate_hz = 60\nsubsteps = 1\niterations = {passes}\n\
+             relaxation = {relaxation}\norder = \"listed\"\n[[particle]]\nposition = [0, 0, 0]\npinned = true\n"
+        );
+        let particles = (1..=20)
+            .map(|index| format!("[[particle]]\nposition = [{}, 0, 0]\n", 1.5 * f64::from(index)));
+        let links = (0..20).map(|index| {
+            format!("[[constraint]]\nparticles = [{index}, {}]\nrest_length = 1\n", index + 1)
+        });
+        let text = text + &particles.collect::<String>() + &links.collect::<String>();
+        let solver = stepped(&text, 1);
+        (0..20).map(|link| (distance(&solver, link, link + 1) - 1.0).abs()).fold(0.0, f64::max)
+    };
+    let [plain, faster, fastest] = [1.0, 1.5, 1.8].map(|relaxation| residual(relaxation, 256));
+    println!("residual after 256 passes: {plain} (w 1), {faster} (w 1.5), {fastest} (w 1.8)");
+    assert!(fastest < faster / 10.0 && faster < plain / 2.0, "{plain} {faster} {fastest}");
+    assert_at_most("w 1.95 converges", residual(1.95, 16), residual(1.95, 1000));
+}
+
 /// A rope of `count` moving particles that hangs straight down from a pinned one.
 fn hanging_rope(count: u32, settings: &str) -> String {
     format!(

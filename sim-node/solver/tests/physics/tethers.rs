@@ -28,6 +28,27 @@ fn a_tethered_rope_of_100_stretches_by_at_most_a_thousandth() {
 }
 
 #[test]
+fn one_pass_of_tethers_brings_a_torn_out_chain_to_its_rigid_length() {
+    // The single pass over the links leaves the middle one at 2 m and the last one at 3 m.
+    let chain = |tethers: bool| {
+        stepped(
+            &format!(
+                "gravity = [0, 0, 0]\n[solver]\nsubsteps = 1\ntethers = {tethers}\n\
+                 [[particle]]\nposition = [0, 0, 0]\npinned = true\n[[particle]]\nposition = [2, 0, 0]\n\
+                 [[particle]]\nposition = [4, 0, 0]\n[[constraint]]\nparticles = [0, 1]\nrest_length = 1\n\
+                 [[constraint]]\nparticles = [1, 2]\nrest_length = 1\n"
+            ),
+            1,
+        )
+    };
+    let (plain, tethered) = (chain(false), chain(true));
+    for (index, without, with) in [(1, 2.0, 1.0), (2, 3.0, 2.0)] {
+        assert_near("without tethers", without, position(&plain, index)[0], 1e-6);
+        assert_near("with tethers", with, position(&tethered, index)[0], 1e-6);
+    }
+}
+
+#[test]
 fn a_swinging_rope_keeps_every_particle_within_its_path() {
     let text = "[solver]\nrate_hz = 60\nsubsteps = 2\ntethers = true\n[[generate]]\n\
          shape = \"rope\"\ncount = 41\nfrom = [0, 0, 0]\nto = [2, 0, 0]\n";

@@ -1,0 +1,20 @@
+//! The bits of this version of the arithmetic, against those that were stored with it. They may
+//! change only together with the solver's version and a line in the CHANGELOG; a recording of
+//! another version is refused, not re-simulated.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+#[allow(dead_code, reason = "its main function is the example's")]
+#[path = "../examples/state_hashes.rs"]
+mod state_hashes;
+
+const STORED: &str = include_str!("state_hashes.txt");
+
+#[test]
+fn every_scene_has_the_stored_hash_of_this_solver_version() {
+    let found = state_hashes::lines().unwrap();
+    assert_eq!(
+        found, STORED,
+        "\nthe arithmetic has changed: raise SOLVER_VERSION, say so in the CHANGELOG, and store\n\
+         cargo run --release -p sim-solver --example state_hashes > sim-node/solver/tests/state_hashes.txt"
+    );
+}
