@@ -276,7 +276,8 @@ pub struct TearsRow {
     pub step: u64,
     /// Indices of the constraints, in the order of tearing.
     pub constraints: Vec<u32>,
-    /// "force", "stretch", "distance" or "cut" for each of them, where that is known.
+    /// "force", "stretch", "distance" or "cut" for each of them; "unknown" where that is not known,
+    /// and nothing at all where it is of none of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub causes: Vec<String>,
 }

@@ -60,3 +60,47 @@ impl ColliderLog {
         self.lost
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn add(log: &mut ColliderLog, step: u64, shape: u32) {
+        let header = CollidersHeader { run_id: 7, step, ..CollidersHeader::default() };
+        log.add(vec![(header, vec![ColliderState { shape, ..ColliderState::default() }])]);
+    }
+
+    fn snapshot(step: u64) -> SnapshotHeader {
+        SnapshotHeader { run_id: 7, step, ..SnapshotHeader::default() }
+    }
+
+    fn steps(log: &mut ColliderLog, until: u64) -> Vec<u64> {
+        log.rows_until(&snapshot(until)).iter().map(|row| row.step).collect()
+    }
+
+    #[test]
+    fn it_begins_with_the_newest_list_before_the_first_snapshot() {
+        let mut log = ColliderLog::default();
+        assert!(!log.is_known_in(7));
+        for step in [0, 3, 5, 8] {
+            add(&mut log, step, 0);
+        }
+        assert!(log.is_known_in(7) && !log.is_known_in(8));
+        log.begin(&snapshot(6));
+        assert_eq!(steps(&mut log, 6), [5]);
+        assert_eq!(steps(&mut log, 9), [8]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_or_waits_too_long_is_counted() {
+        let mut log = ColliderLog::default();
+        log.begin(&snapshot(0));
+        add(&mut log, 1, 99);
+        assert_eq!((steps(&mut log, 1), log.lost_count()), (vec![], 1));
+        for step in 0..WAITING_MAX as u64 + 3 {
+            add(&mut log, 2 + step, 0);
+        }
+        assert_eq!(log.lost_count(), 4);
+        assert_eq!(steps(&mut log, u64::MAX).len(), WAITING_MAX);
+    }
+}
