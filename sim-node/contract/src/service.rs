@@ -60,7 +60,9 @@ pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCH
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };
 pub(crate) const TEARS: ServiceSpec = ServiceSpec { suffix: "tears", ..LATCHED };
 pub(crate) const TEAR_CAUSES: ServiceSpec = ServiceSpec { suffix: "tear_causes", ..LATCHED };
-pub(crate) const COLLIDERS: ServiceSpec = ServiceSpec { suffix: "colliders", ..LATCHED };
+/// As many as snapshots: while one moves, each step has its own.
+pub(crate) const COLLIDERS: ServiceSpec =
+    ServiceSpec { suffix: "colliders", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
 pub(crate) const STATUS: ServiceSpec =
     ServiceSpec { suffix: "status", publishers_max: STATUS_PUBLISHERS_MAX, ..LATCHED };
 pub(crate) const OUTCOMES: ServiceSpec = ServiceSpec {
