@@ -13,6 +13,8 @@ pub(crate) struct Anchors {
     paths: Vec<Path>,
     /// By anchor: where a client has put it, in place of its path.
     pub(crate) moved: Vec<Option<Frame>>,
+    /// By anchor: where it is at the end of the running step.
+    frames: Vec<Frame>,
     followers: Vec<Follower>,
     /// Where each follower is to be at the end of the running step.
     targets: Vec<[f32; 3]>,
@@ -54,6 +56,7 @@ impl Anchors {
         Self {
             paths: scene.iter().map(path).collect(),
             moved: vec![None; scene.len()],
+            frames: vec![Frame::AT_LOAD; scene.len()],
             targets: vec![[0.0; 3]; followers.len()],
             followers,
         }
@@ -66,13 +69,15 @@ impl Anchors {
 
     /// Works out where the followers are to be at the time of the running step's end, in seconds.
     pub(crate) fn begin_step(&mut self, time_s: f64) {
-        for (anchor, path) in self.paths.iter().enumerate() {
-            let frame = self.moved[anchor].unwrap_or_else(|| path.frame(time_s));
-            let places = self.followers.iter().zip(&mut self.targets);
-            for (follower, target) in places.filter(|(one, _)| one.anchor as usize == anchor) {
-                let arm = frame.rotation * (follower.start - path.origin);
-                *target = (path.origin + arm + frame.translation).to_array();
-            }
+        let motions = self.paths.iter().zip(&self.moved);
+        for (frame, (path, moved)) in self.frames.iter_mut().zip(motions) {
+            *frame = moved.unwrap_or_else(|| path.frame(time_s));
+        }
+        for (follower, target) in self.followers.iter().zip(&mut self.targets) {
+            let anchor = follower.anchor as usize;
+            let (frame, origin) = (&self.frames[anchor], self.paths[anchor].origin);
+            let arm = frame.rotation * (follower.start - origin);
+            *target = (origin + arm + frame.translation).to_array();
         }
     }
 

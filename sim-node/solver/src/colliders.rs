@@ -92,14 +92,14 @@ impl Collider {
         }
     }
 
-    /// Whether it can turn: a box for ever, most others where a client turns them.
-    fn can_turn(&self) -> bool {
-        !matches!(self.at_load, Body::Bounds { .. })
+    /// Bounds do not turn.
+    pub(crate) fn can_take(&self, frame: &Frame) -> bool {
+        frame.rotation == Quat::IDENTITY || !matches!(self.at_load, Body::Bounds { .. })
     }
 
     /// Puts it into a frame by the end of the next step.
     pub(crate) fn move_to(&mut self, frame: Frame) -> Result<(), Rejection> {
-        if frame.rotation != Quat::IDENTITY && !self.can_turn() {
+        if !self.can_take(&frame) {
             return Err(Rejection::OutOfRange);
         }
         self.moved = Some(frame);
@@ -156,13 +156,21 @@ impl Collider {
 
     /// Where it is after a share of the running step.
     pub(crate) fn body(&self, share: f32) -> Body {
-        let frame = match share {
+        self.at_load.placed(&self.frame_at(share))
+    }
+
+    /// The point of it that turning leaves in place, after a share of the running step.
+    pub(crate) fn pivot(&self, share: f32) -> Vec3 {
+        self.at_load.middle() + self.frame_at(share).translation
+    }
+
+    fn frame_at(&self, share: f32) -> Frame {
+        match share {
             _ if !self.is_moving() => self.end,
             0.0 => self.start,
             1.0 => self.end,
             share => self.start.towards(&self.end, share),
-        };
-        self.at_load.placed(&frame)
+        }
     }
 }
 
@@ -243,8 +251,8 @@ impl Body {
         }
     }
 
-    /// What it turns about.
-    pub(crate) fn pivot(&self) -> Vec3 {
+    /// What it turns about; of a plane, the point that is nearest to the origin.
+    fn middle(&self) -> Vec3 {
         match *self {
             Self::Plane { normal, offset } => normal * offset,
             Self::Box { center, .. } | Self::Sphere { center, .. } => center,

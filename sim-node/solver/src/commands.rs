@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::Solver;
 use crate::constraints::ConstraintKind;
-use crate::cut::{Ball, check_finite};
+use crate::cut::Ball;
 use crate::drive::Grab;
 use crate::frame::{Frame, Pose};
 use crate::parameters::{Affected, Context, Setting};
@@ -17,6 +17,16 @@ pub const COORDINATE_MAX: f32 = 1e7;
 
 /// Longest time, in seconds, that a grabbed particle may take to its target.
 pub const GRAB_OVER_S_MAX: f32 = 0.25;
+
+/// Whether all are within [`COORDINATE_MAX`].
+pub(crate) fn is_near(numbers: &[f32]) -> bool {
+    numbers.iter().all(|number| number.abs() <= COORDINATE_MAX)
+}
+
+pub(crate) fn check_finite(numbers: &[f32]) -> Result<(), Rejection> {
+    let is_finite = numbers.iter().all(|number| number.is_finite());
+    if is_finite { Ok(()) } else { Err(Rejection::NonFinite) }
+}
 
 /// A wish to drive a particle somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,7 +122,7 @@ impl Solver {
         if !self.has_flag(index, flag::GRABBED) {
             self.particles.stop(index);
         }
-        self.tie();
+        self.due.tethers = true;
         Ok(())
     }
 
@@ -124,7 +134,7 @@ impl Solver {
         let index = self.living_particle(particle)?;
         if self.has_flag(index, flag::PINNED) {
             self.particles.change_flags(index, 0, flag::PINNED);
-            self.tie();
+            self.due.tethers = true;
         }
         Ok(())
     }
@@ -147,6 +157,7 @@ impl Solver {
             Err(place) => self.grabs.insert(place, grab),
         }
         self.particles.change_flags(index, flag::GRABBED, 0);
+        self.tie_if_root(index);
         Ok(())
     }
 
@@ -176,7 +187,13 @@ impl Solver {
         if self.has_flag(index, flag::PINNED) {
             self.particles.stop(index);
         }
+        self.tie_if_root(index);
         Ok(())
+    }
+
+    /// What is in a hand is no root of tethers.
+    fn tie_if_root(&mut self, index: usize) {
+        self.due.tethers |= self.has_flag(index, flag::PINNED | flag::ANCHORED);
     }
 
     /// Gives every free particle strictly within a ball the velocity of a brush.
@@ -185,19 +202,18 @@ impl Solver {
     /// A wrong number.
     pub fn push(&mut self, push: Push) -> Result<(), Rejection> {
         self.check_ball(&push.ball)?;
-        check_finite(&[push.delta, [push.limit.unwrap_or(0.0), 0.0, 0.0]])?;
-        let limit = push.limit.unwrap_or(COORDINATE_MAX);
-        let is_near = push.delta.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
+        check_finite(&push.delta)?;
+        check_finite(push.limit.as_slice())?;
+        let limit = push.limit.unwrap_or(f32::MAX);
         let is_in_plane = !self.is_planar || push.delta[2] == 0.0;
-        if !is_near || !is_in_plane || limit < 0.0 {
+        if !is_in_plane || limit < 0.0 {
             return Err(Rejection::OutOfRange);
         }
-        let clamp = |axis: f32| match axis {
-            far if far > limit => limit,
-            far if far < -limit => -limit,
-            near => near,
-        };
-        let [x, y, z] = push.delta.map(|axis| clamp(axis) * self.settings.rate_hz as f32);
+        let delta = push.delta.map(|axis| axis.clamp(-limit, limit));
+        if !is_near(&delta) {
+            return Err(Rejection::OutOfRange);
+        }
+        let [x, y, z] = delta.map(|axis| axis * self.settings.rate_hz as f32);
         for (position, velocity) in
             self.particles.positions.iter().zip(&mut self.particles.velocities)
         {
@@ -214,7 +230,7 @@ impl Solver {
     /// # Errors
     /// Unknown anchor, or a wrong number.
     pub fn move_anchor(&mut self, anchor: u32, pose: Pose) -> Result<(), Rejection> {
-        let frame = Frame::check(&pose, self.is_planar)?;
+        let frame = Frame::check(&pose, self.context())?;
         let moved = self.anchors.moved.get_mut(anchor as usize);
         *moved.ok_or(Rejection::UnknownAnchor)? = Some(frame);
         Ok(())
@@ -227,7 +243,7 @@ impl Solver {
     /// # Errors
     /// Unknown collider, or a wrong number.
     pub fn move_collider(&mut self, collider: u32, pose: Pose) -> Result<(), Rejection> {
-        let frame = Frame::check(&pose, self.is_planar)?;
+        let frame = Frame::check(&pose, self.context())?;
         let moved = self.colliders.get_mut(collider as usize);
         moved.ok_or(Rejection::UnknownCollider)?.move_to(frame)
     }
@@ -247,12 +263,8 @@ impl Solver {
         kind: Option<ConstraintKind>,
     ) -> Result<(), Rejection> {
         let affected = self.parameters.set(name, setting, kind, self.context())?;
-        if affected != Affected::Nothing {
-            self.configure();
-        }
-        if affected == Affected::RigidPaths {
-            self.tie();
-        }
+        self.due.constraints |= affected != Affected::Nothing;
+        self.due.tethers |= affected == Affected::RigidPaths;
         Ok(())
     }
 
@@ -273,10 +285,9 @@ impl Solver {
     }
 
     fn check_target(&self, grip: &Grip) -> Result<(), Rejection> {
-        if !grip.over_s.is_finite() || !grip.target.iter().all(|axis| axis.is_finite()) {
-            return Err(Rejection::NonFinite);
-        }
-        let is_near = grip.target.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
+        check_finite(&grip.target)?;
+        check_finite(&[grip.over_s])?;
+        let is_near = is_near(&grip.target);
         let is_in_plane = !self.is_planar || grip.target[2] == 0.0;
         let is_timely = (0.0..=GRAB_OVER_S_MAX).contains(&grip.over_s);
         if is_near && is_in_plane && is_timely { Ok(()) } else { Err(Rejection::OutOfRange) }
@@ -284,7 +295,7 @@ impl Solver {
 
     /// Whole steps in `over_s`, rounded up, at least one. A time that is a whole number of steps but
     /// for its rounding to f32 is taken as that number: 1/60 s at 240 Hz is 4 steps, not 5.
-    fn steps_of(&self, over_s: f32) -> u32 {
+    pub(crate) fn steps_of(&self, over_s: f32) -> u32 {
         let steps = f64::from(over_s) * f64::from(self.settings.rate_hz) * (1.0 - 1e-7);
         #[allow(
             clippy::cast_possible_truncation,

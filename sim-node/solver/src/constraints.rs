@@ -127,16 +127,31 @@ impl Constraints {
         }
     }
 
+    /// Makes every torn constraint whole again.
+    pub(crate) fn mend(&mut self, model: &Model) {
+        for (slot, index) in self.indices.iter().enumerate() {
+            let one = model.constraints[*index as usize];
+            self.rests[slot] = rest_at_load(model, one);
+            self.pull_only[slot] = one.kind == ConstraintKind::Tether;
+        }
+    }
+
     /// Works out everything that follows from the parameters.
     pub(crate) fn configure(&mut self, model: &Model, parameters: &Parameters, setup: Setup) {
         let h_squared = setup.h * setup.h;
+        // The root is dear, and most constraints have the stiffness of the one before.
+        let (mut stiffness, mut share) = (f32::NAN, f32::NAN);
         for (slot, index) in self.indices.iter().enumerate() {
             let one = model.constraints[*index as usize];
             let softness = parameters.softness(one.kind, one.compliance);
             self.softness[slot] = match setup.method {
                 Method::Xpbd => softness / h_squared,
                 Method::Pbd => {
-                    parameters.relaxation * stiffness_per_pass(softness, parameters.iterations)
+                    if softness.to_bits() != stiffness.to_bits() {
+                        stiffness = softness;
+                        share = stiffness_per_pass(softness, parameters.iterations);
+                    }
+                    parameters.relaxation * share
                 }
             };
         }

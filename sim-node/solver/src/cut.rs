@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{COORDINATE_MAX, Rejection, Solver};
+use crate::{COORDINATE_MAX, Rejection, Solver, check_finite, is_near};
 
 /// The way of a cursor, extended along the direction of view: a strip that cuts what crosses it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,8 @@ impl Solver {
         if self.constraints.is_torn(constraint) {
             return Err(Rejection::AlreadyTorn);
         }
-        self.tear_all(|_, _, index| index == constraint);
+        self.torn.cut(&mut self.constraints, constraint);
+        self.tethers.drop_torn(&self.constraints);
         Ok(())
     }
 
@@ -46,7 +47,7 @@ impl Solver {
     /// A wrong number.
     pub fn cut_radius(&mut self, ball: Ball) -> Result<(), Rejection> {
         self.check_ball(&ball)?;
-        self.tear_all(|a, b, _| ball.has(a) || ball.has(b));
+        self.tear_all(|a, b| ball.has(a) || ball.has(b));
         Ok(())
     }
 
@@ -56,30 +57,31 @@ impl Solver {
     /// # Errors
     /// A wrong number, or no direction.
     pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Rejection> {
-        check_finite(&[sweep.from, sweep.to, sweep.direction])?;
-        let is_far = |point: &[f32; 3]| point.iter().any(|axis| axis.abs() > COORDINATE_MAX);
-        let leaves_plane = self.is_planar && (sweep.from[2] != 0.0 || sweep.to[2] != 0.0);
-        if [sweep.from, sweep.to, sweep.direction].iter().any(is_far)
-            || leaves_plane
-            || sweep.direction == [0.0; 3]
-        {
+        let Sweep { from, to, direction } = sweep;
+        for vector in [from, to, direction] {
+            check_finite(&vector)?;
+        }
+        let is_near = is_near(&from) && is_near(&to) && is_near(&direction);
+        let leaves_plane = self.is_planar && (from[2] != 0.0 || to[2] != 0.0);
+        if !is_near || leaves_plane || direction == [0.0; 3] {
             return Err(Rejection::OutOfRange);
         }
         let strip = Strip::new(&sweep);
-        self.tear_all(|a, b, _| strip.is_crossed(a, b));
+        self.tear_all(|a, b| strip.is_crossed(a, b));
         Ok(())
     }
 
     pub(crate) fn check_ball(&self, ball: &Ball) -> Result<(), Rejection> {
-        check_finite(&[ball.center, [ball.radius, 0.0, 0.0]])?;
-        let is_near = ball.center.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
+        check_finite(&ball.center)?;
+        check_finite(&[ball.radius])?;
+        let is_near = is_near(&ball.center);
         let is_in_plane = !self.is_planar || ball.center[2] == 0.0;
         let is_size = (0.0..=COORDINATE_MAX).contains(&ball.radius);
         if is_near && is_in_plane && is_size { Ok(()) } else { Err(Rejection::OutOfRange) }
     }
 
-    /// Tears what is whole and meets a condition on its two ends and its index.
-    fn tear_all(&mut self, is_cut: impl Fn(Vec3, Vec3, u32) -> bool) {
+    /// Tears what is whole and meets a condition on its two ends.
+    fn tear_all(&mut self, is_cut: impl Fn(Vec3, Vec3) -> bool) {
         let at = |particle: u32, positions: &[[f32; 4]]| {
             let [x, y, z, _] = positions[particle as usize];
             Vec3::new(x, y, z)
@@ -87,7 +89,7 @@ impl Solver {
         for (index, constraint) in (0_u32..).zip(&self.model.constraints) {
             let positions = &self.particles.positions;
             let (a, b) = (at(constraint.a, positions), at(constraint.b, positions));
-            if !self.constraints.is_torn(index) && is_cut(a, b, index) {
+            if !self.constraints.is_torn(index) && is_cut(a, b) {
                 self.torn.cut(&mut self.constraints, index);
             }
         }
@@ -100,11 +102,6 @@ impl Ball {
         let arm = point - Vec3::from_array(self.center);
         arm.dot(arm) < self.radius * self.radius
     }
-}
-
-pub(crate) fn check_finite(vectors: &[[f32; 3]]) -> Result<(), Rejection> {
-    let is_finite = vectors.iter().flatten().all(|number| number.is_finite());
-    if is_finite { Ok(()) } else { Err(Rejection::NonFinite) }
 }
 
 /// A strip: from a point along one side, and both ways along another direction.

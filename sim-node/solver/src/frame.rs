@@ -2,7 +2,8 @@
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use crate::{COORDINATE_MAX, Rejection};
+use crate::parameters::Context;
+use crate::{Rejection, check_finite, is_near};
 
 /// Where a frame is to be, against where it was at load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,18 +37,21 @@ impl Frame {
     }
 
     /// From what a client asks for; in 2-D a frame stays in the plane.
-    pub(crate) fn check(pose: &Pose, is_planar: bool) -> Result<Self, Rejection> {
-        let numbers = || pose.translation.iter().chain(&pose.rotation);
-        if !numbers().all(|number| number.is_finite()) {
-            return Err(Rejection::NonFinite);
-        }
-        let is_near = numbers().all(|number| number.abs() <= COORDINATE_MAX);
+    pub(crate) fn check(pose: &Pose, context: Context) -> Result<Self, Rejection> {
+        check_finite(&pose.translation)?;
+        check_finite(&pose.rotation)?;
+        let is_near = is_near(&pose.translation) && is_near(&pose.rotation);
         let [x, y, ..] = pose.rotation;
         let leaves_plane = pose.translation[2] != 0.0 || x != 0.0 || y != 0.0;
-        if !is_near || pose.rotation == [0.0; 4] || (is_planar && leaves_plane) {
+        if !is_near || pose.rotation == [0.0; 4] || (context.is_planar && leaves_plane) {
             return Err(Rejection::OutOfRange);
         }
         Ok(Self::from_pose(pose))
+    }
+
+    /// Whether its rotation has length 1, but for its rounding.
+    pub(crate) fn is_unit(&self) -> bool {
+        (self.rotation.dot(self.rotation) - 1.0).abs() < 1e-5
     }
 
     /// The numbers of this frame, for a keyframe.
@@ -66,9 +70,10 @@ impl Frame {
     }
 }
 
-/// Rounded to f32 after it was brought to length 1.
+/// Rounded to f32 after it was brought to length 1; of the two signs, that with w >= 0.
 fn unit(rotation: DQuat) -> Quat {
-    (rotation * (1.0 / rotation.dot(rotation).sqrt())).as_quat()
+    let sign = if rotation.w < 0.0 { -1.0 } else { 1.0 };
+    (rotation * (sign / rotation.dot(rotation).sqrt())).as_quat()
 }
 
 /// The rotation by an angle in radians about an axis of length 1.

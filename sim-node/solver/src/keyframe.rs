@@ -1,18 +1,21 @@
 //! What the particles of a snapshot lack to be the complete state.
 
+mod check;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use glam::{Quat, Vec3};
 
+use crate::Solver;
 use crate::drive::Grab;
 use crate::frame::{Frame, Pose};
 use crate::hash::state_hash;
 use crate::parameters::Parameters;
 use crate::particles::{Particle, flag};
+use crate::solver::Due;
 use crate::tear::TearCause;
 use crate::tethers::{Basis, Tethers};
-use crate::{COORDINATE_MAX, Solver};
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
 const KEYFRAME_VERSION: u32 = 2;
@@ -77,6 +80,9 @@ pub enum KeyframeError {
     /// Fewer than four bytes.
     #[error("a keyframe of {0} bytes is too short")]
     TooShort(usize),
+    /// More bytes than its fields take.
+    #[error("a keyframe has {0} bytes too many")]
+    TooLong(usize),
     /// Written by another version.
     #[error("keyframe version {found}, this program reads version {KEYFRAME_VERSION}")]
     Version {
@@ -138,7 +144,10 @@ impl Keyframe {
         if found != KEYFRAME_VERSION {
             return Err(KeyframeError::Version { found });
         }
-        Ok(postcard::from_bytes(fields)?)
+        match postcard::take_from_bytes(fields)? {
+            (keyframe, []) => Ok(keyframe),
+            (_, rest) => Err(KeyframeError::TooLong(rest.len())),
+        }
     }
 }
 
@@ -168,11 +177,11 @@ impl Solver {
     pub fn keyframe_size_bytes_max(&self) -> usize {
         // Variable-length integers: u32 at most 5 bytes, u64 and lengths at most 10.
         let (fixed, grab, root) = (5 + 4, 5 + 10 + 12 + 5, 5);
-        let (torn, cause, moved) = (5, 5, 5 + 12 + 16);
+        let (torn, cause, basis, moved) = (5, 5, 5, 5 + 12 + 16);
         let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 8 * 5;
-        let head = 4 + 1 + 10 + 7 * 10 + 5 + parameters;
+        let head = 4 + 1 + 10 + 8 * 10 + parameters;
         head + self.particle_count() * (fixed + grab + root)
-            + self.constraint_count() * (torn + cause)
+            + self.constraint_count() * (torn + cause + basis)
             + (self.anchor_count() + self.collider_count()) * moved
     }
 
@@ -207,6 +216,7 @@ impl Solver {
     }
 
     fn restore_constraints(&mut self, keyframe: &Keyframe) {
+        self.due = Due::default();
         self.configure();
         self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
         for index in &keyframe.torn {
@@ -214,7 +224,7 @@ impl Solver {
         }
         if self.settings.tethers {
             let basis = keyframe.tethers.clone();
-            self.tethers = Tethers::new(&self.model, &self.parameters, basis, &keyframe.torn);
+            self.tethers = Tethers::new(&self.model, &self.parameters, basis);
             self.tethers.drop_torn(&self.constraints);
         }
     }
@@ -235,106 +245,4 @@ impl Solver {
     fn is_fixed(&self, particle: u32) -> bool {
         self.particles.flags[particle as usize] & flag::FIXED != 0
     }
-
-    fn check(&self, particles: &[Particle], keyframe: &Keyframe) -> Result<(), RestoreError> {
-        let (expected, found) = (self.particle_count(), particles.len());
-        if expected != found {
-            return Err(RestoreError::ParticleCount { expected, found });
-        }
-        for (particle, state) in particles.iter().enumerate() {
-            self.check_particle(particle, state)
-                .map_err(|what| RestoreError::Particle { particle, what })?;
-        }
-        check_holds(particles, keyframe)
-            .and_then(|()| self.check_keyframe(keyframe))
-            .map_err(|what| RestoreError::Mismatch { what })
-    }
-
-    fn check_particle(&self, index: usize, particle: &Particle) -> Result<(), &'static str> {
-        let is_fixed = particle.flags & flag::FIXED != 0;
-        if !particle.position.iter().chain(&particle.velocity).all(|number| number.is_finite()) {
-            return Err("a number is not finite");
-        }
-        if particle.flags & !flag::KNOWN != 0 {
-            return Err("it has flags that this version does not know");
-        }
-        if (particle.flags ^ self.particles.flags[index]) & flag::ANCHORED != 0 {
-            return Err("other particles follow an anchor in this scene");
-        }
-        if is_fixed != (particle.inverse_mass == 0.0) {
-            return Err("its flags and its inverse mass contradict each other");
-        }
-        if self.is_planar && (particle.position[2] != 0.0 || particle.velocity[2] != 0.0) {
-            return Err("it is out of the plane of a scene of 2 dimensions");
-        }
-        if is_fixed || is_inverse_mass(particle.inverse_mass) {
-            Ok(())
-        } else {
-            Err("its inverse mass is not a positive number")
-        }
-    }
-
-    /// Everything that the scene alone can judge.
-    fn check_keyframe(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
-        let (particles, constraints) = (self.particle_count(), self.constraint_count());
-        if !is_set_below(&keyframe.torn, constraints) {
-            return Err("it has torn constraints that the scene has not, or twice");
-        }
-        if keyframe.tear_causes.len() != keyframe.torn.len() {
-            return Err("not every torn constraint has its cause");
-        }
-        let Basis { roots, torn_count } = &keyframe.tethers;
-        if !is_set_below(roots, particles) || *torn_count as usize > keyframe.torn.len() {
-            return Err("its tethers are not those of the scene");
-        }
-        if !keyframe.parameters.is_valid(self.context()) {
-            return Err("a parameter is out of its range");
-        }
-        let is_frame = |moved: &Moved| {
-            let pose = Pose { translation: moved.translation, rotation: moved.rotation };
-            Frame::check(&pose, self.is_planar).is_ok()
-        };
-        let index = |moved: &Moved| moved.index as usize;
-        let (anchors, colliders) = (&keyframe.moved_anchors, &keyframe.moved_colliders);
-        if anchors.iter().any(|one| index(one) >= self.anchor_count() || !is_frame(one))
-            || colliders.iter().any(|one| index(one) >= self.collider_count() || !is_frame(one))
-        {
-            return Err("it has moved anchors or colliders that the scene has not");
-        }
-        Ok(())
-    }
-}
-
-/// Whether all are below a limit, and none occurs twice.
-fn is_set_below(indices: &[u32], limit: usize) -> bool {
-    let mut ascending = indices.to_vec();
-    ascending.sort_unstable();
-    ascending.windows(2).all(|pair| pair[0] < pair[1])
-        && ascending.last().is_none_or(|last| (*last as usize) < limit)
-}
-
-fn is_inverse_mass(number: f32) -> bool {
-    number.is_finite() && number > 0.0
-}
-
-/// Snapshot and keyframe say the same of what is held.
-fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'static str> {
-    let with = |flags: u32| {
-        let indices = (0_u32..).zip(particles);
-        indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
-    };
-    if !with(flag::FIXED).eq(keyframe.fixed.iter().map(|one| one.particle)) {
-        return Err("other particles are fixed");
-    }
-    if !with(flag::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
-        return Err("other particles are grabbed");
-    }
-    if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {
-        return Err("a mass is not a positive number");
-    }
-    let is_near = |axis: &f32| axis.is_finite() && axis.abs() <= COORDINATE_MAX;
-    if !keyframe.grabs.iter().all(|grab| grab.target.iter().all(is_near)) {
-        return Err("a target is out of range");
-    }
-    Ok(())
 }

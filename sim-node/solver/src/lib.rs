@@ -36,6 +36,7 @@ mod parameters;
 mod particles;
 mod project;
 pub mod scene;
+mod solid;
 mod solver;
 mod step;
 mod tear;
@@ -44,6 +45,7 @@ mod wind;
 
 pub use colliders::PlacedCollider;
 pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Push, Rejection};
+pub(crate) use commands::{check_finite, is_near};
 pub use constraints::{Constraint, ConstraintKind};
 pub use cut::{Ball, Sweep};
 pub use frame::Pose;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::constraints::ConstraintKind;
 use crate::scene::{Limits, Method, PASSES_MAX, Range32, Scene, Wind};
-use crate::{COORDINATE_MAX, Rejection};
+use crate::{Rejection, is_near};
 
 /// A new value for a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -213,7 +213,8 @@ fn is_number(number: f32, range: Range32) -> bool {
 }
 
 fn is_vector(vector: [f32; 3], context: Context) -> bool {
-    vector.iter().all(|axis| axis.is_finite() && axis.abs() <= COORDINATE_MAX)
+    vector.iter().all(|axis| axis.is_finite())
+        && is_near(&vector)
         && (!context.is_planar || vector[2] == 0.0)
 }
 

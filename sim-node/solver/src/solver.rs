@@ -14,7 +14,8 @@ use crate::tear::{TearCause, Torn};
 use crate::tethers::Tethers;
 use crate::wind::Air;
 
-/// A scene that runs. Made once per load; nothing is allocated afterwards in [`Self::step`].
+/// A scene that runs. Made once per load; [`Self::step`] allocates nothing afterwards, except where
+/// a command before it has changed parameters or, with tethers, what is held.
 #[derive(Debug, Clone)]
 pub struct Solver {
     /// Immutable from load to load: particles as loaded, constraints by index, triangles.
@@ -39,12 +40,22 @@ pub struct Solver {
     /// Ascending by particle.
     pub(crate) grabs: Vec<Grab>,
     pub(crate) scene_step: u64,
+    /// What commands of this boundary have left to be worked out before the step.
+    pub(crate) due: Due,
     /// The state was put in place since the last step: the next step shows it, and integrates
     /// nothing.
     pub(crate) is_restored: bool,
     /// Particles frozen since this solver was made: for messages, not part of the state.
     pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
+}
+
+/// What follows from the parameters or from what is held, and has to be worked out again: once for
+/// a boundary, however many commands ask for it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Due {
+    pub(crate) constraints: bool,
+    pub(crate) tethers: bool,
 }
 
 impl Solver {
@@ -75,12 +86,12 @@ impl Solver {
             // Room for every particle, so that a grab allocates nothing.
             grabs: Vec::with_capacity(particle_count),
             scene_step: 0,
+            due: Due { constraints: true, tethers: true },
             is_restored: false,
             frozen_count: 0,
             model,
         };
-        solver.configure();
-        solver.tie();
+        solver.finish_boundary();
         solver
     }
 
@@ -95,8 +106,7 @@ impl Solver {
     pub fn reset(&mut self) {
         self.particles = new_particles(&self.model, &self.scene_anchors);
         self.parameters = self.initial_parameters;
-        self.constraints =
-            Constraints::new(&self.model, &Order::new(&self.model, self.settings.order));
+        self.constraints.mend(&self.model);
         self.torn.clear();
         self.grabs.clear();
         self.anchors.reset();
@@ -104,9 +114,20 @@ impl Solver {
             collider.moved = None;
             collider.place(0.0);
         }
-        self.configure();
-        self.tie();
+        self.due = Due { constraints: true, tethers: true };
         self.is_restored = true;
+    }
+
+    /// Works out what the commands of a boundary have changed. The next step does it where it was not
+    /// called; only this part of a step may allocate.
+    pub(crate) fn finish_boundary(&mut self) {
+        let Due { constraints, tethers } = std::mem::take(&mut self.due);
+        if constraints {
+            self.configure();
+        }
+        if tethers {
+            self.tie();
+        }
     }
 
     /// Works out what constraints derive from the parameters.
@@ -116,7 +137,7 @@ impl Solver {
     }
 
     /// Works out the tethers of the state as it is, where the scene has any.
-    pub(crate) fn tie(&mut self) {
+    fn tie(&mut self) {
         if self.settings.tethers {
             self.tethers = Tethers::of_state(
                 &self.model,

@@ -22,9 +22,13 @@ impl Solver {
     /// velocities: a substep works on the displacement d = h v beside the position, so that
     /// gravity survives where h^2 g is below the resolution of the position.
     pub fn step(&mut self) {
+        self.finish_boundary();
         if self.is_restored {
             self.is_restored = false;
             self.scene_step = 0;
+            for collider in &mut self.colliders {
+                collider.place(0.0);
+            }
         } else {
             self.begin_step();
             for index in 0..self.parameters.substeps {

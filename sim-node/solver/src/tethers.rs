@@ -24,8 +24,8 @@ pub(crate) struct Tethers {
 pub(crate) struct Basis {
     /// Particles that were fixed when they were worked out, ascending.
     pub(crate) roots: Vec<u32>,
-    /// Constraints that were torn by then. What tore later only drops tethers.
-    pub(crate) torn_count: u32,
+    /// Constraints that were torn by then, ascending. What tore later only drops tethers.
+    pub(crate) torn: Vec<u32>,
 }
 
 /// One tether.
@@ -77,15 +77,15 @@ impl Tethers {
             |flags: u32| flags & (flag::PINNED | flag::ANCHORED) != 0 && flags & flag::GRABBED == 0;
         let flags = (0_u32..).zip(&particles.flags);
         let roots = flags.filter(|(_, flags)| is_root(**flags)).map(|(index, _)| index).collect();
-        #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 constraints")]
-        let basis = Basis { roots, torn_count: torn.len() as u32 };
-        Self::new(model, parameters, basis, torn)
+        let mut torn = torn.to_vec();
+        torn.sort_unstable();
+        Self::new(model, parameters, Basis { roots, torn })
     }
 
     /// Works out the tethers from their basis: Dijkstra over rigid constraints that were whole and
     /// are no bends.
-    pub(crate) fn new(model: &Model, parameters: &Parameters, basis: Basis, torn: &[u32]) -> Self {
-        let links = Links::new(model, parameters, &torn[..basis.torn_count as usize]);
+    pub(crate) fn new(model: &Model, parameters: &Parameters, basis: Basis) -> Self {
+        let links = Links::new(model, parameters, &basis.torn);
         let mut is_reached = vec![false; model.particles.len()];
         let mut ways = BinaryHeap::new();
         for root in &basis.roots {

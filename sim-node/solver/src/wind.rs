@@ -78,8 +78,8 @@ impl Air {
     ///
     /// With A the area, n the normal and u the wind less the mean velocity of the corners, a
     /// triangle feels the force drag A |u n| u on both faces alike; each corner takes a third. A
-    /// corner shares its mass among its triangles, and none of them may give it more than it takes
-    /// to fly with the wind: however large the force, it never overshoots.
+    /// corner shares its mass among its triangles, and none of them may give it more than u times
+    /// its share: however large the force, a triangle never overtakes the wind.
     pub(crate) fn blow(&mut self, particles: &Particles, triangles: &[[u32; 3]], breeze: &Breeze) {
         self.gains.fill([0.0; 3]);
         for corners in triangles {
@@ -91,10 +91,12 @@ impl Air {
             let area_normal = (b - a).cross(c - a);
             let pressure = 0.5 * breeze.drag * relative.dot(area_normal).abs();
             // A triangle whose state is no longer finite must not reach its neighbours.
-            if !pressure.is_finite() {
+            if !relative.is_finite() || !area_normal.is_finite() {
                 continue;
             }
-            for corner in corners {
+            for corner in
+                corners.into_iter().filter(|corner| particles.positions[*corner][3] != 0.0)
+            {
                 let share = pressure * breeze.h * particles.positions[corner][3] / 3.0;
                 let share_max = 1.0 / self.triangles_at[corner];
                 let share = if share < share_max { share } else { share_max };

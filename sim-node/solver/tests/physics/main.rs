@@ -7,6 +7,7 @@
 mod anchors;
 mod colliders;
 mod constraints;
+mod contacts;
 mod cuts;
 mod hardening;
 mod motion;
@@ -16,6 +17,14 @@ mod tethers;
 mod wind;
 
 use sim_solver::{Particle, Scene, Solver};
+
+/// A floor at y = 0; keys of it can follow.
+const FLOOR: &str = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n";
+
+/// The head of a scene's settings.
+fn rates(rate_hz: u32, substeps: u32) -> String {
+    format!("[solver]\nrate_hz = {rate_hz}\nsubsteps = {substeps}\n")
+}
 
 /// The solver of a scene without its first line.
 fn solver(text: &str) -> Solver {

@@ -91,6 +91,18 @@ fn a_cut_path_drops_its_tethers_and_a_pin_finds_new_ones() {
 }
 
 #[test]
+fn what_is_in_a_hand_is_no_root_until_it_is_let_go() {
+    let mut solver = solver(&rope(10, true));
+    solver.grab(1, sim_solver::Grip { particle: 0, target: [0.0; 3], over_s: 0.0 }).unwrap();
+    step(&mut solver, 60);
+    let sag = distance(&solver, 0, 10) - 0.5;
+    assert!(sag > 1e-3, "no tether holds the end, so the rope stretches: {sag}");
+    solver.release(1, 0).unwrap();
+    step(&mut solver, 60);
+    assert_at_most("tied again", 0.5 + 1e-5, distance(&solver, 0, 10));
+}
+
+#[test]
 fn bends_compliant_and_torn_constraints_make_no_path() {
     // Only soft or bend links lead to the root: the particle sags as far as the spring lets it.
     let text = "[solver]\nrate_hz = 60\nsubsteps = 4\ndamping = 4\ntethers = true\n\

@@ -53,6 +53,17 @@ fn however_strong_it_never_drives_a_sheet_faster_than_itself() {
 }
 
 #[test]
+fn a_force_beyond_all_numbers_still_only_carries_along() {
+    for drag in ["1e30", "3e38"] {
+        let text = triangle(&format!("velocity = [0, 0, 10]\ndrag = {drag}"), 60);
+        let solver = stepped(&text, 1);
+        for index in 0..4 {
+            assert_close("speed", 10.0, velocity(&solver, index)[2], 1e-5);
+        }
+    }
+}
+
+#[test]
 fn still_air_brakes_a_falling_sheet_to_its_terminal_speed() {
     // m g = drag A v^2: 12 kg on 1 m^2.
     let text =
