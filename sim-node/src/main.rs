@@ -13,6 +13,7 @@ mod publish;
 mod run;
 mod scene_source;
 mod statistics;
+mod warnings;
 
 use args::Verb;
 use exit::Exit;

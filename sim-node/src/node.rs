@@ -1,9 +1,8 @@
 //! The loop: wait for the deadline, apply commands, step, publish, observe.
 
-use std::io::{Write, stderr};
-
+use anyhow::Context;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Action, Command, Endpoint, Reason, Stop};
+use sim_contract::{Action, Command, Endpoint, OwnerError, Reason, Stop};
 use sim_solver::{Scene, Solver};
 
 use crate::commands::{Inbox, Progress, apply};
@@ -11,6 +10,7 @@ use crate::pace::Pace;
 use crate::publish::{Position, Publisher, StepTimes};
 use crate::scene_source;
 use crate::statistics::Statistics;
+use crate::warnings::Warnings;
 
 /// Longest time between two status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
@@ -52,6 +52,7 @@ pub(crate) struct Node {
     /// When it last went on or began to wait for `resume`.
     mark_ns: u64,
     next_status_ns: u64,
+    warnings: Warnings,
 }
 
 impl Node {
@@ -78,6 +79,7 @@ impl Node {
             idle_ns: 0,
             mark_ns: now_ns,
             next_status_ns: now_ns,
+            warnings: Warnings::default(),
             scene,
             solver,
         })
@@ -94,7 +96,7 @@ impl Node {
             if stop.is_asked() {
                 break;
             }
-            self.apply_commands();
+            self.apply_commands()?;
             if self.progress.is_stepping() {
                 self.make_step(wake_late_ns)?;
             } else {
@@ -136,7 +138,7 @@ impl Node {
     }
 
     /// Applies the commands that have arrived, at the boundary before the next step.
-    fn apply_commands(&mut self) {
+    fn apply_commands(&mut self) -> anyhow::Result<()> {
         if self.inbox.has_room() {
             self.publisher.receive_commands(&mut self.arrived);
             self.inbox.add(self.arrived.drain(..));
@@ -145,35 +147,53 @@ impl Node {
             // Whoever commanded and then asks for the status finds the effect in it.
             self.next_status_ns = 0;
             let result = match command.action() {
-                Action::Load { scene } => self.load(scene.as_str()),
+                Action::Load { scene } => self.load(scene.as_str())?,
                 action => apply(command.client_id, action, &mut self.solver, &mut self.progress),
             };
             self.publisher.add_outcome(self.step + 1, command, result);
         }
+        self.solver.finish_boundary();
         self.pace.set_time_scale(self.progress.time_scale);
+        Ok(())
     }
 
-    /// Takes another scene; the next step shows its initial state. The rate of a run stays.
-    fn load(&mut self, source: &str) -> Result<(), Reason> {
-        let mut scene = scene_source::load(source).map_err(|error| {
-            warn(&format!("load: {error:#}"));
-            Reason::OutOfRange
-        })?;
-        let Options { rate_hz, substeps, .. } = self.options;
-        scene.override_solver(rate_hz, substeps).map_err(|_| Reason::OutOfRange)?;
-        if scene.solver.rate_hz != self.scene.solver.rate_hz {
-            let (own, other) = (self.scene.solver.rate_hz, scene.solver.rate_hz);
-            warn(&format!("load: {source} runs at {other} Hz, this node at {own} Hz"));
-            return Err(Reason::NoEffectHere);
-        }
+    /// Takes another scene; the next step shows its initial state. The rate of a run stays. An error
+    /// is one after which the old scene cannot go on either.
+    fn load(&mut self, source: &str) -> anyhow::Result<Result<(), Reason>> {
+        let scene = match self.read_scene(source) {
+            Ok(scene) => scene,
+            Err((problem, reason)) => {
+                self.warnings.say(&format!("load {source}: {problem}"));
+                return Ok(Err(reason));
+            }
+        };
         let solver = Solver::new_in_run(&scene);
-        self.publisher.load(&scene, &solver, self.step + 1).map_err(|error| {
-            warn(&format!("load: {error}"));
-            Reason::NoEffectHere
-        })?;
-        (self.scene, self.solver) = (scene, solver);
-        self.progress.is_reset_due = true;
-        Ok(())
+        match self.publisher.load(&scene, &solver, self.step + 1) {
+            Err(error @ OwnerError::Publish(_)) => Err(error).context("publishing another scene"),
+            Err(error) => {
+                self.warnings.say(&format!("load {source}: {error}"));
+                Ok(Err(Reason::NoEffectHere))
+            }
+            Ok(()) => {
+                (self.scene, self.solver) = (scene, solver);
+                self.progress.is_reset_due = true;
+                Ok(Ok(()))
+            }
+        }
+    }
+
+    /// A scene that this run can go on with, or what is wrong with it.
+    fn read_scene(&self, source: &str) -> Result<Scene, (String, Reason)> {
+        let out_of_range = |problem| (problem, Reason::OutOfRange);
+        let mut scene =
+            scene_source::load(source).map_err(|error| out_of_range(format!("{error:#}")))?;
+        let Options { rate_hz, substeps, .. } = self.options;
+        scene.override_solver(rate_hz, substeps).map_err(out_of_range)?;
+        let (own, other) = (self.scene.solver.rate_hz, scene.solver.rate_hz);
+        if own == other {
+            return Ok(scene);
+        }
+        Err((format!("it runs at {other} Hz, this node at {own} Hz"), Reason::NoEffectHere))
     }
 
     fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
@@ -182,7 +202,12 @@ impl Node {
         self.solver.step();
         let solve_ns = monotonic_ns() - before_ns;
         if self.solver.frozen_count() > frozen_count {
-            warn_of_frozen(self.step + 1, self.solver.frozen_count() - frozen_count);
+            let count = self.solver.frozen_count() - frozen_count;
+            self.warnings.say(&format!(
+                "step {}: {count} particles are frozen, their state was no longer finite; \
+                 `ctl reset` brings them back",
+                self.step + 1
+            ));
         }
         self.step += 1;
         self.progress.count_step();
@@ -229,17 +254,4 @@ impl Node {
         let Progress { is_paused, time_scale, .. } = self.progress;
         Position { step: self.step, is_paused, time_scale, is_last }
     }
-}
-
-/// A state that blows up is no reason to stop, but must not pass unnoticed.
-fn warn_of_frozen(step: u64, count: u64) {
-    warn(&format!(
-        "step {step}: {count} particles are frozen, their state was no longer finite; `ctl reset` \
-         brings them back"
-    ));
-}
-
-fn warn(text: &str) {
-    // Whoever has closed stderr wants no warning.
-    let _unheard = writeln!(stderr(), "warning: {text}");
 }

@@ -1,16 +1,17 @@
 //! Where a scene comes from: built in, or a file.
 
-use std::fs;
+use std::fs::File;
+use std::io::Read;
 
 use anyhow::{Context, bail};
+use sim_contract::SCENE_SIZE_BYTES_MAX;
 use sim_solver::{Scene, builtin};
 
 /// Reads and checks a scene. `source` is a path if it contains `/` or ends in `.toml`, else the
 /// name of a built-in scene.
 pub(crate) fn load(source: &str) -> anyhow::Result<Scene> {
     if is_path(source) {
-        let text = fs::read_to_string(source)
-            .with_context(|| format!("{source}: cannot read the scene"))?;
+        let text = read(source).with_context(|| format!("{source}: cannot read the scene"))?;
         return Ok(Scene::from_toml(&text, source)?);
     }
     let Some(text) = builtin::text(source) else {
@@ -27,4 +28,18 @@ pub(crate) fn load(source: &str) -> anyhow::Result<Scene> {
 #[allow(clippy::case_sensitive_file_extension_comparisons, reason = "exactly the documented rule")]
 pub(crate) fn is_path(source: &str) -> bool {
     source.contains('/') || source.ends_with(".toml")
+}
+
+/// Reads a file that can be a scene: a running node must not wait for a pipe, nor read a device.
+fn read(path: &str) -> anyhow::Result<String> {
+    if !std::fs::metadata(path)?.is_file() {
+        bail!("it is no regular file");
+    }
+    let mut text = String::new();
+    let limit = SCENE_SIZE_BYTES_MAX as u64;
+    let length = File::open(path)?.take(limit + 1).read_to_string(&mut text)?;
+    if length as u64 > limit {
+        bail!("it is longer than {limit} bytes");
+    }
+    Ok(text)
 }

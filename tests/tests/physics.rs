@@ -234,6 +234,8 @@ fn a_scene_of_another_rate_needs_another_node() {
     let _node = node(&sandbox, &["--paused"]);
     let other = sandbox.write("other.toml", "version = 1\n[solver]\nrate_hz = 60\n");
     assert_eq!(ctl(&sandbox, &["load", &other])["reason"], "no_effect_here");
+    // A device is no scene, and nothing that a node would wait for.
+    assert_eq!(ctl(&sandbox, &["load", "/dev/zero"])["reason"], "out_of_range");
     let same = sandbox.write("same.toml", "version = 1\n[[particle]]\nposition = [1, 2, 3]\n");
     assert_eq!(ctl(&sandbox, &["load", &same])["status"], "applied");
     let snapshot = attach(&sandbox).next_snapshot(DEADLINE).unwrap().unwrap();

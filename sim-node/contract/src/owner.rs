@@ -139,7 +139,8 @@ impl Owner {
     ///
     /// # Errors
     /// As [`Owner::create`]: the load is beyond a limit of the contract or of shared memory, or a
-    /// writer could not be created. Then nothing has changed, and the old load can go on.
+    /// writer could not be created. Then nothing has changed, and the old load can go on. Only after
+    /// [`OwnerError::Publish`] it cannot: its writers have gone.
     pub fn load(&mut self, load: &Load<'_>) -> Result<(), OwnerError> {
         check_limits(load)?;
         check_shared_memory(load)?;

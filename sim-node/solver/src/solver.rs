@@ -118,9 +118,9 @@ impl Solver {
         self.is_restored = true;
     }
 
-    /// Works out what the commands of a boundary have changed. The next step does it where it was not
-    /// called; only this part of a step may allocate.
-    pub(crate) fn finish_boundary(&mut self) {
+    /// Works out what the commands of a boundary have changed: once, however many they were. Whoever
+    /// steps in real time calls it after them; else the next step does, and then may allocate.
+    pub fn finish_boundary(&mut self) {
         let Due { constraints, tethers } = std::mem::take(&mut self.due);
         if constraints {
             self.configure();
