@@ -24,7 +24,9 @@ pub use anchor::{SceneAnchor, Waypoint};
 pub(crate) use check::Range32;
 pub use collider::{ColliderShape, SceneCollider};
 pub use error::SceneError;
-pub use generate::{Cloth, Diagonals, Generator, Pinned, Rope, Shape};
+pub use generate::{
+    Bridge, Cloth, Diagonals, Generator, KindSoftness, PerKind, Pinned, Ragdoll, Rope, Shape, Web,
+};
 pub use limits::Limits;
 pub(crate) use model::Model;
 pub use wind::Wind;

@@ -259,7 +259,7 @@ const WRONG: &[(&str, &str)] = &[
     ),
     (
         "version = 1\n[[generate]]\nshape = \"knot\"",
-        "f.toml:3: generate[0].shape: there is no shape \"knot\" (allowed: cloth, rope)",
+        "f.toml:3: generate[0].shape: there is no shape \"knot\" (allowed: cloth, mesh, rope, web, bridge, ragdoll)",
     ),
     (
         "version = 1\n[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]",
@@ -295,7 +295,7 @@ const WRONG: &[(&str, &str)] = &[
     ),
     (
         "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 3\nrows = 3\nspacing = 3e38",
-        "f.toml:3: generate[0]: has a particle at 300000000000000000000000000000000000000 (allowed: -1e7 to 1e7)",
+        "f.toml:3: generate[0]: has a particle at [3e38, 0.0, 0.0] (allowed: -1e7 to 1e7)",
     ),
     (
         "version = 1\n[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]\nto = [1, 0, 0]\ncompliance = { structural = 1e34 }",

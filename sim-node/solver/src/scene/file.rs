@@ -107,6 +107,14 @@ pub(crate) struct FileGenerator {
     pub(crate) count: Option<Whole>,
     pub(crate) from: Option<Vector>,
     pub(crate) to: Option<Vector>,
+    pub(crate) center: Option<Vector>,
+    pub(crate) radius: Option<Number>,
+    pub(crate) spokes: Option<Whole>,
+    pub(crate) rings: Option<Whole>,
+    pub(crate) normal: Option<Vector>,
+    pub(crate) planks: Option<Whole>,
+    pub(crate) width: Option<Number>,
+    pub(crate) height: Option<Number>,
 }
 
 #[derive(Debug, Deserialize)]

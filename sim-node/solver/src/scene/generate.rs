@@ -1,10 +1,22 @@
 //! Generators: shapes that stand for many particles and constraints.
 
+pub(super) mod bridge;
+pub(super) mod cloth;
+pub(super) mod ragdoll;
+pub(super) mod rope;
+pub(super) mod web;
+
+use glam::DVec3;
 use serde::Serialize;
 
 use super::model::Model;
-use super::{Limits, Method, SceneParticle, Softness, decimal};
+use super::{Limits, Method, SceneParticle, Softness, Up, decimal};
 use crate::constraints::{Constraint, ConstraintKind};
+pub use bridge::Bridge;
+pub use cloth::{Cloth, Diagonals};
+pub use ragdoll::Ragdoll;
+pub use rope::Rope;
+pub use web::Web;
 
 /// A shape, and what its particles and constraints are like.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,67 +42,18 @@ pub struct Generator {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "shape", rename_all = "lowercase")]
 pub enum Shape {
-    /// A sheet.
+    /// A sheet that hangs.
     Cloth(Cloth),
+    /// A sheet that holds its form: with bends, and nothing pinned, unless told.
+    Mesh(Cloth),
     /// A line.
     Rope(Rope),
-}
-
-/// A sheet of columns x rows particles; particle (c, r) has index r columns + c.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cloth {
-    /// At least 1.
-    pub columns: u32,
-    /// At least 1.
-    pub rows: u32,
-    /// Distance between neighbours.
-    #[serde(with = "decimal::number")]
-    pub spacing: f32,
-    /// Position of particle (0, 0).
-    #[serde(with = "decimal::vector")]
-    pub origin: [f32; 3],
-    /// From column to column, times the spacing.
-    #[serde(with = "decimal::vector")]
-    pub right: [f32; 3],
-    /// From row to row, times the spacing.
-    #[serde(with = "decimal::vector")]
-    pub down: [f32; 3],
-    /// Which kinds of constraints it has.
-    pub links: Vec<ConstraintKind>,
-    /// Diagonals of a cell with shear constraints.
-    pub diagonals: Diagonals,
-}
-
-/// How many diagonals of a cell have a shear constraint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(into = "u32")]
-pub enum Diagonals {
-    /// Only down-right.
-    One,
-    /// Both.
-    Two,
-}
-
-impl From<Diagonals> for u32 {
-    fn from(diagonals: Diagonals) -> Self {
-        match diagonals {
-            Diagonals::One => 1,
-            Diagonals::Two => 2,
-        }
-    }
-}
-
-/// A line of particles; constraint i joins particles i and i + 1.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Rope {
-    /// Particles, at least 2.
-    pub count: u32,
-    /// Position of the first.
-    #[serde(with = "decimal::vector")]
-    pub from: [f32; 3],
-    /// Position of the last.
-    #[serde(with = "decimal::vector")]
-    pub to: [f32; 3],
+    /// A spider's web.
+    Web(Web),
+    /// Planks on two ropes.
+    Bridge(Bridge),
+    /// A figure.
+    Ragdoll(Ragdoll),
 }
 
 /// Which particles of a shape are pinned.
@@ -152,198 +115,95 @@ impl KindSoftness {
     }
 }
 
-/// The words for pinned particles of a cloth; the first is the default.
-pub(crate) const CLOTH_PINS: [&str; 4] = ["top", "top-even", "corners", "none"];
-/// The words for pinned particles of a rope; the first is the default.
-pub(crate) const ROPE_PINS: [&str; 4] = ["first", "last", "both", "none"];
-
 impl Generator {
     /// Particles that it makes; at most 2^64, so it is known before any is made.
     pub(crate) fn particle_count(&self) -> u64 {
         match &self.shape {
-            Shape::Cloth(cloth) => u64::from(cloth.columns) * u64::from(cloth.rows),
-            Shape::Rope(rope) => u64::from(rope.count),
+            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.particle_count(),
+            Shape::Rope(rope) => rope.particle_count(),
+            Shape::Web(web) => web.particle_count(),
+            Shape::Bridge(bridge) => bridge.particle_count(),
+            Shape::Ragdoll(_) => Ragdoll::particle_count(),
         }
     }
 
     /// Constraints that it makes.
     pub(crate) fn constraint_count(&self) -> u64 {
         match &self.shape {
-            Shape::Cloth(cloth) => cloth.links.iter().map(|kind| cloth.link_count(*kind)).sum(),
-            Shape::Rope(rope) => u64::from(rope.count) - 1,
+            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.constraint_count(),
+            Shape::Rope(rope) => rope.constraint_count(),
+            Shape::Web(web) => web.constraint_count(),
+            Shape::Bridge(bridge) => bridge.constraint_count(),
+            Shape::Ragdoll(_) => Ragdoll::constraint_count(),
         }
     }
 
-    pub(crate) fn build(&self, model: &mut Model) {
+    pub(crate) fn build(&self, up: Up, model: &mut Model) {
         let first = model.particle_count();
         let tear_stretch = self.tear_stretch;
         model.begin_limits(Limits { tear_stretch, ..Limits::default() });
+        let mut builder = Builder { generator: self, up, first, model };
         match &self.shape {
-            Shape::Cloth(cloth) => self.build_cloth(cloth, first, model),
-            Shape::Rope(rope) => self.build_rope(rope, first, model),
-        }
-    }
-
-    fn build_cloth(&self, cloth: &Cloth, first: u32, model: &mut Model) {
-        for row in 0..cloth.rows {
-            for column in 0..cloth.columns {
-                let index = row * cloth.columns + column;
-                let position = cloth.position(column, row);
-                model.particles.push(self.particle(position, self.is_cloth_pin(cloth, index)));
-            }
-        }
-        for row in 0..cloth.rows {
-            for column in 0..cloth.columns {
-                for link in cloth.links_of(column, row) {
-                    self.push_link(&link, first, model);
-                }
-            }
-        }
-        for row in 1..cloth.rows {
-            for column in 1..cloth.columns {
-                let below = first + row * cloth.columns + column;
-                let above = below - cloth.columns;
-                model.triangles.push([above - 1, below - 1, below]);
-                model.triangles.push([above - 1, below, above]);
-            }
-        }
-    }
-
-    fn build_rope(&self, rope: &Rope, first: u32, model: &mut Model) {
-        let last = rope.count - 1;
-        for index in 0..rope.count {
-            let share = f64::from(index) / f64::from(last);
-            let along = |axis: usize| {
-                let (from, to) = (f64::from(rope.from[axis]), f64::from(rope.to[axis]));
-                round(from + (to - from) * share)
-            };
-            let is_pinned = match &self.pinned {
-                Pinned::Word("first") => index == 0,
-                Pinned::Word("last") => index == last,
-                Pinned::Word("both") => index == 0 || index == last,
-                Pinned::Word(_) => false,
-                Pinned::List(list) => list.binary_search(&index).is_ok(),
-            };
-            model.particles.push(self.particle([along(0), along(1), along(2)], is_pinned));
-        }
-        for index in 0..last {
-            let link =
-                Link { a: index, b: index + 1, kind: ConstraintKind::Structural, family: None };
-            self.push_link(&link, first, model);
-        }
-    }
-
-    fn particle(&self, position: [f32; 3], pinned: bool) -> SceneParticle {
-        SceneParticle { position, mass: self.mass, pinned, velocity: [0.0; 3] }
-    }
-
-    fn push_link(&self, link: &Link, first: u32, model: &mut Model) {
-        let (a, b) = (first + link.a, first + link.b);
-        model.push(
-            Constraint {
-                a,
-                b,
-                rest_length: model.distance(a, b),
-                compliance: self.softness.of(link.kind),
-                kind: link.kind,
-            },
-            link.family,
-        );
-    }
-
-    fn is_cloth_pin(&self, cloth: &Cloth, index: u32) -> bool {
-        let is_top = index < cloth.columns;
-        match &self.pinned {
-            Pinned::Word("top") => is_top,
-            Pinned::Word("top-even") => is_top && index.is_multiple_of(2),
-            Pinned::Word("corners") => index == 0 || index == cloth.columns - 1,
-            Pinned::Word(_) => false,
-            Pinned::List(list) => list.binary_search(&index).is_ok(),
+            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.build(&mut builder),
+            Shape::Rope(rope) => rope.build(&mut builder),
+            Shape::Web(web) => web.build(&mut builder),
+            Shape::Bridge(bridge) => bridge.build(&mut builder),
+            Shape::Ragdoll(ragdoll) => ragdoll.build(&mut builder),
         }
     }
 }
 
-/// A constraint within a shape, with the family that it declares for the order of projection.
-struct Link {
-    a: u32,
-    b: u32,
-    kind: ConstraintKind,
-    family: Option<u32>,
+/// What a shape adds its parts to, by their indices within the shape.
+struct Builder<'a> {
+    generator: &'a Generator,
+    up: Up,
+    /// Index of the shape's first particle in the scene.
+    first: u32,
+    model: &'a mut Model,
 }
 
-/// The families of a sheet, in the order of projection; each has an even and an odd half, and no
-/// two constraints of one half share a particle.
-#[derive(Clone, Copy)]
-enum Family {
-    Vertical,
-    Horizontal,
-    DiagonalRight,
-    DiagonalLeft,
-    VerticalBend,
-    HorizontalBend,
-}
-
-impl Family {
-    /// The group of one half; `phase` counts along the direction of the constraint.
-    fn half(self, phase: u32) -> u32 {
-        2 * self as u32 + phase % 2
+impl<'a> Builder<'a> {
+    fn pinned(&self) -> &'a Pinned {
+        &self.generator.pinned
     }
-}
 
-impl Cloth {
-    fn link_count(&self, kind: ConstraintKind) -> u64 {
-        let (columns, rows) = (u64::from(self.columns), u64::from(self.rows));
-        let straight =
-            |reach| columns.saturating_sub(reach) * rows + columns * rows.saturating_sub(reach);
-        match kind {
-            ConstraintKind::Structural => straight(1),
-            ConstraintKind::Shear => {
-                u64::from(u32::from(self.diagonals)) * (columns - 1) * (rows - 1)
-            }
-            ConstraintKind::Bend => straight(2),
-            ConstraintKind::Tether => 0,
+    fn up(&self) -> DVec3 {
+        match self.up {
+            Up::Y => DVec3::Y,
+            Up::MinusY => -DVec3::Y,
+            Up::Z => DVec3::Z,
         }
     }
 
-    fn position(&self, column: u32, row: u32) -> [f32; 3] {
-        let spacing = f64::from(self.spacing);
-        let along = |axis: usize| {
-            let right = f64::from(self.right[axis]) * f64::from(column);
-            let down = f64::from(self.down[axis]) * f64::from(row);
-            round(f64::from(self.origin[axis]) + spacing * (right + down))
-        };
-        [along(0), along(1), along(2)]
+    fn particle(&mut self, position: [f32; 3], pinned: bool) {
+        let mass = self.generator.mass;
+        self.model.particles.push(SceneParticle { position, mass, pinned, velocity: [0.0; 3] });
     }
 
-    /// The constraints that start at a particle: right, down, down-right, then from its right
-    /// neighbour down-left, two right, two down.
-    fn links_of(&self, column: u32, row: u32) -> impl Iterator<Item = Link> {
-        use ConstraintKind::{Bend, Shear, Structural};
-        let index = move |c: u32, r: u32| r * self.columns + c;
-        let link = move |kind, family, from: [u32; 2], to: [u32; 2]| {
-            let is_inside = from[0].max(to[0]) < self.columns && to[1] < self.rows;
-            let is_wanted = is_inside && self.links.contains(&kind);
-            is_wanted.then(|| Link {
-                a: index(from[0], from[1]),
-                b: index(to[0], to[1]),
-                kind,
-                family: Some(family),
-            })
-        };
-        let (c, r) = (column, row);
-        let left = (self.diagonals == Diagonals::Two)
-            .then(|| link(Shear, Family::DiagonalLeft.half(r), [c + 1, r], [c, r + 1]));
-        [
-            link(Structural, Family::Horizontal.half(c), [c, r], [c + 1, r]),
-            link(Structural, Family::Vertical.half(r), [c, r], [c, r + 1]),
-            link(Shear, Family::DiagonalRight.half(r), [c, r], [c + 1, r + 1]),
-            left.flatten(),
-            link(Bend, Family::HorizontalBend.half(c / 2), [c, r], [c + 2, r]),
-            link(Bend, Family::VerticalBend.half(r / 2), [c, r], [c, r + 2]),
-        ]
-        .into_iter()
-        .flatten()
+    fn link(&mut self, pair: [u32; 2], kind: ConstraintKind) {
+        self.family_link(pair, kind, None);
     }
+
+    /// A constraint at the length that it has, of a family that declares itself independent.
+    fn family_link(&mut self, pair: [u32; 2], kind: ConstraintKind, family: Option<u32>) {
+        let [a, b] = pair.map(|index| self.first + index);
+        let rest_length = self.model.distance(a, b);
+        let compliance = self.generator.softness.of(kind);
+        self.model.push(Constraint { a, b, rest_length, compliance, kind }, family);
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) {
+        self.model.triangles.push(corners.map(|corner| self.first + corner));
+    }
+}
+
+/// A point of the way between two, rounded once.
+fn between(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
+    let along = |axis: usize| {
+        let (from, to) = (f64::from(from[axis]), f64::from(to[axis]));
+        round(from + (to - from) * share)
+    };
+    [along(0), along(1), along(2)]
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the one rounding to the scene's f32")]

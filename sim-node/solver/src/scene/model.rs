@@ -33,7 +33,7 @@ impl Model {
             model.push(Constraint { a, b, rest_length, compliance, kind }, None);
         }
         for generator in &scene.generators {
-            generator.build(&mut model);
+            generator.build(scene.up, &mut model);
         }
         model
     }

@@ -218,12 +218,16 @@ impl Reader<'_> {
             let count = usize::try_from(generator.particle_count()).unwrap_or(usize::MAX);
             let positions = model.particles[first..first + count].iter().map(|one| one.position);
             first += count;
-            for axis in positions.flatten() {
+            for position in positions {
                 // Not a number is no coordinate either.
-                if axis.abs() <= COORDINATE_MAX {
-                    continue;
-                }
-                let problem = format!("has a particle at {axis} (allowed: -1e7 to 1e7)");
+                let is_far = !position.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
+                let problem = match position {
+                    _ if is_far => format!("has a particle at {position:?} (allowed: -1e7 to 1e7)"),
+                    [.., z] if self.is_planar && z != 0.0 => {
+                        format!("has a particle at z {z} in a scene of 2 dimensions (allowed: 0)")
+                    }
+                    _ => continue,
+                };
                 let span = file.generate[index].shape.span();
                 return self.error(span, &format!("generate[{index}]"), problem);
             }

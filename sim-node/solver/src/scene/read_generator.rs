@@ -1,14 +1,73 @@
 //! From the keys of a generator to a checked one.
 
+use std::ops::Range;
+
 use toml::Spanned;
 
 use super::check::{Range32, Reader};
 use super::file::{FileGenerator, FilePinned, FileSoftness, Number, Vector, Whole};
 use super::generate::{
-    CLOTH_PINS, Cloth, Diagonals, Generator, KindSoftness, PerKind, Pinned, ROPE_PINS, Rope, Shape,
+    Bridge, Cloth, Diagonals, Generator, KindSoftness, PerKind, Pinned, Ragdoll, Rope, Shape, Web,
+    cloth, ragdoll, rope, web,
 };
 use super::{ELEMENTS_MAX, SceneError, Softness};
 use crate::constraints::ConstraintKind;
+
+/// A shape: its keys, and the words for what of it is pinned, the default first.
+struct ShapeKeys {
+    name: &'static str,
+    keys: &'static [&'static str],
+    pins: &'static [&'static str],
+}
+
+const SHEET: &[&str] =
+    &["columns", "rows", "spacing", "origin", "right", "down", "links", "diagonals"];
+const SHAPES: [ShapeKeys; 6] = [
+    ShapeKeys { name: "cloth", keys: SHEET, pins: &cloth::PINS },
+    ShapeKeys { name: "mesh", keys: SHEET, pins: &["none", "top", "top-even", "corners"] },
+    ShapeKeys { name: "rope", keys: &["count", "from", "to"], pins: &rope::PINS },
+    ShapeKeys {
+        name: "web",
+        keys: &["center", "radius", "spokes", "rings", "normal"],
+        pins: &web::PINS,
+    },
+    ShapeKeys {
+        name: "bridge",
+        keys: &["from", "to", "planks", "width"],
+        pins: &["both", "first", "last", "none"],
+    },
+    ShapeKeys { name: "ragdoll", keys: &["origin", "height"], pins: &ragdoll::PINS },
+];
+
+impl FileGenerator {
+    /// Where each of the shapes' own keys stands, if it does.
+    fn own_keys(&self) -> [(&'static str, Option<Range<usize>>); 19] {
+        fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
+            value.map(Spanned::span)
+        }
+        [
+            ("columns", span(self.columns.as_ref())),
+            ("rows", span(self.rows.as_ref())),
+            ("spacing", span(self.spacing.as_ref())),
+            ("origin", span(self.origin.as_ref())),
+            ("right", span(self.right.as_ref())),
+            ("down", span(self.down.as_ref())),
+            ("links", span(self.links.as_ref())),
+            ("diagonals", span(self.diagonals.as_ref())),
+            ("count", span(self.count.as_ref())),
+            ("from", span(self.from.as_ref())),
+            ("to", span(self.to.as_ref())),
+            ("center", span(self.center.as_ref())),
+            ("radius", span(self.radius.as_ref())),
+            ("spokes", span(self.spokes.as_ref())),
+            ("rings", span(self.rings.as_ref())),
+            ("normal", span(self.normal.as_ref())),
+            ("planks", span(self.planks.as_ref())),
+            ("width", span(self.width.as_ref())),
+            ("height", span(self.height.as_ref())),
+        ]
+    }
+}
 
 impl Reader<'_> {
     /// Checks one `[[generate]]` block.
@@ -18,18 +77,11 @@ impl Reader<'_> {
         file: &FileGenerator,
     ) -> Result<Generator, SceneError> {
         let fields = Fields { reader: self, index, shape: &file.shape };
-        let (shape, words) = match file.shape.get_ref().as_str() {
-            "cloth" => (fields.cloth(file)?, CLOTH_PINS),
-            "rope" => (fields.rope(file)?, ROPE_PINS),
-            other => {
-                let problem = format!("there is no shape \"{other}\" (allowed: cloth, rope)");
-                return self.error(file.shape.span(), &fields.name("shape"), problem);
-            }
-        };
+        let known = fields.known_shape(file)?;
         let mut generator = Generator {
-            shape,
+            shape: fields.shape(file)?,
             mass: self.mass(&fields.name("mass"), file.mass.as_ref())?,
-            pinned: Pinned::Word(words[0]),
+            pinned: Pinned::Word(known.pins[0]),
             tear_stretch: match &file.tear_stretch {
                 Some(number) => {
                     Some(self.limit(&fields.name("tear_stretch"), number, Range32::RATIO)?)
@@ -39,7 +91,7 @@ impl Reader<'_> {
             softness: fields.softness(file)?,
         };
         if let Some(pinned) = &file.pinned {
-            generator.pinned = fields.pinned(pinned, &words, generator.particle_count())?;
+            generator.pinned = fields.pinned(pinned, known.pins, generator.particle_count())?;
         }
         Ok(generator)
     }
@@ -67,11 +119,81 @@ impl Fields<'_, '_> {
         value.ok_or_else(error)
     }
 
-    /// Keys of other shapes are as unknown as any other.
-    fn forbidden<T>(&self, key: &str, value: Option<&Spanned<T>>) -> Result<(), SceneError> {
-        let Some(value) = value else { return Ok(()) };
-        let problem = format!("unknown field of a {} (allowed: remove it)", self.shape.get_ref());
-        self.reader.error(value.span(), &self.name(key), problem)
+    /// The shape by its name. Keys of other shapes are as unknown as any other.
+    fn known_shape(&self, file: &FileGenerator) -> Result<&'static ShapeKeys, SceneError> {
+        static KNOWN: &[ShapeKeys] = &SHAPES;
+        let name = self.shape.get_ref().as_str();
+        let Some(known) = KNOWN.iter().find(|shape| shape.name == name) else {
+            let names: Vec<_> = KNOWN.iter().map(|shape| shape.name).collect();
+            let problem = format!("there is no shape \"{name}\" (allowed: {})", names.join(", "));
+            return self.reader.error(self.shape.span(), &self.name("shape"), problem);
+        };
+        for (key, span) in file.own_keys() {
+            let Some(span) = span.filter(|_| !known.keys.contains(&key)) else { continue };
+            let problem = format!("unknown field of a {name} (allowed: {})", known.keys.join(", "));
+            return self.reader.error(span, &self.name(key), problem);
+        }
+        Ok(known)
+    }
+
+    fn shape(&self, file: &FileGenerator) -> Result<Shape, SceneError> {
+        use ConstraintKind::{Bend, Shear, Structural};
+        Ok(match self.shape.get_ref().as_str() {
+            "cloth" => Shape::Cloth(self.cloth(file, &[Structural, Shear])?),
+            "mesh" => Shape::Mesh(self.cloth(file, &[Structural, Shear, Bend])?),
+            "rope" => Shape::Rope(Rope {
+                count: self.whole("count", file.count.as_ref(), 2)?,
+                from: self.vector("from", file.from.as_ref())?,
+                to: self.vector("to", file.to.as_ref())?,
+            }),
+            "web" => Shape::Web(self.web(file)?),
+            "bridge" => Shape::Bridge(self.bridge(file)?),
+            _ => Shape::Ragdoll(Ragdoll {
+                origin: self.vector_or("origin", file.origin.as_ref(), [0.0; 3])?,
+                height: self.size("height", file.height.as_ref())?,
+            }),
+        })
+    }
+
+    fn size(&self, key: &str, value: Option<&Number>) -> Result<f32, SceneError> {
+        self.reader.ranged(&self.name(key), self.required(key, value)?, Range32::SIZE)
+    }
+
+    fn vector_or(
+        &self,
+        key: &str,
+        value: Option<&Vector>,
+        default: [f32; 3],
+    ) -> Result<[f32; 3], SceneError> {
+        self.reader.vector_or(&self.name(key), value, default)
+    }
+
+    fn web(&self, file: &FileGenerator) -> Result<Web, SceneError> {
+        let normal = self.vector_or("normal", file.normal.as_ref(), [0.0, 0.0, 1.0])?;
+        if let Some(given) = file.normal.as_ref().filter(|_| normal == [0.0; 3]) {
+            let problem = "has no direction (allowed: not all 0)".to_owned();
+            return self.reader.error(given.span(), &self.name("normal"), problem);
+        }
+        Ok(Web {
+            center: self.vector_or("center", file.center.as_ref(), [0.0; 3])?,
+            radius: self.size("radius", file.radius.as_ref())?,
+            spokes: self.whole("spokes", file.spokes.as_ref(), 3)?,
+            rings: self.whole("rings", file.rings.as_ref(), 1)?,
+            normal,
+        })
+    }
+
+    fn bridge(&self, file: &FileGenerator) -> Result<Bridge, SceneError> {
+        if self.reader.is_planar {
+            let problem = "a bridge is as wide as long (allowed: 3 dimensions)".to_owned();
+            return self.reader.error(self.shape.span(), &self.name("shape"), problem);
+        }
+        Ok(Bridge {
+            from: self.vector("from", file.from.as_ref())?,
+            to: self.vector("to", file.to.as_ref())?,
+            planks: self.whole("planks", file.planks.as_ref(), 2)?,
+            width: self.size("width", file.width.as_ref())?,
+        })
     }
 
     fn whole(&self, key: &str, value: Option<&Whole>, least: u32) -> Result<u32, SceneError> {
@@ -82,30 +204,30 @@ impl Fields<'_, '_> {
         self.reader.vector(&self.name(key), self.required(key, value)?)
     }
 
-    fn cloth(&self, file: &FileGenerator) -> Result<Shape, SceneError> {
-        self.forbidden("count", file.count.as_ref())?;
-        self.forbidden("from", file.from.as_ref())?;
-        self.forbidden("to", file.to.as_ref())?;
+    fn cloth(
+        &self,
+        file: &FileGenerator,
+        default_links: &[ConstraintKind],
+    ) -> Result<Cloth, SceneError> {
         let spacing = self.required("spacing", file.spacing.as_ref())?;
-        let vector_or = |key, value: Option<&Vector>, default| {
-            self.reader.vector_or(&self.name(key), value, default)
-        };
-        Ok(Shape::Cloth(Cloth {
+        Ok(Cloth {
             columns: self.whole("columns", file.columns.as_ref(), 1)?,
             rows: self.whole("rows", file.rows.as_ref(), 1)?,
             spacing: self.reader.ranged(&self.name("spacing"), spacing, Range32::POSITIVE)?,
-            origin: vector_or("origin", file.origin.as_ref(), [0.0; 3])?,
-            right: vector_or("right", file.right.as_ref(), [1.0, 0.0, 0.0])?,
-            down: vector_or("down", file.down.as_ref(), [0.0, -1.0, 0.0])?,
-            links: self.links(file)?,
+            origin: self.vector_or("origin", file.origin.as_ref(), [0.0; 3])?,
+            right: self.vector_or("right", file.right.as_ref(), [1.0, 0.0, 0.0])?,
+            down: self.vector_or("down", file.down.as_ref(), [0.0, -1.0, 0.0])?,
+            links: self.links(file, default_links)?,
             diagonals: self.diagonals(file)?,
-        }))
+        })
     }
 
-    fn links(&self, file: &FileGenerator) -> Result<Vec<ConstraintKind>, SceneError> {
-        let Some(links) = &file.links else {
-            return Ok(vec![ConstraintKind::Structural, ConstraintKind::Shear]);
-        };
+    fn links(
+        &self,
+        file: &FileGenerator,
+        default: &[ConstraintKind],
+    ) -> Result<Vec<ConstraintKind>, SceneError> {
+        let Some(links) = &file.links else { return Ok(default.to_vec()) };
         if links.get_ref().contains(&ConstraintKind::Tether) {
             let problem = "a cloth makes no tethers (allowed: structural, shear, bend)".to_owned();
             return self.reader.error(links.span(), &self.name("links"), problem);
@@ -120,22 +242,6 @@ impl Fields<'_, '_> {
         let Some(diagonals) = &file.diagonals else { return Ok(Diagonals::Two) };
         let one = self.reader.whole(&self.name("diagonals"), diagonals, 1..=2)? == 1;
         Ok(if one { Diagonals::One } else { Diagonals::Two })
-    }
-
-    fn rope(&self, file: &FileGenerator) -> Result<Shape, SceneError> {
-        self.forbidden("columns", file.columns.as_ref())?;
-        self.forbidden("rows", file.rows.as_ref())?;
-        self.forbidden("spacing", file.spacing.as_ref())?;
-        self.forbidden("origin", file.origin.as_ref())?;
-        self.forbidden("right", file.right.as_ref())?;
-        self.forbidden("down", file.down.as_ref())?;
-        self.forbidden("links", file.links.as_ref())?;
-        self.forbidden("diagonals", file.diagonals.as_ref())?;
-        Ok(Shape::Rope(Rope {
-            count: self.whole("count", file.count.as_ref(), 2)?,
-            from: self.vector("from", file.from.as_ref())?,
-            to: self.vector("to", file.to.as_ref())?,
-        }))
     }
 
     fn softness(&self, file: &FileGenerator) -> Result<KindSoftness, SceneError> {

@@ -5,8 +5,10 @@ use std::collections::BTreeSet;
 use super::{ConstraintOrder, Model, Scene};
 use crate::constraints::Constraint;
 
-/// Distance from the scene's origin beyond which f32 positions make a scene at rest tremble.
+/// Distance from the scene's origin, in m, beyond which f32 positions make a scene at rest tremble.
 const NEAR_ORIGIN: f32 = 100.0;
+/// In m/s^2. A scene in another unit is told by its gravity.
+const GRAVITY: f32 = 9.81;
 /// Ratio of masses beyond which small steps converge visibly slower.
 const MASS_RATIO_LARGE: f32 = 1e3;
 
@@ -31,9 +33,12 @@ fn far_from_origin(scene: &Scene, model: &Model) -> Option<String> {
     let coordinates = model.particles.iter().flat_map(|one| one.position);
     let farthest =
         coordinates.fold(0.0, |most: f32, one| if one.abs() > most { one.abs() } else { most });
-    (farthest > NEAR_ORIGIN).then(|| {
+    let [x, y, z] = scene.gravity;
+    let unit_scale = (x * x + y * y + z * z).sqrt() / GRAVITY;
+    let near = NEAR_ORIGIN * if unit_scale > 1.0 { unit_scale } else { 1.0 };
+    (farthest > near).then(|| {
         format!(
-            "a coordinate reaches {farthest} {unit} from the origin: beyond {NEAR_ORIGIN} {unit} a \
+            "a coordinate reaches {farthest} {unit} from the origin: beyond {near:.0} {unit} a \
              scene at rest trembles; put the distance into `origin`",
             unit = scene.unit
         )

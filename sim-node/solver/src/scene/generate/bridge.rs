@@ -1,0 +1,75 @@
+//! A bridge of planks on two ropes.
+
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use super::rope::is_end_pinned;
+use super::{Builder, Pinned, between, decimal, round};
+use crate::constraints::ConstraintKind;
+
+/// Planks across a way, each from its left to its right end: particles 2 i and 2 i + 1. Constraints
+/// plank by plank: the plank, then to the next one left, right, and both diagonals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bridge {
+    /// Middle of the first plank.
+    #[serde(with = "decimal::vector")]
+    pub from: [f32; 3],
+    /// Middle of the last plank.
+    #[serde(with = "decimal::vector")]
+    pub to: [f32; 3],
+    /// At least 2.
+    pub planks: u32,
+    /// Length of a plank, > 0: level, across the way.
+    #[serde(with = "decimal::number")]
+    pub width: f32,
+}
+
+impl Bridge {
+    pub(super) fn particle_count(&self) -> u64 {
+        2 * u64::from(self.planks)
+    }
+
+    pub(super) fn constraint_count(&self) -> u64 {
+        5 * u64::from(self.planks) - 4
+    }
+
+    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+        let side = self.side(builder.up());
+        for plank in 0..self.planks {
+            let share = f64::from(plank) / f64::from(self.planks - 1);
+            let middle = Vec3::from_array(between(self.from, self.to, share)).as_dvec3();
+            for (index, arm) in [(2 * plank, -side), (2 * plank + 1, side)] {
+                let is_pinned = self.is_pinned(builder.pinned(), plank, index);
+                builder.particle((middle + arm).to_array().map(round), is_pinned);
+            }
+        }
+        for plank in 0..self.planks {
+            let (left, right) = (2 * plank, 2 * plank + 1);
+            builder.link([left, right], ConstraintKind::Structural);
+            if plank + 1 == self.planks {
+                break;
+            }
+            builder.link([left, left + 2], ConstraintKind::Structural);
+            builder.link([right, right + 2], ConstraintKind::Structural);
+            builder.link([left, right + 2], ConstraintKind::Shear);
+            builder.link([right, left + 2], ConstraintKind::Shear);
+            builder.triangle([left, right, right + 2]);
+            builder.triangle([left, right + 2, left + 2]);
+        }
+    }
+
+    /// Half a plank, to the right; a bridge straight up has its planks along x.
+    fn side(&self, up: DVec3) -> DVec3 {
+        let vector = |axes: [f32; 3]| Vec3::from_array(axes).as_dvec3();
+        let across = (vector(self.to) - vector(self.from)).cross(up);
+        let across = if across.dot(across) > 0.0 { across.normalize() } else { DVec3::X };
+        across * (f64::from(self.width) / 2.0)
+    }
+
+    fn is_pinned(&self, pinned: &Pinned, plank: u32, index: u32) -> bool {
+        match pinned {
+            Pinned::List(list) => list.binary_search(&index).is_ok(),
+            Pinned::Word(_) => is_end_pinned(pinned, plank, self.planks),
+        }
+    }
+}

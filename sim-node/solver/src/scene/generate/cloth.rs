@@ -1,0 +1,181 @@
+//! A sheet of particles.
+
+use serde::Serialize;
+
+use super::{Builder, Pinned, decimal, round};
+use crate::constraints::ConstraintKind;
+
+/// A sheet of columns x rows particles; particle (c, r) has index r columns + c.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cloth {
+    /// At least 1.
+    pub columns: u32,
+    /// At least 1.
+    pub rows: u32,
+    /// Distance between neighbours.
+    #[serde(with = "decimal::number")]
+    pub spacing: f32,
+    /// Position of particle (0, 0).
+    #[serde(with = "decimal::vector")]
+    pub origin: [f32; 3],
+    /// From column to column, times the spacing.
+    #[serde(with = "decimal::vector")]
+    pub right: [f32; 3],
+    /// From row to row, times the spacing.
+    #[serde(with = "decimal::vector")]
+    pub down: [f32; 3],
+    /// Which kinds of constraints it has.
+    pub links: Vec<ConstraintKind>,
+    /// Diagonals of a cell with shear constraints.
+    pub diagonals: Diagonals,
+}
+
+/// How many diagonals of a cell have a shear constraint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(into = "u32")]
+pub enum Diagonals {
+    /// Only down-right.
+    One,
+    /// Both.
+    Two,
+}
+
+impl From<Diagonals> for u32 {
+    fn from(diagonals: Diagonals) -> Self {
+        match diagonals {
+            Diagonals::One => 1,
+            Diagonals::Two => 2,
+        }
+    }
+}
+
+/// The words for pinned particles of a sheet.
+pub(crate) const PINS: [&str; 4] = ["top", "top-even", "corners", "none"];
+
+/// A constraint with the family that it declares for the order of projection.
+struct Link {
+    a: u32,
+    b: u32,
+    kind: ConstraintKind,
+    family: u32,
+}
+
+/// The families of a sheet, in the order of projection; each has an even and an odd half, and no
+/// two constraints of one half share a particle.
+#[derive(Clone, Copy)]
+enum Family {
+    Vertical,
+    Horizontal,
+    DiagonalRight,
+    DiagonalLeft,
+    VerticalBend,
+    HorizontalBend,
+}
+
+impl Family {
+    /// The group of one half; `phase` counts along the direction of the constraint.
+    fn half(self, phase: u32) -> u32 {
+        2 * self as u32 + phase % 2
+    }
+}
+
+impl Cloth {
+    pub(super) fn particle_count(&self) -> u64 {
+        u64::from(self.columns) * u64::from(self.rows)
+    }
+
+    pub(super) fn constraint_count(&self) -> u64 {
+        self.links.iter().map(|kind| self.link_count(*kind)).sum()
+    }
+
+    /// Particles, constraints particle by particle, two triangles a cell.
+    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+        for row in 0..self.rows {
+            for column in 0..self.columns {
+                let index = row * self.columns + column;
+                let is_pinned = self.is_pinned(builder.pinned(), index);
+                builder.particle(self.position(column, row), is_pinned);
+            }
+        }
+        for row in 0..self.rows {
+            for column in 0..self.columns {
+                for link in self.links_of(column, row) {
+                    builder.family_link([link.a, link.b], link.kind, Some(link.family));
+                }
+            }
+        }
+        for row in 1..self.rows {
+            for column in 1..self.columns {
+                let below = row * self.columns + column;
+                let above = below - self.columns;
+                builder.triangle([above - 1, below - 1, below]);
+                builder.triangle([above - 1, below, above]);
+            }
+        }
+    }
+
+    fn is_pinned(&self, pinned: &Pinned, index: u32) -> bool {
+        let is_top = index < self.columns;
+        match pinned {
+            Pinned::Word("top") => is_top,
+            Pinned::Word("top-even") => is_top && index.is_multiple_of(2),
+            Pinned::Word("corners") => index == 0 || index == self.columns - 1,
+            Pinned::Word(_) => false,
+            Pinned::List(list) => list.binary_search(&index).is_ok(),
+        }
+    }
+
+    fn link_count(&self, kind: ConstraintKind) -> u64 {
+        let (columns, rows) = (u64::from(self.columns), u64::from(self.rows));
+        let straight =
+            |reach| columns.saturating_sub(reach) * rows + columns * rows.saturating_sub(reach);
+        match kind {
+            ConstraintKind::Structural => straight(1),
+            ConstraintKind::Shear => {
+                u64::from(u32::from(self.diagonals)) * (columns - 1) * (rows - 1)
+            }
+            ConstraintKind::Bend => straight(2),
+            ConstraintKind::Tether => 0,
+        }
+    }
+
+    fn position(&self, column: u32, row: u32) -> [f32; 3] {
+        let spacing = f64::from(self.spacing);
+        let along = |axis: usize| {
+            let right = f64::from(self.right[axis]) * f64::from(column);
+            let down = f64::from(self.down[axis]) * f64::from(row);
+            round(f64::from(self.origin[axis]) + spacing * (right + down))
+        };
+        [along(0), along(1), along(2)]
+    }
+
+    /// The constraints that start at a particle: right, down, down-right, then from its right
+    /// neighbour down-left, two right, two down.
+    fn links_of(&self, column: u32, row: u32) -> impl Iterator<Item = Link> {
+        use ConstraintKind::{Bend, Shear, Structural};
+        let index = move |c: u32, r: u32| r * self.columns + c;
+        let link = move |kind, family, from: [u32; 2], to: [u32; 2]| {
+            let is_inside = from[0].max(to[0]) < self.columns && to[1] < self.rows;
+            let is_wanted = is_inside && self.links.contains(&kind);
+            is_wanted.then(|| Link {
+                a: index(from[0], from[1]),
+                b: index(to[0], to[1]),
+                kind,
+                family,
+            })
+        };
+        let (c, r) = (column, row);
+        let left = (self.diagonals == Diagonals::Two)
+            .then(|| link(Shear, Family::DiagonalLeft.half(r), [c + 1, r], [c, r + 1]));
+        [
+            link(Structural, Family::Horizontal.half(c), [c, r], [c + 1, r]),
+            link(Structural, Family::Vertical.half(r), [c, r], [c, r + 1]),
+            link(Shear, Family::DiagonalRight.half(r), [c, r], [c + 1, r + 1]),
+            left.flatten(),
+            link(Bend, Family::HorizontalBend.half(c / 2), [c, r], [c + 2, r]),
+            link(Bend, Family::VerticalBend.half(r / 2), [c, r], [c, r + 2]),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}

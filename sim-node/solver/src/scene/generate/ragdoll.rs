@@ -1,0 +1,92 @@
+//! A figure of 15 particles and 20 sticks.
+
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use super::{Builder, Pinned, decimal, round};
+use crate::constraints::ConstraintKind;
+
+/// A standing figure.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ragdoll {
+    /// Between its feet.
+    #[serde(with = "decimal::vector")]
+    pub origin: [f32; 3],
+    /// From its feet to the top of its head, > 0.
+    #[serde(with = "decimal::number")]
+    pub height: f32,
+}
+
+/// The words for pinned particles of a figure.
+pub(crate) const PINS: [&str; 3] = ["none", "head", "hands"];
+
+/// The particles: to the side and up, in heights. Left is towards -x.
+const PLACES: [(f64, f64); 15] = [
+    (0.0, 1.0),    // 0 head
+    (0.0, 0.85),   // 1 neck
+    (-0.12, 0.82), // 2 left shoulder
+    (0.12, 0.82),  // 3 right shoulder
+    (-0.17, 0.62), // 4 left elbow
+    (0.17, 0.62),  // 5 right elbow
+    (-0.2, 0.44),  // 6 left hand
+    (0.2, 0.44),   // 7 right hand
+    (0.0, 0.53),   // 8 pelvis
+    (-0.08, 0.5),  // 9 left hip
+    (0.08, 0.5),   // 10 right hip
+    (-0.09, 0.27), // 11 left knee
+    (0.09, 0.27),  // 12 right knee
+    (-0.09, 0.0),  // 13 left foot
+    (0.09, 0.0),   // 14 right foot
+];
+
+/// The bones.
+const BONES: [[u32; 2]; 14] = [
+    [0, 1],
+    [1, 2],
+    [1, 3],
+    [2, 4],
+    [4, 6],
+    [3, 5],
+    [5, 7],
+    [1, 8],
+    [8, 9],
+    [8, 10],
+    [9, 11],
+    [11, 13],
+    [10, 12],
+    [12, 14],
+];
+
+/// What keeps its body and its head in shape.
+const BRACES: [[u32; 2]; 6] = [[2, 3], [9, 10], [2, 9], [3, 10], [0, 2], [0, 3]];
+
+impl Ragdoll {
+    pub(super) fn particle_count() -> u64 {
+        PLACES.len() as u64
+    }
+
+    pub(super) fn constraint_count() -> u64 {
+        (BONES.len() + BRACES.len()) as u64
+    }
+
+    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+        let origin = Vec3::from_array(self.origin).as_dvec3();
+        let up = builder.up();
+        for (index, (side, height)) in (0_u32..).zip(PLACES) {
+            let place = origin + (DVec3::X * side + up * height) * f64::from(self.height);
+            let is_pinned = match builder.pinned() {
+                Pinned::Word("head") => index == 0,
+                Pinned::Word("hands") => index == 6 || index == 7,
+                Pinned::Word(_) => false,
+                Pinned::List(list) => list.binary_search(&index).is_ok(),
+            };
+            builder.particle(place.to_array().map(round), is_pinned);
+        }
+        for bone in BONES {
+            builder.link(bone, ConstraintKind::Structural);
+        }
+        for brace in BRACES {
+            builder.link(brace, ConstraintKind::Shear);
+        }
+    }
+}
