@@ -20,7 +20,7 @@ pub(crate) fn load_scene(source: &str) -> anyhow::Result<Scene> {
     if source.contains('/') || has_extension(source, ".toml") {
         let text = fs::read_to_string(source)
             .with_context(|| format!("{source}: cannot read the scene"))?;
-        return Ok(Scene::from_toml(&text, source)?);
+        return Ok(Scene::from_toml_with_files(&text, source, &|path| read_beside(source, path))?);
     }
     let Some(text) = builtin::text(source) else {
         let names: Vec<_> = builtin::names().collect();
@@ -31,6 +31,12 @@ pub(crate) fn load_scene(source: &str) -> anyhow::Result<Scene> {
         );
     };
     Ok(Scene::from_toml(text, source)?)
+}
+
+/// Reads a file that a scene names, relative to the scene's own.
+fn read_beside(scene: &str, path: &str) -> Result<String, String> {
+    let folder = Path::new(scene).parent().unwrap_or(Path::new(""));
+    fs::read_to_string(folder.join(path)).map_err(|error| error.to_string())
 }
 
 /// The scene that a recording carries.

@@ -26,7 +26,8 @@ pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
         sim-node run my.toml --duration 10s --json  run a file for 10 s, then print a summary\n  \
         sim-node ctl grab 90 0.5 0.2 0.3            drag particle 90 of the running node\n  \
         sim-node ctl set gravity 0 -1.6 0           take the running node to the moon\n  \
-        sim-node scenes                             list the built-in scenes"
+        sim-node scenes                             list the built-in scenes\n  \
+        sim-node import shirt.obj -o shirt.toml     make a scene of a mesh"
 )]
 pub(crate) struct Args {
     #[command(subcommand)]
@@ -62,6 +63,8 @@ pub(crate) enum Verb {
     Show(ShowArgs),
     /// Check a scene without running it; warn of what is probably not meant.
     Check(CheckArgs),
+    /// Make a scene of a mesh: an OBJ file becomes a cloth.
+    Import(ImportArgs),
     /// Command a running node, or ask it how it does.
     Ctl(CtlArgs),
 }
@@ -138,6 +141,40 @@ pub(crate) struct ScenesArgs {
 pub(crate) struct ShowArgs {
     /// A built-in scene or a TOML file
     pub(crate) scene: String,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Vertices become particles, edges structural constraints, diagonals of faces shear, and the\n\
+        corners on both sides of an edge bend. Faces without area, faces that stand twice and\n\
+        vertices of no face are named and left out.\n\nExamples:\n  \
+        sim-node import shirt.obj --pin 'y > 1.45' -o shirt.toml && sim-node run ./shirt.toml\n  \
+        sim-node import net.obj --density 0.05 --pin 'group rim' --bend 0.01 > net.toml"
+)]
+pub(crate) struct ImportArgs {
+    /// A Wavefront OBJ file of triangles, quads or bigger faces
+    pub(crate) mesh: String,
+    /// File to write the scene to [default: stdout]
+    #[arg(short, long, value_name = "OUT.toml")]
+    pub(crate) output: Option<std::path::PathBuf>,
+    /// Write over an existing file
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    /// Mass per area, in kg per square unit
+    #[arg(long, value_name = "KG", default_value_t = 0.2)]
+    pub(crate) density: f32,
+    /// Vertices that are pinned: 'y > 1.9', 'x < 0 and z >= 1', 'group NAME', or none
+    #[arg(long, value_name = "CHOICE", default_value = "none")]
+    pub(crate) pin: String,
+    /// Compliance of edges, in m/N
+    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
+    pub(crate) structural: f32,
+    /// Compliance of diagonals, in m/N
+    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
+    pub(crate) shear: f32,
+    /// Compliance of bends, in m/N
+    #[arg(long, value_name = "M/N", default_value_t = 1e-2)]
+    pub(crate) bend: f32,
 }
 
 #[derive(Debug, ClapArgs)]

@@ -7,6 +7,7 @@ mod check;
 mod commands;
 mod ctl;
 mod exit;
+mod import;
 mod node;
 mod pace;
 mod publish;
@@ -26,6 +27,7 @@ fn main() -> Exit {
         Some(Verb::Scenes(list)) => check::scenes(&list),
         Some(Verb::Show(show)) => check::show(&show),
         Some(Verb::Check(check)) => check::check(&check),
+        Some(Verb::Import(mesh)) => import::import(&mesh),
         Some(Verb::Ctl(ctl)) => ctl::ctl(&ctl),
     };
     exit::of(result)

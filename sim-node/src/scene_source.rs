@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::Read;
+use std::path::Path;
 
 use anyhow::{Context, bail};
 use sim_contract::SCENE_SIZE_BYTES_MAX;
@@ -12,7 +13,7 @@ use sim_solver::{Scene, builtin};
 pub(crate) fn load(source: &str) -> anyhow::Result<Scene> {
     if is_path(source) {
         let text = read(source).with_context(|| format!("{source}: cannot read the scene"))?;
-        return Ok(Scene::from_toml(&text, source)?);
+        return Ok(Scene::from_toml_with_files(&text, source, &|path| read_beside(source, path))?);
     }
     let Some(text) = builtin::text(source) else {
         let names: Vec<_> = builtin::names().collect();
@@ -30,8 +31,15 @@ pub(crate) fn is_path(source: &str) -> bool {
     source.contains('/') || source.ends_with(".toml")
 }
 
+/// Reads a file that a scene names, relative to the scene's own.
+fn read_beside(scene: &str, path: &str) -> Result<String, String> {
+    let folder = Path::new(scene).parent().unwrap_or(Path::new(""));
+    read(&folder.join(path)).map_err(|error| format!("{error:#}"))
+}
+
 /// Reads a file that can be a scene: a running node must not wait for a pipe, nor read a device.
-fn read(path: &str) -> anyhow::Result<String> {
+pub(crate) fn read(path: impl AsRef<Path>) -> anyhow::Result<String> {
+    let path = path.as_ref();
     if !std::fs::metadata(path)?.is_file() {
         bail!("it is no regular file");
     }

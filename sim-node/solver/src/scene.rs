@@ -12,8 +12,11 @@ mod file;
 mod generate;
 mod limits;
 mod model;
+mod obj;
+mod pins;
 mod read;
 mod read_generator;
+mod read_mesh;
 mod warnings;
 mod wind;
 
@@ -25,10 +28,12 @@ pub(crate) use check::Range32;
 pub use collider::{ColliderShape, SceneCollider};
 pub use error::SceneError;
 pub use generate::{
-    Bridge, Cloth, Diagonals, Generator, KindSoftness, PerKind, Pinned, Ragdoll, Rope, Shape, Web,
+    Bridge, Cloth, Diagonals, Generator, KindSoftness, Obj, PerKind, Pinned, Ragdoll, Rope, Shape,
+    Web,
 };
 pub use limits::Limits;
 pub(crate) use model::Model;
+pub use obj::{Mesh, ReadMesh};
 pub use wind::Wind;
 
 /// Most particles, and most constraints, of a scene: their indices are exact in f32.
@@ -75,6 +80,9 @@ pub struct Scene {
     /// Generators of more particles and constraints, in order.
     #[serde(rename = "generate")]
     pub generators: Vec<Generator>,
+    /// What was found in the files that it names: a sentence each.
+    #[serde(skip)]
+    pub findings: Vec<String>,
 }
 
 /// Which axis points up.
@@ -252,7 +260,22 @@ impl Scene {
     /// The text is not TOML, or a value is wrong: the error names the line, the field and what is
     /// allowed.
     pub fn from_toml(text: &str, label: &str) -> Result<Self, SceneError> {
-        read::scene(text, label)
+        let no_files = |_: &str| Err("no files can be read here".to_owned());
+        Self::from_toml_with_files(text, label, &no_files)
+    }
+
+    /// As [`Self::from_toml`], for a scene that may name files: `read_file` is given the path as it
+    /// stands in the text, relative to the scene's own file, and returns the file's text or what is
+    /// wrong. The scene then holds what it read, and needs the files no more.
+    ///
+    /// # Errors
+    /// As [`Self::from_toml`], and what `read_file` says.
+    pub fn from_toml_with_files(
+        text: &str,
+        label: &str,
+        read_file: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, SceneError> {
+        read::scene(text, label, read_file)
     }
 
     /// The complete scene as TOML, every default written out; reading it gives the same scene.

@@ -1,5 +1,6 @@
 //! Checks of single values: each is read once, and a wrong one is named with its line.
 
+use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
 use toml::Spanned;
@@ -66,6 +67,10 @@ impl Range32 {
 /// Checks values, and says where in the text a wrong one stands.
 pub(super) struct Reader<'a> {
     pub(super) place: Place<'a>,
+    /// Reads a file that the scene names.
+    pub(super) read_file: &'a dyn Fn(&str) -> Result<String, String>,
+    /// What was found in such files.
+    pub(super) findings: RefCell<Vec<String>>,
     pub(super) is_planar: bool,
     pub(super) method: Method,
 }

@@ -3,7 +3,7 @@
 use serde::{Serialize, Serializer};
 
 /// The f64 whose shortest text is that of the f32: 0.1, not 0.10000000149011612.
-fn shortest(value: f32) -> f64 {
+pub(crate) fn shortest(value: f32) -> f64 {
     value.to_string().parse().unwrap_or_else(|_| f64::from(value))
 }
 

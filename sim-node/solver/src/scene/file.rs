@@ -115,6 +115,10 @@ pub(crate) struct FileGenerator {
     pub(crate) planks: Option<Whole>,
     pub(crate) width: Option<Number>,
     pub(crate) height: Option<Number>,
+    pub(crate) path: Option<Spanned<String>>,
+    pub(crate) density: Option<Number>,
+    pub(crate) vertices: Option<Spanned<Vec<Vector>>>,
+    pub(crate) faces: Option<Spanned<Vec<Vec<u32>>>>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -2,6 +2,7 @@
 
 pub(super) mod bridge;
 pub(super) mod cloth;
+pub(super) mod mesh_file;
 pub(super) mod ragdoll;
 pub(super) mod rope;
 pub(super) mod web;
@@ -14,6 +15,7 @@ use super::{Limits, Method, SceneParticle, Softness, Up, decimal};
 use crate::constraints::{Constraint, ConstraintKind};
 pub use bridge::Bridge;
 pub use cloth::{Cloth, Diagonals};
+pub use mesh_file::Obj;
 pub use ragdoll::Ragdoll;
 pub use rope::Rope;
 pub use web::Web;
@@ -54,6 +56,8 @@ pub enum Shape {
     Bridge(Bridge),
     /// A figure.
     Ragdoll(Ragdoll),
+    /// A mesh from a file.
+    Obj(Obj),
 }
 
 /// Which particles of a shape are pinned.
@@ -124,6 +128,7 @@ impl Generator {
             Shape::Web(web) => web.particle_count(),
             Shape::Bridge(bridge) => bridge.particle_count(),
             Shape::Ragdoll(_) => Ragdoll::particle_count(),
+            Shape::Obj(obj) => obj.particle_count(),
         }
     }
 
@@ -135,6 +140,7 @@ impl Generator {
             Shape::Web(web) => web.constraint_count(),
             Shape::Bridge(bridge) => bridge.constraint_count(),
             Shape::Ragdoll(_) => Ragdoll::constraint_count(),
+            Shape::Obj(obj) => obj.constraint_count(),
         }
     }
 
@@ -149,6 +155,7 @@ impl Generator {
             Shape::Web(web) => web.build(&mut builder),
             Shape::Bridge(bridge) => bridge.build(&mut builder),
             Shape::Ragdoll(ragdoll) => ragdoll.build(&mut builder),
+            Shape::Obj(obj) => obj.build(&mut builder),
         }
     }
 }
@@ -176,7 +183,10 @@ impl<'a> Builder<'a> {
     }
 
     fn particle(&mut self, position: [f32; 3], pinned: bool) {
-        let mass = self.generator.mass;
+        self.heavy_particle(position, pinned, self.generator.mass);
+    }
+
+    fn heavy_particle(&mut self, position: [f32; 3], pinned: bool, mass: f32) {
         self.model.particles.push(SceneParticle { position, mass, pinned, velocity: [0.0; 3] });
     }
 

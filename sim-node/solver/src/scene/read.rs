@@ -1,6 +1,7 @@
 //! From text to a checked scene: each value is checked where it is read, and wrong ones are named
 //! with their line.
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use toml::Spanned;
@@ -15,11 +16,17 @@ use super::{
 use crate::COORDINATE_MAX;
 
 /// Reads and checks a scene.
-pub(super) fn scene(text: &str, label: &str) -> Result<Scene, SceneError> {
+pub(super) fn scene(
+    text: &str,
+    label: &str,
+    read_file: &dyn Fn(&str) -> Result<String, String>,
+) -> Result<Scene, SceneError> {
     let place = Place { text, label };
     let file: FileScene = parse(&place)?;
-    let settings = solver(&place, &file.solver)?;
-    let mut reader = Reader { place, is_planar: false, method: settings.method };
+    let method = file.solver.method.unwrap_or_default();
+    let findings = RefCell::default();
+    let mut reader = Reader { place, read_file, findings, is_planar: false, method };
+    let settings = solver(&reader, &file.solver)?;
     reader.whole("version", &file.version, SCENE_VERSION..=SCENE_VERSION)?;
     let dimensions = match &file.dimensions {
         Some(dimensions) => reader.whole("dimensions", dimensions, 2..=3)?,
@@ -44,7 +51,9 @@ pub(super) fn scene(text: &str, label: &str) -> Result<Scene, SceneError> {
         colliders,
         anchors: Vec::new(),
         generators,
+        findings: Vec::new(),
     };
+    scene.findings = reader.findings.take();
     reader.check_size(&scene, &file)?;
     let model = Model::new(&scene);
     reader.check_generated(&scene, &file, &model)?;
@@ -74,10 +83,8 @@ fn enumerate<F, T>(
     items.iter().enumerate().map(|(index, item)| read(index, item)).collect()
 }
 
-fn solver(place: &Place<'_>, file: &FileSolver) -> Result<SolverSettings, SceneError> {
+fn solver(reader: &Reader<'_>, file: &FileSolver) -> Result<SolverSettings, SceneError> {
     let default = SolverSettings::default();
-    let method = file.method.unwrap_or_default();
-    let reader = Reader { place: *place, is_planar: false, method };
     let passes = |field, value: Option<&Whole>, default, max| match value {
         Some(value) => reader.whole(field, value, 1..=max),
         None => Ok(default),
@@ -94,7 +101,7 @@ fn solver(place: &Place<'_>, file: &FileSolver) -> Result<SolverSettings, SceneE
             default.iterations,
             PASSES_MAX,
         )?,
-        method,
+        method: reader.method,
         order: file.order.unwrap_or_default(),
         damping: number_or(
             "solver.damping",

@@ -22,7 +22,7 @@ struct ShapeKeys {
 
 const SHEET: &[&str] =
     &["columns", "rows", "spacing", "origin", "right", "down", "links", "diagonals"];
-const SHAPES: [ShapeKeys; 6] = [
+const SHAPES: [ShapeKeys; 7] = [
     ShapeKeys { name: "cloth", keys: SHEET, pins: &cloth::PINS },
     ShapeKeys { name: "mesh", keys: SHEET, pins: &["none", "top", "top-even", "corners"] },
     ShapeKeys { name: "rope", keys: &["count", "from", "to"], pins: &rope::PINS },
@@ -37,11 +37,12 @@ const SHAPES: [ShapeKeys; 6] = [
         pins: &["both", "first", "last", "none"],
     },
     ShapeKeys { name: "ragdoll", keys: &["origin", "height"], pins: &ragdoll::PINS },
+    ShapeKeys { name: "obj", keys: &["path", "density", "vertices", "faces"], pins: &["none"] },
 ];
 
 impl FileGenerator {
     /// Where each of the shapes' own keys stands, if it does.
-    fn own_keys(&self) -> [(&'static str, Option<Range<usize>>); 19] {
+    fn own_keys(&self) -> [(&'static str, Option<Range<usize>>); 23] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -65,6 +66,10 @@ impl FileGenerator {
             ("planks", span(self.planks.as_ref())),
             ("width", span(self.width.as_ref())),
             ("height", span(self.height.as_ref())),
+            ("path", span(self.path.as_ref())),
+            ("density", span(self.density.as_ref())),
+            ("vertices", span(self.vertices.as_ref())),
+            ("faces", span(self.faces.as_ref())),
         ]
     }
 }
@@ -78,16 +83,14 @@ impl Reader<'_> {
     ) -> Result<Generator, SceneError> {
         let fields = Fields { reader: self, index, shape: &file.shape };
         let known = fields.known_shape(file)?;
+        if known.name == "obj" {
+            return fields.obj(file);
+        }
         let mut generator = Generator {
             shape: fields.shape(file)?,
             mass: self.mass(&fields.name("mass"), file.mass.as_ref())?,
             pinned: Pinned::Word(known.pins[0]),
-            tear_stretch: match &file.tear_stretch {
-                Some(number) => {
-                    Some(self.limit(&fields.name("tear_stretch"), number, Range32::RATIO)?)
-                }
-                None => None,
-            },
+            tear_stretch: fields.tear_stretch(file)?,
             softness: fields.softness(file)?,
         };
         if let Some(pinned) = &file.pinned {
@@ -98,18 +101,18 @@ impl Reader<'_> {
 }
 
 /// The keys of one generator.
-struct Fields<'r, 't> {
-    reader: &'r Reader<'t>,
+pub(super) struct Fields<'r, 't> {
+    pub(super) reader: &'r Reader<'t>,
     index: usize,
-    shape: &'r Spanned<String>,
+    pub(super) shape: &'r Spanned<String>,
 }
 
 impl Fields<'_, '_> {
-    fn name(&self, key: &str) -> String {
+    pub(super) fn name(&self, key: &str) -> String {
         format!("generate[{}].{key}", self.index)
     }
 
-    fn required<'f, T>(
+    pub(super) fn required<'f, T>(
         &self,
         key: &str,
         value: Option<&'f Spanned<T>>,
@@ -153,6 +156,11 @@ impl Fields<'_, '_> {
                 height: self.size("height", file.height.as_ref())?,
             }),
         })
+    }
+
+    pub(super) fn tear_stretch(&self, file: &FileGenerator) -> Result<Option<f32>, SceneError> {
+        let Some(number) = &file.tear_stretch else { return Ok(None) };
+        self.reader.limit(&self.name("tear_stretch"), number, Range32::RATIO).map(Some)
     }
 
     fn size(&self, key: &str, value: Option<&Number>) -> Result<f32, SceneError> {
@@ -244,7 +252,7 @@ impl Fields<'_, '_> {
         Ok(if one { Diagonals::One } else { Diagonals::Two })
     }
 
-    fn softness(&self, file: &FileGenerator) -> Result<KindSoftness, SceneError> {
+    pub(super) fn softness(&self, file: &FileGenerator) -> Result<KindSoftness, SceneError> {
         let reader = self.reader;
         let key = reader.softness_key(
             |key| self.name(key),
@@ -265,7 +273,7 @@ impl Fields<'_, '_> {
         Ok(KindSoftness::new(reader.method, per_kind))
     }
 
-    fn pinned(
+    pub(super) fn pinned(
         &self,
         pinned: &Spanned<FilePinned>,
         words: &[&'static str],

@@ -26,7 +26,7 @@ pub(super) fn warnings(scene: &Scene) -> Vec<String> {
         no_length(&model),
         duplicates(&model),
     ];
-    all.into_iter().flatten().collect()
+    all.into_iter().flatten().chain(scene.findings.iter().cloned()).collect()
 }
 
 fn far_from_origin(scene: &Scene, model: &Model) -> Option<String> {
