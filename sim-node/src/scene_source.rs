@@ -34,7 +34,7 @@ pub(crate) fn is_path(source: &str) -> bool {
 /// Reads a file that a scene names, relative to the scene's own.
 fn read_beside(scene: &str, path: &str) -> Result<String, String> {
     let folder = Path::new(scene).parent().unwrap_or(Path::new(""));
-    read(&folder.join(path)).map_err(|error| format!("{error:#}"))
+    read(folder.join(path)).map_err(|error| format!("{error:#}"))
 }
 
 /// Reads a file that can be a scene: a running node must not wait for a pipe, nor read a device.

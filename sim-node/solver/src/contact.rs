@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::colliders::{Collider, Moments};
 use crate::particles::Particles;
-use crate::solid::{Hit, Way, solids};
+use crate::solid::{Hit, Solid, Way, solids};
 
 /// The contacts of the running substep.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +31,19 @@ struct Surface {
     h: f32,
     /// Approach speeds up to this one end at rest: 2 |g| h, twice what gravity gives in a substep.
     rest_speed: f32,
+}
+
+/// A particle inside of a solid.
+struct Contact {
+    hit: Hit,
+    /// How far its place and the surface may be off by their rounding.
+    rounding: f32,
+}
+
+/// How far numbers of the size of a way and a solid may be off, after a few roundings.
+fn rounding(way: &Way, solid: &Solid) -> f32 {
+    let size = way.start.abs().element_sum() + way.displacement.abs().element_sum();
+    4.0 * f32::EPSILON * (size + solid.reach())
 }
 
 /// What all contacts of a substep have in common.
@@ -71,7 +84,8 @@ impl Contacts {
                     displacement: vector(particles.displacements[index]),
                 };
                 if let Some(hit) = solid.hit(&way) {
-                    self.resolve(particles, index, &way, (&surface, &hit));
+                    let rounding = rounding(&way, solid);
+                    self.resolve(particles, index, &way, (&surface, &Contact { hit, rounding }));
                 }
             }
         }
@@ -91,11 +105,8 @@ impl Contacts {
                 let Some(hit) = solid.hit(&Way { start, displacement: Vec3::ZERO }) else {
                     continue;
                 };
-                // Of the position before, the way and the surface.
-                let way = vector(particles.displacements[index]).abs().element_sum();
-                let size = start.abs().element_sum() + way + solid.reach();
-                let rounding = 4.0 * f32::EPSILON * size;
-                if hit.depth <= rounding {
+                let displacement = vector(particles.displacements[index]);
+                if hit.depth <= rounding(&Way { start, displacement }, solid) {
                     let [x, y, z] = (start + hit.normal * hit.depth).to_array();
                     particles.positions[index][..3].copy_from_slice(&[x, y, z]);
                 }
@@ -115,9 +126,9 @@ impl Contacts {
         particles: &mut Particles,
         index: usize,
         way: &Way,
-        (surface, hit): (&Surface, &Hit),
+        (surface, contact): (&Surface, &Contact),
     ) {
-        let Hit { normal, depth } = *hit;
+        let Hit { normal, depth } = contact.hit;
         let Surface { h, friction, restitution, rest_speed, .. } = *surface;
         let carried = surface.velocity_at(way.start + way.displacement + normal * depth);
         let moved =
@@ -125,7 +136,9 @@ impl Contacts {
         let relative = moved - carried;
         let normal_speed = relative.dot(normal);
         let sliding = relative - normal * normal_speed;
-        let gained = if -normal_speed * h < depth { -normal_speed * h } else { depth };
+        // What rests above the surface by a rounding has come as far as it would from the surface.
+        let depth_max = depth + contact.rounding;
+        let gained = if -normal_speed * h < depth_max { -normal_speed * h } else { depth_max };
         let grip = friction * if gained > 0.0 { gained } else { 0.0 };
         let slide = sliding.length() * h;
         let kept = if slide > grip { sliding * (1.0 - grip / slide) } else { Vec3::ZERO };

@@ -145,6 +145,30 @@ fn a_slope_lets_go_above_the_angle_of_friction() {
 }
 
 #[test]
+fn friction_is_the_same_far_from_the_origin_and_in_many_substeps() {
+    // A slope of 30 degrees and friction 0.5: g (sin - mu cos), from the 1st to the 2nd second.
+    let angle = std::f64::consts::FRAC_PI_6;
+    let expected = 9.81 * (angle.sin() - 0.5 * angle.cos());
+    for along in [0.0, 10.0, 30.0] {
+        for substeps in [1, 4, 20] {
+            let (x, y) = (along * angle.cos(), -along * angle.sin());
+            let text = rates(60, substeps)
+                + &format!("[[particle]]\nposition = [{x}, {y}, 0]\n")
+                + &format!(
+                    "[[collider]]\nshape = \"plane\"\nnormal = [{}, {}, 0]\noffset = 0\nfriction = 0.5\n",
+                    angle.sin(),
+                    angle.cos()
+                );
+            let mut solver = stepped(&text, 60);
+            let before = velocity(&solver, 0)[0];
+            step(&mut solver, 60);
+            let gained = (velocity(&solver, 0)[0] - before) / angle.cos();
+            assert_close(&format!("{along} m away, {substeps} substeps"), expected, gained, 0.05);
+        }
+    }
+}
+
+#[test]
 fn friction_stops_a_slide_after_v2_over_2_mu_g() {
     let text = rates(240, 4)
         + "[[particle]]\nposition = [0, 0, 0]\nvelocity = [2, 0, 0]\n"
