@@ -7,6 +7,7 @@ mod check;
 mod commands;
 mod ctl;
 mod exit;
+mod lesson;
 mod node;
 mod pace;
 mod publish;
@@ -27,6 +28,7 @@ fn main() -> Exit {
         Some(Verb::Show(show)) => check::show(&show),
         Some(Verb::Check(check)) => check::check(&check),
         Some(Verb::Ctl(ctl)) => ctl::ctl(&ctl),
+        Some(Verb::Lesson(lesson)) => lesson::lesson(&lesson),
     };
     exit::of(result)
 }
