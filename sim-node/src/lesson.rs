@@ -2,6 +2,7 @@
 
 mod euler;
 mod experiment;
+mod f32;
 mod table;
 
 use anyhow::Context;
@@ -45,6 +46,7 @@ fn list() -> impl Iterator<Item = Listed> {
 fn tables(name: LessonName) -> anyhow::Result<Vec<Table>> {
     match name {
         LessonName::Euler => euler::tables(),
+        LessonName::F32 => f32::tables(),
     }
 }
 
@@ -76,7 +78,7 @@ mod tests {
     #[test]
     fn the_list_has_a_line_for_each_lesson() {
         let list: Vec<_> = list().collect();
-        assert_eq!(list.len(), 1);
+        assert_eq!(list.len(), 2);
         assert!(list.iter().all(|one| !one.text.is_empty()));
     }
 

@@ -9,7 +9,7 @@ use clap::{Args as ClapArgs, ValueEnum};
     Examples:\n  \
     sim-node lesson               list the lessons\n  \
     sim-node lesson euler         why one table ends at 450, one at 550, and one at 500\n  \
-    sim-node lesson euler --json  the rows, for a plot")]
+    sim-node lesson f32 --json    the rows, for a plot")]
 pub(crate) struct LessonArgs {
     /// Which lesson [default: list them]
     #[arg(value_enum)]
@@ -24,6 +24,8 @@ pub(crate) struct LessonArgs {
 pub(crate) enum LessonName {
     /// One fall by explicit Euler, semi-implicit Euler, Verlet and the solver, and their errors
     Euler,
+    /// A long sum, a clock and a velocity in 32 bits: what rounding does to each
+    F32,
 }
 
 #[cfg(test)]
@@ -38,7 +40,7 @@ mod tests {
         let error = Args::try_parse_from(["sim-node", "lesson", "nix"]).unwrap_err();
         assert_eq!((error.kind(), error.exit_code()), (ErrorKind::InvalidValue, 2));
         let text = error.to_string();
-        for part in ["'nix'", "euler"] {
+        for part in ["'nix'", "euler, f32"] {
             assert!(text.contains(part), "{part} is not in: {text}");
         }
     }
@@ -46,7 +48,7 @@ mod tests {
     #[test]
     fn the_help_says_what_each_lesson_shows() {
         let help = Args::try_parse_from(["sim-node", "lesson", "--help"]).unwrap_err().to_string();
-        for part in ["- euler:"] {
+        for part in ["- euler:", "- f32:"] {
             assert!(help.contains(part), "{part} is not in: {help}");
         }
     }
