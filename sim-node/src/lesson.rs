@@ -3,6 +3,7 @@
 mod euler;
 mod experiment;
 mod f32;
+mod iterations;
 mod table;
 
 use anyhow::Context;
@@ -46,6 +47,7 @@ fn list() -> impl Iterator<Item = Listed> {
 fn tables(name: LessonName) -> anyhow::Result<Vec<Table>> {
     match name {
         LessonName::Euler => euler::tables(),
+        LessonName::Iterations => iterations::tables(),
         LessonName::F32 => f32::tables(),
     }
 }
@@ -78,7 +80,7 @@ mod tests {
     #[test]
     fn the_list_has_a_line_for_each_lesson() {
         let list: Vec<_> = list().collect();
-        assert_eq!(list.len(), 2);
+        assert_eq!(list.len(), 3);
         assert!(list.iter().all(|one| !one.text.is_empty()));
     }
 

@@ -24,6 +24,8 @@ pub(crate) struct LessonArgs {
 pub(crate) enum LessonName {
     /// One fall by explicit Euler, semi-implicit Euler, Verlet and the solver, and their errors
     Euler,
+    /// What a pass does to one stick, and passes against substeps in a hanging rope
+    Iterations,
     /// A long sum, a clock and a velocity in 32 bits: what rounding does to each
     F32,
 }
@@ -40,7 +42,7 @@ mod tests {
         let error = Args::try_parse_from(["sim-node", "lesson", "nix"]).unwrap_err();
         assert_eq!((error.kind(), error.exit_code()), (ErrorKind::InvalidValue, 2));
         let text = error.to_string();
-        for part in ["'nix'", "euler, f32"] {
+        for part in ["'nix'", "euler, iterations, f32"] {
             assert!(text.contains(part), "{part} is not in: {text}");
         }
     }
@@ -48,7 +50,7 @@ mod tests {
     #[test]
     fn the_help_says_what_each_lesson_shows() {
         let help = Args::try_parse_from(["sim-node", "lesson", "--help"]).unwrap_err().to_string();
-        for part in ["- euler:", "- f32:"] {
+        for part in ["- euler:", "- iterations:", "- f32:", "hanging rope"] {
             assert!(help.contains(part), "{part} is not in: {help}");
         }
     }
