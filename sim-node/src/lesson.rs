@@ -4,6 +4,7 @@ mod euler;
 mod experiment;
 mod f32;
 mod iterations;
+mod stiffness;
 mod table;
 
 use anyhow::Context;
@@ -48,6 +49,7 @@ fn tables(name: LessonName) -> anyhow::Result<Vec<Table>> {
     match name {
         LessonName::Euler => euler::tables(),
         LessonName::Iterations => iterations::tables(),
+        LessonName::Stiffness => stiffness::tables(),
         LessonName::F32 => f32::tables(),
     }
 }
@@ -80,7 +82,7 @@ mod tests {
     #[test]
     fn the_list_has_a_line_for_each_lesson() {
         let list: Vec<_> = list().collect();
-        assert_eq!(list.len(), 3);
+        assert_eq!(list.len(), 4);
         assert!(list.iter().all(|one| !one.text.is_empty()));
     }
 

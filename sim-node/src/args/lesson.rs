@@ -26,6 +26,8 @@ pub(crate) enum LessonName {
     Euler,
     /// What a pass does to one stick, and passes against substeps in a hanging rope
     Iterations,
+    /// What k, k' and compliance mean, and which of them depend on the passes or on the rate
+    Stiffness,
     /// A long sum, a clock and a velocity in 32 bits: what rounding does to each
     F32,
 }
@@ -42,7 +44,7 @@ mod tests {
         let error = Args::try_parse_from(["sim-node", "lesson", "nix"]).unwrap_err();
         assert_eq!((error.kind(), error.exit_code()), (ErrorKind::InvalidValue, 2));
         let text = error.to_string();
-        for part in ["'nix'", "euler, iterations, f32"] {
+        for part in ["'nix'", "euler, iterations, stiffness, f32"] {
             assert!(text.contains(part), "{part} is not in: {text}");
         }
     }
@@ -50,7 +52,7 @@ mod tests {
     #[test]
     fn the_help_says_what_each_lesson_shows() {
         let help = Args::try_parse_from(["sim-node", "lesson", "--help"]).unwrap_err().to_string();
-        for part in ["- euler:", "- iterations:", "- f32:", "hanging rope"] {
+        for part in ["- euler:", "- iterations:", "- stiffness:", "- f32:", "hanging rope"] {
             assert!(help.contains(part), "{part} is not in: {help}");
         }
     }
