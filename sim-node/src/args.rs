@@ -1,6 +1,7 @@
 //! The command line. Help texts are the doc comments here.
 
 mod ctl;
+mod lesson;
 
 use std::time::Duration;
 
@@ -9,6 +10,7 @@ use clap::{Args as ClapArgs, CommandFactory, Parser, Subcommand};
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 
 pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
+pub(crate) use lesson::{LessonArgs, LessonName};
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
@@ -27,7 +29,8 @@ pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
         sim-node ctl grab 90 0.5 0.2 0.3            drag particle 90 of the running node\n  \
         sim-node ctl set gravity 0 -1.6 0           take the running node to the moon\n  \
         sim-node scenes                             list the built-in scenes\n  \
-        sim-node import shirt.obj -o shirt.toml     make a scene of a mesh"
+        sim-node import shirt.obj -o shirt.toml     make a scene of a mesh\n  \
+        sim-node lesson                             list the lessons of physics"
 )]
 pub(crate) struct Args {
     #[command(subcommand)]
@@ -67,6 +70,8 @@ pub(crate) enum Verb {
     Import(ImportArgs),
     /// Command a running node, or ask it how it does.
     Ctl(CtlArgs),
+    /// Print tables for teachers of physics: what Euler, passes, stiffness and 32 bits do.
+    Lesson(LessonArgs),
 }
 
 /// Which node.

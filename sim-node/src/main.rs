@@ -8,6 +8,7 @@ mod commands;
 mod ctl;
 mod exit;
 mod import;
+mod lesson;
 mod node;
 mod pace;
 mod publish;
@@ -29,6 +30,7 @@ fn main() -> Exit {
         Some(Verb::Check(check)) => check::check(&check),
         Some(Verb::Import(mesh)) => import::import(&mesh),
         Some(Verb::Ctl(ctl)) => ctl::ctl(&ctl),
+        Some(Verb::Lesson(lesson)) => lesson::lesson(&lesson),
     };
     exit::of(result)
 }
