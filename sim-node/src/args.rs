@@ -3,6 +3,7 @@
 mod ctl;
 mod lesson;
 
+use std::ffi::OsString;
 use std::time::Duration;
 
 use clap::error::ErrorKind;
@@ -41,7 +42,7 @@ pub(crate) struct Args {
 
 /// Reads the command line. Ends the program with code 2 and the usage if it is wrong.
 pub(crate) fn parse() -> Args {
-    let args = Args::parse();
+    let args = Args::parse_from(std::env::args_os().map(plain_negative));
     // What depends on several arguments is beyond clap.
     if let Some(Verb::Ctl(ctl)) = &args.verb
         && let CtlVerb::Set(set) = &ctl.verb
@@ -54,6 +55,16 @@ pub(crate) fn parse() -> Args {
         set.unwrap_or(command).error(ErrorKind::WrongNumberOfValues, text).exit();
     }
     args
+}
+
+/// A negative number as clap knows one: `-.5` and `-1e-3` look like options to it.
+fn plain_negative(word: OsString) -> OsString {
+    let text = word.to_str().filter(|text| text.starts_with('-'));
+    match text.and_then(|text| text.parse::<f64>().ok()) {
+        // Without an exponent, and with the fewest digits that read back as the same number.
+        Some(number) if number.is_finite() => number.to_string().into(),
+        _ => word,
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -189,4 +200,25 @@ pub(crate) struct CheckArgs {
     /// Print one object with the counts and the warnings
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn negative_numbers_are_written_as_clap_knows_them() {
+        for (word, plain) in [
+            ("-.5", "-0.5"),
+            ("-1e-3", "-0.001"),
+            ("-2.5E2", "-250"),
+            ("-3", "-3"),
+            ("--delta", "--delta"),
+            ("-o", "-o"),
+            ("-inf", "-inf"),
+            ("1e-3", "1e-3"),
+        ] {
+            assert_eq!(plain_negative(word.into()), plain, "{word}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! `ctl`: commands to a running node, and questions.
 
 mod action;
+mod hint;
 
 use anyhow::{Context, bail};
 use serde::Serialize;
@@ -48,7 +49,12 @@ fn command(client: &mut Client, args: &CtlArgs, action: Action) -> anyhow::Resul
     } else if outcome.is_applied() {
         println!("applied at step {}", row.step);
     } else {
-        println!("rejected at step {}: {}", row.step, row.reason);
+        println!(
+            "rejected at step {}: {}{}",
+            row.step,
+            row.reason,
+            hint::of(&row.action, &outcome)
+        );
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::colliders::{Collider, Moments};
 use crate::particles::Particles;
+use crate::scene::SceneCollider;
 use crate::solid::{Hit, Solid, Way, solids};
 
 /// The contacts of the running substep.
@@ -31,6 +32,21 @@ struct Surface {
     h: f32,
     /// Approach speeds up to this one end at rest: 2 |g| h, twice what gravity gives in a substep.
     rest_speed: f32,
+}
+
+/// How deep a place is inside of a collider at load; none where it is not, but for a rounding.
+pub(crate) fn depth_at_load(
+    scene: &SceneCollider,
+    position: [f32; 3],
+    is_planar: bool,
+) -> Option<f32> {
+    let moments = Moments { start: 0.0, end: 0.0 };
+    let step = ContactStep { h: 1.0, rest_speed: 0.0, moments, is_planar };
+    let way = Way { start: Vec3::from_array(position), displacement: Vec3::ZERO };
+    let solids = solids(&Collider::new(scene), &step);
+    let mut hits = solids.iter().flatten().filter_map(|solid| Some((solid, solid.hit(&way)?)));
+    let (_, hit) = hits.find(|(solid, hit)| hit.depth > rounding(&way, solid))?;
+    Some(hit.depth)
 }
 
 /// A particle inside of a solid.

@@ -215,7 +215,7 @@ const WRONG: &[(&str, &str)] = &[
     ("version = 1\n[[particle]]\nmass = 1", "f.toml:2: particle[0]: missing field `position`"),
     (
         "version = 1\n[[particle]]\nposition = [0, 0, 0]\nmass = 0",
-        "f.toml:4: particle[0].mass: 0 is out of range (allowed: a number > 0 in kg)",
+        "f.toml:4: particle[0].mass: 0 is out of range (allowed: a number > 0 in kg, and 1/mass a number, too: 1e-38 to 1e38)",
     ),
     (
         "version = 1\n[[particle]]\nposition = [0, 0, 0]\nmass = 1e-40",
@@ -440,6 +440,16 @@ fn what_works_but_hardly_as_meant_is_said() {
         (pair.replace("[1, 0, 0]", "[101, 0, 0]"), "a coordinate reaches 101 m from the origin"),
         (pair.replace("[1, 0, 0]", "[1, 0, 0]\nmass = 2000"), "masses from 1 to 2000 kg"),
         (format!("[solver]\norder = \"listed\"\n{pair}"), "order = \"listed\" with one iteration"),
+        (
+            format!("[solver]\nrate_hz = 1000\nsubsteps = 20\n{pair}tear_force = 50\n"),
+            "constraint 0 is rigid and tears at 50 N, but the rounding",
+        ),
+        (format!("up = \"-y\"\n{pair}"), "up is \"-y\", and gravity pulls that way"),
+        (format!("[wind]\nvelocity = [1, 0, 0]\n{pair}"), "there is wind, but no surface"),
+        (
+            format!("{pair}[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 0.5\n"),
+            "particle 0 begins inside of a collider (collider 0, 0.5 deep)",
+        ),
         (format!("{pair}tear_force = 10\nmax_stretch = 1.2\ntear_stretch = inf\n"), ""),
     ] {
         let warnings =

@@ -30,7 +30,7 @@ impl Range32 {
     /// 1/mass must be a number of f32, too.
     pub(crate) const MASS: Self = Self {
         contains: |value| value > 0.0 && (1.0 / value).is_finite() && 1.0 / value > 0.0,
-        allowed: "a number > 0 in kg",
+        allowed: "a number > 0 in kg, and 1/mass a number, too: 1e-38 to 1e38",
     };
     pub(crate) const RELAXATION: Self = Self {
         contains: |value| value > 0.0 && value < 2.0,

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{ConstraintOrder, Model, Scene};
 use crate::constraints::Constraint;
+use crate::contact::depth_at_load;
 
 /// Distance from the scene's origin, in m, beyond which f32 positions make a scene at rest tremble.
 const NEAR_ORIGIN: f32 = 100.0;
@@ -23,6 +24,10 @@ pub(super) fn warnings(scene: &Scene) -> Vec<String> {
         tear_beyond_limit(scene, &model),
         pinned_and_anchored(scene, &model),
         nothing_to_tie_to(scene, &model),
+        tear_by_noise(scene, &model),
+        upside_down(scene),
+        wind_on_nothing(scene, &model),
+        inside_collider(scene, &model),
         no_length(&model),
         duplicates(&model),
     ];
@@ -95,6 +100,72 @@ fn tear_beyond_limit(scene: &Scene, model: &Model) -> Option<String> {
     Some(format!(
         "constraint {index} is kept within max_stretch, which is not above its tear_stretch: it \
          hardly ever tears; use a smaller tear_stretch, or tear_force"
+    ))
+}
+
+/// The force that the rounding of coordinates alone makes in a rigid constraint.
+fn tear_by_noise(scene: &Scene, model: &Model) -> Option<String> {
+    let h = scene.solver.h();
+    let rigid = super::Softness::rigid(scene.solver.method).value();
+    let noise = |one: &Constraint| {
+        let ends = [one.a, one.b].map(|index| model.particles[index as usize]);
+        let size = ends
+            .iter()
+            .flat_map(|end| end.position)
+            .fold(0.0, |most: f32, axis| if axis.abs() > most { axis.abs() } else { most });
+        let heavier = if ends[0].mass > ends[1].mass { ends[0].mass } else { ends[1].mass };
+        size * (f32::EPSILON / 2.0) * heavier / (h * h)
+    };
+    let (index, one, limits) = limited(scene, model).find(|(_, one, limits)| {
+        let limit = limits.tear_force.unwrap_or(f32::INFINITY);
+        one.compliance == rigid && limit.is_finite() && 3.0 * noise(one) > limit
+    })?;
+    Some(format!(
+        "constraint {index} is rigid and tears at {} N, but the rounding of its coordinates alone \
+         makes forces of about {:.2} N at {} substeps a second: use fewer substeps, or a compliance",
+        limits.tear_force.unwrap_or_default(),
+        noise(&one),
+        scene.solver.rate_hz * scene.solver.substeps
+    ))
+}
+
+fn upside_down(scene: &Scene) -> Option<String> {
+    let [_, y, z] = scene.gravity;
+    let (name, along) = match scene.up {
+        super::Up::Y => ("y", y),
+        super::Up::MinusY => ("-y", -y),
+        super::Up::Z => ("z", z),
+    };
+    (along > 0.0).then(|| format!("up is \"{name}\", and gravity pulls that way: things fall up"))
+}
+
+fn wind_on_nothing(scene: &Scene, model: &Model) -> Option<String> {
+    let is_felt = !model.triangles.is_empty();
+    (scene.wind.is_some() && !is_felt)
+        .then(|| "there is wind, but no surface that feels it: only triangles do".to_owned())
+}
+
+fn inside_collider(scene: &Scene, model: &Model) -> Option<String> {
+    let mut is_held: Vec<_> = model.particles.iter().map(|particle| particle.pinned).collect();
+    for particle in scene.anchors.iter().flat_map(|anchor| &anchor.particles) {
+        is_held[*particle as usize] = true;
+    }
+    let is_planar = scene.dimensions == 2;
+    let depth_of = |index: usize| {
+        let position = model.particles[index].position;
+        let mut colliders = scene.colliders.iter().enumerate();
+        colliders.find_map(|(place, one)| Some((place, depth_at_load(one, position, is_planar)?)))
+    };
+    let free = (0..is_held.len()).filter(|index| !is_held[*index]);
+    let mut inside = free.filter_map(|index| Some((index, depth_of(index)?)));
+    let (index, (collider, depth)) = inside.next()?;
+    let who = match inside.count() {
+        0 => format!("particle {index} begins"),
+        more => format!("particle {index} and {more} more begin"),
+    };
+    Some(format!(
+        "{who} inside of a collider (collider {collider}, {depth} deep): the first step pushes them \
+         out at once"
     ))
 }
 
