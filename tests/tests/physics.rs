@@ -124,7 +124,6 @@ const REFUSED: &[Order] = &[
     (&["set", "damping", "nan"], "non_finite"),
     (&["set", "stiffness", "0.5"], "no_effect_here"),
     (&["set", "time_scale", "0"], "out_of_range"),
-    (&["load", "nix"], "out_of_range"),
 ];
 
 #[test]
@@ -234,8 +233,15 @@ fn a_scene_of_another_rate_needs_another_node() {
     let _node = node(&sandbox, &["--paused"]);
     let other = sandbox.write("other.toml", "version = 1\n[solver]\nrate_hz = 60\n");
     assert_eq!(ctl(&sandbox, &["load", &other])["reason"], "no_effect_here");
+    // What is wrong with a scene is said before it is sent.
+    let wrong = sandbox.write("wrong.toml", "version = 1\nrate = 3\n");
+    let refused = Process::run(Program::SimNode, &sandbox, &["ctl", "load", &wrong]);
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("wrong.toml:2: rate: unknown field"), "{}", refused.stderr);
     // A device is no scene, and nothing that a node would wait for.
-    assert_eq!(ctl(&sandbox, &["load", "/dev/zero"])["reason"], "out_of_range");
+    let device = Action::Load { scene: Text::new("/dev/zero") };
+    let outcome = attach(&sandbox).request(device, DEADLINE).unwrap();
+    assert_eq!(outcome.reason_name(), Reason::OutOfRange.name());
     let same = sandbox.write("same.toml", "version = 1\n[[particle]]\nposition = [1, 2, 3]\n");
     assert_eq!(ctl(&sandbox, &["load", &same])["status"], "applied");
     let snapshot = attach(&sandbox).next_snapshot(DEADLINE).unwrap().unwrap();

@@ -259,7 +259,7 @@ const WRONG: &[(&str, &str)] = &[
     ),
     (
         "version = 1\n[[generate]]\nshape = \"knot\"",
-        "f.toml:3: generate[0].shape: there is no shape \"knot\" (allowed: cloth, mesh, rope, web, bridge, ragdoll)",
+        "f.toml:3: generate[0].shape: there is no shape \"knot\" (allowed: cloth, mesh, rope, web, bridge, ragdoll, obj)",
     ),
     (
         "version = 1\n[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]",

@@ -70,8 +70,10 @@ fn numbers<const COUNT: usize>(values: &[f32]) -> anyhow::Result<[f32; COUNT]> {
     <[f32; COUNT]>::try_from(values).with_context(|| format!("{COUNT} numbers are needed"))
 }
 
-/// A file is named as the node finds it, which runs in another folder.
+/// A file is named as the node finds it, which runs in another folder. What is wrong with a scene
+/// is said here, with its line; an outcome has no room for it.
 fn scene_of(source: &str) -> anyhow::Result<Text> {
+    scene_source::load(source)?;
     if !scene_source::is_path(source) {
         return text(source);
     }
@@ -151,10 +153,12 @@ mod tests {
     #[test]
     fn a_scene_is_a_name_or_a_path_that_the_node_finds() {
         assert_eq!(action("load rope"), Action::Load { scene: Text::new("rope") });
-        let Action::Load { scene } = action("load ./my.toml") else { panic!("no load") };
-        assert!(scene.as_str().starts_with('/') && scene.as_str().ends_with("/my.toml"));
-        let verb = CtlVerb::Load { scene: "x".repeat(161) };
+        let Action::Load { scene } = action("load ./scenes/rope.toml") else { panic!("no load") };
+        assert!(scene.as_str().starts_with('/') && scene.as_str().ends_with("/scenes/rope.toml"));
+        let verb = CtlVerb::Load { scene: "nix".to_owned() };
         let error = of(&verb).unwrap_err().to_string();
+        assert!(error.starts_with("there is no built-in scene 'nix'"), "{error}");
+        let error = text(&"x".repeat(161)).unwrap_err().to_string();
         assert!(error.ends_with("has 161 bytes, a command can hold 160"), "{error}");
     }
 }
