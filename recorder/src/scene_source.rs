@@ -35,6 +35,9 @@ pub(crate) fn load_scene(source: &str) -> anyhow::Result<Scene> {
 
 /// The scene that a recording carries.
 pub(crate) fn scene_of<R: Read>(log: &LogReader<R>, path: &str) -> anyhow::Result<Scene> {
+    if log.scene().is_empty() {
+        bail!("{path}: carries no scene (attachment scene.toml)");
+    }
     let text = std::str::from_utf8(log.scene())
         .with_context(|| format!("{path}: its attachment scene.toml is not text"))?;
     Ok(Scene::from_toml(text, &format!("{path}/scene.toml"))?)
