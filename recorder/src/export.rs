@@ -125,12 +125,12 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let path = output::name_of(&args.file);
     let open = || LogReader::open(&args.file);
     let survey = Survey::of(open().with_context(|| path.clone())?, &path)?;
-    if let Err(why) = &survey.scene {
-        output::note(&format!("warning: {why}; drawn with y up"));
-    }
     let steps = args.choice().pick(&survey.steps, &survey.run).with_context(|| path.clone())?;
     if steps.is_empty() {
         bail!("{path}: has no snapshot to draw (the file is {})", survey.end);
+    }
+    if let Err(why) = &survey.scene {
+        output::note(&format!("warning: {why}; drawn with y up"));
     }
     let target = args.target(&survey.run);
     target.prepare(&steps)?;
