@@ -7,6 +7,7 @@ mod command_file;
 mod difference;
 mod endpoint_args;
 mod exit;
+mod export;
 mod frozen;
 mod info;
 mod output;
@@ -36,6 +37,7 @@ use exit::Exit;
         recorder play run.mcap\n  \
         recorder simulate curtain --steps 2400 -o curtain.mcap\n  \
         recorder info curtain.mcap\n  \
+        recorder export curtain.mcap --png pictures\n  \
         recorder verify curtain.mcap"
 )]
 struct Args {
@@ -45,6 +47,8 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
+    /// Draw pictures of a recording, to look at it without a viewer.
+    Export(export::ExportArgs),
     /// Tell what is in a recording.
     Info(info::InfoArgs),
     /// Play a recording on the services that it was recorded from.
@@ -60,6 +64,7 @@ enum Verb {
 fn main() -> Exit {
     let args = Args::parse();
     exit::of(match &args.verb {
+        Verb::Export(args) => export::run(args),
         Verb::Info(args) => info::run(args),
         Verb::Play(args) => play::run(args),
         Verb::Record(args) => record::run(args),

@@ -26,7 +26,7 @@ pub(crate) fn note(text: &str) {
 /// How results are printed.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct AsJson {
-    /// Print the result as one JSON object
+    /// Print the result as one line of JSON
     #[arg(long)]
     json: bool,
 }

@@ -28,6 +28,7 @@ use crate::solver_rows::cause_of;
 use control::Control;
 use pace::Pace;
 use position::Position;
+pub(crate) use position::{Happening, happenings};
 use replay::{Recorded, Replay};
 
 /// Longest wait before commands, readers and signals are looked at.

@@ -17,6 +17,9 @@ use crate::run::{
 };
 use crate::topic::Topic;
 
+/// The metadata of a run that tells ours from those of others.
+const FORMAT_VERSION_KEY: &str = "format_version";
+
 /// Why a file cannot be read as a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
@@ -117,8 +120,10 @@ impl<R: Read> LogReader<R> {
                 Some(HeadRecord::Library(name)) => library = name,
                 Some(HeadRecord::Scene(bytes)) => scene = Some(bytes),
                 Some(HeadRecord::Run(map)) => {
-                    let scene = scene.ok_or(ReadError::Foreign { library })?;
-                    let run = read_run(&map)?;
+                    if scene.is_none() && !map.contains_key(FORMAT_VERSION_KEY) {
+                        return Err(ReadError::Foreign { library });
+                    }
+                    let (run, scene) = (read_run(&map)?, scene.unwrap_or_default());
                     let channels = BTreeMap::new();
                     return Ok(Self { records, channels, run, scene, closing: None });
                 }
@@ -140,7 +145,7 @@ impl<R: Read> LogReader<R> {
         &self.run
     }
 
-    /// The text of the complete effective scene.
+    /// The text of the complete effective scene; empty where the file carries none.
     pub fn scene(&self) -> &[u8] {
         &self.scene
     }
@@ -223,10 +228,10 @@ fn read_run(map: &BTreeMap<String, String>) -> Result<RunDescription, ReadError>
     let is_read = |found: &String| {
         found.parse().is_ok_and(|one| (FORMAT_VERSION_MIN..=FORMAT_VERSION).contains(&one))
     };
-    match map.get("format_version") {
+    match map.get(FORMAT_VERSION_KEY) {
         Some(found) if is_read(found) => {}
         Some(found) => return Err(ReadError::Version { found: found.clone() }),
-        None => return Err(ReadError::BadRun { key: "format_version".to_owned() }),
+        None => return Err(ReadError::BadRun { key: FORMAT_VERSION_KEY.to_owned() }),
     }
     RunDescription::from_map(map).map_err(|key| ReadError::BadRun { key })
 }

@@ -41,6 +41,9 @@ fn read_beside(scene: &str, path: &str) -> Result<String, String> {
 
 /// The scene that a recording carries.
 pub(crate) fn scene_of<R: Read>(log: &LogReader<R>, path: &str) -> anyhow::Result<Scene> {
+    if log.scene().is_empty() {
+        bail!("{path}: carries no scene (attachment scene.toml)");
+    }
     let text = std::str::from_utf8(log.scene())
         .with_context(|| format!("{path}: its attachment scene.toml is not text"))?;
     Ok(Scene::from_toml(text, &format!("{path}/scene.toml"))?)

@@ -47,6 +47,38 @@ fn a_truncated_recording_is_read_as_far_as_it_goes_and_said_to_be_truncated() {
 }
 
 #[test]
+fn what_cannot_be_drawn_is_named_and_what_can_be_is_drawn() {
+    let sandbox = Sandbox::new();
+    let pictures = sandbox.path("pictures");
+    let text = sandbox.write("text.mcap", "this is no recording, but long enough to be looked at");
+    assert_refused(&recorder(&sandbox, &["export", &text, "--png", &pictures]), &[&text]);
+    assert!(!std::path::Path::new(&pictures).exists());
+
+    let whole = sandbox.path("whole.mcap");
+    recorder(&sandbox, &["simulate", "rope", "--steps", "2400", "-o", &whole]).success();
+    let late = recorder(&sandbox, &["export", &whole, "--png", &pictures, "--at", "20s"]);
+    assert_refused(&late, &[&whole, "--at 20s", "10.000 s"]);
+    let bytes = std::fs::read(&whole).unwrap();
+    let cut = sandbox.path("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() * 6 / 10]).unwrap();
+    let args = ["export", &cut, "--svg", &pictures, "--frames", "2"];
+    let drawn = recorder(&sandbox, &args);
+    assert_eq!(drawn.code, Some(3), "{}", drawn.stderr);
+    assert!(drawn.stderr.contains("truncated"), "{}", drawn.stderr);
+    let files: Vec<_> = drawn.stdout.lines().collect();
+    assert_eq!(files.len(), 2, "{}", drawn.stdout);
+    assert!(files[0].ends_with("/rope_00000000.svg"), "{}", drawn.stdout);
+    assert!(std::fs::read_to_string(files[1]).unwrap().starts_with("<svg"));
+
+    assert_refused(&recorder(&sandbox, &args), &[files[0], "exists", "--overwrite"]);
+    let again: Vec<_> = args.into_iter().chain(["--overwrite", "--json"]).collect();
+    let again = recorder(&sandbox, &again);
+    assert_eq!(again.code, Some(3), "{}", again.stderr);
+    assert!(again.stdout.starts_with("[{\"file\":"), "{}", again.stdout);
+    assert!(again.stdout.contains("\"step\":0,\"time_s\":0.0}"), "{}", again.stdout);
+}
+
+#[test]
 fn a_missing_node_is_named_with_its_domain_and_how_to_start_it() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");

@@ -1,0 +1,103 @@
+//! A picture as PNG.
+
+use anyhow::Context;
+use glam::DVec2;
+use tiny_skia::{
+    FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, StrokeDash, Transform,
+};
+
+use super::font;
+use super::shape::{BACKGROUND, Color, Picture, Shape, Stroke, Text};
+
+/// The bytes of the file. Equal pictures give equal bytes.
+pub(crate) fn bytes(picture: &Picture) -> anyhow::Result<Vec<u8>> {
+    let size = picture.size;
+    let mut pixmap = Pixmap::new(size.width, size.height).context("a picture of no size")?;
+    let [red, green, blue] = BACKGROUND.0;
+    pixmap.fill(tiny_skia::Color::from_rgba8(red, green, blue, u8::MAX));
+    for shape in &picture.shapes {
+        paint(&mut pixmap, shape);
+    }
+    Ok(pixmap.encode_png()?)
+}
+
+fn paint(pixmap: &mut Pixmap, shape: &Shape) {
+    match shape {
+        Shape::Polygon { corners, fill, outline } => {
+            paint_path(pixmap, polygon(corners), Some(*fill), *outline);
+        }
+        Shape::Segment { ends, stroke } => paint_path(pixmap, polyline(ends), None, Some(*stroke)),
+        Shape::Circle { center, radius, fill, outline } => {
+            let circle = PathBuilder::from_circle(f32(center.x), f32(center.y), f32(*radius));
+            paint_path(pixmap, circle, Some(*fill), *outline);
+        }
+        Shape::Text(text) => paint_text(pixmap, text),
+    }
+}
+
+fn polygon(corners: &[DVec2]) -> Option<Path> {
+    let mut path = builder(corners)?;
+    path.close();
+    path.finish()
+}
+
+fn polyline(points: &[DVec2]) -> Option<Path> {
+    builder(points)?.finish()
+}
+
+fn builder(points: &[DVec2]) -> Option<PathBuilder> {
+    let (first, others) = points.split_first()?;
+    let mut path = PathBuilder::new();
+    path.move_to(f32(first.x), f32(first.y));
+    for point in others {
+        path.line_to(f32(point.x), f32(point.y));
+    }
+    Some(path)
+}
+
+/// There is no path where nothing is to be seen, such as of a circle of radius 0.
+fn paint_path(pixmap: &mut Pixmap, path: Option<Path>, fill: Option<Color>, line: Option<Stroke>) {
+    let Some(path) = path else { return };
+    let place = Transform::identity();
+    if let Some(fill) = fill {
+        pixmap.fill_path(&path, &paint_of(fill), FillRule::Winding, place, None);
+    }
+    if let Some(line) = line {
+        let stroke = tiny_skia::Stroke {
+            width: f32(line.width),
+            line_cap: LineCap::Round,
+            line_join: LineJoin::Round,
+            dash: line.dashes().and_then(|lengths| StrokeDash::new(lengths.map(f32).into(), 0.0)),
+            ..tiny_skia::Stroke::default()
+        };
+        pixmap.stroke_path(&path, &paint_of(line.color), &stroke, place, None);
+    }
+}
+
+fn paint_text(pixmap: &mut Pixmap, text: &Text) {
+    let (paint, cell) = (paint_of(text.color), f64::from(text.cell));
+    for (place, letter) in (0_u32..).zip(text.line.chars()) {
+        let corner = text.corner + DVec2::new(f64::from(place * font::ADVANCE) * cell, 0.0);
+        for (column, row) in font::cells(letter) {
+            let at = corner + DVec2::new(f64::from(column), f64::from(row)) * cell;
+            let square = Rect::from_xywh(f32(at.x), f32(at.y), f32(cell), f32(cell));
+            if let Some(square) = square {
+                pixmap.fill_rect(square, &paint, Transform::identity(), None);
+            }
+        }
+    }
+}
+
+fn paint_of(color: Color) -> Paint<'static> {
+    let [red, green, blue] = color.0;
+    let mut paint = Paint::default();
+    paint.set_color_rgba8(red, green, blue, u8::MAX);
+    paint.anti_alias = true;
+    paint
+}
+
+/// The digits that the rasteriser takes.
+#[allow(clippy::cast_possible_truncation, reason = "pixels are rounded to f32 here and only here")]
+fn f32(value: f64) -> f32 {
+    value as f32
+}

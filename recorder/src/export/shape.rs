@@ -1,0 +1,110 @@
+//! What a picture is made of, in pixels: the list that both formats are written from.
+
+use glam::DVec2;
+
+/// A picture's width and height in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Size {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+}
+
+/// A picture: its shapes from back to front.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Picture {
+    pub(crate) size: Size,
+    pub(crate) shapes: Vec<Shape>,
+}
+
+/// Red, green, blue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Color(pub(crate) [u8; 3]);
+
+/// What is behind everything.
+pub(crate) const BACKGROUND: Color = Color([0xf8, 0xf8, 0xf5]);
+
+/// A line's look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Stroke {
+    pub(crate) color: Color,
+    /// In pixels.
+    pub(crate) width: f64,
+    pub(crate) dash: Dash,
+}
+
+/// How a line is interrupted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Dash {
+    Solid,
+    Dashed,
+    Dotted,
+}
+
+/// One element of a picture; x to the right, y down, ends and corners of lines are round.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Shape {
+    Polygon { corners: Vec<DVec2>, fill: Color, outline: Option<Stroke> },
+    Segment { ends: [DVec2; 2], stroke: Stroke },
+    Circle { center: DVec2, radius: f64, fill: Color, outline: Option<Stroke> },
+    Text(Text),
+}
+
+/// One line of text in letters of 5 x 7 cells.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Text {
+    /// Upper left corner.
+    pub(crate) corner: DVec2,
+    /// Side of a cell in pixels.
+    pub(crate) cell: u32,
+    pub(crate) color: Color,
+    pub(crate) line: String,
+}
+
+/// Farthest that anything drawn may be from the picture's corner, in pixels: what is cut off is
+/// cut off exactly, and writers keep their digits.
+const COORDINATE_MAX: f64 = 1e6;
+
+impl Stroke {
+    /// A line without interruptions.
+    pub(crate) fn solid(color: Color, width: f64) -> Self {
+        Self { color, width, dash: Dash::Solid }
+    }
+
+    /// Lengths of a dash and of the gap behind it, in pixels; `None` without interruptions.
+    pub(crate) fn dashes(&self) -> Option<[f64; 2]> {
+        match self.dash {
+            Dash::Solid => None,
+            Dash::Dashed => Some([4.0 * self.width, 4.0 * self.width]),
+            // Round ends make a dot of a dash of nearly no length.
+            Dash::Dotted => Some([0.01, 2.5 * self.width]),
+        }
+    }
+}
+
+impl Shape {
+    /// Whether all of it is where numbers of pixels are meant to be.
+    pub(crate) fn is_drawable(&self) -> bool {
+        let is_near =
+            |point: &DVec2| point.is_finite() && point.abs().max_element() < COORDINATE_MAX;
+        match self {
+            Self::Polygon { corners, .. } => corners.len() >= 3 && corners.iter().all(is_near),
+            Self::Segment { ends, stroke } => {
+                ends.iter().all(is_near) && stroke.width < COORDINATE_MAX
+            }
+            Self::Circle { center, radius, .. } => is_near(center) && *radius < COORDINATE_MAX,
+            Self::Text(text) => is_near(&text.corner),
+        }
+    }
+}
+
+impl Color {
+    /// Darkened: each part times `share`, 0..=1.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of a byte, rounded, is a byte"
+    )]
+    pub(crate) fn times(self, share: f64) -> Self {
+        Self(self.0.map(|part| (f64::from(part) * share).round() as u8))
+    }
+}
