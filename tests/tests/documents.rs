@@ -1,0 +1,116 @@
+//! The reference documents say what the programs accept: their examples run, and they leave out no
+//! key, no kind of command and no built-in scene.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use integration_tests::{Process, Program, Sandbox};
+
+const README: &str = include_str!("../../README.md");
+const SCENES: &str = include_str!("../../sim-node/scenes/README.md");
+const SOLVER: &str = include_str!("../../sim-node/solver/README.md");
+const CONTRACT: &str = include_str!("../../sim-node/contract/README.md");
+
+/// The fenced blocks of a language: the number of their first line, and their text.
+fn blocks(document: &str, language: &str) -> Vec<(usize, String)> {
+    let mut found: Vec<(usize, String)> = Vec::new();
+    let mut fence = None;
+    for (number, line) in (1..).zip(document.lines()) {
+        match (line.strip_prefix("```"), fence) {
+            (Some(_), Some(_)) => fence = None,
+            (Some(opened), None) => {
+                fence = Some(opened);
+                if opened == language {
+                    found.push((number + 1, String::new()));
+                }
+            }
+            (None, Some(opened)) if opened == language => {
+                let (_, text) = found.last_mut().unwrap();
+                text.push_str(line);
+                text.push('\n');
+            }
+            (None, _) => {}
+        }
+    }
+    assert!(fence.is_none(), "a fence is left open");
+    found
+}
+
+/// What an error says is allowed, as a list.
+fn allowed(error: &str) -> Vec<&str> {
+    let (_, behind) = error.split_once("(allowed: ").unwrap();
+    behind.split_once(')').unwrap().0.split(", ").collect()
+}
+
+#[test]
+fn every_scene_in_a_document_is_accepted_without_a_warning_and_runs() {
+    let sandbox = Sandbox::new();
+    let mut count = 0;
+    for (name, document) in [("readme", README), ("scenes", SCENES), ("solver", SOLVER)] {
+        for (line, text) in blocks(document, "toml") {
+            let scene = sandbox.write(&format!("{name}-line-{line}.toml"), &text);
+            let checked = Process::run(Program::SimNode, &sandbox, &["check", "--json", &scene]);
+            let warnings = checked.json()["warnings"].clone();
+            assert_eq!(warnings.as_array().map(Vec::len), Some(0), "{scene}: {warnings}");
+            let args = ["simulate", &scene, "--steps", "10"];
+            Process::run(Program::Recorder, &sandbox, &args).success();
+            count += 1;
+        }
+    }
+    assert!(count >= 8, "only {count} scenes found");
+}
+
+#[test]
+fn the_scene_reference_names_every_key() {
+    let sandbox = Sandbox::new();
+    for table in [
+        "",
+        "[solver]",
+        "[wind]",
+        "[[particle]]\nposition = [0, 0, 0]",
+        "[[constraint]]\nparticles = [0, 1]",
+        "[[collider]]\nshape = \"plane\"",
+        "[[anchor]]\nparticles = []",
+        "[[anchor]]\nparticles = []\n[[anchor.path]]\ntime = 0",
+        "[[generate]]\nshape = \"obj\"",
+        "[[generate]]\nshape = \"obj\"\n[generate.compliance]",
+    ] {
+        let scene = sandbox.write("wrong.toml", &format!("version = 1\n{table}\nnonsense = 1\n"));
+        let checked = Process::run(Program::SimNode, &sandbox, &["check", &scene]);
+        assert_eq!(checked.code, Some(1), "{table}");
+        for key in allowed(&checked.stderr) {
+            assert!(SCENES.contains(&format!("`{key}`")), "{table}: {key} is not described");
+        }
+    }
+}
+
+#[test]
+fn the_scene_reference_names_every_built_in_scene() {
+    let sandbox = Sandbox::new();
+    let listed = Process::run(Program::SimNode, &sandbox, &["scenes", "--json"]).json();
+    for scene in listed.as_array().unwrap() {
+        let name = scene["name"].as_str().unwrap();
+        assert!(SCENES.contains(&format!("| `{name}` |")), "{name} is not described");
+    }
+}
+
+#[test]
+fn every_command_in_the_reference_is_read_and_every_kind_is_there() {
+    let sandbox = Sandbox::new();
+    let simulate = |commands: &str| {
+        let file = sandbox.write("commands.jsonl", commands);
+        let args = ["simulate", "curtain", "--steps", "400", "--commands", &file];
+        Process::run(Program::Recorder, &sandbox, &args)
+    };
+    let commands = blocks(CONTRACT, "json");
+    assert!(!commands.is_empty());
+    for (line, text) in &commands {
+        let done = simulate(text);
+        assert_eq!(done.code, Some(0), "block of line {line}: {}", done.stderr);
+        // A step beyond the end would be a warning.
+        assert!(!done.stderr.contains("warning"), "block of line {line}: {}", done.stderr);
+    }
+    let wrong = simulate(r#"{"step":1,"kind":"nonsense"}"#);
+    for kind in allowed(&wrong.stderr) {
+        let field = format!(r#""kind":"{kind}""#);
+        assert!(commands.iter().any(|(_, text)| text.contains(&field)), "{kind} has no example");
+    }
+}
