@@ -64,7 +64,7 @@ fn rebuild(file: &[u8], mut change: impl FnMut(Message) -> Option<Message>) -> V
 fn equal_inputs_give_equal_files_and_other_inputs_another_run() {
     let job_of = |commands| job("curtain", commands, 300);
     let (file, outcomes) = record(&job_of(COMMANDS));
-    assert_eq!(record(&job_of(COMMANDS)), (file.clone(), outcomes));
+    assert_eq!(record(&job_of(COMMANDS)), (file.clone(), outcomes.clone()));
     assert_eq!((outcomes.applied_count, outcomes.rejected_count), (7, 2));
     let run_id = |file: &[u8]| LogReader::new(file).unwrap().run().run_id;
     let (other, _) = record(&job_of(r#"{"step":10,"kind":"reset"}"#));

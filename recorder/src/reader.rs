@@ -24,7 +24,7 @@ const FORMAT_VERSION_KEY: &str = "format_version";
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The operating system says no.
-    #[error("cannot read: {0}")]
+    #[error("cannot read it")]
     Io(#[from] std::io::Error),
     /// Another kind of file.
     #[error("is not an MCAP file")]

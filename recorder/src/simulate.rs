@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use recorder::Closing;
+use recorder::{Closing, OutcomeRow};
 use serde::Serialize;
 use sim_contract::Stop;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -68,7 +68,10 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let job = Job { scene, commands, steps: args.steps };
     let beyond = job.commands_beyond_the_end();
     if beyond > 0 {
-        output::note(&format!("warning: {beyond} commands are for steps after {}", args.steps));
+        output::note(&format!(
+            "warning: commands for steps after {}, the last one: {beyond}",
+            args.steps
+        ));
     }
     let solver = Solver::new(&job.scene);
     let mut log =
@@ -88,7 +91,8 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let path = log.map(|log| finish(log, &outcomes, args.steps)).transpose()?;
     let wall_ns = monotonic_ns() - before_ns;
 
-    let summary = summary(&job, outcomes, wall_ns, path.as_deref());
+    say_rejected(&outcomes);
+    let summary = summary(&job, &outcomes, wall_ns, path.as_deref());
     output::result(args.as_json, &summary, &summary.to_string())?;
     Ok(if outcomes.steps < args.steps { Exit::Loss } else { Exit::Done })
 }
@@ -111,7 +115,23 @@ fn finish(log: LogFile, outcomes: &Outcomes, steps: u64) -> anyhow::Result<PathB
     Ok(log.finish(&closing)?.finish()?)
 }
 
-fn summary(job: &Job, outcomes: Outcomes, wall_ns: u64, path: Option<&Path>) -> Summary {
+/// Names the first commands that were rejected; the recording has all of them.
+fn say_rejected(outcomes: &Outcomes) {
+    for outcome in &outcomes.rejections {
+        let row = OutcomeRow::from(outcome);
+        let kind = serde_json::to_value(row.action).unwrap_or_default();
+        output::note(&format!(
+            "warning: step {}: {} (client {}, sequence {}) was rejected: {}",
+            row.step,
+            kind["kind"].as_str().unwrap_or("a command"),
+            row.client_id,
+            row.sequence,
+            row.reason
+        ));
+    }
+}
+
+fn summary(job: &Job, outcomes: &Outcomes, wall_ns: u64, path: Option<&Path>) -> Summary {
     let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
     let simulated_s = outcomes.steps as f64 / f64::from(job.scene.solver.rate_hz);
     Summary {

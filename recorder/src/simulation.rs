@@ -25,7 +25,7 @@ pub(crate) struct Job {
 }
 
 /// What came of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Outcomes {
     /// Steps made.
     pub(crate) steps: u64,
@@ -33,7 +33,12 @@ pub(crate) struct Outcomes {
     pub(crate) state_hash: u64,
     pub(crate) applied_count: u64,
     pub(crate) rejected_count: u64,
+    /// The first of the rejected ones, at most [`REJECTIONS_SHOWN_MAX`].
+    pub(crate) rejections: Vec<Outcome>,
 }
+
+/// Rejected commands that are named one by one.
+const REJECTIONS_SHOWN_MAX: usize = 5;
 
 impl Job {
     /// Commands that no step is left for.
@@ -112,7 +117,13 @@ pub(crate) fn simulate<W: Write>(
 
 impl Outcomes {
     fn at_start(solver: &Solver) -> Self {
-        Self { steps: 0, state_hash: solver.state_hash(), applied_count: 0, rejected_count: 0 }
+        Self {
+            steps: 0,
+            state_hash: solver.state_hash(),
+            applied_count: 0,
+            rejected_count: 0,
+            rejections: Vec::new(),
+        }
     }
 
     fn apply(&mut self, solver: &mut Solver, command: &TimedCommand) -> Outcome {
@@ -121,7 +132,11 @@ impl Outcomes {
         let index = self.applied_count + self.rejected_count;
         let outcome = Outcome::new(index, step, Command::new(client_id, sequence, action), result);
         self.applied_count += u64::from(outcome.is_applied());
-        self.rejected_count += u64::from(!outcome.is_applied());
+        if !outcome.is_applied() {
+            self.rejected_count += 1;
+            let shown = self.rejections.len() < REJECTIONS_SHOWN_MAX;
+            self.rejections.extend(shown.then_some(outcome));
+        }
         outcome
     }
 }
