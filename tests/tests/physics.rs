@@ -225,6 +225,16 @@ fn a_load_changes_the_scene_for_readers_that_stay_and_the_step_goes_on() {
     assert!(late.torn(DEADLINE).unwrap().constraints.is_empty());
     assert!(late.colliders(DEADLINE).unwrap().colliders.is_empty());
     assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain");
+    // Down to a smaller one.
+    assert_eq!(ctl(&sandbox, &["load", "rope"])["step"], 9);
+    let snapshot = loop {
+        let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
+        if snapshot.header().step == 9 {
+            break snapshot;
+        }
+    };
+    assert_eq!((snapshot.particles().len(), snapshot.header().topology_revision), (41, 2));
+    assert_eq!(client.topology(DEADLINE).unwrap().unwrap().constraints.len(), 40);
 }
 
 #[test]
