@@ -1,5 +1,6 @@
 //! One step, as a list of its stages. Only + - * / and sqrt, in a fixed order; nothing is
-//! allocated, locked, read from a clock or printed.
+//! allocated, locked, read from a clock or printed. (What commands left to be worked out at the
+//! boundary before it may allocate, once: `finish_boundary`.)
 
 use std::ops::Range;
 
