@@ -8,7 +8,7 @@ mod programs;
 mod sandbox;
 mod wait;
 
-pub use process::{Finished, Process};
+pub use process::{Finished, Process, ctl};
 pub use programs::Program;
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;

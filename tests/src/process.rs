@@ -37,6 +37,15 @@ impl fmt::Debug for Process {
     }
 }
 
+/// What `sim-node ctl --json` answers to a verb with its arguments.
+///
+/// # Panics
+/// If it fails.
+pub fn ctl(sandbox: &Sandbox, args: &[&str]) -> serde_json::Value {
+    let args: Vec<_> = ["ctl", "--json"].iter().chain(args).copied().collect();
+    Process::run(Program::SimNode, sandbox, &args).json()
+}
+
 impl Process {
     /// Starts a program in a domain.
     ///

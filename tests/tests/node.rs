@@ -4,14 +4,8 @@
 
 use std::time::Duration;
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal};
-use serde_json::Value;
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl};
 use sim_contract::{Action, Client, ParticleFlags, Snapshot};
-
-fn ctl(sandbox: &Sandbox, args: &[&str]) -> Value {
-    let args: Vec<_> = ["ctl", "--json"].iter().chain(args).copied().collect();
-    Process::run(Program::SimNode, sandbox, &args).json()
-}
 
 fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
     Process::start_ready(Program::SimNode, sandbox, args)

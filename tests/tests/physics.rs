@@ -2,8 +2,7 @@
 //! by the next snapshots, known to late joiners, recorded, and simulated again bit for bit.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox};
-use serde_json::Value;
+use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
 use sim_contract::{Action, Client, ColliderShape, ParticleFlags, Reason, TearCause, Text};
 
 /// A small cloth on an anchor over a floor and beside a ball, in the wind.
@@ -44,11 +43,6 @@ spacing = 0.1
 mass = 0.02
 pinned = "none"
 "#;
-
-fn ctl(sandbox: &Sandbox, args: &[&str]) -> Value {
-    let args: Vec<_> = ["ctl", "--json"].iter().chain(args).copied().collect();
-    Process::run(Program::SimNode, sandbox, &args).json()
-}
 
 fn node(sandbox: &Sandbox, extra: &[&str]) -> Process {
     let scene = sandbox.write("all.toml", SCENE);

@@ -6,9 +6,8 @@ use std::fs::File;
 use std::path::Path;
 use std::time::Duration;
 
-use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, wait_for};
+use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, wait_for};
 use recorder::{Closing, Frame, FrameReader, LogOptions, LogReader, LogWriter, Message};
-use serde_json::Value;
 use sim_contract::{Action, Client, SnapshotFlags, SnapshotHeader, Tap};
 
 fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
@@ -21,11 +20,6 @@ fn record(sandbox: &Sandbox, file: &str) -> Process {
 
 fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
     Process::run(Program::Recorder, sandbox, args)
-}
-
-fn ctl(sandbox: &Sandbox, args: &[&str]) -> Value {
-    let args: Vec<_> = ["ctl", "--json"].iter().chain(args).copied().collect();
-    Process::run(Program::SimNode, sandbox, &args).json()
 }
 
 /// All snapshots of a recording.
