@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3, Vec3};
 
+use crate::bodies::Bodies;
 use crate::drive::step_towards;
 use crate::frame::{Frame, Pose};
 use crate::particles::{Particles, flag};
@@ -82,12 +83,17 @@ impl Anchors {
     }
 
     /// Moves each follower by its share of the way that is left, unless something holds it.
-    pub(crate) fn drive(&self, particles: &mut Particles, substeps_left: u32, reach: f32) {
+    pub(crate) fn drive(
+        &self,
+        bodies: &mut Bodies,
+        particles: &Particles,
+        (substeps_left, reach): (u32, f32),
+    ) {
         const HELD: u32 = flag::PINNED | flag::FROZEN;
         for (follower, target) in self.followers.iter().zip(&self.targets) {
-            let index = follower.particle as usize;
-            if particles.flags[index] & HELD == 0 {
-                step_towards(particles, index, *target, substeps_left, reach);
+            if particles.states[follower.particle as usize].flags & HELD == 0 {
+                let place = bodies.place(follower.particle);
+                step_towards(bodies, place, (*target, substeps_left), reach);
             }
         }
     }

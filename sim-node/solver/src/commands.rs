@@ -214,12 +214,9 @@ impl Solver {
             return Err(Rejection::OutOfRange);
         }
         let [x, y, z] = delta.map(|axis| axis * self.settings.rate_hz as f32);
-        for (position, velocity) in
-            self.particles.positions.iter().zip(&mut self.particles.velocities)
-        {
-            let [px, py, pz, inverse_mass] = *position;
-            if inverse_mass != 0.0 && push.ball.has(Vec3::new(px, py, pz)) {
-                *velocity = [x, y, z, 0.0];
+        for state in &mut self.particles.states {
+            if state.inverse_mass != 0.0 && push.ball.has(Vec3::from_array(state.position)) {
+                state.velocity = [x, y, z];
             }
         }
         Ok(())
@@ -274,14 +271,14 @@ impl Solver {
 
     fn living_particle(&self, particle: u32) -> Result<usize, Rejection> {
         let index = particle as usize;
-        if index >= self.particles.count() {
+        if index >= self.particle_count() {
             return Err(Rejection::UnknownParticle);
         }
         if self.has_flag(index, flag::FROZEN) { Err(Rejection::NoEffectHere) } else { Ok(index) }
     }
 
     fn has_flag(&self, index: usize, flag: u32) -> bool {
-        self.particles.flags[index] & flag != 0
+        self.particles.states[index].flags & flag != 0
     }
 
     fn check_target(&self, grip: &Grip) -> Result<(), Rejection> {

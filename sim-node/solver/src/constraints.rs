@@ -1,12 +1,13 @@
-//! Distance constraints, stored in the order in which they are projected.
+//! Distance constraints: what a scene says of them, and what follows from the parameters.
 
-use std::ops::Range;
+use std::cell::Cell;
 
 use serde::{Deserialize, Serialize};
 
-use crate::order::Order;
+use crate::bodies::{Give, Term, Terms};
 use crate::parameters::Parameters;
-use crate::scene::{Method, Model};
+use crate::project::Rest;
+use crate::scene::{Limits, Method, Model};
 use crate::tear::TearCause;
 
 /// What a constraint is for.
@@ -47,166 +48,90 @@ pub struct Constraint {
     pub kind: ConstraintKind,
 }
 
-/// The length that a constraint goes back to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Rest {
-    pub(crate) length: f32,
-    /// Its square. Where the length is the distance at load, this is the square of that distance
-    /// before its root was rounded: at load, the error is 0 to the last bit.
-    pub(crate) square: f32,
+/// Works out what constraints are like.
+pub(crate) struct Recipe<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) setup: Setup,
+    /// The last stiffness, and its share of a pass: the root is dear, and most constraints have
+    /// the stiffness of the one before.
+    last_share: Cell<(f32, f32)>,
 }
 
-impl Rest {
-    pub(crate) fn new(length: f32) -> Self {
-        Self { length, square: length * length }
-    }
-}
-
-fn rest_at_load(model: &Model, constraint: Constraint) -> Rest {
-    let square = model.distance_squared(constraint.a, constraint.b);
-    let length = constraint.rest_length;
-    if square.sqrt() == length { Rest { length, square } } else { Rest::new(length) }
-}
-
-/// All constraints in projection order: one array per field, each `constraint_count` long.
-///
-/// A torn constraint is a tether of infinite length: it never pulls, and no kernel needs to know
-/// of it.
-#[derive(Debug, Clone)]
-pub(crate) struct Constraints {
-    /// The two particles.
-    pub(crate) pairs: Vec<[u32; 2]>,
-    /// Of infinite length where torn.
-    pub(crate) rests: Vec<Rest>,
-    /// xpbd: compliance / h^2, in 1/kg. pbd: the share of the error that one pass takes away,
-    /// w k', w being the relaxation factor.
-    pub(crate) softness: Vec<f32>,
-    /// Whether it acts only when longer than its rest length.
-    pub(crate) pull_only: Vec<bool>,
-    /// The multipliers of the running substep, in kg m.
-    pub(crate) multipliers: Vec<f32>,
-    /// Ranges of the arrays above, in the order of projection.
-    pub(crate) groups: Vec<Range<usize>>,
-    /// Groups at the beginning in which no two constraints share a particle.
-    pub(crate) independent_count: usize,
-    /// Lengths that none exceeds; no entries where nothing is limited.
-    pub(crate) max_lengths: Vec<f32>,
-    /// Lengths above which they tear; no entries where none tears by its length.
-    pub(crate) tear_lengths: Vec<f32>,
-    /// Which limit `tear_lengths` holds.
-    pub(crate) tear_causes: Vec<TearCause>,
-    /// Multipliers above which they tear, force times h^2; no entries where none tears by force.
-    pub(crate) tear_multipliers: Vec<f32>,
-    /// Slot by slot: the index in the scene.
-    pub(crate) indices: Vec<u32>,
-    /// Index by index: the slot in these arrays.
-    slots: Vec<u32>,
-}
-
-impl Constraints {
-    pub(crate) fn new(model: &Model, order: &Order) -> Self {
-        let in_order = || order.indices.iter().map(|index| model.constraints[*index as usize]);
-        let mut slots = vec![0; order.indices.len()];
-        for (slot, index) in (0_u32..).zip(&order.indices) {
-            slots[*index as usize] = slot;
-        }
-        Self {
-            pairs: in_order().map(|one| [one.a, one.b]).collect(),
-            rests: in_order().map(|one| rest_at_load(model, one)).collect(),
-            softness: vec![0.0; order.indices.len()],
-            pull_only: in_order().map(|one| one.kind == ConstraintKind::Tether).collect(),
-            multipliers: vec![0.0; order.indices.len()],
-            groups: order.groups.clone(),
-            independent_count: order.independent_count,
-            max_lengths: Vec::new(),
-            tear_lengths: Vec::new(),
-            tear_causes: Vec::new(),
-            tear_multipliers: Vec::new(),
-            indices: order.indices.clone(),
-            slots,
-        }
+impl<'a> Recipe<'a> {
+    pub(crate) fn new(model: &'a Model, parameters: &'a Parameters, setup: Setup) -> Self {
+        Self { model, parameters, setup, last_share: Cell::new((f32::NAN, f32::NAN)) }
     }
 
-    /// Makes every torn constraint whole again.
-    pub(crate) fn mend(&mut self, model: &Model) {
-        for (slot, index) in self.indices.iter().enumerate() {
-            let one = model.constraints[*index as usize];
-            self.rests[slot] = rest_at_load(model, one);
-            self.pull_only[slot] = one.kind == ConstraintKind::Tether;
-        }
+    /// Where the rest length is the distance at load, its square is that of the distance before
+    /// its root was rounded: at load, the error is 0 to the last bit.
+    fn rest(&self, constraint: Constraint) -> Rest<f32> {
+        let square = self.model.distance_squared(constraint.a, constraint.b);
+        let length = constraint.rest_length;
+        if square.sqrt() == length { Rest { length, square } } else { Rest::new(length) }
     }
 
-    /// Works out everything that follows from the parameters.
-    pub(crate) fn configure(&mut self, model: &Model, parameters: &Parameters, setup: Setup) {
-        let h_squared = setup.h * setup.h;
-        // The root is dear, and most constraints have the stiffness of the one before.
-        let (mut stiffness, mut share) = (f32::NAN, f32::NAN);
-        for (slot, index) in self.indices.iter().enumerate() {
-            let one = model.constraints[*index as usize];
-            let softness = parameters.softness(one.kind, one.compliance);
-            self.softness[slot] = match setup.method {
-                Method::Xpbd => softness / h_squared,
-                Method::Pbd => {
-                    if softness.to_bits() != stiffness.to_bits() {
-                        stiffness = softness;
-                        share = stiffness_per_pass(softness, parameters.iterations);
-                    }
-                    parameters.relaxation * share
-                }
-            };
-        }
-        let limits = parameters.limits();
-        let of = |index: u32| model.limits(index).or(limits);
-        let rest = |index: u32| model.constraints[index as usize].rest_length;
-        self.max_lengths =
-            self.thresholds(|index| ratio_length(of(index).max_stretch, rest(index)));
-        let by_stretch = |index| ratio_length(of(index).tear_stretch, rest(index));
-        let by_distance = |index| distance_length(of(index).tear_distance, rest(index));
-        let is_stretch = |index| by_stretch(index) <= by_distance(index);
-        self.tear_lengths =
-            self.thresholds(
-                |index| {
-                    if is_stretch(index) { by_stretch(index) } else { by_distance(index) }
-                },
-            );
-        self.tear_causes = (self.indices[..self.tear_lengths.len()].iter())
-            .map(|index| if is_stretch(*index) { TearCause::Stretch } else { TearCause::Distance })
-            .collect();
-        self.tear_multipliers =
-            self.thresholds(|index| of(index).tear_force.unwrap_or(f32::INFINITY) * h_squared);
-    }
-
-    /// A number for each slot, infinite for torn ones; none at all where all are infinite.
-    fn thresholds(&self, of: impl Fn(u32) -> f32) -> Vec<f32> {
-        let slots = self.indices.iter().zip(&self.rests);
-        let values = slots.map(
-            |(index, rest)| {
-                if rest.length.is_infinite() { f32::INFINITY } else { of(*index) }
-            },
-        );
-        let values: Vec<_> = values.collect();
-        if values.iter().all(|value| value.is_infinite()) { Vec::new() } else { values }
-    }
-
-    /// The first slot behind the groups in which no two constraints share a particle.
-    pub(crate) fn independent_end(&self) -> usize {
-        self.groups[..self.independent_count].last().map_or(0, |group| group.end)
-    }
-
-    pub(crate) fn is_torn(&self, index: u32) -> bool {
-        self.rests[self.slots[index as usize] as usize].length.is_infinite()
-    }
-
-    /// Takes a constraint out for good.
-    pub(crate) fn tear(&mut self, index: u32) {
-        let slot = self.slots[index as usize] as usize;
-        self.rests[slot] = Rest::new(f32::INFINITY);
-        self.pull_only[slot] = true;
-        for limits in [&mut self.max_lengths, &mut self.tear_lengths, &mut self.tear_multipliers] {
-            if let Some(limit) = limits.get_mut(slot) {
-                *limit = f32::INFINITY;
+    fn give(&self, constraint: Constraint) -> Give {
+        let softness = self.parameters.softness(constraint.kind, constraint.compliance);
+        let relaxation = self.parameters.relaxation;
+        match self.setup.method {
+            Method::Xpbd => {
+                Give { softness: softness / (self.setup.h * self.setup.h), share: relaxation }
             }
+            Method::Pbd => Give { softness: 0.0, share: relaxation * self.share(softness) },
         }
+    }
+
+    fn share(&self, stiffness: f32) -> f32 {
+        let (last, share) = self.last_share.get();
+        if stiffness.to_bits() == last.to_bits() {
+            return share;
+        }
+        let share = stiffness_per_pass(stiffness, self.parameters.iterations);
+        self.last_share.set((stiffness, share));
+        share
+    }
+
+    fn limits(&self, index: u32) -> Limits {
+        self.model.limits(index).or(self.parameters.limits())
+    }
+
+    /// The lengths above which a constraint tears: by its stretch, and by its distance.
+    fn tear_lengths(&self, index: u32) -> (f32, f32) {
+        let rest_length = self.model.constraints[index as usize].rest_length;
+        let limits = self.limits(index);
+        (
+            ratio_length(limits.tear_stretch, rest_length),
+            distance_length(limits.tear_distance, rest_length),
+        )
+    }
+
+    /// Why a constraint that is too long tears.
+    pub(crate) fn length_cause(&self, index: u32) -> TearCause {
+        let (by_stretch, by_distance) = self.tear_lengths(index);
+        if by_stretch <= by_distance { TearCause::Stretch } else { TearCause::Distance }
+    }
+}
+
+impl Terms for Recipe<'_> {
+    fn term(&self, index: u32) -> Term {
+        let one = self.model.constraints[index as usize];
+        let limits = self.limits(index);
+        let (by_stretch, by_distance) = self.tear_lengths(index);
+        let force = limits.tear_force.unwrap_or(f32::INFINITY);
+        Term {
+            rest: self.rest(one),
+            // A length is never below -1.
+            floor: if one.kind == ConstraintKind::Tether { one.rest_length } else { -1.0 },
+            give: self.give(one),
+            max_length: ratio_length(limits.max_stretch, one.rest_length),
+            tear_length: if by_stretch <= by_distance { by_stretch } else { by_distance },
+            tear_multiplier: force * (self.setup.h * self.setup.h),
+        }
+    }
+
+    fn pass_count(&self) -> u32 {
+        self.parameters.iterations
     }
 }
 

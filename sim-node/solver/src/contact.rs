@@ -1,13 +1,31 @@
 //! Contacts: what is inside a collider is pushed out, rubs, and bounces.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use crate::colliders::{Collider, Moments};
-use crate::particles::Particles;
+use crate::kernels::Wide;
 use crate::scene::SceneCollider;
-use crate::solid::{Hit, Solid, Way, solids};
+use crate::solid::{Hit, Solid, Way, Zone, solids};
 
-/// The contacts of the running substep.
+/// Particles side by side, as contacts see and move them.
+pub(crate) trait Cells {
+    fn count(&self) -> usize;
+    fn inverse_mass(&self, index: usize) -> f32;
+    /// Position and displacement.
+    fn way(&self, index: usize) -> Way;
+    /// The displacement before any constraint or contact.
+    fn predicted(&self, index: usize) -> Vec3;
+    fn set_displacement(&mut self, index: usize, displacement: Vec3);
+    fn set_position(&mut self, index: usize, position: Vec3);
+    /// Whether any of the particles 8 `eight`, ..., 8 `eight` + 7 may be in a zone.
+    fn may_touch<W: Wide>(&self, eight: usize, zone: &Zone) -> bool;
+    /// x += d.
+    fn advance<W: Wide>(&mut self);
+}
+
+/// The contacts of some particles in the running substep.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Contacts {
     /// Particles that touched something, in the order in which they first did.
@@ -18,6 +36,14 @@ pub(crate) struct Contacts {
     /// By particle: what its bounces add. Friction does not know of them: they are no way that was
     /// made in this substep.
     bounces: Vec<Vec3>,
+}
+
+/// A collider as the particles of a substep meet it; of bounds, one face.
+#[derive(Debug, Clone)]
+pub(crate) struct Obstacle {
+    surface: Surface,
+    solid: Solid,
+    zone: Zone,
 }
 
 /// The collider of a contact, in the running substep.
@@ -32,6 +58,25 @@ struct Surface {
     h: f32,
     /// Approach speeds up to this one end at rest: 2 |g| h, twice what gravity gives in a substep.
     rest_speed: f32,
+}
+
+/// Most obstacles that a collider is: bounds have six faces.
+pub(crate) const OBSTACLES_PER_COLLIDER: usize = 6;
+
+/// What the particles of a substep meet, in the order in which they meet it.
+pub(crate) fn place_obstacles(
+    obstacles: &mut Vec<Obstacle>,
+    colliders: &[Collider],
+    step: &ContactStep,
+) {
+    obstacles.clear();
+    for collider in colliders {
+        let surface = Surface::new(collider, step);
+        for solid in solids(collider, step).into_iter().flatten() {
+            let zone = solid.zone();
+            obstacles.push(Obstacle { surface, solid, zone });
+        }
+    }
 }
 
 /// How deep a place is inside of a collider at load; none where it is not, but for a rounding.
@@ -73,60 +118,70 @@ pub(crate) struct ContactStep {
 }
 
 impl Contacts {
-    pub(crate) fn new(particle_count: usize) -> Self {
+    /// Room for so many particles side by side; none where there are no colliders.
+    pub(crate) fn new(count: usize) -> Self {
         Self {
-            touched: Vec::with_capacity(particle_count),
-            is_touched: vec![false; particle_count],
-            velocities: vec![Vec3::ZERO; particle_count],
-            bounces: vec![Vec3::ZERO; particle_count],
+            touched: Vec::with_capacity(count),
+            is_touched: vec![false; count],
+            velocities: vec![Vec3::ZERO; count],
+            bounces: vec![Vec3::ZERO; count],
         }
     }
 
-    /// Pushes every free particle out of a collider.
-    pub(crate) fn collide(
-        &mut self,
-        particles: &mut Particles,
-        collider: &Collider,
-        step: &ContactStep,
-    ) {
-        let surface = Surface::new(collider, step);
-        for solid in solids(collider, step).iter().flatten() {
-            for index in 0..particles.count() {
-                if particles.positions[index][3] == 0.0 {
-                    continue;
+    /// Ends a substep: what is inside of an obstacle is pushed out, everything takes its way, and
+    /// what touched something goes on with the velocity that its contacts leave it.
+    #[inline(always)]
+    pub(crate) fn end_substep<W: Wide>(&mut self, cells: &mut impl Cells, obstacles: &[Obstacle]) {
+        for obstacle in obstacles {
+            for eight in 0..cells.count().div_ceil(8) {
+                if cells.may_touch::<W>(eight, &obstacle.zone) {
+                    let last = cells.count().min(8 * eight + 8);
+                    self.collide(cells, 8 * eight..last, obstacle);
                 }
-                let way = Way {
-                    start: vector(particles.positions[index]),
-                    displacement: vector(particles.displacements[index]),
-                };
-                if let Some(hit) = solid.hit(&way) {
-                    let rounding = rounding(&way, solid);
-                    self.resolve(particles, index, &way, (&surface, &Contact { hit, rounding }));
-                }
+            }
+        }
+        cells.advance::<W>();
+        if !self.touched.is_empty() {
+            self.part(cells, obstacles);
+        }
+    }
+
+    /// Pushes free particles out of an obstacle.
+    #[inline(never)]
+    fn collide(&mut self, cells: &mut impl Cells, range: Range<usize>, obstacle: &Obstacle) {
+        for index in range {
+            if cells.inverse_mass(index) == 0.0 {
+                continue;
+            }
+            let way = cells.way(index);
+            if let Some(hit) = obstacle.solid.hit(&way) {
+                let rounding = rounding(&way, &obstacle.solid);
+                self.resolve(cells, index, &way, (&obstacle.surface, &Contact { hit, rounding }));
             }
         }
     }
 
     /// Takes back, from the new positions of what touched something, the rounding by which they
-    /// are still inside of a collider.
-    pub(crate) fn settle(
-        &self,
-        particles: &mut Particles,
-        collider: &Collider,
-        step: &ContactStep,
-    ) {
-        for solid in solids(collider, step).iter().flatten() {
+    /// are still inside of an obstacle, and gives them the velocities that their contacts leave
+    /// them.
+    #[inline(never)]
+    fn part(&mut self, cells: &mut impl Cells, obstacles: &[Obstacle]) {
+        for Obstacle { solid, .. } in obstacles {
             for index in self.touched.iter().map(|index| *index as usize) {
-                let start = vector(particles.positions[index]);
+                let Way { start, displacement } = cells.way(index);
                 let Some(hit) = solid.hit(&Way { start, displacement: Vec3::ZERO }) else {
                     continue;
                 };
-                let displacement = vector(particles.displacements[index]);
                 if hit.depth <= rounding(&Way { start, displacement }, solid) {
-                    let [x, y, z] = (start + hit.normal * hit.depth).to_array();
-                    particles.positions[index][..3].copy_from_slice(&[x, y, z]);
+                    cells.set_position(index, start + hit.normal * hit.depth);
                 }
             }
+        }
+        let h = obstacles.first().map_or(0.0, |obstacle| obstacle.surface.h);
+        for index in self.touched.drain(..).map(|index| index as usize) {
+            let velocity = self.velocities[index] + std::mem::take(&mut self.bounces[index]);
+            cells.set_displacement(index, velocity * h);
+            self.is_touched[index] = false;
         }
     }
 
@@ -139,7 +194,7 @@ impl Contacts {
     /// al. 2020, section 3.6). The push itself gives no speed.
     fn resolve(
         &mut self,
-        particles: &mut Particles,
+        cells: &mut impl Cells,
         index: usize,
         way: &Way,
         (surface, contact): (&Surface, &Contact),
@@ -158,24 +213,15 @@ impl Contacts {
         let grip = friction * if gained > 0.0 { gained } else { 0.0 };
         let slide = sliding.length() * h;
         let kept = if slide > grip { sliding * (1.0 - grip / slide) } else { Vec3::ZERO };
-        let approach = (carried - vector(particles.velocities[index])).dot(normal);
+        let approach = (carried - cells.predicted(index) / h).dot(normal);
         let bounce = if approach > rest_speed { restitution * approach } else { 0.0 };
         let displacement = way.displacement + normal * depth - (sliding - kept) * h;
-        particles.displacements[index] = displacement.extend(0.0).to_array();
+        cells.set_displacement(index, displacement);
         self.velocities[index] = carried + kept;
         self.bounces[index] += normal * bounce;
         if !std::mem::replace(&mut self.is_touched[index], true) {
             #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
             self.touched.push(index as u32);
-        }
-    }
-
-    /// Gives the particles that touched something the velocities that their contacts leave them.
-    pub(crate) fn finish(&mut self, particles: &mut Particles) {
-        for index in self.touched.drain(..).map(|index| index as usize) {
-            let velocity = self.velocities[index] + std::mem::take(&mut self.bounces[index]);
-            particles.velocities[index] = velocity.extend(0.0).to_array();
-            self.is_touched[index] = false;
         }
     }
 }
@@ -204,8 +250,4 @@ impl Surface {
     fn velocity_at(&self, point: Vec3) -> Vec3 {
         self.linear + self.angular.cross(point - self.pivot)
     }
-}
-
-fn vector([x, y, z, _]: [f32; 4]) -> Vec3 {
-    Vec3::new(x, y, z)
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{COORDINATE_MAX, Rejection, Solver, check_finite, is_near};
+use crate::{COORDINATE_MAX, Constraint, Rejection, Solver, TearCause, check_finite, is_near};
 
 /// The way of a cursor, extended along the direction of view: a strip that cuts what crosses it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,11 +33,11 @@ impl Solver {
         if constraint as usize >= self.constraint_count() {
             return Err(Rejection::UnknownConstraint);
         }
-        if self.constraints.is_torn(constraint) {
+        if self.torn.is_torn(constraint) {
             return Err(Rejection::AlreadyTorn);
         }
-        self.torn.cut(&mut self.constraints, constraint);
-        self.tethers.drop_torn(&self.constraints);
+        self.tear(constraint, TearCause::Cut);
+        self.tethers.drop_torn(&self.torn, &mut self.bodies);
         Ok(())
     }
 
@@ -82,18 +82,18 @@ impl Solver {
 
     /// Tears what is whole and meets a condition on its two ends.
     fn tear_all(&mut self, is_cut: impl Fn(Vec3, Vec3) -> bool) {
-        let at = |particle: u32, positions: &[[f32; 4]]| {
-            let [x, y, z, _] = positions[particle as usize];
-            Vec3::new(x, y, z)
-        };
-        for (index, constraint) in (0_u32..).zip(&self.model.constraints) {
-            let positions = &self.particles.positions;
-            let (a, b) = (at(constraint.a, positions), at(constraint.b, positions));
-            if !self.constraints.is_torn(index) && is_cut(a, b) {
-                self.torn.cut(&mut self.constraints, index);
+        for index in 0..self.model.constraints.len() {
+            let Constraint { a, b, .. } = self.model.constraints[index];
+            let [a, b] = [a, b].map(|particle| {
+                Vec3::from_array(self.particles.states[particle as usize].position)
+            });
+            #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 constraints")]
+            let index = index as u32;
+            if !self.torn.is_torn(index) && is_cut(a, b) {
+                self.tear(index, TearCause::Cut);
             }
         }
-        self.tethers.drop_torn(&self.constraints);
+        self.tethers.drop_torn(&self.torn, &mut self.bodies);
     }
 }
 

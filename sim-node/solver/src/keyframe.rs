@@ -197,7 +197,7 @@ impl Solver {
         self.check(particles, keyframe)?;
         self.reset();
         for (index, particle) in particles.iter().enumerate() {
-            self.particles.set(index, particle);
+            self.particles.states[index] = *particle;
             if particle.inverse_mass != 0.0 {
                 self.particles.base_inverse_masses[index] = particle.inverse_mass;
             }
@@ -211,22 +211,19 @@ impl Solver {
         self.parameters = keyframe.parameters;
         self.restore_constraints(keyframe);
         self.restore_frames(keyframe);
-        self.state_hash = state_hash(&self.particles, self.torn.hash_seed());
+        self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());
         Ok(())
     }
 
     fn restore_constraints(&mut self, keyframe: &Keyframe) {
-        self.due = Due::default();
-        self.configure();
         self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
-        for index in &keyframe.torn {
-            self.constraints.tear(*index);
-        }
+        self.due = Due::default();
         if self.settings.tethers {
             let basis = keyframe.tethers.clone();
             self.tethers = Tethers::new(&self.model, &self.parameters, basis);
-            self.tethers.drop_torn(&self.constraints);
         }
+        self.configure();
+        self.tethers.drop_torn(&self.torn, &mut self.bodies);
     }
 
     fn restore_frames(&mut self, keyframe: &Keyframe) {
@@ -243,6 +240,6 @@ impl Solver {
     }
 
     fn is_fixed(&self, particle: u32) -> bool {
-        self.particles.flags[particle as usize] & flag::FIXED != 0
+        self.particles.states[particle as usize].flags & flag::FIXED != 0
     }
 }

@@ -18,18 +18,26 @@
 //! ```
 //!
 //! There is no process, clock, file or message in this crate.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel that is not inlined is compiled for the oldest processor, and goes through memory"
+)]
 
 mod anchors;
+mod bodies;
 pub mod builtin;
 mod colliders;
 mod commands;
 mod constraints;
 mod contact;
+mod crew;
 mod cut;
 mod drive;
+mod families;
 mod frame;
 mod hash;
+mod kernels;
 mod keyframe;
 mod order;
 mod parameters;
@@ -49,6 +57,7 @@ pub(crate) use commands::{check_finite, is_near};
 pub use constraints::{Constraint, ConstraintKind};
 pub use cut::{Ball, Sweep};
 pub use frame::Pose;
+pub use kernels::Kernels;
 pub use keyframe::{Keyframe, KeyframeError, RestoreError};
 pub use parameters::{PARAMETERS, Setting};
 pub use particles::{Particle, flag};
@@ -58,4 +67,4 @@ pub use tear::TearCause;
 
 /// Version of the arithmetic. It changes with any change of the bits that a step produces, and a
 /// recording is re-simulated only by the version that made it.
-pub const SOLVER_VERSION: u32 = 2;
+pub const SOLVER_VERSION: u32 = 3;

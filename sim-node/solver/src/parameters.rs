@@ -144,7 +144,7 @@ impl Parameters {
         }
         Ok(match name {
             "compliance" | "stiffness" => Affected::RigidPaths,
-            "substeps" | "iterations" | "relaxation" => Affected::Constraints,
+            "substeps" | "iterations" | "relaxation" | "wind_drag" => Affected::Constraints,
             "max_stretch" | "tear_stretch" | "tear_distance" | "tear_force" => {
                 Affected::Constraints
             }

@@ -1,4 +1,4 @@
-//! The state of the particles: one array per field, hot arrays apart from cold ones.
+//! The state of the particles, as it is published between two steps.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -36,84 +36,53 @@ pub mod flag {
     pub(crate) const FIXED: u32 = PINNED | GRABBED | ANCHORED | FROZEN;
 }
 
-/// All particles, `particle_count` entries in each array. Vectors are padded to four lanes, so
-/// that a particle is one 16-byte load for a vector kernel.
+/// All particles between two steps, `particle_count` entries in each array.
 #[derive(Debug, Clone)]
 pub(crate) struct Particles {
-    /// x, y, z, and in the last lane the inverse mass that the step uses.
-    pub(crate) positions: Vec<[f32; 4]>,
-    /// The displacement d of the running substep; the last lane is 0.
-    pub(crate) displacements: Vec<[f32; 4]>,
-    /// The last lane is 0.
-    pub(crate) velocities: Vec<[f32; 4]>,
-    /// Cold: the inverse mass of the particle when nothing holds it.
+    /// As they are published.
+    pub(crate) states: Vec<Particle>,
+    /// The inverse mass of the particle when nothing holds it.
     pub(crate) base_inverse_masses: Vec<f32>,
-    /// Cold: bits of [`flag`].
-    pub(crate) flags: Vec<u32>,
-    /// Positions at the start of the step, for particles that must be frozen at its end.
-    pub(crate) step_starts: Vec<[f32; 4]>,
 }
 
 impl Particles {
     /// The particles of a scene at its step 0; what follows an anchor is held by that alone.
     pub(crate) fn new(scene: &[SceneParticle], anchored: impl Iterator<Item = u32>) -> Self {
-        let mut flags: Vec<_> =
-            scene.iter().map(|one| if one.pinned { flag::PINNED } else { 0 }).collect();
+        let state = |one: &SceneParticle| Particle {
+            position: one.position.map(|axis| axis + 0.0),
+            inverse_mass: 0.0,
+            velocity: one.velocity.map(|axis| axis + 0.0),
+            flags: if one.pinned { flag::PINNED } else { 0 },
+        };
+        let mut states: Vec<_> = scene.iter().map(state).collect();
         for particle in anchored {
-            flags[particle as usize] = flag::ANCHORED;
+            states[particle as usize].flags = flag::ANCHORED;
         }
-        let pad = |[x, y, z]: [f32; 3], last| [x + 0.0, y + 0.0, z + 0.0, last];
-        let base_inverse_mass = |particle: &SceneParticle| 1.0 / particle.mass;
-        let positions: Vec<_> = scene
-            .iter()
-            .zip(&flags)
-            .map(|(one, flags)| {
-                pad(one.position, if *flags == 0 { base_inverse_mass(one) } else { 0.0 })
-            })
-            .collect();
-        Self {
-            displacements: vec![[0.0; 4]; scene.len()],
-            velocities: scene.iter().map(|one| pad(one.velocity, 0.0)).collect(),
-            base_inverse_masses: scene.iter().map(base_inverse_mass).collect(),
-            flags,
-            step_starts: positions.clone(),
-            positions,
+        let base_inverse_masses: Vec<_> = scene.iter().map(|one| 1.0 / one.mass).collect();
+        for (state, base) in states.iter_mut().zip(&base_inverse_masses) {
+            state.inverse_mass = if state.flags == 0 { *base } else { 0.0 };
         }
-    }
-
-    pub(crate) fn count(&self) -> usize {
-        self.positions.len()
-    }
-
-    pub(crate) fn get(&self, index: usize) -> Particle {
-        let [x, y, z, inverse_mass] = self.positions[index];
-        let [vx, vy, vz, _] = self.velocities[index];
-        Particle {
-            position: [x, y, z],
-            inverse_mass,
-            velocity: [vx, vy, vz],
-            flags: self.flags[index],
-        }
-    }
-
-    pub(crate) fn set(&mut self, index: usize, particle: &Particle) {
-        let [x, y, z] = particle.position;
-        let [vx, vy, vz] = particle.velocity;
-        self.positions[index] = [x, y, z, particle.inverse_mass];
-        self.velocities[index] = [vx, vy, vz, 0.0];
-        self.displacements[index] = [0.0; 4];
-        self.flags[index] = particle.flags;
+        Self { states, base_inverse_masses }
     }
 
     /// Sets and clears flags, and gives the particle the inverse mass that follows from them.
     pub(crate) fn change_flags(&mut self, index: usize, set: u32, clear: u32) {
-        let flags = (self.flags[index] | set) & !clear;
-        self.flags[index] = flags;
-        let is_fixed = flags & flag::FIXED != 0;
-        self.positions[index][3] = if is_fixed { 0.0 } else { self.base_inverse_masses[index] };
+        let state = &mut self.states[index];
+        state.flags = (state.flags | set) & !clear;
+        let is_fixed = state.flags & flag::FIXED != 0;
+        state.inverse_mass = if is_fixed { 0.0 } else { self.base_inverse_masses[index] };
     }
 
     pub(crate) fn stop(&mut self, index: usize) {
-        self.velocities[index] = [0.0; 4];
+        self.states[index].velocity = [0.0; 3];
+    }
+
+    /// Commands may leave -0, which is published as +0.
+    pub(crate) fn make_zeros_canonical(&mut self) {
+        for state in &mut self.states {
+            for number in state.position.iter_mut().chain(&mut state.velocity) {
+                *number += 0.0;
+            }
+        }
     }
 }

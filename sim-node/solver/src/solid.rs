@@ -4,6 +4,7 @@ use glam::{Quat, Vec3};
 
 use crate::colliders::{Body, Collider};
 use crate::contact::ContactStep;
+use crate::kernels::{Lanes, each};
 
 /// Where a particle leaves a collider.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +24,55 @@ pub(crate) struct Way {
     pub(crate) displacement: Vec3,
 }
 
+/// Where ways can end inside of a solid, or pass through it: nowhere else.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Zone {
+    /// Where the height above a plane is below 0.
+    Below { normal: Vec3, offset: f32 },
+    /// Around a solid.
+    Around { min: Vec3, max: Vec3 },
+}
+
+impl Zone {
+    /// All within a distance of some points, and what rounding may add.
+    fn around(points: [Vec3; 2], distance: Vec3, reach: f32) -> Self {
+        let distance = distance + Vec3::splat(64.0 * f32::EPSILON * reach);
+        let ([a, b], mut min, mut max) = (points, Vec3::ZERO, Vec3::ZERO);
+        for axis in 0..3 {
+            let (low, high) = if a[axis] < b[axis] { (a, b) } else { (b, a) };
+            (min[axis], max[axis]) = (low[axis] - distance[axis], high[axis] + distance[axis]);
+        }
+        Self::Around { min, max }
+    }
+
+    /// Whether a way comes into it.
+    #[inline(always)]
+    pub(crate) fn may_be_met<L: Lanes>(&self, x: [L; 3], d: [L; 3]) -> L::Mask {
+        match self {
+            // As `hit_half_space` works it out.
+            Self::Below { normal, offset } => {
+                let normal = each(normal.to_array(), L::splat);
+                let along =
+                    |way: [L; 3]| normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2];
+                ((along(x) - L::splat(*offset)) + along(d)).is_below(L::splat(0.0))
+            }
+            Self::Around { min, max } => {
+                let meets = |axis: usize| {
+                    let (start, end) = (x[axis], x[axis] + d[axis]);
+                    let is_down = end.is_below(start);
+                    let low = L::choose(is_down, end, start);
+                    let high = L::choose(is_down, start, end);
+                    let (min, max) = (L::splat(min[axis]), L::splat(max[axis]));
+                    L::both(low.is_at_most(max), min.is_at_most(high))
+                };
+                L::both(L::both(meets(0), meets(1)), meets(2))
+            }
+        }
+    }
+}
+
 /// Everything that a particle can be inside of, where it is at the end of a substep.
+#[derive(Debug, Clone)]
 pub(crate) enum Solid {
     HalfSpace { normal: Vec3, offset: f32 },
     Ball { center: Vec3, radius: f32 },
@@ -72,6 +121,28 @@ impl Solid {
                 let (start, end) = (before.local(way.start), now.local_end(way));
                 let (face, depth) = block.hit(start.to_array(), end.to_array())?;
                 Some(Hit { normal: now.face_normal(face), depth })
+            }
+        }
+    }
+
+    /// Where it can be met.
+    pub(crate) fn zone(&self) -> Zone {
+        let reach = self.reach();
+        match self {
+            Self::HalfSpace { normal, offset } => Zone::Below { normal: *normal, offset: *offset },
+            Self::Ball { center, radius } => {
+                Zone::around([*center; 2], Vec3::splat(*radius), reach)
+            }
+            Self::Capsule { ends, radius } => Zone::around(*ends, Vec3::splat(*radius), reach),
+            Self::Block { block, now, before } => {
+                let extents = Vec3::from_array(block.extents);
+                // A box that turns sweeps a ball.
+                let is_turned = now.is_turned || before.is_turned;
+                let mut distance = if is_turned { Vec3::splat(extents.length()) } else { extents };
+                if block.axis_count == 2 {
+                    distance.z = f32::INFINITY;
+                }
+                Zone::around([now.center, before.center], distance, reach)
             }
         }
     }
@@ -133,6 +204,7 @@ struct Face {
 const FACES: [(usize, f32); 6] = [(0, 1.0), (1, 1.0), (2, 1.0), (0, -1.0), (1, -1.0), (2, -1.0)];
 
 /// A box in its own axes, of which a 2-D scene has two.
+#[derive(Debug, Clone)]
 pub(crate) struct Block {
     extents: [f32; 3],
     axis_count: usize,
@@ -233,6 +305,7 @@ impl Block {
 }
 
 /// The axes of a box where it is.
+#[derive(Debug, Clone)]
 pub(crate) struct Axes {
     center: Vec3,
     rotation: Quat,

@@ -1,11 +1,13 @@
 //! The running state of a scene.
 
 use crate::anchors::Anchors;
+use crate::bodies::{Bodies, Extras};
 use crate::colliders::{Collider, PlacedCollider};
-use crate::constraints::{Constraint, Constraints, Setup};
-use crate::contact::Contacts;
+use crate::constraints::{Constraint, Recipe, Setup};
+use crate::contact::{OBSTACLES_PER_COLLIDER, Obstacle};
 use crate::drive::Grab;
 use crate::hash::state_hash;
+use crate::kernels::Kernels;
 use crate::order::Order;
 use crate::parameters::Parameters;
 use crate::particles::{Particle, Particles};
@@ -27,13 +29,16 @@ pub struct Solver {
     initial_parameters: Parameters,
     /// z is 0 bit for bit.
     pub(crate) is_planar: bool,
+    /// Between two steps.
     pub(crate) particles: Particles,
-    pub(crate) constraints: Constraints,
+    /// Within a step.
+    pub(crate) bodies: Bodies,
     pub(crate) torn: Torn,
     pub(crate) tethers: Tethers,
     /// In the order of the scene, which is that of contacts.
     pub(crate) colliders: Vec<Collider>,
-    pub(crate) contacts: Contacts,
+    /// The colliders as the running substep meets them.
+    pub(crate) obstacles: Vec<Obstacle>,
     pub(crate) anchors: Anchors,
     scene_anchors: Vec<SceneAnchor>,
     pub(crate) air: Air,
@@ -61,20 +66,25 @@ pub(crate) struct Due {
 impl Solver {
     /// Makes the state at step 0: the particles as given, nothing projected.
     pub fn new(scene: &Scene) -> Self {
+        Self::with_kernels(scene, Kernels::best())
+    }
+
+    /// As [`Self::new`], with other kernels than the best ones: for tests and comparisons. All give
+    /// the same bits.
+    pub fn with_kernels(scene: &Scene, kernels: Kernels) -> Self {
         let model = scene.model();
         let settings = scene.solver;
         let order = Order::new(&model, settings.order);
         let particles = new_particles(&model, &scene.anchors);
         let (particle_count, constraint_count) = (model.particles.len(), model.constraints.len());
-        let contact_count = if scene.colliders.is_empty() { 0 } else { particle_count };
         let parameters = Parameters::new(scene);
         let mut solver = Self {
-            state_hash: state_hash(&particles, 0),
-            constraints: Constraints::new(&model, &order),
+            state_hash: state_hash(&particles.states, 0),
+            bodies: Bodies::new(&model, &order, kernels),
             torn: Torn::new(constraint_count),
             tethers: Tethers::default(),
             colliders: scene.colliders.iter().map(Collider::new).collect(),
-            contacts: Contacts::new(contact_count),
+            obstacles: Vec::with_capacity(OBSTACLES_PER_COLLIDER * scene.colliders.len()),
             anchors: Anchors::new(&scene.anchors, &model.particles),
             scene_anchors: scene.anchors.clone(),
             air: Air::new(scene.wind, settings.rate_hz, particle_count, &model.triangles),
@@ -101,12 +111,24 @@ impl Solver {
         Self { is_restored: true, ..Self::new(scene) }
     }
 
+    /// Steps with so many threads from now on, this one included; 1 is how it begins. They change no
+    /// bit. Small scenes are stepped by one, whatever is set.
+    pub fn set_threads(&mut self, threads: usize) {
+        if threads != self.bodies.threads() {
+            self.bodies.set_threads(threads);
+        }
+    }
+
+    /// Threads that step it, this one included.
+    pub fn threads(&self) -> usize {
+        self.bodies.threads()
+    }
+
     /// Makes the next step's state the initial one: particles, parameters, colliders and anchors
     /// as loaded, nothing grabbed, nothing torn.
     pub fn reset(&mut self) {
         self.particles = new_particles(&self.model, &self.scene_anchors);
         self.parameters = self.initial_parameters;
-        self.constraints.mend(&self.model);
         self.torn.clear();
         self.grabs.clear();
         self.anchors.reset();
@@ -126,26 +148,44 @@ impl Solver {
             self.configure();
         }
         if tethers {
-            self.tie();
+            self.work_out_tethers();
         }
     }
 
-    /// Works out what constraints derive from the parameters.
+    /// Works out what constraints derive from the parameters, and makes room for it.
     pub(crate) fn configure(&mut self) {
-        let setup = Setup { method: self.settings.method, h: self.h() };
-        self.constraints.configure(&self.model, &self.parameters, setup);
+        let recipe = Recipe::new(&self.model, &self.parameters, self.setup());
+        let extras = Extras {
+            colliders: !self.colliders.is_empty(),
+            wind: self.air.has_surface() && self.parameters.wind_drag > 0.0,
+            tethers: self.settings.tethers,
+        };
+        self.bodies.configure(&recipe, extras, self.torn.all());
+        if extras.wind {
+            self.air.find_corners(&self.bodies, &self.model.triangles);
+        }
+        self.tethers.tie(&mut self.bodies, &self.particles);
+    }
+
+    pub(crate) fn setup(&self) -> Setup {
+        Setup { method: self.settings.method, h: self.h() }
     }
 
     /// Works out the tethers of the state as it is, where the scene has any.
-    fn tie(&mut self) {
-        if self.settings.tethers {
-            self.tethers = Tethers::of_state(
-                &self.model,
-                &self.parameters,
-                &self.particles,
-                self.torn.order(),
-            );
+    fn work_out_tethers(&mut self) {
+        if !self.settings.tethers {
+            return;
         }
+        self.tethers.untie(&mut self.bodies);
+        let (model, parameters) = (&self.model, &self.parameters);
+        self.tethers = Tethers::of_state(model, parameters, &self.particles, self.torn.order());
+        self.tethers.tie(&mut self.bodies, &self.particles);
+    }
+
+    /// Takes a constraint out for good, unless it is torn already.
+    pub(crate) fn tear(&mut self, constraint: u32, cause: TearCause) {
+        self.torn.tear(constraint, cause);
+        self.bodies.tear(constraint);
     }
 
     /// Length of a substep in seconds.
@@ -181,7 +221,12 @@ impl Solver {
 
     /// Number of particles.
     pub fn particle_count(&self) -> usize {
-        self.particles.count()
+        self.particles.states.len()
+    }
+
+    /// The particles after the last step, as they are published and hashed.
+    pub fn particles(&self) -> &[Particle] {
+        &self.particles.states
     }
 
     /// One particle after the last step.
@@ -189,7 +234,7 @@ impl Solver {
     /// # Panics
     /// If there is no particle `index`.
     pub fn particle(&self, index: usize) -> Particle {
-        self.particles.get(index)
+        self.particles.states[index]
     }
 
     /// Number of constraints.

@@ -2,17 +2,16 @@
 //! allocated, locked, read from a clock or printed. (What commands left to be worked out at the
 //! boundary before it may allocate, once: `finish_boundary`.)
 
-use std::ops::Range;
-
 use crate::Solver;
+use crate::bodies::{Fall, Motion};
 use crate::colliders::Moments;
-use crate::constraints::Constraints;
-use crate::contact::ContactStep;
+use crate::constraints::Recipe;
+use crate::contact::{ContactStep, place_obstacles};
 use crate::drive::{Substep, count_step, drive_grabbed};
 use crate::hash::state_hash;
-use crate::particles::{Particles, flag};
-use crate::project::{Pass, limit_stretch, project_group};
-use crate::tear::Torn;
+use crate::particles::flag;
+use crate::project::BY_LENGTH;
+use crate::tear::TearCause;
 use crate::wind::Breeze;
 
 impl Solver {
@@ -30,23 +29,25 @@ impl Solver {
             for collider in &mut self.colliders {
                 collider.place(0.0);
             }
+            self.particles.make_zeros_canonical();
         } else {
             self.begin_step();
+            let mut is_any_marked = false;
             for index in 0..self.parameters.substeps {
-                self.substep(Substep { index, count: self.parameters.substeps });
+                is_any_marked |= self.substep(Substep { index, count: self.parameters.substeps });
             }
-            self.end_step();
+            self.end_step(is_any_marked);
         }
-        if self.torn.end_step(&mut self.constraints) {
-            self.tethers.drop_torn(&self.constraints);
+        if self.torn.end_step() {
+            self.tethers.drop_torn(&self.torn, &mut self.bodies);
         }
-        make_zeros_canonical(&mut self.particles);
-        self.state_hash = state_hash(&self.particles, self.torn.hash_seed());
+        self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());
     }
 
-    /// Works out where everything that moves by itself is to be at the end of the step.
+    /// Takes over the state, and works out where everything that moves by itself is to be at the
+    /// end of the step.
     fn begin_step(&mut self) {
-        self.particles.step_starts.copy_from_slice(&self.particles.positions);
+        self.bodies.unpack(&self.particles.states);
         self.scene_step += 1;
         let (time_s, dt) = (self.scene_time_s(), self.step_length());
         self.anchors.begin_step(time_s);
@@ -55,81 +56,48 @@ impl Solver {
         }
     }
 
-    fn substep(&mut self, substep: Substep) {
-        let h = self.h();
-        self.predict(h);
-        self.drive(substep, self.parameters.max_speed * h);
-        self.project();
-        limit_stretch(&mut self.particles, &self.constraints);
-        self.tethers.pull(&mut self.particles);
+    /// What is held goes its way, the wind blows; then everything falls, is brought back by its
+    /// constraints, and by its tethers, and is pushed out of the colliders. Whether anything tears
+    /// at the end of the step.
+    fn substep(&mut self, substep: Substep) -> bool {
+        self.drive(substep);
+        self.blow(substep);
         let contact_step = self.contact_step(substep);
-        self.collide(&contact_step);
-        update(&mut self.particles, h);
-        self.part(&contact_step);
+        place_obstacles(&mut self.obstacles, &self.colliders, &contact_step);
+        let motion = Motion { fall: self.fall(substep), obstacles: &self.obstacles };
+        self.bodies.substep(&motion, self.parameters.iterations)
     }
 
-    /// Everything falls, is slowed down by damping, and is carried along by the wind.
-    fn predict(&mut self, h: f32) {
-        let prediction = Prediction {
-            h,
-            kept: kept_share(self.parameters.damping * h),
-            max_speed: self.parameters.max_speed,
-        };
-        let fall = self.parameters.gravity.map(|axis| h * axis);
-        if !(self.air.has_surface() && self.parameters.wind_drag > 0.0) {
-            predict(&mut self.particles, &prediction, |_| fall);
+    /// Anchored and grabbed particles go their own way; a hand is stronger than an anchor. Tethers
+    /// follow.
+    fn drive(&mut self, substep: Substep) {
+        let reach = self.parameters.max_speed * self.h();
+        let Self { bodies, particles, anchors, grabs, tethers, .. } = self;
+        anchors.drive(bodies, particles, (substep.left(), reach));
+        drive_grabbed(bodies, grabs, substep, reach);
+        tethers.follow_roots(bodies);
+    }
+
+    fn blow(&mut self, substep: Substep) {
+        let drag = self.parameters.wind_drag;
+        if !self.air.has_surface() || drag == 0.0 {
             return;
         }
         let strength = self.air.strength(self.scene_step);
         let velocity = self.parameters.wind_velocity.map(|axis| strength * axis);
-        let breeze = Breeze { velocity, drag: self.parameters.wind_drag, h };
-        self.air.blow(&self.particles, &self.model.triangles, &breeze);
-        let gains = &self.air.gains;
-        predict(&mut self.particles, &prediction, |index| {
-            let [x, y, z] = gains[index];
-            [fall[0] + x, fall[1] + y, fall[2] + z]
-        });
+        let breeze = Breeze { velocity, drag, h: self.h(), is_first: substep.is_first() };
+        self.air.blow(&mut self.bodies, &breeze);
     }
 
-    /// Anchored and grabbed particles go their own way; a hand is stronger than an anchor.
-    fn drive(&mut self, substep: Substep, reach: f32) {
-        self.anchors.drive(&mut self.particles, substep.left(), reach);
-        drive_grabbed(&mut self.particles, &self.grabs, substep, reach);
-    }
-
-    /// The passes of a substep over all constraints, group by group.
-    fn project(&mut self) {
-        let Self { particles, constraints, torn, settings, parameters, .. } = self;
-        let pass = Pass { method: settings.method, relaxation: parameters.relaxation };
-        constraints.multipliers.fill(0.0);
-        for iteration in 0..parameters.iterations {
-            if iteration == 0 && !constraints.tear_lengths.is_empty() {
-                project_measured(particles, constraints, torn, pass);
-                continue;
-            }
-            for group in 0..constraints.groups.len() {
-                let range = constraints.groups[group].clone();
-                project_group(particles, constraints, range, pass);
-            }
+    fn fall(&self, substep: Substep) -> Fall {
+        let (h, parameters) = (self.h(), &self.parameters);
+        Fall {
+            h,
+            kept: kept_share(parameters.damping * h),
+            gain: parameters.gravity.map(|axis| h * axis),
+            reach: parameters.max_speed * h,
+            is_first: substep.is_first(),
         }
-        if !constraints.tear_multipliers.is_empty() {
-            torn.mark_overloaded(constraints);
-        }
-    }
-
-    /// Contacts come last, so that no published state is inside of a collider.
-    fn collide(&mut self, step: &ContactStep) {
-        for collider in &self.colliders {
-            self.contacts.collide(&mut self.particles, collider, step);
-        }
-    }
-
-    /// What touched something goes on with the velocity that its contacts leave it.
-    fn part(&mut self, step: &ContactStep) {
-        for collider in &self.colliders {
-            self.contacts.settle(&mut self.particles, collider, step);
-        }
-        self.contacts.finish(&mut self.particles);
     }
 
     fn contact_step(&self, substep: Substep) -> ContactStep {
@@ -146,111 +114,38 @@ impl Solver {
         }
     }
 
-    /// Takes out what is no longer finite, and with it the hands that held it.
-    fn end_step(&mut self) {
+    /// Gives the state back. What is no longer finite is taken out, and with it the hands that held
+    /// it; what was marked tears.
+    fn end_step(&mut self, is_any_marked: bool) {
         count_step(&mut self.grabs);
-        let frozen_count = freeze_non_finite(&mut self.particles);
+        let h = self.h();
+        let frozen_count = self.bodies.pack(&mut self.particles.states, h);
         if frozen_count > 0 {
             self.frozen_count += frozen_count;
-            let flags = &self.particles.flags;
-            self.grabs.retain(|grab| flags[grab.particle as usize] & flag::GRABBED != 0);
+            let states = &self.particles.states;
+            self.grabs.retain(|grab| states[grab.particle as usize].flags & flag::GRABBED != 0);
+        }
+        if is_any_marked {
+            self.tear_marked();
         }
     }
-}
 
-/// A pass over all constraints that measures each before it is projected: those that share no
-/// particle together, the others when their turn has come.
-fn project_measured(
-    particles: &mut Particles,
-    constraints: &mut Constraints,
-    torn: &mut Torn,
-    pass: Pass,
-) {
-    let mut project = |range: Range<usize>, constraints: &mut Constraints| {
-        torn.mark_overstretched(particles, constraints, range.clone());
-        project_group(particles, constraints, range, pass);
-    };
-    for group in 0..constraints.independent_count {
-        project(constraints.groups[group].clone(), constraints);
+    fn tear_marked(&mut self) {
+        let setup = self.setup();
+        let recipe = Recipe::new(&self.model, &self.parameters, setup);
+        let torn = &mut self.torn;
+        self.bodies.take_marks(|constraint, mark| {
+            let is_force = mark > BY_LENGTH;
+            let cause = if is_force { TearCause::Force } else { recipe.length_cause(constraint) };
+            torn.tear(constraint, cause);
+        });
+        for constraint in self.torn.new_ones() {
+            self.bodies.tear(*constraint);
+        }
     }
-    for slot in constraints.independent_end()..constraints.pairs.len() {
-        project(slot..slot + 1, constraints);
-    }
-}
-
-/// What the prediction of a substep needs: all the same for every particle.
-struct Prediction {
-    /// Seconds.
-    h: f32,
-    /// The share of the velocity that damping leaves in a substep.
-    kept: f32,
-    max_speed: f32,
 }
 
 /// max(0, 1 - c h).
 fn kept_share(damping: f32) -> f32 {
     if damping < 1.0 { 1.0 - damping } else { 0.0 }
-}
-
-/// v = max(0, 1 - c h) v + h a, |v| <= `max_speed`, d = h v; fixed particles: d = 0.
-/// `gain` is h a of a particle.
-fn predict(particles: &mut Particles, prediction: &Prediction, gain: impl Fn(usize) -> [f32; 3]) {
-    let Prediction { h, kept, max_speed } = *prediction;
-    let states = particles.positions.iter().zip(&mut particles.velocities);
-    for (index, ((position, velocity), displacement)) in
-        states.zip(&mut particles.displacements).enumerate()
-    {
-        if position[3] == 0.0 {
-            *displacement = [0.0; 4];
-            continue;
-        }
-        let gain = gain(index);
-        let [x, y, z, _] = *velocity;
-        let [mut x, mut y, mut z] = [kept * x + gain[0], kept * y + gain[1], kept * z + gain[2]];
-        let speed_squared = x * x + y * y + z * z;
-        if speed_squared > max_speed * max_speed {
-            let scale = max_speed / speed_squared.sqrt();
-            (x, y, z) = (x * scale, y * scale, z * scale);
-        }
-        // Contacts ask for the predicted velocity.
-        *velocity = [x, y, z, 0.0];
-        *displacement = [h * x, h * y, h * z, 0.0];
-    }
-}
-
-/// x += d, v = d / h.
-fn update(particles: &mut Particles, h: f32) {
-    let states = particles.positions.iter_mut().zip(&mut particles.velocities);
-    for ((position, velocity), displacement) in states.zip(&particles.displacements) {
-        for axis in 0..3 {
-            position[axis] += displacement[axis];
-            velocity[axis] = displacement[axis] / h;
-        }
-    }
-}
-
-/// Takes particles out whose state is no longer finite: they stand where they were at the start of
-/// the step, for good. Returns how many.
-fn freeze_non_finite(particles: &mut Particles) -> u64 {
-    let mut count = 0;
-    for index in 0..particles.count() {
-        let state = particles.positions[index].iter().chain(&particles.velocities[index]);
-        if state.into_iter().all(|number| number.is_finite()) {
-            continue;
-        }
-        particles.positions[index] = particles.step_starts[index];
-        particles.stop(index);
-        particles.change_flags(index, flag::FROZEN, flag::GRABBED);
-        count += 1;
-    }
-    count
-}
-
-/// -0 becomes +0, in the state itself: the same numbers have the same bits, and thus the same hash.
-fn make_zeros_canonical(particles: &mut Particles) {
-    for vector in particles.positions.iter_mut().chain(&mut particles.velocities) {
-        for number in vector {
-            *number += 0.0;
-        }
-    }
 }

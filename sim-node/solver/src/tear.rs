@@ -1,14 +1,8 @@
 //! What is torn, why, and what tears in the running step.
 
-use std::ops::Range;
-
 use bytemuck::cast_slice;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
-
-use crate::constraints::Constraints;
-use crate::particles::Particles;
-use crate::project::length_between;
 
 /// Why a constraint tore.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,10 +34,9 @@ pub(crate) struct Torn {
     shown_count: usize,
     /// 0 while nothing is torn, else the XXH3-64 of the ascending indices.
     hash_seed: u64,
-    /// Constraints that tear at the end of the running step, with why.
-    marked: Vec<(u32, TearCause)>,
-    /// Slot by slot: whether it is among `marked`.
-    is_marked: Vec<bool>,
+    /// Room to sort the new ones in.
+    sorted: Vec<(u32, TearCause)>,
+    by_constraint: Vec<bool>,
 }
 
 impl Torn {
@@ -55,8 +48,8 @@ impl Torn {
             new_count: 0,
             shown_count: 0,
             hash_seed: 0,
-            marked: Vec::with_capacity(constraint_count),
-            is_marked: vec![false; constraint_count],
+            sorted: Vec::with_capacity(constraint_count),
+            by_constraint: vec![false; constraint_count],
         }
     }
 
@@ -78,70 +71,43 @@ impl Torn {
 
     /// Nothing is torn any more.
     pub(crate) fn clear(&mut self) {
-        *self = Self::new(self.is_marked.len());
+        *self = Self::new(self.by_constraint.len());
     }
 
     /// Takes over what a keyframe says.
     pub(crate) fn restore(&mut self, order: &[u32], causes: &[TearCause]) {
         self.clear();
-        self.order.extend_from_slice(order);
-        self.causes.extend_from_slice(causes);
+        for (index, cause) in order.iter().zip(causes) {
+            self.tear(*index, *cause);
+        }
         self.shown_count = order.len();
         self.sort_ascending();
     }
 
-    /// Tears a constraint at the boundary before a step.
-    pub(crate) fn cut(&mut self, constraints: &mut Constraints, index: u32) {
-        constraints.tear(index);
-        self.order.push(index);
-        self.causes.push(TearCause::Cut);
+    /// By constraint.
+    pub(crate) fn all(&self) -> &[bool] {
+        &self.by_constraint
     }
 
-    /// Marks those of a group whose length, before their first projection of the substep, exceeds
-    /// what they bear.
-    pub(crate) fn mark_overstretched(
-        &mut self,
-        particles: &Particles,
-        constraints: &Constraints,
-        group: Range<usize>,
-    ) {
-        for slot in group {
-            let tear_length = constraints.tear_lengths[slot];
-            if tear_length.is_infinite() || self.is_marked[slot] {
-                continue;
-            }
-            if length_between(particles, constraints.pairs[slot]) > tear_length {
-                self.mark(constraints, slot, constraints.tear_causes[slot]);
-            }
+    pub(crate) fn is_torn(&self, index: u32) -> bool {
+        self.by_constraint[index as usize]
+    }
+
+    /// Tears a constraint, unless it is torn.
+    pub(crate) fn tear(&mut self, index: u32, cause: TearCause) {
+        if !std::mem::replace(&mut self.by_constraint[index as usize], true) {
+            self.order.push(index);
+            self.causes.push(cause);
         }
     }
 
-    /// Marks those whose force |lambda| / h^2 in this substep exceeds what they bear.
-    pub(crate) fn mark_overloaded(&mut self, constraints: &Constraints) {
-        let slots = constraints.multipliers.iter().zip(&constraints.tear_multipliers);
-        for (slot, (multiplier, tear_multiplier)) in slots.enumerate() {
-            if multiplier.abs() > *tear_multiplier && !self.is_marked[slot] {
-                self.mark(constraints, slot, TearCause::Force);
-            }
-        }
+    /// Torn since the last step that was shown.
+    pub(crate) fn new_ones(&self) -> &[u32] {
+        &self.order[self.shown_count..]
     }
 
-    fn mark(&mut self, constraints: &Constraints, slot: usize, cause: TearCause) {
-        self.is_marked[slot] = true;
-        self.marked.push((constraints.indices[slot], cause));
-    }
-
-    /// Tears what was marked during the step, by index. Whether anything is new in this step.
-    pub(crate) fn end_step(&mut self, constraints: &mut Constraints) -> bool {
-        for (index, cause) in &self.marked {
-            constraints.tear(*index);
-            self.order.push(*index);
-            self.causes.push(*cause);
-        }
-        if !self.marked.is_empty() {
-            self.is_marked.fill(false);
-            self.marked.clear();
-        }
+    /// Ends a step. Whether anything is new in it.
+    pub(crate) fn end_step(&mut self) -> bool {
         self.new_count = self.order.len() - self.shown_count;
         if self.new_count > 0 {
             self.sort_new();
@@ -155,11 +121,10 @@ impl Torn {
     fn sort_new(&mut self) {
         let (order, causes) =
             (&mut self.order[self.shown_count..], &mut self.causes[self.shown_count..]);
-        // Both together, in place: the marked list is free by now.
-        self.marked.extend(order.iter().copied().zip(causes.iter().copied()));
-        self.marked.sort_unstable_by_key(|(index, _)| *index);
+        self.sorted.extend(order.iter().copied().zip(causes.iter().copied()));
+        self.sorted.sort_unstable_by_key(|(index, _)| *index);
         for ((index, cause), (to_index, to_cause)) in
-            self.marked.drain(..).zip(order.iter_mut().zip(causes))
+            self.sorted.drain(..).zip(order.iter_mut().zip(causes))
         {
             (*to_index, *to_cause) = (index, cause);
         }

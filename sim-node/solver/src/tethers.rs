@@ -4,11 +4,12 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::constraints::{ConstraintKind, Constraints};
+use crate::bodies::{Bodies, Place};
+use crate::constraints::ConstraintKind;
 use crate::parameters::Parameters;
 use crate::particles::{Particles, flag};
-use crate::project::pull_back;
 use crate::scene::{Model, Softness};
+use crate::tear::Torn;
 
 /// The tethers of a scene. Empty where it has none.
 #[derive(Debug, Clone, Default)]
@@ -17,6 +18,15 @@ pub(crate) struct Tethers {
     pub(crate) basis: Basis,
     /// Parents before children.
     all: Vec<Tether>,
+    /// Those whose root moves, with where both ends are: theirs follow it.
+    leads: Vec<Lead>,
+}
+
+/// A tether whose root moves.
+#[derive(Debug, Clone, Copy)]
+struct Lead {
+    particle: Place,
+    root: Place,
 }
 
 /// What tethers follow from, beside the scene and its parameters: part of a keyframe.
@@ -56,7 +66,7 @@ struct Way {
 
 /// A particle that the shortest way is known to.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct Reached {
     particle: u32,
     root: u32,
     length: f64,
@@ -75,8 +85,8 @@ impl Tethers {
     ) -> Self {
         let is_root =
             |flags: u32| flags & (flag::PINNED | flag::ANCHORED) != 0 && flags & flag::GRABBED == 0;
-        let flags = (0_u32..).zip(&particles.flags);
-        let roots = flags.filter(|(_, flags)| is_root(**flags)).map(|(index, _)| index).collect();
+        let states = (0_u32..).zip(&particles.states);
+        let roots = states.filter(|(_, one)| is_root(one.flags)).map(|(index, _)| index).collect();
         let mut torn = torn.to_vec();
         torn.sort_unstable();
         Self::new(model, parameters, Basis { roots, torn })
@@ -92,8 +102,8 @@ impl Tethers {
             is_reached[*root as usize] = true;
         }
         for root in &basis.roots {
-            let place = Place { particle: *root, root: *root, length: 0.0, tether: None };
-            links.push_ways(&mut ways, place);
+            let reached = Reached { particle: *root, root: *root, length: 0.0, tether: None };
+            links.push_ways(&mut ways, reached);
         }
         let mut all: Vec<Tether> = Vec::new();
         while let Some(Reverse(way)) = ways.pop() {
@@ -115,27 +125,52 @@ impl Tethers {
                 is_dropped: false,
             });
             let Way { particle, root, .. } = way;
-            links.push_ways(&mut ways, Place { particle, root, length, tether });
+            links.push_ways(&mut ways, Reached { particle, root, length, tether });
         }
-        Self { basis, all }
+        Self { basis, all, leads: Vec::new() }
     }
 
     /// Drops every tether whose path has a torn constraint.
-    pub(crate) fn drop_torn(&mut self, constraints: &Constraints) {
+    pub(crate) fn drop_torn(&mut self, torn: &Torn, bodies: &mut Bodies) {
         for place in 0..self.all.len() {
-            let Tether { parent, constraint, .. } = self.all[place];
+            let Tether { particle, parent, constraint, is_dropped, .. } = self.all[place];
             let is_cut_off = parent.is_some_and(|parent| self.all[parent as usize].is_dropped);
-            self.all[place].is_dropped |= is_cut_off || constraints.is_torn(constraint);
+            if !is_dropped && (is_cut_off || torn.is_torn(constraint)) {
+                self.all[place].is_dropped = true;
+                bodies.set_tether(bodies.place(particle), f32::INFINITY);
+            }
         }
     }
 
-    /// Pulls every free particle back within its tether. Each is moved alone, so their order does
-    /// not matter.
-    pub(crate) fn pull(&self, particles: &mut Particles) {
+    /// Ties the bodies: from here to the next time, substeps pull them back.
+    pub(crate) fn tie(&mut self, bodies: &mut Bodies, particles: &Particles) {
+        if self.basis.roots.is_empty() {
+            return;
+        }
+        self.leads.clear();
         for tether in self.all.iter().filter(|tether| !tether.is_dropped) {
-            if particles.positions[tether.particle as usize][3] != 0.0 {
-                pull_back(particles, tether.particle, tether.root, tether.length);
+            let [particle, root] = [tether.particle, tether.root].map(|one| bodies.place(one));
+            bodies.set_tether(particle, tether.length);
+            let state = &particles.states[tether.root as usize];
+            bodies.set_root(particle, state.position);
+            if state.flags & flag::ANCHORED != 0 {
+                self.leads.push(Lead { particle, root });
             }
+        }
+    }
+
+    /// Frees the bodies of these tethers.
+    pub(crate) fn untie(&self, bodies: &mut Bodies) {
+        for tether in &self.all {
+            bodies.set_tether(bodies.place(tether.particle), f32::INFINITY);
+        }
+    }
+
+    /// Tells the bodies where roots that move are at the end of the substep.
+    pub(crate) fn follow_roots(&self, bodies: &mut Bodies) {
+        for Lead { particle, root } in &self.leads {
+            let (position, displacement) = (bodies.position(*root), bodies.displacement(*root));
+            bodies.set_root(*particle, [0, 1, 2].map(|axis| position[axis] + displacement[axis]));
         }
     }
 }
@@ -183,7 +218,7 @@ impl<'a> Links<'a> {
     }
 
     /// The ways on from a place.
-    fn push_ways(&self, ways: &mut BinaryHeap<Reverse<Way>>, from: Place) {
+    fn push_ways(&self, ways: &mut BinaryHeap<Reverse<Way>>, from: Reached) {
         let at = |particle: u32| self.starts[particle as usize] as usize;
         for constraint in &self.constraints[at(from.particle)..at(from.particle + 1)] {
             let [a, b] = self.model.pair(*constraint);

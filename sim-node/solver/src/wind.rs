@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::particles::Particles;
+use crate::bodies::{Bodies, Place};
 use crate::scene::Wind;
 
 /// What the surface of a scene feels of the air. Empty where there is no surface.
@@ -13,8 +13,17 @@ pub(crate) struct Air {
     gust_period_steps: u64,
     /// By particle: triangles that have it as a corner.
     triangles_at: Vec<f32>,
-    /// By particle: the velocity that the air has given it in the running substep.
-    pub(crate) gains: Vec<[f32; 3]>,
+    /// By triangle: where its corners are, and the share of its mass that each has for it.
+    /// Empty where no wind is felt.
+    corners: Vec<[Corner; 3]>,
+}
+
+/// A corner of a triangle.
+#[derive(Debug, Clone, Copy)]
+struct Corner {
+    place: Place,
+    /// One of as many as there are triangles at it.
+    share_max: f32,
 }
 
 /// The air of one substep.
@@ -26,6 +35,9 @@ pub(crate) struct Breeze {
     pub(crate) drag: f32,
     /// Seconds.
     pub(crate) h: f32,
+    /// It is that of the first substep of a step: bodies have velocities in the place of
+    /// displacements.
+    pub(crate) is_first: bool,
 }
 
 impl Air {
@@ -51,13 +63,22 @@ impl Air {
             gust: wind.gust,
             gust_period_steps: period.max(1),
             triangles_at,
-            gains: vec![[0.0; 3]; particles],
+            corners: Vec::new(),
         }
     }
 
     /// Whether there is anything that could feel it.
     pub(crate) fn has_surface(&self) -> bool {
-        !self.gains.is_empty()
+        !self.triangles_at.is_empty()
+    }
+
+    /// Finds the corners among the bodies.
+    pub(crate) fn find_corners(&mut self, bodies: &Bodies, triangles: &[[u32; 3]]) {
+        let corner = |particle: u32| Corner {
+            place: bodies.place(particle),
+            share_max: 1.0 / self.triangles_at[particle as usize],
+        };
+        self.corners = triangles.iter().map(|corners| corners.map(corner)).collect();
     }
 
     /// How strong the wind is in a step: 1 + gust tri(t), tri being a triangle wave that begins at
@@ -80,13 +101,16 @@ impl Air {
     /// triangle feels the force drag A |u n| u on both faces alike; each corner takes a third. A
     /// corner shares its mass among its triangles, and none of them may give it more than u times
     /// its share: however large the force, a triangle never overtakes the wind.
-    pub(crate) fn blow(&mut self, particles: &Particles, triangles: &[[u32; 3]], breeze: &Breeze) {
-        self.gains.fill([0.0; 3]);
-        for corners in triangles {
-            let corners = corners.map(|corner| corner as usize);
-            let [a, b, c] = corners.map(|corner| vector(particles.positions[corner]));
-            let [va, vb, vc] = corners.map(|corner| vector(particles.velocities[corner]));
-            let relative = Vec3::from_array(breeze.velocity) - (va + vb + vc) * (1.0 / 3.0);
+    pub(crate) fn blow(&self, bodies: &mut Bodies, breeze: &Breeze) {
+        for corner in self.corners.iter().flatten() {
+            bodies.set_wind(corner.place, [0.0; 3]);
+        }
+        let third = 1.0 / (3.0 * if breeze.is_first { 1.0 } else { breeze.h });
+        for corners in &self.corners {
+            let vector = |axes: [f32; 3]| Vec3::from_array(axes);
+            let [a, b, c] = corners.map(|corner| vector(bodies.position(corner.place)));
+            let [da, db, dc] = corners.map(|corner| vector(bodies.displacement(corner.place)));
+            let relative = vector(breeze.velocity) - (da + db + dc) * third;
             // Twice the area times the normal.
             let area_normal = (b - a).cross(c - a);
             let pressure = 0.5 * breeze.drag * relative.dot(area_normal).abs();
@@ -94,21 +118,14 @@ impl Air {
             if !relative.is_finite() || !area_normal.is_finite() {
                 continue;
             }
-            for corner in
-                corners.into_iter().filter(|corner| particles.positions[*corner][3] != 0.0)
-            {
-                let share = pressure * breeze.h * particles.positions[corner][3] / 3.0;
-                let share_max = 1.0 / self.triangles_at[corner];
-                let share = if share < share_max { share } else { share_max };
-                let gain = &mut self.gains[corner];
-                *gain = (Vec3::from_array(*gain) + relative * share).to_array();
+            for Corner { place, share_max } in corners {
+                let share = pressure * breeze.h * bodies.inverse_mass(*place) / 3.0;
+                let share = if share < *share_max { share } else { *share_max };
+                let gain = vector(bodies.wind(*place)) + relative * share;
+                bodies.set_wind(*place, gain.to_array());
             }
         }
     }
-}
-
-fn vector([x, y, z, _]: [f32; 4]) -> Vec3 {
-    Vec3::new(x, y, z)
 }
 
 #[cfg(test)]

@@ -181,7 +181,7 @@ fn a_state_that_overflows_freezes_its_particle_where_it_last_stood() {
     // Two particles at the end of the range on a stick: the squared distance overflows.
     let text = "version = 1\norigin = [0, 0, 0]\n[solver]\nmax_speed = 3e38\n\
          [[particle]]\nposition = [0, 0, 0]\nvelocity = [1e7, 0, 0]\n\
-         [[particle]]\nposition = [1, 0, 0]\n[[constraint]]\nparticles = [0, 1]\nrest_length = 3e38\n";
+         [[particle]]\nposition = [1, 0, 0]\n[[constraint]]\nparticles = [0, 1]\nrest_length = 1e30\n";
     let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
     step(&mut solver, 20);
     for index in 0..2 {
@@ -198,8 +198,8 @@ fn what_is_held_survives_a_neighbour_that_blows_up_and_the_state_can_be_restored
     // Particle 1 overflows between a pinned and a grabbed one.
     let text = "version = 1\n[solver]\nmax_speed = 3e38\n[[particle]]\nposition = [0, 0, 0]\npinned = true\n\
          [[particle]]\nposition = [1, 0, 0]\n[[particle]]\nposition = [2, 0, 0]\n\
-         [[constraint]]\nparticles = [0, 1]\nrest_length = 3e38\n\
-         [[constraint]]\nparticles = [1, 2]\nrest_length = 3e38\n";
+         [[constraint]]\nparticles = [0, 1]\nrest_length = 1e30\n\
+         [[constraint]]\nparticles = [1, 2]\nrest_length = 1e30\n";
     let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
     solver.grab(CLIENT, grip(2, [2.0, 1.0, 0.0])).unwrap();
     step(&mut solver, 20);

@@ -36,7 +36,7 @@ impl Solver {
         if particle.flags & !flag::KNOWN != 0 {
             return Err("it has flags that this version does not know");
         }
-        if (particle.flags ^ self.particles.flags[index]) & flag::ANCHORED != 0 {
+        if (particle.flags ^ self.particles.states[index].flags) & flag::ANCHORED != 0 {
             return Err("other particles follow an anchor in this scene");
         }
         if is_fixed != (particle.inverse_mass == 0.0) {

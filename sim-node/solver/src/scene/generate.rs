@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::model::Model;
 use super::{Limits, Method, SceneParticle, Softness, Up, decimal};
 use crate::constraints::{Constraint, ConstraintKind};
+use crate::families::Sheet;
 pub use bridge::Bridge;
 pub use cloth::{Cloth, Diagonals};
 pub use mesh_file::Obj;
@@ -200,6 +201,11 @@ impl<'a> Builder<'a> {
         let rest_length = self.model.distance(a, b);
         let compliance = self.generator.softness.of(kind);
         self.model.push(Constraint { a, b, rest_length, compliance, kind }, family);
+    }
+
+    /// The shape's particles, from the first on, are a sheet, all of whose links declare families.
+    fn sheet(&mut self, columns: u32, rows: u32) {
+        self.model.sheets.push(Sheet { first: self.first, columns, rows });
     }
 
     fn triangle(&mut self, corners: [u32; 3]) {

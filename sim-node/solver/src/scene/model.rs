@@ -2,6 +2,7 @@
 
 use super::{Limits, Method, Scene, SceneParticle};
 use crate::constraints::Constraint;
+use crate::families::Sheet;
 
 /// Every particle, constraint and triangle of a scene; immutable from load to load.
 #[derive(Debug, Clone, Default)]
@@ -11,6 +12,8 @@ pub(crate) struct Model {
     pub(crate) constraints: Vec<Constraint>,
     /// Constraint by constraint: the group of independent constraints that its shape declares.
     pub(crate) families: Vec<Option<u32>>,
+    /// Sheets that declare families.
+    pub(crate) sheets: Vec<Sheet>,
     /// Limits that stand in place of the scene's.
     limits: Vec<Limits>,
     /// Constraint by constraint: its place in `limits`.

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{Builder, Pinned, decimal, round};
 use crate::constraints::ConstraintKind;
+use crate::families::Family;
 
 /// A sheet of columns x rows particles; particle (c, r) has index r columns + c.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -60,25 +61,6 @@ struct Link {
     family: u32,
 }
 
-/// The families of a sheet, in the order of projection; each has an even and an odd half, and no
-/// two constraints of one half share a particle.
-#[derive(Clone, Copy)]
-enum Family {
-    Vertical,
-    Horizontal,
-    DiagonalRight,
-    DiagonalLeft,
-    VerticalBend,
-    HorizontalBend,
-}
-
-impl Family {
-    /// The group of one half; `phase` counts along the direction of the constraint.
-    fn half(self, phase: u32) -> u32 {
-        2 * self as u32 + phase % 2
-    }
-}
-
 impl Cloth {
     pub(super) fn particle_count(&self) -> u64 {
         u64::from(self.columns) * u64::from(self.rows)
@@ -97,6 +79,7 @@ impl Cloth {
                 builder.particle(self.position(column, row), is_pinned);
             }
         }
+        builder.sheet(self.columns, self.rows);
         for row in 0..self.rows {
             for column in 0..self.columns {
                 for link in self.links_of(column, row) {
@@ -154,26 +137,26 @@ impl Cloth {
     fn links_of(&self, column: u32, row: u32) -> impl Iterator<Item = Link> {
         use ConstraintKind::{Bend, Shear, Structural};
         let index = move |c: u32, r: u32| r * self.columns + c;
-        let link = move |kind, family, from: [u32; 2], to: [u32; 2]| {
+        let (c, r) = (column, row);
+        let link = move |kind, family: Family, from: [u32; 2], to: [u32; 2]| {
             let is_inside = from[0].max(to[0]) < self.columns && to[1] < self.rows;
             let is_wanted = is_inside && self.links.contains(&kind);
             is_wanted.then(|| Link {
                 a: index(from[0], from[1]),
                 b: index(to[0], to[1]),
                 kind,
-                family,
+                family: family.group(r as usize, c as usize),
             })
         };
-        let (c, r) = (column, row);
         let left = (self.diagonals == Diagonals::Two)
-            .then(|| link(Shear, Family::DiagonalLeft.half(r), [c + 1, r], [c, r + 1]));
+            .then(|| link(Shear, Family::DiagonalLeft, [c + 1, r], [c, r + 1]));
         [
-            link(Structural, Family::Horizontal.half(c), [c, r], [c + 1, r]),
-            link(Structural, Family::Vertical.half(r), [c, r], [c, r + 1]),
-            link(Shear, Family::DiagonalRight.half(r), [c, r], [c + 1, r + 1]),
+            link(Structural, Family::Horizontal, [c, r], [c + 1, r]),
+            link(Structural, Family::Vertical, [c, r], [c, r + 1]),
+            link(Shear, Family::DiagonalRight, [c, r], [c + 1, r + 1]),
             left.flatten(),
-            link(Bend, Family::HorizontalBend.half(c / 2), [c, r], [c + 2, r]),
-            link(Bend, Family::VerticalBend.half(r / 2), [c, r], [c, r + 2]),
+            link(Bend, Family::HorizontalBend, [c, r], [c + 2, r]),
+            link(Bend, Family::VerticalBend, [c, r], [c, r + 2]),
         ]
         .into_iter()
         .flatten()

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{Builder, Pinned, between, decimal};
 use crate::constraints::ConstraintKind;
+use crate::families::Family;
 
 /// A line of particles; constraint i joins particles i and i + 1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,8 +49,10 @@ impl Rope {
             let is_pinned = is_end_pinned(builder.pinned(), index, self.count);
             builder.particle(between(self.from, self.to, share), is_pinned);
         }
+        builder.sheet(self.count, 1);
         for index in 0..self.count - 1 {
-            builder.link([index, index + 1], ConstraintKind::Structural);
+            let family = Family::Horizontal.group(0, index as usize);
+            builder.family_link([index, index + 1], ConstraintKind::Structural, Some(family));
         }
     }
 }

@@ -1,0 +1,61 @@
+//! Who works on the bodies, and with what.
+
+use crate::contact::Contacts;
+use crate::crew::{Crew, MEMBERS_MAX};
+use crate::kernels::Kernels;
+use crate::project::Block;
+
+/// The threads, the kernels that they use, and what each of them needs for itself.
+#[derive(Debug, Clone)]
+pub(crate) struct Team {
+    pub(crate) kernels: Kernels,
+    crew: Crew,
+    scratches: Vec<Scratch>,
+}
+
+/// What a member needs for itself.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Scratch {
+    pub(crate) contacts: Contacts,
+    pub(crate) block: Box<Block>,
+}
+
+impl Team {
+    pub(crate) fn new(kernels: Kernels, members: usize) -> Self {
+        let crew = Crew::new(members);
+        let scratches = vec![Scratch::default(); crew.members()];
+        Self { kernels, crew, scratches }
+    }
+
+    pub(crate) fn members(&self) -> usize {
+        self.crew.members()
+    }
+
+    /// Makes room for contacts of so many particles side by side.
+    pub(crate) fn make_room(&mut self, contact_count: usize) {
+        for scratch in &mut self.scratches {
+            scratch.contacts = Contacts::new(contact_count);
+        }
+    }
+
+    /// Lets each member work on a part, with its own scratch. At most as many parts as members.
+    pub(crate) fn each<P: Send>(
+        &mut self,
+        parts: impl Iterator<Item = P>,
+        work: impl Fn(&mut P, &mut Scratch) + Sync,
+        mut done: impl FnMut(P),
+    ) {
+        let mut pairs = [const { None }; MEMBERS_MAX];
+        let mut count = 0;
+        for (pair, place) in parts.zip(&mut self.scratches).zip(&mut pairs) {
+            *place = Some(pair);
+            count += 1;
+        }
+        self.crew.each(&mut pairs[..count], |pair| {
+            if let Some((part, scratch)) = pair {
+                work(part, scratch);
+            }
+        });
+        pairs.into_iter().flatten().for_each(|(part, _)| done(part));
+    }
+}

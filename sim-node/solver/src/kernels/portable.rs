@@ -1,0 +1,204 @@
+//! Eight lanes as an array: the compiler makes of it what the processor has.
+
+use std::cell::Cell;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::lanes::{Eight, Lanes, Wide};
+
+/// Eight numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Portable(Eight);
+
+impl Portable {
+    #[inline(always)]
+    fn zip_with(self, other: Self, with: impl Fn(f32, f32) -> f32) -> Self {
+        let mut result = self.0;
+        for (number, other) in result.iter_mut().zip(other.0) {
+            *number = with(*number, other);
+        }
+        Self(result)
+    }
+
+    #[inline(always)]
+    fn compare(self, other: Self, with: impl Fn(f32, f32) -> bool) -> [bool; 8] {
+        let mut result = [false; 8];
+        for (yes, (number, other)) in result.iter_mut().zip(self.0.into_iter().zip(other.0)) {
+            *yes = with(number, other);
+        }
+        result
+    }
+
+    #[inline(always)]
+    fn pick(low: Self, high: Self, lanes: [usize; 8]) -> Self {
+        Self(lanes.map(|lane| if lane < 8 { low.0[lane] } else { high.0[lane - 8] }))
+    }
+}
+
+impl Add for Portable {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip_with(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Portable {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip_with(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Portable {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip_with(other, |a, b| a * b)
+    }
+}
+
+impl Div for Portable {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip_with(other, |a, b| a / b)
+    }
+}
+
+impl Neg for Portable {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|number| -number))
+    }
+}
+
+impl Lanes for Portable {
+    type Mask = [bool; 8];
+
+    #[inline(always)]
+    fn splat(number: f32) -> Self {
+        Self([number; 8])
+    }
+
+    #[inline(always)]
+    fn load(from: &Eight, _lane: usize) -> Self {
+        Self(*from)
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut Eight, _lane: usize) {
+        *to = self.0;
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f32::abs))
+    }
+
+    #[inline(always)]
+    fn is_below(self, other: Self) -> [bool; 8] {
+        self.compare(other, |a, b| a < b)
+    }
+
+    #[inline(always)]
+    fn is_at_most(self, other: Self) -> [bool; 8] {
+        self.compare(other, |a, b| a <= b)
+    }
+
+    #[inline(always)]
+    fn is_not_zero(self) -> [bool; 8] {
+        self.compare(Self::splat(0.0), |a, b| a != b)
+    }
+
+    #[inline(always)]
+    fn both(a: [bool; 8], b: [bool; 8]) -> [bool; 8] {
+        let mut result = a;
+        for (yes, other) in result.iter_mut().zip(b) {
+            *yes &= other;
+        }
+        result
+    }
+
+    #[inline(always)]
+    fn choose(mask: [bool; 8], yes: Self, no: Self) -> Self {
+        let mut result = no.0;
+        for (number, (mask, yes)) in result.iter_mut().zip(mask.into_iter().zip(yes.0)) {
+            *number = if mask { yes } else { *number };
+        }
+        Self(result)
+    }
+
+    #[inline(always)]
+    fn only(self, mask: [bool; 8]) -> Self {
+        Self::choose(mask, self, Self::splat(0.0))
+    }
+
+    #[inline(always)]
+    fn any(mask: [bool; 8]) -> bool {
+        mask.contains(&true)
+    }
+}
+
+impl Wide for Portable {
+    #[inline(always)]
+    fn unzip(low: Self, high: Self) -> [Self; 2] {
+        let even = Self::pick(low, high, [0, 2, 8, 10, 4, 6, 12, 14]);
+        [even, Self::pick(low, high, [1, 3, 9, 11, 5, 7, 13, 15])]
+    }
+
+    #[inline(always)]
+    fn zip(even: Self, odd: Self) -> [Self; 2] {
+        let low = Self::pick(even, odd, [0, 8, 1, 9, 4, 12, 5, 13]);
+        [low, Self::pick(even, odd, [2, 10, 3, 11, 6, 14, 7, 15])]
+    }
+
+    #[inline(always)]
+    fn unzip_pairs(low: Self, high: Self) -> [Self; 2] {
+        let even = Self::pick(low, high, [0, 1, 8, 9, 4, 5, 12, 13]);
+        [even, Self::pick(low, high, [2, 3, 10, 11, 6, 7, 14, 15])]
+    }
+
+    #[inline(always)]
+    fn zip_pairs(even: Self, odd: Self) -> [Self; 2] {
+        // The same exchange takes itself back.
+        Self::unzip_pairs(even, odd)
+    }
+
+    #[inline(always)]
+    fn differences(bodies: &[Cell<Eight>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2] {
+        let mut halves = [[[0.0; 8]; 3]; 2];
+        for lane in 0..8 {
+            let (from, to) = (bodies[a[lane] as usize].get(), bodies[b[lane] as usize].get());
+            for (half, axes) in halves.iter_mut().enumerate() {
+                for (axis, numbers) in axes.iter_mut().enumerate() {
+                    numbers[lane] = to[4 * half + axis] - from[4 * half + axis];
+                }
+            }
+        }
+        halves.map(|axes| axes.map(Self))
+    }
+
+    #[inline(always)]
+    fn take(bodies: &[Cell<Eight>], from: &[u32; 8], amounts: [Self; 3]) {
+        for (lane, index) in from.iter().enumerate() {
+            let body = &bodies[*index as usize];
+            let mut numbers = body.get();
+            for (axis, amount) in amounts.iter().enumerate() {
+                numbers[4 + axis] -= amount.0[lane];
+            }
+            body.set(numbers);
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! Every kernel, and every number of threads, makes the bits of the reference, which projects one constraint after the other and
+//! knows no sheets: on every scene, at every size around a vector's, with everything that a
+//! constraint can have.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use sim_solver::{Ball, Grip, Kernels, Push, Scene, Setting, Solver, builtin};
+
+/// Steps all kernels side by side, with commands between, and compares every particle.
+fn assert_same_bits(text: &str, name: &str, steps: u32) {
+    let scene = Scene::from_toml(text, name).unwrap();
+    let mut reference = Solver::with_kernels(&scene, Kernels::Reference);
+    let others = Kernels::available().filter(|kernels| *kernels != Kernels::Reference);
+    let mut others: Vec<_> =
+        others.map(|kernels| (kernels, Solver::with_kernels(&scene, kernels))).collect();
+    for step in 0..steps {
+        command(&mut reference, step);
+        reference.step();
+        for (kernels, solver) in &mut others {
+            command(solver, step);
+            solver.step();
+            let hashes = (reference.state_hash(), solver.state_hash());
+            assert_eq!(hashes.0, hashes.1, "{name}: {kernels:?} differs in step {step}");
+            assert_eq!(reference.torn(), solver.torn(), "{name}: {kernels:?}, step {step}");
+            assert_eq!(reference.tear_causes(), solver.tear_causes(), "{name}: {kernels:?}");
+        }
+    }
+}
+
+/// A little of everything; what a scene refuses, every kernel refuses.
+fn command(solver: &mut Solver, step: u32) {
+    let count = u32::try_from(solver.particle_count()).unwrap();
+    if count == 0 {
+        return;
+    }
+    let particle = step.wrapping_mul(7919) % count;
+    let [x, y, z] = solver.particle(particle as usize).position;
+    let _refused = match step % 23 {
+        3 => solver.grab(1, Grip { particle, target: [x + 0.1, y, z], over_s: 0.02 }),
+        7 => solver.pin(particle),
+        11 => solver.unpin(particle),
+        13 => solver.push(Push {
+            ball: Ball { center: [x, y, z], radius: 0.3 },
+            delta: [0.01, 0.0, 0.0],
+            limit: None,
+        }),
+        17 => solver.cut(step % 50),
+        19 => {
+            release_all(solver, count);
+            Ok(())
+        }
+        _ => Ok(()),
+    };
+}
+
+fn release_all(solver: &mut Solver, count: u32) {
+    for particle in 0..count {
+        let _not_held = solver.release(1, particle);
+    }
+}
+
+#[test]
+fn on_every_built_in_scene() {
+    for name in builtin::names() {
+        let text = builtin::text(name).unwrap();
+        let is_big = Solver::new(&Scene::from_toml(text, name).unwrap()).particle_count() > 500;
+        assert_same_bits(text, name, if is_big { 60 } else { 300 });
+    }
+}
+
+#[test]
+fn on_scenes_with_every_mechanism() {
+    for text in [include_str!("scenes/everything.toml"), include_str!("scenes/stiffness.toml")] {
+        assert_same_bits(text, "test", 300);
+    }
+}
+
+/// A sheet that falls onto a ball and a floor.
+fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
+    format!(
+        "version = 1\n[solver]\nrate_hz = 120\n{solver}\n\
+         [[collider]]\nshape = \"plane\"\nnormal = [0.1, 1, 0]\noffset = -0.3\nfriction = 0.4\nrestitution = 0.3\n\
+         [[collider]]\nshape = \"sphere\"\ncenter = [0.3, -0.2, 0.3]\nradius = 0.2\n\
+         [[collider]]\nshape = \"box\"\ncenter = [1.2, -0.1, 0.5]\nhalf_extents = [0.2, 0.1, 0.2]\nrotation = [0, 0.3, 0, 0.95]\n\
+         [[generate]]\nshape = \"cloth\"\ncolumns = {columns}\nrows = {rows}\nspacing = 0.05\ndown = [0, 0, 1]\n{generator}\n"
+    )
+}
+
+const LINKS: &str = "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"corners\"";
+
+/// What a scene can ask of its constraints.
+const VARIANTS: [(&str, &str, &str); 8] = [
+    ("rigid", "substeps = 3", LINKS),
+    ("passes", "substeps = 2\niterations = 3\nrelaxation = 1.2", LINKS),
+    ("tethers", "substeps = 2\ntethers = true", LINKS),
+    (
+        "soft",
+        "substeps = 2\niterations = 2",
+        "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"top\"\ncompliance = { structural = 1e-6, shear = 1e-4, bend = 1e-2 }",
+    ),
+    (
+        "pbd",
+        "substeps = 2\niterations = 3\nmethod = \"pbd\"",
+        "links = [\"structural\", \"shear\"]\npinned = \"top\"\nstiffness = { structural = 0.9, shear = 0.5, bend = 0.1 }",
+    ),
+    ("limited", "substeps = 1\nmax_stretch = 1.02", LINKS),
+    ("torn", "substeps = 2\ntear_stretch = 1.05\ntear_force = 40", LINKS),
+    ("one diagonal", "substeps = 2\ntear_distance = 0.01", "diagonals = 1\npinned = \"top-even\""),
+];
+
+#[test]
+fn on_sheets_of_every_size_around_a_vector() {
+    for (name, solver, generator) in VARIANTS {
+        for size in [1, 2, 3, 7, 8, 9, 15, 16, 17, 31, 32, 33] {
+            for (columns, rows) in [(size, 9), (5, size), (size, size)] {
+                let name = format!("{name}, {columns} x {rows}");
+                assert_same_bits(&sheet(columns, rows, solver, generator), &name, 24);
+            }
+        }
+    }
+}
+
+#[test]
+fn on_sheets_that_are_taken_in_strips() {
+    for (name, solver, generator) in VARIANTS {
+        for columns in [127, 128, 129, 200, 255, 256, 257, 400] {
+            let name = format!("{name}, {columns} x 12");
+            assert_same_bits(&sheet(columns, 12, solver, generator), &name, 6);
+        }
+    }
+}
+
+#[test]
+fn on_ropes_of_every_length_around_a_vector() {
+    for count in [2, 3, 7, 8, 9, 16, 17, 31, 32, 33, 300] {
+        let text = format!(
+            "version = 1\n[solver]\nsubsteps = 5\ntethers = true\n[[generate]]\nshape = \"rope\"\n\
+             count = {count}\nfrom = [0, 0, 0]\nto = [1, 0, 0]\npinned = \"first\"\n"
+        );
+        assert_same_bits(&text, &format!("rope of {count}"), 60);
+    }
+}
+
+#[test]
+fn on_sheets_that_are_sewn_to_something_else() {
+    // One constraint of another kind makes a graph of the first sheet; the second stays one.
+    let cloth = "[[generate]]\nshape = \"cloth\"\ncolumns = 12\nrows = 9\nspacing = 0.1\n";
+    let text = format!(
+        "version = 1\n[solver]\nsubsteps = 3\n[[particle]]\nposition = [0, -1, 0]\n\
+         [[constraint]]\nparticles = [0, 100]\n[[constraint]]\nparticles = [0, 100]\nrest_length = 0\ncompliance = 1e-4\n\
+         {cloth}{cloth}pinned = \"none\"\norigin = [0, 0, 1]\n"
+    );
+    assert_same_bits(&text, "sewn", 120);
+}
+
+#[test]
+fn where_ends_coincide_and_lengths_are_zero() {
+    let mut text = "version = 1\n[solver]\nsubsteps = 2\niterations = 2\n".to_owned();
+    for index in 0..24 {
+        let x = f64::from(index / 2) * 0.25;
+        text += &format!("[[particle]]\nposition = [{x}, 0, 0]\npinned = {}\n", index % 5 == 0);
+    }
+    for index in 0..22 {
+        let rest = ["", "rest_length = 0\n", "rest_length = 0.1\nkind = \"tether\"\n"][index % 3];
+        text += &format!("[[constraint]]\nparticles = [{index}, {}]\n{rest}", index + 2);
+        text += &format!("[[constraint]]\nparticles = [{index}, {}]\n{rest}", index + 1);
+    }
+    assert_same_bits(&text, "zero", 120);
+}
+
+/// Steps several numbers of threads side by side with one.
+fn assert_same_bits_of_threads(text: &str, name: &str, steps: u32) {
+    let scene = Scene::from_toml(text, name).unwrap();
+    let mut alone = Solver::new(&scene);
+    let mut others: Vec<_> = [2, 3, 4, 8]
+        .into_iter()
+        .map(|threads| {
+            let mut solver = Solver::new(&scene);
+            solver.set_threads(threads);
+            solver
+        })
+        .collect();
+    for step in 0..steps {
+        command(&mut alone, step);
+        alone.step();
+        for solver in &mut others {
+            command(solver, step);
+            solver.step();
+            let threads = solver.threads();
+            assert_eq!(alone.state_hash(), solver.state_hash(), "{name}: {threads}, step {step}");
+        }
+    }
+}
+
+#[test]
+fn threads_make_the_same_bits_on_every_built_in_scene() {
+    for name in builtin::names() {
+        assert_same_bits_of_threads(builtin::text(name).unwrap(), name, 30);
+    }
+}
+
+#[test]
+fn threads_make_the_same_bits_on_big_sheets() {
+    for (name, solver, generator) in VARIANTS {
+        for (columns, rows) in [(70, 240), (300, 90)] {
+            let name = format!("{name}, {columns} x {rows}");
+            assert_same_bits_of_threads(&sheet(columns, rows, solver, generator), &name, 10);
+        }
+    }
+}
+
+#[test]
+fn threads_make_the_same_bits_on_big_graphs() {
+    // A constraint from each of two sheets to a particle of the other makes a graph of both.
+    for (name, solver, generator) in VARIANTS {
+        let text = sheet(150, 140, solver, generator);
+        let sewn = format!("{text}[[constraint]]\nparticles = [500, 900]\n");
+        assert_same_bits_of_threads(&sewn, name, 6);
+    }
+}
+
+#[test]
+fn after_parameters_have_changed() {
+    let text = sheet(33, 17, "substeps = 2\ntethers = true", LINKS);
+    let scene = Scene::from_toml(&text, "set").unwrap();
+    let settings = [
+        ("tear_force", Setting::Number(30.0)),
+        ("iterations", Setting::Number(3.0)),
+        ("compliance", Setting::Number(1e-5)),
+        ("max_stretch", Setting::Number(1.1)),
+        ("wind_drag", Setting::Number(0.5)),
+        ("substeps", Setting::Number(4.0)),
+        ("tear_force", Setting::Off),
+        ("compliance", Setting::Number(0.0)),
+    ];
+    let mut hashes = Vec::new();
+    for kernels in Kernels::available() {
+        let mut solver = Solver::with_kernels(&scene, kernels);
+        for (name, setting) in settings {
+            solver.set(name, setting, None).unwrap();
+            (0..10).for_each(|_| solver.step());
+        }
+        hashes.push(solver.state_hash());
+    }
+    assert!(hashes.windows(2).all(|two| two[0] == two[1]), "{hashes:x?}");
+}
