@@ -1,0 +1,64 @@
+//! What the command line asks for.
+
+/// The options, and the names of the cases that are wanted.
+#[derive(Debug, Default)]
+pub(crate) struct Options {
+    /// One JSON object a line and case, in place of tables.
+    pub(crate) as_json: bool,
+    /// Long cases too.
+    pub(crate) is_full: bool,
+    /// Few and short runs: whether everything works, not how fast it is.
+    pub(crate) is_quick: bool,
+    /// None: all but the long ones.
+    wanted: Vec<String>,
+}
+
+impl Options {
+    /// # Errors
+    /// An option that there is not.
+    pub(crate) fn parse(args: impl Iterator<Item = String>) -> Result<Self, String> {
+        let mut options = Self::default();
+        for arg in args {
+            match arg.as_str() {
+                // Cargo adds the first, and a person may separate options from names.
+                "--bench" | "--" => {}
+                "--json" => options.as_json = true,
+                "--full" => options.is_full = true,
+                "--quick" => options.is_quick = true,
+                unknown if unknown.starts_with('-') => {
+                    return Err(format!("{unknown}: there are --json, --full and --quick"));
+                }
+                _ => options.wanted.push(arg),
+            }
+        }
+        Ok(options)
+    }
+
+    /// Whether a case is to run.
+    pub(crate) fn wants(&self, case: &str) -> bool {
+        self.wanted.is_empty() || self.names(case)
+    }
+
+    /// Whether the part of a case is to run that takes long: not if only its kind is named.
+    pub(crate) fn wants_all_of(&self, case: &str) -> bool {
+        self.is_full || self.wanted.iter().any(|wanted| wanted == case)
+    }
+
+    /// A name stands for itself and for all that goes on after it: "torn" for "torn-32".
+    fn names(&self, case: &str) -> bool {
+        let is_named = |wanted: &String| {
+            case.strip_prefix(wanted).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+        };
+        self.wanted.iter().any(is_named)
+    }
+
+    /// Runs of each program, in turn; odd, so that there is a median.
+    pub(crate) fn rounds(&self) -> usize {
+        if self.is_quick { 1 } else { 5 }
+    }
+
+    /// Projections of one timed run: enough for tens of milliseconds.
+    pub(crate) fn projections_per_run(&self) -> u64 {
+        if self.is_quick { 1_000_000 } else { 12_000_000 }
+    }
+}

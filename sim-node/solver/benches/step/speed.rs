@@ -1,0 +1,173 @@
+//! How fast a substep is, against the loop of a tutorial in the same run.
+//!
+//! Both go through the first two seconds of the scene, again and again: what falls does not fall
+//! for hours. Every time is CPU time of this process, the median of runs in turn.
+
+use serde::Serialize;
+use sim_solver::{Scene, Solver};
+
+use super::clock::{cpu_ns, median};
+use super::naive::Naive;
+use super::options::Options;
+use super::quality::{self, Quality};
+use super::report::{Report, Row, cell};
+use super::sheet::Sheet;
+
+/// Sheets: particles along a side, and substeps.
+const SHEETS: [(u32, u32); 4] = [(32, 16), (100, 16), (316, 8), (1000, 4)];
+/// Sheets whose motion is looked at, too; the biggest has no room for it.
+const QUALITY_COLUMNS_MAX: u32 = 316;
+/// Seconds of the scene after which it begins again.
+const SCENE_SECONDS: u32 = 2;
+
+/// What is measured of a case.
+#[derive(Debug, Serialize)]
+struct Speed {
+    case: String,
+    particles: usize,
+    constraints: usize,
+    substeps: u32,
+    iterations: u32,
+    /// Constraints that are whole, times substeps, times iterations.
+    projections_per_step: u64,
+    /// Of the whole substep: predict, project, collide, update, and the step's hash.
+    ns_per_projection: f64,
+    /// How many times as fast as the tutorial's loop: one step of as many passes. None if its
+    /// numbers are none.
+    ratio_to_naive: Option<f64>,
+    naive_ns_per_projection: Option<f64>,
+    steps_per_s: f64,
+    #[serde(flatten)]
+    quality: Option<Quality>,
+}
+
+impl Row for Speed {
+    const HEADINGS: &'static [&'static str] = &[
+        "particles",
+        "links",
+        "substeps x iterations",
+        "ns per projection",
+        "naive",
+        "ratio",
+        "steps/s",
+    ];
+
+    fn case(&self) -> &str {
+        &self.case
+    }
+
+    fn cells(&self) -> Vec<String> {
+        vec![
+            self.particles.to_string(),
+            self.constraints.to_string(),
+            format!("{} x {}", self.substeps, self.iterations),
+            format!("{:.2}", self.ns_per_projection),
+            cell(self.naive_ns_per_projection, 2),
+            cell(self.ratio_to_naive, 2),
+            format!("{:.1}", self.steps_per_s),
+        ]
+    }
+}
+
+pub(crate) fn run(options: &Options, report: &mut Report) {
+    for (columns, substeps) in SHEETS {
+        let sheet = Sheet::swing(columns, substeps);
+        let case = format!("sheet-{columns}");
+        if options.wants(&case) {
+            push_sheet(&case, &sheet, options, report);
+        }
+        let case = format!("torn-{columns}");
+        if options.wants(&case) {
+            let scene = sheet.scene();
+            let mut solver = Solver::new(&scene);
+            cut_one_in_a_hundred(&mut solver);
+            report.push(&speed(&case, &scene, solver, options));
+        }
+    }
+}
+
+/// A sheet, with how well it moves.
+fn push_sheet(case: &str, sheet: &Sheet, options: &Options, report: &mut Report) {
+    let scene = sheet.scene();
+    let mut speed = speed(case, &scene, Solver::new(&scene), options);
+    if sheet.columns > QUALITY_COLUMNS_MAX {
+        report.push(&speed);
+        return;
+    }
+    let row = quality::Row::measure(case, sheet, 1e3 / speed.steps_per_s, options);
+    speed.quality = Some(row.quality.clone());
+    report.push(&speed);
+    report.tabulate(&row);
+}
+
+fn cut_one_in_a_hundred(solver: &mut Solver) {
+    for index in (50..solver.constraint_count()).step_by(100) {
+        solver.cut(u32::try_from(index).unwrap()).unwrap();
+    }
+}
+
+/// Measures a scene that a solver is at the beginning of.
+fn speed(case: &str, scene: &Scene, solver: Solver, options: &Options) -> Speed {
+    let settings = scene.solver;
+    let (particles, constraints) = (solver.particle_count(), solver.constraint_count());
+    let whole = (constraints - solver.torn().len()) as u64;
+    let projections_per_step =
+        whole * u64::from(settings.substeps) * u64::from(settings.iterations);
+    let steps = (options.projections_per_run() / projections_per_step).max(1);
+    let period = u64::from(SCENE_SECONDS * settings.rate_hz);
+    let mut naive = Course::new(Naive::new(scene, &solver), period);
+    let mut solver = Course::new(solver, period);
+    let (mut ours, mut theirs, mut is_finite) = (Vec::new(), Vec::new(), true);
+    for _ in 0..options.rounds() {
+        ours.push(solver.cpu_ns(steps, Solver::step));
+        theirs.push(naive.cpu_ns(steps, Naive::step));
+        is_finite &= naive.now.is_finite();
+    }
+    assert_eq!(solver.now.frozen_count(), 0, "{case}: no time of numbers that are none");
+    let projections = (steps * projections_per_step) as f64;
+    let ns_per_projection = median(ours) / projections;
+    let naive_ns_per_projection = is_finite.then(|| median(theirs) / projections);
+    Speed {
+        case: case.to_owned(),
+        particles,
+        constraints,
+        substeps: settings.substeps,
+        iterations: settings.iterations,
+        projections_per_step,
+        ns_per_projection,
+        ratio_to_naive: naive_ns_per_projection.map(|naive| naive / ns_per_projection),
+        naive_ns_per_projection,
+        steps_per_s: 1e9 / (ns_per_projection * projections_per_step as f64),
+        quality: None,
+    }
+}
+
+/// A program that begins again after a number of steps.
+struct Course<T> {
+    start: T,
+    now: T,
+    period: u64,
+    steps_left: u64,
+}
+
+impl<T: Clone> Course<T> {
+    fn new(start: T, period: u64) -> Self {
+        Self { now: start.clone(), start, period, steps_left: period }
+    }
+
+    /// CPU time of the next steps, in ns. Beginning again is not part of it.
+    fn cpu_ns(&mut self, mut steps: u64, step: fn(&mut T)) -> f64 {
+        let mut sum = 0.0;
+        while steps > 0 {
+            if self.steps_left == 0 {
+                self.now = self.start.clone();
+                self.steps_left = self.period;
+            }
+            let count = steps.min(self.steps_left);
+            sum += cpu_ns(|| (0..count).for_each(|_| step(&mut self.now)));
+            self.steps_left -= count;
+            steps -= count;
+        }
+        sum
+    }
+}
