@@ -11,10 +11,16 @@
 //! |---|---|
 //! | sheet-N | a substep of the sheet, N = 32, 100, 316, 1000; and how well it moves, up to 316 |
 //! | torn-N | the same with 1 % of the links cut |
+//! | ragdolls-1000, web-large | 1,000 figures that fall on a plane; a web of 10,000 particles |
+//! | mesh, mesh-shuffled | an imported mesh of 10,000 vertices, numbered as built or at random |
+//! | rope-20, rope-50 | ropes of so many particles |
+//! | curtain, ragdoll, pendulum ... | every built-in scene that has links |
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what it is for")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a benchmark fails")]
 
 mod clock;
+mod graphs;
+mod mesh;
 mod naive;
 mod options;
 mod quality;
@@ -40,7 +46,8 @@ fn main() -> ExitCode {
         }
     };
     let mut report = Report::new(options.as_json);
-    speed::run(&options, &mut report);
+    speed::run_sheets(&options, &mut report);
+    speed::run_graphs(&options, &mut report);
     if report.is_empty() {
         eprintln!("there is no case of that name");
         return ExitCode::from(USAGE);

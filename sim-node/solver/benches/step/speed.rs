@@ -7,6 +7,7 @@ use serde::Serialize;
 use sim_solver::{Scene, Solver};
 
 use super::clock::{cpu_ns, median};
+use super::graphs::Graph;
 use super::naive::Naive;
 use super::options::Options;
 use super::quality::{self, Quality};
@@ -69,7 +70,7 @@ impl Row for Speed {
     }
 }
 
-pub(crate) fn run(options: &Options, report: &mut Report) {
+pub(crate) fn run_sheets(options: &Options, report: &mut Report) {
     for (columns, substeps) in SHEETS {
         let sheet = Sheet::swing(columns, substeps);
         let case = format!("sheet-{columns}");
@@ -82,6 +83,17 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
             let mut solver = Solver::new(&scene);
             cut_one_in_a_hundred(&mut solver);
             report.push(&speed(&case, &scene, solver, options));
+        }
+    }
+}
+
+/// Scenes whose links form any graph.
+pub(crate) fn run_graphs(options: &Options, report: &mut Report) {
+    for graph in Graph::all() {
+        let case = graph.name();
+        if options.wants(&case) {
+            let scene = graph.scene();
+            report.push(&speed(&case, &scene, Solver::new(&scene), options));
         }
     }
 }
