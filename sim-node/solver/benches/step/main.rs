@@ -20,6 +20,7 @@
 
 mod clock;
 mod graphs;
+mod memory;
 mod mesh;
 mod naive;
 mod options;

@@ -8,6 +8,7 @@ use sim_solver::{Scene, Solver};
 
 use super::clock::{cpu_ns, median};
 use super::graphs::Graph;
+use super::memory::Footprint;
 use super::naive::Naive;
 use super::options::Options;
 use super::quality::{self, Quality};
@@ -39,6 +40,8 @@ struct Speed {
     naive_ns_per_projection: Option<f64>,
     steps_per_s: f64,
     #[serde(flatten)]
+    footprint: Footprint,
+    #[serde(flatten)]
     quality: Option<Quality>,
 }
 
@@ -51,6 +54,8 @@ impl Row for Speed {
         "naive",
         "ratio",
         "steps/s",
+        "B/particle",
+        "B/link",
     ];
 
     fn case(&self) -> &str {
@@ -66,6 +71,8 @@ impl Row for Speed {
             cell(self.naive_ns_per_projection, 2),
             cell(self.ratio_to_naive, 2),
             format!("{:.1}", self.steps_per_s),
+            format!("{:.0}", self.footprint.bytes_per_particle),
+            format!("{:.0}", self.footprint.bytes_per_constraint),
         ]
     }
 }
@@ -150,6 +157,7 @@ fn speed(case: &str, scene: &Scene, solver: Solver, options: &Options) -> Speed 
         ratio_to_naive: naive_ns_per_projection.map(|naive| naive / ns_per_projection),
         naive_ns_per_projection,
         steps_per_s: 1e9 / (ns_per_projection * projections_per_step as f64),
+        footprint: Footprint::measure(scene),
         quality: None,
     }
 }
