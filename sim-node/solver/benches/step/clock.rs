@@ -22,3 +22,28 @@ pub(crate) fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }
+
+/// Says when whoever waits should hear that it goes on.
+#[derive(Debug)]
+pub(crate) struct Pacer {
+    last_ns: f64,
+}
+
+/// Between two signs of life, in ns.
+const PACE_NS: f64 = 10e9;
+
+impl Pacer {
+    pub(crate) fn new() -> Self {
+        Self { last_ns: now(ClockId::Monotonic) }
+    }
+
+    /// Whether a while has passed since this was true.
+    pub(crate) fn is_due(&mut self) -> bool {
+        let now_ns = now(ClockId::Monotonic);
+        let is_due = now_ns - self.last_ns >= PACE_NS;
+        if is_due {
+            self.last_ns = now_ns;
+        }
+        is_due
+    }
+}

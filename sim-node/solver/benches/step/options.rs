@@ -39,6 +39,11 @@ impl Options {
         self.wanted.is_empty() || self.names(case)
     }
 
+    /// Whether a case is to run that takes long.
+    pub(crate) fn wants_long(&self, case: &str) -> bool {
+        self.names(case) || (self.is_full && self.wanted.is_empty())
+    }
+
     /// Whether the part of a case is to run that takes long: not if only its kind is named.
     pub(crate) fn wants_all_of(&self, case: &str) -> bool {
         self.is_full || self.wanted.iter().any(|wanted| wanted == case)
@@ -60,5 +65,15 @@ impl Options {
     /// Projections of one timed run: enough for tens of milliseconds.
     pub(crate) fn projections_per_run(&self) -> u64 {
         if self.is_quick { 1_000_000 } else { 12_000_000 }
+    }
+
+    /// Frames whose median is the time of a frame.
+    pub(crate) fn budget_frames(&self) -> u32 {
+        if self.is_quick { 3 } else { 30 }
+    }
+
+    /// Frames of a run that has to stay stable: a minute.
+    pub(crate) fn stability_frames(&self) -> u32 {
+        if self.is_quick { 60 } else { 3_600 }
     }
 }

@@ -21,6 +21,14 @@ pub(crate) enum Start {
 }
 
 impl Start {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Swing => "swing",
+            Self::Hang => "hang",
+            Self::Corners => "corners",
+        }
+    }
+
     /// The scene's word for what is pinned.
     fn pinned(self) -> &'static str {
         match self {
