@@ -15,6 +15,8 @@ const BUDGETS: [(u32, Start, f64); 3] =
 /// Between these the largest number of substeps within the time is sought.
 const SUBSTEPS_MIN: u32 = 8;
 const SUBSTEPS_MAX: u32 = 64;
+/// Frames whose median is the time of a frame.
+const FRAMES: usize = 31;
 
 /// What the time is good for. With fewer than 8 substeps it is not measured: then the time is that
 /// of 8, and exceeds the budget.
@@ -71,6 +73,6 @@ fn finest_within(budget_ms: f64, coarsest: &Sheet, options: &Options) -> (Sheet,
 /// CPU time of a frame in ms: the median of the first ones.
 fn ms_per_frame(sheet: &Sheet, options: &Options) -> f64 {
     let mut solver = Solver::new(&sheet.scene());
-    let frames = options.budget_frames();
+    let frames = options.count(FRAMES);
     1e-6 * median((0..frames).map(|_| cpu_ns(|| solver.step())).collect())
 }

@@ -16,6 +16,7 @@
 //! | rope-20, rope-50 | ropes of so many particles |
 //! | curtain, ragdoll, pendulum ... | every built-in scene that has links |
 //! | quality-N-START | how well a sheet with tethers moves in 2 ms (N = 100) or 8 ms (316) a frame |
+//! | cost-316 | packing, hashing and publishing, against a step of the sheet |
 //! | stability-START-N-SUBSTEPS | a minute without gaining 1 % of energy, or the exit code is 1; long |
 //!
 //! START is "swing" (level, held at one side), "hang" (upright) or "corners" (level, held at two).
@@ -25,6 +26,7 @@
 
 mod budget;
 mod clock;
+mod cost;
 mod graphs;
 mod memory;
 mod mesh;
@@ -57,6 +59,7 @@ fn main() -> ExitCode {
     speed::run_sheets(&options, &mut report);
     speed::run_graphs(&options, &mut report);
     budget::run(&options, &mut report);
+    cost::run(&options, &mut report);
     let are_stable = stability::run(&options, &mut report);
     if report.is_empty() {
         eprintln!("there is no case of that name");

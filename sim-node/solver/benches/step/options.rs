@@ -57,19 +57,14 @@ impl Options {
         self.wanted.iter().any(is_named)
     }
 
-    /// Runs of each program, in turn; odd, so that there is a median.
-    pub(crate) fn rounds(&self) -> usize {
-        if self.is_quick { 1 } else { 5 }
+    /// How often something is measured: as often as is good, or once.
+    pub(crate) fn count(&self, usual: usize) -> usize {
+        if self.is_quick { 1 } else { usual }
     }
 
     /// Projections of one timed run: enough for tens of milliseconds.
     pub(crate) fn projections_per_run(&self) -> u64 {
         if self.is_quick { 1_000_000 } else { 12_000_000 }
-    }
-
-    /// Frames whose median is the time of a frame.
-    pub(crate) fn budget_frames(&self) -> u32 {
-        if self.is_quick { 3 } else { 30 }
     }
 
     /// Frames of a run that has to stay stable: a minute.

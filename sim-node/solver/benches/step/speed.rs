@@ -19,6 +19,8 @@ use super::sheet::Sheet;
 const SHEETS: [(u32, u32); 4] = [(32, 16), (100, 16), (316, 8), (1000, 4)];
 /// Sheets whose motion is looked at, too; the biggest has no room for it.
 const QUALITY_COLUMNS_MAX: u32 = 316;
+/// Runs of each program, in turn; odd, so that there is a median.
+const ROUNDS: usize = 5;
 /// Seconds of the scene after which it begins again.
 const SCENE_SECONDS: u32 = 2;
 
@@ -137,7 +139,7 @@ fn speed(case: &str, scene: &Scene, solver: Solver, options: &Options) -> Speed 
     let mut naive = Course::new(Naive::new(scene, &solver), period);
     let mut solver = Course::new(solver, period);
     let (mut ours, mut theirs, mut is_finite) = (Vec::new(), Vec::new(), true);
-    for _ in 0..options.rounds() {
+    for _ in 0..options.count(ROUNDS) {
         ours.push(solver.cpu_ns(steps, Solver::step));
         theirs.push(naive.cpu_ns(steps, Naive::step));
         is_finite &= naive.now.is_finite();
