@@ -62,6 +62,11 @@ impl Options {
         if self.is_quick { 1 } else { usual }
     }
 
+    /// Steps before anything is timed: half a second.
+    pub(crate) fn lead_steps(&self, rate_hz: u32) -> u32 {
+        if self.is_quick { 0 } else { rate_hz.div_ceil(2) }
+    }
+
     /// Projections of one timed run: enough for tens of milliseconds.
     pub(crate) fn projections_per_run(&self) -> u64 {
         if self.is_quick { 1_000_000 } else { 12_000_000 }
