@@ -7,6 +7,11 @@ pub(crate) fn cpu_ns(work: impl FnOnce()) -> f64 {
     between(ClockId::ProcessCPUTime, work)
 }
 
+/// Time on the wall for some work, in ns: the measure of work that is shared out.
+pub(crate) fn wall_ns(work: impl FnOnce()) -> f64 {
+    between(ClockId::Monotonic, work)
+}
+
 fn between(clock: ClockId, work: impl FnOnce()) -> f64 {
     let before = now(clock);
     work();
@@ -18,9 +23,19 @@ fn now(clock: ClockId) -> f64 {
     time.tv_sec as f64 * 1e9 + time.tv_nsec as f64
 }
 
-pub(crate) fn median(mut times: Vec<f64>) -> f64 {
+pub(crate) fn median(times: Vec<f64>) -> f64 {
+    after_share(2, times)
+}
+
+/// The time that a tenth of them stay below.
+pub(crate) fn tenth_percentile(times: Vec<f64>) -> f64 {
+    after_share(10, times)
+}
+
+/// The first time behind the n-th part of the smaller ones.
+fn after_share(n: usize, mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
+    times[times.len() / n]
 }
 
 /// Says when whoever waits should hear that it goes on.

@@ -17,6 +17,7 @@
 //! | curtain, ragdoll, pendulum ... | every built-in scene that has links |
 //! | quality-N-START | how well a sheet with tethers moves in 2 ms (N = 100) or 8 ms (316) a frame |
 //! | cost-316 | packing, hashing and publishing, against a step of the sheet |
+//! | threads-N | a step of the sheet with one and two threads, on the wall clock |
 //! | stability-START-N-SUBSTEPS | a minute without gaining 1 % of energy, or the exit code is 1; long |
 //!
 //! START is "swing" (level, held at one side), "hang" (upright) or "corners" (level, held at two).
@@ -38,6 +39,7 @@ mod report;
 mod sheet;
 mod speed;
 mod stability;
+mod threads;
 
 use std::process::ExitCode;
 
@@ -60,6 +62,7 @@ fn main() -> ExitCode {
     speed::run_graphs(&options, &mut report);
     budget::run(&options, &mut report);
     cost::run(&options, &mut report);
+    threads::run(&options, &mut report);
     let are_stable = stability::run(&options, &mut report);
     if report.is_empty() {
         eprintln!("there is no case of that name");
