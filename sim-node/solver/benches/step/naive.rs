@@ -1,74 +1,76 @@
-//! The loop of a tutorial: particles as structs, sticks in the order of the grid, one step of many
-//! passes. (In small steps of one pass its numbers are soon none.)
+//! The loop of a tutorial: particles as structs, sticks in the order in which the scene lists them,
+//! one step of many passes. (In small steps of one pass its numbers are soon none.)
+//!
+//! It knows no collider, wind, softness or limit: what it leaves out makes it faster, not slower.
 
 use glam::Vec3;
+use sim_solver::{Scene, Solver};
 
+#[derive(Debug, Clone)]
 struct Particle {
     position: Vec3,
     previous: Vec3,
     inverse_mass: f32,
 }
 
+#[derive(Debug, Clone)]
 struct Stick {
     a: usize,
     b: usize,
     length: f32,
 }
 
-/// A sheet of particles and sticks.
-pub(crate) struct Sheet {
+/// The particles and sticks of a scene.
+#[derive(Debug, Clone)]
+pub(crate) struct Naive {
     particles: Vec<Particle>,
     sticks: Vec<Stick>,
+    gravity: Vec3,
+    dt: f32,
+    passes: u32,
 }
 
-impl Sheet {
-    pub(crate) fn new(columns: u32) -> Self {
-        let spacing = 2.0 / (columns - 1) as f32;
-        let count = columns as usize;
-        let particles: Vec<_> = (0..count * count)
-            .map(|index| {
-                let (row, column) = (index / count, index % count);
-                let position = Vec3::new(column as f32 * spacing, 0.0, row as f32 * spacing);
-                let inverse_mass = if row == 0 { 0.0 } else { 1.0 };
-                Particle { position, previous: position, inverse_mass }
-            })
-            .collect();
-        let mut sheet = Self { particles, sticks: Vec::new() };
-        for row in 0..count {
-            for column in 0..count {
-                let at = |down: usize, right: usize| (row + down) * count + column + right;
-                let (has_right, has_down) = (column + 1 < count, row + 1 < count);
-                if has_right {
-                    sheet.join(at(0, 0), at(0, 1));
-                }
-                if has_down {
-                    sheet.join(at(0, 0), at(1, 0));
-                }
-                if has_right && has_down {
-                    sheet.join(at(0, 0), at(1, 1));
-                    sheet.join(at(0, 1), at(1, 0));
-                }
-            }
+impl Naive {
+    /// As a solver of this scene has them now; without what is torn. A step makes as many passes
+    /// as a step of the solver.
+    pub(crate) fn new(scene: &Scene, solver: &Solver) -> Self {
+        let dt = 1.0 / scene.solver.rate_hz as f32;
+        let particles = (0..solver.particle_count()).map(|index| {
+            let one = solver.particle(index);
+            let position = Vec3::from_array(one.position);
+            let previous = position - dt * Vec3::from_array(one.velocity);
+            Particle { position, previous, inverse_mass: one.inverse_mass }
+        });
+        let mut is_whole = vec![true; solver.constraint_count()];
+        for index in solver.torn() {
+            is_whole[*index as usize] = false;
         }
-        sheet
+        let whole = solver.constraints().zip(is_whole).filter(|(_, is_whole)| *is_whole);
+        let sticks = whole.map(|(one, _)| Stick {
+            a: one.a as usize,
+            b: one.b as usize,
+            length: one.rest_length,
+        });
+        Self {
+            particles: particles.collect(),
+            sticks: sticks.collect(),
+            gravity: Vec3::from_array(scene.gravity),
+            dt,
+            passes: scene.solver.substeps * scene.solver.iterations,
+        }
     }
 
-    fn join(&mut self, a: usize, b: usize) {
-        let length = (self.particles[b].position - self.particles[a].position).length();
-        self.sticks.push(Stick { a, b, length });
-    }
-
-    /// One frame of 1/60 s: Verlet, then the passes.
-    pub(crate) fn step(&mut self, passes: u32) {
-        let dt = 1.0 / 60.0;
+    /// Verlet, then the passes.
+    pub(crate) fn step(&mut self) {
+        let dt = self.dt;
         for particle in &mut self.particles {
             if particle.inverse_mass > 0.0 {
                 let velocity = particle.position - particle.previous;
                 particle.previous = particle.position;
-                particle.position += velocity + Vec3::new(0.0, -9.81, 0.0) * dt * dt;
+                particle.position += velocity + self.gravity * dt * dt;
             }
         }
-        for _ in 0..passes {
+        for _ in 0..self.passes {
             for stick in &self.sticks {
                 let way = self.particles[stick.b].position - self.particles[stick.a].position;
                 let length = way.length();

@@ -1,93 +1,145 @@
 //! How well a sheet moves: its stretch, its energy, and how far it is from a run in very small
 //! steps.
 
-use std::fmt;
-
 use serde::Serialize;
-use sim_solver::Solver;
+use sim_solver::{ConstraintKind, Solver};
 
-use super::sheet::Variant;
+use super::clock::cpu_ns;
+use super::options::Options;
+use super::reference;
+use super::report::{self, cell};
+use super::sheet::{SIDE, Sheet};
 
-/// Substeps of the reference.
-const REFERENCE_SUBSTEPS: u32 = 256;
 /// Frames after which the motion is compared: half a second, before it is chaotic.
 const COMPARED_FRAMES: u32 = 30;
+/// Frames of a measurement; stretch is that of the second half.
+const FRAMES: u32 = 120;
+/// The biggest sheet whose reference takes seconds; 316 take half a minute.
+const REFERENCE_COLUMNS_MAX: u32 = 100;
 
-/// What is measured in the frames 61..=120, and at half a second.
-#[derive(Debug, Serialize)]
+/// What is measured in two seconds.
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Quality {
+    /// CPU time of the slowest of all frames.
+    slowest_frame_ms: f64,
+    /// Mean |length / rest - 1| of the structural links: the mean over the frames 61..=120.
     stretch_mean_percent: f64,
+    /// The largest one: the mean over those frames.
     stretch_max_percent: f64,
-    /// Largest energy of all frames, against the largest that there is to lose.
+    /// The largest energy of all frames less that at the start, against the range that there is:
+    /// m g 2 m for each particle.
     energy_gain_percent: f64,
-    /// Root mean square distance to the same sheet in 256 substeps, in mm.
-    rms_to_reference_mm: f64,
+    /// Root mean square distance at half a second to the reference, in mm. None where that takes
+    /// long and nobody asked.
+    rms_to_reference_mm: Option<f64>,
+}
+
+/// The quality of a sheet, and what it costs.
+#[derive(Debug, Serialize)]
+pub(crate) struct Row {
+    case: String,
+    substeps: u32,
+    has_tethers: bool,
+    ms_per_frame: f64,
+    #[serde(flatten)]
+    pub(crate) quality: Quality,
+}
+
+impl Row {
+    /// `case` decides whether a long reference is wanted.
+    pub(crate) fn measure(case: &str, sheet: &Sheet, ms_per_frame: f64, options: &Options) -> Self {
+        let has_reference = sheet.columns <= REFERENCE_COLUMNS_MAX || options.wants_all_of(case);
+        Self {
+            case: case.to_owned(),
+            substeps: sheet.substeps,
+            has_tethers: sheet.has_tethers,
+            ms_per_frame,
+            quality: Quality::measure(sheet, has_reference),
+        }
+    }
+}
+
+impl report::Row for Row {
+    const HEADINGS: &'static [&'static str] = &[
+        "substeps",
+        "tethers",
+        "ms a frame",
+        "slowest",
+        "stretch mean %",
+        "max %",
+        "energy gain %",
+        "mm from the reference",
+    ];
+
+    fn case(&self) -> &str {
+        &self.case
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let quality = &self.quality;
+        vec![
+            self.substeps.to_string(),
+            if self.has_tethers { "yes" } else { "no" }.to_owned(),
+            format!("{:.2}", self.ms_per_frame),
+            format!("{:.2}", quality.slowest_frame_ms),
+            format!("{:.3}", quality.stretch_mean_percent),
+            format!("{:.2}", quality.stretch_max_percent),
+            format!("{:+.3}", quality.energy_gain_percent),
+            cell(quality.rms_to_reference_mm, 1),
+        ]
+    }
 }
 
 impl Quality {
-    pub(crate) fn measure(columns: u32, substeps: u32) -> Self {
-        let mut solver = Variant::Plain.solver(columns, substeps);
-        let mut reference = Variant::Plain.solver(columns, REFERENCE_SUBSTEPS);
-        (0..COMPARED_FRAMES).for_each(|_| reference.step());
-        let start = energy(&solver);
-        // All of it 2 m lower.
-        let range = 9.81 * 2.0 * solver.particle_count() as f64;
+    fn measure(sheet: &Sheet, has_reference: bool) -> Self {
+        let mut solver = Solver::new(&sheet.scene());
+        let energy = EnergyGain::new(&solver);
         let mut quality = Self {
+            slowest_frame_ms: 0.0,
             stretch_mean_percent: 0.0,
             stretch_max_percent: 0.0,
             energy_gain_percent: f64::NEG_INFINITY,
-            rms_to_reference_mm: 0.0,
+            rms_to_reference_mm: None,
         };
-        for frame in 1..=120_u32 {
-            solver.step();
-            let gain = 100.0 * (energy(&solver) - start) / range;
-            quality.energy_gain_percent = quality.energy_gain_percent.max(gain);
-            if frame == COMPARED_FRAMES {
-                quality.rms_to_reference_mm = 1000.0 * rms(&solver, &reference);
+        for frame in 1..=FRAMES {
+            let ms = 1e-6 * cpu_ns(|| solver.step());
+            quality.slowest_frame_ms = quality.slowest_frame_ms.max(ms);
+            quality.energy_gain_percent = quality.energy_gain_percent.max(energy.percent(&solver));
+            if frame == COMPARED_FRAMES && has_reference {
+                let reference = reference::positions(sheet, COMPARED_FRAMES);
+                quality.rms_to_reference_mm = Some(1000.0 * rms(&solver, &reference));
             }
-            if frame > 60 {
+            if frame > FRAMES / 2 {
                 let (mean, max) = stretch(&solver);
-                quality.stretch_mean_percent += 100.0 * mean / 60.0;
-                quality.stretch_max_percent += 100.0 * max / 60.0;
+                let share = 100.0 / f64::from(FRAMES / 2);
+                quality.stretch_mean_percent += share * mean;
+                quality.stretch_max_percent += share * max;
             }
         }
         quality
     }
 }
 
-impl fmt::Display for Quality {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "stretch mean {:.3} % max {:.2} %, energy at most {:+.3} %, {:.1} mm from 256 substeps",
-            self.stretch_mean_percent,
-            self.stretch_max_percent,
-            self.energy_gain_percent,
-            self.rms_to_reference_mm
-        )
+/// The energy of a sheet against that at its start.
+#[derive(Debug)]
+pub(crate) struct EnergyGain {
+    start: f64,
+    /// All of it 2 m lower.
+    range: f64,
+}
+
+impl EnergyGain {
+    pub(crate) fn new(solver: &Solver) -> Self {
+        Self { start: energy(solver), range: 9.81 * SIDE * solver.particle_count() as f64 }
+    }
+
+    /// In percent of the range.
+    pub(crate) fn percent(&self, solver: &Solver) -> f64 {
+        100.0 * (energy(solver) - self.start) / self.range
     }
 }
 
-fn position(solver: &Solver, index: usize) -> [f64; 3] {
-    solver.particle(index).position.map(f64::from)
-}
-
-/// Mean and largest |length / rest - 1| of the structural links.
-fn stretch(solver: &Solver) -> (f64, f64) {
-    let structural =
-        solver.constraints().filter(|one| one.kind == sim_solver::ConstraintKind::Structural);
-    let strains = structural.map(|one| {
-        let (a, b) = (position(solver, one.a as usize), position(solver, one.b as usize));
-        let square: f64 = (0..3).map(|axis| (b[axis] - a[axis]).powi(2)).sum();
-        (square.sqrt() / f64::from(one.rest_length) - 1.0).abs()
-    });
-    let (mut sum, mut max, mut count) = (0.0, 0.0, 0.0);
-    for strain in strains {
-        (sum, max, count) = (sum + strain, f64::max(max, strain), count + 1.0);
-    }
-    (sum / count, max)
-}
-
+/// Kinetic and potential energy in J; every mass is 1 kg.
 fn energy(solver: &Solver) -> f64 {
     let of = |index: usize| {
         let one = solver.particle(index);
@@ -97,10 +149,30 @@ fn energy(solver: &Solver) -> f64 {
     (0..solver.particle_count()).map(of).sum()
 }
 
-fn rms(solver: &Solver, reference: &Solver) -> f64 {
-    let squares = (0..solver.particle_count()).map(|index| {
-        let (a, b) = (position(solver, index), position(reference, index));
-        (0..3).map(|axis| (b[axis] - a[axis]).powi(2)).sum::<f64>()
+fn position(solver: &Solver, index: usize) -> [f64; 3] {
+    solver.particle(index).position.map(f64::from)
+}
+
+/// Mean and largest |length / rest - 1| of the structural links.
+fn stretch(solver: &Solver) -> (f64, f64) {
+    let structural = solver.constraints().filter(|one| one.kind == ConstraintKind::Structural);
+    let strains = structural.map(|one| {
+        let (a, b) = (position(solver, one.a as usize), position(solver, one.b as usize));
+        (distance_squared(a, b).sqrt() / f64::from(one.rest_length) - 1.0).abs()
     });
-    (squares.sum::<f64>() / solver.particle_count() as f64).sqrt()
+    let (mut sum, mut max, mut count) = (0.0, 0.0, 0.0);
+    for strain in strains {
+        (sum, max, count) = (sum + strain, f64::max(max, strain), count + 1.0);
+    }
+    (sum / count, max)
+}
+
+fn rms(solver: &Solver, reference: &[[f64; 3]]) -> f64 {
+    let squares = (reference.iter().enumerate())
+        .map(|(index, expected)| distance_squared(position(solver, index), *expected));
+    (squares.sum::<f64>() / reference.len() as f64).sqrt()
+}
+
+fn distance_squared(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|axis| (b[axis] - a[axis]).powi(2)).sum()
 }

@@ -1,0 +1,78 @@
+//! How well a sheet with tethers moves if a frame may take so many ms of one processor.
+
+use serde::Serialize;
+use sim_solver::Solver;
+
+use super::clock::cpu_ns;
+use super::options::Options;
+use super::quality;
+use super::report::{self, Report};
+use super::sheet::{Sheet, Start};
+
+/// Side and start of the sheet, and the time of a frame in ms.
+const BUDGETS: [(u32, Start, f64); 3] =
+    [(100, Start::Swing, 2.0), (100, Start::Corners, 2.0), (316, Start::Swing, 8.0)];
+/// Between these the largest number of substeps within the time is sought.
+const SUBSTEPS_MIN: u32 = 8;
+const SUBSTEPS_MAX: u32 = 64;
+/// Frames whose mean is the time of a frame: those in which quality is measured.
+const FRAMES: usize = 120;
+
+/// What the time is good for. With fewer than 8 substeps it is not measured: then the time is that
+/// of 8, and exceeds the budget.
+#[derive(Debug, Serialize)]
+struct Budget {
+    budget_ms: f64,
+    #[serde(flatten)]
+    row: quality::Row,
+}
+
+impl report::Row for Budget {
+    const HEADINGS: &'static [&'static str] = <quality::Row as report::Row>::HEADINGS;
+
+    fn case(&self) -> &str {
+        self.row.case()
+    }
+
+    fn cells(&self) -> Vec<String> {
+        self.row.cells()
+    }
+}
+
+pub(crate) fn run(options: &Options, report: &mut Report) {
+    for (columns, start, budget_ms) in BUDGETS {
+        let case = format!("quality-{columns}-{}", start.name());
+        if !options.wants(&case) {
+            continue;
+        }
+        let sheet = Sheet { columns, substeps: SUBSTEPS_MIN, start, has_tethers: true };
+        let (sheet, ms_per_frame) = finest_within(budget_ms, &sheet, options);
+        let row = quality::Row::measure(&case, &sheet, ms_per_frame, options);
+        report.push(&Budget { budget_ms, row });
+    }
+}
+
+/// The sheet with the most substeps whose frame is within the time, and that frame's time in ms; by
+/// halving the interval, as more substeps never take less time.
+fn finest_within(budget_ms: f64, coarsest: &Sheet, options: &Options) -> (Sheet, f64) {
+    let mut found = (*coarsest, ms_per_frame(coarsest, options));
+    let (mut low, mut high) = (SUBSTEPS_MIN, SUBSTEPS_MAX);
+    while low < high {
+        let substeps = (low + high).div_ceil(2);
+        let sheet = Sheet { substeps, ..*coarsest };
+        let ms = ms_per_frame(&sheet, options);
+        if ms <= budget_ms {
+            (found, low) = ((sheet, ms), substeps);
+        } else {
+            high = substeps - 1;
+        }
+    }
+    found
+}
+
+/// CPU time of a frame in ms, the slow first ones included.
+fn ms_per_frame(sheet: &Sheet, options: &Options) -> f64 {
+    let mut solver = Solver::new(&sheet.scene());
+    let frames = options.count(FRAMES);
+    1e-6 * cpu_ns(|| (0..frames).for_each(|_| solver.step())) / frames as f64
+}

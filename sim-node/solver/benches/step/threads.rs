@@ -1,0 +1,92 @@
+//! What a second thread gains, in wall-clock time.
+
+use serde::Serialize;
+use sim_solver::{Scene, Solver};
+
+use super::clock::{tenth_percentile, wall_ns};
+use super::options::Options;
+use super::report::{Report, Row};
+use super::sheet::Sheet;
+
+/// Side of the sheet, substeps, and turns.
+const SHEETS: [(u32, u32, usize); 4] = [(32, 16, 60), (100, 16, 30), (316, 8, 8), (1000, 4, 2)];
+/// Steps in a row of the same solver: a thread that still waits for work disturbs only the first
+/// of the other solver.
+const STEPS_PER_TURN: usize = 5;
+/// Pairs of solvers. Which one is made first takes turns, too: where its arrays lie in memory is
+/// worth some percent.
+const PAIRS: usize = 4;
+
+/// A sheet with one thread and with two.
+#[derive(Debug, Serialize)]
+struct Threads {
+    case: String,
+    substeps: u32,
+    /// A tenth of the steps take less: what other processes take away is in the slower ones. CPU
+    /// time would count the waiting, too.
+    one_thread_p10_ms: f64,
+    two_threads_p10_ms: f64,
+    /// How many times as fast with two.
+    speedup: f64,
+}
+
+impl Row for Threads {
+    const HEADINGS: &'static [&'static str] =
+        &["substeps", "1 thread: ms a step (p10)", "2 threads", "speed-up"];
+
+    fn case(&self) -> &str {
+        &self.case
+    }
+
+    fn cells(&self) -> Vec<String> {
+        vec![
+            self.substeps.to_string(),
+            format!("{:.3}", self.one_thread_p10_ms),
+            format!("{:.3}", self.two_threads_p10_ms),
+            format!("{:.2}", self.speedup),
+        ]
+    }
+}
+
+pub(crate) fn run(options: &Options, report: &mut Report) {
+    for (columns, substeps, turns) in SHEETS {
+        let case = format!("threads-{columns}");
+        if options.wants(&case) {
+            let scene = Sheet::swing(columns, substeps).scene();
+            report.push(&measure(case, &scene, options.count(turns)));
+        }
+    }
+}
+
+/// In turns, so that both have the same share of the machine's moods.
+fn measure(case: String, scene: &Scene, turns: usize) -> Threads {
+    let (mut ones, mut twos) = (Vec::new(), Vec::new());
+    for pair in 0..PAIRS {
+        let mut two = (pair % 2 == 0).then(|| with_threads(scene, 2));
+        let mut one = with_threads(scene, 1);
+        let two = two.get_or_insert_with(|| with_threads(scene, 2));
+        for _ in 0..turns {
+            take_turn(&mut one, &mut ones);
+            take_turn(two, &mut twos);
+        }
+        assert_eq!(one.state_hash(), two.state_hash(), "{case}: the bits depend on the threads");
+    }
+    let (one_ns, two_ns) = (tenth_percentile(ones), tenth_percentile(twos));
+    Threads {
+        case,
+        substeps: scene.solver.substeps,
+        one_thread_p10_ms: 1e-6 * one_ns,
+        two_threads_p10_ms: 1e-6 * two_ns,
+        speedup: one_ns / two_ns,
+    }
+}
+
+fn with_threads(scene: &Scene, count: usize) -> Solver {
+    let mut solver = Solver::new(scene);
+    solver.set_threads(count);
+    solver
+}
+
+fn take_turn(solver: &mut Solver, times_ns: &mut Vec<f64>) {
+    times_ns.extend((0..STEPS_PER_TURN).map(|_| wall_ns(|| solver.step())));
+}
