@@ -235,13 +235,6 @@ impl Bodies {
     }
 
     /// The velocity that the wind gives a particle in the running substep.
-    pub(crate) fn wind(&self, place: Place) -> [f32; 3] {
-        match place.patch() {
-            None => self.graph.gains[place.at()],
-            Some(patch) => self.patches[patch].wind(place.at()),
-        }
-    }
-
     pub(crate) fn set_wind(&mut self, place: Place, gain: [f32; 3]) {
         match place.patch() {
             None => self.graph.gains[place.at()] = gain,

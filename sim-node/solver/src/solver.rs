@@ -162,7 +162,7 @@ impl Solver {
         };
         self.bodies.configure(&recipe, extras, self.torn.all());
         if extras.wind {
-            self.air.find_corners(&self.bodies, &self.model.triangles);
+            self.air.find_corners(&self.bodies);
         }
         self.tethers.tie(&mut self.bodies, &self.particles);
     }

@@ -86,7 +86,7 @@ impl Solver {
         let strength = self.air.strength(self.scene_step);
         let velocity = self.parameters.wind_velocity.map(|axis| strength * axis);
         let breeze = Breeze { velocity, drag, h: self.h(), is_first: substep.is_first() };
-        self.air.blow(&mut self.bodies, &breeze);
+        self.air.blow(&mut self.bodies, &self.model.triangles, &breeze);
     }
 
     fn fall(&self, substep: Substep) -> Fall {

@@ -13,17 +13,22 @@ pub(crate) struct Air {
     gust_period_steps: u64,
     /// By particle: triangles that have it as a corner.
     triangles_at: Vec<f32>,
-    /// By triangle: where its corners are, and the share of its mass that each has for it.
-    /// Empty where no wind is felt.
-    corners: Vec<[Corner; 3]>,
+    /// By particle: what its triangles ask of it, side by side. Empty where no wind is felt.
+    corners: Vec<Corner>,
 }
 
-/// A corner of a triangle.
+/// A particle as a corner of triangles, in the running substep.
 #[derive(Debug, Clone, Copy)]
 struct Corner {
     place: Place,
-    /// One of as many as there are triangles at it.
+    position: Vec3,
+    /// The displacement, or the velocity in the first substep.
+    displacement: Vec3,
+    inverse_mass: f32,
+    /// The share of its mass that each of its triangles has.
     share_max: f32,
+    /// The velocity that it gets.
+    gain: Vec3,
 }
 
 /// The air of one substep.
@@ -73,12 +78,16 @@ impl Air {
     }
 
     /// Finds the corners among the bodies.
-    pub(crate) fn find_corners(&mut self, bodies: &Bodies, triangles: &[[u32; 3]]) {
-        let corner = |particle: u32| Corner {
+    pub(crate) fn find_corners(&mut self, bodies: &Bodies) {
+        let corner = |(particle, triangles): (u32, &f32)| Corner {
             place: bodies.place(particle),
-            share_max: 1.0 / self.triangles_at[particle as usize],
+            position: Vec3::ZERO,
+            displacement: Vec3::ZERO,
+            inverse_mass: 0.0,
+            share_max: 1.0 / triangles,
+            gain: Vec3::ZERO,
         };
-        self.corners = triangles.iter().map(|corners| corners.map(corner)).collect();
+        self.corners = (0..).zip(&self.triangles_at).map(corner).collect();
     }
 
     /// How strong the wind is in a step: 1 + gust tri(t), tri being a triangle wave that begins at
@@ -101,30 +110,46 @@ impl Air {
     /// triangle feels the force drag A |u n| u on both faces alike; each corner takes a third. A
     /// corner shares its mass among its triangles, and none of them may give it more than u times
     /// its share: however large the force, a triangle never overtakes the wind.
-    pub(crate) fn blow(&self, bodies: &mut Bodies, breeze: &Breeze) {
-        for corner in self.corners.iter().flatten() {
-            bodies.set_wind(corner.place, [0.0; 3]);
+    pub(crate) fn blow(&mut self, bodies: &mut Bodies, triangles: &[[u32; 3]], breeze: &Breeze) {
+        for corner in &mut self.corners {
+            corner.position = Vec3::from_array(bodies.position(corner.place));
+            corner.displacement = Vec3::from_array(bodies.displacement(corner.place));
+            corner.inverse_mass = bodies.inverse_mass(corner.place);
+            corner.gain = Vec3::ZERO;
         }
-        let third = 1.0 / (3.0 * if breeze.is_first { 1.0 } else { breeze.h });
-        for corners in &self.corners {
-            let vector = |axes: [f32; 3]| Vec3::from_array(axes);
-            let [a, b, c] = corners.map(|corner| vector(bodies.position(corner.place)));
-            let [da, db, dc] = corners.map(|corner| vector(bodies.displacement(corner.place)));
-            let relative = vector(breeze.velocity) - (da + db + dc) * third;
-            // Twice the area times the normal.
-            let area_normal = (b - a).cross(c - a);
-            let pressure = 0.5 * breeze.drag * relative.dot(area_normal).abs();
-            // A triangle whose state is no longer finite must not reach its neighbours.
-            if !relative.is_finite() || !area_normal.is_finite() {
-                continue;
-            }
-            for Corner { place, share_max } in corners {
-                let share = pressure * breeze.h * bodies.inverse_mass(*place) / 3.0;
-                let share = if share < *share_max { share } else { *share_max };
-                let gain = vector(bodies.wind(*place)) + relative * share;
-                bodies.set_wind(*place, gain.to_array());
-            }
+        for triangle in triangles {
+            self.blow_at(triangle.map(|corner| corner as usize), breeze);
         }
+        for corner in &self.corners {
+            bodies.set_wind(corner.place, corner.gain.to_array());
+        }
+    }
+
+    fn blow_at(&mut self, corners: [usize; 3], breeze: &Breeze) {
+        let [a, b, c] = corners.map(|corner| &self.corners[corner]);
+        let mean = (a.displacement + b.displacement + c.displacement) * breeze.third();
+        let relative = Vec3::from_array(breeze.velocity) - mean;
+        // Twice the area times the normal.
+        let area_normal = (b.position - a.position).cross(c.position - a.position);
+        // Of the force on a third of the area, times the time.
+        let pressure = relative.dot(area_normal).abs() * (breeze.drag * breeze.h * (0.5 / 3.0));
+        // A triangle whose state is no longer finite must not reach its neighbours.
+        if !pressure.is_finite() {
+            return;
+        }
+        for corner in corners {
+            let corner = &mut self.corners[corner];
+            let share = pressure * corner.inverse_mass;
+            let share = if share < corner.share_max { share } else { corner.share_max };
+            corner.gain += relative * share;
+        }
+    }
+}
+
+impl Breeze {
+    /// What brings the sum of three displacements to the mean of three velocities.
+    fn third(&self) -> f32 {
+        if self.is_first { 1.0 / 3.0 } else { 1.0 / (3.0 * self.h) }
     }
 }
 

@@ -355,10 +355,6 @@ impl Patch {
         self.set_vector(number, 4, displacement);
     }
 
-    pub(crate) fn wind(&self, number: usize) -> [f32; 3] {
-        self.vector(number, self.shape.wind_at())
-    }
-
     pub(crate) fn set_wind(&mut self, number: usize, gain: [f32; 3]) {
         self.set_vector(number, self.shape.wind_at(), gain);
     }

@@ -45,6 +45,13 @@ impl Team {
         work: impl Fn(&mut P, &mut Scratch) + Sync,
         mut done: impl FnMut(P),
     ) {
+        if self.members() == 1 {
+            for mut part in parts {
+                work(&mut part, &mut self.scratches[0]);
+                done(part);
+            }
+            return;
+        }
         let mut pairs = [const { None }; MEMBERS_MAX];
         let mut count = 0;
         for (pair, place) in parts.zip(&mut self.scratches).zip(&mut pairs) {

@@ -1,7 +1,5 @@
 //! The rows of a patch, eight columns at a time.
 
-use std::ops::Range;
-
 use glam::Vec3;
 
 use super::{Extras, STATE_FIELDS, Shape};
@@ -133,7 +131,7 @@ fn pairs_mut(eights: &mut [Eight], count: usize) -> &mut [[Eight; 2]] {
     &mut pairs[..count]
 }
 
-/// The particles of some columns of a row, with what only some scenes have.
+/// The particles of a row, with what only some scenes have.
 pub(super) struct Columns<'a> {
     x: [&'a mut [Eight]; 3],
     w: &'a [Eight],
@@ -149,15 +147,15 @@ pub(super) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// Columns of a row, the first a multiple of eight.
+    /// All columns of a row.
     #[inline(always)]
-    pub(super) fn new(row: &'a mut [f32], shape: &Shape, columns: &Range<usize>) -> Self {
-        let (from, count) = (columns.start, columns.len().div_ceil(8));
+    pub(super) fn new(row: &'a mut [f32], shape: &Shape) -> Self {
+        let count = shape.columns.div_ceil(8);
         let mut rest = row;
         let mut next = || {
             let (field, others) = std::mem::take(&mut rest).split_at_mut(shape.stride);
             rest = others;
-            eights_mut(field, from, count)
+            eights_mut(field, 0, count)
         };
         let Extras { colliders, wind, tethers } = shape.extras;
         let x = [next(), next(), next()];
@@ -166,7 +164,7 @@ impl<'a> Columns<'a> {
         let wind = wind.then(|| [&*next(), &*next(), &*next()]);
         let root = tethers.then(|| [&*next(), &*next(), &*next()]);
         let tether = tethers.then(|| [&*next(), &*next()]);
-        Self { x, w, d, predicted, wind, root, tether, count: columns.len() }
+        Self { x, w, d, predicted, wind, root, tether, count: shape.columns }
     }
 
     /// Lets every free particle fall.

@@ -2,9 +2,8 @@
 //!
 //! Family after family over the whole patch, every row would come from a far cache for each of
 //! them. Instead, each family follows the one before it, a row behind where it reaches down a row,
-//! and all of them run down the patch like a wave; so few rows are in work at a time that they stay
-//! in the nearest cache, and where a row is long it is taken in strips. Every constraint finds its
-//! ends as it would family after family: the bits are the same.
+//! and all of them run down the patch like a wave: a few rows are in work at a time, and stay near.
+//! Every constraint finds its ends as it would family after family: the bits are the same.
 
 use std::ops::Range;
 
@@ -17,8 +16,6 @@ use crate::families::Family;
 use crate::kernels::{Wide, Work};
 use crate::project::{Block, Law};
 
-/// Columns of a strip: the rows in work are then within 32 KiB.
-const STRIP: usize = 128;
 /// Most stages of a pass: two halves of six families, twice, and what comes before and after.
 const STAGES_MAX: usize = 2 * 2 * Family::ALL.len() + 2;
 
@@ -42,10 +39,8 @@ pub(super) struct Stage {
     deed: Deed,
     /// Rows that it reaches down.
     reach: usize,
-    /// Rows.
+    /// Rows that it is behind the first.
     lag: usize,
-    /// Columns.
-    column_lag: usize,
 }
 
 /// The stages of a pass, in order.
@@ -59,21 +54,16 @@ pub(super) fn stages(families: &[Strand], pass: Pass, has_limits: bool) -> Vec<S
         deeds.extend(halves().map(|(strand, half)| Deed::LimitStretch { strand, half }));
     }
     deeds.extend(is_last.then_some(Deed::EndSubstep));
-    let (mut lag, mut column_lag) = (0_usize, 0_usize);
+    let mut lag = 0;
     let stage = |deed| {
-        let mut reach = 0;
-        if let Deed::Project { strand, half } | Deed::LimitStretch { strand, half } = deed {
-            let family = families[strand].family;
-            reach = family.reach();
-            lag += reach;
-            column_lag = match (reach, half) {
-                // An odd half begins between the pairs of the even one. Both begin with sixteen.
-                (0, _) => column_lag.next_multiple_of(LINE) + half * LINE,
-                _ if family.shifts() == [0, 0] => column_lag,
-                _ => column_lag + 8,
-            };
-        }
-        Stage { deed, reach, lag, column_lag }
+        let reach = match deed {
+            Deed::Project { strand, .. } | Deed::LimitStretch { strand, .. } => {
+                families[strand].family.reach()
+            }
+            Deed::Predict | Deed::EndSubstep => 0,
+        };
+        lag += reach;
+        Stage { deed, reach, lag }
     };
     deeds.into_iter().map(stage).collect()
 }
@@ -151,16 +141,12 @@ impl Band<'_> {
             }
         }
         let mut is_marked = false;
-        for strip in Strip::all(self.shape.columns) {
-            for moment in first..last {
-                let due = stages.iter().zip(&rows).filter_map(|(stage, rows)| {
-                    // Before the first row it wraps to a row that there is not.
-                    let row = moment.wrapping_sub(stage.lag);
-                    rows.contains(&row).then_some((stage, row))
-                });
-                for (stage, row) in due {
-                    let window = strip.window(stage.column_lag);
-                    is_marked |= self.take::<W>(stage.deed, row, &window, sweep);
+        for moment in first..last {
+            for (stage, rows) in stages.iter().zip(&rows) {
+                // Before the first row it wraps to a row that there is not.
+                let row = moment.wrapping_sub(stage.lag);
+                if rows.contains(&row) {
+                    is_marked |= self.take::<W>(stage.deed, row, sweep);
                 }
             }
         }
@@ -168,21 +154,15 @@ impl Band<'_> {
     }
 
     #[inline(always)]
-    fn take<W: Wide>(
-        &mut self,
-        deed: Deed,
-        row: usize,
-        window: &Window,
-        sweep: &mut Sweep<'_, '_>,
-    ) -> bool {
+    fn take<W: Wide>(&mut self, deed: Deed, row: usize, sweep: &mut Sweep<'_, '_>) -> bool {
         let shape = self.shape;
         match deed {
             Deed::Predict => {
-                self.columns(row, window).predict::<W>(sweep.motion);
+                self.columns(row).predict::<W>(sweep.motion);
                 false
             }
             Deed::EndSubstep => {
-                let mut columns = self.columns(row, window);
+                let mut columns = self.columns(row);
                 columns.pull_back::<W>();
                 let contacts = &mut sweep.scratch.contacts;
                 contacts.end_substep::<W>(&mut columns, sweep.motion.obstacles);
@@ -194,16 +174,16 @@ impl Band<'_> {
                     return false;
                 }
                 let is_limit = matches!(deed, Deed::LimitStretch { .. });
-                self.project::<W>(row, (strand, half), window, (is_limit, sweep))
+                self.project::<W>(row, (strand, half), (is_limit, sweep))
             }
         }
     }
 
     #[inline(always)]
-    fn columns(&mut self, row: usize, window: &Window) -> Columns<'_> {
+    fn columns(&mut self, row: usize) -> Columns<'_> {
         let length = self.shape.row_length();
         let row = &mut self.numbers[(row - self.first) * length..][..length];
-        Columns::new(row, self.shape, &window.of(self.shape.columns))
+        Columns::new(row, self.shape)
     }
 
     /// Projects constraints of one half of a family that begin in a row.
@@ -212,13 +192,13 @@ impl Band<'_> {
         &mut self,
         row: usize,
         (strand, half): (usize, usize),
-        window: &Window,
         (is_limit, sweep): (bool, &mut Sweep<'_, '_>),
     ) -> bool {
-        let (shape, length) = (self.shape, self.shape.row_length());
+        let (shape, row_length) = (self.shape, self.shape.row_length());
         let Strand { family, give } = shape.families[strand];
         let (stride, reach) = (shape.stride, family.reach());
-        let (upper, below) = self.numbers[(row - self.first) * length..].split_at_mut(length);
+        let (upper, below) =
+            self.numbers[(row - self.first) * row_length..].split_at_mut(row_length);
         let (state, rest) = upper.split_at_mut(STATE_FIELDS * stride);
         let block_length = shape.features.field_count() * stride;
         let links_at = (shape.links_at() - STATE_FIELDS) * stride + strand * block_length;
@@ -226,22 +206,19 @@ impl Band<'_> {
         let count = family.count(shape.columns);
         // The first of a half within the row, in memory and in its fields.
         let from = if reach == 0 { half * family.shifts()[1] } else { 0 };
-        let columns = window.of(count.saturating_sub(from));
-        if columns.is_empty() {
-            return false;
-        }
-        let per_eight = if reach == 0 { LINE } else { 8 };
-        let first = columns.start / per_eight;
-        let base = if reach == 0 { half * stride / LINE } else { 0 };
-        let eights = base + first..base + columns.end.div_ceil(per_eight);
-        let ways = if reach == 0 {
-            let count = 2 * eights.len();
-            Ways::Across(Ends::new(state, stride, from + columns.start, count), family)
+        let (base, length) = if reach == 0 {
+            (half * stride / LINE, count.saturating_sub(from).div_ceil(LINE))
         } else {
-            let ([a, b], count) = (family.shifts(), eights.len());
-            let lower = &mut below[(reach - 1) * length..];
-            let upper = Ends::new(state, stride, columns.start + a, count);
-            Ways::Down(upper, Ends::new(lower, stride, columns.start + b, count))
+            (0, count.div_ceil(8))
+        };
+        let eights = base..base + length;
+        let ways = if reach == 0 {
+            Ways::Across(Ends::new(state, stride, from, 2 * length), family)
+        } else {
+            let [a, b] = family.shifts();
+            let lower = &mut below[(reach - 1) * row_length..];
+            let upper = Ends::new(state, stride, a, length);
+            Ways::Down(upper, Ends::new(lower, stride, b, length))
         };
         let block = &mut *sweep.scratch.block;
         if is_limit {
@@ -252,43 +229,6 @@ impl Band<'_> {
         } else {
             ways.project::<W>(fields.general(&eights, give, sweep.pass), block)
         }
-    }
-}
-
-/// Columns of all rows that the wave runs down together.
-#[derive(Debug, Clone, Copy)]
-struct Strip {
-    number: usize,
-    is_last: bool,
-}
-
-impl Strip {
-    fn all(columns: usize) -> impl Iterator<Item = Self> {
-        let count = (columns / STRIP).max(1);
-        (0..count).map(move |number| Self { number, is_last: number + 1 == count })
-    }
-
-    /// The columns of a stage, which is so many behind the first.
-    #[inline(always)]
-    fn window(self, lag: usize) -> Window {
-        let first = STRIP * self.number;
-        Window {
-            start: if self.number == 0 { 0 } else { first - lag },
-            end: (!self.is_last).then_some(first + STRIP - lag),
-        }
-    }
-}
-
-/// A strip of columns, to the end of the row where it has no other.
-struct Window {
-    start: usize,
-    end: Option<usize>,
-}
-
-impl Window {
-    #[inline(always)]
-    fn of(&self, count: usize) -> Range<usize> {
-        self.start..self.end.unwrap_or(count).min(count)
     }
 }
 
