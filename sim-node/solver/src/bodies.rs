@@ -172,7 +172,7 @@ impl Bodies {
     pub(crate) fn substep(&mut self, motion: &Motion<'_>, pass_count: u32) -> bool {
         let Self { team, graph, patches, .. } = self;
         let mut is_marked = false;
-        graph.predict(motion);
+        graph.predict(team, motion);
         for index in 0..pass_count {
             let pass = Pass { index, count: pass_count };
             is_marked |= graph.project(team, pass);
@@ -208,28 +208,28 @@ impl Bodies {
 
     pub(crate) fn position(&self, place: Place) -> [f32; 3] {
         match place.patch() {
-            None => three(&self.graph.bodies[place.at()], 0),
+            None => three(&self.graph.bodies[place.at()].0, 0),
             Some(patch) => self.patches[patch].position(place.at()),
         }
     }
 
     pub(crate) fn inverse_mass(&self, place: Place) -> f32 {
         match place.patch() {
-            None => self.graph.bodies[place.at()][3],
+            None => self.graph.bodies[place.at()].0[3],
             Some(patch) => self.patches[patch].inverse_mass(place.at()),
         }
     }
 
     pub(crate) fn displacement(&self, place: Place) -> [f32; 3] {
         match place.patch() {
-            None => three(&self.graph.bodies[place.at()], 4),
+            None => three(&self.graph.bodies[place.at()].0, 4),
             Some(patch) => self.patches[patch].displacement(place.at()),
         }
     }
 
     pub(crate) fn set_displacement(&mut self, place: Place, displacement: [f32; 3]) {
         match place.patch() {
-            None => self.graph.bodies[place.at()][4..7].copy_from_slice(&displacement),
+            None => self.graph.bodies[place.at()].0[4..7].copy_from_slice(&displacement),
             Some(patch) => self.patches[patch].set_displacement(place.at(), displacement),
         }
     }

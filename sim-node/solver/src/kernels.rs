@@ -9,7 +9,7 @@ mod lanes;
 mod portable;
 mod scalar;
 
-pub(crate) use lanes::{Eight, Lanes, Wide, axes, each, eights, eights_mut};
+pub(crate) use lanes::{Body, Eight, Lanes, Wide, axes, each, eights, eights_mut};
 pub(crate) use portable::Portable;
 
 /// Which program makes the steps. All of them give the same bits.

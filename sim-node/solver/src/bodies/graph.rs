@@ -10,7 +10,7 @@ use super::team::{Scratch, Team};
 use super::terms::{Features, Fields, Give, Pass, Term};
 use crate::contact::{Cells, Contacts};
 use crate::crew::Shared;
-use crate::kernels::{Eight, Kernels, Wide, Work, axes};
+use crate::kernels::{Body, Eight, Kernels, Wide, Work, axes};
 use crate::order::Order;
 use crate::particles::Particle;
 use crate::project::{BLOCK, Block, Gap, Law, Rest, Spot, amount, end_scales};
@@ -20,10 +20,6 @@ use crate::solid::{Way, Zone};
 /// Groups with fewer constraints are projected one after the other: an eight costs as much as a
 /// few of them.
 const BATCHED_MIN: usize = 4;
-
-/// One particle: x, y, z and the inverse mass, then its displacement and 0. Both ends of a
-/// constraint are then one load each.
-pub(super) type Body = Eight;
 
 /// Everything that no patch has.
 #[derive(Debug, Clone, Default)]
@@ -84,8 +80,11 @@ impl Graph {
         particles: Vec<u32>,
         body_of: impl Fn(u32) -> Option<u32>,
     ) -> (Self, Vec<(u32, usize)>) {
-        let mut graph =
-            Self { bodies: vec![[0.0; 8]; particles.len() + 1], particles, ..Self::default() };
+        let mut graph = Self {
+            bodies: vec![Body::default(); particles.len() + 1],
+            particles,
+            ..Self::default()
+        };
         let mut places = Vec::new();
         for (group, range) in order.groups.iter().enumerate() {
             let links: Vec<_> = order.indices[range.clone()]
@@ -115,6 +114,7 @@ impl Graph {
         for eight in links.chunks(8) {
             let mut ends = [[pad; 8]; 2];
             for (lane, (index, [a, b])) in eight.iter().enumerate() {
+                assert!(*a.max(b) < pad, "a constraint of a body that there is not");
                 places.push((*index, 8 * self.ends.len() + lane));
                 (ends[0][lane], ends[1][lane]) = (*a, *b);
             }
@@ -161,8 +161,8 @@ impl Graph {
         for (body, particle) in self.bodies.iter_mut().zip(&self.particles) {
             let state = &states[*particle as usize];
             let ([x, y, z], [vx, vy, vz]) = (state.position, state.velocity);
-            is_other_weight |= body[3] != state.inverse_mass;
-            *body = [x, y, z, state.inverse_mass, vx, vy, vz, 0.0];
+            is_other_weight |= body.0[3] != state.inverse_mass;
+            *body = Body([x, y, z, state.inverse_mass, vx, vy, vz, 0.0]);
         }
         if is_other_weight {
             self.weigh();
@@ -173,7 +173,7 @@ impl Graph {
     pub(super) fn pack(&self, states: &mut [Particle], h: f32) -> u64 {
         let mut frozen_count = 0;
         for (body, particle) in self.bodies.iter().zip(&self.particles) {
-            let [x, y, z, _, dx, dy, dz, _] = *body;
+            let Body([x, y, z, _, dx, dy, dz, _]) = *body;
             let state = &mut states[*particle as usize];
             frozen_count += u64::from(super::pack(state, [x, y, z], [dx, dy, dz], h));
         }
@@ -181,16 +181,18 @@ impl Graph {
     }
 
     /// Lets every free body fall.
-    pub(super) fn predict(&mut self, motion: &Motion<'_>) {
-        let count = self.count();
-        for (index, body) in self.bodies[..count].iter_mut().enumerate() {
-            let [_, _, _, w, x, y, z, _] = *body;
-            let wind = self.gains.get(index).copied().unwrap_or_default();
-            let after = motion.fall.predict([x, y, z], wind, w);
-            body[4..7].copy_from_slice(&after);
-            if let Some(predicted) = self.predicted.get_mut(index) {
-                *predicted = after;
-            }
+    pub(super) fn predict(&mut self, team: &mut Team, motion: &Motion<'_>) {
+        let (count, kernels, gains) = (self.count(), team.kernels, &self.gains);
+        let length = part_length(count, team.members()).next_multiple_of(8);
+        let parts = self.bodies[..count].chunks_mut(length).enumerate();
+        let work = |(part, bodies): &mut (usize, &mut [Body]), _: &mut Scratch| {
+            let gains = gains.get(*part * length..).unwrap_or_default();
+            kernels.run(PredictWork { bodies, gains, motion });
+        };
+        team.each(parts, work, |_| {});
+        for (predicted, body) in self.predicted.iter_mut().zip(&self.bodies) {
+            let Body([_, _, _, _, x, y, z, _]) = *body;
+            *predicted = [x, y, z];
         }
     }
 
@@ -221,7 +223,7 @@ impl Graph {
         for (ends, weights) in self.ends.iter().zip(&mut self.weights) {
             for (ends, weights) in ends.iter().zip(weights) {
                 for (body, weight) in ends.iter().zip(weights) {
-                    *weight = self.bodies[*body as usize][3];
+                    *weight = self.bodies[*body as usize].0[3];
                 }
             }
         }
@@ -320,15 +322,15 @@ impl Batch<'_> {
             let ([a, b], [w_a, w_b]) = (&self.ends[at.eight], &self.weights[at.eight]);
             let (a, b) = (a[at.lane] as usize, b[at.lane] as usize);
             let (w_a, w_b) = (w_a[at.lane], w_b[at.lane]);
-            let difference = |axis: usize| self.bodies[b][axis] - self.bodies[a][axis];
+            let difference = |axis: usize| self.bodies[b].0[axis] - self.bodies[a].0[axis];
             let gap = Gap::new(axes(difference), axes(|axis| difference(4 + axis)));
             let scale = law.scale(at, &gap.size, w_a + w_b);
             let [scale_a, scale_b] = end_scales([w_a, w_b], scale);
             let from_a = amount(gap.separation, scale_a);
             let from_b = amount(gap.separation, scale_b);
             for axis in 0..3 {
-                self.bodies[a][4 + axis] -= from_a[axis];
-                self.bodies[b][4 + axis] -= from_b[axis];
+                self.bodies[a].0[4 + axis] -= from_a[axis];
+                self.bodies[b].0[4 + axis] -= from_b[axis];
             }
         }
         law.is_marked()
@@ -352,6 +354,7 @@ impl<T: Law> Work for BatchWork<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
+    #[allow(unsafe_code, reason = "the check of each index would be a third of the work")]
     fn run<W: Wide>(self) {
         let Self { part: BatchPart { ends, weights, bodies }, law, block } = self;
         let bodies = bodies.cells();
@@ -359,7 +362,8 @@ impl<T: Law> Work for BatchWork<'_, '_, T> {
             let length = BLOCK.min(ends.len() - first);
             let ends = &ends[first..first + length];
             for (eight, [a, b]) in ends.iter().enumerate() {
-                let [start, moved] = W::differences(bodies, a, b);
+                // SAFETY: `Graph::push` made the ends, of bodies that the graph has.
+                let [start, moved] = unsafe { W::differences(bodies, a, b) };
                 block.set_gap::<W>(eight, &Gap::new(start, moved));
             }
             for (eight, [w_a, w_b]) in weights[first..first + length].iter().enumerate() {
@@ -368,20 +372,56 @@ impl<T: Law> Work for BatchWork<'_, '_, T> {
             }
             for (eight, [a, b]) in ends.iter().enumerate() {
                 let [from_a, from_b] = block.amounts::<W>(eight);
-                W::take(bodies, a, from_a);
-                W::take(bodies, b, from_b);
+                // SAFETY: as above.
+                unsafe { W::take(bodies, a, from_a) };
+                // SAFETY: as above.
+                unsafe { W::take(bodies, b, from_b) };
             }
+        }
+    }
+}
+
+/// Lets bodies fall.
+struct PredictWork<'a> {
+    bodies: &'a mut [Body],
+    /// Empty where there is no wind.
+    gains: &'a [[f32; 3]],
+    motion: &'a Motion<'a>,
+}
+
+impl Work for PredictWork<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let Self { bodies, gains, motion: Motion { fall, .. } } = self;
+        let (eights, rest) = bodies.as_chunks_mut::<8>();
+        let eights_end = 8 * eights.len();
+        for (eight, bodies) in eights.iter_mut().enumerate() {
+            let [[_, _, _, w], [x, y, z, _]] = W::columns(bodies);
+            let wind = match gains.get(8 * eight..8 * eight + 8) {
+                None => [W::splat(0.0); 3],
+                Some(gains) => {
+                    axes(|axis| W::load(&std::array::from_fn(|lane| gains[lane][axis]), 0))
+                }
+            };
+            W::set_displacements(bodies, fall.predict([x, y, z], wind, w));
+        }
+        for (index, body) in rest.iter_mut().enumerate() {
+            let Body([_, _, _, w, x, y, z, _]) = *body;
+            let wind = gains.get(eights_end + index).copied().unwrap_or_default();
+            body.0[4..7].copy_from_slice(&fall.predict([x, y, z], wind, w));
         }
     }
 }
 
 #[inline(always)]
 fn body_pull_back(body: &mut Body, tether: &Tether) {
-    let [x, y, z, w, dx, dy, dz, _] = *body;
+    let Body([x, y, z, w, dx, dy, dz, _]) = *body;
     let [root_x, root_y, root_z] = tether.root;
     let rest = Rest::new(tether.length);
     let take = pull_back([x - root_x, y - root_y, z - root_z], [dx, dy, dz], rest, w);
-    for (number, take) in body[4..7].iter_mut().zip(take) {
+    for (number, take) in body.0[4..7].iter_mut().zip(take) {
         *number -= take;
     }
 }
@@ -413,11 +453,11 @@ impl Cells for BodyCells<'_> {
     }
 
     fn inverse_mass(&self, index: usize) -> f32 {
-        self.bodies[index][3]
+        self.bodies[index].0[3]
     }
 
     fn way(&self, index: usize) -> Way {
-        let [x, y, z, _, dx, dy, dz, _] = self.bodies[index];
+        let Body([x, y, z, _, dx, dy, dz, _]) = self.bodies[index];
         Way { start: Vec3::new(x, y, z), displacement: Vec3::new(dx, dy, dz) }
     }
 
@@ -426,25 +466,32 @@ impl Cells for BodyCells<'_> {
     }
 
     fn set_displacement(&mut self, index: usize, displacement: Vec3) {
-        self.bodies[index][4..7].copy_from_slice(&displacement.to_array());
+        self.bodies[index].0[4..7].copy_from_slice(&displacement.to_array());
     }
 
     fn set_position(&mut self, index: usize, position: Vec3) {
-        self.bodies[index][..3].copy_from_slice(&position.to_array());
+        self.bodies[index].0[..3].copy_from_slice(&position.to_array());
     }
 
     #[inline(always)]
     fn may_touch<W: Wide>(&self, eight: usize, zone: &Zone) -> bool {
-        let bodies = self.bodies[8 * eight..].iter().take(8);
-        bodies
-            .into_iter()
-            .any(|[x, y, z, _, dx, dy, dz, _]| zone.may_be_met([*x, *y, *z], [*dx, *dy, *dz]))
+        if let Some(bodies) = self.bodies[8 * eight..].first_chunk::<8>() {
+            let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(bodies);
+            return W::any(zone.may_be_met([x, y, z], [dx, dy, dz]));
+        }
+        self.bodies[8 * eight..]
+            .iter()
+            .any(|Body([x, y, z, _, dx, dy, dz, _])| zone.may_be_met([*x, *y, *z], [*dx, *dy, *dz]))
     }
 
     #[inline(always)]
     fn advance<W: Wide>(&mut self) {
-        for [x, y, z, _, dx, dy, dz, _] in self.bodies.iter_mut() {
-            (*x, *y, *z) = (*x + *dx, *y + *dy, *z + *dz);
+        for Body(numbers) in self.bodies.iter_mut() {
+            let (x, d) = numbers.split_at_mut(4);
+            // With the inverse mass, to which 0 is added: all four at once.
+            for (x, d) in x.iter_mut().zip(d) {
+                *x += *d;
+            }
         }
     }
 }

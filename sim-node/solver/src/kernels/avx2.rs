@@ -11,7 +11,7 @@ use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::Work;
-use super::lanes::{Eight, Lanes, Wide, axes};
+use super::lanes::{Body, Eight, Lanes, Wide, axes};
 
 /// Eight numbers. There are values of this type only within [`run`], on a processor with AVX2: that
 /// is the invariant on which every block of this file rests.
@@ -161,21 +161,31 @@ impl Lanes for Avx2 {
 }
 
 impl Avx2 {
-    /// Half of a body for each of two lanes of 128 bits.
+    /// What one body has more than another.
+    ///
+    /// # Safety
+    /// There are bodies of these numbers.
     #[inline(always)]
-    fn difference(bodies: &[Cell<Eight>], a: u32, b: u32) -> Self {
-        Self::load(&bodies[b as usize].get(), 0) - Self::load(&bodies[a as usize].get(), 0)
+    unsafe fn difference(bodies: &[Cell<Body>], a: u32, b: u32) -> Self {
+        // SAFETY: the caller's promise.
+        let from = unsafe { bodies.get_unchecked(a as usize) };
+        // SAFETY: as above.
+        let to = unsafe { bodies.get_unchecked(b as usize) };
+        Self::load(&to.get().0, 0) - Self::load(&from.get().0, 0)
     }
 
     /// The differences of four pairs, by columns.
+    ///
+    /// # Safety
+    /// There are bodies of these numbers.
     #[inline(always)]
-    fn four(bodies: &[Cell<Eight>], a: &[u32; 8], b: &[u32; 8], first: usize) -> [Self; 3] {
-        Self::columns([
-            Self::difference(bodies, a[first], b[first]),
-            Self::difference(bodies, a[first + 1], b[first + 1]),
-            Self::difference(bodies, a[first + 2], b[first + 2]),
-            Self::difference(bodies, a[first + 3], b[first + 3]),
-        ])
+    unsafe fn four(bodies: &[Cell<Body>], a: &[u32; 8], b: &[u32; 8], first: usize) -> [Self; 3] {
+        let mut rows = [Self::splat(0.0); 4];
+        for (lane, row) in rows.iter_mut().enumerate() {
+            // SAFETY: the caller's promise.
+            *row = unsafe { Self::difference(bodies, a[first + lane], b[first + lane]) };
+        }
+        Self::three_columns(rows)
     }
 
     #[inline(always)]
@@ -190,7 +200,7 @@ impl Avx2 {
 
     /// Four bodies to x, y, z of their first halves (low four lanes) and second halves (high).
     #[inline(always)]
-    fn columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
+    fn three_columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
         // x y of a and b, of c and d; z of a and b, of c and d.
         let low_ab = avx2!(_mm256_unpacklo_ps(a.0, b.0));
         let low_cd = avx2!(_mm256_unpacklo_ps(c.0, d.0));
@@ -229,8 +239,31 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
-    fn differences(bodies: &[Cell<Eight>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2] {
-        let (low, high) = (Self::four(bodies, a, b, 0), Self::four(bodies, a, b, 4));
+    fn columns(bodies: &[Body; 8]) -> [[Self; 4]; 2] {
+        let [a, b, c, d, e, f, g, h] = bodies;
+        let low = Self::transpose([a, b, c, d]);
+        let high = Self::transpose([e, f, g, h]);
+        let first = |number: usize| Self::low_halves(low[number], high[number]);
+        let second = |number: usize| Self::high_halves(low[number], high[number]);
+        [[first(0), first(1), first(2), first(3)], [second(0), second(1), second(2), second(3)]]
+    }
+
+    #[inline(always)]
+    fn set_displacements(bodies: &mut [Body; 8], displacements: [Self; 3]) {
+        let rows = Self::rows(displacements);
+        let [a, b, c, d, e, f, g, h] = bodies;
+        for (row, [low, high]) in rows.into_iter().zip([[a, e], [b, f], [c, g], [d, h]]) {
+            row.low_as_second().set_second(low);
+            row.high_as_second().set_second(high);
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn differences(bodies: &[Cell<Body>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2] {
+        // SAFETY: the caller's promise.
+        let low = unsafe { Self::four(bodies, a, b, 0) };
+        // SAFETY: as above.
+        let high = unsafe { Self::four(bodies, a, b, 4) };
         [
             axes(|axis| Self::low_halves(low[axis], high[axis])),
             axes(|axis| Self::high_halves(low[axis], high[axis])),
@@ -238,45 +271,70 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
-    fn take(bodies: &[Cell<Eight>], from: &[u32; 8], [x, y, z]: [Self; 3]) {
-        // Back to four numbers a body, for bodies 0 and 4, 1 and 5, 2 and 6, 3 and 7; before them,
-        // four zeros for the first half of the body.
-        let zero = Self::splat(0.0).0;
-        let low_xy = avx2!(_mm256_unpacklo_ps(x.0, y.0));
-        let high_xy = avx2!(_mm256_unpackhi_ps(x.0, y.0));
-        let low_z = avx2!(_mm256_unpacklo_ps(z.0, zero));
-        let high_z = avx2!(_mm256_unpackhi_ps(z.0, zero));
-        let rows = [
-            Self(avx2!(_mm256_shuffle_ps::<0x44>(low_xy, low_z))),
-            Self(avx2!(_mm256_shuffle_ps::<0xEE>(low_xy, low_z))),
-            Self(avx2!(_mm256_shuffle_ps::<0x44>(high_xy, high_z))),
-            Self(avx2!(_mm256_shuffle_ps::<0xEE>(high_xy, high_z))),
-        ];
-        for (lane, row) in rows.into_iter().enumerate() {
-            row.take_low(&bodies[from[lane] as usize]);
-            row.take_high(&bodies[from[lane + 4] as usize]);
+    unsafe fn take(bodies: &[Cell<Body>], from: &[u32; 8], amounts: [Self; 3]) {
+        for (lane, row) in Self::rows(amounts).into_iter().enumerate() {
+            // SAFETY: the caller's promise.
+            let low = unsafe { bodies.get_unchecked(from[lane] as usize) };
+            // SAFETY: as above.
+            let high = unsafe { bodies.get_unchecked(from[lane + 4] as usize) };
+            row.low_as_second().take_from(low);
+            row.high_as_second().take_from(high);
         }
     }
 }
 
 impl Avx2 {
-    /// Takes the low half from the second half of a body.
+    /// Three numbers and 0 for each of eight bodies: those of bodies 0 and 4, 1 and 5, 2 and 6, 3
+    /// and 7.
     #[inline(always)]
-    fn take_low(self, body: &Cell<Eight>) {
-        // 0, 0, 0, 0, then the low half.
-        Self(avx2!(_mm256_permute2f128_ps::<0x08>(self.0, self.0))).take_from(body);
+    fn rows([x, y, z]: [Self; 3]) -> [Self; 4] {
+        let zero = Self::splat(0.0).0;
+        let low_xy = avx2!(_mm256_unpacklo_ps(x.0, y.0));
+        let high_xy = avx2!(_mm256_unpackhi_ps(x.0, y.0));
+        let low_z = avx2!(_mm256_unpacklo_ps(z.0, zero));
+        let high_z = avx2!(_mm256_unpackhi_ps(z.0, zero));
+        [
+            Self(avx2!(_mm256_shuffle_ps::<0x44>(low_xy, low_z))),
+            Self(avx2!(_mm256_shuffle_ps::<0xEE>(low_xy, low_z))),
+            Self(avx2!(_mm256_shuffle_ps::<0x44>(high_xy, high_z))),
+            Self(avx2!(_mm256_shuffle_ps::<0xEE>(high_xy, high_z))),
+        ]
     }
 
-    /// Takes the high half from the second half of a body.
+    /// Four bodies, number by number: of their first halves in the low lanes, of their second ones
+    /// in the high lanes.
     #[inline(always)]
-    fn take_high(self, body: &Cell<Eight>) {
-        Self(avx2!(_mm256_permute2f128_ps::<0x18>(self.0, self.0))).take_from(body);
+    fn transpose([a, b, c, d]: [&Body; 4]) -> [Self; 4] {
+        let (a, b) = (Self::load(&a.0, 0), Self::load(&b.0, 0));
+        let (c, d) = (Self::load(&c.0, 0), Self::load(&d.0, 0));
+        let high_ab = avx2!(_mm256_unpackhi_ps(a.0, b.0));
+        let high_cd = avx2!(_mm256_unpackhi_ps(c.0, d.0));
+        let [x, y, z] = Self::three_columns([a, b, c, d]);
+        [x, y, z, Self(avx2!(_mm256_shuffle_ps::<0xEE>(high_ab, high_cd)))]
+    }
+
+    /// 0, 0, 0, 0, then the low half.
+    #[inline(always)]
+    fn low_as_second(self) -> Self {
+        Self(avx2!(_mm256_permute2f128_ps::<0x08>(self.0, self.0)))
+    }
+
+    /// 0, 0, 0, 0, then the high half.
+    #[inline(always)]
+    fn high_as_second(self) -> Self {
+        Self(avx2!(_mm256_permute2f128_ps::<0x18>(self.0, self.0)))
     }
 
     #[inline(always)]
-    fn take_from(self, body: &Cell<Eight>) {
+    fn set_second(self, body: &mut Body) {
+        let before = Self::load(&body.0, 0);
+        Self(avx2!(_mm256_blend_ps::<0xF0>(before.0, self.0))).store(&mut body.0, 0);
+    }
+
+    #[inline(always)]
+    fn take_from(self, body: &Cell<Body>) {
         let mut numbers = body.get();
-        (Self::load(&numbers, 0) - self).store(&mut numbers, 0);
+        (Self::load(&numbers.0, 0) - self).store(&mut numbers.0, 0);
         body.set(numbers);
     }
 }

@@ -1,10 +1,17 @@
 //! The words that kernels are written in.
+#![allow(unsafe_code, reason = "the promises of `differences` and `take`")]
 
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Eight numbers in memory: a vector, whatever the processor calls it.
 pub(crate) type Eight = [f32; 8];
+
+/// One particle of a graph: x, y, z and the inverse mass, then its displacement and 0. Both are one
+/// load, and lie in one cache line.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[repr(C, align(32))]
+pub(crate) struct Body(pub(crate) Eight);
 
 /// One number, or several side by side. No lane knows of another.
 pub(crate) trait Lanes:
@@ -47,11 +54,22 @@ pub(crate) trait Wide: Lanes {
     /// As [`Self::unzip`], by pairs: 0 1 8 9 4 5 12 13 and two more each.
     fn unzip_pairs(low: Self, high: Self) -> [Self; 2];
     fn zip_pairs(even: Self, odd: Self) -> [Self; 2];
+    /// Eight bodies, number by number: x, y, z and the inverse mass, and the same places of the
+    /// second half.
+    fn columns(bodies: &[Body; 8]) -> [[Self; 4]; 2];
+    /// Sets the displacements of eight bodies.
+    fn set_displacements(bodies: &mut [Body; 8], displacements: [Self; 3]);
     /// What body `b` has more than body `a`, for eight pairs: x, y, z of the first half, then of the
     /// second.
-    fn differences(bodies: &[Cell<Eight>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2];
+    ///
+    /// # Safety
+    /// There are bodies of these numbers.
+    unsafe fn differences(bodies: &[Cell<Body>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2];
     /// Takes x, y, z from the second half of eight different bodies (or of one, if that is 0).
-    fn take(bodies: &[Cell<Eight>], from: &[u32; 8], amounts: [Self; 3]);
+    ///
+    /// # Safety
+    /// There are bodies of these numbers.
+    unsafe fn take(bodies: &[Cell<Body>], from: &[u32; 8], amounts: [Self; 3]);
 }
 
 /// `count` vectors of a row, from a column on.

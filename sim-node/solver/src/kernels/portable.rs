@@ -1,9 +1,11 @@
 //! Eight lanes as an array: the compiler makes of it what the processor has.
 
+#![allow(unsafe_code, reason = "the trait's promises; nothing here needs them")]
+
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::lanes::{Eight, Lanes, Wide};
+use super::lanes::{Body, Eight, Lanes, Wide};
 
 /// Eight numbers.
 #[derive(Debug, Clone, Copy)]
@@ -177,10 +179,25 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
-    fn differences(bodies: &[Cell<Eight>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2] {
+    fn columns(bodies: &[Body; 8]) -> [[Self; 4]; 2] {
+        let column = |number: usize| Self(bodies.map(|body| body.0[number]));
+        [[0, 1, 2, 3].map(column), [4, 5, 6, 7].map(column)]
+    }
+
+    #[inline(always)]
+    fn set_displacements(bodies: &mut [Body; 8], displacements: [Self; 3]) {
+        for (lane, body) in bodies.iter_mut().enumerate() {
+            for (axis, along) in displacements.iter().enumerate() {
+                body.0[4 + axis] = along.0[lane];
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn differences(bodies: &[Cell<Body>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2] {
         let mut halves = [[[0.0; 8]; 3]; 2];
         for lane in 0..8 {
-            let (from, to) = (bodies[a[lane] as usize].get(), bodies[b[lane] as usize].get());
+            let (from, to) = (bodies[a[lane] as usize].get().0, bodies[b[lane] as usize].get().0);
             for (half, axes) in halves.iter_mut().enumerate() {
                 for (axis, numbers) in axes.iter_mut().enumerate() {
                     numbers[lane] = to[4 * half + axis] - from[4 * half + axis];
@@ -191,12 +208,12 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
-    fn take(bodies: &[Cell<Eight>], from: &[u32; 8], amounts: [Self; 3]) {
+    unsafe fn take(bodies: &[Cell<Body>], from: &[u32; 8], amounts: [Self; 3]) {
         for (lane, index) in from.iter().enumerate() {
             let body = &bodies[*index as usize];
             let mut numbers = body.get();
             for (axis, amount) in amounts.iter().enumerate() {
-                numbers[4 + axis] -= amount.0[lane];
+                numbers.0[4 + axis] -= amount.0[lane];
             }
             body.set(numbers);
         }
