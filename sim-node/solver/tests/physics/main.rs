@@ -11,6 +11,7 @@ mod contacts;
 mod cuts;
 mod hardening;
 mod motion;
+mod order;
 mod parameters;
 mod tearing;
 mod tethers;
