@@ -34,7 +34,6 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-// The only test of this binary: another one beside it would count as well.
 #[test]
 fn neither_steps_nor_commands_allocate() {
     // Tethers are worked out anew at the boundary where something is pinned, which may allocate.
