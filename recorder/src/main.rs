@@ -20,6 +20,7 @@ mod scene_source;
 mod simulate;
 mod simulation;
 mod solver_rows;
+mod thread_args;
 mod verify;
 
 use clap::{Parser, Subcommand};

@@ -44,7 +44,7 @@ fn record(job: &Job) -> (Vec<u8>, Outcomes) {
 }
 
 fn check(file: &[u8]) -> (Report, Option<LogEnd>) {
-    verify(LogReader::new(file).unwrap(), "test.mcap", |_| false).unwrap()
+    verify(LogReader::new(file).unwrap(), "test.mcap", 1, |_| false).unwrap()
 }
 
 /// The same recording with each message changed, or left out where `None` comes back.
@@ -257,7 +257,7 @@ fn a_recording_without_a_keyframe_says_so() {
     let (file, _) = record(&job("curtain", "", 10));
     let without =
         rebuild(&file, |message| (!matches!(message, Message::Keyframe { .. })).then_some(message));
-    let error = verify(LogReader::new(without.as_slice()).unwrap(), "x.mcap", |_| false);
+    let error = verify(LogReader::new(without.as_slice()).unwrap(), "x.mcap", 1, |_| false);
     let error = error.unwrap_err().to_string();
     assert_eq!(error, "x.mcap: has no snapshot with a keyframe to start from");
 }
@@ -271,7 +271,7 @@ fn a_recording_of_another_solver_version_is_refused() {
     let scene = job.scene.to_toml();
     let log = LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0);
     let file = log.unwrap().finish(&Closing::default()).unwrap();
-    let error = verify(LogReader::new(file.as_slice()).unwrap(), "x.mcap", |_| false);
+    let error = verify(LogReader::new(file.as_slice()).unwrap(), "x.mcap", 1, |_| false);
     let error = error.unwrap_err().to_string();
     let found = format!("recorded with solver version {}, this program", SOLVER_VERSION + 1);
     assert!(error.contains(&found), "{error}");

@@ -80,6 +80,11 @@ impl Resimulation {
         Ok(Some(start))
     }
 
+    /// Simulates with so many threads from now on.
+    pub(crate) fn set_threads(&mut self, threads: usize) {
+        self.solver.set_threads(threads);
+    }
+
     /// Compares the snapshot that it started from with its own header and with what the file says
     /// was torn until then, and step 0 with the scene.
     pub(crate) fn compare_start(&self, frame: &Frame) -> Finding {

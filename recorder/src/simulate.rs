@@ -15,6 +15,7 @@ use crate::exit::Exit;
 use crate::output::{self, AsJson, FileArgs, LogFile};
 use crate::scene_source::{load_commands, load_scene};
 use crate::simulation::{Job, Outcomes, simulate};
+use crate::thread_args::ThreadArgs;
 
 /// Steps between two looks at the signals and two moves of the progress bar.
 const STEPS_PER_LOOK: u64 = 256;
@@ -37,10 +38,8 @@ pub(crate) struct SimulateArgs {
     /// Commands: JSON lines, or the outcomes of a recording (ending in .mcap) [default: none]
     #[arg(long, value_name = "FILE")]
     commands: Option<String>,
-    /// Threads of the solver, from 1. The result is the same for any number; this version of the
-    /// solver uses one
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
-    threads: u32,
+    #[command(flatten)]
+    threads: ThreadArgs,
     #[command(flatten)]
     file: FileArgs,
     #[command(flatten)]
@@ -73,7 +72,8 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
             args.steps
         ));
     }
-    let solver = Solver::new(&job.scene);
+    let mut solver = Solver::new(&job.scene);
+    solver.set_threads(args.threads.count());
     let mut log =
         args.output.as_deref().map(|path| begin(args, path, &job, &solver)).transpose()?;
 

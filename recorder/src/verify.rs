@@ -15,6 +15,7 @@ use crate::exit::Exit;
 use crate::output::{self, AsJson};
 use crate::resimulation::{Finding, Resimulation};
 use crate::scene_source::scene_of;
+use crate::thread_args::ThreadArgs;
 
 /// Snapshots between two looks at the signals and two moves of the progress bar.
 const SNAPSHOTS_PER_LOOK: u64 = 64;
@@ -27,6 +28,8 @@ const SNAPSHOTS_PER_LOOK: u64 = 64;
 pub(crate) struct VerifyArgs {
     /// Recording to simulate again, from its first snapshot with a keyframe
     file: PathBuf,
+    #[command(flatten)]
+    threads: ThreadArgs,
     #[command(flatten)]
     as_json: AsJson,
 }
@@ -64,7 +67,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let path = output::name_of(&args.file);
     let log = LogReader::open(&args.file).with_context(|| path.clone())?;
     let bar = output::progress_spinner();
-    let (report, end) = verify(log, &path, |step| {
+    let (report, end) = verify(log, &path, args.threads.count(), |step| {
         bar.set_message(format!("step {step}"));
         stop.is_asked()
     })?;
@@ -80,10 +83,11 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     })
 }
 
-/// Simulates a recording again. `is_stopped` is asked now and then, with the step.
+/// Simulates a recording again, with so many threads. `is_stopped` is asked now and then, with the step.
 pub(crate) fn verify<R: Read>(
     log: LogReader<R>,
     path: &str,
+    threads: usize,
     mut is_stopped: impl FnMut(u64) -> bool,
 ) -> anyhow::Result<(Report, Option<LogEnd>)> {
     let recorded_version = log.run().solver_version;
@@ -103,7 +107,8 @@ pub(crate) fn verify<R: Read>(
         let finding = match &mut simulation {
             None => {
                 let start = Resimulation::start(&scene, &frame).with_context(|| path.to_owned())?;
-                let Some(start) = start else { continue };
+                let Some(mut start) = start else { continue };
+                start.set_threads(threads);
                 report.first_step = step;
                 simulation.insert(start).compare_start(&frame)
             }

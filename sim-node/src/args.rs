@@ -13,6 +13,8 @@ use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
 pub(crate) use lesson::{LessonArgs, LessonName};
 
+use crate::threads::THREADS_MAX;
+
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
 /// Every state is published in shared memory, where other processes read it without a copy, and
@@ -135,6 +137,11 @@ pub(crate) struct RunArgs {
     /// Make steps without waiting for their time
     #[arg(long)]
     pub(crate) as_fast_as_possible: bool,
+    /// Threads that step the solver, 1 to 64; they change no bit [default: 1 for scenes of fewer than
+    /// 4000 particles, else the cores that this process may use, less one]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u8).range(1..=i64::from(THREADS_MAX)))]
+    pub(crate) threads: Option<u8>,
     /// Publish every K-th snapshot only, and the last one before a wait
     #[arg(long, value_name = "K", default_value_t = 1,
         value_parser = clap::value_parser!(u64).range(1..=1_000_000))]

@@ -15,6 +15,7 @@ mod publish;
 mod run;
 mod scene_source;
 mod statistics;
+mod threads;
 mod warnings;
 
 use args::Verb;

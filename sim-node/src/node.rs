@@ -10,6 +10,7 @@ use crate::pace::Pace;
 use crate::publish::{Position, Publisher, StepTimes};
 use crate::scene_source;
 use crate::statistics::Statistics;
+use crate::threads::with_threads;
 use crate::warnings::Warnings;
 
 /// Longest time between two status messages: 10 Hz.
@@ -23,6 +24,8 @@ pub(crate) struct Options {
     /// In place of the scenes' own.
     pub(crate) rate_hz: Option<u32>,
     pub(crate) substeps: Option<u32>,
+    /// In place of as many as the scene calls for.
+    pub(crate) threads: Option<u8>,
     /// Steps after which the run ends.
     pub(crate) steps: Option<u64>,
     pub(crate) starts_paused: bool,
@@ -58,7 +61,7 @@ pub(crate) struct Node {
 impl Node {
     /// Takes the name and publishes the scene; the run has not begun.
     pub(crate) fn new(endpoint: &Endpoint, scene: Scene, options: Options) -> anyhow::Result<Self> {
-        let solver = Solver::new(&scene);
+        let solver = with_threads(Solver::new(&scene), options.threads);
         let publisher = Publisher::new(endpoint, &scene, &solver, options.every)?;
         let now_ns = monotonic_ns();
         Ok(Self {
@@ -167,7 +170,7 @@ impl Node {
                 return Ok(Err(reason));
             }
         };
-        let solver = Solver::new_in_run(&scene);
+        let solver = with_threads(Solver::new_in_run(&scene), self.options.threads);
         match self.publisher.load(&scene, &solver, self.step + 1) {
             Err(error @ OwnerError::Publish(_)) => Err(error).context("publishing another scene"),
             Err(error) => {

@@ -17,6 +17,7 @@ use crate::scene_source;
 struct Summary {
     scene: String,
     rate_hz: u32,
+    threads: usize,
     steps: u64,
     real_time_factor: f64,
     late_steps: u64,
@@ -37,6 +38,7 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     let options = Options {
         rate_hz: args.rate,
         substeps: args.substeps,
+        threads: args.threads,
         steps: args.steps.or(args.duration.map(|time| steps_in(time, scene.solver.rate_hz))),
         starts_paused: args.paused,
         waits_for_time: !args.as_fast_as_possible,
@@ -76,13 +78,16 @@ fn warn(scene: &Scene) {
 #[allow(clippy::print_stderr, reason = "messages to the user")]
 fn say_ready(endpoint: &Endpoint, node: &Node) {
     let settings = &node.scene.solver;
+    let threads = node.solver.threads();
     eprintln!(
-        "ready: {endpoint}: scene {}, {} particles, {} constraints, {} Hz x {} substeps",
+        "ready: {endpoint}: scene {}, {} particles, {} constraints, {} Hz x {} substeps, \
+         {threads} thread{}",
         node.scene.name,
         node.solver.particle_count(),
         node.solver.constraint_count(),
         settings.rate_hz,
         settings.substeps,
+        if threads == 1 { "" } else { "s" },
     );
 }
 
@@ -110,6 +115,7 @@ impl Summary {
         Self {
             scene: node.scene.name.clone(),
             rate_hz: node.scene.solver.rate_hz,
+            threads: node.solver.threads(),
             steps: node.step,
             real_time_factor: node.real_time_factor(),
             late_steps: status.late_steps,

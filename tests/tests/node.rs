@@ -236,9 +236,14 @@ fn a_run_ends_by_itself_and_reports_in_json() {
         ["run", "rope", "--rate", "500", "--duration", "0.2s", "--as-fast-as-possible", "--json"];
     let summary = Process::run(Program::SimNode, &sandbox, &args).json();
     assert_eq!((summary["steps"].as_u64(), summary["rate_hz"].as_u64()), (Some(100), Some(500)));
-    for key in
-        ["real_time_factor", "late_steps", "solve_ns_p50", "solve_ns_p99", "wake_late_ns_p50"]
-    {
+    for key in [
+        "threads",
+        "real_time_factor",
+        "late_steps",
+        "solve_ns_p50",
+        "solve_ns_p99",
+        "wake_late_ns_p50",
+    ] {
         assert!(summary[key].is_number(), "{key} in {summary}");
     }
     assert_eq!(summary["state_hash"].as_str().unwrap().len(), 16);

@@ -1,0 +1,88 @@
+//! The number of threads is no input of a simulation: whole recordings are equal byte for byte, and
+//! what some threads have simulated others verify.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::path::Path;
+
+use integration_tests::{Finished, Process, Program, Sandbox};
+use recorder::{LogReader, Message};
+
+/// A sheet that is big enough to be divided, falls onto a ball, and tears there.
+const SCENE: &str = r#"
+version = 1
+
+[solver]
+rate_hz = 120
+substeps = 2
+tethers = true
+tear_stretch = 1.05
+tear_force = 40
+
+[[collider]]
+shape = "sphere"
+center = [2.5, -0.2, 2.5]
+radius = 0.2
+
+[[generate]]
+shape = "cloth"
+columns = 100
+rows = 100
+spacing = 0.05
+down = [0, 0, 1]
+pinned = "corners"
+"#;
+
+fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
+    Process::run(Program::Recorder, sandbox, args)
+}
+
+/// Constraints that have torn in a recording.
+fn torn_count(file: &str) -> usize {
+    let mut log = LogReader::open(Path::new(file)).unwrap();
+    let rows = std::iter::from_fn(|| log.next_message().unwrap());
+    let torn = rows.filter_map(|logged| match logged.message {
+        Message::Tears(row) => Some(row.constraints.len()),
+        _ => None,
+    });
+    torn.sum()
+}
+
+#[test]
+fn simulate_writes_the_same_file_with_any_number_of_threads() {
+    let sandbox = Sandbox::new();
+    let scene = sandbox.write("sheet.toml", SCENE);
+    let files = ["1", "2", "3"].map(|threads| {
+        let file = sandbox.path(&format!("{threads}.mcap"));
+        let args = ["simulate", &scene, "--steps", "60", "--threads", threads, "-o", &file];
+        recorder(&sandbox, &args).success();
+        file
+    });
+    assert!(torn_count(&files[0]) > 0, "a sheet that does not tear proves less");
+    let [one, two, three] = files.each_ref().map(|file| std::fs::read(file).unwrap());
+    // Not `assert_eq`: nobody reads megabytes.
+    assert!(one == two, "two threads write another file");
+    assert!(one == three, "three threads write another file");
+    let verified = recorder(&sandbox, &["verify", &files[0], "--threads", "2"]).success();
+    assert!(verified.starts_with("60 steps bit-identical"), "{verified}");
+}
+
+#[test]
+fn wrong_numbers_of_threads_exit_with_2_and_the_range() {
+    let sandbox = Sandbox::new();
+    for (program, command) in [
+        (Program::SimNode, &["run", "curtain"][..]),
+        (Program::Recorder, &["simulate", "curtain", "--steps", "1"]),
+        (Program::Recorder, &["verify", "run.mcap"]),
+    ] {
+        for (threads, cause) in
+            [("0", "1..=64"), ("65", "1..=64"), ("-1", "1..=64"), ("x", "invalid digit")]
+        {
+            let finished =
+                Process::run(program, &sandbox, &[command, &["--threads", threads]].concat());
+            assert_eq!(finished.code, Some(2), "{program:?} {threads}: {}", finished.stderr);
+            for word in ["--threads", cause] {
+                assert!(finished.stderr.contains(word), "no \"{word}\" in: {}", finished.stderr);
+            }
+        }
+    }
+}
