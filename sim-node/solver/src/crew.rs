@@ -54,10 +54,8 @@ struct JobCell(UnsafeCell<Option<&'static Job<'static>>>);
 unsafe impl Sync for JobCell {}
 
 impl Crew {
-    /// Starts threads until there are so many members, at least 1.
-    ///
-    /// # Errors
-    /// The system has no thread left; then there are fewer.
+    /// Starts threads until there are so many members, at least 1 and at most [`MEMBERS_MAX`]. Where
+    /// the system gives no more threads there are fewer.
     pub(crate) fn new(members: usize) -> Self {
         let others = members.clamp(1, MEMBERS_MAX) - 1;
         let board = Arc::new(Board {
