@@ -11,7 +11,7 @@ use sim_contract::{
 };
 
 /// The header of one recorded snapshot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct StepRow {
     /// The step that the snapshot is the state after.
     pub step: u64,

@@ -5,7 +5,7 @@
 pub(crate) struct ThreadArgs {
     /// Threads that step the solver, 1 to 64; they change no bit, and make big scenes faster
     #[arg(long = "threads", value_name = "N", default_value_t = 1, allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u8).range(1..=64))]
+        value_parser = clap::value_parser!(u8).range(1..=i64::from(sim_solver::THREADS_MAX)))]
     thread_count: u8,
 }
 

@@ -9,11 +9,10 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args as ClapArgs, CommandFactory, Parser, Subcommand};
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
+use sim_solver::THREADS_MAX;
 
 pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
 pub(crate) use lesson::{LessonArgs, LessonName};
-
-use crate::threads::THREADS_MAX;
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///

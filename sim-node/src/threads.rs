@@ -3,10 +3,7 @@
 use std::num::NonZero;
 use std::thread::available_parallelism;
 
-use sim_solver::Solver;
-
-/// Most threads of a solver.
-pub(crate) const THREADS_MAX: u8 = 64;
+use sim_solver::{Solver, THREADS_MAX};
 
 /// Particles from which on more than one thread is the default: the solver divides nothing smaller.
 const SHARED_MIN: usize = 4000;

@@ -46,18 +46,8 @@ pub(crate) fn visit<R: Read>(
 
 impl Moment {
     pub(crate) fn new() -> Self {
-        let row = StepRow {
-            step: 0,
-            scene_step: 0,
-            state_hash: 0,
-            topology_revision: 0,
-            torn_count: 0,
-            outcome_count: 0,
-            wake_late_ns: 0,
-            solve_ns: 0,
-        };
         Self {
-            row,
+            row: StepRow::default(),
             particles: Vec::new(),
             constraints: Vec::new(),
             is_torn: Vec::new(),

@@ -132,16 +132,7 @@ mod tests {
     use super::*;
 
     fn row(step: u64) -> StepRow {
-        StepRow {
-            step,
-            scene_step: step,
-            state_hash: 0,
-            topology_revision: 0,
-            torn_count: 0,
-            outcome_count: 0,
-            wake_late_ns: 0,
-            solve_ns: 0,
-        }
+        StepRow { step, scene_step: step, ..StepRow::default() }
     }
 
     fn snapshot(step: u64) -> Item {

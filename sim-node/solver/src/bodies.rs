@@ -8,6 +8,7 @@ mod patch;
 mod team;
 mod terms;
 
+use crate::constraints::Recipe;
 use crate::families::{Family, Sheet};
 use crate::kernels::Kernels;
 use crate::order::Order;
@@ -27,6 +28,8 @@ pub(crate) struct Bodies {
     team: Team,
     graph: Graph,
     patches: Vec<Patch>,
+    /// That of each patch, ascending.
+    sheets: Vec<Sheet>,
     /// By constraint: where its term is.
     term_places: Vec<Place>,
     /// Particles side by side that can touch something.
@@ -56,13 +59,6 @@ impl Place {
     }
 }
 
-/// What the constraints of a scene are like: worked out anew whenever parameters change.
-pub(crate) trait Terms {
-    fn term(&self, constraint: u32) -> Term;
-    /// Passes of a substep.
-    fn pass_count(&self) -> u32;
-}
-
 impl Bodies {
     pub(crate) fn new(model: &Model, order: &Order, kernels: Kernels) -> Self {
         let is_structured = kernels != Kernels::Reference && order.independent_count > 0;
@@ -73,34 +69,32 @@ impl Bodies {
             u32::try_from(body).ok()
         };
         let (graph, places) = Graph::new(model, order, loose.clone(), body_of);
+        let families = families_of(model, &sheets);
         let patches: Vec<_> =
-            sheets.iter().map(|sheet| Patch::new(*sheet, &families_of(model, sheet))).collect();
+            sheets.iter().zip(&families).map(|(sheet, found)| Patch::new(*sheet, found)).collect();
         let mut term_places = vec![Place::default(); model.constraints.len()];
         for (index, at) in places {
             term_places[index as usize] = Place::new(0, at);
         }
-        for (index, family) in (0_u32..).zip(&model.families) {
-            let first = model.pair(index)[0];
-            let found = sheets
-                .iter()
-                .enumerate()
-                .find_map(|(patch, sheet)| Some((patch, sheet.find(first)?)));
-            if let (Some((patch, [row, column])), Some(group)) = (found, family) {
+        for (index, group) in (0_u32..).zip(&model.families) {
+            let found = find_sheet(&sheets, model.pair(index)[0]);
+            if let (Some((patch, [row, column])), Some(group)) = (found, group) {
                 let family = Family::of_group(*group);
                 let place = [row, column - family.shifts()[0]];
                 let at = patches[patch].place(family, place);
                 term_places[index as usize] = Place::new(patch + 1, at);
             }
         }
-        Self { team: Team::new(kernels, 1), graph, patches, term_places, contact_count: 0 }
+        let team = Team::new(kernels, 1);
+        Self { team, graph, patches, sheets, term_places, contact_count: 0 }
     }
 
     /// Makes room for what the scene has, and takes over what its constraints are like. `is_torn`
     /// says which of them do nothing any more.
-    pub(crate) fn configure(&mut self, terms: &impl Terms, extras: Extras, is_torn: &[bool]) {
+    pub(crate) fn configure(&mut self, recipe: &Recipe<'_>, extras: Extras, is_torn: &[bool]) {
         let (mut found, mut patch_gives) = (Found::default(), vec![Vec::new(); self.patches.len()]);
         for (index, place) in (0_u32..).zip(&self.term_places) {
-            let term = terms.term(index);
+            let term = recipe.term(index);
             found.see(&term, place.patch().is_none());
             if let Some(patch) = place.patch() {
                 let strand = self.patches[patch].strand(place.at());
@@ -109,16 +103,16 @@ impl Bodies {
                 gives[strand] = Some(term.give);
             }
         }
-        let features = found.features(terms.pass_count());
+        let features = found.features(recipe.pass_count());
         self.graph.lay_out(features, extras, found.give());
         let features = Features { gives: false, floors: false, ..features };
         for (patch, gives) in self.patches.iter_mut().zip(&patch_gives) {
-            patch.lay_out(features, extras, (gives, terms.pass_count()));
+            patch.lay_out(features, extras, (gives, recipe.pass_count()));
         }
         for index in
             (0_u32..).zip(is_torn).filter(|(_, is_torn)| !**is_torn).map(|(index, _)| index)
         {
-            self.set_term(index, &terms.term(index));
+            self.set_term(index, &recipe.term(index));
         }
         let widest = self.patches.iter().map(|patch| patch.sheet.columns as usize).max();
         let most = RUN.min(self.graph.count()).max(widest.unwrap_or_default());
@@ -197,11 +191,8 @@ impl Bodies {
 
     /// Where a particle is, as long as nothing is configured anew.
     pub(crate) fn place(&self, particle: u32) -> Place {
-        let sheets = self.patches.iter().enumerate();
-        for (patch, one) in sheets {
-            if let Some(place) = one.sheet.find(particle) {
-                return Place::new(patch + 1, one.number_of(place));
-            }
+        if let Some((patch, place)) = find_sheet(&self.sheets, particle) {
+            return Place::new(patch + 1, self.patches[patch].number_of(place));
         }
         Place::new(0, self.graph.particles.binary_search(&particle).unwrap_or_default())
     }
@@ -292,33 +283,48 @@ impl Found {
     }
 }
 
+/// The sheet that has a particle, with its row and column there; sheets are ascending.
+fn find_sheet(sheets: &[Sheet], particle: u32) -> Option<(usize, [usize; 2])> {
+    let sheet = sheets.partition_point(|sheet| sheet.first <= particle).checked_sub(1)?;
+    Some((sheet, sheets[sheet].find(particle)?))
+}
+
 /// The sheets whose particles have no constraint but those of their families.
 fn pure_sheets(model: &Model) -> Vec<Sheet> {
-    let mut sheets = model.sheets.clone();
+    let mut is_pure = vec![true; model.sheets.len()];
     for (index, family) in (0_u32..).zip(&model.families) {
         if family.is_none() {
-            let pair = model.pair(index);
-            sheets.retain(|sheet| pair.iter().all(|particle| sheet.find(*particle).is_none()));
+            for particle in model.pair(index) {
+                if let Some((sheet, _)) = find_sheet(&model.sheets, particle) {
+                    is_pure[sheet] = false;
+                }
+            }
         }
     }
-    sheets
+    let sheets = model.sheets.iter().zip(is_pure);
+    sheets.filter(|(_, is_pure)| *is_pure).map(|(sheet, _)| *sheet).collect()
 }
 
 /// Particles in none of the sheets, ascending.
 fn loose_particles(model: &Model, sheets: &[Sheet]) -> Vec<u32> {
     let all = 0..model.particle_count();
-    all.filter(|particle| sheets.iter().all(|sheet| sheet.find(*particle).is_none())).collect()
+    all.filter(|particle| find_sheet(sheets, *particle).is_none()).collect()
 }
 
-/// The families of a sheet, in the order of projection.
-fn families_of(model: &Model, sheet: &Sheet) -> Vec<Family> {
-    let is_there = |family: &Family| {
-        (0_u32..).zip(&model.families).any(|(index, group)| {
-            group.is_some_and(|group| Family::of_group(group) == *family)
-                && sheet.find(model.pair(index)[0]).is_some()
-        })
+/// The families of each sheet, in the order of projection.
+fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<Vec<Family>> {
+    let mut has_family = vec![[false; Family::ALL.len()]; sheets.len()];
+    for (index, group) in (0_u32..).zip(&model.families) {
+        let found = find_sheet(sheets, model.pair(index)[0]);
+        if let (Some((sheet, _)), Some(group)) = (found, group) {
+            has_family[sheet][Family::of_group(*group) as usize] = true;
+        }
+    }
+    let chosen = |has: [bool; Family::ALL.len()]| {
+        let all = Family::ALL.into_iter().zip(has);
+        all.filter(|(_, has)| *has).map(|(family, _)| family).collect()
     };
-    Family::ALL.into_iter().filter(is_there).collect()
+    has_family.into_iter().map(chosen).collect()
 }
 
 fn three(body: &[f32; 8], first: usize) -> [f32; 3] {

@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use serde::{Deserialize, Serialize};
 
-use crate::bodies::{Give, Term, Terms};
+use crate::bodies::{Give, Term};
 use crate::parameters::Parameters;
 use crate::project::Rest;
 use crate::scene::{Limits, Method, Model};
@@ -113,8 +113,9 @@ impl<'a> Recipe<'a> {
     }
 }
 
-impl Terms for Recipe<'_> {
-    fn term(&self, index: u32) -> Term {
+impl Recipe<'_> {
+    /// What a constraint is like that is whole.
+    pub(crate) fn term(&self, index: u32) -> Term {
         let one = self.model.constraints[index as usize];
         let limits = self.limits(index);
         let (by_stretch, by_distance) = self.tear_lengths(index);
@@ -130,7 +131,8 @@ impl Terms for Recipe<'_> {
         }
     }
 
-    fn pass_count(&self) -> u32 {
+    /// Passes of a substep.
+    pub(crate) fn pass_count(&self) -> u32 {
         self.parameters.iterations
     }
 }

@@ -14,8 +14,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::{self, JoinHandle};
 
+/// Most threads that step a solver.
+pub const THREADS_MAX: u8 = 64;
+
 /// Most members of a crew.
-pub(crate) const MEMBERS_MAX: usize = 64;
+pub(crate) const MEMBERS_MAX: usize = THREADS_MAX as usize;
 
 /// How often a member looks for a job, or for its end, before it gives the core away: some ten
 /// microseconds.

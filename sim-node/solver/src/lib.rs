@@ -55,6 +55,7 @@ pub use colliders::PlacedCollider;
 pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Push, Rejection};
 pub(crate) use commands::{check_finite, is_near};
 pub use constraints::{Constraint, ConstraintKind};
+pub use crew::THREADS_MAX;
 pub use cut::{Ball, Sweep};
 pub use frame::Pose;
 pub use kernels::Kernels;

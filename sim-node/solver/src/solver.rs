@@ -111,7 +111,7 @@ impl Solver {
         Self { is_restored: true, ..Self::new(scene) }
     }
 
-    /// Steps with so many threads from now on, this one included; 1 is how it begins, 64 the most.
+    /// Steps with so many threads from now on, this one included; 1 is how it begins, [`THREADS_MAX`](crate::THREADS_MAX) the most.
     /// They change no bit. Small scenes are stepped by one, whatever is set. Threads that the system
     /// does not give are not there: see [`Self::threads`].
     pub fn set_threads(&mut self, threads: usize) {

@@ -3,10 +3,11 @@
 //! constraint can have.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{Ball, Grip, Kernels, Push, Scene, Setting, Solver, builtin};
+use sim_solver::{Ball, Grip, Kernels, Push, Scene, Setting, Solver, TearCause, builtin};
 
-/// Steps all kernels side by side, with commands between, and compares every particle.
-fn assert_same_bits(text: &str, name: &str, steps: u32) {
+/// Steps all kernels side by side, with commands between, and compares every particle; gives the
+/// reference back.
+fn assert_same_bits(text: &str, name: &str, steps: u32) -> Solver {
     let scene = Scene::from_toml(text, name).unwrap();
     let mut reference = Solver::with_kernels(&scene, Kernels::Reference);
     let others = Kernels::available().filter(|kernels| *kernels != Kernels::Reference);
@@ -24,6 +25,7 @@ fn assert_same_bits(text: &str, name: &str, steps: u32) {
             assert_eq!(reference.tear_causes(), solver.tear_causes(), "{name}: {kernels:?}");
         }
     }
+    reference
 }
 
 /// A little of everything; what a scene refuses, every kernel refuses.
@@ -110,11 +112,21 @@ const VARIANTS: [(&str, &str, &str); 8] = [
 #[test]
 fn on_sheets_of_every_size_around_a_vector() {
     for (name, solver, generator) in VARIANTS {
+        let mut causes = Vec::new();
         for size in [1, 2, 3, 7, 8, 9, 15, 16, 17, 31, 32, 33] {
             for (columns, rows) in [(size, 9), (5, size), (size, size)] {
                 let name = format!("{name}, {columns} x {rows}");
-                assert_same_bits(&sheet(columns, rows, solver, generator), &name, 24);
+                let text = sheet(columns, rows, solver, generator);
+                causes.extend_from_slice(assert_same_bits(&text, &name, 24).tear_causes());
             }
+        }
+        // What is said to tear does.
+        let tears = |cause| causes.contains(&cause);
+        let by_itself = [TearCause::Force, TearCause::Stretch, TearCause::Distance].map(tears);
+        match name {
+            "torn" => assert_eq!(by_itself, [true, true, false]),
+            "one diagonal" => assert_eq!(by_itself, [false, false, true]),
+            _ => assert_eq!(by_itself, [false; 3], "{name}"),
         }
     }
 }

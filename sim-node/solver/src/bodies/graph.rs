@@ -269,7 +269,8 @@ impl Graph {
 
 /// Bodies or constraints of a part, when so many are divided among so many members.
 fn part_length(count: usize, members: usize) -> usize {
-    count.div_ceil(members).max(SHARED_MIN / 2)
+    let parts = if count < SHARED_MIN { 1 } else { members.min(count / (SHARED_MIN / 2)) };
+    count.div_ceil(parts).max(1)
 }
 
 /// Constraints of one group, and what they move.

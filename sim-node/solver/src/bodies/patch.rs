@@ -50,33 +50,6 @@ pub(crate) struct Patch {
     stages: Vec<Vec<Stage>>,
 }
 
-/// Rows that one member of a team works on.
-struct Part<'a> {
-    numbers: &'a mut [f32],
-    /// The first row.
-    first: usize,
-    span: Span,
-    is_marked: bool,
-}
-
-impl<'a> Part<'a> {
-    /// Cuts ascending ranges of rows out of all numbers.
-    fn cut(
-        numbers: &'a mut [f32],
-        row_length: usize,
-        spans: impl Iterator<Item = (Range<usize>, Span)>,
-    ) -> impl Iterator<Item = Self> {
-        let (mut rest, mut next) = (numbers, 0);
-        spans.map(move |(rows, span)| {
-            let (_, from) =
-                std::mem::take(&mut rest).split_at_mut((rows.start - next) * row_length);
-            let (numbers, behind) = from.split_at_mut(rows.len() * row_length);
-            (rest, next) = (behind, rows.end);
-            Self { numbers, first: rows.start, span, is_marked: false }
-        })
-    }
-}
-
 /// Particles of a patch from which on several threads are faster than one.
 const SHARED_MIN: usize = 4000;
 
@@ -123,6 +96,27 @@ impl Shape {
     /// Numbers of a row.
     fn row_length(&self) -> usize {
         self.field_count() * self.stride
+    }
+
+    fn wind_at(&self) -> usize {
+        STATE_FIELDS + 3 * usize::from(self.extras.colliders)
+    }
+
+    fn root_at(&self) -> usize {
+        self.wind_at() + 3 * usize::from(self.extras.wind)
+    }
+
+    /// The place in its field of a constraint within a row: its half begins at 0 or in the middle;
+    /// there, in the order in which [`Wide::unzip`] takes sixteen columns apart.
+    fn place_across(&self, family: Family, column: usize) -> usize {
+        let half = family.half(0, column);
+        let (start, order): (_, [usize; 8]) = match family {
+            Family::HorizontalBend => (2 * half, [0, 1, 8, 9, 4, 5, 12, 13]),
+            _ => (half, [0, 2, 8, 10, 4, 6, 12, 14]),
+        };
+        let (block, within) = ((column - start) / 16, (column - start) % 16);
+        let lane = order.iter().position(|column| *column == within).unwrap_or_default();
+        half * self.stride / 2 + 8 * block + lane
     }
 }
 
@@ -252,24 +246,7 @@ impl Patch {
             }
         }
     }
-}
 
-impl Shape {
-    /// The place in its field of a constraint within a row: its half begins at 0 or in the middle;
-    /// there, in the order in which [`Wide::unzip`] takes sixteen columns apart.
-    fn place_across(&self, family: Family, column: usize) -> usize {
-        let half = family.half(0, column);
-        let (start, order): (_, [usize; 8]) = match family {
-            Family::HorizontalBend => (2 * half, [0, 1, 8, 9, 4, 5, 12, 13]),
-            _ => (half, [0, 2, 8, 10, 4, 6, 12, 14]),
-        };
-        let (block, within) = ((column - start) / 16, (column - start) % 16);
-        let lane = order.iter().position(|column| *column == within).unwrap_or_default();
-        half * self.stride / 2 + 8 * block + lane
-    }
-}
-
-impl Patch {
     /// Takes all rows through a pass. Whether anything has torn.
     ///
     /// Each member of the team has a band of rows. What cannot be finished at their edges, as it
@@ -372,12 +349,29 @@ impl Patch {
     }
 }
 
-impl Shape {
-    fn wind_at(&self) -> usize {
-        STATE_FIELDS + 3 * usize::from(self.extras.colliders)
-    }
+/// Rows that one member of a team works on.
+struct Part<'a> {
+    numbers: &'a mut [f32],
+    /// The first row.
+    first: usize,
+    span: Span,
+    is_marked: bool,
+}
 
-    fn root_at(&self) -> usize {
-        self.wind_at() + 3 * usize::from(self.extras.wind)
+impl<'a> Part<'a> {
+    /// Cuts ascending ranges of rows out of all numbers.
+    fn cut(
+        numbers: &'a mut [f32],
+        row_length: usize,
+        spans: impl Iterator<Item = (Range<usize>, Span)>,
+    ) -> impl Iterator<Item = Self> {
+        let (mut rest, mut next) = (numbers, 0);
+        spans.map(move |(rows, span)| {
+            let (_, from) =
+                std::mem::take(&mut rest).split_at_mut((rows.start - next) * row_length);
+            let (numbers, behind) = from.split_at_mut(rows.len() * row_length);
+            (rest, next) = (behind, rows.end);
+            Self { numbers, first: rows.start, span, is_marked: false }
+        })
     }
 }

@@ -38,7 +38,10 @@ impl Team {
         }
     }
 
-    /// Lets each member work on a part, with its own scratch. At most as many parts as members.
+    /// Lets each member work on a part, with its own scratch; one alone takes them in turn.
+    ///
+    /// # Panics
+    /// If there are more parts than members.
     pub(crate) fn each<P: Send>(
         &mut self,
         parts: impl Iterator<Item = P>,
@@ -53,9 +56,11 @@ impl Team {
             return;
         }
         let mut pairs = [const { None }; MEMBERS_MAX];
-        let mut count = 0;
-        for (pair, place) in parts.zip(&mut self.scratches).zip(&mut pairs) {
-            *place = Some(pair);
+        let (mut count, mut scratches) = (0, self.scratches.iter_mut());
+        for (part, place) in parts.zip(&mut pairs) {
+            let scratch = scratches.next();
+            assert!(scratch.is_some(), "more parts than members");
+            *place = scratch.map(|scratch| (part, scratch));
             count += 1;
         }
         self.crew.each(&mut pairs[..count], |pair| {

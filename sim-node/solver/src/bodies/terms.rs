@@ -71,7 +71,7 @@ impl Features {
         self == plain && softness == 0.0
     }
 
-    /// Fields that constraints with these features need, in the order in which [`split`] takes them.
+    /// Fields that constraints with these features need, in the order of [`Fields::new`].
     pub(crate) fn field_count(self) -> usize {
         let tears = self.tear_lengths || self.tear_multipliers;
         let [gives, floors, limits] = [self.gives, self.floors, self.max_lengths].map(usize::from);
