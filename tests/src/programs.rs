@@ -11,6 +11,8 @@ pub enum Program {
     SimNode,
     /// The recorder.
     Recorder,
+    /// The server of the page.
+    ViewerBridge,
     /// A reader that takes samples and never gives them back.
     StubbornReader,
     /// The contract's example that prints snapshots.
@@ -27,6 +29,7 @@ impl Program {
         match self {
             Self::SimNode => built().join("sim-node"),
             Self::Recorder => built().join("recorder"),
+            Self::ViewerBridge => built().join("viewer-bridge"),
             Self::StubbornReader => built().join("stubborn-reader"),
             Self::Watch => built().join("examples/watch"),
             Self::Drag => built().join("examples/drag"),

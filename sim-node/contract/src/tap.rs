@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::reader::{Drained, SliceReader, ValueReader};
+use crate::reader::{Drained, ReadError, SliceReader, ValueReader};
 use crate::service::{
     COLLIDERS, KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEAR_CAUSES,
     TEARS, TOPOLOGY,
@@ -13,7 +13,7 @@ use crate::wake::WakeListener;
 use crate::watch::listen;
 use crate::{
     ColliderState, CollidersHeader, ConstraintState, Endpoint, KeyframeHeader, LoadHeader,
-    NodeStatus, Outcome, ParticleState, SnapshotHeader, TearsHeader, Triangle,
+    NodeStatus, Outcome, ParticleState, Snapshot, SnapshotHeader, TearsHeader, Triangle,
 };
 
 /// Reads everything that an owner publishes, without a copy.
@@ -99,6 +99,16 @@ impl Tap {
         let mut drained = Drained::default();
         self.particles.drain(&mut drained, sink);
         drained
+    }
+
+    /// The newest snapshot that has come, if any has since the last call; those before it are
+    /// skipped. For those who cannot use every one; beside [`Tap::drain_particles`], each snapshot
+    /// goes to the one that is called first.
+    ///
+    /// # Errors
+    /// More than [`crate::BORROWED_SAMPLES_MAX`] snapshots are held, or a malformed one came.
+    pub fn latest_snapshot(&mut self) -> Result<Option<Snapshot>, ReadError> {
+        Ok(self.particles.newest()?.map(Snapshot))
     }
 
     /// Shows everything else that has come to `sink`, each kind oldest first and at most one buffer

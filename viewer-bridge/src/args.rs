@@ -1,0 +1,61 @@
+//! The command line. Help texts are the doc comments here.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Parser;
+use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
+
+/// Show a running simulation in a browser, and let it be touched.
+///
+/// Open the address that is printed: the particles of the node can be dragged, pinned, pushed and
+/// cut there, its parameters changed, its pace watched. The node may come later, go, and come back.
+#[derive(Debug, Parser)]
+#[command(
+    name = "viewer-bridge",
+    version,
+    after_help = "Ends cleanly with Ctrl-C or SIGTERM.\n\n\
+        Exit codes: 0 done, 1 failed, 2 wrong option.\n\nExamples:\n  \
+        viewer-bridge                               show the node `sim` at http://127.0.0.1:8080/\n  \
+        viewer-bridge --listen 127.0.0.1:0          on any free port; the address is printed\n  \
+        viewer-bridge --name left --domain lab      show another node\n  \
+        viewer-bridge --listen 0.0.0.0:8080         for other machines; the address has a token"
+)]
+pub(crate) struct Args {
+    /// Address and port to listen at; port 0 is any free one. Elsewhere than on loopback, pages need
+    /// the token that is printed with the address. Nothing is encrypted
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8080")]
+    pub(crate) listen: SocketAddr,
+    /// Name by which browsers may call this host, beside its addresses and `localhost`; may be given
+    /// more than once
+    #[arg(long = "host", value_name = "HOST")]
+    pub(crate) hosts: Vec<String>,
+    /// Name of the node: its services are NAME/particles, NAME/commands, ...
+    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = name)]
+    name: String,
+    /// Domain that keeps services apart from others on this host [default: that of iceoryx2]
+    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = domain)]
+    domain: Option<String>,
+    /// Folder to read the page's files from, for who works on them [default: those built in]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) assets: Option<PathBuf>,
+}
+
+impl Args {
+    pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
+        // An empty variable counts as absent.
+        let domain = self.domain.as_deref().filter(|domain| !domain.is_empty());
+        Endpoint::new(domain, &self.name)
+    }
+}
+
+fn name(text: &str) -> Result<String, EndpointError> {
+    Endpoint::new(None, text).map(|_| text.to_owned())
+}
+
+fn domain(text: &str) -> Result<String, EndpointError> {
+    if !text.is_empty() {
+        Endpoint::new(Some(text), NAME_DEFAULT)?;
+    }
+    Ok(text.to_owned())
+}

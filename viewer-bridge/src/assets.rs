@@ -1,0 +1,118 @@
+//! The files of the page: built into the program, or, for who works on them, read from a folder.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use xxhash_rust::xxh3::xxh3_64;
+
+/// The page's files: path and content. A file that is missing does not compile.
+const FILES: [(&str, &str); 1] = [("index.html", include_str!("../web/index.html"))];
+
+/// Where the files come from.
+#[derive(Debug, Clone, Default)]
+pub enum Assets {
+    /// Out of the program.
+    #[default]
+    Embedded,
+    /// Out of this folder, as they are at the moment.
+    Folder(PathBuf),
+}
+
+impl Assets {
+    /// The files of a folder.
+    ///
+    /// # Errors
+    /// It is no folder, or cannot be read.
+    pub fn folder(path: &Path) -> io::Result<Self> {
+        let folder = path.canonicalize()?;
+        if folder.is_dir() {
+            Ok(Self::Folder(folder))
+        } else {
+            Err(io::ErrorKind::NotADirectory.into())
+        }
+    }
+
+    /// The answer to a request for a path such as `js/main.js`; the empty one is the page.
+    pub(crate) fn answer(&self, path: &str, headers: &HeaderMap) -> Response {
+        let path = if path.is_empty() { "index.html" } else { path };
+        let (Some(content), Some(mime)) = (self.content(path), mime(path)) else {
+            return (StatusCode::NOT_FOUND, "there is no such file\n").into_response();
+        };
+        let tag = format!("\"{:016x}\"", xxh3_64(&content));
+        if headers
+            .get(header::IF_NONE_MATCH)
+            .is_some_and(|known| known.as_bytes() == tag.as_bytes())
+        {
+            return (StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response();
+        }
+        let headers = [(header::CONTENT_TYPE, mime.to_owned()), (header::ETAG, tag)];
+        (headers, content).into_response()
+    }
+
+    fn content(&self, path: &str) -> Option<Vec<u8>> {
+        match self {
+            Self::Embedded => {
+                let file = FILES.iter().find(|(known, _)| *known == path);
+                file.map(|(_, content)| content.as_bytes().to_vec())
+            }
+            Self::Folder(folder) => {
+                // What leaves the folder, by dots or by a link, is not there.
+                let file = folder.join(path).canonicalize().ok()?;
+                if file.starts_with(folder) { fs::read(file).ok() } else { None }
+            }
+        }
+    }
+}
+
+/// What a file is; what is none of these is not served.
+fn mime(path: &str) -> Option<&'static str> {
+    let (_, ending) = path.rsplit_once('.')?;
+    Some(match ending {
+        "html" => "text/html; charset=utf-8",
+        "css" => "text/css; charset=utf-8",
+        "js" | "mjs" => "text/javascript; charset=utf-8",
+        "json" | "map" => "application/json",
+        "svg" => "image/svg+xml",
+        "png" => "image/png",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(assets: &Assets, path: &str) -> StatusCode {
+        assets.answer(path, &HeaderMap::new()).status()
+    }
+
+    #[test]
+    fn every_embedded_file_has_a_type_and_nothing_else_is_there() {
+        for (path, _) in FILES {
+            assert_eq!(status(&Assets::Embedded, path), StatusCode::OK, "{path}");
+        }
+        assert_eq!(status(&Assets::Embedded, ""), StatusCode::OK);
+        assert_eq!(status(&Assets::Embedded, "../Cargo.toml"), StatusCode::NOT_FOUND);
+    }
+
+    #[test]
+    fn a_folder_serves_nothing_from_outside() {
+        let assets = Assets::folder(Path::new(env!("CARGO_MANIFEST_DIR")).join("web").as_path());
+        let assets = assets.unwrap();
+        assert_eq!(status(&assets, "index.html"), StatusCode::OK);
+        for path in ["../PROTOCOL.md", "../tests/golden/messages.json", "/etc/passwd.json", "js"] {
+            assert_eq!(status(&assets, path), StatusCode::NOT_FOUND, "{path}");
+        }
+    }
+
+    #[test]
+    fn who_has_a_file_already_is_told_so() {
+        let first = Assets::Embedded.answer("", &HeaderMap::new());
+        let mut headers = HeaderMap::new();
+        headers.insert(header::IF_NONE_MATCH, first.headers()[header::ETAG].clone());
+        assert_eq!(Assets::Embedded.answer("", &headers).status(), StatusCode::NOT_MODIFIED);
+    }
+}

@@ -1,0 +1,38 @@
+//! Shows a running simulation in a browser, and lets it be touched.
+//!
+//! A [`Source`] (a live node, or a recording) feeds a [`Hub`]; the hub serves any number of pages
+//! over sockets, and hands their commands to the source. `PROTOCOL.md` beside this crate is what
+//! both ends of a socket go by; [`wire`] is its binary half, [`message`] its text half.
+//!
+//! ```
+//! use viewer_bridge::wire::{Message, Pins, Stamp, decode};
+//!
+//! let pins = Pins { stamp: Stamp { epoch: 1, step: 60 }, held: vec![[3, 1]] };
+//! assert_eq!(decode(&pins.encode())?, Message::Pins(pins));
+//! # Ok::<(), viewer_bridge::wire::DecodeError>(())
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod assets;
+mod check;
+mod client;
+pub mod guard;
+pub mod hub;
+pub mod limits;
+pub mod live;
+pub mod measure;
+pub mod message;
+pub mod parameters;
+mod rate_limit;
+pub mod reason;
+pub mod scene_text;
+pub mod scenes;
+pub mod server;
+pub mod settings;
+pub mod source;
+pub mod stage;
+pub mod wire;
+
+pub use hub::Hub;
+pub use server::{Server, ServerOptions};
+pub use source::Source;

@@ -1,0 +1,215 @@
+//! Commands on their way: from pages to the node, and their outcomes back.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use sim_contract::clock::monotonic_ns;
+use sim_contract::{Action, Client, Outcome, RequestError};
+
+use super::actions::{Context, actions};
+use crate::Hub;
+use crate::limits::{COMMANDS_QUEUED_MAX, OUTCOME_TIMEOUT, PARTICLES_HELD_MAX};
+use crate::message::{Command, OutcomeText, Status, ToPage};
+use crate::reason;
+
+/// Commands on their way, and what pages hold. All pages are one client of the node: who of them
+/// holds a particle is known here only.
+#[derive(Debug, Default)]
+pub(super) struct Dispatch {
+    /// Which page holds a particle.
+    holders: BTreeMap<u32, u32>,
+    /// Unanswered commands by number, ascending in time.
+    tickets: BTreeMap<u64, Ticket>,
+    last_ticket: u64,
+    /// What has not been sent yet, for which ticket; what nobody waits for has none.
+    outbox: VecDeque<(Option<u64>, Action)>,
+    /// Tickets by the sequence number that the node was told.
+    sent: BTreeMap<u64, u64>,
+}
+
+/// A command that a page waits for.
+#[derive(Debug)]
+struct Ticket {
+    client: u32,
+    deadline_ns: u64,
+    /// Actions without an outcome.
+    open: usize,
+    outcome: OutcomeText,
+}
+
+impl Dispatch {
+    /// Takes a command of a page.
+    pub(super) fn take(
+        &mut self,
+        client: u32,
+        id: Option<u32>,
+        command: Command,
+        context: Context<'_>,
+    ) -> Option<(u32, OutcomeText)> {
+        let kind = command.name();
+        let mut outcome = OutcomeText {
+            id,
+            kind,
+            status: Status::Applied,
+            step: None,
+            applied: 0,
+            rejected: 0,
+            reason: "",
+            text: String::new(),
+        };
+        let parts = self.hold(client, &command).and_then(|()| actions(command, context));
+        match parts {
+            Err(reason) => {
+                refuse(&mut outcome, reason);
+                outcome.status = Status::Rejected;
+                Some((client, outcome))
+            }
+            Ok(parts) if parts.is_empty() => id.map(|_| (client, outcome)),
+            Ok(parts) => {
+                self.last_ticket += 1;
+                let number = self.last_ticket;
+                let timeout_ns = u64::try_from(OUTCOME_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
+                let deadline_ns = monotonic_ns() + timeout_ns;
+                let ticket = Ticket { client, deadline_ns, open: parts.len(), outcome };
+                self.tickets.insert(number, ticket);
+                self.outbox.extend(parts.into_iter().map(|action| (Some(number), action)));
+                None
+            }
+        }
+    }
+
+    /// Keeps the book of who holds what.
+    fn hold(&mut self, client: u32, command: &Command) -> Result<(), &'static str> {
+        if self.outbox.len() >= COMMANDS_QUEUED_MAX {
+            return Err(reason::BUSY);
+        }
+        let holder = |particle: &u32| self.holders.get(particle).copied();
+        match command {
+            Command::DragBegin { particle, .. } => {
+                if holder(particle).is_some_and(|other| other != client) {
+                    return Err("grabbed_by_other");
+                }
+                let held = self.holders.values().filter(|holder| **holder == client).count();
+                if held >= PARTICLES_HELD_MAX && holder(particle).is_none() {
+                    return Err(reason::TOO_MANY_HELD);
+                }
+                self.holders.insert(*particle, client);
+            }
+            Command::DragMove { particle, .. } | Command::DragEnd { particle } => {
+                match holder(particle) {
+                    None => return Err("not_grabbed"),
+                    Some(other) if other != client => return Err("grabbed_by_other"),
+                    Some(_) => {}
+                }
+                if matches!(command, Command::DragEnd { .. }) {
+                    self.holders.remove(particle);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A page has gone: what it holds is let go.
+    pub(super) fn leave(&mut self, client: u32) {
+        let held = self.holders.extract_if(.., |_, holder| *holder == client);
+        let releases = held.map(|(particle, _)| (None, Action::Release { particle }));
+        self.outbox.extend(releases);
+        self.tickets.retain(|_, ticket| ticket.client != client);
+    }
+
+    /// Hands the node as much as it takes.
+    pub(super) fn flush(&mut self, node: &mut Client, hub: &Hub) {
+        while let Some((ticket, action)) = self.outbox.pop_front() {
+            match node.send(action) {
+                Ok(sequence) => {
+                    if let Some(ticket) = ticket {
+                        self.sent.insert(sequence, ticket);
+                    }
+                }
+                Err(RequestError::QueueFull { .. }) => {
+                    self.outbox.push_front((ticket, action));
+                    return;
+                }
+                Err(_) => self.close_part(hub, ticket, None, Err(reason::NO_NODE)),
+            }
+        }
+    }
+
+    /// Takes the outcome of what this bridge sent.
+    pub(super) fn take_outcome(&mut self, hub: &Hub, outcome: &Outcome) {
+        let ticket = self.sent.remove(&outcome.command.sequence);
+        let result = if outcome.is_applied() { Ok(()) } else { Err(outcome.reason_name()) };
+        if let (Err(_), Action::Grab { particle, .. }) = (result, outcome.command.action()) {
+            self.holders.remove(&particle);
+        }
+        self.close_part(hub, ticket, Some(outcome.step), result);
+    }
+
+    /// The state is another one: nobody holds anything any more.
+    pub(super) fn forget_holders(&mut self) {
+        self.holders.clear();
+    }
+
+    fn close_part(
+        &mut self,
+        hub: &Hub,
+        number: Option<u64>,
+        step: Option<u64>,
+        result: Result<(), &'static str>,
+    ) {
+        let Some(number) = number else { return };
+        let Some(ticket) = self.tickets.get_mut(&number) else { return };
+        let outcome = &mut ticket.outcome;
+        outcome.step = outcome.step.max(step);
+        match result {
+            Ok(()) => outcome.applied += 1,
+            Err(reason) => refuse(outcome, reason),
+        }
+        ticket.open -= 1;
+        if ticket.open == 0
+            && let Some(ticket) = self.tickets.remove(&number)
+        {
+            ticket.answer(hub);
+        }
+    }
+
+    /// Answers what the node has not, for too long or for ever.
+    pub(super) fn expire(&mut self, hub: &Hub, now_ns: u64) {
+        while let Some(first) = self.tickets.first_entry()
+            && first.get().deadline_ns <= now_ns
+        {
+            let (number, mut ticket) = first.remove_entry();
+            self.sent.retain(|_, ticket| *ticket != number);
+            self.outbox.retain(|(ticket, _)| *ticket != Some(number));
+            if ticket.outcome.applied + ticket.outcome.rejected == 0 {
+                ticket.outcome.status = Status::Unanswered;
+            }
+            explain(&mut ticket.outcome, reason::NO_ANSWER);
+            ticket.answer(hub);
+        }
+    }
+}
+
+impl Ticket {
+    fn answer(mut self, hub: &Hub) {
+        if self.outcome.status == Status::Applied && self.outcome.applied == 0 {
+            self.outcome.status = Status::Rejected;
+        }
+        if self.outcome.id.is_some() || self.outcome.status != Status::Applied {
+            hub.send(self.client, &ToPage::Outcome(self.outcome));
+        }
+    }
+}
+
+fn refuse(outcome: &mut OutcomeText, reason: &'static str) {
+    outcome.rejected += 1;
+    explain(outcome, reason);
+}
+
+/// The first reason is told.
+fn explain(outcome: &mut OutcomeText, reason: &'static str) {
+    if outcome.reason.is_empty() {
+        outcome.reason = reason;
+        reason::text(reason).clone_into(&mut outcome.text);
+    }
+}

@@ -1,0 +1,337 @@
+//! The connection to one run of a node.
+
+mod known;
+mod statistics;
+
+use std::time::Duration;
+
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{
+    Action, AttachError, Client, Endpoint, NodeStatus, Snapshot, SnapshotFlags, StatusFlags, Tap,
+};
+
+use super::actions::Context;
+use super::dispatch::Dispatch;
+use super::load::{Load, Parts};
+use super::news::News;
+use crate::Hub;
+use crate::hub::Slot;
+use crate::limits::FRAMES_PER_SECOND_MAX;
+use crate::message::{Level, Node, NodeState, ToPage};
+use crate::source::{Ask, Request, Requests};
+use crate::stage::{Stage, single};
+use crate::wire::{FrameHead, Stamp, frame_flag};
+use known::Known;
+
+/// Time from a frame to the next, less a little: a node of the display's rate is met each time.
+const FRAME_PERIOD_NS: u64 = SECOND_NS / FRAMES_PER_SECOND_MAX as u64 - SECOND_NS / 1000;
+/// How long a frame that is due waits for a fresh state; commands wait with it.
+const FRESH_STATE_WAIT: Duration = Duration::from_millis(5);
+/// How often the node is looked at while nobody waits for a frame.
+const IDLE_PERIOD: Duration = Duration::from_millis(50);
+/// How often the owner is looked for.
+const OWNER_LOOK_NS: u64 = SECOND_NS / 5;
+/// How often statistics are sent.
+const STATISTICS_PERIOD_NS: u64 = SECOND_NS / 4;
+/// Requests that are taken before the node is looked at again.
+const REQUESTS_PER_ROUND_MAX: usize = 1024;
+
+/// Why a link ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum LinkEnd {
+    /// The server ends.
+    Closed,
+    /// The node has gone; or what went wrong.
+    Lost(Option<String>),
+    /// Another run has the name.
+    NewRun,
+}
+
+/// The connection to one run of a node.
+#[derive(Debug)]
+pub(super) struct Link {
+    tap: Tap,
+    client: Client,
+    run_id: Option<u64>,
+    parts: Parts,
+    load: Option<Load>,
+    /// The newest state, in shared memory.
+    snapshot: Option<Snapshot>,
+    status: Option<NodeStatus>,
+    known: Known,
+    dispatch: Dispatch,
+    /// The torn list with its causes, until a load is there that it belongs to.
+    is_torn: Vec<bool>,
+    causes: Vec<u8>,
+    torn: Option<(u64, Vec<u32>)>,
+    colliders: Option<(u64, Vec<sim_contract::ColliderState>)>,
+    /// The state that was shown last.
+    shown_step: Option<u64>,
+    due_ns: u64,
+    next_owner_look_ns: u64,
+    next_statistics_ns: u64,
+}
+
+impl Link {
+    pub(super) fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
+        Ok(Self {
+            tap: Tap::attach(endpoint)?,
+            client: Client::attach(endpoint)?,
+            run_id: None,
+            parts: Parts::default(),
+            load: None,
+            snapshot: None,
+            status: None,
+            known: Known::default(),
+            dispatch: Dispatch::default(),
+            is_torn: Vec::new(),
+            causes: Vec::new(),
+            torn: None,
+            colliders: None,
+            shown_step: None,
+            due_ns: 0,
+            next_owner_look_ns: 0,
+            next_statistics_ns: 0,
+        })
+    }
+
+    /// Takes requests until a frame is due, then reads the node, and shows what it has.
+    pub(super) fn round(
+        &mut self,
+        stage: &mut Stage,
+        hub: &Hub,
+        requests: &Requests,
+    ) -> Result<(), LinkEnd> {
+        let is_awaited = hub.demand(self.particle_count()).is_any();
+        self.take_requests(stage, hub, requests, is_awaited);
+        if is_awaited && monotonic_ns() >= self.due_ns {
+            // What woke before is read below; this waits for what comes now.
+            self.tap.wait(Duration::ZERO);
+            self.tap.wait(FRESH_STATE_WAIT);
+        }
+        self.read(stage, hub)?;
+        self.show(stage, hub);
+        let now_ns = monotonic_ns();
+        self.dispatch.expire(hub, now_ns);
+        if now_ns >= self.next_statistics_ns {
+            self.next_statistics_ns = now_ns + STATISTICS_PERIOD_NS;
+            self.tell_statistics(stage, hub);
+        }
+        if hub.is_closed() {
+            return Err(LinkEnd::Closed);
+        }
+        self.look_for_owner(now_ns)
+    }
+
+    fn look_for_owner(&mut self, now_ns: u64) -> Result<(), LinkEnd> {
+        if now_ns < self.next_owner_look_ns {
+            return Ok(());
+        }
+        self.next_owner_look_ns = now_ns + OWNER_LOOK_NS;
+        if self.tap.is_owner_alive() { Ok(()) } else { Err(LinkEnd::Lost(None)) }
+    }
+
+    /// Answers what pages ask for until the next frame is due; while nobody waits for one, a while.
+    fn take_requests(&mut self, stage: &Stage, hub: &Hub, requests: &Requests, is_awaited: bool) {
+        for _ in 0..REQUESTS_PER_ROUND_MAX {
+            let until_due = Duration::from_nanos(self.due_ns.saturating_sub(monotonic_ns()));
+            let timeout = if is_awaited { until_due } else { IDLE_PERIOD };
+            let Some(request) = requests.next(timeout) else { return };
+            let is_new_demand = request.ask == Ask::Frame;
+            self.take(request, stage, hub);
+            self.dispatch.flush(&mut self.client, hub);
+            if is_new_demand {
+                return;
+            }
+        }
+    }
+
+    fn take(&mut self, request: Request, stage: &Stage, hub: &Hub) {
+        match request.ask {
+            Ask::Frame => self.shown_step = None,
+            Ask::Left => self.dispatch.leave(request.client),
+            Ask::Command { id, command } => {
+                let context = Context {
+                    epoch: stage.epoch(),
+                    rate_hz: self.load.as_ref().map_or(1, |load| load.header.rate_hz.max(1)),
+                    is_planar: self.load.as_ref().is_some_and(|load| load.summary.is_planar),
+                    particles: self.snapshot.as_ref().map_or(&[], Snapshot::particles),
+                };
+                let answer = self.dispatch.take(request.client, id, command, context);
+                if let Some((client, outcome)) = answer {
+                    hub.send(client, &ToPage::Outcome(outcome));
+                }
+            }
+        }
+    }
+
+    /// Reads what has come. The snapshot first: then all that it builds on is among the rest.
+    fn read(&mut self, stage: &mut Stage, hub: &Hub) -> Result<(), LinkEnd> {
+        // One that cannot be read is dropped; the next one comes.
+        if let Ok(Some(snapshot)) = self.tap.latest_snapshot() {
+            self.snapshot = Some(snapshot);
+        }
+        let mut news = News::drain(&mut self.tap);
+        self.check_run(&news)?;
+        self.take_outcomes(&news, hub);
+        self.parts.take(&mut news);
+        self.status = news.status.or(self.status);
+        if let Some((header, torn)) = news.tears {
+            self.torn = Some((header.step, torn));
+        }
+        if let Some(causes) = news.tear_causes {
+            self.causes = causes;
+        }
+        if let Some((header, colliders)) = news.colliders {
+            self.colliders = Some((header.step, colliders));
+        }
+        self.begin_load(stage, hub);
+        self.known.set_time_scale(self.status.as_ref());
+        self.known.tell(hub);
+        self.set_changes(stage, hub);
+        Ok(())
+    }
+
+    fn check_run(&mut self, news: &News) -> Result<(), LinkEnd> {
+        let run_id = news.run_id().or(self.snapshot.as_ref().map(|one| one.header().run_id));
+        let known = *self.run_id.get_or_insert_with(|| run_id.unwrap_or_default());
+        match run_id {
+            Some(run_id) if run_id != known && known != 0 => Err(LinkEnd::NewRun),
+            Some(run_id) => {
+                self.run_id = Some(run_id);
+                Ok(())
+            }
+            None => {
+                self.run_id = None;
+                Ok(())
+            }
+        }
+    }
+
+    fn take_outcomes(&mut self, news: &News, hub: &Hub) {
+        for outcome in &news.outcomes {
+            self.known.follow(outcome);
+            let action = outcome.command.action();
+            if outcome.is_applied() && matches!(action, Action::Reset | Action::Load { .. }) {
+                self.dispatch.forget_holders();
+                if action == Action::Reset {
+                    hub.broadcast(&ToPage::Reset { step: outcome.step });
+                }
+            }
+            if outcome.command.client_id == self.client.client_id() {
+                self.dispatch.take_outcome(hub, outcome);
+            }
+        }
+        // They have been read above; this makes room for the next ones.
+        while let Ok(Some(_)) = self.client.next_outcome(Duration::ZERO) {}
+    }
+
+    /// Shows another load, once it is complete.
+    fn begin_load(&mut self, stage: &mut Stage, hub: &Hub) {
+        let Some(snapshot) = &self.snapshot else { return };
+        let header = snapshot.header();
+        match self.parts.complete(header) {
+            None => {}
+            Some(Err(text)) => {
+                let text = text.to_owned();
+                hub.broadcast(&ToPage::Notice { level: Level::Error, text });
+            }
+            Some(Ok(load)) => {
+                stage.begin(hub, load.to_scene(header.step, snapshot.particles()));
+                self.known.begin(load.summary.parameters, header.outcome_count);
+                self.is_torn = vec![false; load.constraints.len()];
+                self.load = Some(load);
+                self.shown_step = None;
+            }
+        }
+    }
+
+    /// Puts tears, colliders and pins on the stage.
+    fn set_changes(&mut self, stage: &mut Stage, hub: &Hub) {
+        let Some((load, snapshot)) = self.on_show() else { return };
+        let (step, constraint_count) = (snapshot.header().step, load.constraints.len());
+        stage.set_pins(hub, step, snapshot.particles());
+        if let Some((step, torn)) = self.torn.take()
+            && torn.iter().all(|constraint| (*constraint as usize) < constraint_count)
+        {
+            stage.set_torn(hub, step, &torn, &self.causes);
+            self.is_torn = vec![false; constraint_count];
+            for constraint in &torn {
+                self.is_torn[*constraint as usize] = true;
+            }
+        }
+        if let Some((step, colliders)) = self.colliders.take() {
+            stage.set_colliders(step, &colliders);
+        }
+    }
+
+    /// Load and newest state, if they belong together.
+    fn on_show(&self) -> Option<(&Load, &Snapshot)> {
+        let (load, snapshot) = (self.load.as_ref()?, self.snapshot.as_ref()?);
+        let header = snapshot.header();
+        let is_of_load = (header.run_id, header.topology_revision)
+            == (load.header.run_id, load.header.topology_revision);
+        is_of_load.then_some((load, snapshot))
+    }
+
+    /// Shows the newest state, if it is due and was not shown.
+    fn show(&mut self, stage: &mut Stage, hub: &Hub) {
+        let Some((load, snapshot)) = self.on_show() else { return };
+        let header = snapshot.header();
+        let now_ns = monotonic_ns();
+        let is_awaited = hub.demand(snapshot.particles().len()).is_any();
+        if !is_awaited || self.shown_step == Some(header.step) || now_ns < self.due_ns {
+            return;
+        }
+        let micros = |ns: u64| single(ns as f64 / 1000.0);
+        let flag = |own: u32, flag: u32| if header.flags & own == 0 { 0 } else { flag };
+        let head = FrameHead {
+            stamp: Stamp { epoch: 0, step: header.step },
+            sim_time_s: header.step as f64 / f64::from(load.header.rate_hz.max(1)),
+            flags: flag(SnapshotFlags::PAUSED, frame_flag::PAUSED)
+                | flag(SnapshotFlags::REPLAY, frame_flag::REPLAY),
+            torn_count: header.torn_count,
+            solve_us: micros(header.solve_ns),
+            wake_late_us: micros(header.wake_late_ns),
+            number: 0,
+            publish_monotonic_ns: header.publish_monotonic_ns,
+        };
+        stage.show(hub, head, snapshot.particles());
+        let step = header.step;
+        self.shown_step = Some(step);
+        self.due_ns = now_ns + FRAME_PERIOD_NS;
+    }
+
+    fn particle_count(&self) -> usize {
+        self.snapshot.as_ref().map_or(0, |snapshot| snapshot.particles().len())
+    }
+
+    /// How the node stands, for pages.
+    pub(super) fn node(&self) -> Node {
+        let Some(status) = &self.status else {
+            return Node {
+                state: NodeState::Alive,
+                text: "a node is there; it has not said anything yet".to_owned(),
+                ..Node::default()
+            };
+        };
+        Node {
+            state: NodeState::Alive,
+            text: String::new(),
+            run_id: Some(format!("{:016x}", status.run_id)),
+            scene: Some(status.scene_name()),
+            method: self.load.as_ref().map(Load::method),
+            rate_hz: status.rate_hz,
+            is_paused: status.is_paused(),
+            is_replay: status.flags & StatusFlags::REPLAY != 0,
+            time_scale: status.time_scale,
+            process_id: Some(status.process_id),
+        }
+    }
+
+    /// Answers what is open; nobody else will.
+    pub(super) fn leave(mut self, hub: &Hub) {
+        self.dispatch.expire(hub, u64::MAX);
+        hub.latch(Slot::Parameters, &Known::default().to_message());
+    }
+}

@@ -1,0 +1,49 @@
+//! What came from the node since the last look: copies, for shared memory is on loan.
+
+use sim_contract::{
+    ColliderState, CollidersHeader, ConstraintState, LoadHeader, NodeStatus, Outcome, Tap,
+    TearsHeader, Triangle, Update,
+};
+
+/// The newest message of each kind that came, and all outcomes.
+#[derive(Debug, Default)]
+pub(super) struct News {
+    pub(super) scene: Option<(LoadHeader, Vec<u8>)>,
+    pub(super) topology: Option<(LoadHeader, Vec<ConstraintState>)>,
+    pub(super) surface: Option<(LoadHeader, Vec<Triangle>)>,
+    pub(super) colliders: Option<(CollidersHeader, Vec<ColliderState>)>,
+    pub(super) tears: Option<(TearsHeader, Vec<u32>)>,
+    pub(super) tear_causes: Option<Vec<u8>>,
+    pub(super) outcomes: Vec<Outcome>,
+    pub(super) status: Option<NodeStatus>,
+}
+
+impl News {
+    /// Takes what has come. Messages that cannot be read are dropped: a viewer shows the next one.
+    pub(super) fn drain(tap: &mut Tap) -> Self {
+        let mut news = Self::default();
+        tap.drain_updates(|update| news.add(update));
+        news
+    }
+
+    fn add(&mut self, update: Update<'_>) {
+        match update {
+            Update::Scene(header, text) => self.scene = Some((*header, text.to_vec())),
+            Update::Topology(header, all) => self.topology = Some((*header, all.to_vec())),
+            Update::Surface(header, all) => self.surface = Some((*header, all.to_vec())),
+            Update::Colliders(header, all) => self.colliders = Some((*header, all.to_vec())),
+            Update::Tears(header, all) => self.tears = Some((*header, all.to_vec())),
+            Update::TearCauses(_, all) => self.tear_causes = Some(all.to_vec()),
+            Update::Outcome(outcome) => self.outcomes.push(*outcome),
+            Update::Status(status) => self.status = Some(*status),
+            // It is for the solver.
+            Update::Keyframe(..) => {}
+        }
+    }
+
+    /// The run that the newest of it belongs to, if anything of it says.
+    pub(super) fn run_id(&self) -> Option<u64> {
+        let load = self.topology.as_ref().map(|(header, _)| header.run_id);
+        load.or(self.status.map(|status| status.run_id))
+    }
+}

@@ -1,0 +1,402 @@
+//! Every message of the protocol as bytes, and what the bytes say: `golden/messages.json` and
+//! `golden/texts.json` are what the page's decoder is tested on as well.
+//!
+//! With `UPDATE_GOLDEN=1` the files are written anew; then look at what changed.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use sim_contract::{
+    ColliderShape, ColliderState, ConstraintState, ParticleFlags, ParticleState, PlainF32, Triangle,
+};
+use viewer_bridge::message::{
+    Choice, FromPage, Hashes, Level, Limits, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
+    ParametersText, Playback, Status, Timeline, ToPage, Welcome,
+};
+use viewer_bridge::parameters::Parameters;
+use viewer_bridge::wire::{
+    Colliders, Format, FrameHead, FrameLimits, Grid, Message, Pins, Scene, SceneText, Stamp,
+    Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
+};
+use viewer_bridge::{scenes, settings};
+
+const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
+
+/// Three particles, the last one out of reach of u16, and one that is not finite.
+fn particles() -> Vec<ParticleState> {
+    let at = |position, flags| ParticleState { position, flags, ..ParticleState::default() };
+    vec![
+        at([0.0, 1.0, -0.5], ParticleFlags::PINNED),
+        at([0.25, 0.5, 0.5], 0),
+        at([1.0, 0.0, 0.125], ParticleFlags::GRABBED),
+        at([f32::NAN, 0.0, 0.0], ParticleFlags::FROZEN),
+    ]
+}
+
+fn scene() -> Scene {
+    let mut scene = Scene {
+        stamp: STAMP,
+        flags: scene_flag::TEARABLE | scene_flag::TETHERS,
+        rate_hz: 240,
+        origin: [0.0, 100.5, -2.0],
+        text: SceneText {
+            name: "gemütlich".to_owned(),
+            unit: "m".to_owned(),
+            up: "y".to_owned(),
+            run_id: "0123456789abcdef".to_owned(),
+            grids: vec![Grid { first: 0, columns: 2, rows: 2 }],
+        },
+        ..Scene::default()
+    };
+    let joins = |a, b, kind| ConstraintState { a, b, rest_length: 0.5, kind, compliance: 0.0 };
+    let triangles = [Triangle { corners: [0, 1, 2] }, Triangle { corners: [1, 3, 2] }];
+    scene.set_geometry(&particles(), &[joins(0, 1, 0), joins(1, 2, 1), joins(2, 3, 2)], &triangles);
+    scene
+}
+
+fn head() -> FrameHead {
+    FrameHead {
+        stamp: STAMP,
+        sim_time_s: 5.0,
+        flags: frame_flag::PAUSED,
+        torn_count: 2,
+        solve_us: 12.5,
+        wake_late_us: 3.25,
+        number: 77,
+        publish_monotonic_ns: 123_456_789_012,
+    }
+}
+
+fn statistics() -> Statistics {
+    Statistics {
+        stamp: STAMP,
+        solve_us: [10.0, 20.0],
+        wake_late_us: [50.0, 900.0],
+        period_us: 4166.5,
+        real_time_factor: 0.5,
+        time_scale: 1.0,
+        stretch_mean: 0.25,
+        stretch_max: 0.5,
+        stretch_max_constraint: 2,
+        kinetic_j: 1.5,
+        potential_j: -2.25,
+        late_steps: 1,
+        skipped_periods: 2,
+        outcome_count: 3,
+        rejected_count: 4,
+        frozen_count: 5,
+        torn_count: 6,
+        reader_count: 7,
+        client_count: 8,
+        encode_us: 9.5,
+        frames_per_second: 60.0,
+        flags: 1,
+    }
+}
+
+fn colliders() -> Colliders {
+    let ball = ColliderState {
+        shape: ColliderShape::Sphere as u32,
+        restitution: 0.5,
+        friction: 0.25,
+        radius: 2.0,
+        center: [1.0, 2.0, 3.0],
+        rotation: [0.0, 0.0, 0.0, 1.0],
+        velocity: [0.0, -1.0, 0.0],
+        ..ColliderState::default()
+    };
+    let floor = ColliderState {
+        shape: ColliderShape::Plane as u32,
+        offset: -1.0,
+        normal: [0.0, 1.0, 0.0],
+        ..ColliderState::default()
+    };
+    Colliders { stamp: STAMP, colliders: vec![ball, floor] }
+}
+
+/// All binary messages by name.
+fn messages() -> Vec<(&'static str, Vec<u8>)> {
+    let finite = &particles()[..3];
+    let limits = FrameLimits::around([0.0; 3], [0.1; 3]);
+    let mut far = particles();
+    far[2].position[0] = 1000.0;
+    let frame = |format, particles: &[ParticleState]| {
+        encode_frame(&head(), particles, format, &limits).to_vec()
+    };
+    let tear = Tear { stamp: STAMP, first: 1, constraints: vec![7, 3, 9], causes: vec![0, 3, 255] };
+    let nothing = Tear { stamp: STAMP, ..Tear::default() };
+    let pins = Pins { stamp: STAMP, held: Pins::of(&particles()) };
+    vec![
+        ("scene", scene().encode().to_vec()),
+        ("scene_without_particles", Scene { stamp: STAMP, ..Scene::default() }.encode().to_vec()),
+        ("frame_f32", frame(Format::F32, finite)),
+        ("frame_f32_not_finite", frame(Format::F32, &particles())),
+        ("frame_u16", frame(Format::U16, finite)),
+        ("frame_u16_saturated_and_not_finite", frame(Format::U16, &far)),
+        ("frame_u16_without_particles", frame(Format::U16, &[])),
+        ("tear", tear.encode().to_vec()),
+        ("tear_reset", nothing.encode().to_vec()),
+        ("pins", pins.encode().to_vec()),
+        ("statistics", statistics().encode().to_vec()),
+        ("colliders", colliders().encode().to_vec()),
+    ]
+}
+
+/// What a decoder has to find.
+fn fields(message: &Message) -> Value {
+    match message {
+        Message::Scene(scene) => json!({
+            "kind": 1, "epoch": scene.stamp.epoch, "step": scene.stamp.step,
+            "flags": scene.flags, "rate_hz": scene.rate_hz, "origin": scene.origin,
+            "min": scene.bounds().0, "max": scene.bounds().1,
+            "positions": scene.positions, "ends": scene.ends,
+            "rest_lengths": scene.rest_lengths, "triangles": scene.triangles,
+            "kinds": scene.kinds, "text": scene.text,
+        }),
+        Message::Frame(frame) => json!({
+            "kind": if frame.format == Format::F32 { 2 } else { 3 },
+            "epoch": frame.head.stamp.epoch, "step": frame.head.stamp.step,
+            "sim_time_s": frame.head.sim_time_s, "flags": frame.head.flags,
+            "lo": frame.lo, "scale": frame.scale, "torn_count": frame.head.torn_count,
+            "solve_us": frame.head.solve_us, "wake_late_us": frame.head.wake_late_us,
+            "number": frame.head.number,
+            "publish_monotonic_ns": frame.head.publish_monotonic_ns,
+            "positions": frame.positions, "not_finite": frame.not_finite,
+        }),
+        Message::Tear(tear) => json!({
+            "kind": 4, "epoch": tear.stamp.epoch, "step": tear.stamp.step,
+            "first": tear.first, "constraints": tear.constraints, "causes": tear.causes,
+        }),
+        Message::Pins(pins) => json!({
+            "kind": 5, "epoch": pins.stamp.epoch, "step": pins.stamp.step, "held": pins.held,
+        }),
+        Message::Statistics(one) => json!({
+            "kind": 6, "epoch": one.stamp.epoch, "step": one.stamp.step,
+            "solve_us": one.solve_us, "wake_late_us": one.wake_late_us,
+            "period_us": one.period_us, "real_time_factor": one.real_time_factor,
+            "time_scale": one.time_scale, "stretch_mean": one.stretch_mean,
+            "stretch_max": one.stretch_max,
+            "stretch_max_constraint": one.stretch_max_constraint,
+            "kinetic_j": one.kinetic_j, "potential_j": one.potential_j,
+            "late_steps": one.late_steps, "skipped_periods": one.skipped_periods,
+            "outcome_count": one.outcome_count, "rejected_count": one.rejected_count,
+            "frozen_count": one.frozen_count, "torn_count": one.torn_count,
+            "reader_count": one.reader_count, "client_count": one.client_count,
+            "encode_us": one.encode_us, "frames_per_second": one.frames_per_second,
+            "flags": one.flags,
+        }),
+        Message::Colliders(all) => json!({
+            "kind": 7, "epoch": all.stamp.epoch, "step": all.stamp.step,
+            "colliders": all.colliders.iter().map(|one| json!({
+                "shape": one.shape, "restitution": one.restitution, "friction": one.friction,
+                "radius": one.radius, "offset": one.offset, "normal": one.normal,
+                "center": one.center, "half_extents": one.half_extents,
+                "rotation": one.rotation, "a": one.a, "b": one.b,
+                "velocity": one.velocity, "angular_velocity": one.angular_velocity,
+            })).collect::<Vec<_>>(),
+        }),
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").unwrap();
+        text
+    })
+}
+
+/// Compares with a file of `golden/`, or writes it.
+fn check(file: &str, content: &Value) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(file);
+    let text = serde_json::to_string_pretty(content).unwrap() + "\n";
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        fs::write(&path, text).unwrap();
+        return;
+    }
+    let known = fs::read_to_string(&path).unwrap_or_default();
+    assert!(known == text, "{file} is another one now; UPDATE_GOLDEN=1 shows how");
+}
+
+#[test]
+fn the_bytes_of_every_message_are_frozen() {
+    let all = messages().into_iter().map(|(name, bytes)| {
+        let fields = fields(&decode(&bytes).unwrap());
+        json!({ "name": name, "hex": hex(&bytes), "fields": fields })
+    });
+    check("messages.json", &all.collect());
+}
+
+#[test]
+fn every_message_survives_the_wire() {
+    assert_eq!(decode(&scene().encode()), Ok(Message::Scene(scene())));
+    assert_eq!(decode(&colliders().encode()), Ok(Message::Colliders(colliders())));
+    let decoded = decode(&statistics().encode());
+    assert_eq!(decoded, Ok(Message::Statistics(Box::new(statistics()))));
+    for (name, bytes) in messages() {
+        assert!(bytes.len().is_multiple_of(4), "{name}");
+        for end in 0..bytes.len() {
+            assert!(decode(&bytes[..end]).is_err(), "{name} cut at {end}");
+        }
+        assert!(decode(&[&bytes[..], &[0]].concat()).is_err(), "{name} with a byte too many");
+    }
+}
+
+#[test]
+fn u16_positions_are_within_half_a_step_and_f32_positions_are_the_bits() {
+    let limits = FrameLimits::around([0.0; 3], [1.0; 3]);
+    let particles: Vec<_> = (0..1000_u16)
+        .map(|index| {
+            let x = f32::from(index);
+            let position = [x.sin() * 3.0, (x * 0.37).cos() - 1.0, 0.25];
+            ParticleState { position, ..ParticleState::default() }
+        })
+        .collect();
+    for format in [Format::F32, Format::U16] {
+        let bytes = encode_frame(&head(), &particles, format, &limits);
+        let Ok(Message::Frame(frame)) = decode(&bytes) else { panic!("no frame") };
+        assert_eq!(frame.head, head());
+        for (position, particle) in frame.positions.iter().zip(&particles) {
+            for axis in 0..3 {
+                let error = (position[axis] - particle.position[axis]).abs();
+                let allowed = if format == Format::F32 { 0.0 } else { frame.scale[axis] * 0.51 };
+                assert!(error <= allowed, "{format:?}: {error} > {allowed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn one_particle_that_flies_off_takes_no_resolution_from_the_others() {
+    let limits = FrameLimits::around([0.0; 3], [1.0; 3]);
+    let mut all = particles();
+    all[1].position = [1e30, 0.0, 0.0];
+    let Ok(Message::Frame(frame)) = decode(&encode_frame(&head(), &all, Format::U16, &limits))
+    else {
+        panic!("no frame")
+    };
+    assert_eq!(frame.head.flags & frame_flag::SATURATED, frame_flag::SATURATED);
+    assert_eq!(frame.not_finite, [3]);
+    assert!(frame.scale[0] < 1e-3, "{:?}", frame.scale);
+    assert!((frame.positions[2][0] - 1.0).abs() <= frame.scale[0]);
+}
+
+fn to_page() -> Vec<ToPage> {
+    let outcome = OutcomeText {
+        id: Some(7),
+        kind: "cut",
+        status: Status::Applied,
+        step: Some(1234),
+        applied: 3,
+        rejected: 1,
+        reason: "already_torn",
+        text: "it is torn already".to_owned(),
+    };
+    let parameters = Parameters { tear_force: Some(PlainF32(20.0)), ..Parameters::default() };
+    vec![
+        ToPage::Hello(Box::new(Welcome {
+            protocol: 1,
+            version: "0.1.0",
+            client: 3,
+            mode: Mode::Live,
+            format: Choice::Auto,
+            scenes: scenes::all(),
+            settings: &settings::SETTINGS,
+            limits: Limits::default(),
+        })),
+        ToPage::Node(Node { text: "no simulation runs".to_owned(), ..Node::default() }),
+        ToPage::Node(Node {
+            state: NodeState::Alive,
+            text: String::new(),
+            run_id: Some("0123456789abcdef".to_owned()),
+            scene: Some("curtain".to_owned()),
+            method: Some("xpbd"),
+            rate_hz: 240,
+            is_paused: false,
+            is_replay: false,
+            time_scale: 1.0,
+            process_id: Some(4711),
+        }),
+        ToPage::Parameters(Box::new(ParametersText {
+            is_complete: true,
+            values: Some(parameters),
+            initial: Some(Parameters::default()),
+        })),
+        ToPage::Outcome(outcome.clone()),
+        ToPage::Outcome(OutcomeText {
+            id: None,
+            status: Status::Unanswered,
+            step: None,
+            applied: 0,
+            rejected: 0,
+            reason: "no_answer",
+            text: "the node did not answer; it may still happen".to_owned(),
+            ..outcome
+        }),
+        ToPage::Reset { step: 1300 },
+        ToPage::Clients { count: 2 },
+        ToPage::Notice { level: Level::Warning, text: "look".to_owned() },
+        ToPage::Timeline(Box::new(Timeline {
+            file: "run.mcap".to_owned(),
+            scene: "curtain".to_owned(),
+            rate_hz: 240,
+            first_step: 0,
+            last_step: 2400,
+            first_time_s: 0.0,
+            last_time_s: 10.0,
+            marks: [MarkKind::Tear, MarkKind::Pin, MarkKind::Command, MarkKind::Late]
+                .map(|kind| Mark { kind, step: 60, count: 1 })
+                .to_vec(),
+            hashes: Hashes::Unchecked,
+            hash_text: String::new(),
+        })),
+        ToPage::Playback(Playback {
+            is_playing: true,
+            rate: 1.0,
+            is_looping: false,
+            step: 240,
+            time_s: 1.0,
+        }),
+    ]
+}
+
+/// One of each kind, as a page may send them.
+const FROM_PAGE: [&str; 25] = [
+    r#"{"type":"hello","protocol":1,"token":"00","format":"u16"}"#,
+    r#"{"type":"hello","protocol":1}"#,
+    r#"{"type":"ack","frame":77}"#,
+    r#"{"type":"drag_begin","particle":90,"target":[0.5,0.2,0.3],"over_s":0.05,"id":1}"#,
+    r#"{"type":"drag_move","particle":90,"target":[0.5,0.4,0.3]}"#,
+    r#"{"type":"drag_end","particle":90}"#,
+    r#"{"type":"brush","eye":[0,0,5],"ray":[0,0,-1],"radius":0.2,"delta":[0.01,0,0],"over_s":0.016,"cap":0.05}"#,
+    r#"{"type":"pin","particle":3}"#,
+    r#"{"type":"unpin","particle":3}"#,
+    r#"{"type":"cut","epoch":3,"constraints":[1,2,3],"id":2}"#,
+    r#"{"type":"cut_segment","from":[-1,0,0],"to":[1,0,0],"direction":[0,0,1]}"#,
+    r#"{"type":"cut_radius","center":[0,0,0],"radius":0.1}"#,
+    r#"{"type":"move_collider","collider":0,"translation":[0.5,0,0],"rotation":[0,0.6,0,0.8]}"#,
+    r#"{"type":"move_anchor","anchor":0,"translation":[0,0.3,0]}"#,
+    r#"{"type":"pause"}"#,
+    r#"{"type":"resume"}"#,
+    r#"{"type":"step","count":10}"#,
+    r#"{"type":"reset"}"#,
+    r#"{"type":"load","scene":"rope"}"#,
+    r#"{"type":"set","parameter":"gravity","value":[0,-1.62,0]}"#,
+    r#"{"type":"set","parameter":"tear_force","value":null}"#,
+    r#"{"type":"set","parameter":"compliance","value":0.0001,"constraint_kind":"shear"}"#,
+    r#"{"type":"seek","step":1200}"#,
+    r#"{"type":"rate","value":0.5}"#,
+    r#"{"type":"loop","is_on":true}"#,
+];
+
+#[test]
+fn the_texts_are_frozen() {
+    for text in FROM_PAGE {
+        FromPage::parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
+    }
+    let parse = |text: &str| serde_json::from_str::<Value>(text).unwrap();
+    let to_page: Vec<_> = to_page().iter().map(|message| parse(&message.to_json())).collect();
+    let from_page: Vec<_> = FROM_PAGE.iter().map(|text| parse(text)).collect();
+    check("texts.json", &json!({ "to_page": to_page, "from_page": from_page }));
+}
