@@ -2,6 +2,7 @@
 //! `golden/texts.json` are what the page's decoder is tested on as well.
 //!
 //! With `UPDATE_GOLDEN=1` the files are written anew; then look at what changed.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use std::fmt::Write;
 use std::fs;
@@ -258,9 +259,9 @@ fn u16_positions_are_within_half_a_step_and_f32_positions_are_the_bits() {
         let Ok(Message::Frame(frame)) = decode(&bytes) else { panic!("no frame") };
         assert_eq!(frame.head, head());
         for (position, particle) in frame.positions.iter().zip(&particles) {
-            for axis in 0..3 {
-                let error = (position[axis] - particle.position[axis]).abs();
-                let allowed = if format == Format::F32 { 0.0 } else { frame.scale[axis] * 0.51 };
+            for ((axis, exact), scale) in position.iter().zip(particle.position).zip(frame.scale) {
+                let error = (axis - exact).abs();
+                let allowed = if format == Format::F32 { 0.0 } else { scale * 0.51 };
                 assert!(error <= allowed, "{format:?}: {error} > {allowed}");
             }
         }
@@ -337,6 +338,11 @@ fn to_page() -> Vec<ToPage> {
         ToPage::Reset { step: 1300 },
         ToPage::Clients { count: 2 },
         ToPage::Notice { level: Level::Warning, text: "look".to_owned() },
+    ]
+}
+
+fn to_page_of_a_replay() -> Vec<ToPage> {
+    vec![
         ToPage::Timeline(Box::new(Timeline {
             file: "run.mcap".to_owned(),
             scene: "curtain".to_owned(),
@@ -396,7 +402,11 @@ fn the_texts_are_frozen() {
         FromPage::parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
     }
     let parse = |text: &str| serde_json::from_str::<Value>(text).unwrap();
-    let to_page: Vec<_> = to_page().iter().map(|message| parse(&message.to_json())).collect();
+    let to_page: Vec<_> = to_page()
+        .into_iter()
+        .chain(to_page_of_a_replay())
+        .map(|message| parse(&message.to_json()))
+        .collect();
     let from_page: Vec<_> = FROM_PAGE.iter().map(|text| parse(text)).collect();
     check("texts.json", &json!({ "to_page": to_page, "from_page": from_page }));
 }

@@ -1,0 +1,181 @@
+//! What pages are told, in which order, and how far a slow one is behind.
+
+use std::time::Duration;
+
+use viewer_bridge::hub::{Demand, Slot};
+use viewer_bridge::message::{Node, ToPage};
+use viewer_bridge::source::{Ask, Request};
+use viewer_bridge::wire::Format::{F32, U16};
+use viewer_bridge::wire::Message;
+
+use crate::support::{Site, wait_for};
+
+fn ack(frame: u32) -> String {
+    format!(r#"{{"type":"ack","frame":{frame}}}"#)
+}
+
+#[test]
+fn who_comes_late_is_told_everything_in_order() {
+    let mut site = Site::start();
+    site.hub.latch(Slot::Node, &ToPage::Node(Node::default()));
+    site.begin(2);
+    site.stage.set_torn(&site.hub, 5, &[3, 1], &[0]);
+    site.stage.set_torn(&site.hub, 6, &[3, 1, 2], &[0, 1, 2]);
+    let mut page = site.page();
+    assert_eq!(page.text()["type"], "node");
+    let Message::Scene(scene) = page.binary() else { panic!("no scene") };
+    assert_eq!((scene.stamp.epoch, scene.positions.len()), (1, 2));
+    let Message::Tear(tear) = page.binary() else { panic!("no tear") };
+    assert_eq!((tear.first, tear.constraints), (0, vec![3, 1, 2]));
+    assert_eq!(page.text_of("clients")["count"], 1);
+}
+
+#[test]
+fn tears_come_as_changes_and_a_reset_empties_the_list() {
+    let mut site = Site::start();
+    let mut page = site.page();
+    site.begin(2);
+    site.stage.set_torn(&site.hub, 5, &[3], &[0]);
+    site.stage.set_torn(&site.hub, 6, &[3, 1], &[0, 3]);
+    site.stage.set_torn(&site.hub, 7, &[], &[]);
+    site.stage.set_torn(&site.hub, 8, &[2], &[1]);
+    let mut tears = Vec::new();
+    while tears.len() < 4 {
+        if let Message::Tear(tear) = page.binary() {
+            tears.push((tear.stamp.step, tear.first, tear.constraints, tear.causes));
+        }
+    }
+    let expected = [
+        (5, 0, vec![3], vec![0]),
+        (6, 1, vec![1], vec![3]),
+        (7, 0, vec![], vec![]),
+        (8, 0, vec![2], vec![1]),
+    ];
+    assert_eq!(tears, expected);
+}
+
+#[test]
+fn a_page_gets_two_frames_and_then_the_newest_when_it_has_drawn_one() {
+    let mut site = Site::start();
+    let mut page = site.page();
+    site.begin(1);
+    site.show(1, 1);
+    let first = page.frame();
+    site.show(2, 1);
+    assert_eq!((first.0, page.frame().0), (1, 2));
+    // Credit is used up; whatever is shown now waits, and only the last of it.
+    assert_eq!(site.hub.demand(1), Demand::default());
+    for step in 3..50 {
+        site.show(step, 1);
+    }
+    page.say(&ack(first.1));
+    // Its page has credit again: the source is told, and shows what it has.
+    wait_for("demand", || site.hub.demand(1).is_any().then_some(()));
+    site.show(50, 1);
+    assert_eq!(page.frame().0, 50);
+}
+
+#[test]
+fn a_slow_page_is_never_more_than_three_frames_behind() {
+    let mut site = Site::start();
+    let mut page = site.page();
+    site.begin(1);
+    let mut step = 0;
+    for _ in 0..20 {
+        // Five steps pass while the page draws one frame.
+        for _ in 0..5 {
+            step += 1;
+            site.show(step, 1);
+        }
+        let (shown, number) = page.frame();
+        assert!(step - shown <= 15, "step {shown} is shown at step {step}");
+        page.say(&ack(number));
+        wait_for("credit", || site.hub.demand(1).is_any().then_some(()));
+    }
+}
+
+#[test]
+fn no_frame_comes_before_its_scene() {
+    let mut site = Site::start();
+    let mut page = site.page();
+    let mut epoch = 0;
+    for step in 0..200 {
+        site.begin(1);
+        site.show(step, 1);
+        site.hub.broadcast(&ToPage::Reset { step });
+        let mut is_over = false;
+        while !is_over {
+            match page.next().unwrap() {
+                tungstenite::Message::Binary(bytes) => match viewer_bridge::wire::decode(&bytes) {
+                    Ok(Message::Scene(scene)) => epoch = scene.stamp.epoch,
+                    Ok(Message::Frame(frame)) => {
+                        assert!(frame.head.stamp.epoch <= epoch, "frame before scene");
+                        page.say(&ack(frame.head.number));
+                    }
+                    _ => {}
+                },
+                tungstenite::Message::Text(text) => is_over = text.contains("\"reset\""),
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn each_page_gets_the_format_that_it_asked_for() {
+    let mut site = Site::start();
+    let mut kinds = Vec::new();
+    let mut pages = Vec::new();
+    for format in ["auto", "f32", "u16"] {
+        let mut page = site.silent_page();
+        page.say(&format!(r#"{{"type":"hello","protocol":1,"format":"{format}"}}"#));
+        assert_eq!(page.text()["format"], format);
+        pages.push(page);
+    }
+    site.begin(1);
+    for (step, count) in [(1, 10), (2, 5000)] {
+        site.show(step, count);
+        for page in &mut pages {
+            loop {
+                if let Message::Frame(frame) = page.binary() {
+                    kinds.push(frame.format);
+                    page.say(&ack(frame.head.number));
+                    break;
+                }
+            }
+        }
+    }
+    assert_eq!(kinds, [F32, F32, U16, U16, F32, U16]);
+}
+
+#[test]
+fn nobody_to_show_to_is_no_demand() {
+    let mut site = Site::start();
+    assert_eq!(site.hub.demand(10), Demand::default());
+    let page = site.page();
+    assert_eq!(site.hub.demand(10), Demand { f32: true, u16: false });
+    assert_eq!(site.hub.demand(100_000), Demand { f32: false, u16: true });
+    site.begin(1);
+    drop(page);
+    site.wait_for_clients(0);
+    assert_eq!(site.hub.demand(10), Demand::default());
+}
+
+#[test]
+fn the_source_is_told_who_comes_and_goes() {
+    let site = Site::start();
+    let page = site.page();
+    let patience = Duration::from_mins(1);
+    assert_eq!(site.requests.next(patience), Some(Request { client: 1, ask: Ask::Frame }));
+    // Torn off, without a farewell.
+    drop(page);
+    assert_eq!(site.requests.next(patience), Some(Request { client: 1, ask: Ask::Left }));
+}
+
+#[test]
+fn the_end_of_the_server_is_told() {
+    let site = Site::start();
+    let mut page = site.page();
+    site.hub.close();
+    assert_eq!(page.close_code(), Some(1001));
+}

@@ -1,0 +1,91 @@
+//! Who is let in: Host and Origin of every request, the token, and the number of pages.
+
+use tungstenite::http::{HeaderValue, header};
+
+use crate::support::{Site, wait_for};
+
+#[test]
+fn a_socket_of_a_foreign_page_is_refused() {
+    let site = Site::start();
+    for origin in ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"] {
+        let refused = site.open(site.request(Some(origin))).err();
+        assert_eq!(refused, Some(403), "{origin}");
+    }
+    let own = format!("http://{}", site.address);
+    let localhost = format!("http://localhost:{}", site.address.port());
+    for origin in [None, Some(own.as_str()), Some(localhost.as_str())] {
+        assert!(site.open(site.request(origin)).is_ok(), "{origin:?}");
+    }
+}
+
+#[test]
+fn a_foreign_host_is_refused_on_every_path() {
+    let site = Site::start();
+    let mut request = site.request(None);
+    let foreign = HeaderValue::from_static("evil.example");
+    request.headers_mut().insert(header::HOST, foreign);
+    assert_eq!(site.open(request).err(), Some(403));
+    for path in ["/", "/index.html", "/socket", "/nothing", "/../secret"] {
+        let request =
+            format!("GET {path} HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
+        assert!(site.answer(&request).starts_with("http/1.1 403"), "{path}");
+        let without = format!("GET {path} HTTP/1.1\r\nConnection: close\r\n\r\n");
+        let answer = site.answer(&without);
+        assert!(answer.starts_with("http/1.1 40"), "{path}: {answer}");
+    }
+}
+
+#[test]
+fn every_answer_has_the_headers_that_keep_other_pages_out() {
+    let site = Site::start();
+    for (path, status) in [("/", "200"), ("/nothing", "404"), ("/%2e%2e/Cargo.toml", "404")] {
+        let host = site.address;
+        let answer = site
+            .answer(&format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"));
+        assert!(answer.starts_with(&format!("http/1.1 {status}")), "{path}: {answer}");
+        for line in [
+            "content-security-policy: default-src 'none'; script-src 'self'",
+            "frame-ancestors 'none'",
+            "x-content-type-options: nosniff",
+            "referrer-policy: no-referrer",
+            "cross-origin-opener-policy: same-origin",
+            "cross-origin-resource-policy: same-origin",
+            "cache-control: no-cache",
+        ] {
+            assert!(answer.contains(line), "{path} lacks {line}: {answer}");
+        }
+    }
+}
+
+#[test]
+fn elsewhere_than_on_loopback_the_token_is_demanded() {
+    let site = Site::listen("0.0.0.0:0");
+    let token = site.url.split_once("#token=").unwrap().1.to_owned();
+    for hello in [
+        r#"{"type":"hello","protocol":1}"#.to_owned(),
+        r#"{"type":"hello","protocol":1,"token":"0123456789abcdef0123456789abcdef"}"#.to_owned(),
+        format!(r#"{{"type":"hello","protocol":1,"token":"{}"}}"#, &token[..31]),
+    ] {
+        let mut page = site.silent_page();
+        page.say(&hello);
+        assert_eq!(page.close_code(), Some(4401), "{hello}");
+    }
+    let mut page = site.silent_page();
+    page.say(&format!(r#"{{"type":"hello","protocol":1,"token":"{token}"}}"#));
+    assert_eq!(page.text()["type"], "hello");
+}
+
+#[test]
+fn on_loopback_there_is_no_token() {
+    assert!(!Site::start().url.contains('#'));
+}
+
+#[test]
+fn the_seventeenth_page_is_refused_until_another_one_goes() {
+    let site = Site::start();
+    let mut pages: Vec<_> = (0..16).map(|_| site.page()).collect();
+    assert_eq!(site.open(site.request(None)).err(), Some(503));
+    drop(pages.pop());
+    site.wait_for_clients(15);
+    wait_for("a place", || site.open(site.request(None)).ok());
+}

@@ -1,0 +1,129 @@
+//! Pages that break the rules are told why, and disconnected; nobody else notices.
+
+use std::io::Read;
+use std::net::TcpStream;
+use std::time::Duration;
+
+use serde_json::json;
+use tungstenite::Message;
+use viewer_bridge::message::ToPage;
+use viewer_bridge::source::Ask;
+
+use crate::support::{Site, filler, wait_for};
+
+#[test]
+fn a_first_message_that_is_no_hello_ends_the_connection() {
+    let site = Site::start();
+    for (text, code) in [
+        ("", 4400),
+        ("hello", 4400),
+        (r#"{"type":"pause"}"#, 4400),
+        (r#"{"type":"hello"}"#, 4400),
+        (r#"{"type":"hello","protocol":2}"#, 4426),
+    ] {
+        let mut page = site.silent_page();
+        page.say(text);
+        assert_eq!(page.close_code(), Some(code), "{text}");
+    }
+    assert_eq!(site.hub.client_count(), 0);
+}
+
+#[test]
+fn a_malformed_message_ends_the_connection() {
+    let site = Site::start();
+    for text in [
+        "{",
+        "[]",
+        r#"{"type":"dance"}"#,
+        r#"{"type":"pin","particle":1,"colour":2}"#,
+        r#"{"type":"drag_move","particle":1,"target":["nan",0,0]}"#,
+        r#"{"type":"hello","protocol":1}"#,
+    ] {
+        let mut page = site.page();
+        page.say(text);
+        assert_eq!(page.close_code(), Some(4400), "{text}");
+    }
+    let mut page = site.page();
+    page.socket.send(Message::binary(vec![1, 2, 3])).unwrap();
+    assert_eq!(page.close_code(), Some(4400));
+    site.wait_for_clients(0);
+}
+
+#[test]
+fn a_message_that_is_too_long_ends_the_connection() {
+    let site = Site::start();
+    let mut other = site.page();
+    let mut page = site.page();
+    let text = format!(r#"{{"type":"load","scene":"{}"}}"#, "x".repeat(64 << 10));
+    // The server may have closed before all of it was sent.
+    let _sent = page.socket.send(Message::text(text));
+    let code = page.close_code();
+    assert!(code.is_none_or(|code| code == 1009), "{code:?}");
+    site.wait_for_clients(1);
+    site.hub.broadcast(&ToPage::Reset { step: 1 });
+    assert_eq!(other.text_of("reset")["step"], 1);
+}
+
+#[test]
+fn a_flood_ends_the_connection() {
+    let site = Site::start();
+    let mut page = site.page();
+    for _ in 0..1000 {
+        // The server may have closed already.
+        if page.socket.send(Message::text(r#"{"type":"pause"}"#)).is_err() {
+            break;
+        }
+    }
+    assert_eq!(page.close_code(), Some(4429));
+    site.wait_for_clients(0);
+}
+
+#[test]
+fn a_wrong_number_is_refused_and_the_page_stays() {
+    let site = Site::start();
+    let mut page = site.page();
+    page.say(r#"{"type":"drag_begin","particle":1,"target":[0,1e8,0],"id":5}"#);
+    let outcome = page.text_of("outcome");
+    assert_eq!(
+        outcome,
+        json!({
+            "type": "outcome", "id": 5, "kind": "drag_begin", "status": "rejected", "step": null,
+            "applied": 0, "rejected": 1, "reason": "out_of_range",
+            "text": "a value is out of its range",
+        })
+    );
+    page.say(r#"{"type":"pin","particle":1,"id":6}"#);
+    wait_for("the command", || {
+        let request = site.requests.next(Duration::ZERO)?;
+        matches!(request.ask, Ask::Command { id: Some(6), .. }).then_some(())
+    });
+}
+
+#[test]
+fn who_says_nothing_is_let_go() {
+    let site = Site::start();
+    // One that connects and is silent, one that opens a socket and is silent, and one that came in
+    // and then answers no ping.
+    let mut head = TcpStream::connect(site.address).unwrap();
+    let mut silent = site.silent_page();
+    let half_open = site.page();
+    assert_eq!(silent.close_code(), Some(4408));
+    head.set_read_timeout(Some(Duration::from_mins(1))).unwrap();
+    let mut rest = Vec::new();
+    head.read_to_end(&mut rest).unwrap();
+    site.wait_for_clients(0);
+    drop(half_open);
+}
+
+#[test]
+fn who_leaves_the_reliable_messages_unread_is_let_go_and_others_get_them_all() {
+    let site = Site::start();
+    let mut reader = site.page();
+    let _stalled = site.page();
+    // More than the system keeps for a socket that nobody reads, and the queue on top of it.
+    for _ in 0..1000 {
+        site.hub.broadcast_binary(filler(64 << 10));
+        while !matches!(reader.next().unwrap(), Message::Binary(_)) {}
+    }
+    assert_eq!(site.hub.client_count(), 1);
+}

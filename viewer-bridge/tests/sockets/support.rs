@@ -1,0 +1,215 @@
+//! A server in this process without a source, and pages that talk to it over real sockets.
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use serde_json::Value;
+use sim_contract::ParticleState;
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use tokio::runtime::Runtime;
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::{HeaderValue, Request, header};
+use tungstenite::protocol::CloseFrame;
+use tungstenite::{Message, WebSocket};
+use viewer_bridge::assets::Assets;
+use viewer_bridge::message::Mode;
+use viewer_bridge::source::Requests;
+use viewer_bridge::stage::Stage;
+use viewer_bridge::wire::{self, FrameHead, Scene, Stamp, decode};
+use viewer_bridge::{Hub, Server, ServerOptions};
+
+/// Longest wait for anything that should happen: generous, because the machine may be busy.
+const DEADLINE: Duration = Duration::from_mins(1);
+
+/// A server; it ends with this.
+pub(crate) struct Site {
+    pub(crate) hub: Arc<Hub>,
+    pub(crate) requests: Requests,
+    pub(crate) address: SocketAddr,
+    pub(crate) url: String,
+    pub(crate) stage: Stage,
+    _runtime: Runtime,
+}
+
+impl Site {
+    pub(crate) fn start() -> Self {
+        Self::listen("127.0.0.1:0")
+    }
+
+    pub(crate) fn listen(address: &str) -> Self {
+        let runtime = Runtime::new().unwrap();
+        let options = ServerOptions {
+            listen: address.parse().unwrap(),
+            names: Vec::new(),
+            assets: Assets::Embedded,
+        };
+        let server = runtime.block_on(Server::bind(options)).unwrap();
+        let (hub, requests) = Hub::new(Mode::Live);
+        let (hub, url) = (Arc::new(hub), server.url());
+        let port = url.rsplit(':').next().unwrap().split('/').next().unwrap();
+        let address = SocketAddr::from(([127, 0, 0, 1], port.parse().unwrap()));
+        runtime.spawn(server.serve(Arc::clone(&hub)));
+        Self { hub, requests, address, url, stage: Stage::default(), _runtime: runtime }
+    }
+
+    /// What a browser asks for when a page of `origin` opens a socket.
+    pub(crate) fn request(&self, origin: Option<&str>) -> Request<()> {
+        let url = format!("ws://{}/socket", self.address);
+        let mut request = url.into_client_request().unwrap();
+        if let Some(origin) = origin {
+            request.headers_mut().insert(header::ORIGIN, HeaderValue::from_str(origin).unwrap());
+        }
+        request
+    }
+
+    /// Opens a socket; the status of the answer if it is refused.
+    pub(crate) fn open(&self, request: Request<()>) -> Result<Page, u16> {
+        let stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(DEADLINE)).unwrap();
+        match tungstenite::client(request, stream) {
+            Ok((socket, _)) => Ok(Page { socket }),
+            Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(response))) => {
+                Err(response.status().as_u16())
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    /// A socket before its first message.
+    pub(crate) fn silent_page(&self) -> Page {
+        self.open(self.request(None)).unwrap()
+    }
+
+    /// A page that was let in, its greeting read.
+    pub(crate) fn page(&self) -> Page {
+        let mut page = self.silent_page();
+        page.say(r#"{"type":"hello","protocol":1}"#);
+        assert_eq!(page.text()["type"], "hello");
+        page
+    }
+
+    /// The head of the answer to a request that is sent as it stands.
+    pub(crate) fn answer(&self, request: &str) -> String {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream.set_read_timeout(Some(DEADLINE)).unwrap();
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut answer = String::new();
+        // A reset after the answer is an end as well.
+        let _ended = stream.read_to_string(&mut answer);
+        answer.split("\r\n\r\n").next().unwrap_or_default().to_lowercase()
+    }
+
+    /// Shows a scene of that many particles.
+    pub(crate) fn begin(&mut self, particle_count: usize) {
+        let scene = Scene { positions: vec![[0.0; 3]; particle_count], ..Scene::default() };
+        self.stage.begin(&self.hub, scene);
+    }
+
+    /// Shows a frame of that step.
+    pub(crate) fn show(&mut self, step: u64, particle_count: usize) {
+        let head = FrameHead { stamp: Stamp { epoch: 0, step }, ..FrameHead::default() };
+        let particles = vec![ParticleState::default(); particle_count];
+        self.stage.show(&self.hub, head, &particles);
+    }
+
+    pub(crate) fn wait_for_clients(&self, count: usize) {
+        wait_for(&format!("{count} clients"), || (self.hub.client_count() == count).then_some(()));
+    }
+}
+
+impl Drop for Site {
+    fn drop(&mut self) {
+        self.hub.close();
+    }
+}
+
+/// A page.
+pub(crate) struct Page {
+    pub(crate) socket: WebSocket<TcpStream>,
+}
+
+impl Page {
+    pub(crate) fn say(&mut self, text: &str) {
+        self.socket.send(Message::text(text)).unwrap();
+    }
+
+    /// The next message that is no ping.
+    pub(crate) fn next(&mut self) -> Result<Message, tungstenite::Error> {
+        loop {
+            match self.socket.read()? {
+                Message::Ping(_) | Message::Pong(_) => {}
+                message => return Ok(message),
+            }
+        }
+    }
+
+    /// The next text; nothing else may come before it.
+    pub(crate) fn text(&mut self) -> Value {
+        match self.next().unwrap() {
+            Message::Text(text) => serde_json::from_str(&text).unwrap(),
+            other => panic!("no text: {other:?}"),
+        }
+    }
+
+    /// The next binary message, texts before it are passed over.
+    pub(crate) fn binary(&mut self) -> wire::Message {
+        loop {
+            if let Message::Binary(bytes) = self.next().unwrap() {
+                return decode(&bytes).unwrap();
+            }
+        }
+    }
+
+    /// The next frame: its step and its number.
+    pub(crate) fn frame(&mut self) -> (u64, u32) {
+        loop {
+            if let wire::Message::Frame(frame) = self.binary() {
+                return (frame.head.stamp.step, frame.head.number);
+            }
+        }
+    }
+
+    /// The next text of a type.
+    pub(crate) fn text_of(&mut self, kind: &str) -> Value {
+        loop {
+            let text = match self.next().unwrap() {
+                Message::Text(text) => serde_json::from_str::<Value>(&text).unwrap(),
+                _ => continue,
+            };
+            if text["type"] == kind {
+                return text;
+            }
+        }
+    }
+
+    /// Reads to the end; the code that the server closed with, if it said one.
+    pub(crate) fn close_code(&mut self) -> Option<u16> {
+        loop {
+            match self.next() {
+                Ok(Message::Close(Some(CloseFrame { code, .. }))) => return Some(code.into()),
+                Ok(_) => {}
+                Err(_) => return None,
+            }
+        }
+    }
+}
+
+/// Polls until the condition gives a value.
+pub(crate) fn wait_for<T>(what: &str, mut condition: impl FnMut() -> Option<T>) -> T {
+    let end_ns = monotonic_ns() + u64::try_from(DEADLINE.as_nanos()).unwrap();
+    loop {
+        if let Some(value) = condition() {
+            return value;
+        }
+        assert!(monotonic_ns() < end_ns, "waited {DEADLINE:?} in vain for {what}");
+        sleep_until(monotonic_ns() + SECOND_NS / 500);
+    }
+}
+
+/// A message of that size that nobody looks into.
+pub(crate) fn filler(size_bytes: usize) -> Bytes {
+    Bytes::from(vec![0; size_bytes])
+}
