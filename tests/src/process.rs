@@ -103,29 +103,30 @@ impl Process {
         self.wait_for_line("ready");
     }
 
-    /// Waits until its stderr has a line that starts like that.
+    /// Waits until its stderr has a line that starts like that, and returns the line.
     ///
     /// # Panics
     /// If it ends before, or the deadline passes.
-    pub fn wait_for_line(&mut self, start: &str) {
-        let has_line = |text: &str| text.lines().any(|line| line.starts_with(start));
+    pub fn wait_for_line(&mut self, start: &str) -> String {
+        let line =
+            |text: &str| text.lines().find(|line| line.starts_with(start)).map(ToOwned::to_owned);
         wait_for(&format!("\"{start}\" from {}", self.title), || {
-            if has_line(&self.stderr.text()) {
-                return Some(());
+            if let Some(line) = line(&self.stderr.text()) {
+                return Some(line);
             }
             let ended = self.child.try_wait().expect("a child");
             if ended.is_some() {
                 // It may have written the line just before it ended.
                 self.stderr.join();
+                let text = self.stderr.text();
                 assert!(
-                    has_line(&self.stderr.text()),
-                    "{} ended before it wrote \"{start}\": {}",
-                    self.title,
-                    self.stderr.text()
+                    line(&text).is_some(),
+                    "{} ended before it wrote \"{start}\": {text}",
+                    self.title
                 );
             }
             None
-        });
+        })
     }
 
     /// Sends a signal.

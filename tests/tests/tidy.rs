@@ -45,8 +45,10 @@ fn dependencies_between_crates_are_those_of_the_architecture() {
 
 #[test]
 fn no_source_file_hides_several_concepts() {
-    let mut folders: Vec<_> =
-        ["sim-node", "recorder", "viewer-bridge", "tests"].iter().map(|folder| root().join(folder)).collect();
+    let mut folders: Vec<_> = ["sim-node", "recorder", "viewer-bridge", "tests"]
+        .iter()
+        .map(|folder| root().join(folder))
+        .collect();
     let mut count = 0;
     while let Some(folder) = folders.pop() {
         for entry in folder.read_dir().unwrap().map(|entry| entry.unwrap().path()) {

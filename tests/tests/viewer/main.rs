@@ -1,0 +1,236 @@
+//! The viewer's server between a node and pages, all of them processes or sockets: what pages see
+//! is what the node publishes, and what they do is seen in the node's own snapshots.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
+
+mod page;
+
+use std::time::Duration;
+
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
+use serde_json::{Value, json};
+use sim_contract::{Client, ParticleFlags, ParticleState};
+use viewer_bridge::wire::{Message, scene_flag};
+
+use page::{Bridge, Page};
+
+/// Waits for a state of the node in which that holds for a particle.
+fn wait_for_particle(
+    node: &mut Client,
+    particle: usize,
+    what: &str,
+    is_so: impl Fn(&ParticleState) -> bool,
+) {
+    wait_for(what, || {
+        let snapshot = node.latest_snapshot(Duration::from_millis(100)).unwrap()?;
+        is_so(&snapshot.particles()[particle]).then_some(())
+    });
+}
+
+fn is_grabbed(particle: &ParticleState) -> bool {
+    particle.flags & ParticleFlags::GRABBED != 0
+}
+
+fn drag(phase: &str, target: [f32; 3]) -> Value {
+    json!({ "type": format!("drag_{phase}"), "particle": 90, "target": target })
+}
+
+#[test]
+fn a_page_sees_what_the_node_publishes() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let bridge = Bridge::start(&sandbox);
+    let mut page = bridge.page();
+    let scene = page.scene();
+    assert_eq!((scene.positions.len(), scene.ends.len(), scene.rate_hz), (168, 596, 240));
+    assert_eq!((scene.text.name.as_str(), scene.text.grids.len()), ("curtain", 1));
+    assert_eq!(scene.flags, scene_flag::TETHERS);
+    let pins = loop {
+        if let Message::Pins(pins) = page.binary() {
+            break pins;
+        }
+    };
+    assert_eq!(pins.held, (0..14).map(|particle| [particle, 1]).collect::<Vec<_>>());
+    page.frame(|frame| frame.head.stamp.step > 60);
+    page.applied(json!({ "type": "pause" }));
+    page.told("node", "is_paused", &json!(true));
+    let mut node = Client::attach(&sandbox.endpoint()).unwrap();
+    let snapshot = node.latest_snapshot(DEADLINE).unwrap().unwrap();
+    let step = snapshot.header().step;
+    let mut late = bridge.page();
+    let frame = late.frame(|frame| frame.head.stamp.step == step);
+    let positions: Vec<_> = snapshot.particles().iter().map(|one| one.position).collect();
+    assert_eq!(frame.positions, positions);
+    let statistics = loop {
+        if let Message::Statistics(statistics) = page.binary()
+            && statistics.client_count == 2
+        {
+            break statistics;
+        }
+    };
+    assert!(statistics.stretch_max < 0.2 && statistics.stretch_max >= statistics.stretch_mean);
+    assert_eq!(statistics.torn_count, 0);
+}
+
+#[test]
+fn what_a_page_grabs_follows_it_and_is_let_go_when_the_page_goes() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let bridge = Bridge::start(&sandbox);
+    let mut node = Client::attach(&sandbox.endpoint()).unwrap();
+    let (mut page, mut other) = (bridge.page(), bridge.page());
+    page.applied(drag("begin", [0.2, 0.5, 0.5]));
+    assert_eq!(other.rejected(drag("begin", [0.0; 3])), "grabbed_by_other");
+    assert_eq!(other.rejected(drag("move", [0.0; 3])), "grabbed_by_other");
+    assert_eq!(other.rejected(json!({ "type": "drag_end", "particle": 3 })), "not_grabbed");
+    page.send(&drag("move", [0.3, 0.5, 0.4]));
+    wait_for_particle(&mut node, 90, "the particle at its target", |particle| {
+        is_grabbed(particle) && particle.position == [0.3, 0.5, 0.4]
+    });
+    drop(page);
+    wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
+    other.applied(drag("begin", [0.2, 0.5, 0.5]));
+    other.applied(json!({ "type": "drag_end", "particle": 90 }));
+    wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
+}
+
+#[test]
+fn pages_pin_cut_brush_set_step_reset_and_load() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let bridge = Bridge::start(&sandbox);
+    let mut page = bridge.page();
+    let epoch = page.scene().stamp.epoch;
+    page.applied(json!({ "type": "pin", "particle": 100 }));
+    let cut = json!({ "type": "cut", "epoch": epoch, "constraints": [300, 301, 302] });
+    let outcome = page.command(cut.clone());
+    assert_eq!((&outcome["applied"], &outcome["rejected"]), (&json!(3), &json!(0)));
+    let tear = loop {
+        if let Message::Tear(tear) = page.binary() {
+            break tear;
+        }
+    };
+    assert_eq!((tear.first, tear.constraints, tear.causes), (0, vec![300, 301, 302], vec![3; 3]));
+    assert_eq!(page.rejected(cut), "already_torn");
+    let stale = json!({ "type": "cut", "epoch": epoch + 1, "constraints": [1] });
+    assert_eq!(page.rejected(stale), "stale_epoch");
+    let brush = |eye: [f32; 3]| {
+        json!({ "type": "brush", "eye": eye, "ray": [0, 0, -1], "radius": 0.2,
+            "delta": [0, 0, 0.05], "over_s": 0.016, "cap": 0.1 })
+    };
+    assert_eq!(page.command(brush([0.0, 0.5, 3.0]))["applied"], 1);
+    assert_eq!(page.command(brush([9.0, 0.5, 3.0]))["applied"], 0);
+    page.applied(json!({ "type": "set", "parameter": "gravity", "value": [0, -1.5, 0] }));
+    let parameters = page.text(|text| text["values"]["gravity"][1] == -1.5);
+    assert_eq!(
+        (&parameters["is_complete"], &parameters["initial"]["gravity"][1]),
+        (&json!(true), &json!(-9.81))
+    );
+    assert_eq!(
+        page.rejected(json!({ "type": "set", "parameter": "stiffness", "value": 0.5 })),
+        "no_effect_here"
+    );
+    assert_eq!(page.rejected(json!({ "type": "step" })), "no_effect_here");
+    let paused_before = page.applied(json!({ "type": "pause" }));
+    page.applied(json!({ "type": "step", "count": 3 }));
+    page.frame(|frame| frame.head.stamp.step == paused_before + 2);
+    page.applied(json!({ "type": "resume" }));
+    let reset = page.applied(json!({ "type": "reset" }));
+    let tear = loop {
+        if let Message::Tear(tear) = page.binary() {
+            break tear;
+        }
+    };
+    assert!(tear.constraints.is_empty() && tear.first == 0 && tear.stamp.step >= reset);
+    refusals(&mut page);
+    page.send(&json!({ "type": "load", "scene": "rope" }));
+    let rope = page.scene();
+    assert_eq!((rope.text.name.as_str(), rope.positions.len()), ("rope", 41));
+    assert_ne!(rope.stamp.epoch, epoch);
+    page.frame(|frame| frame.head.stamp.epoch == rope.stamp.epoch);
+}
+
+/// What a live node, or the bridge, does not do.
+fn refusals(page: &mut Page) {
+    for (message, reason) in [
+        (json!({ "type": "load", "scene": "/etc/passwd.toml" }), "out_of_range"),
+        (json!({ "type": "load", "scene": "ragdoll" }), "no_effect_here"),
+        (json!({ "type": "seek", "step": 3 }), "only_replay"),
+        (json!({ "type": "step", "count": -3 }), "only_replay"),
+        (json!({ "type": "pin", "particle": 100_000 }), "unknown_particle"),
+    ] {
+        assert_eq!(page.rejected(message.clone()), reason, "{message}");
+    }
+}
+
+#[test]
+fn what_others_set_is_shown() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let bridge = Bridge::start(&sandbox);
+    let mut page = bridge.page();
+    page.text(|text| text["type"] == "parameters" && text["is_complete"] == true);
+    ctl(&sandbox, &["set", "damping", "2.5"]);
+    page.text(|text| text["values"]["damping"] == 2.5);
+    ctl(&sandbox, &["pause"]);
+    page.told("node", "is_paused", &json!(true));
+    // Who comes after a command cannot know what it did, and says so.
+    let late = Bridge::start(&sandbox);
+    let told = late.page().text(|text| text["type"] == "parameters" && !text["values"].is_null());
+    assert_eq!(told["is_complete"], false);
+}
+
+#[test]
+fn pages_wait_for_a_node_and_see_it_go_and_come_back() {
+    let sandbox = Sandbox::new();
+    let bridge = Bridge::start(&sandbox);
+    let mut page = bridge.page();
+    let told = page.text(|text| text["type"] == "node" && text["text"] != "");
+    assert_eq!(told["state"], "none");
+    assert!(told["text"].as_str().unwrap().contains("sim-node run"), "{told}");
+    assert_eq!(page.rejected(json!({ "type": "pause" })), "no_node");
+
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let first = page.scene();
+    page.told("node", "state", &json!("alive"));
+    // Killed: it cannot say that it goes.
+    node.signal(Signal::KILL);
+    page.told("node", "state", &json!("lost"));
+    assert_eq!(page.rejected(json!({ "type": "pause" })), "no_node");
+    drop(node);
+
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
+    let second = page.scene();
+    assert_eq!((first.positions.len(), second.positions.len()), (168, 41));
+    assert_ne!(first.text.run_id, second.text.run_id);
+    assert_ne!(first.stamp.epoch, second.stamp.epoch);
+    page.frame(|frame| frame.head.stamp.epoch == second.stamp.epoch);
+    // A clean end.
+    node.interrupt();
+    page.told("node", "state", &json!("lost"));
+}
+
+#[test]
+fn the_picker_has_the_scenes_of_the_node() {
+    let sandbox = Sandbox::new();
+    let listed = Process::run(Program::SimNode, &sandbox, &["scenes", "--json"]).json();
+    let listed: Vec<_> = listed.as_array().unwrap().iter().map(|one| &one["name"]).collect();
+    let known: Vec<_> = viewer_bridge::scenes::all().iter().map(|one| json!(one.name)).collect();
+    assert_eq!(listed, known.iter().collect::<Vec<_>>());
+    assert!(viewer_bridge::scenes::all().iter().all(|one| !one.text.is_empty()));
+}
+
+#[test]
+fn the_server_ends_as_programs_should() {
+    let sandbox = Sandbox::new();
+    let bridge = Bridge::start(&sandbox);
+    let _page = bridge.page();
+    let taken = bridge.host.clone();
+    let second = Process::run(Program::ViewerBridge, &sandbox, &["--listen", &taken]);
+    assert_eq!(second.code, Some(1));
+    assert!(second.stderr.starts_with("error: cannot listen at"), "{}", second.stderr);
+    let wrong = Process::run(Program::ViewerBridge, &sandbox, &["--listen", "nowhere"]);
+    assert_eq!(wrong.code, Some(2));
+    bridge.process.signal(Signal::TERM);
+    let ended = bridge.process.wait();
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), ""), "{}", ended.stderr);
+}
