@@ -16,6 +16,8 @@ const FIELD_OF_VIEW = (38 * Math.PI) / 180;
 const PITCH_MAX = Math.PI / 2 - 0.02;
 /** Radians that a drag across 1 CSS pixel turns. */
 const TURN_PER_PIXEL = 0.008;
+/** How much deeper than wide the room of a plane scene is. */
+const FLAT_DEPTH = 100;
 /** Share of the picture that a framed box fills. */
 const FRAME_FILL = 0.8;
 
@@ -88,7 +90,9 @@ export class Camera {
     const reach = this.distance + this.sceneRadius * 4;
     if (this.isFlat) {
       const h = this.halfHeight();
-      return [1 / (h * aspect), 0, 0, 0, 0, 1 / h, 0, 0, 0, 0, -1 / reach, 0, 0, 0, 0, 1];
+      // The plane of the scene is in the middle of the depths: nothing is ever behind the eye.
+      const depth = reach * FLAT_DEPTH;
+      return [1 / (h * aspect), 0, 0, 0, 0, 1 / h, 0, 0, 0, 0, -1 / depth, 0, 0, 0, -this.distance / depth, 1];
     }
     const near = Math.max(this.distance * 0.02, this.sceneRadius * 1e-3);
     const far = reach * 8;

@@ -93,7 +93,6 @@ function start(renderer) {
   followLink(views, controls);
 
   let scriptMs = 0;
-  let acknowledged = -1;
   const loop = (/** @type {number} */ nowMs) => {
     requestAnimationFrame(loop);
     const begin = performance.now();
@@ -105,14 +104,10 @@ function start(renderer) {
     if (renderer.isDirty) renderer.draw();
     const drawn = performance.now();
     overlay.draw();
-    const { frame } = simulation;
-    if (frame !== null && frame.number !== acknowledged && renderer.frameDrawn === frame) {
-      acknowledged = frame.number;
-      connector.acknowledge(frame.number);
-    }
+    if (simulation.frameNumber !== null) connector.acknowledge(simulation.frameNumber);
+    simulation.frameNumber = null;
     scriptMs += 0.05 * (between - begin + performance.now() - drawn - scriptMs);
   };
-  simulation.on("hello", () => { acknowledged = -1; });
   requestAnimationFrame(loop);
   connector.connect();
 

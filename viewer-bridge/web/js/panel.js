@@ -67,23 +67,22 @@ export class Panel {
     }));
   }
 
-  /** @param {Row} row @param {HTMLElement} label @param {HTMLElement[]} beside @param {() => void} undo */
-  rowShell(row, label, beside, undo) {
-    const button = make("button", { type: "button", class: "undo", title: `${row.label} as in the scene`, "aria-label": `${row.label} as in the scene` });
+  /** The button at the end of a row that gives back the scene's own value. @param {Row} row @param {() => void} undo */
+  undoButton(row, undo) {
+    const text = `${row.label} as in the scene`;
+    const button = make("button", { type: "button", class: "undo", title: text, "aria-label": text });
     button.innerHTML = `<svg viewBox="0 0 20 20" aria-hidden="true"><path d="M4.5 6.5A7 7 0 1 1 3.2 11M4 2.5v4.3h4.3"/></svg>`;
     button.addEventListener("click", undo);
-    const shell = make("fieldset", { class: "row" }, make("div", { class: "head" }, label, ...beside, button));
-    return { shell, button };
+    return button;
   }
 
   /** Three sliders, of which a plane scene uses two. @param {Row} row */
   vectorRow(row) {
     const { simulation } = this;
     const output = make("output");
-    const title = make("span", { id: `label-${row.name}` }, row.label);
     const read = () => vectorOf(valueOf(simulation.parameters?.values ?? null, row.name, "structural"));
     const initial = () => vectorOf(valueOf(simulation.parameters?.initial ?? null, row.name, "structural"));
-    const { shell, button } = this.rowShell(row, title, [output], () => this.set(row.name, initial()));
+    const button = this.undoButton(row, () => this.set(row.name, initial()));
     const range = () => rangeOf(row, ...read(), ...initial());
     const sliders = AXES.map((axis) => make("input", { type: "range", min: 0, max: SLIDER_STEPS, "aria-label": `${row.label} ${axis}` }));
     const shown = () => /** @type {[number, number, number]} */ (sliders.map((slider) => valueAt(row, range(), slider.valueAsNumber)));
@@ -96,7 +95,8 @@ export class Panel {
       this.set(row.name, vector);
       if (row.name === "wind_velocity" && !valueOf(simulation.parameters?.values ?? null, "wind_drag", "")) this.set("wind_drag", WIND_DRAG);
     }));
-    shell.append(make("div", { class: "axes" }, ...sliders.map((slider, axis) => make("label", {}, AXES[axis], slider))));
+    const axes = make("div", { class: "axes all" }, ...sliders.map((slider, axis) => make("label", {}, AXES[axis], slider)));
+    const shell = make("fieldset", { class: "row" }, make("span", { class: "title wide" }, row.label), output, button, axes);
     this.refreshers.push(() => {
       const vector = read();
       sliders.forEach((slider, axis) => {
@@ -115,16 +115,19 @@ export class Panel {
     const output = make("output");
     const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name}` });
     const kinds = make("select", { "aria-label": `${row.label} of which constraints` }, ...["all", ...KINDS].map((kind) => make("option", {}, kind)));
-    const isOn = make("input", { type: "checkbox" });
+    const isOn = make("input", { type: "checkbox", "aria-label": `${row.label}: on` });
     const kind = () => (row.perKind ? kinds.value : "all");
     const read = (/** @type {"values" | "initial"} */ which) => valueOf(simulation.parameters?.[which] ?? null, row.name, kind() === "all" ? "structural" : kind());
     const numbers = () => [read("values"), read("initial")].filter((value) => typeof value === "number");
     const range = () => rangeOf(row, .../** @type {number[]} */ (numbers()));
     const send = (/** @type {SettingValue} */ value) => this.set(row.name, value, row.perKind ? kind() : undefined);
-    const { shell, button } = this.rowShell(row, make("label", { for: slider.id }, row.label), [
-      ...(row.perKind ? [kinds] : []), output, ...(row.canBeOff ? [make("label", { class: "check" }, isOn, "on")] : []),
-    ], () => send(read("initial")));
-    const say = (/** @type {SettingValue} */ value) => { output.textContent = typeof value === "number" ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "as in the scene" : "off"; };
+    const button = this.undoButton(row, () => send(read("initial")));
+    const title = make("span", { class: "title" }, ...(row.canBeOff ? [isOn] : []), make("label", { for: slider.id }, row.label));
+    const shell = make("fieldset", { class: "row" }, title, slider, output, button);
+    if (row.perKind) slider.before(kinds);
+    if (row.perKind) shell.append(slider);
+    slider.classList.toggle("all", row.perKind ?? false);
+    const say = (/** @type {SettingValue} */ value) => { output.textContent = typeof value === "number" ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
     slider.addEventListener("input", () => {
       const value = valueAt(row, range(), slider.valueAsNumber);
       isOn.checked = true;
@@ -133,7 +136,6 @@ export class Panel {
     });
     isOn.addEventListener("change", () => send(isOn.checked ? row.whenOn ?? row.least : null));
     kinds.addEventListener("change", () => this.update());
-    shell.append(slider);
     this.refreshers.push(() => {
       const value = read("values");
       if (!slider.matches(":active")) slider.valueAsNumber = placeOf(row, range(), typeof value === "number" ? value : row.whenOn ?? row.least);

@@ -28,9 +28,9 @@ export const ROWS = [
   { name: "stiffness", label: "Stiffness", unit: "", kind: "linear", least: 0, most: 1, method: "pbd", perKind: true },
   { name: "iterations", label: "Iterations", unit: "", kind: "whole", least: 1, most: 32 },
   { name: "substeps", label: "Substeps", unit: "", kind: "whole", least: 1, most: 32 },
-  { name: "tear_force", label: "Tears at force", unit: "N", kind: "log", least: 1e-3, most: 1e5, canBeOff: true, whenOn: 50 },
-  { name: "tear_stretch", label: "Tears at length ×", unit: "", kind: "linear", least: 1.01, most: 4, canBeOff: true, whenOn: 1.5 },
-  { name: "tear_distance", label: "Tears beyond", unit: "m", kind: "log", least: 1e-3, most: 100, canBeOff: true, whenOn: 0.1 },
+  { name: "tear_force", label: "Tear force", unit: "N", kind: "log", least: 1e-3, most: 1e5, canBeOff: true, whenOn: 50 },
+  { name: "tear_stretch", label: "Tear stretch", unit: "×", kind: "linear", least: 1.01, most: 4, canBeOff: true, whenOn: 1.5 },
+  { name: "tear_distance", label: "Tear distance", unit: "m", kind: "log", least: 1e-3, most: 100, canBeOff: true, whenOn: 0.1 },
   { name: "time_scale", label: "Pace", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
 

@@ -2,7 +2,8 @@
 // Messages go in, topics come out. It has no clock, no socket and no picture.
 
 import { Emitter } from "./emitter.js";
-import { Topology, lowestReach } from "./topology.js";
+import { lowestReach } from "./hanging.js";
+import { Topology } from "./topology.js";
 import { axesOf } from "./camera.js";
 import { add, addScaled, boxOf, dot, length, scale, subtract } from "./math.js";
 
@@ -45,6 +46,9 @@ export class Simulation extends Emitter {
     this.topology = null;
     /** @type {Frame | null} */
     this.frame = null;
+    /** Number of the newest frame that came, shown or not: one that a scene has overtaken has to be
+     * acknowledged too, or its credit is lost. @type {number | null} */
+    this.frameNumber = null;
     /** Constraints in the order of tearing. @type {number[]} */
     this.torn = [];
     /** Flags of the particles that are not free. @type {Map<number, number>} */
@@ -86,6 +90,7 @@ export class Simulation extends Emitter {
       this.stats = message;
       return this.emit("stats", message);
     }
+    if (message.kind === "frame") this.frameNumber = message.number;
     if (message.kind === "scene") return this.receiveScene(message);
     if (this.scene === null || message.epoch !== this.scene.epoch) return;
     if (message.kind === "frame") this.receiveFrame(message);

@@ -209,38 +209,3 @@ export function drawnSticks(scene, limit) {
   }
   return Uint32Array.from(drawn);
 }
-
-/**
- * The lowest height that each particle can hang at: a particle is no farther from what holds it than
- * the shortest way along constraints, so no lower than the greatest of height - distance.
- *
- * Swept along the constraints both ways until nothing changes, at most `SWEEPS_MAX` times.
- * @param {Scene} scene @param {ArrayLike<number>} held particles that do not fall @param {import("./math.js").Vec3} up
- * @returns {number | null} of the lowest particle; null where one hangs from nothing
- */
-export function lowestReach(scene, held, up) {
-  const { positions, ends, restLengths, particleCount, constraintCount } = scene;
-  const lowest = new Float64Array(particleCount).fill(-Infinity);
-  const height = (/** @type {number} */ p) => positions[3 * p] * up[0] + positions[3 * p + 1] * up[1] + positions[3 * p + 2] * up[2];
-  for (let k = 0; k < held.length; k++) lowest[held[k]] = height(held[k]);
-  const relax = (/** @type {number} */ i) => {
-    const a = ends[2 * i];
-    const b = ends[2 * i + 1];
-    const fromA = lowest[a] - restLengths[i];
-    const fromB = lowest[b] - restLengths[i];
-    if (fromA > lowest[b]) lowest[b] = fromA;
-    else if (fromB > lowest[a]) lowest[a] = fromB;
-    else return 0;
-    return 1;
-  };
-  for (let sweep = 0, changes = 1; changes > 0 && sweep < SWEEPS_MAX; sweep++) {
-    changes = 0;
-    for (let i = 0; i < constraintCount; i++) changes += relax(i);
-    for (let i = constraintCount - 1; i >= 0; i--) changes += relax(i);
-  }
-  let least = Infinity;
-  for (const value of lowest) least = Math.min(least, value);
-  return Number.isFinite(least) ? least : null;
-}
-
-const SWEEPS_MAX = 40;

@@ -74,12 +74,12 @@ function placeCapsule(a, b, radius) {
   return { solid: "ball", a, b, shape: frameOf(scale(u, radius), scale(axis, radius), scale(v, radius), ORIGIN), turn: frameOf(u, axis, v, ORIGIN) };
 }
 
-/** Everything behind a line, as a box far bigger than the picture. @param {Vec3} normal @param {number} offset @param {Vec3} near @param {number} size */
+/** Everything behind a line, as a leaf far bigger than the picture. @param {Vec3} normal @param {number} offset @param {Vec3} near @param {number} size */
 function placeHalfPlane(normal, offset, near, size) {
   const along = /** @type {Vec3} */ ([-normal[1], normal[0], 0]);
   const foot = addScaled(scale(normal, offset), along, near[0] * along[0] + near[1] * along[1]);
   const angle = Math.atan2(along[1], along[0]);
-  return placeBox(addScaled(foot, normal, -size), [size, size, size], [0, 0, Math.sin(angle / 2), Math.cos(angle / 2)]);
+  return placeBox(addScaled(foot, normal, -size), [size, size, 0], [0, 0, Math.sin(angle / 2), Math.cos(angle / 2)]);
 }
 
 /** The solids that a collider is drawn as; a plane in space is drawn with the ground's shader.

@@ -43,17 +43,18 @@ uniform vec3 u_fill;
 uniform vec3 u_line;
 uniform float u_size;
 uniform float u_spacing;
+uniform float u_contrast;
 float lines(float spacing) {
   vec2 cell = (v_at + u_shift) / spacing;
   vec2 width = fwidth(cell);
   vec2 away = abs(fract(cell - 0.5) - 0.5);
   vec2 line = 1.0 - smoothstep(width * 0.4, width * 1.4, away);
-  vec2 calm = 1.0 - smoothstep(0.15, 0.5, width);
+  vec2 calm = 1.0 - smoothstep(0.06, 0.35, width);
   return max(line.x * calm.x, line.y * calm.y);
 }
 void main() {
   float fade = 1.0 - smoothstep(0.08, 1.0, length(v_at) / u_size);
-  float line = max(lines(u_spacing * 10.0) * 0.55, lines(u_spacing) * 0.28);
+  float line = u_contrast * max(lines(u_spacing * 10.0), lines(u_spacing) * 0.5);
   o_color = screen(mix(u_fill, u_line, line), fade * fade);
 }
 `;

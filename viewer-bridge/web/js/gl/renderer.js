@@ -18,7 +18,9 @@ import { Ground } from "./ground.js";
 const PIXEL_RATIO_MAX = 2;
 const HEAT_COLORS = HEAT_STOPS.flatMap((hex) => linear(hex));
 /** Radii of the ground that fades out. */
-const GROUND_RADII = 7;
+const GROUND_RADII = 6;
+/** Scenes of more particles than a body has joints are drawn with thinner sticks. */
+const FEW_PARTICLES = 60;
 
 export class Renderer {
   /** @param {HTMLCanvasElement} canvas @param {Simulation} simulation @param {Camera} camera @param {boolean} antialias */
@@ -162,7 +164,7 @@ export class Renderer {
       u_view_projection: multiply(projection, camera.view()),
       u_lo: simulation.frame?.lo ?? [0, 0, 0], u_scale: simulation.frame?.scale ?? [1, 1, 1],
       u_viewport: [canvas.width, canvas.height], u_eye: camera.eye(), u_up: up, u_light: light,
-      u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: camera.distance * 0.02,
+      u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: isFlat ? 0 : camera.distance * 0.02,
       u_sky: palette.sky, u_bounce: palette.bounce, u_key: palette.key,
       u_heat_max: this.toggles.heat ? this.heatMax : 0, u_heat_stops: HEAT_COLORS,
       u_front: palette.front, u_back: palette.back, u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
@@ -180,13 +182,14 @@ export class Renderer {
   sizes(ratio, hasSurface, isFlat) {
     const { simulation } = this;
     const spacing = medianLength(simulation.scene?.restLengths ?? new Float32Array(0), simulation.radius());
-    const thick = Math.min(spacing * 0.13, simulation.radius() * 0.02);
+    const count = simulation.scene?.particleCount ?? 0;
+    const thick = Math.min(spacing * 0.13, simulation.radius() * (count > FEW_PARTICLES ? 0.006 : 0.02));
     return {
       u_radius: hasSurface && !isFlat ? 0 : hasSurface ? thick * 0.5 : thick,
       u_radius_min: (hasSurface ? 0.6 : 1.1) * ratio,
       u_point_radius: hasSurface ? 0 : thick * 1.5,
-      u_point_min: (hasSurface ? 1.8 : (simulation.scene?.particleCount ?? 0) < 20 ? 6 : 2.4) * ratio,
-      u_mark_min: ((simulation.scene?.particleCount ?? 0) > 2000 ? 4 : 5.5) * ratio,
+      u_point_min: (hasSurface ? 1.8 : count < 20 ? 6 : 2.4) * ratio,
+      u_mark_min: (count > 2000 ? 4 : 5.5) * ratio,
     };
   }
 
@@ -211,12 +214,12 @@ export class Renderer {
     const size = Math.max(this.simulation.radius(), this.camera.distance * 0.4) * GROUND_RADII;
     const middle = addScaled(near, plane.normal, plane.offset - dot(plane.normal, near));
     const [along, across] = tangents(plane.normal);
-    const spacing = 10 ** Math.floor(Math.log10(this.camera.distance * 0.35));
+    const spacing = 10 ** Math.floor(Math.log10(this.camera.distance * 0.16));
     const period = spacing * 10;
     const shift = [along, across].map((axis) => ((dot(axis, middle) % period) + period) % period);
     this.ground?.draw({
       u_view_projection: uniforms.u_view_projection, u_middle: middle, u_along: along, u_across: across,
-      u_size: size, u_shift: shift, u_fill: palette.ground, u_line: palette.gridLine, u_spacing: spacing,
+      u_size: size, u_shift: shift, u_fill: palette.ground, u_line: palette.gridLine, u_contrast: palette.gridContrast, u_spacing: spacing,
     });
   }
 

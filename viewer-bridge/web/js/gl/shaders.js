@@ -39,12 +39,12 @@ uniform float u_key;
 vec3 lit(vec3 base, vec3 normal, vec3 to_eye, float sheen) {
   vec3 around = mix(u_bounce, u_sky, 0.5 + 0.5 * dot(normal, u_up));
   float facing = dot(normal, u_light);
-  float direct = pow(clamp((facing + 0.35) / 1.35, 0.0, 1.0), 1.4);
+  float direct = pow(clamp((facing + 0.25) / 1.25, 0.0, 1.0), 1.6);
   float through = clamp(-facing, 0.0, 1.0) * 0.12 * sheen;
-  vec3 color = base * (around * 0.55 + u_key * (direct * 0.75 + through));
+  vec3 color = base * (around * 0.42 + u_key * (direct * 1.0 + through));
   float gloss = pow(clamp(dot(normal, normalize(u_light + to_eye)), 0.0, 1.0), 28.0);
   float rim = pow(1.0 - clamp(dot(normal, to_eye), 0.0, 1.0), 4.0);
-  return color + sheen * u_key * (gloss * 0.05 + rim * 0.06 * u_sky);
+  return color + sheen * u_key * (gloss * 0.07 + rim * 0.08 * u_sky);
 }
 `;
 
