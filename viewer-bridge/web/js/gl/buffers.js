@@ -1,0 +1,95 @@
+// What a scene holds on the graphics card: positions, the fans of triangles, the lists of what is
+// drawn. Written when something has changed, and only what has.
+
+import { drawnSticks } from "../topology.js";
+import { ArrayTexture, layouts } from "./context.js";
+import { Cloth } from "./cloth.js";
+import { POINT, Points } from "./points.js";
+import { Sticks } from "./sticks.js";
+import { PIN } from "../wire.js";
+
+/** @typedef {import("../wire.js").Frame} Frame */
+/** @typedef {import("../state.js").Simulation} Simulation */
+
+/** Sticks that are drawn at most: more are a grey carpet, and slow on weak machines. */
+export const STICKS_MAX = 30_000;
+/** Particles that are drawn as balls at most. */
+export const PARTICLES_MAX = 60_000;
+
+/** Programs by the kind of positions that they read. */
+export class Drawers {
+  /** @param {WebGL2RenderingContext} gl @param {boolean} isQuantised */
+  constructor(gl, isQuantised) {
+    this.isQuantised = isQuantised;
+    this.cloth = new Cloth(gl, isQuantised);
+    this.sticks = new Sticks(gl, isQuantised);
+    this.points = new Points(gl, isQuantised);
+  }
+}
+
+export class SceneBuffers {
+  /** @param {WebGL2RenderingContext} gl @param {Simulation} simulation @param {Drawers} drawers */
+  constructor(gl, simulation, drawers) {
+    this.gl = gl;
+    this.simulation = simulation;
+    this.drawers = drawers;
+    const scene = simulation.scene;
+    const topology = simulation.topology;
+    if (scene === null || topology === null) throw new Error("no scene to draw");
+    this.topology = topology;
+    this.epoch = scene.epoch;
+    const formats = layouts(gl);
+    this.positions = new ArrayTexture(gl, 0, drawers.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
+    this.fanRanges = new ArrayTexture(gl, 1, formats.u32x2, scene.particleCount);
+    this.fans = new ArrayTexture(gl, 2, formats.u32x4, scene.triangles.length);
+    if (scene.particleCount > 0) this.fanRanges.write(topology.fanRanges);
+    drawers.sticks.setSticks(scene, drawnSticks(scene, STICKS_MAX), topology.styles);
+    this.writeTopology(true);
+    this.writeParticles();
+    this.writeMarks();
+  }
+
+  /** @param {Frame} frame */
+  writePositions(frame) {
+    if (frame.particleCount > 0) this.positions.write(frame.positions);
+  }
+
+  /** After a tear: which triangles and sticks are left, and the fans of those that died. @param {boolean} [isAll] */
+  writeTopology(isAll = false) {
+    const { topology, drawers, fans } = this;
+    const { first, end } = isAll ? { first: 0, end: fans.count } : topology.dirtyFans.range();
+    if (end > first) fans.write(topology.fans, first, end);
+    topology.dirtyFans.clear();
+    drawers.cloth.setTriangles(topology.indices);
+    if (!isAll) drawers.sticks.setStyles(topology.styles);
+  }
+
+  /** All particles that have a position, those of a big scene up to a limit. */
+  writeParticles() {
+    const scene = /** @type {import("../wire.js").Scene} */ (this.simulation.scene);
+    const lost = new Set(Array.from(this.simulation.nonFinite));
+    const words = [];
+    for (let particle = 0; particle < Math.min(scene.particleCount, PARTICLES_MAX); particle++) {
+      if (!lost.has(particle)) words.push(particle, POINT.particle);
+    }
+    this.drawers.points.particles.set(new Uint32Array(words));
+  }
+
+  /** What is held, and by what. */
+  writeMarks() {
+    const words = [];
+    for (const [particle, flags] of this.simulation.pins) words.push(particle, lookOf(flags));
+    this.drawers.points.marks.set(new Uint32Array(words));
+  }
+
+  delete() {
+    for (const texture of [this.positions, this.fanRanges, this.fans]) texture.delete();
+  }
+}
+
+/** What holds first, as the node has it: a hand before a pin, a pin before an anchor. @param {number} flags */
+function lookOf(flags) {
+  if (flags & PIN.frozen) return POINT.frozen;
+  if (flags & PIN.grabbed) return POINT.held;
+  return flags & PIN.pinned ? POINT.pin : POINT.anchor;
+}

@@ -1,0 +1,150 @@
+// What particles collide with: solids in three dimensions, filled shapes in two.
+
+import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../math.js";
+import { Program } from "./context.js";
+import { HEADER, LIGHT, SCREEN, SHADOW } from "./shaders.js";
+import { VERTEX_FLOATS, ball, cube, cubeEdges } from "./solids.js";
+
+/** @typedef {import("../math.js").Vec3} Vec3 */
+/** @typedef {import("../wire.js").Collider} Collider */
+/** @typedef {Record<string, number | number[]>} Uniforms */
+/** Axes of a solid scaled by its size, where both ends of its axis are, and its axes for normals.
+ * @typedef {{ solid: "ball" | "cube" | "edges", shape: number[], turn: number[], a: Vec3, b: Vec3 }} Placed */
+
+/** How far half planes go in two dimensions, in radii of the scene. */
+const HALF_PLANE_RADII = 200;
+
+const VERTEX = `${HEADER}${SHADOW}
+layout(location = 0) in vec3 a_position;
+layout(location = 1) in vec3 a_normal;
+layout(location = 2) in float a_end;
+uniform mat4 u_view_projection;
+uniform mat4 u_shape;
+uniform mat4 u_turn;
+uniform vec3 u_a;
+uniform vec3 u_b;
+out vec3 v_position;
+out vec3 v_normal;
+out float v_height;
+void main() {
+  vec3 at = mix(u_a, u_b, a_end) + mat3(u_shape) * a_position;
+  v_position = at;
+  v_normal = mat3(u_turn) * a_normal;
+  v_height = dot(u_ground.xyz, at) - u_ground.w;
+  gl_Position = u_view_projection * vec4(at, 1.0);
+}
+`;
+
+const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}${LIGHT}
+in vec3 v_position;
+in vec3 v_normal;
+in float v_height;
+uniform vec3 u_collider;
+uniform vec3 u_eye;
+uniform vec4 u_flat;
+void main() {
+  if (u_shadow > 0.0) {
+    if (v_height < 0.0) discard;
+    o_color = vec4(0.0, 0.0, 0.0, u_shadow);
+  } else if (u_flat.a > 0.0) {
+    o_color = screen(u_flat.rgb, u_flat.a);
+  } else {
+    o_color = screen(lit(u_collider, normalize(v_normal), normalize(u_eye - v_position), 0.3), 1.0);
+  }
+}
+`;
+
+const STILL = [0, 0, 0, 1];
+const ORIGIN = /** @type {Vec3} */ ([0, 0, 0]);
+
+/** A box with these half edges, turned by a quaternion. @param {Vec3} center @param {Vec3} half @param {number[]} rotation @returns {Placed} */
+function placeBox(center, half, rotation) {
+  const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(rotation, /** @type {Vec3} */ (axis)));
+  return {
+    solid: "cube", a: center, b: center,
+    shape: frameOf(scale(axes[0], half[0]), scale(axes[1], half[1]), scale(axes[2], half[2]), ORIGIN),
+    turn: frameOf(axes[0], axes[1], axes[2], ORIGIN),
+  };
+}
+
+/** @param {Vec3} a @param {Vec3} b @param {number} radius @returns {Placed} */
+function placeCapsule(a, b, radius) {
+  const axis = length(subtract(b, a)) > 0 ? normalize(subtract(b, a)) : /** @type {Vec3} */ ([0, 1, 0]);
+  const [u, v] = tangents(axis);
+  return { solid: "ball", a, b, shape: frameOf(scale(u, radius), scale(axis, radius), scale(v, radius), ORIGIN), turn: frameOf(u, axis, v, ORIGIN) };
+}
+
+/** Everything behind a line, as a leaf far bigger than the picture. @param {Vec3} normal @param {number} offset @param {Vec3} near @param {number} size */
+function placeHalfPlane(normal, offset, near, size) {
+  const along = /** @type {Vec3} */ ([-normal[1], normal[0], 0]);
+  const foot = addScaled(scale(normal, offset), along, near[0] * along[0] + near[1] * along[1]);
+  const angle = Math.atan2(along[1], along[0]);
+  return placeBox(addScaled(foot, normal, -size), [size, size, 0], [0, 0, Math.sin(angle / 2), Math.cos(angle / 2)]);
+}
+
+/** The solids that a collider is drawn as; a plane in space is drawn with the ground's shader.
+ * @param {Collider} one @param {boolean} isPlanar @param {Vec3} near @param {number} radius of the scene @returns {Placed[]} */
+export function place(one, isPlanar, near, radius) {
+  const size = radius * HALF_PLANE_RADII;
+  if (one.shape === "box") return [placeBox(one.center, one.halfExtents, one.rotation)];
+  if (one.shape === "sphere") return [placeCapsule(one.center, one.center, one.radius)];
+  if (one.shape === "capsule") return [placeCapsule(one.a, one.b, one.radius)];
+  if (one.shape === "plane") return isPlanar ? [placeHalfPlane(one.normal, one.offset, near, size)] : [];
+  if (!isPlanar) return [{ ...placeBox(scale(add(one.a, one.b), 0.5), scale(subtract(one.b, one.a), 0.5), STILL), solid: "edges" }];
+  return [
+    placeHalfPlane([1, 0, 0], one.a[0], near, size), placeHalfPlane([-1, 0, 0], -one.b[0], near, size),
+    placeHalfPlane([0, 1, 0], one.a[1], near, size), placeHalfPlane([0, -1, 0], -one.b[1], near, size),
+  ];
+}
+
+export class Colliders {
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+    this.program = new Program(gl, VERTEX, FRAGMENT);
+    const [aBall, aCube] = [ball(), cube()];
+    this.solids = {
+      ball: this.load(aBall.vertices, aBall.indices),
+      cube: this.load(aCube.vertices, aCube.indices),
+      edges: this.load(cubeEdges(), null),
+    };
+    /** @type {Placed[]} */
+    this.placed = [];
+  }
+
+  /** @param {Float32Array} vertices @param {Uint16Array | null} indices */
+  load(vertices, indices) {
+    const { gl } = this;
+    const vao = gl.createVertexArray();
+    gl.bindVertexArray(vao);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.STATIC_DRAW);
+    for (const [location, size, at] of [[0, 3, 0], [1, 3, 3], [2, 1, 6]]) {
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, VERTEX_FLOATS * 4, at * 4);
+    }
+    if (indices !== null) {
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    }
+    gl.bindVertexArray(null);
+    return { vao, count: indices === null ? vertices.length / VERTEX_FLOATS : indices.length };
+  }
+
+  /** @param {Uniforms} uniforms */
+  draw(uniforms) {
+    if (this.placed.length === 0) return;
+    const { gl } = this;
+    this.program.use();
+    this.program.set(uniforms);
+    for (const { solid, shape, turn, a, b } of this.placed) {
+      const isEdges = solid === "edges";
+      if (isEdges && /** @type {number} */ (uniforms.u_shadow) > 0) continue;
+      this.program.set({ u_shape: shape, u_turn: turn, u_a: a, u_b: b, ...(isEdges ? { u_flat: [.../** @type {number[]} */ (uniforms.u_collider), 1] } : { u_flat: uniforms.u_flat }) });
+      gl.bindVertexArray(this.solids[solid].vao);
+      if (isEdges) gl.drawArrays(gl.LINES, 0, this.solids[solid].count);
+      else gl.drawElements(gl.TRIANGLES, this.solids[solid].count, gl.UNSIGNED_SHORT, 0);
+    }
+    gl.bindVertexArray(null);
+  }
+}

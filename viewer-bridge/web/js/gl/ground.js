@@ -1,0 +1,90 @@
+// What is behind everything: a soft backdrop, and a ground whose lines are computed for each pixel,
+// so that they neither flicker at the horizon nor end at an edge.
+
+import { Program } from "./context.js";
+import { CORNER, HEADER, SCREEN } from "./shaders.js";
+
+const BACKDROP_VERTEX = `${HEADER}${CORNER}
+out vec2 v_at;
+void main() { v_at = corner(); gl_Position = vec4(v_at, 0.999, 1.0); }
+`;
+
+const BACKDROP_FRAGMENT = `${HEADER}${SCREEN}
+in vec2 v_at;
+uniform vec3 u_top;
+uniform vec3 u_bottom;
+void main() {
+  vec3 color = mix(u_bottom, u_top, smoothstep(-0.9, 1.0, v_at.y));
+  // A grain of less than one step of 8 bits: wide gradients show no bands.
+  float grain = fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) - 0.5;
+  o_color = screen(color, 1.0) + vec4(vec3(grain / 255.0), 0.0);
+}
+`;
+
+const GROUND_VERTEX = `${HEADER}${CORNER}
+uniform mat4 u_view_projection;
+uniform vec3 u_middle;
+uniform vec3 u_along;
+uniform vec3 u_across;
+uniform float u_size;
+out vec2 v_at;
+void main() {
+  v_at = corner() * u_size;
+  vec3 at = u_middle + u_along * v_at.x + u_across * v_at.y;
+  gl_Position = u_view_projection * vec4(at, 1.0);
+}
+`;
+
+/** Two spacings, ten times apart; the finer one fades out before its lines would touch. */
+const GROUND_FRAGMENT = `${HEADER}${SCREEN}
+in vec2 v_at;
+uniform vec2 u_shift;
+uniform vec3 u_fill;
+uniform vec3 u_line;
+uniform float u_size;
+uniform float u_spacing;
+uniform float u_contrast;
+float lines(float spacing) {
+  vec2 cell = (v_at + u_shift) / spacing;
+  vec2 width = fwidth(cell);
+  vec2 away = abs(fract(cell - 0.5) - 0.5);
+  vec2 line = 1.0 - smoothstep(width * 0.4, width * 1.4, away);
+  vec2 calm = 1.0 - smoothstep(0.06, 0.35, width);
+  return max(line.x * calm.x, line.y * calm.y);
+}
+void main() {
+  float fade = 1.0 - smoothstep(0.08, 1.0, length(v_at) / u_size);
+  float line = u_contrast * max(lines(u_spacing * 10.0), lines(u_spacing) * 0.5);
+  o_color = screen(mix(u_fill, u_line, line), fade * fade);
+}
+`;
+
+export class Ground {
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+    this.backdrop = new Program(gl, BACKDROP_VERTEX, BACKDROP_FRAGMENT);
+    this.program = new Program(gl, GROUND_VERTEX, GROUND_FRAGMENT);
+    this.vao = gl.createVertexArray();
+  }
+
+  /** @param {Record<string, number | number[]>} uniforms */
+  drawBackdrop(uniforms) {
+    this.quad(this.backdrop, uniforms);
+  }
+
+  /** @param {Record<string, number | number[]>} uniforms */
+  draw(uniforms) {
+    this.quad(this.program, uniforms);
+  }
+
+  /** @param {Program} program @param {Record<string, number | number[]>} uniforms */
+  quad(program, uniforms) {
+    const { gl } = this;
+    program.use();
+    program.set(uniforms);
+    gl.bindVertexArray(this.vao);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.bindVertexArray(null);
+  }
+}

@@ -1,0 +1,112 @@
+// Particles as small balls, and what holds some of them as discs with a white ring.
+
+import { Program } from "./context.js";
+import { HEADER, SCREEN, SHADOW, positionReader } from "./shaders.js";
+
+/** Looks of a point, as the shader numbers them. */
+export const POINT = Object.freeze({ particle: 0, pin: 1, anchor: 2, held: 3, frozen: 4 });
+
+/** Words of a point: particle, look. */
+const WORDS = 2;
+
+/** @param {boolean} isQuantised */
+const vertex = (isQuantised) => `${HEADER}${SHADOW}
+layout(location = 0) in uint a_particle;
+layout(location = 1) in uint a_look;
+uniform mat4 u_view_projection;
+uniform float u_pixels_per_unit;
+uniform float u_radius;
+uniform float u_radius_min;
+uniform float u_forward;
+flat out uint v_look;
+flat out float v_diameter;
+out float v_height;
+${positionReader(isQuantised)}
+void main() {
+  vec3 at = position(a_particle);
+  vec4 clip = u_view_projection * vec4(at, 1.0);
+  float radius = max(u_radius_min, u_radius * u_pixels_per_unit / clip.w);
+  if (a_look != ${POINT.particle}u) radius *= a_look == ${POINT.held}u ? 1.35 : 1.0;
+  v_look = a_look;
+  v_diameter = radius * 2.0 + 1.0;
+  v_height = dot(u_ground.xyz, at) - u_ground.w;
+  gl_PointSize = v_diameter;
+  gl_Position = clip - vec4(0.0, 0.0, u_forward * clip.w, 0.0);
+}
+`;
+
+const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}
+flat in uint v_look;
+flat in float v_diameter;
+in float v_height;
+uniform vec3 u_particle;
+uniform vec3 u_marks[4];
+uniform vec3 u_ring;
+uniform float u_round;
+void main() {
+  vec2 at = gl_PointCoord * 2.0 - 1.0;
+  float away = length(at);
+  float soft = 2.0 / v_diameter;
+  float alpha = 1.0 - smoothstep(1.0 - soft, 1.0, away);
+  if (u_shadow > 0.0) {
+    if (alpha < 0.5 || v_height < 0.0) discard;
+    o_color = vec4(0.0, 0.0, 0.0, u_shadow);
+    return;
+  }
+  if (alpha < 0.03) discard;
+  if (v_look == ${POINT.particle}u) {
+    float up = sqrt(max(0.0, 1.0 - away * away));
+    float light = 0.5 + 0.6 * max(0.0, dot(vec3(at.x, -at.y, up), normalize(vec3(-0.4, 0.6, 0.8))));
+    o_color = screen(u_particle * mix(1.0, light, u_round * smoothstep(5.0, 9.0, v_diameter)), alpha);
+    return;
+  }
+  float ring = smoothstep(0.62 - soft, 0.62, away);
+  o_color = screen(mix(u_marks[int(v_look) - 1], u_ring, ring), alpha);
+}
+`;
+
+export class Points {
+  /** @param {WebGL2RenderingContext} gl @param {boolean} isQuantised */
+  constructor(gl, isQuantised) {
+    this.gl = gl;
+    this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
+    this.program.samplers({ u_positions: 0 });
+    this.particles = new PointList(gl);
+    this.marks = new PointList(gl);
+  }
+
+  /** @param {PointList} list @param {Record<string, number | number[]>} uniforms */
+  draw(list, uniforms) {
+    if (list.count === 0) return;
+    const { gl } = this;
+    this.program.use();
+    this.program.set(uniforms);
+    gl.bindVertexArray(list.vao);
+    gl.drawArrays(gl.POINTS, 0, list.count);
+    gl.bindVertexArray(null);
+  }
+}
+
+export class PointList {
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+    this.vao = gl.createVertexArray();
+    this.buffer = gl.createBuffer();
+    this.count = 0;
+    gl.bindVertexArray(this.vao);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+    for (const location of [0, 1]) {
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribIPointer(location, 1, gl.UNSIGNED_INT, WORDS * 4, location * 4);
+    }
+    gl.bindVertexArray(null);
+  }
+
+  /** @param {Uint32Array} words particle and look of each point */
+  set(words) {
+    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffer);
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, words, this.gl.DYNAMIC_DRAW);
+    this.count = words.length / WORDS;
+  }
+}

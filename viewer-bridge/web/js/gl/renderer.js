@@ -1,0 +1,305 @@
+// The picture: everything in the order that it is drawn in. It asks the simulation what has changed
+// since the last picture, and draws only when something has.
+
+import { add, addScaled, dot, multiply, normalize, scale, shadowOnto, tangents } from "../math.js";
+import { HEAT_STOPS, linear, paletteOf } from "../theme.js";
+import { openContext, rendererName } from "./context.js";
+import { Drawers, SceneBuffers } from "./buffers.js";
+import { Colliders, place } from "./colliders.js";
+import { Ground } from "./ground.js";
+
+/** @typedef {import("../math.js").Vec3} Vec3 */
+/** @typedef {import("../state.js").Simulation} Simulation */
+/** @typedef {import("../camera.js").Camera} Camera */
+/** @typedef {Record<string, number | number[]>} Uniforms */
+/** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean }} Toggles */
+
+/** Pixels of the screen that a CSS pixel is made of, at most: finer is not seen, and costs the square. */
+const PIXEL_RATIO_MAX = 2;
+const HEAT_COLORS = HEAT_STOPS.flatMap((hex) => linear(hex));
+/** Radii of the ground that fades out. */
+const GROUND_RADII = 6;
+/** Scenes of more particles than a body has joints are drawn with thinner sticks. */
+const FEW_PARTICLES = 60;
+
+export class Renderer {
+  /** @param {HTMLCanvasElement} canvas @param {Simulation} simulation @param {Camera} camera @param {boolean} antialias */
+  constructor(canvas, simulation, camera, antialias) {
+    this.canvas = canvas;
+    this.simulation = simulation;
+    this.camera = camera;
+    const gl = openContext(canvas, antialias);
+    if (gl === null) throw new Error("no WebGL2");
+    this.gl = gl;
+    this.isDark = false;
+    this.heatMax = 0.05;
+    /** @type {Toggles} */
+    this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true };
+    this.framesDrawn = 0;
+    this.stepDrawn = -1;
+    /** @type {import("../wire.js").Frame | null} */
+    this.frameDrawn = null;
+    this.isDirty = true;
+    /** What has changed since it was uploaded. */
+    this.stale = { topology: false, particles: false, marks: false, colliders: true };
+    this.create();
+    this.listen();
+  }
+
+  get rendererName() {
+    return rendererName(this.gl);
+  }
+
+  /** All that lives in the context: again after it was lost. */
+  create() {
+    this.ground = new Ground(this.gl);
+    this.colliders = new Colliders(this.gl);
+    /** @type {Drawers | null} */
+    this.drawers = null;
+    /** @type {SceneBuffers | null} */
+    this.buffers = null;
+    this.frameDrawn = null;
+    this.stale.colliders = true;
+    this.isDirty = true;
+  }
+
+  listen() {
+    const { simulation } = this;
+    simulation.on("scene", () => this.invalidate({}));
+    simulation.on("frame", () => this.invalidate({}));
+    simulation.on("tear", () => this.invalidate({ topology: true, particles: true }));
+    simulation.on("pins", () => this.invalidate({ marks: true }));
+    simulation.on("colliders", () => this.invalidate({ colliders: true }));
+    simulation.on("ground", () => this.invalidate({}));
+  }
+
+  /** @param {Partial<Renderer["stale"]>} what */
+  invalidate(what) {
+    Object.assign(this.stale, what);
+    this.isDirty = true;
+  }
+
+  /** CSS pixels of the canvas. */
+  get viewport() {
+    return { width: Math.max(1, this.canvas.clientWidth), height: Math.max(1, this.canvas.clientHeight) };
+  }
+
+  /** Fits the picture to the element; true if it changed. */
+  resize() {
+    const ratio = Math.min(globalThis.devicePixelRatio || 1, PIXEL_RATIO_MAX);
+    const width = Math.round(this.viewport.width * ratio);
+    const height = Math.round(this.viewport.height * ratio);
+    if (this.canvas.width === width && this.canvas.height === height) return;
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.isDirty = true;
+  }
+
+  /** Draws the newest frame. A readPixels in the same task sees it. */
+  draw() {
+    const { gl } = this;
+    if (gl.isContextLost()) return;
+    this.resize();
+    this.upload();
+    const uniforms = this.uniforms();
+    gl.viewport(0, 0, this.canvas.width, this.canvas.height);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    this.drawSurroundings(uniforms);
+    if (this.simulation.scene?.isPlanar) this.drawFlat(uniforms);
+    else this.drawSolid(uniforms);
+    this.framesDrawn++;
+    this.isDirty = false;
+  }
+
+  /** Brings what has changed to the graphics card. */
+  upload() {
+    const { simulation, stale } = this;
+    const { frame, scene } = simulation;
+    if (frame === null || scene === null) {
+      this.buffers?.delete();
+      this.buffers = null;
+      return;
+    }
+    if (this.drawers === null || this.drawers.isQuantised !== frame.isQuantised) {
+      this.drawers = new Drawers(this.gl, frame.isQuantised);
+      this.buffers = null;
+    }
+    if (this.buffers === null || this.buffers.epoch !== scene.epoch) {
+      this.buffers?.delete();
+      this.buffers = new SceneBuffers(this.gl, simulation, this.drawers);
+      this.frameDrawn = null;
+      stale.topology = stale.particles = stale.marks = false;
+      stale.colliders = true;
+    }
+    if (stale.topology) this.buffers.writeTopology();
+    if (stale.particles) this.buffers.writeParticles();
+    if (stale.marks) this.buffers.writeMarks();
+    if (frame !== this.frameDrawn) this.buffers.writePositions(frame);
+    if (stale.colliders) this.placeColliders(scene.isPlanar);
+    this.frameDrawn = frame;
+    this.stepDrawn = frame.step;
+    this.stale = { topology: false, particles: false, marks: false, colliders: false };
+  }
+
+  /** @param {boolean} isPlanar */
+  placeColliders(isPlanar) {
+    const { simulation, colliders } = this;
+    if (colliders) colliders.placed = simulation.colliders.flatMap((one) => place(one, isPlanar, this.camera.target, simulation.radius()));
+  }
+
+  /** What all programs may ask for. @returns {Uniforms} */
+  uniforms() {
+    const { camera, simulation, canvas, viewport } = this;
+    const palette = paletteOf(this.isDark);
+    const { up, right, toward } = camera.axes;
+    const light = normalize(add(add(scale(up, 0.8), scale(toward, 0.62)), scale(right, -0.5)));
+    const ratio = canvas.height / viewport.height;
+    const projection = camera.projection(viewport.width / viewport.height);
+    const isFlat = camera.isFlat;
+    const hasSurface = (simulation.scene?.triangleCount ?? 0) > 0;
+    const ground = simulation.ground;
+    return {
+      u_view_projection: multiply(projection, camera.view()),
+      u_lo: simulation.frame?.lo ?? [0, 0, 0], u_scale: simulation.frame?.scale ?? [1, 1, 1],
+      u_viewport: [canvas.width, canvas.height], u_eye: camera.eye(), u_up: up, u_light: light,
+      u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: isFlat ? 0 : camera.distance * 0.02,
+      u_sky: palette.sky, u_bounce: palette.bounce, u_key: palette.key,
+      u_heat_max: this.toggles.heat ? this.heatMax : 0, u_heat_stops: HEAT_COLORS,
+      u_front: palette.front, u_back: palette.back, u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
+      u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick, u_stick_faint: palette.stickFaint,
+      u_particle: palette.particle, u_ring: palette.ring, u_collider: palette.collider,
+      u_marks: [...palette.pin, ...palette.anchor, ...palette.held, ...palette.frozen],
+      u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
+      u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
+      ...this.sizes(ratio, hasSurface, isFlat),
+    };
+  }
+
+  /** Radii of sticks: part of what is between particles, but never thinner than can be seen.
+   * @param {number} ratio @param {boolean} hasSurface @param {boolean} isFlat @returns {Uniforms} */
+  sizes(ratio, hasSurface, isFlat) {
+    const { simulation } = this;
+    const spacing = medianLength(simulation.scene?.restLengths ?? new Float32Array(0), simulation.radius());
+    const count = simulation.scene?.particleCount ?? 0;
+    const thick = Math.min(spacing * 0.13, simulation.radius() * (count > FEW_PARTICLES ? 0.006 : 0.02));
+    return {
+      u_radius: hasSurface && !isFlat ? 0 : hasSurface ? thick * 0.5 : thick,
+      u_radius_min: (hasSurface ? 0.6 : 1.1) * ratio,
+      u_point_radius: hasSurface ? 0 : thick * 1.5,
+      u_point_min: (hasSurface ? 1.8 : count < 20 ? 6 : 2.4) * ratio,
+      u_mark_min: (count > 2000 ? 4 : 5.5) * ratio,
+    };
+  }
+
+  /** @param {Uniforms} uniforms */
+  drawSurroundings(uniforms) {
+    const { gl, ground: drawer, simulation } = this;
+    const palette = paletteOf(this.isDark);
+    gl.disable(gl.DEPTH_TEST);
+    gl.depthMask(false);
+    drawer?.drawBackdrop({ u_top: palette.backdropTop, u_bottom: palette.backdropBottom });
+    if (simulation.ground !== null && !simulation.scene?.isPlanar) {
+      this.drawPlane(simulation.ground, uniforms, this.camera.target);
+      if (this.toggles.shadow) this.drawShadows(simulation.ground, uniforms);
+    }
+    gl.depthMask(true);
+  }
+
+  /** A plane as a fading piece of ground, its lines at round numbers of the scene.
+   * @param {import("../state.js").Plane} plane @param {Uniforms} uniforms @param {Vec3} near */
+  drawPlane(plane, uniforms, near) {
+    const palette = paletteOf(this.isDark);
+    const size = Math.max(this.simulation.radius(), this.camera.distance * 0.4) * GROUND_RADII;
+    const middle = addScaled(near, plane.normal, plane.offset - dot(plane.normal, near));
+    const [along, across] = tangents(plane.normal);
+    const spacing = 10 ** Math.floor(Math.log10(this.camera.distance * 0.16));
+    const period = spacing * 10;
+    const shift = [along, across].map((axis) => ((dot(axis, middle) % period) + period) % period);
+    this.ground?.draw({
+      u_view_projection: uniforms.u_view_projection, u_middle: middle, u_along: along, u_across: across,
+      u_size: size, u_shift: shift, u_fill: palette.ground, u_line: palette.gridLine, u_contrast: palette.gridContrast, u_spacing: spacing,
+    });
+  }
+
+  /** Each pixel of the ground is darkened once, however many things are over it: the stencil counts.
+   * @param {import("../state.js").Plane} plane @param {Uniforms} uniforms */
+  drawShadows(plane, uniforms) {
+    const { gl } = this;
+    const eye = /** @type {Vec3} */ (uniforms.u_eye);
+    if (dot(plane.normal, eye) < plane.offset) return;
+    const flattened = shadowOnto(plane.normal, plane.offset, /** @type {Vec3} */ (uniforms.u_light));
+    const shadow = {
+      ...uniforms, u_shadow: paletteOf(this.isDark).shadow,
+      u_view_projection: multiply(/** @type {number[]} */ (uniforms.u_view_projection), flattened),
+    };
+    gl.enable(gl.STENCIL_TEST);
+    gl.stencilFunc(gl.EQUAL, 0, 0xff);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
+    this.colliders?.draw(shadow);
+    if (this.toggles.surface) this.drawers?.cloth.drawShadow(shadow);
+    // The flattening matrix multiplies w by its last number: sizes in pixels are divided by w.
+    this.drawSticks({ ...shadow, u_pixels_per_unit: /** @type {number} */ (uniforms.u_pixels_per_unit) * flattened[15] });
+    gl.disable(gl.STENCIL_TEST);
+  }
+
+  /** @param {Uniforms} uniforms */
+  drawSolid(uniforms) {
+    const { gl, simulation, drawers } = this;
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    this.colliders?.draw(uniforms);
+    const { ground } = simulation;
+    for (const one of simulation.colliders) {
+      if (one.shape !== "plane" || (ground !== null && one.offset === ground.offset && dot(one.normal, ground.normal) > 0.999)) continue;
+      gl.depthMask(false);
+      this.drawPlane(one, uniforms, this.camera.target);
+      gl.depthMask(true);
+    }
+    if (this.buffers === null || drawers === null) return;
+    if (this.toggles.surface) drawers.cloth.draw(uniforms);
+    this.drawSticks({ ...uniforms, u_forward: 4e-4, u_opacity: this.hasSurface() ? 0.75 : 1 });
+    this.drawPoints({ ...uniforms, u_forward: 1.2e-3 });
+  }
+
+  /** In two dimensions the later is in front: nothing has a depth. @param {Uniforms} uniforms */
+  drawFlat(uniforms) {
+    const { gl, drawers } = this;
+    const palette = paletteOf(this.isDark);
+    gl.disable(gl.DEPTH_TEST);
+    this.colliders?.draw({ ...uniforms, u_flat: [...palette.collider, 0.55] });
+    if (this.buffers === null || drawers === null) return;
+    if (this.toggles.surface) drawers.cloth.draw(uniforms);
+    this.drawSticks({ ...uniforms, u_round: 0.35 });
+    this.drawPoints({ ...uniforms, u_round: 0.6 });
+  }
+
+  /** @param {Uniforms} uniforms */
+  drawSticks(uniforms) {
+    const isAll = this.toggles.sticks || !this.hasSurface() || !this.toggles.surface;
+    this.drawers?.sticks.draw({ ...uniforms, u_is_all: isAll ? 1 : 0 });
+  }
+
+  /** @param {Uniforms} uniforms */
+  drawPoints(uniforms) {
+    const { drawers, toggles } = this;
+    if (drawers === null) return;
+    const particles = { ...uniforms, u_radius: uniforms.u_point_radius, u_radius_min: uniforms.u_point_min };
+    if (toggles.particles) drawers.points.draw(drawers.points.particles, particles);
+    const marks = { ...particles, u_radius_min: uniforms.u_mark_min, u_forward: /** @type {number} */ (uniforms.u_forward) * 2 };
+    if (toggles.pins) drawers.points.draw(drawers.points.marks, marks);
+  }
+
+  hasSurface() {
+    return (this.simulation.scene?.triangleCount ?? 0) > 0;
+  }
+}
+
+/** @param {Float32Array} lengths @param {number} fallback */
+function medianLength(lengths, fallback) {
+  if (lengths.length === 0) return fallback * 0.5;
+  // A sample is enough for the width of a line.
+  const sample = lengths.filter((_, index) => index % Math.ceil(lengths.length / 500) === 0).sort();
+  return sample[sample.length >> 1];
+}

@@ -1,0 +1,64 @@
+// What all programs share: reading a particle's position by its index, the heat ramp, the light.
+
+import { HEAT_STOPS } from "../theme.js";
+
+/** Both stages of a program need the same precisions, or it does not link. */
+export const HEADER = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+`;
+
+/** position(particle), for frames of 16-bit integers or of floats. @param {boolean} isQuantised */
+export const positionReader = (isQuantised) => `
+uniform highp ${isQuantised ? "usampler2D" : "sampler2D"} u_positions;
+uniform vec3 u_lo;
+uniform vec3 u_scale;
+ivec2 place(uint index) { return ivec2(int(index & 1023u), int(index >> 10u)); }
+vec3 position(uint particle) { return u_lo + u_scale * vec3(texelFetch(u_positions, place(particle), 0).xyz); }
+`;
+
+/** heat(strain): the colour of a strain; u_heat_max is the strain at the end of the ramp, 0 for no heat map. */
+export const HEAT = `
+uniform float u_heat_max;
+uniform vec3 u_heat_stops[${HEAT_STOPS.length}];
+vec3 heat(float strain) {
+  float at = clamp(strain / u_heat_max, 0.0, 1.0) * ${(HEAT_STOPS.length - 1).toFixed(1)};
+  int stop = min(int(at), ${HEAT_STOPS.length - 2});
+  return mix(u_heat_stops[stop], u_heat_stops[stop + 1], at - float(stop));
+}
+`;
+
+/** lit(base, normal, to_eye): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim. */
+export const LIGHT = `
+uniform vec3 u_up;
+uniform vec3 u_light;
+uniform vec3 u_sky;
+uniform vec3 u_bounce;
+uniform float u_key;
+vec3 lit(vec3 base, vec3 normal, vec3 to_eye, float sheen) {
+  vec3 around = mix(u_bounce, u_sky, 0.5 + 0.5 * dot(normal, u_up));
+  float facing = dot(normal, u_light);
+  float direct = pow(clamp((facing + 0.25) / 1.25, 0.0, 1.0), 1.6);
+  float through = clamp(-facing, 0.0, 1.0) * 0.12 * sheen;
+  vec3 color = base * (around * 0.42 + u_key * (direct * 1.0 + through));
+  float gloss = pow(clamp(dot(normal, normalize(u_light + to_eye)), 0.0, 1.0), 28.0);
+  float rim = pow(1.0 - clamp(dot(normal, to_eye), 0.0, 1.0), 4.0);
+  return color + sheen * u_key * (gloss * 0.07 + rim * 0.08 * u_sky);
+}
+`;
+
+/** To the screen: linear light becomes sRGB. */
+export const SCREEN = `
+out vec4 o_color;
+vec4 screen(vec3 color, float alpha) { return vec4(pow(clamp(color, 0.0, 1.0), vec3(1.0 / 2.2)), alpha); }
+`;
+
+/** What casts a shadow gives its height over the ground; what is under it casts none. */
+export const SHADOW = `
+uniform vec4 u_ground;
+uniform float u_shadow;
+`;
+
+/** A quad over the whole picture, or any other, from gl_VertexID 0..=3 as a strip. */
+export const CORNER = "vec2 corner() { return vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0; }\n";

@@ -1,0 +1,71 @@
+// The two solids that colliders are drawn with: a ball in two halves that can be pulled apart into a
+// capsule, and a cube.
+
+/** Numbers of a vertex: position 3, normal 3, and which end of the axis it belongs to, 0 or 1. */
+export const VERTEX_FLOATS = 7;
+const SECTORS = 40;
+const RINGS_OF_HALF = 10;
+
+/** @typedef {{ vertices: Float32Array, indices: Uint16Array }} Solid */
+
+/** The unit ball about y; the equator stands twice, once for each half. @returns {Solid} */
+export function ball() {
+  /** @type {number[]} */
+  const vertices = [];
+  /** @type {number[]} */
+  const indices = [];
+  for (const end of [0, 1]) {
+    for (let ring = 0; ring <= RINGS_OF_HALF; ring++) {
+      const latitude = ((ring / RINGS_OF_HALF - 1 + end) * Math.PI) / 2;
+      for (let sector = 0; sector <= SECTORS; sector++) {
+        const longitude = (sector / SECTORS) * 2 * Math.PI;
+        const at = [Math.cos(latitude) * Math.cos(longitude), Math.sin(latitude), Math.cos(latitude) * Math.sin(longitude)];
+        vertices.push(...at, ...at, end);
+      }
+    }
+  }
+  const width = SECTORS + 1;
+  for (let ring = 0; ring < 2 * RINGS_OF_HALF + 1; ring++) {
+    for (let sector = 0; sector < SECTORS; sector++) {
+      const corner = ring * width + sector;
+      indices.push(corner, corner + width, corner + 1, corner + 1, corner + width, corner + width + 1);
+    }
+  }
+  return { vertices: new Float32Array(vertices), indices: new Uint16Array(indices) };
+}
+
+/** The cube from -1 to 1, four corners a face. @returns {Solid} */
+export function cube() {
+  /** @type {number[]} */
+  const vertices = [];
+  /** @type {number[]} */
+  const indices = [];
+  for (let face = 0; face < 6; face++) {
+    const axis = face >> 1;
+    const side = face & 1 ? -1 : 1;
+    const normal = [0, 0, 0];
+    normal[axis] = side;
+    const first = face * 4;
+    for (const [u, v] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      const at = [0, 0, 0];
+      at[axis] = side;
+      at[(axis + 1) % 3] = u;
+      at[(axis + 2) % 3] = v * side;
+      vertices.push(...at, ...normal, 0);
+    }
+    indices.push(first, first + 1, first + 2, first, first + 2, first + 3);
+  }
+  return { vertices: new Float32Array(vertices), indices: new Uint16Array(indices) };
+}
+
+/** Pairs of corners of the cube from -1 to 1: its edges. */
+export function cubeEdges() {
+  /** @type {number[]} */
+  const ends = [];
+  for (let corner = 0; corner < 8; corner++) {
+    for (const bit of [1, 2, 4]) {
+      if ((corner & bit) === 0) for (const end of [corner, corner | bit]) ends.push(end & 1 ? 1 : -1, end & 2 ? 1 : -1, end & 4 ? 1 : -1, 0, 0, 0, 0);
+    }
+  }
+  return new Float32Array(ends);
+}

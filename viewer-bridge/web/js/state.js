@@ -1,0 +1,269 @@
+// What the page knows of the simulation: the last scene, the newest frame, what is torn and held.
+// Messages go in, topics come out. It has no clock, no socket and no picture.
+
+import { Emitter } from "./emitter.js";
+import { lowestReach } from "./hanging.js";
+import { Topology } from "./topology.js";
+import { axesOf } from "./camera.js";
+import { add, addScaled, boxOf, dot, length, scale, subtract } from "./math.js";
+
+/** @typedef {import("./math.js").Vec3} Vec3 */
+/** @typedef {import("./math.js").Box} Box */
+/** @typedef {import("./wire.js").Message} Message */
+/** @typedef {import("./wire.js").Scene} Scene */
+/** @typedef {import("./wire.js").Frame} Frame */
+/** @typedef {import("./wire.js").Stats} Stats */
+/** @typedef {import("./wire.js").Collider} Collider */
+/** @typedef {import("./messages.js").Hello} Hello */
+/** @typedef {import("./messages.js").NodeState} NodeState */
+/** @typedef {import("./messages.js").Parameters} Parameters */
+/** @typedef {import("./messages.js").TimelineMessage} TimelineMessage */
+/** @typedef {import("./messages.js").Playback} Playback */
+/** @typedef {import("./messages.js").TextMessage} TextMessage */
+/** A plane to stand on: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
+
+/** Room under what hangs, in radii of the scene. */
+const GROUND_GAP = 0.06;
+/** A plane is a floor if its normal is that much upward. */
+const FLOOR_COSINE = 0.99;
+
+/**
+ * @typedef {{
+ *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
+ *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage, playback: Playback,
+ *   outcome: import("./messages.js").OutcomeMessage, reset: void, clients: number,
+ *   notice: { level: string, text: string }, ground: void,
+ * }} Topics
+ */
+
+/** @extends {Emitter<Topics>} */
+export class Simulation extends Emitter {
+  constructor() {
+    super();
+    /** @type {Scene | null} */
+    this.scene = null;
+    /** @type {Topology | null} */
+    this.topology = null;
+    /** @type {Frame | null} */
+    this.frame = null;
+    /** Number of the newest frame that came, shown or not: one that a scene has overtaken has to be
+     * acknowledged too, or its credit is lost. @type {number | null} */
+    this.frameNumber = null;
+    /** Constraints in the order of tearing. @type {number[]} */
+    this.torn = [];
+    /** Flags of the particles that are not free. @type {Map<number, number>} */
+    this.pins = new Map();
+    /** @type {Collider[]} */
+    this.colliders = [];
+    /** @type {ArrayLike<number>} */
+    this.nonFinite = [];
+    /** @type {Stats | null} */
+    this.stats = null;
+    /** @type {Hello | null} */
+    this.hello = null;
+    /** @type {NodeState | null} */
+    this.node = null;
+    /** @type {Parameters | null} */
+    this.parameters = null;
+    /** @type {TimelineMessage | null} */
+    this.timeline = null;
+    /** @type {Playback | null} */
+    this.playback = null;
+    this.clients = 0;
+    /** @type {Plane | null} */
+    this.ground = null;
+    this.groundIsSettled = false;
+  }
+
+  get isReplay() {
+    return this.hello?.mode === "replay";
+  }
+
+  get isPaused() {
+    if (this.isReplay) return this.playback !== null && !this.playback.is_playing;
+    return this.node?.is_paused ?? false;
+  }
+
+  /** A decoded binary message; one of another epoch than the scene's is not of this picture. @param {Message} message */
+  receive(message) {
+    if (message.kind === "stats") {
+      this.stats = message;
+      return this.emit("stats", message);
+    }
+    if (message.kind === "frame") this.frameNumber = message.number;
+    if (message.kind === "scene") return this.receiveScene(message);
+    if (this.scene === null || message.epoch !== this.scene.epoch) return;
+    if (message.kind === "frame") this.receiveFrame(message);
+    else if (message.kind === "tear") this.receiveTear(message);
+    else if (message.kind === "pins") this.receivePins(message);
+    else this.receiveColliders(message.colliders);
+  }
+
+  /** @param {Scene} scene */
+  receiveScene(scene) {
+    this.scene = scene;
+    this.topology = new Topology(scene);
+    this.frame = null;
+    this.torn = [];
+    this.pins = new Map();
+    this.colliders = [];
+    this.nonFinite = [];
+    this.ground = null;
+    this.groundIsSettled = false;
+    this.emit("scene", scene);
+    this.emit("pins", undefined);
+    this.emit("colliders", []);
+  }
+
+  /** @param {Frame} frame */
+  receiveFrame(frame) {
+    if (frame.particleCount !== this.scene?.particleCount) return;
+    this.frame = frame;
+    if (!sameNumbers(frame.nonFinite, this.nonFinite)) {
+      this.nonFinite = frame.nonFinite.slice();
+      this.rebuild();
+    }
+    this.emit("frame", frame);
+  }
+
+  /** @param {import("./wire.js").Tear} tear */
+  receiveTear(tear) {
+    const isMore = tear.first === this.torn.length;
+    this.torn.length = Math.min(tear.first, this.torn.length);
+    this.torn.push(...tear.constraints);
+    if (!isMore) return this.rebuild();
+    this.topology?.remove(tear.constraints);
+    this.emit("tear", undefined);
+  }
+
+  /** Works out anew what is whole: after a reset, or when particles lost their position. */
+  rebuild() {
+    this.topology?.restore();
+    this.topology?.remove(this.torn);
+    this.topology?.removeAround(Uint32Array.from(this.nonFinite));
+    this.emit("tear", undefined);
+  }
+
+  /** @param {import("./wire.js").Pins} pins */
+  receivePins(pins) {
+    this.pins = new Map();
+    pins.particles.forEach((particle, k) => this.pins.set(particle, pins.flags[k]));
+    this.emit("pins", undefined);
+    if (!this.groundIsSettled) this.settleGround();
+  }
+
+  /** @param {Collider[]} colliders */
+  receiveColliders(colliders) {
+    const hadFloor = this.colliders.length > 0;
+    this.colliders = colliders;
+    this.emit("colliders", colliders);
+    if (!hadFloor) this.settleGround();
+  }
+
+  /** The floor: a collider's where there is one; else a little below what can hang lowest; else none. */
+  settleGround() {
+    if (this.scene === null || this.scene.isPlanar) return;
+    const { up } = this.axes();
+    const floors = this.colliders.flatMap((one) => floorOf(one, up));
+    if (floors.length > 0) this.ground = floors.reduce((best, one) => (one.offset > best.offset ? one : best));
+    else {
+      const lowest = lowestReach(this.scene, [...this.pins.keys()], up);
+      this.ground = lowest === null ? null : { normal: up, offset: lowest - this.radius() * GROUND_GAP };
+    }
+    this.groundIsSettled = true;
+    this.emit("ground", undefined);
+  }
+
+  axes() {
+    return axesOf(this.scene?.up ?? "y", this.scene?.isPlanar ? 2 : 3);
+  }
+
+  /** Half the diagonal of the box round the scene's positions. */
+  radius() {
+    if (this.scene === null || this.scene.particleCount === 0) return 1;
+    return Math.max(length(subtract(this.scene.max, this.scene.min)) / 2, 1e-3);
+  }
+
+  /** @param {number} particle @returns {Vec3 | null} */
+  position(particle) {
+    const { frame } = this;
+    if (frame === null || particle >= frame.particleCount || particle < 0) return null;
+    const { lo, scale: unit, positions: p } = frame;
+    const i = 3 * particle;
+    return [lo[0] + unit[0] * p[i], lo[1] + unit[1] * p[i + 1], lo[2] + unit[2] * p[i + 2]];
+  }
+
+  /** The box round the newest positions. @returns {Box} */
+  box() {
+    const { frame, scene } = this;
+    if (frame === null) return scene === null ? boxOf([]) : boxOf(scene.positions);
+    const raw = boxOf(frame.positions);
+    const at = (/** @type {Vec3} */ value) => /** @type {Vec3} */ ([0, 1, 2].map((axis) => frame.lo[axis] + frame.scale[axis] * value[axis]));
+    return frame.particleCount === 0 ? raw : { min: at(raw.min), max: at(raw.max) };
+  }
+
+  /** The box that a first look should show: with the floor, the walls, and both sides of a swing. @returns {Box} */
+  stage() {
+    const box = this.box();
+    const bounds = this.colliders.find((one) => one.shape === "bounds");
+    if (bounds) return { min: bounds.a, max: bounds.b };
+    const { up } = this.axes();
+    const size = Math.max(length(subtract(box.max, box.min)), 1e-3);
+    if (this.ground !== null) {
+      const middle = scale(add(box.min, box.max), 0.5);
+      const drop = dot(this.ground.normal, middle) - this.ground.offset;
+      if (drop > 0 && drop < 3 * size) include(box, addScaled(middle, up, -drop));
+    }
+    if (this.pins.size === 1) {
+      const pivot = this.position([...this.pins.keys()][0]);
+      if (pivot !== null) for (const axis of [0, 2]) mirror(box, pivot, axis);
+    }
+    return box;
+  }
+
+  /** @param {TextMessage} message */
+  receiveText(message) {
+    switch (message.type) {
+      case "hello": this.hello = message; return this.emit("hello", message);
+      case "node": this.node = message; return this.emit("node", message);
+      case "parameters": this.parameters = message; return this.emit("parameters", message);
+      case "timeline": this.timeline = message; return this.emit("timeline", message);
+      case "playback": this.playback = message; return this.emit("playback", message);
+      case "clients": this.clients = message.count; return this.emit("clients", message.count);
+      case "outcome": return this.emit("outcome", message);
+      case "reset": return this.emit("reset", undefined);
+      case "notice": return this.emit("notice", message);
+      default: // A later bridge may say more.
+    }
+  }
+}
+
+/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
+function sameNumbers(a, b) {
+  if (a.length !== b.length) return false;
+  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
+  return true;
+}
+
+/** @param {Box} box @param {Vec3} point */
+function include(box, point) {
+  for (const axis of [0, 1, 2]) {
+    box.min[axis] = Math.min(box.min[axis], point[axis]);
+    box.max[axis] = Math.max(box.max[axis], point[axis]);
+  }
+}
+
+/** Makes a box reach as far on one side of a pivot as on the other. @param {Box} box @param {Vec3} pivot @param {number} axis */
+function mirror(box, pivot, axis) {
+  const reach = Math.max(box.max[axis] - pivot[axis], pivot[axis] - box.min[axis]);
+  if (reach < 1e-6) return;
+  box.min[axis] = pivot[axis] - reach;
+  box.max[axis] = pivot[axis] + reach;
+}
+
+/** @param {Collider} one @param {Vec3} up @returns {Plane[]} */
+function floorOf(one, up) {
+  if (one.shape === "plane" && dot(one.normal, up) > FLOOR_COSINE) return [{ normal: one.normal, offset: one.offset }];
+  if (one.shape === "bounds") return [{ normal: up, offset: Math.min(dot(one.a, up), dot(one.b, up)) }];
+  return [];
+}
