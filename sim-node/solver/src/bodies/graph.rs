@@ -13,7 +13,7 @@ use crate::crew::Shared;
 use crate::kernels::{Body, Eight, Kernels, Wide, Work, axes};
 use crate::order::Order;
 use crate::particles::Particle;
-use crate::project::{BLOCK, Block, Gap, Law, Rest, Spot, amount, end_scales};
+use crate::project::{BLOCK, Block, Gap, Law, Rest, Spot, correction};
 use crate::scene::Model;
 use crate::solid::{Way, Zone};
 
@@ -326,12 +326,11 @@ impl Batch<'_> {
             let difference = |axis: usize| self.bodies[b].0[axis] - self.bodies[a].0[axis];
             let gap = Gap::new(axes(difference), axes(|axis| difference(4 + axis)));
             let scale = law.scale(at, &gap.size, w_a + w_b);
-            let [scale_a, scale_b] = end_scales([w_a, w_b], scale);
-            let from_a = amount(gap.separation, scale_a);
-            let from_b = amount(gap.separation, scale_b);
+            let correction = correction(gap.separation, scale);
+            let (way_a, way_b) = (correction.way(w_a), correction.way(w_b));
             for axis in 0..3 {
-                self.bodies[a].0[4 + axis] -= from_a[axis];
-                self.bodies[b].0[4 + axis] -= from_b[axis];
+                self.bodies[a].0[4 + axis] += way_a[axis];
+                self.bodies[b].0[4 + axis] -= way_b[axis];
             }
         }
         law.is_marked()
@@ -369,14 +368,15 @@ impl<T: Law> Work for BatchWork<'_, '_, T> {
             }
             for (eight, [w_a, w_b]) in weights[first..first + length].iter().enumerate() {
                 let at = Spot { eight: first + eight, lane: 0 };
-                block.solve(eight, (&mut *law, at), [W::load(w_a, 0), W::load(w_b, 0)]);
+                block.solve(eight, (&mut *law, at), W::load(w_a, 0) + W::load(w_b, 0));
             }
-            for (eight, [a, b]) in ends.iter().enumerate() {
-                let [from_a, from_b] = block.amounts::<W>(eight);
+            let weights = &weights[first..first + length];
+            for (eight, ([a, b], [w_a, w_b])) in ends.iter().zip(weights).enumerate() {
+                let correction = block.correction::<W>(eight);
                 // SAFETY: as above.
-                unsafe { W::take(bodies, a, from_a) };
+                unsafe { W::take(bodies, a, correction.way(-W::load(w_a, 0))) };
                 // SAFETY: as above.
-                unsafe { W::take(bodies, b, from_b) };
+                unsafe { W::take(bodies, b, correction.way(W::load(w_b, 0))) };
             }
         }
     }
