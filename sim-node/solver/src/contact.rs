@@ -31,10 +31,10 @@ pub(crate) struct Contacts {
     /// Particles that touched something, in the order in which they first did.
     touched: Vec<u32>,
     is_touched: Vec<bool>,
-    /// By particle: the velocity that its contacts leave it, but for the bounces.
-    velocities: Vec<Vec3>,
-    /// By particle: what its bounces add. Friction does not know of them: they are no way that was
-    /// made in this substep.
+    /// By particle: the displacement that its contacts leave it, but for the bounces.
+    ways: Vec<Vec3>,
+    /// By particle: what its bounces add to that. Friction does not know of them: they are no way
+    /// that was made in this substep.
     bounces: Vec<Vec3>,
 }
 
@@ -56,8 +56,8 @@ struct Surface {
     friction: f32,
     /// Length of the substep in seconds.
     h: f32,
-    /// Approach speeds up to this one end at rest: 2 |g| h, twice what gravity gives in a substep.
-    rest_speed: f32,
+    /// Approaches by up to this way end at rest: 2 |g| h^2, twice what gravity gives in a substep.
+    rest_way: f32,
 }
 
 /// Most obstacles that a collider is: bounds have six faces.
@@ -123,13 +123,13 @@ impl Contacts {
         Self {
             touched: Vec::with_capacity(count),
             is_touched: vec![false; count],
-            velocities: vec![Vec3::ZERO; count],
+            ways: vec![Vec3::ZERO; count],
             bounces: vec![Vec3::ZERO; count],
         }
     }
 
     /// Ends a substep: what is inside of an obstacle is pushed out, everything takes its way, and
-    /// what touched something goes on with the velocity that its contacts leave it.
+    /// what touched something goes on with the displacement that its contacts leave it.
     #[inline(always)]
     pub(crate) fn end_substep<W: Wide>(&mut self, cells: &mut impl Cells, obstacles: &[Obstacle]) {
         for obstacle in obstacles {
@@ -162,7 +162,7 @@ impl Contacts {
     }
 
     /// Takes back, from the new positions of what touched something, the rounding by which they
-    /// are still inside of an obstacle, and gives them the velocities that their contacts leave
+    /// are still inside of an obstacle, and gives them the displacements that their contacts leave
     /// them.
     #[inline(never)]
     fn part(&mut self, cells: &mut impl Cells, obstacles: &[Obstacle]) {
@@ -177,21 +177,20 @@ impl Contacts {
                 }
             }
         }
-        let h = obstacles.first().map_or(0.0, |obstacle| obstacle.surface.h);
         for index in self.touched.drain(..).map(|index| index as usize) {
-            let velocity = self.velocities[index] + std::mem::take(&mut self.bounces[index]);
-            cells.set_displacement(index, velocity * h);
+            let way = self.ways[index] + std::mem::take(&mut self.bounces[index]);
+            cells.set_displacement(index, way);
             self.is_touched[index] = false;
         }
     }
 
-    /// Pushes one particle out, and works out the velocity that it goes on with.
+    /// Pushes one particle out, and works out the displacement that it goes on with.
     ///
     /// Friction acts on the displacement: the tangential one is shortened by at most friction times
     /// the depth gained in this substep, so that a particle on a slope stands still instead of
     /// creeping (Unified Particle Physics: Macklin et al. 2014, section 6.1). Restitution acts on
-    /// the velocity, from the predicted approach speed (Detailed Rigid Body Simulation: Mueller et
-    /// al. 2020, section 3.6). The push itself gives no speed.
+    /// the predicted approach (Detailed Rigid Body Simulation: Mueller et al. 2020, section 3.6).
+    /// The push itself gives no speed.
     fn resolve(
         &mut self,
         cells: &mut impl Cells,
@@ -200,24 +199,21 @@ impl Contacts {
         (surface, contact): (&Surface, &Contact),
     ) {
         let Hit { normal, depth } = contact.hit;
-        let Surface { h, friction, restitution, rest_speed, .. } = *surface;
-        let carried = surface.velocity_at(way.start + way.displacement + normal * depth);
-        let moved =
-            if self.is_touched[index] { self.velocities[index] } else { way.displacement / h };
+        let carried = surface.way_of(way.start + way.displacement + normal * depth);
+        let moved = if self.is_touched[index] { self.ways[index] } else { way.displacement };
         let relative = moved - carried;
-        let normal_speed = relative.dot(normal);
-        let sliding = relative - normal * normal_speed;
+        let out = relative.dot(normal);
+        let sliding = relative - normal * out;
         // What rests above the surface by a rounding has come as far as it would from the surface.
         let depth_max = depth + contact.rounding;
-        let gained = if -normal_speed * h < depth_max { -normal_speed * h } else { depth_max };
-        let grip = friction * if gained > 0.0 { gained } else { 0.0 };
-        let slide = sliding.length() * h;
+        let gained = if -out < depth_max { -out } else { depth_max };
+        let grip = surface.friction * if gained > 0.0 { gained } else { 0.0 };
+        let slide = sliding.length();
         let kept = if slide > grip { sliding * (1.0 - grip / slide) } else { Vec3::ZERO };
-        let approach = (carried - cells.predicted(index) / h).dot(normal);
-        let bounce = if approach > rest_speed { restitution * approach } else { 0.0 };
-        let displacement = way.displacement + normal * depth - (sliding - kept) * h;
-        cells.set_displacement(index, displacement);
-        self.velocities[index] = carried + kept;
+        let approach = (carried - cells.predicted(index)).dot(normal);
+        let bounce = if approach > surface.rest_way { surface.restitution * approach } else { 0.0 };
+        cells.set_displacement(index, way.displacement + normal * depth - (sliding - kept));
+        self.ways[index] = carried + kept;
         self.bounces[index] += normal * bounce;
         if !std::mem::replace(&mut self.is_touched[index], true) {
             #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
@@ -242,12 +238,12 @@ impl Surface {
             restitution: collider.restitution,
             friction: collider.friction,
             h: step.h,
-            rest_speed: step.rest_speed,
+            rest_way: step.rest_speed * step.h,
         }
     }
 
-    /// The velocity of the collider's material at a point.
-    fn velocity_at(&self, point: Vec3) -> Vec3 {
-        self.linear + self.angular.cross(point - self.pivot)
+    /// How far the collider's material at a point comes in a substep.
+    fn way_of(&self, point: Vec3) -> Vec3 {
+        (self.linear + self.angular.cross(point - self.pivot)) * self.h
     }
 }

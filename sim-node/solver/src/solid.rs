@@ -112,6 +112,7 @@ pub(crate) fn solids(collider: &Collider, step: &ContactStep) -> [Option<Solid>;
 
 impl Solid {
     /// Where a particle leaves it, if its way ends inside or, for a box, passes through it.
+    #[inline(always)]
     pub(crate) fn hit(&self, way: &Way) -> Option<Hit> {
         match self {
             Self::HalfSpace { normal, offset } => hit_half_space(way, *normal, *offset),
@@ -161,6 +162,7 @@ impl Solid {
 }
 
 /// The displacement is added last: near the surface, the rest is exact, and it keeps its digits.
+#[inline(always)]
 fn hit_half_space(way: &Way, normal: Vec3, offset: f32) -> Option<Hit> {
     let height = (normal.dot(way.start) - offset) + normal.dot(way.displacement);
     (height < 0.0).then_some(Hit { normal, depth: -height })
@@ -180,6 +182,7 @@ fn hit_ball(way: &Way, center: Vec3, radius: f32, fallback: Vec3) -> Option<Hit>
     (distance < radius).then_some(Hit { normal, depth: radius - distance })
 }
 
+#[inline(never)]
 fn hit_capsule(way: &Way, [a, b]: [Vec3; 2], radius: f32) -> Option<Hit> {
     let axis = b - a;
     let square = axis.dot(axis);
