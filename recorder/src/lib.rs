@@ -49,6 +49,8 @@
 mod collider_rows;
 mod descriptor;
 mod frames;
+mod index;
+mod keyframe_tears;
 mod message;
 mod part_file;
 mod protobuf;
@@ -56,11 +58,14 @@ mod reader;
 mod records;
 mod rows;
 mod run;
+mod state_hash;
 mod topic;
 mod writer;
 
 pub use collider_rows::{ColliderRow, CollidersRow, ShapeRow};
 pub use frames::{Frame, FrameReader};
+pub use index::{ChunkEntry, IndexedLog};
+pub use keyframe_tears::{KeyframeTears, cause_of};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
 pub use reader::{LogReader, Logged, ReadError};
@@ -69,5 +74,6 @@ pub use rows::{
     EventRow, OutcomeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
 pub use run::{Closing, FORMAT_VERSION, RunDescription};
+pub use state_hash::state_hash;
 pub use topic::{AllCounts, Topic, TopicCounts};
 pub use writer::{Compression, LogOptions, LogWriter, WriteError};
