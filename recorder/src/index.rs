@@ -10,7 +10,8 @@ mod walk;
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::ErrorKind;
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 use mcap::records::{Record, op};
@@ -23,7 +24,7 @@ use crate::topic::Topic;
 /// Most chunks of a file. With the usual size of a chunk it is 4 TB; a file of more is not ours.
 const CHUNK_COUNT_MAX: usize = 1 << 22;
 /// Bytes of a record's head: what it is, and its length.
-const RECORD_HEAD_SIZE_BYTES: u64 = 9;
+const RECORD_HEAD_SIZE_BYTES: usize = 9;
 
 /// A recording that is read from any place.
 #[derive(Debug)]
@@ -81,6 +82,18 @@ impl IndexedLog {
     /// # Errors
     /// If it is no recording, or has no readable head.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
+        Self::open_telling(path, &mut |_, _| {})
+    }
+
+    /// The same; `on_walk` is told how many bytes of how many have been looked through, if there is
+    /// no index.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_telling(
+        path: &Path,
+        on_walk: &mut dyn FnMut(u64, u64),
+    ) -> Result<Self, ReadError> {
         let log = LogReader::open(path)?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let mut file = File::open(path)?;
@@ -89,16 +102,16 @@ impl IndexedLog {
         let has_index = summary.is_some();
         let (found, end) = match summary {
             Some(found) => (found, LogEnd::Whole),
-            None => walk::read(&file, size_bytes)?,
+            None => walk::read(&file, size_bytes, on_walk)?,
         };
         let channels = BTreeMap::new();
         let mut log = Self { file, run, scene, channels, chunks: Vec::new(), end, has_index };
-        log.name_topics(found)?;
+        log.name_topics(&found)?;
         Ok(log)
     }
 
     /// Channels are named in the first chunk, and their topics are asked for before it is read.
-    fn name_topics(&mut self, found: Vec<FoundChunk>) -> Result<(), ReadError> {
+    fn name_topics(&mut self, found: &[FoundChunk]) -> Result<(), ReadError> {
         let entry = |found: &FoundChunk, topics| ChunkEntry {
             offset: found.offset,
             size_bytes: found.size_bytes,
@@ -107,11 +120,17 @@ impl IndexedLog {
         self.chunks = found.iter().map(|found| entry(found, Topics::ALL)).collect();
         if !self.chunks.is_empty() {
             match self.read_chunk(0) {
-                Ok(_) | Err(ReadError::DamagedChunk { .. } | ReadError::Malformed { .. }) => {}
+                // It may have channels and no messages, which its indexes do not tell.
+                Ok(messages) => {
+                    let mut topics = Topics::default();
+                    messages.iter().for_each(|logged| topics.add(logged.message.topic()));
+                    self.chunks[0].topics = topics;
+                }
+                Err(ReadError::DamagedChunk { .. } | ReadError::Malformed { .. }) => {}
                 Err(other) => return Err(other),
             }
         }
-        for (chunk, found) in self.chunks.iter_mut().zip(&found) {
+        for (chunk, found) in self.chunks.iter_mut().zip(found) {
             let known: Option<Vec<_>> =
                 found.channels.iter().map(|id| self.channels.get(id)).collect();
             if let Some(known) = known.filter(|known| !known.is_empty()) {
@@ -120,6 +139,22 @@ impl IndexedLog {
             }
         }
         Ok(())
+    }
+
+    /// Another reader of the same file, for another thread.
+    ///
+    /// # Errors
+    /// If the operating system says no.
+    pub fn try_clone(&self) -> Result<Self, ReadError> {
+        Ok(Self {
+            file: self.file.try_clone()?,
+            run: self.run.clone(),
+            scene: self.scene.clone(),
+            channels: self.channels.clone(),
+            chunks: self.chunks.clone(),
+            end: self.end.clone(),
+            has_index: self.has_index,
+        })
     }
 
     /// The run that was recorded.
@@ -161,9 +196,14 @@ impl IndexedLog {
         if size_bytes > RECORD_SIZE_BYTES_MAX as u64 {
             return Err(damaged("its length is beyond any chunk's".to_owned()));
         }
-        self.file.seek(SeekFrom::Start(offset))?;
-        let mut bytes = Vec::new();
-        (&self.file).take(size_bytes).read_to_end(&mut bytes)?;
+        let mut bytes = vec![0; usize::try_from(size_bytes).unwrap_or(usize::MAX)];
+        // Not from where the file stands: a clone of this stands there too.
+        match self.file.read_exact_at(&mut bytes, offset) {
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
+                return Err(damaged("the file has become shorter".to_owned()));
+            }
+            read => read?,
+        }
         if bytes.first() != Some(&op::CHUNK) || record_size_bytes(&bytes) != Some(size_bytes) {
             return Err(damaged("no chunk begins here".to_owned()));
         }
@@ -197,5 +237,5 @@ impl IndexedLog {
 /// The size of a record with its head, which these bytes begin with.
 fn record_size_bytes(bytes: &[u8]) -> Option<u64> {
     let length: [u8; 8] = bytes.get(1..9)?.try_into().ok()?;
-    u64::from_le_bytes(length).checked_add(RECORD_HEAD_SIZE_BYTES)
+    u64::from_le_bytes(length).checked_add(RECORD_HEAD_SIZE_BYTES as u64)
 }

@@ -59,6 +59,8 @@ mod records;
 mod rows;
 mod run;
 mod state_hash;
+mod tape;
+mod tears;
 mod topic;
 mod writer;
 
@@ -75,5 +77,7 @@ pub use rows::{
 };
 pub use run::{Closing, FORMAT_VERSION, RunDescription};
 pub use state_hash::state_hash;
+pub use tape::{Tape, TapeError, TapeState};
+pub use tears::{Torn, TornFollower};
 pub use topic::{AllCounts, Topic, TopicCounts};
 pub use writer::{Compression, LogOptions, LogWriter, WriteError};

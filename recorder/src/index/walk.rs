@@ -11,15 +11,27 @@ use crate::reader::ReadError;
 use crate::records::LogEnd;
 
 /// The head of a record and the first number behind it.
-const HEAD_AND_NUMBER: usize = RECORD_HEAD_SIZE_BYTES as usize + size_of::<u16>();
+const HEAD_AND_NUMBER: usize = RECORD_HEAD_SIZE_BYTES + size_of::<u16>();
+
+/// Bytes between two reports.
+const REPORT_SIZE_BYTES: u64 = 256 << 20;
 
 /// The whole chunks of a file, and how it ends.
-pub(super) fn read(file: &File, size_bytes: u64) -> Result<(Vec<FoundChunk>, LogEnd), ReadError> {
+pub(super) fn read(
+    file: &File,
+    size_bytes: u64,
+    on_walk: &mut dyn FnMut(u64, u64),
+) -> Result<(Vec<FoundChunk>, LogEnd), ReadError> {
     let mut source = BufReader::new(file);
     let mut chunks: Vec<FoundChunk> = Vec::new();
     let mut byte = MAGIC.len() as u64;
     source.seek(SeekFrom::Start(byte))?;
+    let mut report_byte = 0;
     loop {
+        if byte >= report_byte {
+            on_walk(byte, size_bytes);
+            report_byte = byte + REPORT_SIZE_BYTES;
+        }
         let head = read_head(&mut source)?;
         let size = record_size_bytes(&head).filter(|size| *size <= size_bytes - byte);
         let Some(record_size) = size else { return Ok((chunks, LogEnd::Truncated { byte })) };
@@ -54,14 +66,14 @@ fn damaged(byte: u64, cause: &str) -> LogEnd {
 
 /// The number behind the head of a record: the channel of an index.
 fn number(head: &[u8]) -> Option<u16> {
-    let bytes = head.get(RECORD_HEAD_SIZE_BYTES as usize..HEAD_AND_NUMBER)?;
+    let bytes = head.get(RECORD_HEAD_SIZE_BYTES..HEAD_AND_NUMBER)?;
     Some(u16::from_le_bytes(bytes.try_into().ok()?))
 }
 
 /// The head of the next record, and the number behind it where it is an index; less at the end of
 /// the file.
 fn read_head(source: &mut impl Read) -> Result<Vec<u8>, ReadError> {
-    let mut head = vec![0; RECORD_HEAD_SIZE_BYTES as usize];
+    let mut head = vec![0; RECORD_HEAD_SIZE_BYTES];
     if !is_filled(source, &mut head)? {
         return Ok(Vec::new());
     }
