@@ -90,10 +90,7 @@ impl IndexedLog {
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub fn open_telling(
-        path: &Path,
-        on_walk: &mut dyn FnMut(u64, u64),
-    ) -> Result<Self, ReadError> {
+    pub fn open_telling(path: &Path, on_walk: &mut dyn FnMut(u64, u64)) -> Result<Self, ReadError> {
         let log = LogReader::open(path)?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let mut file = File::open(path)?;
@@ -123,7 +120,9 @@ impl IndexedLog {
                 // It may have channels and no messages, which its indexes do not tell.
                 Ok(messages) => {
                     let mut topics = Topics::default();
-                    messages.iter().for_each(|logged| topics.add(logged.message.topic()));
+                    for logged in &messages {
+                        topics.add(logged.message.topic());
+                    }
                     self.chunks[0].topics = topics;
                 }
                 Err(ReadError::DamagedChunk { .. } | ReadError::Malformed { .. }) => {}

@@ -62,9 +62,8 @@ pub(crate) struct RecordReader<R> {
 
 impl<R: Read> RecordReader<R> {
     pub(crate) fn new(source: R) -> Self {
-        let options = options()
-            .with_validate_data_section_crc(true)
-            .with_validate_summary_section_crc(true);
+        let options =
+            options().with_validate_data_section_crc(true).with_validate_summary_section_crc(true);
         Self::with_options(source, options)
     }
 

@@ -25,9 +25,8 @@ mod tests {
         let text = "generate = [{ shape = 'cloth', columns = 4, rows = 4, spacing = 0.1 }]";
         let scene = Scene::from_toml(&format!("version = 1\n{text}"), "scene.toml").unwrap();
         let mut solver = Solver::new(&scene);
-        let hash = |solver: &Solver| {
-            state_hash(bytemuck::cast_slice(solver.particles()), solver.torn())
-        };
+        let hash =
+            |solver: &Solver| state_hash(bytemuck::cast_slice(solver.particles()), solver.torn());
         solver.step();
         assert_eq!(hash(&solver), solver.state_hash());
         for constraint in [7, 3] {

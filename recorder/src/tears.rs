@@ -46,7 +46,9 @@ impl Torn {
         match change {
             TearChange::Reset(_) => *self = Self::default(),
             TearChange::Tears(row) => {
-                let cause = |place: usize| row.causes.get(place).and_then(|name| TearCause::from_name(name));
+                let cause = |place: usize| {
+                    row.causes.get(place).and_then(|name| TearCause::from_name(name))
+                };
                 self.causes.extend((0..row.constraints.len()).map(cause));
                 self.constraints.extend(&row.constraints);
             }

@@ -102,7 +102,7 @@ fn topics_of_a_chunk_are_known_without_reading_it() {
             let messages = log.read_chunk(chunk).unwrap();
             let is_tears = |logged: &Logged| logged.message.topic() == Topic::Tears;
             assert_eq!(messages.iter().any(is_tears), has_tears, "chunk {chunk}");
-            assert!(log.chunks()[chunk].has_any(&[Topic::Tears, Topic::Steps]));
+            assert_eq!(log.chunks()[chunk].has_any(&Topic::ALL), !messages.is_empty());
         }
     }
 }

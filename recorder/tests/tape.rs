@@ -94,14 +94,13 @@ fn updates(solver: &Solver, step: u64, style: Style) -> Vec<Message> {
 
 /// Makes a step with all that happens in it.
 fn advance(solver: &mut Solver, step: u64) {
-    let is_reset = RESETS.contains(&step);
-    if is_reset {
+    if RESETS.contains(&step) {
         solver.reset();
     }
     for (_, constraint) in CUTS.iter().filter(|(of, _)| *of == step) {
         solver.cut(*constraint).unwrap();
     }
-    if is_reset { solver.finish_boundary() } else { solver.step() }
+    solver.step();
 }
 
 fn topology(solver: &Solver) -> Message {
@@ -134,8 +133,7 @@ fn written(style: Style) -> (Vec<u8>, Vec<Expected>) {
         contract_version: 1,
         recorder_version: "0.1.0".to_owned(),
     };
-    let options =
-        LogOptions { chunk_size_bytes: style.chunk_size_bytes, ..LogOptions::default() };
+    let options = LogOptions { chunk_size_bytes: style.chunk_size_bytes, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, SCENE.as_bytes(), 0).unwrap();
     log.write(&topology(&solver), 0).unwrap();
     let surface = SurfaceRow { step: 0, triangles: Vec::new() };

@@ -72,7 +72,9 @@ async fn serve(source: Box<dyn Source>, options: ServerOptions, stop: Stop) -> a
         hub.close();
     };
     tokio::join!(server.serve(Arc::clone(&hub)), watch);
-    feeding.join().map_err(|_| anyhow!("the thread that reads the node or the recording panicked"))?
+    feeding
+        .join()
+        .map_err(|_| anyhow!("the thread that reads the node or the recording panicked"))?
 }
 
 /// Starts the thread of the source.

@@ -105,8 +105,12 @@ impl Tape {
     /// that. `None` if there is none.
     pub(super) fn find(&mut self, step: u64) -> Result<Option<(usize, u64)>, ReadError> {
         let list = self.chunks.of(Topic::Particles).0;
-        let mut range =
-            Range { low: 0, low_step: self.first_step, high: list.len(), high_step: self.last_step };
+        let mut range = Range {
+            low: 0,
+            low_step: self.first_step,
+            high: list.len(),
+            high_step: self.last_step,
+        };
         let mut is_middle = false;
         while range.high - range.low > 1 {
             let guess = range.guess(step, is_middle);

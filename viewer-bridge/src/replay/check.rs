@@ -95,14 +95,15 @@ impl Check {
     }
 
     fn take_chunk(&mut self, read: Result<Vec<Logged>, ReadError>) {
-        match read {
-            Ok(messages) => messages.iter().for_each(|one| self.take(&one.message)),
-            Err(_) => {
-                self.damaged_count += 1;
-                self.torn.lose();
-                self.settings.add_gap(self.step + 1);
-                self.row = None;
-            }
+        let Ok(messages) = read else {
+            self.damaged_count += 1;
+            self.torn.lose();
+            self.settings.add_gap(self.step + 1);
+            self.row = None;
+            return;
+        };
+        for logged in &messages {
+            self.take(&logged.message);
         }
     }
 

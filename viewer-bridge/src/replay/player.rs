@@ -246,8 +246,7 @@ impl<'a> Player<'a> {
             None => (initial, false),
         };
         values.time_scale = PlainF32(self.playhead.rate);
-        let text =
-            ParametersText { is_complete, values: Some(values), initial: Some(initial) };
+        let text = ParametersText { is_complete, values: Some(values), initial: Some(initial) };
         self.hub.latch(Slot::Parameters, &ToPage::Parameters(Box::new(text.clone())));
         self.parameters = Some(text);
     }

@@ -178,6 +178,9 @@ mod tests {
     fn a_recording_of_one_step_stands() {
         let mut head = Playhead::new(7, 7, 60);
         head.resume(0);
-        assert_eq!((head.advance(ms(1)), head.step(ms(1)), head.is_playing), (Passed::End, 7, false));
+        assert_eq!(
+            (head.advance(ms(1)), head.step(ms(1)), head.is_playing),
+            (Passed::End, 7, false)
+        );
     }
 }
