@@ -99,7 +99,7 @@ impl<'a> Player<'a> {
             if self.playhead.advance(now_ns) == Passed::End {
                 self.is_changed = true;
             }
-            if self.is_awaited() || !self.answers.is_empty() {
+            if self.is_awaited() || self.is_changed {
                 self.wind(now_ns)?;
             }
             if self.is_changed {
