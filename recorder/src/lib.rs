@@ -43,7 +43,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! mcap's own types stay inside.
+//! [`LogReader`] and [`FrameReader`] read a file from its start, [`Tape`] at any step. mcap's own types
+//! stay inside.
 #![forbid(unsafe_code)]
 
 mod collider_rows;

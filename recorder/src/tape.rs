@@ -138,7 +138,7 @@ impl Tape {
         self.stride
     }
 
-    /// What could not be read since the last call, for users.
+    /// What could not be read since the last call, for users; of a part that is read again, once.
     pub fn take_faults(&mut self) -> Vec<String> {
         std::mem::take(&mut self.faults)
     }
@@ -201,10 +201,11 @@ impl Tape {
     }
 
     fn read(&mut self, chunk: usize) -> Result<(), ReadError> {
+        let mut faults = Vec::new();
         let messages = match self.log.read_chunk(chunk) {
             Ok(messages) => messages,
             Err(error @ (ReadError::DamagedChunk { .. } | ReadError::Malformed { .. })) => {
-                self.faults.push(error.to_string());
+                faults.push(error.to_string());
                 Vec::new()
             }
             Err(error) => return Err(error),
@@ -215,13 +216,16 @@ impl Tape {
                 && particles.len() != self.log.run().particle_count as usize
             {
                 let count = particles.len();
-                self.faults.push(format!("the snapshot of step {step} has {count} particles"));
+                faults.push(format!("the snapshot of step {step} has {count} particles"));
                 continue;
             }
             digest.take(&logged.message);
             if let Message::Particles { step, particles } = logged.message {
                 snapshots.push((step, Arc::new(particles)));
             }
+        }
+        if !self.chunks.is_known(chunk) {
+            self.faults.append(&mut faults);
         }
         self.chunks.set_span(chunk, &digest.snapshots);
         self.digests.put(chunk, digest);

@@ -65,6 +65,11 @@ impl Chunks {
         self.changes.clone()
     }
 
+    /// Whether a chunk was read.
+    pub(super) fn is_known(&self, chunk: usize) -> bool {
+        self.spans[chunk].is_some()
+    }
+
     /// Remembers the steps of a chunk.
     pub(super) fn set_span(&mut self, chunk: usize, steps: &[u64]) {
         self.spans[chunk] = Some(match (steps.first(), steps.last()) {

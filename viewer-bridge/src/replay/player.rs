@@ -44,8 +44,8 @@ pub(super) struct Player<'a> {
     /// What is on show.
     pub(super) state: TapeState,
     pub(super) parameters: Option<ParametersText>,
-    /// How many changes of the parameters are in them.
-    change_count: Option<usize>,
+    /// What they follow from: how many changes of the recording, and the pace.
+    parameters_of: Option<(Option<usize>, f32)>,
     /// Commands that were obeyed, to be answered with the step that shows it.
     answers: Vec<(u32, OutcomeText)>,
     /// Whether pages are to be told how the recording is played.
@@ -76,7 +76,7 @@ impl<'a> Player<'a> {
             playhead,
             state,
             parameters: None,
-            change_count: None,
+            parameters_of: None,
             answers: Vec::new(),
             is_changed: true,
             shown_step: None,
@@ -236,10 +236,11 @@ impl<'a> Player<'a> {
     fn set_parameters(&mut self) {
         let settings = self.report.settings.as_ref();
         let count = settings.map(|log| log.count_until(self.state.row.step));
-        if self.parameters.is_some() && count == self.change_count {
+        let of = Some((count, self.playhead.rate));
+        if of == self.parameters_of {
             return;
         }
-        self.change_count = count;
+        self.parameters_of = of;
         let initial = self.replay.load.summary.parameters;
         let (mut values, is_complete) = match settings.zip(count) {
             Some((log, count)) => log.after(count, initial),
@@ -298,6 +299,7 @@ impl<'a> Player<'a> {
         self.set_parameters();
     }
 
+    /// Tells pages what the recording holds.
     fn tell_timeline(&self) {
         let tape = &self.replay.tape;
         let timeline = Timeline {
@@ -315,6 +317,7 @@ impl<'a> Player<'a> {
         self.hub.latch(Slot::Timeline, &ToPage::Timeline(Box::new(timeline)));
     }
 
+    /// Tells pages how the recording is played.
     fn tell_playback(&mut self) {
         self.is_changed = false;
         let (head, step) = (&self.playhead, self.state.row.step);
@@ -340,6 +343,7 @@ impl<'a> Player<'a> {
             process_id: None,
         };
         self.hub.latch(Slot::Node, &ToPage::Node(node));
+        self.set_parameters();
     }
 
     fn tell_statistics_if_due(&mut self, now_ns: u64) {
