@@ -48,6 +48,7 @@
 
 mod collider_rows;
 mod descriptor;
+mod encoding;
 mod frames;
 mod message;
 mod part_file;
@@ -60,9 +61,11 @@ mod topic;
 mod writer;
 
 pub use collider_rows::{ColliderRow, CollidersRow, ShapeRow};
+pub use encoding::{MessageEncoder, TopicFormat, TopicSchema};
 pub use frames::{Frame, FrameReader};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
+pub use protobuf::{WORLD_FRAME, encode_transform};
 pub use reader::{LogReader, Logged, ReadError};
 pub use records::LogEnd;
 pub use rows::{

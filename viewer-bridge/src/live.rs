@@ -105,16 +105,7 @@ fn refuse_for_a_while(hub: &Hub, requests: &Requests) {
     while monotonic_ns() < end_ns && !hub.is_closed() {
         let Some(request) = requests.next(LOOK_PERIOD) else { continue };
         if let Ask::Command { id, command } = request.ask {
-            let outcome = OutcomeText {
-                id,
-                kind: command.name(),
-                status: Status::Rejected,
-                step: None,
-                applied: 0,
-                rejected: 1,
-                reason: reason::NO_NODE,
-                text: reason::text(reason::NO_NODE).to_owned(),
-            };
+            let outcome = OutcomeText::refused(id, command.name(), reason::NO_NODE);
             hub.send(request.client, &ToPage::Outcome(outcome));
         }
     }
