@@ -1,5 +1,7 @@
 //! The files of the page: built into the program, or, for who works on them, read from a folder.
 
+mod files;
+
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,8 +10,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// The page's files: path and content. A file that is missing does not compile.
-const FILES: [(&str, &str); 1] = [("index.html", include_str!("../web/index.html"))];
+use files::FILES;
 
 /// Where the files come from.
 #[derive(Debug, Clone, Default)]
@@ -83,6 +84,8 @@ fn mime(path: &str) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     fn status(assets: &Assets, path: &str) -> StatusCode {
@@ -96,6 +99,31 @@ mod tests {
         }
         assert_eq!(status(&Assets::Embedded, ""), StatusCode::OK);
         assert_eq!(status(&Assets::Embedded, "../Cargo.toml"), StatusCode::NOT_FOUND);
+    }
+
+    /// Adds the files of a folder that a browser asks for.
+    fn add_files(folder: &Path, paths: &mut BTreeSet<PathBuf>) {
+        for entry in folder.read_dir().unwrap().map(|entry| entry.unwrap().path()) {
+            let is_for_developers =
+                ["node_modules", "test"].iter().any(|name| entry.ends_with(name));
+            if entry.is_dir() && !is_for_developers {
+                add_files(&entry, paths);
+            } else if entry
+                .extension()
+                .is_some_and(|one| ["html", "css", "js"].iter().any(|known| one == *known))
+            {
+                paths.insert(entry);
+            }
+        }
+    }
+
+    #[test]
+    fn every_file_of_the_page_is_embedded() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("web");
+        let mut paths = BTreeSet::new();
+        add_files(&folder, &mut paths);
+        let embedded: BTreeSet<_> = FILES.iter().map(|(path, _)| folder.join(path)).collect();
+        assert_eq!(embedded, paths);
     }
 
     #[test]
