@@ -11,7 +11,7 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 use crate::check::check;
 use crate::hub::{Connection, Hub, Shown};
 use crate::limits::{HELLO_TIMEOUT, PING_PERIOD, PROTOCOL, SILENCE_MAX};
-use crate::message::{Command, FromPage, Hello, OutcomeText, Status, ToPage};
+use crate::message::{Command, FromPage, Hello, OutcomeText, ToPage};
 use crate::rate_limit::RateLimit;
 use crate::reason;
 use crate::server::Site;

@@ -10,6 +10,7 @@ mod desk;
 mod gate;
 mod listener;
 mod picture;
+mod playback;
 mod published;
 mod publisher;
 mod settable;
@@ -32,6 +33,8 @@ use desk::{Desk, ParameterDesk};
 use gate::Gate;
 use listener::Listener;
 
+pub use playback::Recording;
+
 pub(crate) use desk::CLIENT_FIRST;
 pub(crate) use publisher::Publisher;
 
@@ -42,8 +45,24 @@ pub struct FoxgloveOptions {
     pub listen: SocketAddr,
     /// Origins of web pages that may connect, as browsers write them.
     pub origins: Vec<String>,
-    /// Whether clients may publish commands.
+    /// Whether clients may change anything: publish commands, call services, set parameters.
     pub takes_commands: bool,
+    /// The times of the recording that the hub's source shows, if it shows one.
+    pub recording: Option<Recording>,
+}
+
+impl FoxgloveOptions {
+    /// Whether a server may listen there.
+    ///
+    /// # Errors
+    /// Others than this host could reach it.
+    pub fn check_address(address: SocketAddr) -> Result<(), FoxgloveServerError> {
+        if address.ip().is_loopback() {
+            Ok(())
+        } else {
+            Err(FoxgloveServerError::NotLoopback { address })
+        }
+    }
 }
 
 /// Why a Foxglove server does not start.
@@ -96,15 +115,13 @@ impl FoxgloveServer {
         hub: &Arc<Hub>,
     ) -> Result<Self, FoxgloveServerError> {
         let address = options.listen;
-        if !address.ip().is_loopback() {
-            return Err(FoxgloveServerError::NotLoopback { address });
-        }
+        FoxgloveOptions::check_address(address)?;
         let listen = |cause| FoxgloveServerError::Listen { address, cause };
         let listener = TcpListener::bind(address).await.map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;
         let context = Context::new();
-        let desk = Arc::new(Desk::new(Arc::downgrade(hub)));
-        let publisher = Arc::new(Publisher::new(&context, Arc::clone(&desk))?);
+        let desk = Arc::new(Desk::new(Arc::downgrade(hub), &options));
+        let publisher = Arc::new(Publisher::new(&context, Arc::clone(&desk), options.recording)?);
         let listener_of_clients = Listener {
             hub: Arc::downgrade(hub),
             publisher: Arc::clone(&publisher),
@@ -112,7 +129,8 @@ impl FoxgloveServer {
         };
         let secret = secret_address().map_err(FoxgloveServerError::NoRandomNumber)?;
         let publish = options.takes_commands.then_some(Capability::ClientPublish);
-        let handle = context
+        let services = if options.takes_commands { listener::services(&desk) } else { Vec::new() };
+        let mut server = context
             .websocket_server()
             .name("catenary")
             .bind(secret.to_string(), 0)
@@ -120,10 +138,12 @@ impl FoxgloveServer {
             .supported_encodings(["json"])
             .capabilities(publish)
             .parameter_handler(Arc::new(ParameterDesk(Arc::clone(&desk))))
-            .services(listener::services(&desk))
-            .listener(Arc::new(listener_of_clients))
-            .start()
-            .await?;
+            .services(services)
+            .listener(Arc::new(listener_of_clients));
+        if let Some((first_ns, last_ns)) = options.recording.map(|recording| recording.range_ns()) {
+            server = server.playback_time_range(first_ns, last_ns);
+        }
+        let handle = server.start().await?;
         let inner = SocketAddr::from((secret, handle.port()));
         desk.open(handle);
         hub.set_publisher(publisher);
@@ -149,7 +169,8 @@ impl FoxgloveServer {
     }
 }
 
-/// An address of the loopback network that nobody can guess, together with its port: 38 bits.
+/// An address of the loopback network that no web page can guess, together with its port: 38 bits.
+/// Programs of this host can look it up; they need no such way, for they have no origin.
 fn secret_address() -> Result<Ipv4Addr, getrandom::Error> {
     let [_, b, c, d] = getrandom::u32()?.to_le_bytes();
     // Neither the network's own address, nor its broadcast.

@@ -34,7 +34,7 @@ pub mod source;
 pub mod stage;
 pub mod wire;
 
-pub use foxglove_server::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError};
+pub use foxglove_server::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Recording};
 pub use hub::Hub;
 pub use server::{Server, ServerOptions};
 pub use source::Source;

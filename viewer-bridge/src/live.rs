@@ -14,7 +14,7 @@ use sim_contract::{AttachError, Endpoint};
 
 use crate::Hub;
 use crate::hub::Slot;
-use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, Status, ToPage};
+use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, ToPage};
 use crate::reason;
 use crate::source::{Ask, Requests, Source};
 use crate::stage::Stage;

@@ -14,7 +14,8 @@ use sim_contract::Stop;
 use tokio::runtime;
 use viewer_bridge::assets::Assets;
 use viewer_bridge::live::Live;
-use viewer_bridge::{Hub, Server, ServerOptions, Source};
+use viewer_bridge::source::Requests;
+use viewer_bridge::{FoxgloveOptions, FoxgloveServer, Hub, Server, ServerOptions, Source};
 
 use args::Args;
 
@@ -48,39 +49,60 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .enable_all()
         .build()
         .context("starting the server's threads")?;
-    runtime.block_on(serve(source, options, stop))
+    runtime.block_on(serve(source, options, args.foxglove(), stop))
 }
 
 /// Serves until asked to stop, or until the source fails.
-async fn serve(source: Live, options: ServerOptions, stop: Stop) -> anyhow::Result<()> {
+async fn serve(
+    source: Live,
+    options: ServerOptions,
+    foxglove: Option<FoxgloveOptions>,
+    stop: Stop,
+) -> anyhow::Result<()> {
     let server = Server::bind(options).await?;
-    let (hub, feeding) = feed(source)?;
-    say_ready(&server);
+    let (hub, requests) = Hub::new(source.mode());
+    let hub = Arc::new(hub);
+    // Before the source starts: it has to hear everything.
+    let foxglove = match foxglove {
+        None => None,
+        Some(options) => Some(FoxgloveServer::start(options, &hub).await?),
+    };
+    let feeding = feed(source, &hub, requests)?;
+    say_ready(&server, foxglove.as_ref());
+    let serve_foxglove = async {
+        if let Some(foxglove) = foxglove {
+            foxglove.serve(Arc::clone(&hub)).await;
+        }
+    };
     let watch = async {
         while !stop.is_asked() && !feeding.is_finished() {
             tokio::time::sleep(LOOK_PERIOD).await;
         }
         hub.close();
     };
-    tokio::join!(server.serve(Arc::clone(&hub)), watch);
+    tokio::join!(server.serve(Arc::clone(&hub)), serve_foxglove, watch);
     feeding.join().map_err(|_| anyhow!("the thread that reads the node panicked"))?
 }
 
 /// Starts the thread of the source.
-fn feed(mut source: Live) -> anyhow::Result<(Arc<Hub>, JoinHandle<anyhow::Result<()>>)> {
-    let (hub, requests) = Hub::new(source.mode());
-    let hub = Arc::new(hub);
-    let fed = Arc::clone(&hub);
-    let feeding = thread::Builder::new()
+fn feed(
+    mut source: Live,
+    hub: &Arc<Hub>,
+    requests: Requests,
+) -> anyhow::Result<JoinHandle<anyhow::Result<()>>> {
+    let hub = Arc::clone(hub);
+    thread::Builder::new()
         .name("source".to_owned())
-        .spawn(move || source.run(&fed, &requests))
-        .context("starting the thread that reads the node")?;
-    Ok((hub, feeding))
+        .spawn(move || source.run(&hub, &requests))
+        .context("starting the thread that reads the node")
 }
 
 #[allow(clippy::print_stderr, reason = "messages to the user")]
-fn say_ready(server: &Server) {
+fn say_ready(server: &Server, foxglove: Option<&FoxgloveServer>) {
     let url = server.url();
+    if let Some(foxglove) = foxglove {
+        eprintln!("foxglove {}", foxglove.url());
+    }
     eprintln!("ready {url}");
     if url.contains('#') {
         eprintln!(

@@ -10,13 +10,15 @@ use foxglove::WebSocketServerHandle;
 use foxglove::websocket::service::Responder;
 use foxglove::websocket::{
     AnyClient, Client, ClientId, GetParametersResponder, Parameter, ParameterHandler,
-    SetParametersResponder, Status,
+    PlaybackControlRequest, PlaybackState, SetParametersResponder, Status,
 };
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
-use super::{published, settable};
+use super::playback::Recording;
+use super::{FoxgloveOptions, published, settable};
 use crate::Hub;
 use crate::check::check;
-use crate::message::{Command, OutcomeText, Status as Fate};
+use crate::message::{Command, OutcomeText, Playback, Status as Fate};
 use crate::parameters::Parameters;
 use crate::reason;
 use crate::source::Ask;
@@ -26,6 +28,13 @@ pub(crate) const CLIENT_FIRST: u32 = 1 << 30;
 
 /// Most parameters of one request.
 const PARAMETERS_PER_REQUEST_MAX: usize = 64;
+/// Time from a complaint about what a client publishes to the next. Whoever leaves more than a few
+/// answers unread is disconnected by the library, and commands may come in hundreds; each rejected
+/// one is on `/outcomes` all the same.
+const COMPLAINT_PERIOD_NS: u64 = SECOND_NS / 10;
+
+/// Why nothing can be changed.
+const NO_COMMANDS: &str = "this server changes nothing; it was started without --allow-commands";
 
 /// The two senders that a client is to the source: one leaves, and lets go what it holds, when the
 /// client stops to publish; the other has its answers all the same.
@@ -43,6 +52,8 @@ fn number_of(client: ClientId, sender: Sender) -> u32 {
 #[derive(Debug)]
 pub(super) struct Desk {
     hub: Weak<Hub>,
+    takes_commands: bool,
+    recording: Option<Recording>,
     /// For news that nobody asked for; set once the server runs.
     handle: Mutex<Option<WebSocketServerHandle>>,
     state: Mutex<State>,
@@ -56,7 +67,11 @@ struct State {
     /// Requests to set parameters, until each of them has its outcome.
     requests: BTreeMap<u32, Request>,
     last_request: u32,
+    /// When a client may be told the next time what is wrong with what it publishes.
+    next_complaint_ns: BTreeMap<u32, u64>,
     parameters: Option<Parameters>,
+    /// How the recording is played, as the source said last.
+    playback: Option<Playback>,
     /// The load on show.
     epoch: u32,
 }
@@ -81,11 +96,14 @@ struct Request {
     open_count: usize,
     /// What they are now.
     values: Vec<Parameter>,
+    /// What was refused, and why.
+    refusals: Vec<String>,
 }
 
 impl Desk {
-    pub(super) fn new(hub: Weak<Hub>) -> Self {
-        Self { hub, handle: Mutex::default(), state: Mutex::default() }
+    pub(super) fn new(hub: Weak<Hub>, options: &FoxgloveOptions) -> Self {
+        let (takes_commands, recording) = (options.takes_commands, options.recording);
+        Self { hub, takes_commands, recording, handle: Mutex::default(), state: Mutex::default() }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -125,6 +143,35 @@ impl Desk {
         }
     }
 
+    /// Takes how the recording is played, and tells everyone.
+    pub(super) fn set_playback(&self, playback: Playback) {
+        let before = self.state().playback.replace(playback);
+        if let (Some(recording), Some(handle)) = (self.recording, self.handle().as_ref()) {
+            handle.broadcast_playback_state(recording.state(before, playback));
+        }
+    }
+
+    /// Takes a request to play the recording in another way. None: there is no recording.
+    pub(super) fn control_playback(
+        &self,
+        request: &PlaybackControlRequest,
+    ) -> Option<PlaybackState> {
+        let (recording, hub) = (self.recording?, self.hub.upgrade()?);
+        let playback = self.state().playback;
+        for command in recording.commands(request, playback) {
+            hub.request(CLIENT_FIRST, Ask::Command { id: None, command });
+        }
+        Some(recording.answer(request, playback))
+    }
+
+    /// The parameters of these names, as they are.
+    fn present(&self, is_meant: impl Fn(&str) -> bool) -> Vec<Parameter> {
+        let parameters = self.state().parameters;
+        let mut all = parameters.as_ref().map(settable::list).unwrap_or_default();
+        all.retain(|one| is_meant(&one.name));
+        all
+    }
+
     /// Calls a service: it is answered with the outcome.
     pub(super) fn call(&self, client: ClientId, command: Command, responder: Responder) {
         self.submit(number_of(client, Sender::Caller), command, Waiting::Service(responder));
@@ -138,7 +185,21 @@ impl Desk {
                 let number = number_of(client.id(), Sender::Publisher);
                 self.submit(number, command, Waiting::Publisher(client));
             }
-            Err(error) => client.send_status(Status::error(format!("no command: {error}"))),
+            Err(error) => self.complain(&client, format!("no command: {error}")),
+        }
+    }
+
+    /// Tells a client what is wrong with what it publishes, unless it was told something just now.
+    pub(super) fn complain(&self, client: &Client, text: String) {
+        let now_ns = monotonic_ns();
+        let is_due = {
+            let mut state = self.state();
+            state.next_complaint_ns.retain(|_, due_ns| *due_ns > now_ns);
+            let due_ns = now_ns + COMPLAINT_PERIOD_NS;
+            state.next_complaint_ns.insert(client.id().into(), due_ns).is_none()
+        };
+        if is_due {
+            client.send_status(Status::error(text));
         }
     }
 
@@ -147,8 +208,9 @@ impl Desk {
         if let Some(hub) = self.hub.upgrade() {
             hub.request(number_of(client, Sender::Publisher), Ask::Left);
         }
+        let mut state = self.state();
         // Nobody answers these any more.
-        self.state().waiting.retain(
+        state.waiting.retain(
             |_, waiting| !matches!(waiting, Waiting::Publisher(other) if other.id() == client),
         );
     }
@@ -188,7 +250,7 @@ impl Desk {
             }
             Some(Waiting::Publisher(client)) => {
                 if outcome.status != Fate::Applied {
-                    client.send_status(Status::error(refusal(outcome.kind, outcome)));
+                    self.complain(&client, refusal(outcome.kind, outcome));
                 }
             }
         }
@@ -203,7 +265,7 @@ impl Desk {
         if outcome.status == Fate::Applied {
             request.values.push(asked);
         } else {
-            request.client.send_error(refusal(&name, outcome));
+            request.refusals.push(refusal(&name, outcome));
             let present = present.iter().flat_map(settable::list).find(|one| one.name == name);
             request.values.extend(present);
         }
@@ -211,6 +273,9 @@ impl Desk {
         if request.open_count == 0
             && let Some(request) = state.requests.remove(&number)
         {
+            if !request.refusals.is_empty() {
+                request.client.send_error(request.refusals.join("; "));
+            }
             request.responder.respond(request.values);
         }
     }
@@ -240,10 +305,9 @@ impl ParameterHandler for ParameterDesk {
         _request_id: Option<String>,
         responder: GetParametersResponder,
     ) {
-        let parameters = self.0.state().parameters;
-        let mut all = parameters.as_ref().map(settable::list).unwrap_or_default();
-        all.retain(|one| names.is_empty() || names.contains(&one.name));
-        responder.respond(all);
+        responder.respond(
+            self.0.present(|name| names.is_empty() || names.iter().any(|one| one == name)),
+        );
     }
 
     fn set(
@@ -254,6 +318,11 @@ impl ParameterHandler for ParameterDesk {
         responder: SetParametersResponder,
     ) {
         let desk = &self.0;
+        if !desk.takes_commands {
+            client.send_error(NO_COMMANDS.to_owned());
+            let is_asked = |name: &str| parameters.iter().any(|one| one.name == name);
+            return responder.respond(desk.present(is_asked));
+        }
         if parameters.is_empty() || parameters.len() > PARAMETERS_PER_REQUEST_MAX {
             client.send_error(format!("1 to {PARAMETERS_PER_REQUEST_MAX} parameters at once"));
             return responder.respond(Vec::new());
@@ -264,7 +333,8 @@ impl ParameterHandler for ParameterDesk {
             let mut state = desk.state();
             state.last_request = state.last_request.wrapping_add(1);
             let number = state.last_request;
-            let request = Request { client, responder, open_count, values: Vec::new() };
+            let request =
+                Request { client, responder, open_count, values: Vec::new(), refusals: Vec::new() };
             state.requests.insert(number, request);
             number
         };

@@ -1,7 +1,7 @@
 //! The door in front of the Foxglove server.
 //!
 //! The library takes any connection, from any web page, and messages of any size and number. So it
-//! listens at an address of the loopback network that only this process knows, and the public
+//! listens at an address of the loopback network that no web page can know, and the public
 //! address is this door's: it reads the head of the request, refuses hosts and origins that have no
 //! business here, and then passes bytes on in both directions, counting what clients send.
 
@@ -150,8 +150,8 @@ async fn pass_checked(mut from: OwnedReadHalf, mut to: impl AsyncWrite + Unpin) 
     }
 }
 
-/// Passes on what the server sends. A client that takes nothing is not given up here: it may be a
-/// window in the background, and the library drops what it does not take.
+/// Passes on what the server sends. A client that takes nothing of it for so long is given up, as a
+/// page is: what it holds would never be let go.
 async fn pass(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + Unpin) -> io::Result<()> {
     let mut bytes = vec![0; PASS_SIZE_BYTES];
     loop {
@@ -159,7 +159,7 @@ async fn pass(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + Unpin)
         if count == 0 {
             return Ok(());
         }
-        to.write_all(&bytes[..count]).await?;
+        timeout(SILENCE_MAX, to.write_all(&bytes[..count])).await??;
     }
 }
 

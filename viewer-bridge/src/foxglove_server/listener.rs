@@ -4,7 +4,9 @@ use std::sync::{Arc, Weak};
 
 use foxglove::Schema;
 use foxglove::websocket::service::{Handler, Request, Responder, Service, ServiceSchema};
-use foxglove::websocket::{ChannelView, Client, ClientChannel, ServerListener, Status};
+use foxglove::websocket::{
+    ChannelView, Client, ClientChannel, PlaybackControlRequest, PlaybackState, ServerListener,
+};
 use serde::Deserialize;
 
 use super::desk::{CLIENT_FIRST, Desk};
@@ -33,7 +35,7 @@ impl ServerListener for Listener {
     fn on_client_advertise(&self, client: Client, channel: &ClientChannel) {
         if channel.topic != published::TOPIC {
             let text = format!("only {} is taken, not {}", published::TOPIC, channel.topic);
-            client.send_status(Status::warning(text));
+            self.desk.complain(&client, text);
         }
     }
 
@@ -41,6 +43,13 @@ impl ServerListener for Listener {
         if channel.topic == published::TOPIC {
             self.desk.publish(client, payload);
         }
+    }
+
+    fn on_playback_control_request(
+        &self,
+        request: PlaybackControlRequest,
+    ) -> Option<PlaybackState> {
+        self.desk.control_playback(&request)
     }
 
     fn on_client_unadvertise(&self, client: Client, channel: &ClientChannel) {
@@ -58,14 +67,15 @@ const EMPTY_SCHEMA: &str = r#"{"type":"object","additionalProperties":false,"pro
 const OUTCOME_SCHEMA: &str = r#"{"type":"object","properties":{"kind":{"type":"string"},"status":{"type":"string"},"step":{"type":["integer","null"]},"applied":{"type":"integer"},"rejected":{"type":"integer"},"reason":{"type":"string"},"text":{"type":"string"}}}"#;
 
 /// All services.
-pub(super) fn services(desk: &Arc<Desk>) -> impl Iterator<Item = Service> {
-    NAMES.into_iter().map(|name| {
+pub(super) fn services(desk: &Arc<Desk>) -> Vec<Service> {
+    let service = |name| {
         let request = if name == "step" { STEP_SCHEMA } else { EMPTY_SCHEMA };
         let schema = ServiceSchema::new(format!("catenary.{name}"))
             .with_request("json", json_schema(&format!("catenary.{name}.Request"), request))
             .with_response("json", json_schema("catenary.Answer", OUTCOME_SCHEMA));
         Service::builder(name, schema).handler(ServiceDesk(Arc::clone(desk)))
-    })
+    };
+    NAMES.map(service).into()
 }
 
 fn json_schema(name: &str, schema: &'static str) -> Schema {

@@ -37,7 +37,7 @@ pub(super) fn command(payload: &[u8], epoch: u32) -> Result<Command, String> {
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
         Action::Push { .. } => return Err("push is not taken here".to_owned()),
-        Action::Unknown { .. } => return Err("there is no such command".to_owned()),
+        _ => return Err("there is no such command".to_owned()),
     })
 }
 

@@ -14,6 +14,7 @@ use sim_contract::{ParticleState, TearCause};
 
 use super::desk::Desk;
 use super::picture::Picture;
+use super::playback::{Recording, step_ns};
 use crate::message::{OutcomeText, ToPage};
 use crate::wire::Scene;
 
@@ -32,6 +33,8 @@ pub(crate) struct Publisher {
     channels: [Arc<RawChannel>; TOPICS.len()],
     scene: Channel<SceneUpdate>,
     desk: Arc<Desk>,
+    /// Where a recording is shown: its times are those of the messages.
+    recording: Option<Recording>,
     state: Mutex<State>,
     /// Subscriptions that have not been given what was said before they came.
     greetings: Mutex<Vec<(Topic, SinkId)>>,
@@ -52,7 +55,7 @@ struct State {
     /// How many states and pictures were encoded.
     encoded_count: u64,
     /// What a late subscriber is given.
-    torn: Option<Message>,
+    torn: Option<Torn>,
     status: Option<Message>,
     step: Option<Message>,
 }
@@ -68,6 +71,28 @@ struct Load {
     picture: Picture,
 }
 
+/// All that is torn.
+#[derive(Debug)]
+struct Torn {
+    /// Since when it is all.
+    step: u64,
+    constraints: Vec<u32>,
+    /// May be shorter: not known then.
+    causes: Vec<u8>,
+}
+
+impl Torn {
+    /// The message that tells of what stands at `first` and behind it.
+    fn row(&self, first: usize) -> Message {
+        let cause = |place| self.causes.get(place).copied().and_then(TearCause::from_number);
+        let name = |cause: Option<TearCause>| cause.map_or("unknown", TearCause::name);
+        let places = first..self.constraints.len();
+        let causes = places.map(|place| name(cause(place)).to_owned()).collect();
+        let constraints = self.constraints[first..].to_vec();
+        Message::Tears(TearsRow { step: self.step, constraints, causes })
+    }
+}
+
 impl Load {
     /// The time of a step, as recordings have it.
     fn time_ns(&self, step: u64) -> u64 {
@@ -75,17 +100,12 @@ impl Load {
     }
 }
 
-fn step_ns(step: u64, rate_hz: u32) -> u64 {
-    let time_ns = u128::from(step) * u128::from(SECOND_NS) / u128::from(rate_hz.max(1));
-    u64::try_from(time_ns).unwrap_or(u64::MAX)
-}
-
-fn now() -> PartialMetadata {
-    PartialMetadata::with_log_time(realtime_ns())
-}
-
 impl Publisher {
-    pub(super) fn new(context: &Arc<Context>, desk: Arc<Desk>) -> Result<Self, FoxgloveError> {
+    pub(super) fn new(
+        context: &Arc<Context>,
+        desk: Arc<Desk>,
+        recording: Option<Recording>,
+    ) -> Result<Self, FoxgloveError> {
         let mut channels = Vec::new();
         for topic in TOPICS {
             let TopicFormat { encoding, schema } = TopicFormat::of(topic);
@@ -98,6 +118,7 @@ impl Publisher {
             channels,
             scene: context.channel_builder(SCENE_TOPIC).build(),
             desk,
+            recording,
             state: Mutex::default(),
             greetings: Mutex::default(),
             is_frame_due: AtomicBool::new(false),
@@ -147,6 +168,16 @@ impl Publisher {
         }
     }
 
+    /// Sends bytes to all who subscribed, or to one. `time_ns`: of the step, since 1970.
+    fn log(&self, channel: &RawChannel, bytes: &[u8], time_ns: u64, sink: Option<SinkId>) {
+        channel.log_with_meta_to_sink(bytes, self.metadata(time_ns), sink);
+    }
+
+    /// When a message was made: a live one now, one of a recording at its step.
+    fn metadata(&self, time_ns: u64) -> PartialMetadata {
+        PartialMetadata::with_log_time(self.recording.map_or_else(realtime_ns, |_| time_ns))
+    }
+
     /// Another load is on show.
     pub(crate) fn begin(&self, scene: &Scene) {
         let mut state = self.state();
@@ -158,12 +189,19 @@ impl Publisher {
             run_id: text.run_id.clone(),
             origin: scene.origin,
             rate_hz: scene.rate_hz,
-            epoch_ns: before.map_or(now_ns, |load| load.epoch_ns),
+            epoch_ns: match (self.recording, before) {
+                (Some(recording), _) => recording.epoch_ns,
+                (None, Some(before)) => before.epoch_ns,
+                (None, None) => now_ns,
+            },
             picture: Picture::new(scene),
         };
         self.desk.set_epoch(load.epoch);
         if let Some(channel) = self.channel(Topic::Tf) {
-            log(channel, &encode_transform(load.time_ns(scene.stamp.step), load.origin), None);
+            let time_ns = load.time_ns(scene.stamp.step);
+            if channel.has_sinks() {
+                self.log(channel, &encode_transform(time_ns, load.origin), time_ns, None);
+            }
         }
         state.load = Some(load);
         state.torn = None;
@@ -176,16 +214,11 @@ impl Publisher {
         let Some(load) = &mut state.load else { return };
         load.picture.set_torn(torn);
         self.is_scene_due.store(true, Ordering::Relaxed);
-        let row = |first: usize| {
-            let cause = |place| causes.get(place).copied().and_then(TearCause::from_number);
-            let name = |cause: Option<TearCause>| cause.map_or("unknown", TearCause::name);
-            let causes = (first..torn.len()).map(|place| name(cause(place)).to_owned()).collect();
-            Message::Tears(TearsRow { step, constraints: torn[first..].to_vec(), causes })
-        };
-        if self.is_heard(Topic::Tears) && first < torn.len() {
-            self.send(&mut state, &row(first), None);
+        let torn = Torn { step, constraints: torn.to_vec(), causes: causes.to_vec() };
+        if self.is_heard(Topic::Tears) && first < torn.constraints.len() {
+            self.send(&mut state, &torn.row(first), None);
         }
-        state.torn = (!torn.is_empty()).then(|| row(0));
+        state.torn = (!torn.constraints.is_empty()).then_some(torn);
     }
 
     /// Says something on a topic of recordings. It is made only where somebody hears it, or where
@@ -214,7 +247,7 @@ impl Publisher {
         let Some(channel) = self.channel(message.topic()) else { return };
         // Every row has a JSON form.
         if let Ok(bytes) = state.encoder.encode(message, time_ns) {
-            log(channel, bytes, sink);
+            self.log(channel, bytes, time_ns, sink);
         }
     }
 
@@ -231,13 +264,14 @@ impl Publisher {
             && (is_new || is_frame_due)
             && channel.has_sinks()
         {
-            log(channel, state.encoder.encode_particles(particles, time_ns), None);
+            self.log(channel, state.encoder.encode_particles(particles, time_ns), time_ns, None);
             state.encoded_count += 1;
         }
         let now_ns = monotonic_ns();
         let is_time = is_new && now_ns >= state.next_scene_ns;
         if self.scene.has_sinks() && (is_time || self.is_scene_due.swap(false, Ordering::Relaxed)) {
-            self.scene.log_with_meta(&load.picture.draw(time_ns, particles), now());
+            let picture = load.picture.draw(time_ns, particles);
+            self.scene.log_with_meta(&picture, self.metadata(time_ns));
             state.next_scene_ns = now_ns + SCENE_PERIOD_NS;
             state.encoded_count += 1;
         }
@@ -253,15 +287,13 @@ impl Publisher {
             let said = match topic {
                 Topic::Tf => {
                     if let (Some(channel), Some(load)) = (self.channel(topic), &state.load) {
-                        log(
-                            channel,
-                            &encode_transform(load.time_ns(step), load.origin),
-                            Some(sink),
-                        );
+                        let time_ns = load.time_ns(step);
+                        let bytes = encode_transform(time_ns, load.origin);
+                        self.log(channel, &bytes, time_ns, Some(sink));
                     }
                     continue;
                 }
-                Topic::Tears => state.torn.take(),
+                Topic::Tears => state.torn.as_ref().map(|torn| torn.row(0)),
                 Topic::Status => state.status.take(),
                 Topic::Steps => state.step.take(),
                 _ => continue,
@@ -269,7 +301,7 @@ impl Publisher {
             let Some(message) = said else { continue };
             self.send(state, &message, Some(sink));
             match topic {
-                Topic::Tears => state.torn = Some(message),
+                Topic::Tears => {}
                 Topic::Status => state.status = Some(message),
                 _ => state.step = Some(message),
             }
@@ -285,9 +317,12 @@ impl Publisher {
                 self.is_scene_due.store(true, Ordering::Relaxed);
                 return self.scene.has_sinks();
             }
-            ToPage::Playback(playback) if !playback.is_playing => {
-                self.is_scene_due.store(true, Ordering::Relaxed);
-                return self.scene.has_sinks();
+            ToPage::Playback(playback) => {
+                self.desk.set_playback(*playback);
+                if !playback.is_playing {
+                    self.is_scene_due.store(true, Ordering::Relaxed);
+                    return self.scene.has_sinks();
+                }
             }
             _ => {}
         }
@@ -298,8 +333,4 @@ impl Publisher {
     pub(crate) fn answer(&self, outcome: &OutcomeText) {
         self.desk.answer(outcome);
     }
-}
-
-fn log(channel: &RawChannel, bytes: &[u8], sink: Option<SinkId>) {
-    channel.log_with_meta_to_sink(bytes, now(), sink);
 }
