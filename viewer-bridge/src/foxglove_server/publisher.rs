@@ -253,6 +253,11 @@ impl Publisher {
 
     /// Shows a state: particles each time, the picture as often as it is made.
     pub(crate) fn show(&self, step: u64, particles: &[ParticleState]) {
+        self.show_at(monotonic_ns(), step, particles);
+    }
+
+    /// The same at that time of the monotonic clock.
+    pub(super) fn show_at(&self, now_ns: u64, step: u64, particles: &[ParticleState]) {
         let mut state = self.state();
         let state = &mut *state;
         self.serve_greetings(state, step);
@@ -267,9 +272,11 @@ impl Publisher {
             self.log(channel, state.encoder.encode_particles(particles, time_ns), time_ns, None);
             state.encoded_count += 1;
         }
-        let now_ns = monotonic_ns();
-        let is_time = is_new && now_ns >= state.next_scene_ns;
-        if self.scene.has_sinks() && (is_time || self.is_scene_due.swap(false, Ordering::Relaxed)) {
+        if !self.scene.has_sinks() {
+            return;
+        }
+        let is_scene_due = self.is_scene_due.swap(false, Ordering::Relaxed);
+        if is_scene_due || (is_new && now_ns >= state.next_scene_ns) {
             let picture = load.picture.draw(time_ns, particles);
             self.scene.log_with_meta(&picture, self.metadata(time_ns));
             state.next_scene_ns = now_ns + SCENE_PERIOD_NS;
