@@ -201,10 +201,12 @@ impl Publisher {
             let time_ns = load.time_ns(scene.stamp.step);
             if channel.has_sinks() {
                 self.log(channel, &encode_transform(time_ns, load.origin), time_ns, None);
+                self.settle(Topic::Tf);
             }
         }
         state.load = Some(load);
         state.torn = None;
+        state.step = None;
         self.is_scene_due.store(true, Ordering::Relaxed);
     }
 
@@ -231,8 +233,12 @@ impl Publisher {
         }
         let message = make();
         let mut state = self.state();
-        if is_heard {
+        // A state that is shown again was said already, and late subscribers are given it.
+        let is_known = topic == Topic::Steps
+            && state.step.as_ref().is_some_and(|before| before.step() == message.step());
+        if is_heard && !is_known {
             self.send(&mut state, &message, None);
+            self.settle(topic);
         }
         match topic {
             Topic::Status => state.status = Some(message),
@@ -282,6 +288,12 @@ impl Publisher {
             state.next_scene_ns = now_ns + SCENE_PERIOD_NS;
             state.encoded_count += 1;
         }
+    }
+
+    /// All who subscribed to a topic were told: none of them is late any more.
+    fn settle(&self, topic: Topic) {
+        let mut greetings = self.greetings.lock().unwrap_or_else(PoisonError::into_inner);
+        greetings.retain(|(other, _)| *other != topic);
     }
 
     /// Gives late subscribers what was said before they came.

@@ -137,12 +137,16 @@ fn a_late_subscriber_is_given_the_state_though_nothing_moves() {
     let bench = Bench::new(None);
     bench.begin(1);
     bench.publisher.set_torn(3, &[0], &[3], 0);
-    bench.publisher.say(Topic::Steps, || {
-        let header = SnapshotHeader { step: 3, ..bytemuck::Zeroable::zeroed() };
-        Message::Step(StepRow::from(&header))
-    });
+    let say_step = || {
+        bench.publisher.say(Topic::Steps, || {
+            let header = SnapshotHeader { step: 3, ..bytemuck::Zeroable::zeroed() };
+            Message::Step(StepRow::from(&header))
+        });
+    };
+    say_step();
     bench.show(0, 3);
     let first = bench.listen(&["/particles", "/scene", "/tears", "/steps", "/tf"]);
+    say_step();
     bench.show(1, 3);
     let mut heard = first.topics();
     heard.sort();
