@@ -163,6 +163,7 @@ impl Publisher {
         let mut greetings = self.greetings.lock().unwrap_or_else(PoisonError::into_inner);
         if let (Some(topic), Some(sink)) = (Topic::from_name(topic), sink)
             && greetings.len() < GREETINGS_MAX
+            && !greetings.contains(&(topic, sink))
         {
             greetings.push((topic, sink));
         }
