@@ -243,16 +243,14 @@ impl Desk {
         let Some(id) = outcome.id else { return };
         let waiting = self.state().waiting.remove(&id);
         match waiting {
-            None => {}
             Some(Waiting::Service(responder)) => respond(responder, outcome),
             Some(Waiting::Parameter { request, asked }) => {
                 self.close_part(request, asked, outcome);
             }
-            Some(Waiting::Publisher(client)) => {
-                if outcome.status != Fate::Applied {
-                    self.complain(&client, refusal(outcome.kind, outcome));
-                }
+            Some(Waiting::Publisher(client)) if outcome.status != Fate::Applied => {
+                self.complain(&client, refusal(outcome.kind, outcome));
             }
+            Some(Waiting::Publisher(_)) | None => {}
         }
     }
 

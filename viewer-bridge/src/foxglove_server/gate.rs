@@ -37,6 +37,7 @@ pub(super) struct Gate {
 
 impl Gate {
     /// Lets clients in as long as it is polled.
+    #[allow(clippy::infinite_loop, reason = "the type that says so is no async result yet")]
     pub(super) async fn run(self) {
         let Self { listener, guard, inner } = self;
         let (guard, places) = (Arc::new(guard), Arc::new(Semaphore::new(CLIENTS_MAX)));

@@ -112,10 +112,11 @@ fn one() -> i32 {
 fn command(name: &str, payload: &[u8]) -> Result<Command, String> {
     let payload = if payload.is_empty() { b"{}" } else { payload };
     if name == "step" {
-        let request: StepRequest = serde_json::from_slice(payload).map_err(wrong)?;
+        let request: StepRequest =
+            serde_json::from_slice(payload).map_err(|error| wrong(&error))?;
         return Ok(Command::Step { count: request.count });
     }
-    let EmptyRequest {} = serde_json::from_slice(payload).map_err(wrong)?;
+    let EmptyRequest {} = serde_json::from_slice(payload).map_err(|error| wrong(&error))?;
     match name {
         "pause" => Ok(Command::Pause {}),
         "resume" => Ok(Command::Resume {}),
@@ -124,7 +125,7 @@ fn command(name: &str, payload: &[u8]) -> Result<Command, String> {
     }
 }
 
-fn wrong(error: serde_json::Error) -> String {
+fn wrong(error: &serde_json::Error) -> String {
     format!("not what this service takes: {error}")
 }
 
