@@ -29,12 +29,12 @@ impl Stand {
     fn start(options: &[&str]) -> Self {
         let sandbox = Sandbox::new();
         let args = ["run", "curtain", "--paused"];
-        let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+        let process = Process::start_ready(Program::SimNode, &sandbox, &args);
         let args = [&["--listen", "127.0.0.1:0", "--foxglove", "127.0.0.1:0"], options].concat();
         let mut bridge = Process::start(Program::ViewerBridge, &sandbox, &args);
         let url = bridge.wait_for_line("foxglove ws://").replace("foxglove ", "");
         let node = Reader::attach(&sandbox.endpoint()).unwrap();
-        Self { sandbox, _node, _bridge: bridge, url, node }
+        Self { sandbox, _node: process, _bridge: bridge, url, node }
     }
 
     /// The newest state.

@@ -94,11 +94,11 @@ mod tests {
         match size {
             0..126 => bytes.push(0x80 | u8::try_from(size).unwrap()),
             126..65_536 => {
-                bytes.push(0x80 | 126);
+                bytes.push(0x80 | 0x7e);
                 bytes.extend(u16::try_from(size).unwrap().to_be_bytes());
             }
             _ => {
-                bytes.push(0x80 | 127);
+                bytes.push(0x80 | 0x7f);
                 bytes.extend((size as u64).to_be_bytes());
             }
         }

@@ -70,7 +70,7 @@ impl Bench {
         let stamp = Stamp { epoch, step: 0 };
         let (positions, ends) = (vec![[0.0; 3]; 2], vec![[0, 1]]);
         let rate_hz = 100;
-        self.publisher.begin(&Scene { stamp, positions, ends, rate_hz, ..Scene::default() });
+        self.publisher.begin(&Scene { stamp, rate_hz, positions, ends, ..Scene::default() });
     }
 
     fn show(&self, now_ns: u64, step: u64) {

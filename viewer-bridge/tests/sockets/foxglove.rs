@@ -165,7 +165,7 @@ fn a_client_gets_the_topics_it_subscribed_to_and_no_others() {
 
 #[test]
 fn nobody_waits_for_a_state_after_the_last_one_unsubscribed() {
-    let site = Site::start(options());
+    let mut site = Site::start(options());
     assert_eq!(site.hub.demand(1), Demand::default());
     let (mut client, _) = Client::start(&site.url);
     let (mut other, _) = Client::start(&site.url);
@@ -176,7 +176,6 @@ fn nobody_waits_for_a_state_after_the_last_one_unsubscribed() {
     client.unsubscribe(1);
     drop(other);
     // What was to be given to them at their coming has to be given up as well.
-    let mut site = site;
     site.begin(1);
     site.show(0, &particles(1, 0.0));
     wait_for("no demand", || (!site.hub.demand(1).foxglove).then_some(()));
