@@ -49,6 +49,7 @@
 
 mod collider_rows;
 mod descriptor;
+mod encoding;
 mod frames;
 mod index;
 mod keyframe_tears;
@@ -66,11 +67,13 @@ mod topic;
 mod writer;
 
 pub use collider_rows::{ColliderRow, CollidersRow, ShapeRow};
+pub use encoding::{MessageEncoder, TopicFormat, TopicSchema};
 pub use frames::{Frame, FrameReader};
 pub use index::{ChunkEntry, IndexedLog};
 pub use keyframe_tears::{KeyframeTears, cause_of};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
+pub use protobuf::{WORLD_FRAME, encode_transform};
 pub use reader::{LogReader, Logged, ReadError};
 pub use records::LogEnd;
 pub use rows::{

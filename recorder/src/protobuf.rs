@@ -7,8 +7,8 @@ use prost::Message;
 use prost_types::Timestamp;
 use sim_contract::ParticleState;
 
-/// The frame that particles are in; `/tf` says where it is in [`MAP_FRAME`].
-pub(crate) const WORLD_FRAME: &str = "world";
+/// Name of the frame that particles are in; `/tf` says where it is in the frame `map`.
+pub const WORLD_FRAME: &str = "world";
 /// The frame that a scene's origin is given in.
 pub(crate) const MAP_FRAME: &str = "map";
 
@@ -161,8 +161,9 @@ pub(crate) fn decode_particles(message: &[u8]) -> Result<Vec<ParticleState>, Str
     Ok(particles)
 }
 
-/// The message on `/tf`: the scene's frame stands at `origin` of the map, unturned.
-pub(crate) fn encode_transform(time_ns: u64, origin: [f64; 3]) -> Vec<u8> {
+/// The message on `/tf`: the scene's frame stands at `origin` (m) of the map, unturned. `time_ns`: of
+/// the step, in nanoseconds since 1970.
+pub fn encode_transform(time_ns: u64, origin: [f64; 3]) -> Vec<u8> {
     let [x, y, z] = origin;
     FrameTransform {
         timestamp: Some(timestamp(time_ns)),

@@ -7,19 +7,12 @@ use std::io::Write;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
-use schemars::{JsonSchema, schema_for};
-use serde::Serialize;
 
-use crate::collider_rows::CollidersRow;
-use crate::descriptor::{FRAME_TRANSFORM, POINT_CLOUD, file_descriptor_set};
+use crate::encoding::{MessageEncoder, TopicFormat};
 use crate::message::Message;
-use crate::protobuf::{PointCloudEncoder, encode_transform};
-use crate::rows::{EventRow, OutcomeRow, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow};
+use crate::protobuf::encode_transform;
 use crate::run::{CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT};
 use crate::topic::{AllCounts, Topic};
-
-/// Encoding of `/keyframe`: bytes that only the solver reads.
-pub(crate) const KEYFRAME_ENCODING: &str = "application/octet-stream";
 
 /// How the chunks of a file are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,9 +84,7 @@ pub struct LogWriter<W: Write> {
     run: RunDescription,
     /// Channel of each topic, in their order.
     channels: [u16; Topic::ALL.len()],
-    point_cloud: PointCloudEncoder,
-    /// The message that is being encoded.
-    scratch: Vec<u8>,
+    encoder: MessageEncoder,
     /// The newest time of reception: a later message is never earlier.
     log_time_ns: u64,
     /// Only `written` is counted here.
@@ -119,8 +110,7 @@ impl<W: Write> LogWriter<W> {
                 file: Some(file),
                 run: run.clone(),
                 channels,
-                point_cloud: PointCloudEncoder::new(),
-                scratch: Vec::new(),
+                encoder: MessageEncoder::default(),
                 log_time_ns,
                 counts: AllCounts::default(),
             }),
@@ -139,7 +129,7 @@ impl<W: Write> LogWriter<W> {
     pub fn write(&mut self, message: &Message, log_time_ns: u64) -> Result<(), WriteError> {
         self.log_time_ns = self.log_time_ns.max(log_time_ns);
         let publish_time_ns = self.run.time_of_step_ns(message.step());
-        let data = encode(message, publish_time_ns, &mut self.point_cloud, &mut self.scratch)?;
+        let data = self.encoder.encode(message, publish_time_ns)?;
         let header = MessageHeader {
             channel_id: self.channels[message.topic().index()],
             sequence: low_32_bits(message.step()),
@@ -253,62 +243,12 @@ fn write_head<W: Write>(
 }
 
 fn add_channel<W: Write>(file: &mut Writer<NoSeek<W>>, topic: Topic) -> mcap::McapResult<u16> {
-    let mut json = |name: &str, schema: String| {
-        file.add_schema(name, "jsonschema", schema.as_bytes()).map(|id| (id, "json"))
+    let TopicFormat { encoding, schema } = TopicFormat::of(topic);
+    let schema_id = match &schema {
+        Some(schema) => file.add_schema(schema.name, schema.encoding, &schema.data)?,
+        None => 0,
     };
-    let (schema_id, encoding) = match topic {
-        Topic::Topology => json("catenary.Topology", schema::<TopologyRow>()),
-        Topic::Surface => json("catenary.Surface", schema::<SurfaceRow>()),
-        Topic::Colliders => json("catenary.Colliders", schema::<CollidersRow>()),
-        Topic::Tears => json("catenary.Tears", schema::<TearsRow>()),
-        Topic::Outcomes => json("catenary.Outcome", schema::<OutcomeRow>()),
-        Topic::Status => json("catenary.Status", schema::<StatusRow>()),
-        Topic::Events => json("catenary.Event", schema::<EventRow>()),
-        Topic::Steps => json("catenary.Step", schema::<StepRow>()),
-        Topic::Keyframe => Ok((0, KEYFRAME_ENCODING)),
-        Topic::Tf => protobuf(file, FRAME_TRANSFORM),
-        Topic::Particles => protobuf(file, POINT_CLOUD),
-    }?;
     file.add_channel(schema_id, topic.name(), encoding, &BTreeMap::new())
-}
-
-fn protobuf<W: Write>(
-    file: &mut Writer<NoSeek<W>>,
-    name: &'static str,
-) -> mcap::McapResult<(u16, &'static str)> {
-    let id = file.add_schema(name, "protobuf", &file_descriptor_set(name))?;
-    Ok((id, "protobuf"))
-}
-
-fn schema<T: JsonSchema>() -> String {
-    schema_for!(T).to_value().to_string()
-}
-
-/// The bytes of a message: its own, or encoded into `scratch`.
-fn encode<'a>(
-    message: &'a Message,
-    time_ns: u64,
-    point_cloud: &mut PointCloudEncoder,
-    scratch: &'a mut Vec<u8>,
-) -> Result<&'a [u8], WriteError> {
-    match message {
-        Message::Topology(row) => json(row, scratch)?,
-        Message::Surface(row) => json(row, scratch)?,
-        Message::Colliders(row) => json(row, scratch)?,
-        Message::Tears(row) => json(row, scratch)?,
-        Message::Outcome(row) => json(row, scratch)?,
-        Message::Status(row) => json(row, scratch)?,
-        Message::Event(row) => json(row, scratch)?,
-        Message::Step(row) => json(row, scratch)?,
-        Message::Keyframe { bytes, .. } => return Ok(bytes),
-        Message::Particles { particles, .. } => point_cloud.encode(time_ns, particles, scratch),
-    }
-    Ok(scratch)
-}
-
-fn json<T: Serialize>(row: &T, scratch: &mut Vec<u8>) -> Result<(), WriteError> {
-    scratch.clear();
-    Ok(serde_json::to_writer(scratch, row)?)
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the low half is what is asked for")]

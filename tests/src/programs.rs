@@ -21,6 +21,8 @@ pub enum Program {
     Drag,
     /// The Python of `.venv`, which `.ci/run` makes.
     Python,
+    /// The Node of this machine, for scripts whose packages `.ci/run` installs in `tests/node`.
+    Node,
 }
 
 impl Program {
@@ -33,6 +35,8 @@ impl Program {
             Self::StubbornReader => built().join("stubborn-reader"),
             Self::Watch => built().join("examples/watch"),
             Self::Drag => built().join("examples/drag"),
+            // Out of the search path.
+            Self::Node => PathBuf::from("node"),
             Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),
         }
     }

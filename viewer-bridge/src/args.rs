@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
+use viewer_bridge::{FoxgloveOptions, Recording};
 
 /// Show a running simulation in a browser, and let it be touched.
 ///
@@ -21,7 +22,9 @@ use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
         viewer-bridge --listen 127.0.0.1:0          on any free port; the address is printed\n  \
         viewer-bridge --name left --domain lab      show another node\n  \
         viewer-bridge --replay run.mcap             show a recording; no node is needed\n  \
-        viewer-bridge --listen 0.0.0.0:8080         for other machines; the address has a token"
+        viewer-bridge --listen 0.0.0.0:8080         for other machines; the address has a token\n  \
+        viewer-bridge --foxglove                    also for Foxglove viewers, at ws://127.0.0.1:8765\n  \
+        viewer-bridge --foxglove --allow-commands   they may also pause, step, reset and set"
 )]
 pub(crate) struct Args {
     /// Address and port to listen at; port 0 is any free one. Elsewhere than on loopback, pages need
@@ -36,6 +39,24 @@ pub(crate) struct Args {
     /// one that was cut off is shown as far as it goes
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "name")]
     pub(crate) replay: Option<PathBuf>,
+    /// Also serve viewers that speak the Foxglove protocol (foxglove.sdk.v1), at this address; port 0
+    /// is any free one. Only on loopback: the protocol has no way to prove who connects
+    #[arg(
+        long,
+        value_name = "ADDR:PORT",
+        num_args = 0..=1,
+        default_missing_value = "127.0.0.1:8765",
+        value_parser = foxglove_address
+    )]
+    foxglove: Option<SocketAddr>,
+    /// Origin of a web page that may connect to the Foxglove address, as in `https://viewer.example`;
+    /// may be given more than once. Programs have none, and may
+    #[arg(long = "foxglove-origin", value_name = "ORIGIN", requires = "foxglove")]
+    foxglove_origins: Vec<String>,
+    /// Let Foxglove clients change things: services (pause, resume, step, reset), parameters, and
+    /// commands that they publish. Pages always may
+    #[arg(long, requires = "foxglove")]
+    allow_commands: bool,
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = name)]
     name: String,
@@ -53,6 +74,22 @@ impl Args {
         let domain = self.domain.as_deref().filter(|domain| !domain.is_empty());
         Endpoint::new(domain, &self.name)
     }
+
+    /// What the Foxglove server is told, where there is to be one.
+    pub(crate) fn foxglove(&self, recording: Option<Recording>) -> Option<FoxgloveOptions> {
+        self.foxglove.map(|listen| FoxgloveOptions {
+            listen,
+            origins: self.foxglove_origins.clone(),
+            takes_commands: self.allow_commands,
+            recording,
+        })
+    }
+}
+
+fn foxglove_address(text: &str) -> Result<SocketAddr, String> {
+    let address = text.parse().map_err(|_| "an address and a port, as in 127.0.0.1:8765")?;
+    FoxgloveOptions::check_address(address).map_err(|error| error.to_string())?;
+    Ok(address)
 }
 
 fn name(text: &str) -> Result<String, EndpointError> {

@@ -11,7 +11,7 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 use crate::check::check;
 use crate::hub::{Connection, Hub, Shown};
 use crate::limits::{HELLO_TIMEOUT, PING_PERIOD, PROTOCOL, SILENCE_MAX};
-use crate::message::{Command, FromPage, Hello, OutcomeText, Status, ToPage};
+use crate::message::{Command, FromPage, Hello, OutcomeText, ToPage};
 use crate::rate_limit::RateLimit;
 use crate::reason;
 use crate::server::Site;
@@ -187,17 +187,7 @@ fn hand_over(hub: &Hub, client: u32, id: Option<u32>, command: Command) {
         (!is_taken).then_some(reason::BUSY)
     });
     if let Some(reason) = refused {
-        let text = reason::text(reason).to_owned();
-        let outcome = OutcomeText {
-            id,
-            kind,
-            status: Status::Rejected,
-            step: None,
-            applied: 0,
-            rejected: 1,
-            reason,
-            text,
-        };
+        let outcome = OutcomeText::refused(id, kind, reason);
         hub.send(client, &ToPage::Outcome(outcome));
     }
 }

@@ -40,6 +40,19 @@ pub struct Guard {
     names: Vec<String>,
     /// What a page has to know where anybody could reach the server.
     token: Option<String>,
+    /// Origins that are let in; none: those of this server's own pages.
+    origins: Option<Vec<String>>,
+}
+
+/// Whether a request is let in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Admission {
+    /// It is.
+    Granted,
+    /// It is meant for a host of another name.
+    ForeignHost,
+    /// It comes from a page that has no business here.
+    ForeignOrigin,
 }
 
 impl Guard {
@@ -53,7 +66,13 @@ impl Guard {
         } else {
             Some(format!("{:016x}{:016x}", getrandom::u64()?, getrandom::u64()?))
         };
-        Ok(Self { address, names, token })
+        Ok(Self { address, names, token, origins: None })
+    }
+
+    /// The rules of a server on loopback that has no pages: only those of these origins, and programs,
+    /// which have none, are let in.
+    pub(crate) fn for_origins(address: SocketAddr, origins: Vec<String>) -> Self {
+        Self { address, names: Vec::new(), token: None, origins: Some(origins) }
     }
 
     /// The token, where there has to be one.
@@ -71,19 +90,27 @@ impl Guard {
 
     /// Whether a request with these headers is let in.
     pub(crate) fn admits(&self, headers: &HeaderMap) -> bool {
-        let Some(host) = single(headers, &header::HOST) else { return false };
-        if !self.is_own(host) {
-            return false;
-        }
+        self.admission(headers) == Admission::Granted
+    }
+
+    /// The same, with what is wrong.
+    pub(crate) fn admission(&self, headers: &HeaderMap) -> Admission {
+        let Some(host) = single(headers, &header::HOST).filter(|host| self.is_own(host)) else {
+            return Admission::ForeignHost;
+        };
         if !headers.contains_key(header::ORIGIN) {
             // No browser, or a plain request for a file.
-            return true;
+            return Admission::Granted;
         }
-        let origin = single(headers, &header::ORIGIN).and_then(|one| one.strip_prefix("http://"));
-        origin.is_some_and(|origin| match self.token {
-            None => self.is_own(origin),
-            Some(_) => origin.eq_ignore_ascii_case(host),
-        })
+        let is_allowed = single(headers, &header::ORIGIN).is_some_and(|origin| {
+            match (&self.origins, origin.strip_prefix("http://")) {
+                (Some(allowed), _) => allowed.iter().any(|one| one == origin),
+                (None, Some(origin)) if self.token.is_none() => self.is_own(origin),
+                (None, Some(origin)) => origin.eq_ignore_ascii_case(host),
+                (None, None) => false,
+            }
+        });
+        if is_allowed { Admission::Granted } else { Admission::ForeignOrigin }
     }
 
     /// Whether that is this server: a name or address, and the port unless it is the usual one.

@@ -8,14 +8,16 @@
 mod connection;
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use axum::extract::ws::Message;
 use bytes::Bytes;
+use recorder::Topic;
 use tokio::sync::{mpsc, watch};
 
 pub(crate) use connection::{Connection, Credit, Shown};
 
+use crate::foxglove_server::{CLIENT_FIRST, Publisher};
 use crate::limits::{F32_PARTICLES_MAX, PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{Choice, Limits, Mode, ToPage, Welcome};
 use crate::source::{Ask, Request, RequestSender, Requests, requests};
@@ -71,11 +73,18 @@ pub struct Demand {
     pub f32: bool,
     /// FRAME u16.
     pub u16: bool,
+    /// Foxglove clients wait for a state.
+    pub foxglove: bool,
 }
 
 impl Demand {
     /// Whether anybody waits for a frame.
     pub fn is_any(self) -> bool {
+        self.is_of_pages() || self.foxglove
+    }
+
+    /// Whether a page does.
+    pub fn is_of_pages(self) -> bool {
         self.f32 || self.u16
     }
 }
@@ -97,6 +106,8 @@ pub struct Hub {
     frames: watch::Sender<Arc<FrameSet>>,
     closed: watch::Sender<bool>,
     requests: RequestSender,
+    /// The Foxglove side, if there is one.
+    publisher: OnceLock<Arc<Publisher>>,
 }
 
 #[derive(Debug, Default)]
@@ -133,6 +144,7 @@ impl Hub {
             frames: watch::Sender::default(),
             closed: watch::Sender::new(false),
             requests: sender,
+            publisher: OnceLock::new(),
         };
         (hub, receiver)
     }
@@ -143,8 +155,28 @@ impl Hub {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Adds the Foxglove side; the first one stays.
+    pub(crate) fn set_publisher(&self, publisher: Arc<Publisher>) {
+        let _first = self.publisher.set(publisher);
+    }
+
+    /// The Foxglove side, if there is one.
+    pub(crate) fn publisher(&self) -> Option<&Publisher> {
+        self.publisher.get().map(Arc::as_ref)
+    }
+
+    /// Says something on a topic of recordings, to Foxglove clients; it is made only if one hears it.
+    pub fn say(&self, topic: Topic, make: impl FnOnce() -> recorder::Message) {
+        if let Some(publisher) = self.publisher() {
+            publisher.say(topic, make);
+        }
+    }
+
     /// Tells everyone something that stays true: pages that come later are told as well.
     pub fn latch(&self, slot: Slot, message: &ToPage) {
+        if self.publisher().is_some_and(|publisher| publisher.hear(message)) {
+            self.request(CLIENT_FIRST, Ask::Frame);
+        }
         self.latch_bytes(slot, &text(message), None);
     }
 
@@ -180,6 +212,12 @@ impl Hub {
 
     /// Tells one page, if it is still here.
     pub fn send(&self, client: u32, message: &ToPage) {
+        if client >= CLIENT_FIRST {
+            if let (Some(publisher), ToPage::Outcome(outcome)) = (self.publisher(), message) {
+                publisher.answer(outcome);
+            }
+            return;
+        }
         let mut state = self.state();
         if let Some(member) = state.clients.get(&client)
             && member.queue.try_send(text(message)).is_err()
@@ -200,7 +238,8 @@ impl Hub {
 
     /// Which encodings pages with credit wait for, in a scene of that many particles.
     pub fn demand(&self, particle_count: usize) -> Demand {
-        let mut demand = Demand::default();
+        let foxglove = self.publisher().is_some_and(Publisher::is_awaiting);
+        let mut demand = Demand { foxglove, ..Demand::default() };
         for member in self.state().clients.values().filter(|member| member.credit.is_left()) {
             if wants_f32(member.choice, particle_count) {
                 demand.f32 = true;

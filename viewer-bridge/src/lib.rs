@@ -16,6 +16,7 @@
 pub mod assets;
 mod check;
 mod client;
+mod foxglove_server;
 pub mod guard;
 pub mod hub;
 pub mod limits;
@@ -35,6 +36,7 @@ pub mod source;
 pub mod stage;
 pub mod wire;
 
+pub use foxglove_server::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Recording};
 pub use hub::Hub;
 pub use server::{Server, ServerOptions};
 pub use source::Source;

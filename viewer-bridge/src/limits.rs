@@ -21,6 +21,9 @@ pub const FRAMES_UNACKNOWLEDGED_MAX: u32 = 2;
 pub const FRAMES_PER_SECOND_MAX: u32 = 60;
 /// Reliable messages that wait for one page before it is given up.
 pub const RELIABLE_QUEUED_MAX: usize = 256;
+/// Messages that wait for one Foxglove client; a new one replaces the oldest. More than a few are only
+/// old when a client that was slow gets them.
+pub const FOXGLOVE_QUEUED_MAX: usize = 8;
 /// Requests of all pages that wait for the source.
 pub const REQUESTS_QUEUED_MAX: usize = 4096;
 /// Commands that wait for room at the node.
@@ -44,3 +47,7 @@ pub const PING_PERIOD: Duration = Duration::from_secs(3);
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long a command may go unanswered.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long clients have to take their leave at the end.
+pub const FAREWELL_TIMEOUT: Duration = Duration::from_secs(2);
+/// Pause after a connection could not be taken.
+pub const ACCEPT_PAUSE: Duration = Duration::from_millis(20);

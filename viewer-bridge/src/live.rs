@@ -14,7 +14,7 @@ use sim_contract::{AttachError, Endpoint};
 
 use crate::Hub;
 use crate::hub::Slot;
-use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, Status, ToPage};
+use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, ToPage};
 use crate::reason;
 use crate::source::{Ask, Requests, Source};
 use crate::stage::Stage;
@@ -108,16 +108,7 @@ fn refuse_for_a_while(hub: &Hub, requests: &Requests) {
             hub.show_again();
         }
         if let Ask::Command { id, command } = request.ask {
-            let outcome = OutcomeText {
-                id,
-                kind: command.name(),
-                status: Status::Rejected,
-                step: None,
-                applied: 0,
-                rejected: 1,
-                reason: reason::NO_NODE,
-                text: reason::text(reason::NO_NODE).to_owned(),
-            };
+            let outcome = OutcomeText::refused(id, command.name(), reason::NO_NODE);
             hub.send(request.client, &ToPage::Outcome(outcome));
         }
     }

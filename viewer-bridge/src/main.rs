@@ -15,7 +15,8 @@ use tokio::runtime;
 use viewer_bridge::assets::Assets;
 use viewer_bridge::live::Live;
 use viewer_bridge::replay::Replay;
-use viewer_bridge::{Hub, Server, ServerOptions, Source};
+use viewer_bridge::source::Requests;
+use viewer_bridge::{FoxgloveOptions, FoxgloveServer, Hub, Server, ServerOptions, Source};
 
 use args::Args;
 
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = Stop::install()?;
     let source = source(args)?;
+    let foxglove = args.foxglove(source.recording());
     let assets = match &args.assets {
         None => Assets::Embedded,
         Some(folder) => Assets::folder(folder)
@@ -49,7 +51,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .enable_all()
         .build()
         .context("starting the server's threads")?;
-    runtime.block_on(serve(source, options, stop))
+    runtime.block_on(serve(source, options, foxglove, stop))
 }
 
 /// What is shown: a recording, or whatever node has the name.
@@ -61,36 +63,57 @@ fn source(args: &Args) -> anyhow::Result<Box<dyn Source>> {
 }
 
 /// Serves until asked to stop, or until the source fails.
-async fn serve(source: Box<dyn Source>, options: ServerOptions, stop: Stop) -> anyhow::Result<()> {
+async fn serve(
+    source: Box<dyn Source>,
+    options: ServerOptions,
+    foxglove: Option<FoxgloveOptions>,
+    stop: Stop,
+) -> anyhow::Result<()> {
     let server = Server::bind(options).await?;
-    let (hub, feeding) = feed(source)?;
-    say_ready(&server);
+    let (hub, requests) = Hub::new(source.mode());
+    let hub = Arc::new(hub);
+    // Before the source starts: it has to hear everything.
+    let foxglove = match foxglove {
+        None => None,
+        Some(options) => Some(FoxgloveServer::start(options, &hub).await?),
+    };
+    let feeding = feed(source, &hub, requests)?;
+    say_ready(&server, foxglove.as_ref());
+    let serve_foxglove = async {
+        if let Some(foxglove) = foxglove {
+            foxglove.serve(Arc::clone(&hub)).await;
+        }
+    };
     let watch = async {
         while !stop.is_asked() && !feeding.is_finished() {
             tokio::time::sleep(LOOK_PERIOD).await;
         }
         hub.close();
     };
-    tokio::join!(server.serve(Arc::clone(&hub)), watch);
+    tokio::join!(server.serve(Arc::clone(&hub)), serve_foxglove, watch);
     feeding
         .join()
         .map_err(|_| anyhow!("the thread that reads the node or the recording panicked"))?
 }
 
 /// Starts the thread of the source.
-fn feed(mut source: Box<dyn Source>) -> anyhow::Result<(Arc<Hub>, JoinHandle<anyhow::Result<()>>)> {
-    let (hub, requests) = Hub::new(source.mode());
-    let hub = Arc::new(hub);
-    let fed = Arc::clone(&hub);
-    let feeding = thread::Builder::new()
+fn feed(
+    mut source: Box<dyn Source>,
+    hub: &Arc<Hub>,
+    requests: Requests,
+) -> anyhow::Result<JoinHandle<anyhow::Result<()>>> {
+    let hub = Arc::clone(hub);
+    thread::Builder::new()
         .name("source".to_owned())
-        .spawn(move || source.run(&fed, &requests))
-        .context("starting the thread that reads the node or the recording")?;
-    Ok((hub, feeding))
+        .spawn(move || source.run(&hub, &requests))
+        .context("starting the thread that reads the node or the recording")
 }
 
-fn say_ready(server: &Server) {
+fn say_ready(server: &Server, foxglove: Option<&FoxgloveServer>) {
     let url = server.url();
+    if let Some(foxglove) = foxglove {
+        note(&format!("foxglove {}", foxglove.url()));
+    }
     note(&format!("ready {url}"));
     if url.contains('#') {
         note("warning: other machines can reach this; whoever has the token can command the node");

@@ -20,6 +20,7 @@ use anyhow::Context;
 use recorder::{Tape, TapeState, Torn};
 
 use crate::Hub;
+use crate::foxglove_server::Recording;
 use crate::load::Load;
 use crate::message::Mode;
 use crate::source::{Requests, Source};
@@ -59,6 +60,16 @@ impl Replay {
 impl Source for Replay {
     fn mode(&self) -> Mode {
         Mode::Replay
+    }
+
+    fn recording(&self) -> Option<Recording> {
+        let run = self.tape.run();
+        Some(Recording {
+            epoch_ns: run.epoch_ns,
+            rate_hz: run.rate_hz,
+            first_step: self.tape.first_step(),
+            last_step: self.tape.last_step(),
+        })
     }
 
     fn run(&mut self, hub: &Hub, requests: &Requests) -> anyhow::Result<()> {

@@ -3,7 +3,6 @@
 use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
@@ -24,7 +23,10 @@ use crate::assets::Assets;
 use crate::client;
 use crate::guard::{Guard, HEADERS};
 use crate::hub::Hub;
-use crate::limits::{CLIENTS_MAX, CONNECTIONS_MAX, HELLO_TIMEOUT, MESSAGE_SIZE_BYTES_MAX};
+use crate::limits::{
+    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTIONS_MAX, FAREWELL_TIMEOUT, HELLO_TIMEOUT,
+    MESSAGE_SIZE_BYTES_MAX,
+};
 
 /// What a server is told.
 #[derive(Debug)]
@@ -71,11 +73,6 @@ pub(crate) struct Site {
     /// A permit for each page.
     places: Arc<Semaphore>,
 }
-
-/// How long pages have to take their leave at the end.
-const FAREWELL_TIMEOUT: Duration = Duration::from_secs(2);
-/// Pause after a connection could not be taken.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(20);
 
 impl Server {
     /// Takes the address.

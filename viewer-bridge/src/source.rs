@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
 use crate::Hub;
+use crate::foxglove_server::Recording;
 use crate::limits::REQUESTS_QUEUED_MAX;
 use crate::message::{Command, Mode};
 
@@ -14,6 +15,11 @@ use crate::message::{Command, Mode};
 pub trait Source: Send {
     /// Whether pages get a picker of scenes or a timeline.
     fn mode(&self) -> Mode;
+
+    /// The times of the recording that it plays, if it plays one.
+    fn recording(&self) -> Option<Recording> {
+        None
+    }
 
     /// Feeds the hub and answers the requests until [`Hub::is_closed`].
     ///

@@ -65,6 +65,9 @@ impl Stage {
         self.colliders.clear();
         self.collider_set = None;
         hub.latch_binary(Slot::Scene, scene.encode(), None);
+        if let Some(publisher) = hub.publisher() {
+            publisher.begin(&scene);
+        }
     }
 
     /// Takes the list of all that is torn after a step. `causes` may be shorter: not known then.
@@ -82,6 +85,9 @@ impl Stage {
             Tear { stamp: self.stamp(step), first, constraints, causes }.encode()
         };
         hub.latch_binary(Slot::Tear, tear(0), Some(tear(first)));
+        if let Some(publisher) = hub.publisher() {
+            publisher.set_torn(step, torn, causes.as_slice(), first);
+        }
         self.torn = torn.to_vec();
     }
 
@@ -109,7 +115,12 @@ impl Stage {
     /// Shows a state to those who wait for one. Load and number of the head are filled in.
     pub fn show(&mut self, hub: &Hub, mut head: FrameHead, particles: &[ParticleState]) {
         let demand = hub.demand(particles.len());
-        if !demand.is_any() {
+        if let Some(publisher) = hub.publisher()
+            && demand.foxglove
+        {
+            publisher.show(head.stamp.step, particles);
+        }
+        if !demand.is_of_pages() {
             return;
         }
         let begin_ns = monotonic_ns();

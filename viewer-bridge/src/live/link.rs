@@ -5,6 +5,7 @@ mod statistics;
 
 use std::time::Duration;
 
+use recorder::{Message, OutcomeRow, StatusRow, StepRow, Topic};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     Action, AttachError, Client, Endpoint, NodeStatus, Snapshot, SnapshotFlags, StatusFlags, Tap,
@@ -196,6 +197,9 @@ impl Link {
         self.check_run(&news)?;
         self.take_outcomes(&news, hub);
         self.parts.take(&mut news);
+        if let Some(status) = &news.status {
+            hub.say(Topic::Status, || Message::Status(StatusRow::from(status)));
+        }
         self.status = news.status.or(self.status);
         if let Some((header, torn)) = news.tears {
             self.torn = Some((header.step, torn));
@@ -225,6 +229,7 @@ impl Link {
 
     fn take_outcomes(&mut self, news: &News, hub: &Hub) {
         for outcome in &news.outcomes {
+            hub.say(Topic::Outcomes, || Message::Outcome(OutcomeRow::from(outcome)));
             self.known.follow(outcome);
             let action = outcome.command.action();
             if outcome.is_applied() && matches!(action, Action::Reset | Action::Load { .. }) {
@@ -311,6 +316,7 @@ impl Link {
             number: 0,
             publish_monotonic_ns: header.publish_monotonic_ns,
         };
+        hub.say(Topic::Steps, || Message::Step(StepRow::from(header)));
         stage.show(hub, head, snapshot.particles());
         let step = header.step;
         self.shown_step = Some(step);

@@ -9,6 +9,7 @@ pub use timeline::{Hashes, Mark, MarkKind, Playback, Timeline};
 use super::Choice;
 use crate::limits;
 use crate::parameters::Parameters;
+use crate::reason;
 use crate::scenes::SceneEntry;
 use crate::settings::SettingEntry;
 
@@ -195,6 +196,22 @@ pub struct OutcomeText {
     pub reason: &'static str,
     /// A sentence for the user, or "".
     pub text: String,
+}
+
+impl OutcomeText {
+    /// The outcome of what was refused before it reached a node; `reason` is its word.
+    pub fn refused(id: Option<u32>, kind: &'static str, reason: &'static str) -> Self {
+        Self {
+            id,
+            kind,
+            status: Status::Rejected,
+            step: None,
+            applied: 0,
+            rejected: 1,
+            reason,
+            text: reason::text(reason).to_owned(),
+        }
+    }
 }
 
 /// How bad something is.

@@ -4,7 +4,7 @@
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use recorder::{ReadError, TapeState};
+use recorder::{Message, ReadError, TapeState, Topic};
 use sim_contract::PlainF32;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
@@ -254,7 +254,7 @@ impl<'a> Player<'a> {
 
     /// Shows the state, if it was not shown: at once where a page asked for it.
     fn show(&mut self, now_ns: u64) {
-        let row = &self.state.row;
+        let row = self.state.row;
         let is_due = now_ns >= self.due_ns || !self.answers.is_empty();
         if !is_due || !self.is_awaited() {
             return;
@@ -275,6 +275,7 @@ impl<'a> Player<'a> {
             publish_monotonic_ns: now_ns,
         };
         self.shown_step = Some(row.step);
+        self.hub.say(Topic::Steps, || Message::Step(row));
         self.stage.show(self.hub, head, &self.state.particles);
     }
 
@@ -349,6 +350,9 @@ impl<'a> Player<'a> {
     fn tell_statistics_if_due(&mut self, now_ns: u64) {
         if now_ns >= self.next_statistics_ns {
             self.next_statistics_ns = now_ns + STATISTICS_PERIOD_NS;
+            if let Some(status) = &self.state.status {
+                self.hub.say(Topic::Status, || Message::Status(status.clone()));
+            }
             self.tell_statistics();
         }
     }

@@ -153,8 +153,8 @@ fn nobody_to_show_to_is_no_demand() {
     let mut site = Site::start();
     assert_eq!(site.hub.demand(10), Demand::default());
     let page = site.page();
-    assert_eq!(site.hub.demand(10), Demand { f32: true, u16: false });
-    assert_eq!(site.hub.demand(100_000), Demand { f32: false, u16: true });
+    assert_eq!(site.hub.demand(10), Demand { f32: true, ..Demand::default() });
+    assert_eq!(site.hub.demand(100_000), Demand { u16: true, ..Demand::default() });
     site.begin(1);
     drop(page);
     site.wait_for_clients(0);

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod delivery;
+mod foxglove;
+mod foxglove_client;
 mod intruders;
 mod misuse;
 mod support;

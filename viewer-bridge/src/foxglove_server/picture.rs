@@ -1,0 +1,181 @@
+//! `/scene`: sticks and surface, as one message that draws them.
+
+use std::collections::BTreeSet;
+
+use foxglove::messages::line_primitive::Type;
+use foxglove::messages::{
+    Color, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate, Timestamp,
+    TriangleListPrimitive, Vector3,
+};
+use recorder::WORLD_FRAME;
+use sim_contract::ParticleState;
+use sim_contract::clock::SECOND_NS;
+
+use crate::wire::Scene;
+
+/// Width of a stick in pixels, however far away it is.
+const STICK_WIDTH_PX: f64 = 1.5;
+const STICK_COLOR: Color = Color { r: 0.45, g: 0.6, b: 0.75, a: 1.0 };
+const SURFACE_COLOR: Color = Color { r: 0.72, g: 0.2, b: 0.18, a: 0.85 };
+const IDENTITY: Pose = Pose {
+    position: Some(Vector3 { x: 0.0, y: 0.0, z: 0.0 }),
+    orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
+};
+
+/// What is drawn of a load: its constraints and triangles, and which of them are left.
+#[derive(Debug, Default)]
+pub(super) struct Picture {
+    sticks: Vec<[u32; 2]>,
+    triangles: Vec<[u32; 3]>,
+    is_torn: Vec<bool>,
+    /// A triangle goes with the first of its edges that tears.
+    is_gone: Vec<bool>,
+}
+
+impl Picture {
+    /// Of a load of which nothing is torn.
+    pub(super) fn new(scene: &Scene) -> Self {
+        Self {
+            is_torn: vec![false; scene.ends.len()],
+            is_gone: vec![false; scene.triangles.len()],
+            sticks: scene.ends.clone(),
+            triangles: scene.triangles.clone(),
+        }
+    }
+
+    /// Takes the list of all that is torn.
+    pub(super) fn set_torn(&mut self, torn: &[u32]) {
+        self.is_torn.fill(false);
+        let mut edges = BTreeSet::new();
+        for constraint in torn.iter().map(|constraint| *constraint as usize) {
+            if let Some(ends) = self.sticks.get(constraint) {
+                self.is_torn[constraint] = true;
+                edges.insert(ordered(*ends));
+            }
+        }
+        for (is_gone, [a, b, c]) in self.is_gone.iter_mut().zip(&self.triangles) {
+            *is_gone =
+                [[*a, *b], [*b, *c], [*c, *a]].map(ordered).iter().any(|edge| edges.contains(edge));
+        }
+    }
+
+    /// The message for a state, with the same two entities each time: each replaces the one before.
+    pub(super) fn draw(&self, time_ns: u64, particles: &[ParticleState]) -> SceneUpdate {
+        let is_place = |particle: &u32| {
+            let particle = particles.get(*particle as usize);
+            particle.is_some_and(|one| one.position.iter().all(|axis| axis.is_finite()))
+        };
+        let sticks = left(&self.sticks, &self.is_torn, is_place);
+        let triangles = left(&self.triangles, &self.is_gone, is_place);
+        let points = points(particles);
+        let surface = TriangleListPrimitive {
+            pose: Some(IDENTITY),
+            points: if triangles.is_empty() { Vec::new() } else { points.clone() },
+            color: Some(SURFACE_COLOR),
+            indices: triangles,
+            ..TriangleListPrimitive::default()
+        };
+        let sticks = LinePrimitive {
+            r#type: Type::LineList as i32,
+            pose: Some(IDENTITY),
+            thickness: STICK_WIDTH_PX,
+            scale_invariant: true,
+            points: if sticks.is_empty() { Vec::new() } else { points },
+            color: Some(STICK_COLOR),
+            indices: sticks,
+            ..LinePrimitive::default()
+        };
+        SceneUpdate {
+            deletions: Vec::new(),
+            entities: vec![
+                SceneEntity { lines: vec![sticks], ..entity("sticks", time_ns) },
+                SceneEntity { triangles: vec![surface], ..entity("surface", time_ns) },
+            ],
+        }
+    }
+}
+
+fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// The particles of the elements that are left and whose particles all have a place.
+fn left<const N: usize>(
+    elements: &[[u32; N]],
+    is_gone: &[bool],
+    is_place: impl Fn(&u32) -> bool,
+) -> Vec<u32> {
+    let elements = elements.iter().zip(is_gone);
+    let left = elements.filter(|(element, is_gone)| !**is_gone && element.iter().all(&is_place));
+    left.flat_map(|(element, _)| *element).collect()
+}
+
+/// Positions as the message has them; one that is none is not drawn, but counts.
+fn points(particles: &[ParticleState]) -> Vec<Point3> {
+    let finite = |axis: f32| if axis.is_finite() { f64::from(axis) } else { 0.0 };
+    let positions = particles.iter().map(|particle| particle.position.map(finite));
+    positions.map(|[x, y, z]| Point3 { x, y, z }).collect()
+}
+
+fn entity(id: &str, time_ns: u64) -> SceneEntity {
+    // Seconds fit until 2106.
+    let seconds = u32::try_from(time_ns / SECOND_NS).unwrap_or(u32::MAX);
+    #[allow(clippy::cast_possible_truncation, reason = "the remainder is below 10^9")]
+    let nanoseconds = (time_ns % SECOND_NS) as u32;
+    SceneEntity {
+        timestamp: Timestamp::new_checked(seconds, nanoseconds),
+        frame_id: WORLD_FRAME.to_owned(),
+        id: id.to_owned(),
+        ..SceneEntity::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn particles() -> Vec<ParticleState> {
+        let at =
+            |x: f32, y: f32| ParticleState { position: [x, y, 0.0], ..ParticleState::default() };
+        vec![at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)]
+    }
+
+    fn picture() -> Picture {
+        Picture::new(&Scene {
+            ends: vec![[0, 1], [1, 2], [2, 3]],
+            triangles: vec![[0, 1, 2], [3, 2, 1]],
+            ..Scene::default()
+        })
+    }
+
+    fn indices(update: &SceneUpdate) -> (&[u32], &[u32]) {
+        (&update.entities[0].lines[0].indices, &update.entities[1].triangles[0].indices)
+    }
+
+    #[test]
+    fn sticks_and_triangles_are_drawn_at_the_particles() {
+        let update = picture().draw(1_500_000_000, &particles());
+        assert_eq!(indices(&update), (&[0, 1, 1, 2, 2, 3][..], &[0, 1, 2, 3, 2, 1][..]));
+        let point = update.entities[0].lines[0].points[3];
+        assert_eq!((point.x, point.y, point.z), (1.0, 1.0, 0.0));
+        assert_eq!(update.entities[0].frame_id, "world");
+    }
+
+    #[test]
+    fn what_tore_and_the_triangles_along_it_are_not_drawn() {
+        let mut picture = picture();
+        picture.set_torn(&[2, 99]);
+        assert_eq!(indices(&picture.draw(0, &particles())), (&[0, 1, 1, 2][..], &[0, 1, 2][..]));
+        picture.set_torn(&[]);
+        assert_eq!(indices(&picture.draw(0, &particles())).1.len(), 6);
+    }
+
+    #[test]
+    fn what_hangs_on_a_particle_without_a_place_is_not_drawn() {
+        let mut particles = particles();
+        particles[3].position[1] = f32::NAN;
+        let update = picture().draw(0, &particles);
+        assert_eq!(indices(&update), (&[0, 1, 1, 2][..], &[0, 1, 2][..]));
+        assert!(update.entities[0].lines[0].points.iter().all(|point| point.y.is_finite()));
+    }
+}

@@ -1,0 +1,440 @@
+//! The Foxglove server over real sockets: what clients get, what they may do, and what becomes of
+//! those that break the rules. There is no node: the tests feed the hub, and answer for it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytemuck::cast_slice;
+use serde_json::{Value, json};
+use sim_contract::ParticleState;
+use tokio::runtime::Runtime;
+use viewer_bridge::hub::{Demand, Slot};
+use viewer_bridge::message::{
+    Command, Mode, OutcomeText, ParametersText, Playback, Status, ToPage,
+};
+use viewer_bridge::parameters::Parameters;
+use viewer_bridge::source::{Ask, Requests};
+use viewer_bridge::stage::Stage;
+use viewer_bridge::wire::{FrameHead, Scene, Stamp};
+use viewer_bridge::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Hub, Recording};
+
+use crate::foxglove_client::{Binary, Client, connect};
+use crate::support::wait_for;
+
+/// Connections at the same time.
+const CLIENTS_MAX: usize = viewer_bridge::limits::CLIENTS_MAX;
+
+/// A Foxglove server; it ends with this.
+struct Site {
+    hub: Arc<Hub>,
+    requests: Requests,
+    url: String,
+    stage: Stage,
+    _runtime: Runtime,
+}
+
+fn options() -> FoxgloveOptions {
+    FoxgloveOptions {
+        listen: "127.0.0.1:0".parse().unwrap(),
+        origins: vec!["https://viewer.example".to_owned()],
+        takes_commands: true,
+        recording: None,
+    }
+}
+
+impl Site {
+    fn start(options: FoxgloveOptions) -> Self {
+        let runtime = Runtime::new().unwrap();
+        let mode = if options.recording.is_some() { Mode::Replay } else { Mode::Live };
+        let (hub, requests) = Hub::new(mode);
+        let hub = Arc::new(hub);
+        let server = runtime.block_on(FoxgloveServer::start(options, &hub)).unwrap();
+        let url = server.url();
+        runtime.spawn(server.serve(Arc::clone(&hub)));
+        Self { hub, requests, url, stage: Stage::default(), _runtime: runtime }
+    }
+
+    /// Shows a scene of that many particles, joined in a row.
+    fn begin(&mut self, count: u32) {
+        let positions = (0..count).map(|_| [0.0; 3]).collect();
+        let ends = (1..count).map(|particle| [particle - 1, particle]).collect();
+        self.stage.begin(&self.hub, Scene { positions, ends, rate_hz: 240, ..Scene::default() });
+    }
+
+    fn show(&mut self, step: u64, particles: &[ParticleState]) {
+        let head = FrameHead { stamp: Stamp { epoch: 0, step }, ..FrameHead::default() };
+        self.stage.show(&self.hub, head, particles);
+    }
+
+    /// Waits until a subscription has reached the source.
+    fn wait_for_subscription(&self) {
+        wait_for("a subscription", || {
+            let request = self.requests.next(Duration::ZERO)?;
+            (request.ask == Ask::Frame).then_some(())
+        });
+    }
+
+    /// The next command and who sent it; subscriptions before it are passed over.
+    fn command(&self) -> (u32, Option<u32>, Command) {
+        wait_for("a command", || match self.requests.next(Duration::ZERO)? {
+            request if request.ask == Ask::Frame => None,
+            request => match request.ask {
+                Ask::Command { id, command } => Some((request.client, id, command)),
+                other => panic!("no command: {other:?}"),
+            },
+        })
+    }
+
+    /// Answers a command as a node would that applied it, or one that rejected it.
+    fn answer(&self, client: u32, id: Option<u32>, kind: &'static str, reason: &'static str) {
+        let mut outcome = OutcomeText::refused(id, kind, reason);
+        if reason.is_empty() {
+            outcome = OutcomeText { status: Status::Applied, applied: 1, rejected: 0, ..outcome };
+            outcome.step = Some(8);
+        }
+        self.hub.send(client, &ToPage::Outcome(outcome));
+    }
+
+    fn set_parameters(&self, values: Parameters) {
+        let text = ParametersText { is_complete: true, values: Some(values), initial: None };
+        self.hub.latch(Slot::Parameters, &ToPage::Parameters(Box::new(text)));
+    }
+}
+
+impl Drop for Site {
+    fn drop(&mut self) {
+        self.hub.close();
+    }
+}
+
+/// Particles of which the first one is at `x`.
+fn particles(count: usize, x: f32) -> Vec<ParticleState> {
+    let mut particles = vec![ParticleState::default(); count];
+    particles[0].position[0] = x;
+    particles
+}
+
+/// Whether a message on `/particles` has these bits; they are its last field.
+fn has_bits(message: &[u8], particles: &[ParticleState]) -> bool {
+    message.ends_with(cast_slice::<_, u8>(particles))
+}
+
+fn parameter(values: &Value, name: &str) -> Value {
+    let values = values["parameters"].as_array().unwrap();
+    values.iter().find(|one| one["name"] == name).unwrap()["value"].clone()
+}
+
+#[test]
+fn a_client_gets_the_topics_it_subscribed_to_and_no_others() {
+    let mut site = Site::start(options());
+    let (mut client, server) = Client::start(&site.url);
+    assert_eq!(server["name"], "catenary");
+    let topics =
+        ["/tf", "/tears", "/outcomes", "/status", "/steps", "/particles", "/scene"].map(Some);
+    let mut advertised: Vec<_> = client.topics().into_iter().map(Some).collect();
+    advertised.sort_by_key(|topic| topics.iter().position(|one| one == topic));
+    assert_eq!(advertised, topics);
+    assert_eq!(client.channel("/particles")["schemaName"], "foxglove.PointCloud");
+    assert_eq!(client.channel("/scene")["schemaName"], "foxglove.SceneUpdate");
+    assert_eq!(client.channel("/tf")["schemaName"], "foxglove.FrameTransform");
+    assert_eq!(client.channel("/tears")["schemaEncoding"], "jsonschema");
+    site.begin(4);
+    client.subscribe(1, "/particles");
+    site.wait_for_subscription();
+    let state = particles(4, 0.5);
+    site.show(7, &state);
+    assert!(has_bits(&client.message(1).1, &state));
+    client.subscribe(2, "/tears");
+    client.subscribe(3, "/tf");
+    client.subscribe(4, "/scene");
+    (0..3).for_each(|_| site.wait_for_subscription());
+    site.stage.set_torn(&site.hub, 8, &[2, 0], &[0, 3]);
+    site.show(8, &state);
+    let tears = json!({ "step": 8, "constraints": [2, 0], "causes": ["force", "cut"] });
+    assert_eq!(client.json(2), tears);
+    // In whatever order the server has for them.
+    let mut others = BTreeSet::new();
+    while others.len() < 2 {
+        others.insert(client.binary(|binary| match binary {
+            Binary::Message { subscription, .. } => (subscription > 2).then_some(subscription),
+            _ => None,
+        }));
+    }
+}
+
+#[test]
+fn nobody_waits_for_a_state_after_the_last_one_unsubscribed() {
+    let mut site = Site::start(options());
+    assert_eq!(site.hub.demand(1), Demand::default());
+    let (mut client, _) = Client::start(&site.url);
+    let (mut other, _) = Client::start(&site.url);
+    client.subscribe(1, "/scene");
+    other.subscribe(1, "/particles");
+    wait_for("a demand", || site.hub.demand(1).foxglove.then_some(()));
+    (0..2).for_each(|_| site.wait_for_subscription());
+    client.unsubscribe(1);
+    drop(other);
+    // What was to be given to them at their coming has to be given up as well.
+    site.begin(1);
+    site.show(0, &particles(1, 0.0));
+    wait_for("no demand", || (!site.hub.demand(1).foxglove).then_some(()));
+}
+
+#[test]
+fn services_become_commands_and_are_answered_with_the_outcome() {
+    let site = Site::start(options());
+    let (mut client, server) = Client::start(&site.url);
+    let capabilities: Vec<String> = serde_json::from_value(server["capabilities"].clone()).unwrap();
+    assert!(capabilities.iter().any(|one| one == "services"), "{capabilities:?}");
+    let services = client.text("advertiseServices")["services"].take();
+    let services: Vec<Value> = serde_json::from_value(services).unwrap();
+    assert_eq!(services.len(), 4);
+    let number = |name: &str| {
+        let service = services.iter().find(|service| service["name"] == name).unwrap();
+        u32::try_from(service["id"].as_u64().unwrap()).unwrap()
+    };
+    let step = number("step");
+    client.call(step, 1, &json!({ "count": 3 }));
+    let (sender, id, command) = site.command();
+    assert_eq!(command, Command::Step { count: 3 });
+    site.answer(sender, id, "step", "");
+    let answer = client.response(1);
+    assert_eq!((&answer["status"], &answer["step"]), (&json!("applied"), &json!(8)));
+    for (name, command) in
+        [("pause", Command::Pause {}), ("resume", Command::Resume {}), ("reset", Command::Reset {})]
+    {
+        client.call(number(name), 2, &json!({}));
+        let (sender, id, asked) = site.command();
+        assert_eq!(asked, command);
+        site.answer(sender, id, name, "no_effect_here");
+        let failure = client.text("serviceCallFailure");
+        assert_eq!(failure["callId"], 2);
+        assert!(failure["message"].as_str().unwrap().contains("no effect"), "{failure}");
+    }
+    for request in
+        [json!({ "count": 0 }), json!({ "count": "2" }), json!({ "colour": 1 }), json!(7)]
+    {
+        client.call(step, 3, &request);
+        assert_eq!(client.text("serviceCallFailure")["callId"], 3, "{request}");
+    }
+    assert_eq!(site.requests.next(Duration::ZERO), None);
+}
+
+#[test]
+fn without_permission_nothing_can_be_changed() {
+    let site = Site::start(FoxgloveOptions { takes_commands: false, ..options() });
+    site.set_parameters(Parameters::default());
+    let (mut client, server) = Client::start(&site.url);
+    for capability in server["capabilities"].as_array().unwrap() {
+        assert!(capability != "clientPublish" && capability != "services", "{server}");
+    }
+    client.call(1, 1, &json!({}));
+    assert_eq!(client.text("serviceCallFailure")["callId"], 1);
+    client.advertise(1, "/commands");
+    assert!(client.text("status")["message"].as_str().unwrap().contains("clientPublish"));
+    client.publish(1, &json!({ "kind": "pause" }));
+    assert_eq!(client.text("status")["level"], 2);
+    let set = json!([{ "name": "damping", "value": 3.5 }]);
+    client.say(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
+    assert!(client.text("status")["message"].as_str().unwrap().contains("--allow-commands"));
+    let values = client.text("parameterValues");
+    assert_eq!((&values["id"], parameter(&values, "damping")), (&json!("set"), json!(0.0)));
+    client.say(&json!({ "op": "getParameters", "parameterNames": [], "id": "get" }));
+    assert_eq!(parameter(&client.text("parameterValues"), "substeps"), json!(4));
+    assert_eq!(site.requests.next(Duration::ZERO), None);
+}
+
+#[test]
+fn parameters_are_read_set_and_followed() {
+    let site = Site::start(options());
+    site.set_parameters(Parameters::default());
+    let (mut client, _) = Client::start(&site.url);
+    let (mut other, _) = Client::start(&site.url);
+    other.say(&json!({ "op": "subscribeParameterUpdates", "parameterNames": ["damping"] }));
+    other.say(&json!({ "op": "getParameters", "parameterNames": ["damping"], "id": "get" }));
+    assert_eq!(other.text("parameterValues")["parameters"].as_array().unwrap().len(), 1);
+    let set = json!([{ "name": "damping", "value": 3.5 }, { "name": "dance", "value": 1 }]);
+    client.say(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
+    let (sender, id, command) = site.command();
+    assert!(matches!(&command, Command::Set { parameter, .. } if parameter == "damping"));
+    site.answer(sender, id, "set", "");
+    assert!(client.text("status")["message"].as_str().unwrap().contains("dance"));
+    assert_eq!(parameter(&client.text("parameterValues"), "damping"), json!(3.5));
+    let mut values = Parameters::default();
+    values.damping.0 = 3.5;
+    site.set_parameters(values);
+    assert_eq!(parameter(&other.text("parameterValues"), "damping"), json!(3.5));
+}
+
+#[test]
+fn published_commands_reach_the_source_and_drags_end_with_the_client() {
+    let site = Site::start(options());
+    let grab = json!({ "kind": "grab", "particle": 3, "target": [0, 1, 2], "over_s": 0.1 });
+    let (mut client, _) = Client::start(&site.url);
+    client.advertise(5, "/commands");
+    client.publish(5, &grab);
+    let (holder, id, command) = site.command();
+    assert_eq!(command, Command::DragBegin { particle: 3, target: [0.0, 1.0, 2.0], over_s: 0.1 });
+    site.answer(holder, id, "drag_begin", "grabbed_by_other");
+    let status = client.text("status");
+    assert!(status["message"].as_str().unwrap().contains("somebody else"), "{status}");
+    let leaves = |holder: u32| {
+        wait_for("the client to leave", || {
+            let request = site.requests.next(Duration::ZERO)?;
+            (request.ask == Ask::Left && request.client == holder).then_some(())
+        });
+    };
+    client.unadvertise(5);
+    leaves(holder);
+    let (mut other, _) = Client::start(&site.url);
+    other.advertise(1, "/commands");
+    other.publish(1, &grab);
+    let (other_holder, _, _) = site.command();
+    assert_ne!(other_holder, holder);
+    // Torn off, without a farewell.
+    drop(other);
+    leaves(other_holder);
+}
+
+#[test]
+fn what_is_no_command_is_refused_and_reaches_nobody() {
+    let site = Site::start(options());
+    for wrong in [
+        json!("pause"),
+        json!({ "kind": "dance" }),
+        json!({ "kind": "grab", "particle": 1, "target": [1e9, 0, 0] }),
+        json!({ "kind": "cut_radius", "center": ["nan", 0, 0], "radius": 1 }),
+        json!({ "kind": "push", "center": [0, 0, 0], "radius": 1, "delta": [0, 0, 0] }),
+    ] {
+        let (mut client, _) = Client::start(&site.url);
+        client.advertise(1, "/commands");
+        client.publish(1, &wrong);
+        assert_eq!(client.text("status")["level"], 2, "{wrong}");
+    }
+    let (mut client, _) = Client::start(&site.url);
+    client.advertise(1, "/other");
+    assert!(client.text("status")["message"].as_str().unwrap().contains("/commands"));
+    client.publish(1, &json!({ "kind": "pause" }));
+    client.advertise(2, "/commands");
+    client.publish(2, &json!({ "kind": "resume" }));
+    let command = wait_for("a command", || match site.requests.next(Duration::ZERO)?.ask {
+        Ask::Command { command, .. } => Some(command),
+        Ask::Left | Ask::Frame => None,
+    });
+    assert_eq!(command, Command::Resume {});
+}
+
+#[test]
+fn other_pages_and_other_protocols_are_refused() {
+    let site = Site::start(options());
+    assert!(connect(&site.url, Some("https://viewer.example")).is_ok());
+    for origin in ["null", "http://evil.example", &site.url.replace("ws", "http")] {
+        assert_eq!(connect(&site.url, Some(origin)).err(), Some(403), "{origin}");
+    }
+    let plain = std::net::TcpStream::connect(site.url.trim_start_matches("ws://")).unwrap();
+    let refused = tungstenite::client(&site.url, plain).unwrap_err();
+    assert!(refused.to_string().contains("400"), "{refused}");
+}
+
+#[test]
+fn another_address_than_loopback_is_refused() {
+    let runtime = Runtime::new().unwrap();
+    let hub = Arc::new(Hub::new(Mode::Live).0);
+    for address in ["0.0.0.0:0", "[::]:0", "10.1.2.3:8765"] {
+        let options = FoxgloveOptions { listen: address.parse().unwrap(), ..options() };
+        let refused = runtime.block_on(FoxgloveServer::start(options, &hub)).unwrap_err();
+        assert!(matches!(refused, FoxgloveServerError::NotLoopback { .. }), "{refused}");
+        assert!(refused.to_string().contains("ssh -L"), "{refused}");
+    }
+}
+
+#[test]
+fn so_many_clients_are_let_in_and_the_next_when_one_has_gone() {
+    let site = Site::start(options());
+    let mut clients: Vec<_> = (0..CLIENTS_MAX).map(|_| Client::start(&site.url)).collect();
+    assert_eq!(connect(&site.url, None).err(), Some(0));
+    clients.pop();
+    wait_for("a place", || connect(&site.url, None).ok());
+}
+
+#[test]
+fn who_sends_too_much_is_let_go_and_others_stay() {
+    let mut site = Site::start(options());
+    let (mut other, _) = Client::start(&site.url);
+    let (mut long, _) = Client::start(&site.url);
+    // The door may have closed before all of it was sent.
+    let names = vec!["x".repeat(1 << 10); 65];
+    long.flood(&json!({ "op": "getParameters", "parameterNames": names }), 1);
+    long.read_to_end();
+    let (mut flood, _) = Client::start(&site.url);
+    flood.flood(&json!({ "op": "unsubscribe", "subscriptionIds": [] }), 1000);
+    flood.read_to_end();
+    site.begin(2);
+    other.subscribe(1, "/particles");
+    site.wait_for_subscription();
+    site.show(1, &particles(2, 0.25));
+    assert!(has_bits(&other.message(1).1, &particles(2, 0.25)));
+}
+
+#[test]
+fn a_client_that_takes_nothing_delays_nobody_and_finds_the_newest_state() {
+    // A megabyte a state, far more than sockets hold.
+    const PARTICLES: u32 = 1 << 15;
+    const STATES: u32 = 80;
+    let mut site = Site::start(options());
+    let (mut slow, _) = Client::start(&site.url);
+    let (mut quick, _) = Client::start(&site.url);
+    site.begin(PARTICLES);
+    slow.subscribe(1, "/particles");
+    quick.subscribe(1, "/particles");
+    (0..2).for_each(|_| site.wait_for_subscription());
+    let mut state = particles(PARTICLES as usize, 0.0);
+    for step in 0..STATES {
+        state[0].position[0] = step as f32;
+        site.show(u64::from(step), &state);
+        assert!(has_bits(&quick.message(1).1, &state), "{step}");
+    }
+    let mut count = 1;
+    while !has_bits(&slow.message(1).1, &state) {
+        count += 1;
+    }
+    assert!(count < STATES, "{count} states were kept for it");
+}
+
+#[test]
+fn the_playback_of_a_recording_is_told_and_controlled() {
+    let second_ns = 1_000_000_000;
+    let recording =
+        Recording { epoch_ns: 5 * second_ns, rate_hz: 240, first_step: 0, last_step: 480 };
+    let mut site = Site::start(FoxgloveOptions { recording: Some(recording), ..options() });
+    let (mut client, server) = Client::start(&site.url);
+    let capabilities: Vec<String> = serde_json::from_value(server["capabilities"].clone()).unwrap();
+    assert!(capabilities.iter().any(|one| one == "playbackControl"), "{capabilities:?}");
+    assert_eq!(server["dataStartTime"], json!({ "sec": 5, "nsec": 0 }), "{server}");
+    assert_eq!(server["dataEndTime"], json!({ "sec": 7, "nsec": 0 }), "{server}");
+    let state = |client: &mut Client| {
+        client.binary(|binary| match binary {
+            Binary::Playback { status, time_ns, speed, did_seek, request } => {
+                Some((status, time_ns, speed, did_seek, request))
+            }
+            _ => None,
+        })
+    };
+    let paused = Playback { is_playing: false, rate: 1.0, is_looping: false, step: 0, time_s: 0.0 };
+    site.hub.latch(Slot::Playback, &ToPage::Playback(paused));
+    assert_eq!(state(&mut client), (1, 5 * second_ns, 1.0, false, String::new()));
+    client.play(0, 2.0, Some(6 * second_ns), "seven");
+    let commands = [(); 3].map(|()| site.command().2);
+    let seek = Command::Seek { step: 240 };
+    assert_eq!(commands, [seek, Command::Rate { value: 2.0 }, Command::Resume {}]);
+    assert_eq!(state(&mut client), (0, 6 * second_ns, 2.0, true, "seven".to_owned()));
+    let ended = Playback { step: 480, rate: 2.0, ..paused };
+    site.hub.latch(Slot::Playback, &ToPage::Playback(ended));
+    assert_eq!(state(&mut client), (3, 7 * second_ns, 2.0, false, String::new()));
+    site.begin(2);
+    client.subscribe(1, "/particles");
+    site.wait_for_subscription();
+    site.show(120, &particles(2, 0.0));
+    assert_eq!(client.message(1).0, 5 * second_ns + second_ns / 2);
+}

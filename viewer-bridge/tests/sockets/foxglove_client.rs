@@ -1,0 +1,245 @@
+//! A client of the Foxglove protocol on a bare WebSocket: it knows the messages from the protocol's
+//! description, and nothing of the library that serves them.
+
+use std::collections::VecDeque;
+use std::net::TcpStream;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::{HeaderValue, header};
+use tungstenite::{Message, WebSocket};
+
+/// Longest wait for a message.
+const DEADLINE: Duration = Duration::from_mins(1);
+
+/// What comes as bytes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Binary {
+    /// A message on a topic.
+    Message { subscription: u32, log_time_ns: u64, payload: Vec<u8> },
+    /// The answer of a service.
+    Response { call: u32, payload: Value },
+    /// How a recording is played: 0 playing, 1 paused, 3 at its end.
+    Playback { status: u8, time_ns: u64, speed: f32, did_seek: bool, request: String },
+}
+
+/// A client that is connected.
+pub(crate) struct Client {
+    socket: WebSocket<TcpStream>,
+    /// What came while something else was waited for.
+    texts: VecDeque<Value>,
+    binaries: VecDeque<Binary>,
+    channels: Vec<Value>,
+}
+
+/// Opens a connection as a page of `origin` would, or as a program; the status of a refusal.
+pub(crate) fn connect(url: &str, origin: Option<&str>) -> Result<Client, u16> {
+    let host = url.trim_start_matches("ws://");
+    let stream = TcpStream::connect(host).unwrap();
+    stream.set_read_timeout(Some(DEADLINE)).unwrap();
+    let mut request = url.into_client_request().unwrap();
+    let protocol = HeaderValue::from_static("foxglove.sdk.v1");
+    request.headers_mut().insert(header::SEC_WEBSOCKET_PROTOCOL, protocol);
+    if let Some(origin) = origin {
+        request.headers_mut().insert(header::ORIGIN, HeaderValue::from_str(origin).unwrap());
+    }
+    match tungstenite::client(request, stream) {
+        Ok((socket, answer)) => {
+            assert_eq!(answer.headers()[header::SEC_WEBSOCKET_PROTOCOL], "foxglove.sdk.v1");
+            let (texts, binaries) = (VecDeque::new(), VecDeque::new());
+            Ok(Client { socket, texts, binaries, channels: Vec::new() })
+        }
+        Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(response))) => {
+            Err(response.status().as_u16())
+        }
+        // Nobody was there any more to refuse it.
+        Err(_) => Err(0),
+    }
+}
+
+impl Client {
+    /// A program that connects, and the server's description of itself.
+    pub(crate) fn start(url: &str) -> (Self, Value) {
+        let mut client = connect(url, None).unwrap();
+        let server = client.text("serverInfo");
+        let channels = client.text("advertise")["channels"].take();
+        client.channels = serde_json::from_value(channels).unwrap();
+        (client, server)
+    }
+
+    /// What is said of a topic.
+    pub(crate) fn channel(&self, topic: &str) -> &Value {
+        self.channels.iter().find(|channel| channel["topic"] == topic).unwrap()
+    }
+
+    pub(crate) fn topics(&self) -> Vec<&str> {
+        self.channels.iter().map(|channel| channel["topic"].as_str().unwrap()).collect()
+    }
+
+    pub(crate) fn say(&mut self, message: &Value) {
+        self.socket.send(Message::text(message.to_string())).unwrap();
+    }
+
+    pub(crate) fn say_bytes(&mut self, bytes: Vec<u8>) {
+        self.socket.send(Message::binary(bytes)).unwrap();
+    }
+
+    /// Subscribes to a topic under that number.
+    pub(crate) fn subscribe(&mut self, subscription: u32, topic: &str) {
+        let channel = self.channel(topic)["id"].clone();
+        let subscriptions = json!([{ "id": subscription, "channelId": channel }]);
+        self.say(&json!({ "op": "subscribe", "subscriptions": subscriptions }));
+    }
+
+    pub(crate) fn unsubscribe(&mut self, subscription: u32) {
+        self.say(&json!({ "op": "unsubscribe", "subscriptionIds": [subscription] }));
+    }
+
+    /// Announces that it publishes on a topic, under that number.
+    pub(crate) fn advertise(&mut self, channel: u32, topic: &str) {
+        let channels = json!([
+            { "id": channel, "topic": topic, "encoding": "json", "schemaName": "catenary.Command" }
+        ]);
+        self.say(&json!({ "op": "advertise", "channels": channels }));
+    }
+
+    pub(crate) fn unadvertise(&mut self, channel: u32) {
+        self.say(&json!({ "op": "unadvertise", "channelIds": [channel] }));
+    }
+
+    pub(crate) fn publish(&mut self, channel: u32, message: &Value) {
+        let mut bytes = vec![1];
+        bytes.extend(channel.to_le_bytes());
+        bytes.extend(message.to_string().into_bytes());
+        self.say_bytes(bytes);
+    }
+
+    /// Calls a service; it is not waited for.
+    pub(crate) fn call(&mut self, service: u32, call: u32, request: &Value) {
+        let mut bytes = vec![2];
+        bytes.extend(service.to_le_bytes());
+        bytes.extend(call.to_le_bytes());
+        bytes.extend(4_u32.to_le_bytes());
+        bytes.extend(b"json");
+        bytes.extend(request.to_string().into_bytes());
+        self.say_bytes(bytes);
+    }
+
+    /// Asks for another manner of playing. `command`: 0 to play, 1 to pause.
+    pub(crate) fn play(&mut self, command: u8, speed: f32, seek_ns: Option<u64>, request: &str) {
+        let mut bytes = vec![3, command];
+        bytes.extend(speed.to_le_bytes());
+        bytes.push(u8::from(seek_ns.is_some()));
+        bytes.extend(seek_ns.unwrap_or(0).to_le_bytes());
+        bytes.extend(u32::try_from(request.len()).unwrap().to_le_bytes());
+        bytes.extend(request.as_bytes());
+        self.say_bytes(bytes);
+    }
+
+    /// Reads one message into the queues; false at the end of the connection.
+    fn read(&mut self) -> bool {
+        match self.socket.read() {
+            Ok(Message::Text(text)) => self.texts.push_back(serde_json::from_str(&text).unwrap()),
+            Ok(Message::Binary(bytes)) => self.binaries.push_back(parse(&bytes)),
+            Ok(Message::Close(_)) | Err(_) => return false,
+            Ok(_) => {}
+        }
+        true
+    }
+
+    /// Says the same so many times, or until the other end has had enough.
+    pub(crate) fn flood(&mut self, message: &Value, count: usize) {
+        let text = message.to_string();
+        // An error is what this is about.
+        let _enough = (0..count).try_for_each(|_| self.socket.send(Message::text(text.clone())));
+    }
+
+    /// Reads to the end of the connection.
+    pub(crate) fn read_to_end(&mut self) {
+        while self.read() {}
+    }
+
+    /// The next text of that kind; those before it are dropped.
+    pub(crate) fn text(&mut self, op: &str) -> Value {
+        loop {
+            while let Some(text) = self.texts.pop_front() {
+                if text["op"] == op {
+                    return text;
+                }
+            }
+            assert!(self.read(), "the connection ended before {op} came");
+        }
+    }
+
+    /// The next binary message out of which that can be taken; those before it are dropped.
+    pub(crate) fn binary<T>(&mut self, take: impl Fn(Binary) -> Option<T>) -> T {
+        loop {
+            while let Some(binary) = self.binaries.pop_front() {
+                if let Some(taken) = take(binary) {
+                    return taken;
+                }
+            }
+            assert!(self.read(), "the connection ended before a message came");
+        }
+    }
+
+    /// The next message of a subscription: when it was made, and its bytes.
+    pub(crate) fn message(&mut self, of: u32) -> (u64, Vec<u8>) {
+        self.binary(|binary| match binary {
+            Binary::Message { subscription, log_time_ns, payload } if subscription == of => {
+                Some((log_time_ns, payload))
+            }
+            _ => None,
+        })
+    }
+
+    /// The next message of a subscription to a topic with JSON.
+    pub(crate) fn json(&mut self, of: u32) -> Value {
+        serde_json::from_slice(&self.message(of).1).unwrap()
+    }
+
+    /// The answer to a call.
+    pub(crate) fn response(&mut self, of: u32) -> Value {
+        self.binary(|binary| match binary {
+            Binary::Response { call, payload } if call == of => Some(payload),
+            _ => None,
+        })
+    }
+}
+
+/// Numbers out of the front of some bytes.
+fn take<const N: usize>(bytes: &mut &[u8]) -> [u8; N] {
+    let (front, rest) = bytes.split_first_chunk().unwrap();
+    *bytes = rest;
+    *front
+}
+
+fn parse(bytes: &[u8]) -> Binary {
+    let mut rest = bytes;
+    let [opcode] = take(&mut rest);
+    match opcode {
+        1 => Binary::Message {
+            subscription: u32::from_le_bytes(take(&mut rest)),
+            log_time_ns: u64::from_le_bytes(take(&mut rest)),
+            payload: rest.to_vec(),
+        },
+        3 => {
+            let _service = u32::from_le_bytes(take(&mut rest));
+            let call = u32::from_le_bytes(take(&mut rest));
+            let encoding = u32::from_le_bytes(take(&mut rest)) as usize;
+            assert_eq!(&rest[..encoding], b"json");
+            Binary::Response { call, payload: serde_json::from_slice(&rest[encoding..]).unwrap() }
+        }
+        5 => {
+            let [status] = take(&mut rest);
+            let time_ns = u64::from_le_bytes(take(&mut rest));
+            let speed = f32::from_le_bytes(take(&mut rest));
+            let [did_seek] = take(&mut rest);
+            let _size = u32::from_le_bytes(take(&mut rest));
+            let request = String::from_utf8(rest.to_vec()).unwrap();
+            Binary::Playback { status, time_ns, speed, did_seek: did_seek != 0, request }
+        }
+        other => panic!("a message with the opcode {other}"),
+    }
+}
