@@ -193,6 +193,11 @@ impl Hub {
         self.frames.send_replace(Arc::new(frame));
     }
 
+    /// Shows the last frame once more, to those who have not seen it.
+    pub fn show_again(&self) {
+        self.frames.send_modify(|_| {});
+    }
+
     /// Which encodings pages with credit wait for, in a scene of that many particles.
     pub fn demand(&self, particle_count: usize) -> Demand {
         let mut demand = Demand::default();

@@ -104,6 +104,9 @@ fn refuse_for_a_while(hub: &Hub, requests: &Requests) {
     let end_ns = monotonic_ns() + u64::try_from(SEARCH_PERIOD.as_nanos()).unwrap_or(u64::MAX);
     while monotonic_ns() < end_ns && !hub.is_closed() {
         let Some(request) = requests.next(LOOK_PERIOD) else { continue };
+        if request.ask == Ask::Frame {
+            hub.show_again();
+        }
         if let Ask::Command { id, command } = request.ask {
             let outcome = OutcomeText {
                 id,

@@ -13,29 +13,33 @@ pub(crate) struct Gap<L> {
 ///
 /// In small substeps h^2 g is of the size of one rounding of |r|, and the force lambda / h^2 would
 /// be noise. So with R = `x_b` - `x_a` at the start of the substep and D = `d_b` - `d_a`, the base
-/// is |R|^2, and what the substep changes, (R + r) D, keeps all of its digits beside it. Where it
-/// changes much they may cancel; there the base is |r|^2 itself, and the change 0.
+/// is |R|^2, and what the substep changes, (R + r) D, keeps all of its digits beside it.
 #[derive(Clone, Copy)]
 pub(crate) struct Size<L> {
-    pub(crate) squared: L,
-    pub(crate) base: L,
-    pub(crate) change: L,
+    base: L,
+    change: L,
 }
+
+/// Share of |R|^2 below which base and change have cancelled to noise: |r| is a thousandth of |R|.
+const NOISE: f32 = 1.0 / (1 << 20) as f32;
 
 impl<L: Lanes> Gap<L> {
     /// From R and D.
     #[inline(always)]
     pub(crate) fn new(start: [L; 3], moved: [L; 3]) -> Self {
         let separation = sum(start, moved);
-        let (squared, start_squared) = (dot(separation, separation), dot(start, start));
-        let change = dot(sum(start, separation), moved);
-        let is_small = (L::splat(8.0) * change.abs()).is_below(start_squared);
-        let base = L::choose(is_small, start_squared, squared);
-        Self { separation, size: Size { squared, base, change: change.only(is_small) } }
+        let size = Size { base: dot(start, start), change: dot(sum(start, separation), moved) };
+        Self { separation, size }
     }
 }
 
 impl<L: Lanes> Size<L> {
+    /// |r|^2; at least what is not noise, so that a collapsed gap is not pushed apart by it.
+    #[inline(always)]
+    pub(crate) fn squared(&self) -> L {
+        (L::splat(NOISE) * self.base).or_at_least(self.base + self.change)
+    }
+
     /// |r|^2 - L^2.
     #[inline(always)]
     fn excess(&self, square: L) -> L {
@@ -44,36 +48,49 @@ impl<L: Lanes> Size<L> {
 
     /// -`delta_lambda` / |r| of a rigid constraint in one division: with
     /// C = (|r|^2 - L^2) / (|r| + L), both sides of (C / w) / |r| times |r| + L.
+    ///
+    /// No number where there is nothing to correct by; see [`divide`].
     #[inline(always)]
     pub(crate) fn scale(&self, rest: Rest<L>, weight: L, share: L) -> L {
-        let length = self.squared.sqrt();
-        let weight = weight * ((length + rest.length) * length);
-        ((share * self.excess(rest.square)) / weight).only(is_normal(weight))
+        let length = self.squared().sqrt();
+        divide(share * self.excess(rest.square), weight * ((length + rest.length) * length))
     }
 }
 
-/// Whether a division by that weight moves anything: not where both ends are fixed, where they
-/// coincide and there is no direction, where the constraint is torn (of infinite length), and not
-/// where the state is no longer finite, which must not reach its neighbours.
+/// A scale: a division by the weight of a correction. It is no number, and [`correction`] makes
+/// nothing of it, where both ends are fixed, where they coincide and there is no direction, where
+/// the constraint is torn (of infinite length), and where the state is no longer finite. Else it is
+/// finite, so that an end without weight has no part in it, whatever happens to the other.
 #[inline(always)]
-fn is_normal<L: Lanes>(weight: L) -> L::Mask {
+fn divide<L: Lanes>(numerator: L, weight: L) -> L {
     let is_enough = L::splat(f32::MIN_POSITIVE).is_at_most(weight);
-    L::both(is_enough, weight.is_at_most(L::splat(f32::MAX)))
+    let scale = L::splat(-f32::MAX).or_at_least(numerator / weight);
+    L::choose(is_enough, scale, L::splat(f32::NAN))
 }
 
-/// The scales of the two ends of a constraint. An end without weight is left out: a state that
-/// blows up gives 0 times infinity, and must not reach what is held.
+/// What is made of a scale: nothing where it is no number, so that a state that blows up reaches
+/// neither its neighbours nor what is held.
 #[inline(always)]
-pub(crate) fn end_scales<L: Lanes>([w_a, w_b]: [L; 2], scale: L) -> [L; 2] {
-    let zero = L::splat(0.0);
-    [(w_a * -scale).only(zero.is_below(w_a)), (w_b * scale).only(zero.is_below(w_b))]
+pub(crate) fn correction<L: Lanes>(separation: [L; 3], scale: L) -> Correction<L> {
+    let is_made = scale.is_number();
+    let separation = each(separation, |along| along.only(is_made));
+    Correction { separation, scale: scale.only(is_made) }
 }
 
-/// What an end is moved by, in reverse: nothing where the scale is 0, whatever the separation.
-#[inline(always)]
-pub(crate) fn amount<L: Lanes>(separation: [L; 3], scale: L) -> [L; 3] {
-    let is_moved = scale.is_not_zero();
-    each(separation, |along| (scale * along).only(is_moved))
+/// A correction: an end of inverse mass w moves by w scale r, the other one in reverse.
+#[derive(Clone, Copy)]
+pub(crate) struct Correction<L> {
+    pub(crate) separation: [L; 3],
+    pub(crate) scale: L,
+}
+
+impl<L: Lanes> Correction<L> {
+    /// What the first end moves by, or the second in reverse.
+    #[inline(always)]
+    pub(crate) fn way(&self, w: L) -> [L; 3] {
+        let scale = w * self.scale;
+        each(self.separation, |along| scale * along)
+    }
 }
 
 /// The length that a constraint goes back to, and its square.
@@ -92,7 +109,7 @@ impl Rest<f32> {
 /// How the constraints of a run push. A run is some eights of constraints of one group.
 pub(crate) trait Law: Sized {
     /// -`delta_lambda` / |r| of the constraints `at` in the run; `weight` is `w_a` + `w_b`. The ends
-    /// move by `d_a` += `w_a` scale r, `d_b` -= `w_b` scale r.
+    /// move by `d_a` += `w_a` scale r, `d_b` -= `w_b` scale r; not where it is no number.
     fn scale<L: Lanes>(&mut self, at: Spot, size: &Size<L>, weight: L) -> L;
 
     /// The first eights of the run, and the others.
@@ -174,10 +191,9 @@ pub(crate) struct General<'a> {
 #[repr(C, align(64))]
 pub(crate) struct Block {
     separations: [[Eight; BLOCK]; 3],
-    squared: [Eight; BLOCK],
     base: [Eight; BLOCK],
     change: [Eight; BLOCK],
-    scales: [[Eight; BLOCK]; 2],
+    scales: [Eight; BLOCK],
 }
 
 /// Eights of a block.
@@ -186,13 +202,7 @@ pub(crate) const BLOCK: usize = 16;
 impl Default for Block {
     fn default() -> Self {
         let zeros = [[0.0; 8]; BLOCK];
-        Self {
-            separations: [zeros; 3],
-            squared: zeros,
-            base: zeros,
-            change: zeros,
-            scales: [zeros; 2],
-        }
+        Self { separations: [zeros; 3], base: zeros, change: zeros, scales: zeros }
     }
 }
 
@@ -202,38 +212,27 @@ impl Block {
         for (axis, along) in gap.separation.into_iter().enumerate() {
             along.store(&mut self.separations[axis][eight], 0);
         }
-        gap.size.squared.store(&mut self.squared[eight], 0);
         gap.size.base.store(&mut self.base[eight], 0);
         gap.size.change.store(&mut self.change[eight], 0);
     }
 
-    /// Works out how far the ends of constraints `eight` of the block move, `at` in the run.
+    /// Works out the scales of constraints `eight` of the block, `at` in the run.
     #[inline(always)]
     pub(crate) fn solve<W: Wide>(
         &mut self,
         eight: usize,
         (law, at): (&mut impl Law, Spot),
-        [w_a, w_b]: [W; 2],
+        weight: W,
     ) {
-        let size = Size {
-            squared: W::load(&self.squared[eight], 0),
-            base: W::load(&self.base[eight], 0),
-            change: W::load(&self.change[eight], 0),
-        };
-        let scale = law.scale(at, &size, w_a + w_b);
-        for (end, scale) in end_scales([w_a, w_b], scale).into_iter().enumerate() {
-            scale.store(&mut self.scales[end][eight], 0);
-        }
+        let (base, change) = (W::load(&self.base[eight], 0), W::load(&self.change[eight], 0));
+        law.scale(at, &Size { base, change }, weight).store(&mut self.scales[eight], 0);
     }
 
-    /// What the two ends are moved by, in reverse.
+    /// How constraints `eight` of the block move their ends.
     #[inline(always)]
-    pub(crate) fn amounts<W: Wide>(&self, eight: usize) -> [[W; 3]; 2] {
+    pub(crate) fn correction<W: Wide>(&self, eight: usize) -> Correction<W> {
         let separation = axes(|axis| W::load(&self.separations[axis][eight], 0));
-        [
-            amount(separation, W::load(&self.scales[0][eight], 0)),
-            amount(separation, W::load(&self.scales[1][eight], 0)),
-        ]
+        correction(separation, W::load(&self.scales[eight], 0))
     }
 }
 
@@ -274,7 +273,7 @@ impl Law for General<'_> {
     fn scale<L: Lanes>(&mut self, at: Spot, size: &Size<L>, weight: L) -> L {
         let rest: Rest<L> = rest(self.lengths, self.squares, at);
         let softness: L = self.softness.load(at);
-        let length = size.squared.sqrt();
+        let length = size.squared().sqrt();
         let denominator = length + rest.length;
         let before = match &self.multipliers {
             Some(multipliers) if !self.is_first => load(multipliers, at),
@@ -282,11 +281,11 @@ impl Law for General<'_> {
         };
         let excess = size.excess(rest.square) + (softness * before) * denominator;
         let total = (weight + softness) * (denominator * length);
-        let mut is_made = L::both(is_normal(total), L::splat(0.0).is_below(weight));
+        let scale = divide(self.shares.load::<L>(at) * excess, total);
+        let mut is_made = L::both(scale.is_number(), L::splat(0.0).is_below(weight));
         if let Some(floors) = self.floors {
             is_made = L::both(is_made, load::<L>(floors, at).is_below(length));
         }
-        let scale = ((self.shares.load::<L>(at) * excess) / total).only(is_made);
         if let Some(tear_lengths) = self.tear_lengths {
             self.mark::<L>(at, load::<L>(tear_lengths, at).is_below(length), BY_LENGTH);
         }
@@ -297,7 +296,7 @@ impl Law for General<'_> {
                 self.mark::<L>(at, load::<L>(tear_multipliers, at).is_below(after.abs()), BY_FORCE);
             }
         }
-        scale
+        L::choose(is_made, scale, L::splat(f32::NAN))
     }
 
     fn split(mut self, eights: usize) -> (Self, Self) {

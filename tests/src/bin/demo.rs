@@ -1,9 +1,10 @@
-//! `cargo demo`: a node and a recorder as processes, until Ctrl-C; then what was recorded.
+//! `cargo demo`: a node, a recorder and a viewer as processes, until Ctrl-C; then what was recorded.
 //!
-//! Drag the curtain from another terminal meanwhile: `cargo run --release -- ctl grab 90 0.5 0.2 0.3`.
+//! Open the printed address in a browser meanwhile, and drag the curtain.
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stderr, clippy::print_stdout, reason = "it talks to the user")]
 
+use std::net::TcpListener;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -16,12 +17,17 @@ const POLL: Duration = Duration::from_millis(200);
 
 /// What `--help` says.
 const HELP: &str =
-    "Run a node with the curtain and a recorder, until Ctrl-C; then say what was recorded.
+    "Run a node with the curtain, a recorder and a viewer, until Ctrl-C; then say what was recorded.
 
 Usage: cargo demo
 
-CATENARY_DOMAIN keeps it apart from other nodes on this host. The recording goes to the
-temporary folder.";
+Open the printed address in a browser and drag the curtain. CATENARY_DOMAIN keeps it apart from
+other nodes on this host. The recording goes to the temporary folder.";
+
+/// Where the viewer listens unless that is taken.
+const LISTEN: &str = "127.0.0.1:8080";
+/// Any free port.
+const LISTEN_ANYWHERE: &str = "127.0.0.1:0";
 
 fn main() -> anyhow::Result<()> {
     match std::env::args().nth(1).as_deref() {
@@ -43,13 +49,16 @@ fn main() -> anyhow::Result<()> {
     node.wait_until_ready();
     let mut recorder = Process::start_in(Program::Recorder, &domain, &["record", "-o", file]);
     recorder.wait_until_ready();
+    let mut viewer = start_viewer(&domain);
+    let url = viewer.wait_for_line("ready ");
     eprintln!("the curtain hangs, and everything is recorded; Ctrl-C ends the demo");
-    eprintln!("drag it:  cargo run --release -- ctl grab 90 0.5 0.2 0.3");
+    eprintln!("see it, drag it, cut it:  {}", url.trim_start_matches("ready "));
 
     watch(&stop, &mut node, &domain)?;
     let recorded = recorder.interrupt();
+    let shown = viewer.interrupt();
     let ended = node.interrupt();
-    eprint!("{}{}", recorded.stderr, ended.stderr);
+    eprint!("{}{}{}", recorded.stderr, shown.stderr, ended.stderr);
     // Exit code 3: finished, and it says itself what was lost.
     if !matches!(recorded.code, Some(0 | 3)) || ended.code != Some(0) {
         bail!("the recorder ended with {:?}, the node with {:?}", recorded.code, ended.code);
@@ -58,6 +67,13 @@ fn main() -> anyhow::Result<()> {
     let info = Process::start_in(Program::Recorder, &domain, &["info", file]).wait();
     print!("{}", info.stdout);
     Ok(())
+}
+
+/// Starts the viewer, on another port where the usual one is taken.
+fn start_viewer(domain: &str) -> Process {
+    let is_free = TcpListener::bind(LISTEN).is_ok();
+    let listen = if is_free { LISTEN } else { LISTEN_ANYWHERE };
+    Process::start_in(Program::ViewerBridge, domain, &["--listen", listen])
 }
 
 /// Shows how the node does until Ctrl-C, or until it ends by itself.

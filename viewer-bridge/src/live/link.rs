@@ -104,12 +104,18 @@ impl Link {
     ) -> Result<(), LinkEnd> {
         let is_awaited = hub.demand(self.particle_count()).is_any();
         self.take_requests(stage, hub, requests, is_awaited);
-        if is_awaited && monotonic_ns() >= self.due_ns {
-            // What woke before is read below; this waits for what comes now.
+        let is_due = is_awaited && monotonic_ns() >= self.due_ns;
+        if is_due && self.is_fast() {
+            // There is always a state that was not shown; this waits for one that comes now. What
+            // woke before is read below.
             self.tap.wait(Duration::ZERO);
             self.tap.wait(FRESH_STATE_WAIT);
         }
         self.read(stage, hub)?;
+        if is_due && !self.has_news() {
+            self.tap.wait(FRESH_STATE_WAIT);
+            self.read(stage, hub)?;
+        }
         self.show(stage, hub);
         let now_ns = monotonic_ns();
         self.dispatch.expire(hub, now_ns);
@@ -121,6 +127,20 @@ impl Link {
             return Err(LinkEnd::Closed);
         }
         self.look_for_owner(now_ns)
+    }
+
+    /// Whether a fresh state comes within the wait for one.
+    fn is_fast(&self) -> bool {
+        let pace_hz = |status: &NodeStatus| f64::from(status.rate_hz) * status.time_scale;
+        let is_stepping = |status: &&NodeStatus| !status.is_paused();
+        let pace_hz = self.status.as_ref().filter(is_stepping).map_or(0.0, pace_hz);
+        pace_hz * FRESH_STATE_WAIT.as_secs_f64() >= 1.0
+    }
+
+    /// Whether there is a state that was not shown.
+    fn has_news(&self) -> bool {
+        let newest = self.snapshot.as_ref().map(|snapshot| snapshot.header().step);
+        newest != self.shown_step
     }
 
     fn look_for_owner(&mut self, now_ns: u64) -> Result<(), LinkEnd> {
@@ -192,19 +212,13 @@ impl Link {
         Ok(())
     }
 
+    /// Notices another run of the node: everything is begun anew then.
     fn check_run(&mut self, news: &News) -> Result<(), LinkEnd> {
-        let run_id = news.run_id().or(self.snapshot.as_ref().map(|one| one.header().run_id));
-        let known = *self.run_id.get_or_insert_with(|| run_id.unwrap_or_default());
-        match run_id {
-            Some(run_id) if run_id != known && known != 0 => Err(LinkEnd::NewRun),
-            Some(run_id) => {
-                self.run_id = Some(run_id);
-                Ok(())
-            }
-            None => {
-                self.run_id = None;
-                Ok(())
-            }
+        let snapshot = || self.snapshot.as_ref().map(|one| one.header().run_id);
+        let Some(run_id) = news.run_id().or_else(snapshot) else { return Ok(()) };
+        match self.run_id.replace(run_id) {
+            Some(known) if known != run_id => Err(LinkEnd::NewRun),
+            _ => Ok(()),
         }
     }
 

@@ -65,7 +65,6 @@ export class Input {
     const at = this.pixel(event);
     this.pointers.set(event.pointerId, at);
     this.canvas.setPointerCapture(event.pointerId);
-    this.canvas.focus({ preventScroll: true });
     clearTimeout(this.longPress);
     if (this.pointers.size > 1) {
       // The second finger takes the first one's work away: two fingers move the view.

@@ -7,7 +7,10 @@ const TYPING = "input, select, textarea, dialog";
 
 /** @param {Keymap} keymap */
 export function listenToKeys(keymap) {
+  // Keys also work after a click on the picture: its frame is for those who came to it by Tab.
+  document.addEventListener("pointerdown", () => { delete document.documentElement.dataset.tabbed; });
   document.addEventListener("keydown", (event) => {
+    if (event.key === "Tab") document.documentElement.dataset.tabbed = "";
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const target = event.target instanceof Element ? event.target : null;
     if (target?.closest(TYPING)) return;

@@ -127,7 +127,7 @@ export class Panel {
     if (row.perKind) slider.before(kinds);
     if (row.perKind) shell.append(slider);
     slider.classList.toggle("all", row.perKind ?? false);
-    const say = (/** @type {SettingValue} */ value) => { output.textContent = typeof value === "number" ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
+    const say = (/** @type {SettingValue} */ value) => { output.textContent = typeof value === "number" && !(row.canBeOff && value === 0 && row.least === 0) ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
     slider.addEventListener("input", () => {
       const value = valueAt(row, range(), slider.valueAsNumber);
       isOn.checked = true;
@@ -139,7 +139,8 @@ export class Panel {
     this.refreshers.push(() => {
       const value = read("values");
       if (!slider.matches(":active")) slider.valueAsNumber = placeOf(row, range(), typeof value === "number" ? value : row.whenOn ?? row.least);
-      isOn.checked = value !== null;
+      // No drag and no air are the same thing.
+      isOn.checked = value !== null && !(value === 0 && row.least === 0);
       say(value);
       // What each constraint has for itself cannot be given back but by a reset.
       button.classList.toggle("is-idle", String(value) === String(read("initial")) || (read("initial") === null && !row.canBeOff));

@@ -66,9 +66,14 @@ export function niceCeiling(value) {
   return step * power;
 }
 
+/** What is less is noise and written as 0: a hundred-thousandth of a percent, a nanojoule. */
+const LEAST = /** @type {Record<string, number>} */ ({ "%": 1e-5, J: 1e-9 });
+
 /** A number with three digits and its prefix: 1234 µs is "1.23 ms" by the caller's unit. @param {number} value @param {string} unit */
 export function readable(value, unit) {
   if (!Number.isFinite(value)) return "–";
+  const least = LEAST[unit] ?? 0;
+  if (Math.abs(value) < least) return `0 ${unit}`;
   if (unit === "%") return `${trim(value * 100)} %`;
   if (unit === "µs" && Math.abs(value) >= 1000) return `${trim(value / 1000)} ms`;
   if (unit === "J" && value !== 0) {

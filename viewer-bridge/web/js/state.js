@@ -4,6 +4,7 @@
 import { Emitter } from "./emitter.js";
 import { lowestReach } from "./hanging.js";
 import { Topology } from "./topology.js";
+import { PIN } from "./wire.js";
 import { axesOf } from "./camera.js";
 import { add, addScaled, boxOf, dot, length, scale, subtract } from "./math.js";
 
@@ -182,6 +183,28 @@ export class Simulation extends Emitter {
   radius() {
     if (this.scene === null || this.scene.particleCount === 0) return 1;
     return Math.max(length(subtract(this.scene.max, this.scene.min)) / 2, 1e-3);
+  }
+
+  /** The middle of the box round the scene's positions. @returns {Vec3} */
+  middle() {
+    return this.scene === null ? [0, 0, 0] : scale(add(this.scene.min, this.scene.max), 0.5);
+  }
+
+  /** Shows at once what the node has answered but will publish with its next step only: while it is
+   * paused, that may be long. @param {number} particle @param {boolean} isPinned */
+  expectPin(particle, isPinned) {
+    const others = (this.pins.get(particle) ?? 0) & ~PIN.pinned;
+    if (isPinned) this.pins.set(particle, others | PIN.pinned);
+    else if (others !== 0) this.pins.set(particle, others);
+    else this.pins.delete(particle);
+    this.emit("pins", undefined);
+  }
+
+  /** The same for a cut. @param {number} epoch @param {number[]} constraints */
+  expectCut(epoch, constraints) {
+    if (epoch !== this.scene?.epoch) return;
+    this.topology?.remove(constraints);
+    this.emit("tear", undefined);
   }
 
   /** @param {number} particle @returns {Vec3 | null} */

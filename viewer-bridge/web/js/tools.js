@@ -30,7 +30,9 @@ export function particleAt({ simulation, camera, renderer }, at, reach) {
 /** Pins what is free, frees what is pinned. @param {Bench} bench @param {number} particle */
 export function togglePin({ simulation, commands }, particle) {
   const isPinned = ((simulation.pins.get(particle) ?? 0) & PIN.pinned) !== 0;
-  commands.run(isPinned ? "unpin" : "pin", { particle });
+  commands.run(isPinned ? "unpin" : "pin", { particle }, ({ status }) => {
+    if (status === "applied" && simulation.isPaused) simulation.expectPin(particle, !isPinned);
+  });
 }
 
 /** Holds one particle: it is driven to where the pointer meets the plane through it that faces the camera. @implements {Tool} */
@@ -162,7 +164,10 @@ export class Knife {
     const most = simulation.hello?.limits.constraints_per_cut ?? 256;
     for (let first = 0; first < crossed.length; first += most) {
       const constraints = crossed.slice(first, first + most);
-      if (commands.run("cut", { epoch: scene.epoch, constraints })) for (const one of constraints) this.cut.add(one);
+      const isSent = commands.run("cut", { epoch: scene.epoch, constraints }, ({ status }) => {
+        if (status === "applied" && simulation.isPaused) simulation.expectCut(scene.epoch, constraints);
+      });
+      if (isSent) for (const one of constraints) this.cut.add(one);
     }
   }
 

@@ -9,6 +9,8 @@ import { HEAT_STOPS } from "./theme.js";
 
 /** The end of an automatic strain scale is never below this: rounding is no load. */
 const HEAT_LEAST = 0.002;
+/** An automatic scale ends at so many times the mean strain, or at the greatest. */
+const HEAT_MEANS = 8;
 /** Yaw and pitch of the first look. */
 const FIRST_LOOK = { yaw: 0.42, pitch: 0.16 };
 /** Scenes up to so many particles without a surface show them. */
@@ -112,11 +114,13 @@ export class Views {
   scaleHeat() {
     const { renderer, simulation } = this.bench;
     if (!renderer.toggles.heat) return;
-    const measured = Math.max(simulation.stats?.stretchMax ?? 0, HEAT_LEAST);
+    const { stretchMax, stretchMean } = simulation.stats ?? { stretchMax: 0, stretchMean: 0 };
+    // A single edge at a pin is stretched far more than the rest: it may be beyond the scale.
+    const measured = Math.max(Math.min(stretchMax, stretchMean * HEAT_MEANS) || 0, HEAT_LEAST);
     const isFixed = this.range.value !== "auto";
     if (isFixed) renderer.heatMax = Number(this.range.value);
     else if (measured > renderer.heatMax || measured < renderer.heatMax * 0.3) renderer.heatMax = niceCeiling(measured);
-    find("heat-end", HTMLOutputElement).textContent = `${readable(renderer.heatMax, "%")}`;
+    find("heat-end", HTMLOutputElement).textContent = `≥ ${readable(renderer.heatMax, "%")}`;
     drawRamp(find("ramp", HTMLCanvasElement));
     renderer.isDirty = true;
   }

@@ -13,7 +13,7 @@ use crate::crew::Shared;
 use crate::kernels::{Body, Eight, Kernels, Wide, Work, axes};
 use crate::order::Order;
 use crate::particles::Particle;
-use crate::project::{BLOCK, Block, Gap, Law, Rest, Spot, amount, end_scales};
+use crate::project::{BLOCK, Block, Gap, Law, Rest, Spot, correction};
 use crate::scene::Model;
 use crate::solid::{Way, Zone};
 
@@ -183,13 +183,18 @@ impl Graph {
     /// Lets every free body fall.
     pub(super) fn predict(&mut self, team: &mut Team, motion: &Motion<'_>) {
         let (count, kernels, gains) = (self.count(), team.kernels, &self.gains);
-        let length = part_length(count, team.members()).next_multiple_of(8);
-        let parts = self.bodies[..count].chunks_mut(length).enumerate();
-        let work = |(part, bodies): &mut (usize, &mut [Body]), _: &mut Scratch| {
-            let gains = gains.get(*part * length..).unwrap_or_default();
-            kernels.run(PredictWork { bodies, gains, motion });
-        };
-        team.each(parts, work, |_| {});
+        let part_count = part_count(count, team.members());
+        if part_count == 1 {
+            kernels.run(PredictWork { bodies: &mut self.bodies[..count], gains, motion });
+        } else {
+            let length = count.div_ceil(part_count).next_multiple_of(8);
+            let parts = self.bodies[..count].chunks_mut(length).enumerate();
+            let work = |(part, bodies): &mut (usize, &mut [Body]), _: &mut Scratch| {
+                let gains = gains.get(*part * length..).unwrap_or_default();
+                kernels.run(PredictWork { bodies, gains, motion });
+            };
+            team.each(parts, work, |_| {});
+        }
         for (predicted, body) in self.predicted.iter_mut().zip(&self.bodies) {
             let Body([_, _, _, _, x, y, z, _]) = *body;
             *predicted = [x, y, z];
@@ -204,7 +209,7 @@ impl Graph {
             }
         }
         let (count, kernels) = (self.count(), team.kernels);
-        let length = part_length(count, team.members()).next_multiple_of(RUN);
+        let length = count.div_ceil(part_count(count, team.members())).next_multiple_of(RUN).max(1);
         let predicted = &self.predicted;
         let parts = self.bodies[..count].chunks_mut(length).enumerate();
         let work = |(part, bodies): &mut (usize, &mut [Body]), scratch: &mut Scratch| {
@@ -267,10 +272,9 @@ impl Graph {
     }
 }
 
-/// Bodies or constraints of a part, when so many are divided among so many members.
-fn part_length(count: usize, members: usize) -> usize {
-    let parts = if count < SHARED_MIN { 1 } else { members.min(count / (SHARED_MIN / 2)) };
-    count.div_ceil(parts).max(1)
+/// Parts that so many bodies or constraints are divided into among so many members.
+fn part_count(count: usize, members: usize) -> usize {
+    if count < SHARED_MIN { 1 } else { members.min(count / (SHARED_MIN / 2)) }
 }
 
 /// Constraints of one group, and what they move.
@@ -289,32 +293,14 @@ impl Batch<'_> {
         if !is_big || team.kernels == Kernels::Reference {
             return self.project_singly(law);
         }
-        let kernels = team.kernels;
-        let length = part_length(self.group.count, team.members()).div_ceil(8);
-        let mut rest = Some(law);
         // SAFETY: no two constraints of an independent group share a body; and the body of the
         // padding is in the last eight alone.
         let bodies = unsafe { Shared::new(self.bodies) };
-        let parts =
-            self.ends.chunks(length).zip(self.weights.chunks(length)).map(|(ends, weights)| {
-                let law = rest.take().map(|law| {
-                    if ends.len() < length {
-                        return law;
-                    }
-                    let (law, others) = law.split(ends.len());
-                    rest = Some(others);
-                    law
-                });
-                (BatchPart { ends, weights, bodies }, law)
-            });
-        let mut is_marked = false;
-        let work = |(part, law): &mut (BatchPart<'_>, Option<T>), scratch: &mut Scratch| {
-            if let Some(law) = law {
-                kernels.run(BatchWork { part, law, block: &mut scratch.block });
-            }
-        };
-        team.each(parts, work, |(_, law)| is_marked |= law.is_some_and(|law| law.is_marked()));
-        is_marked
+        let whole = BatchPart { ends: self.ends, weights: self.weights, bodies };
+        if part_count(self.group.count, team.members()) == 1 {
+            return whole.project(law, (team.kernels, team.alone()));
+        }
+        whole.project_together(law, team)
     }
 
     fn project_singly(self, mut law: impl Law) -> bool {
@@ -326,12 +312,11 @@ impl Batch<'_> {
             let difference = |axis: usize| self.bodies[b].0[axis] - self.bodies[a].0[axis];
             let gap = Gap::new(axes(difference), axes(|axis| difference(4 + axis)));
             let scale = law.scale(at, &gap.size, w_a + w_b);
-            let [scale_a, scale_b] = end_scales([w_a, w_b], scale);
-            let from_a = amount(gap.separation, scale_a);
-            let from_b = amount(gap.separation, scale_b);
+            let correction = correction(gap.separation, scale);
+            let (way_a, way_b) = (correction.way(w_a), correction.way(w_b));
             for axis in 0..3 {
-                self.bodies[a].0[4 + axis] -= from_a[axis];
-                self.bodies[b].0[4 + axis] -= from_b[axis];
+                self.bodies[a].0[4 + axis] += way_a[axis];
+                self.bodies[b].0[4 + axis] -= way_b[axis];
             }
         }
         law.is_marked()
@@ -343,6 +328,42 @@ struct BatchPart<'a> {
     ends: &'a [[[u32; 8]; 2]],
     weights: &'a [[Eight; 2]],
     bodies: Shared<'a, Body>,
+}
+
+impl BatchPart<'_> {
+    /// Whether anything has torn.
+    fn project(&self, mut law: impl Law, (kernels, scratch): (Kernels, &mut Scratch)) -> bool {
+        kernels.run(BatchWork { part: self, law: &mut law, block: &mut scratch.block });
+        law.is_marked()
+    }
+
+    /// As [`Self::project`], by all members of the team.
+    fn project_together<T: Law + Send>(&self, law: T, team: &mut Team) -> bool {
+        let kernels = team.kernels;
+        let length = self.ends.len().div_ceil(part_count(8 * self.ends.len(), team.members()));
+        let mut rest = Some(law);
+        let parts = self.ends.chunks(length).zip(self.weights.chunks(length));
+        let parts = parts.map(|(ends, weights)| {
+            let law = rest.take().map(|law| {
+                if ends.len() < length {
+                    return law;
+                }
+                let (law, others) = law.split(ends.len());
+                rest = Some(others);
+                law
+            });
+            (BatchPart { ends, weights, bodies: self.bodies }, law, false)
+        });
+        let mut is_any_marked = false;
+        let work = |(part, law, is_marked): &mut (BatchPart<'_>, Option<T>, bool),
+                    scratch: &mut _| {
+            if let Some(law) = law.take() {
+                *is_marked = part.project(law, (kernels, scratch));
+            }
+        };
+        team.each(parts, work, |(.., is_marked)| is_any_marked |= is_marked);
+        is_any_marked
+    }
 }
 
 struct BatchWork<'a, 'b, T> {
@@ -369,14 +390,15 @@ impl<T: Law> Work for BatchWork<'_, '_, T> {
             }
             for (eight, [w_a, w_b]) in weights[first..first + length].iter().enumerate() {
                 let at = Spot { eight: first + eight, lane: 0 };
-                block.solve(eight, (&mut *law, at), [W::load(w_a, 0), W::load(w_b, 0)]);
+                block.solve(eight, (&mut *law, at), W::load(w_a, 0) + W::load(w_b, 0));
             }
-            for (eight, [a, b]) in ends.iter().enumerate() {
-                let [from_a, from_b] = block.amounts::<W>(eight);
+            let weights = &weights[first..first + length];
+            for (eight, ([a, b], [w_a, w_b])) in ends.iter().zip(weights).enumerate() {
+                let correction = block.correction::<W>(eight);
                 // SAFETY: as above.
-                unsafe { W::take(bodies, a, from_a) };
+                unsafe { W::take(bodies, a, correction.way(-W::load(w_a, 0))) };
                 // SAFETY: as above.
-                unsafe { W::take(bodies, b, from_b) };
+                unsafe { W::take(bodies, b, correction.way(W::load(w_b, 0))) };
             }
         }
     }

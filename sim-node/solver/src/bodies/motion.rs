@@ -2,7 +2,7 @@
 
 use crate::contact::Obstacle;
 use crate::kernels::{Lanes, axes, each};
-use crate::project::{Gap, Rest, amount};
+use crate::project::{Gap, Rest, correction};
 
 /// What a substep does beside its constraints.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,9 @@ impl Fall {
         let reach = L::splat(self.reach);
         let is_fast = (reach * reach).is_below(squared);
         if L::any(is_fast) {
-            let scale = reach / squared.sqrt();
+            // A speed whose square is beyond f32 has no direction left: the state has blown up.
+            let is_known = squared.is_at_most(L::splat(f32::MAX));
+            let scale = L::choose(is_known, reach / squared.sqrt(), L::splat(f32::NAN));
             after = each(after, |along| L::choose(is_fast, along * scale, along));
         }
         let is_free = L::splat(0.0).is_below(w);
@@ -62,7 +64,9 @@ impl Fall {
 pub(crate) fn pull_back<L: Lanes>(start: [L; 3], moved: [L; 3], rest: Rest<L>, w: L) -> [L; 3] {
     let gap = Gap::new(start, moved);
     let scale = gap.size.scale(rest, L::splat(1.0), L::splat(1.0));
-    let is_taut = rest.square.is_below(gap.size.base + gap.size.change);
+    let is_taut = rest.square.is_below(gap.size.squared());
     let is_free = L::splat(0.0).is_below(w);
-    amount(gap.separation, scale.only(L::both(is_taut, is_free)))
+    let is_pulled = L::both(is_taut, is_free);
+    let way = correction(gap.separation, scale).way(L::splat(1.0));
+    each(way, |along| along.only(is_pulled))
 }

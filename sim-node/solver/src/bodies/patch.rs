@@ -64,6 +64,12 @@ struct Shape {
     features: Features,
     /// The families that the sheet has, in the order of projection.
     families: Vec<Strand>,
+    /// The first field of the constraints.
+    links_at: usize,
+    /// Numbers that the constraints of a family have in a row.
+    strand_length: usize,
+    /// Numbers of a row.
+    row_length: usize,
 }
 
 /// The constraints of a family.
@@ -72,6 +78,8 @@ struct Strand {
     family: Family,
     /// All of a family are alike: generators make them so.
     give: Give,
+    /// They need no more than [`crate::project::Rigid`].
+    is_plain: bool,
 }
 
 impl Shape {
@@ -83,19 +91,16 @@ impl Shape {
         members.min(self.rows / (4 * reach + 1)).max(1)
     }
 
-    fn field_count(&self) -> usize {
-        self.links_at() + self.families.len() * self.features.field_count()
-    }
-
-    /// The first field of the constraints.
-    fn links_at(&self) -> usize {
-        let Extras { colliders, wind, tethers } = self.extras;
-        STATE_FIELDS + 3 * usize::from(colliders) + 3 * usize::from(wind) + 5 * usize::from(tethers)
-    }
-
-    /// Numbers of a row.
-    fn row_length(&self) -> usize {
-        self.field_count() * self.stride
+    /// Where everything is with these features; asked for by every row, so worked out once.
+    fn lay_out(&mut self, features: Features, extras: Extras) {
+        (self.features, self.extras) = (features, extras);
+        for strand in &mut self.families {
+            strand.is_plain = features.are_plain(strand.give.softness);
+        }
+        let Extras { wind, tethers, .. } = extras;
+        self.links_at = self.wind_at() + 3 * usize::from(wind) + 5 * usize::from(tethers);
+        self.strand_length = features.field_count() * self.stride;
+        self.row_length = self.links_at * self.stride + self.families.len() * self.strand_length;
     }
 
     fn wind_at(&self) -> usize {
@@ -131,7 +136,7 @@ struct Row<'a> {
 
 impl<'a> Row<'a> {
     fn new(row: &'a mut [f32], shape: &Shape) -> Self {
-        let (mut rest, links) = row.split_at_mut(shape.links_at() * shape.stride);
+        let (mut rest, links) = row.split_at_mut(shape.links_at * shape.stride);
         let mut next = || {
             let (field, others) = std::mem::take(&mut rest).split_at_mut(shape.stride);
             rest = others;
@@ -146,6 +151,7 @@ impl Patch {
     pub(crate) fn new(sheet: Sheet, families: &[Family]) -> Self {
         let (columns, rows) = (sheet.columns as usize, sheet.rows as usize);
         let give = Give::default();
+        let strand = |family: &Family| Strand { family: *family, give, is_plain: false };
         let shape = Shape {
             columns,
             rows,
@@ -154,7 +160,10 @@ impl Patch {
             stride: columns.next_multiple_of(LINE) + LINE,
             extras: Extras::default(),
             features: Features::default(),
-            families: families.iter().map(|family| Strand { family: *family, give }).collect(),
+            families: families.iter().map(strand).collect(),
+            links_at: 0,
+            strand_length: 0,
+            row_length: 0,
         };
         Self { sheet, shape, lines: Vec::new(), stages: Vec::new() }
     }
@@ -166,14 +175,14 @@ impl Patch {
         extras: Extras,
         (gives, pass_count): (&[Option<Give>], u32),
     ) {
-        (self.shape.features, self.shape.extras) = (features, extras);
         for (strand, give) in self.shape.families.iter_mut().zip(gives) {
             strand.give = give.unwrap_or(strand.give);
         }
+        self.shape.lay_out(features, extras);
         let passes = (0..pass_count).map(|index| Pass { index, count: pass_count });
         let stages = |pass| stages(&self.shape.families, pass, features.max_lengths);
         self.stages = passes.map(stages).collect();
-        let length = self.shape.rows * self.shape.row_length();
+        let length = self.shape.rows * self.shape.row_length;
         self.lines.clear();
         self.lines.resize(length / LINE, Line([0.0; LINE]));
         for place in 0..self.shape.rows * self.shape.families.len() * self.shape.stride {
@@ -189,7 +198,7 @@ impl Patch {
     }
 
     fn row(&mut self, row: usize) -> Row<'_> {
-        let length = self.shape.row_length();
+        let length = self.shape.row_length;
         let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
         Row::new(&mut numbers[row * length..][..length], &self.shape)
     }
@@ -210,9 +219,9 @@ impl Patch {
     fn fields(&mut self, place: usize) -> (Fields<'_>, usize) {
         let (stride, strands) = (self.shape.stride, self.shape.families.len());
         let (block, at) = (place / stride, place % stride);
-        let (features, count) = (self.shape.features, self.shape.features.field_count());
+        let (features, length) = (self.shape.features, self.shape.strand_length);
         let links = self.row(block / strands).links;
-        let block = &mut links[block % strands * count * stride..][..count * stride];
+        let block = &mut links[block % strands * length..][..length];
         (Fields::new(block, stride, features), at)
     }
 
@@ -270,7 +279,7 @@ impl Patch {
                 let sweep = Sweep { stages, pass, motion, scratch };
                 part.is_marked = kernels.run(SweepWork { band, span: part.span.clone(), sweep });
             };
-            let parts = Part::cut(numbers, shape.row_length(), parts);
+            let parts = Part::cut(numbers, shape.row_length, parts);
             team.each(parts, work, |part| is_marked |= part.is_marked);
         };
         round(&mut spans.into_iter());
@@ -298,7 +307,7 @@ impl Patch {
 
     /// Where x of a particle is among the numbers.
     pub(crate) fn number_of(&self, [row, column]: [usize; 2]) -> usize {
-        row * self.shape.row_length() + column
+        row * self.shape.row_length + column
     }
 
     /// A vector of a particle: fields `field`, `field` + 1, `field` + 2.

@@ -38,6 +38,11 @@ impl Team {
         }
     }
 
+    /// For work that one does alone.
+    pub(crate) fn alone(&mut self) -> &mut Scratch {
+        &mut self.scratches[0]
+    }
+
     /// Lets each member work on a part, with its own scratch; one alone takes them in turn.
     ///
     /// # Panics

@@ -125,6 +125,12 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn or_at_least(self, other: Self) -> Self {
+        // The second one on ties and where one is no number, as in the other programs.
+        Self(avx2!(_mm256_max_ps(self.0, other.0)))
+    }
+
+    #[inline(always)]
     fn is_below(self, other: Self) -> Mask {
         Mask(avx2!(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
     }
@@ -135,8 +141,8 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn is_not_zero(self) -> Mask {
-        Mask(avx2!(_mm256_cmp_ps::<_CMP_NEQ_UQ>(self.0, Self::splat(0.0).0)))
+    fn is_number(self) -> Mask {
+        Mask(avx2!(_mm256_cmp_ps::<_CMP_ORD_Q>(self.0, self.0)))
     }
 
     #[inline(always)]

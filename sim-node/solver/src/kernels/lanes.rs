@@ -32,12 +32,13 @@ pub(crate) trait Lanes:
     fn store(self, to: &mut Eight, lane: usize);
     fn sqrt(self) -> Self;
     fn abs(self) -> Self;
+    /// The larger one; the other where either is no number.
+    fn or_at_least(self, other: Self) -> Self;
     /// self < other; no where one of them is no number.
     fn is_below(self, other: Self) -> Self::Mask;
     /// self <= other; no where one of them is no number.
     fn is_at_most(self, other: Self) -> Self::Mask;
-    /// Yes where it is no number, too.
-    fn is_not_zero(self) -> Self::Mask;
+    fn is_number(self) -> Self::Mask;
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     fn choose(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The number where the mask says yes, +0 elsewhere, whatever stands there.

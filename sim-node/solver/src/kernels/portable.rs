@@ -110,6 +110,11 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
+    fn or_at_least(self, other: Self) -> Self {
+        self.zip_with(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
     fn is_below(self, other: Self) -> [bool; 8] {
         self.compare(other, |a, b| a < b)
     }
@@ -120,8 +125,8 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn is_not_zero(self) -> [bool; 8] {
-        self.compare(Self::splat(0.0), |a, b| a != b)
+    fn is_number(self) -> [bool; 8] {
+        self.0.map(|number| !number.is_nan())
     }
 
     #[inline(always)]

@@ -31,6 +31,11 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
+    fn or_at_least(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
+
+    #[inline(always)]
     fn is_below(self, other: Self) -> bool {
         self < other
     }
@@ -41,8 +46,8 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    fn is_not_zero(self) -> bool {
-        self != 0.0
+    fn is_number(self) -> bool {
+        !self.is_nan()
     }
 
     #[inline(always)]

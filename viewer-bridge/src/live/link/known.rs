@@ -111,3 +111,67 @@ impl Known {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sim_contract::{Command, Reason};
+
+    use super::*;
+
+    fn outcome(index: u64, action: Action) -> Outcome {
+        Outcome::new(index, 10, Command::new(1, index, action), Ok(()))
+    }
+
+    fn damping(value: f32) -> Action {
+        let parameter = Text::new("damping");
+        Action::Set { parameter, value: SettingValue::Number(value), constraint_kind: None }
+    }
+
+    fn begun(outcome_count: u64) -> Known {
+        let mut known = Known::default();
+        known.begin(Parameters::default(), outcome_count);
+        known
+    }
+
+    fn damping_of(known: &Known) -> f32 {
+        known.values.unwrap().damping.0
+    }
+
+    #[test]
+    fn who_came_after_a_command_does_not_know_until_a_reset() {
+        let mut known = begun(3);
+        assert!(!known.is_complete);
+        known.follow(&outcome(3, damping(2.0)));
+        assert!(!known.is_complete && damping_of(&known) == 2.0);
+        known.follow(&outcome(4, Action::Reset));
+        assert!(known.is_complete && damping_of(&known) == 0.0);
+    }
+
+    #[test]
+    fn a_gap_in_the_outcomes_is_noticed() {
+        let mut known = begun(0);
+        known.follow(&outcome(0, Action::Pause));
+        assert!(known.is_complete);
+        known.follow(&outcome(2, Action::Pause));
+        assert!(!known.is_complete);
+    }
+
+    #[test]
+    fn what_is_set_after_a_load_waits_for_it() {
+        let mut known = begun(0);
+        known.follow(&outcome(0, damping(1.0)));
+        known.follow(&outcome(1, Action::Load { scene: Text::new("rope") }));
+        known.follow(&outcome(2, damping(2.0)));
+        assert_eq!(damping_of(&known), 1.0);
+        known.begin(Parameters::default(), 3);
+        assert!(known.is_complete && damping_of(&known) == 2.0);
+    }
+
+    #[test]
+    fn a_rejected_command_changes_nothing() {
+        let mut known = begun(0);
+        let command = Command::new(1, 0, damping(1.0));
+        known.follow(&Outcome::new(0, 10, command, Err(Reason::OutOfRange)));
+        assert_eq!(damping_of(&known), 0.0);
+    }
+}

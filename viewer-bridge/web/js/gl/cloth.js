@@ -56,7 +56,7 @@ void main() {
   vec3 to_eye = normalize(u_eye - v_position);
   bool is_heat = u_heat_max > 0.0;
   if (is_heat) base = heat(v_strain);
-  vec3 color = lit(base, normal, to_eye, is_heat ? 0.2 : 1.0);
+  vec3 color = lit(base, v_position, normal, to_eye, is_heat ? 0.2 : 1.0);
   // A heat map has to be read by its colour: half of it is not shaded.
   o_color = screen(is_heat ? mix(base, color, 0.45) : color, 1.0);
 }

@@ -49,7 +49,7 @@ void main() {
   } else if (u_flat.a > 0.0) {
     o_color = screen(u_flat.rgb, u_flat.a);
   } else {
-    o_color = screen(lit(u_collider, normalize(v_normal), normalize(u_eye - v_position), 0.3), 1.0);
+    o_color = screen(lit(u_collider, v_position, normalize(v_normal), normalize(u_eye - v_position), 0.3), 1.0);
   }
 }
 `;

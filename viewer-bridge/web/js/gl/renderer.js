@@ -17,6 +17,8 @@ import { Ground } from "./ground.js";
 /** Pixels of the screen that a CSS pixel is made of, at most: finer is not seen, and costs the square. */
 const PIXEL_RATIO_MAX = 2;
 const HEAT_COLORS = HEAT_STOPS.flatMap((hex) => linear(hex));
+/** Distance of the lamp in radii of the scene. */
+const LAMP_RADII = 2.6;
 /** Radii of the ground that fades out. */
 const GROUND_RADII = 6;
 /** Scenes of more particles than a body has joints are drawn with thinner sticks. */
@@ -164,6 +166,8 @@ export class Renderer {
       u_view_projection: multiply(projection, camera.view()),
       u_lo: simulation.frame?.lo ?? [0, 0, 0], u_scale: simulation.frame?.scale ?? [1, 1, 1],
       u_viewport: [canvas.width, canvas.height], u_eye: camera.eye(), u_up: up, u_light: light,
+      // Near enough that a flat cloth is not of one colour; the shadow takes it as far away.
+      u_lamp: addScaled(simulation.middle(), light, simulation.radius() * LAMP_RADII),
       u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: isFlat ? 0 : camera.distance * 0.02,
       u_sky: palette.sky, u_bounce: palette.bounce, u_key: palette.key,
       u_heat_max: this.toggles.heat ? this.heatMax : 0, u_heat_stops: HEAT_COLORS,

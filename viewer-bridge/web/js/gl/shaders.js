@@ -29,20 +29,21 @@ vec3 heat(float strain) {
 }
 `;
 
-/** lit(base, normal, to_eye): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim. */
+/** lit(base, at, normal, to_eye, sheen): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim. */
 export const LIGHT = `
 uniform vec3 u_up;
-uniform vec3 u_light;
+uniform vec3 u_lamp;
 uniform vec3 u_sky;
 uniform vec3 u_bounce;
 uniform float u_key;
-vec3 lit(vec3 base, vec3 normal, vec3 to_eye, float sheen) {
+vec3 lit(vec3 base, vec3 at, vec3 normal, vec3 to_eye, float sheen) {
+  vec3 to_light = normalize(u_lamp - at);
   vec3 around = mix(u_bounce, u_sky, 0.5 + 0.5 * dot(normal, u_up));
-  float facing = dot(normal, u_light);
+  float facing = dot(normal, to_light);
   float direct = pow(clamp((facing + 0.25) / 1.25, 0.0, 1.0), 1.6);
   float through = clamp(-facing, 0.0, 1.0) * 0.12 * sheen;
   vec3 color = base * (around * 0.42 + u_key * (direct * 1.0 + through));
-  float gloss = pow(clamp(dot(normal, normalize(u_light + to_eye)), 0.0, 1.0), 28.0);
+  float gloss = pow(clamp(dot(normal, normalize(to_light + to_eye)), 0.0, 1.0), 28.0);
   float rim = pow(1.0 - clamp(dot(normal, to_eye), 0.0, 1.0), 4.0);
   return color + sheen * u_key * (gloss * 0.07 + rim * 0.08 * u_sky);
 }

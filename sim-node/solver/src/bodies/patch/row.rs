@@ -54,14 +54,16 @@ pub(super) fn project_down<W: Wide>(
         for eight in 0..length {
             let load = |field: &[Eight]| W::load(&field[first + eight], 0);
             let at = Spot { eight: first + eight, lane: 0 };
-            block.solve(eight, (law, at), [load(w_a), load(w_b)]);
+            block.solve(eight, (law, at), load(w_a) + load(w_b));
         }
         for eight in 0..length {
-            let [take_a, take_b] = block.amounts::<W>(eight);
+            let load = |field: &[Eight]| W::load(&field[first + eight], 0);
+            let correction = block.correction::<W>(eight);
+            let (way_a, way_b) = (correction.way(load(w_a)), correction.way(load(w_b)));
             for axis in 0..3 {
                 let (d_a, d_b) = (&mut d_a[axis][first + eight], &mut d_b[axis][first + eight]);
-                (W::load(d_a, 0) - take_a[axis]).store(d_a, 0);
-                (W::load(d_b, 0) - take_b[axis]).store(d_b, 0);
+                (W::load(d_a, 0) + way_a[axis]).store(d_a, 0);
+                (W::load(d_b, 0) - way_b[axis]).store(d_b, 0);
             }
         }
     }
@@ -88,16 +90,18 @@ pub(super) fn project_across<W: Wide>(
         }
         for eight in 0..length {
             let at = Spot { eight: first + eight, lane: 0 };
-            let weights: [W; 2] = unzip(&w[at.eight], is_bend);
-            block.solve(eight, (law, at), weights);
+            let [w_a, w_b]: [W; 2] = unzip(&w[at.eight], is_bend);
+            block.solve(eight, (law, at), w_a + w_b);
         }
         for eight in 0..length {
-            let [take_a, take_b] = block.amounts::<W>(eight);
+            let correction = block.correction::<W>(eight);
+            let [w_a, w_b]: [W; 2] = unzip(&w[first + eight], is_bend);
+            let (way_a, way_b) = (correction.way(w_a), correction.way(-w_b));
             for axis in 0..3 {
-                let [low, high] = zip([take_a[axis], take_b[axis]], is_bend);
+                let [low, high] = zip([way_a[axis], way_b[axis]], is_bend);
                 let [to_low, to_high] = &mut d[axis][first + eight];
-                (W::load(to_low, 0) - low).store(to_low, 0);
-                (W::load(to_high, 0) - high).store(to_high, 0);
+                (W::load(to_low, 0) + low).store(to_low, 0);
+                (W::load(to_high, 0) + high).store(to_high, 0);
             }
         }
     }

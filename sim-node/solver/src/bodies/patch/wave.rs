@@ -181,7 +181,7 @@ impl Band<'_> {
 
     #[inline(always)]
     fn columns(&mut self, row: usize) -> Columns<'_> {
-        let length = self.shape.row_length();
+        let length = self.shape.row_length;
         let row = &mut self.numbers[(row - self.first) * length..][..length];
         Columns::new(row, self.shape)
     }
@@ -194,15 +194,15 @@ impl Band<'_> {
         (strand, half): (usize, usize),
         (is_limit, sweep): (bool, &mut Sweep<'_, '_>),
     ) -> bool {
-        let (shape, row_length) = (self.shape, self.shape.row_length());
-        let Strand { family, give } = shape.families[strand];
+        let (shape, row_length) = (self.shape, self.shape.row_length);
+        let Strand { family, give, is_plain } = shape.families[strand];
         let (stride, reach) = (shape.stride, family.reach());
         let (upper, below) =
             self.numbers[(row - self.first) * row_length..].split_at_mut(row_length);
         let (state, rest) = upper.split_at_mut(STATE_FIELDS * stride);
-        let block_length = shape.features.field_count() * stride;
-        let links_at = (shape.links_at() - STATE_FIELDS) * stride + strand * block_length;
-        let fields = Fields::new(&mut rest[links_at..][..block_length], stride, shape.features);
+        let length = shape.strand_length;
+        let links_at = (shape.links_at - STATE_FIELDS) * stride + strand * length;
+        let fields = Fields::new(&mut rest[links_at..][..length], stride, shape.features);
         let count = family.count(shape.columns);
         // The first of a half within the row, in memory and in its fields.
         let from = if reach == 0 { half * family.shifts()[1] } else { 0 };
@@ -224,7 +224,7 @@ impl Band<'_> {
         if is_limit {
             return fields.limit(&eights).is_some_and(|limit| ways.project::<W>(limit, block));
         }
-        if shape.features.are_plain(give.softness) {
+        if is_plain {
             ways.project::<W>(fields.rigid(&eights, give.share), block)
         } else {
             ways.project::<W>(fields.general(&eights, give, sweep.pass), block)

@@ -1,0 +1,59 @@
+// What the pointer finds: on a camera whose pixels are known in closed form.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Camera, axesOf } from "../js/camera.js";
+import { crossedSticks, pickParticle, projectAll, segmentsCross } from "../js/pick.js";
+
+const VIEWPORT = { width: 800, height: 600 };
+const camera = Object.assign(new Camera(), { yaw: 0, pitch: 0, distance: 5 });
+const frame = (positions) => ({ positions: Float32Array.from(positions), lo: [0, 0, 0], scale: [1, 1, 1] });
+const pick = (points, at, radius = 18) => pickParticle(points, camera.viewProjection(VIEWPORT), VIEWPORT, at, radius);
+
+test("the nearest particle within the radius is taken, and none outside of it", () => {
+  const points = frame([0, 0, 0, 0.05, 0, 0, 1, 1, 0]);
+  const at = camera.project([0.04, 0, 0], VIEWPORT);
+  assert.equal(pick(points, at), 1);
+  assert.equal(pick(points, { x: 10, y: 10 }), null);
+});
+
+test("of two layers the one in front is taken, though the other is nearer to the pixel", () => {
+  const at = camera.project([0, 0, 0], VIEWPORT);
+  assert.equal(pick(frame([0, 0, -2, 0.01, 0.01, 1]), at), 1);
+});
+
+test("what is behind the eye is not taken", () => {
+  assert.equal(pick(frame([0, 0, 9]), { x: 400, y: 300 }, 1000), null);
+});
+
+test("quantised positions are picked like the ones that they stand for", () => {
+  const positions = Uint16Array.from([0, 0, 0, 65535, 32768, 0]);
+  const points = { positions, lo: [-1, -0.5, 0], scale: [2 / 65535, 1 / 65535, 0] };
+  assert.equal(pick(points, camera.project([1, 0, 0], VIEWPORT)), 1);
+  const pixels = projectAll(points, camera.viewProjection(VIEWPORT), VIEWPORT);
+  const expected = camera.project([-1, -0.5, 0], VIEWPORT);
+  assert.ok(Math.abs(pixels[0] - expected.x) < 1e-3 && Math.abs(pixels[1] - expected.y) < 1e-3);
+});
+
+test("a stroke crosses the sticks on its way, and only those that are whole", () => {
+  const flat = Object.assign(new Camera(), { isFlat: true, axes: axesOf("y", 2) });
+  // A ladder: rungs at heights 0, 1, 2, 3 between x = -1 and x = 1.
+  const points = frame([0, 1, 2, 3].flatMap((y) => [-1, y, 0, 1, y, 0]));
+  const pixels = projectAll(points, flat.viewProjection(VIEWPORT), VIEWPORT);
+  const ends = Uint32Array.from([0, 1, 2, 3, 4, 5, 6, 7]);
+  const from = flat.project([0, -0.5, 0], VIEWPORT);
+  const to = flat.project([0.2, 2.5, 0], VIEWPORT);
+  assert.deepEqual(crossedSticks(pixels, ends, new Uint8Array(4), from, to), [0, 1, 2]);
+  assert.deepEqual(crossedSticks(pixels, ends, Uint8Array.from([0, 1, 0, 0]), from, to), [0, 2]);
+});
+
+test("segments cross where each has its ends on both sides of the other", () => {
+  const from = { x: 0, y: 0 };
+  const to = { x: 2, y: 2 };
+  assert.ok(segmentsCross(0, 2, 2, 0, from, to));
+  assert.ok(segmentsCross(2, 0, 2, 2, from, to), "a touch counts");
+  assert.ok(!segmentsCross(0, 2, 0.9, 1.1, from, to), "too short");
+  assert.ok(!segmentsCross(1, 0, 3, 2, from, to), "parallel");
+  assert.ok(!segmentsCross(0.5, 0.5, 1, 1, from, to), "on the same line");
+  assert.ok(!segmentsCross(NaN, NaN, 1, 1, from, to), "behind the eye");
+});

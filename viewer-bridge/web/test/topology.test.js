@@ -1,0 +1,124 @@
+// Which triangles and sticks are left after tears, and that a fan's normal is the triangles' sum.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { FAN_WORDS, STICK, Topology, drawnSticks } from "../js/topology.js";
+import { lowestReach, lowestWithin } from "../js/hanging.js";
+
+/** A sheet of columns x rows, a unit apart, hanging along -y: links right, down, and the diagonal down-right. */
+function sheet(columns, rows) {
+  const at = (c, r) => r * columns + c;
+  const positions = [], ends = [], kinds = [], triangles = [];
+  for (let r = 0; r < rows; r++) {
+    for (let c = 0; c < columns; c++) {
+      positions.push(c, -r, 0);
+      if (c + 1 < columns) { ends.push(at(c, r), at(c + 1, r)); kinds.push(0); }
+      if (r + 1 < rows) { ends.push(at(c, r), at(c, r + 1)); kinds.push(0); }
+      if (c + 1 < columns && r + 1 < rows) {
+        ends.push(at(c, r), at(c + 1, r + 1));
+        kinds.push(1);
+        triangles.push(at(c, r), at(c, r + 1), at(c + 1, r + 1), at(c, r), at(c + 1, r + 1), at(c + 1, r));
+      }
+    }
+  }
+  return sceneOf(positions, ends, kinds, triangles);
+}
+
+function sceneOf(positions, ends, kinds, triangles = []) {
+  const lengths = kinds.map((_, i) => Math.hypot(...[0, 1, 2].map((k) => positions[3 * ends[2 * i] + k] - positions[3 * ends[2 * i + 1] + k])));
+  return {
+    positions: Float32Array.from(positions), ends: Uint32Array.from(ends), restLengths: Float32Array.from(lengths),
+    triangles: Uint32Array.from(triangles), constraintKinds: Uint8Array.from(kinds),
+    particleCount: positions.length / 3, constraintCount: kinds.length, triangleCount: triangles.length / 3,
+  };
+}
+
+const find = (scene, a, b) => Array.from({ length: scene.constraintCount }, (_, i) => i).find((i) => scene.ends[2 * i] === a && scene.ends[2 * i + 1] === b);
+const live = (topology) => [...topology.isDead].filter((dead) => dead === 0).length;
+
+test("every triangle is in the fans of its three corners", () => {
+  const scene = sheet(4, 3);
+  const topology = new Topology(scene);
+  for (let p = 0; p < scene.particleCount; p++) {
+    const [first, count] = topology.fanRanges.subarray(2 * p, 2 * p + 2);
+    const around = Array.from({ length: scene.triangleCount }, (_, t) => [...scene.triangles.subarray(3 * t, 3 * t + 3)]).filter((triangle) => triangle.includes(p));
+    assert.equal(count, around.length);
+    for (let entry = first; entry < first + count; entry++) {
+      const [b, c] = topology.fans.subarray(entry * FAN_WORDS, entry * FAN_WORDS + 2);
+      assert.ok(around.some((triangle) => [0, 1, 2].some((k) => triangle[k] === p && triangle[(k + 1) % 3] === b && triangle[(k + 2) % 3] === c)));
+    }
+  }
+});
+
+test("a fan knows the rest length to its first corner, and 0 where nothing joins them", () => {
+  const scene = sheet(2, 2);
+  scene.constraintKinds.fill(0);
+  const topology = new Topology(scene);
+  const entry = topology.fanRanges[0];
+  const words = topology.fans.subarray(entry * FAN_WORDS, entry * FAN_WORDS + FAN_WORDS);
+  assert.equal(new Float32Array(Uint32Array.of(words[2]).buffer)[0], 1);
+  const bare = new Topology(sceneOf([0, 0, 0, 1, 0, 0, 0, 1, 0], [], [], [0, 1, 2]));
+  assert.equal(bare.fans[2], 0);
+});
+
+test("a torn constraint takes the triangles along it, and no others", () => {
+  const scene = sheet(3, 3);
+  const topology = new Topology(scene);
+  topology.remove([find(scene, 0, 4)]);
+  assert.equal(live(topology), 6, "both halves of the cell go with its diagonal");
+  topology.remove([find(scene, 7, 8)]);
+  assert.equal(live(topology), 5, "an edge of the border has one triangle");
+  for (let t = 0; t < scene.triangleCount; t++) {
+    const corners = [...topology.indices.subarray(3 * t, 3 * t + 3)];
+    assert.deepEqual(corners, topology.isDead[t] ? [0, 0, 0] : [...scene.triangles.subarray(3 * t, 3 * t + 3)]);
+  }
+});
+
+test("a thread whose triangles are gone is a stick again, and a torn one is none", () => {
+  const scene = sheet(2, 2);
+  const topology = new Topology(scene);
+  const [right, diagonal] = [find(scene, 0, 1), find(scene, 0, 3)];
+  assert.ok(topology.styles[right] & STICK.isCovered);
+  topology.remove([diagonal]);
+  assert.equal(topology.styles[right] & STICK.isCovered, 0);
+  assert.ok(topology.styles[diagonal] & STICK.isGone);
+  topology.restore();
+  assert.equal(live(topology), 2);
+  assert.ok(topology.styles[right] & STICK.isCovered);
+  assert.equal(topology.styles[diagonal] & STICK.isGone, 0);
+});
+
+test("what joins a particle without a position is not drawn", () => {
+  const topology = new Topology(sheet(3, 3));
+  topology.removeAround(Uint32Array.of(4));
+  assert.equal(live(topology), 2, "of eight triangles, six have the middle as a corner");
+});
+
+test("sticks are drawn up to a limit, structural ones first and bends never", () => {
+  const scene = sceneOf([0, 0, 0, 1, 0, 0, 2, 0, 0], [0, 2, 0, 1, 1, 2, 0, 1], [2, 1, 0, 3]);
+  assert.deepEqual([...drawnSticks(scene, 10)], [2, 1, 3]);
+  assert.deepEqual([...drawnSticks(scene, 1)], [2]);
+});
+
+test("a rope held at one end can hang its whole length down", () => {
+  const count = 11;
+  const positions = Array.from({ length: count }, (_, i) => [i * 0.1, 2, 0]).flat();
+  const scene = sceneOf(positions, Array.from({ length: count - 1 }, (_, i) => [i, i + 1]).flat(), new Array(count - 1).fill(0));
+  assert.ok(Math.abs(lowestReach(scene, [0], [0, 1, 0]) - 1) < 1e-6);
+  assert.equal(lowestReach(scene, [], [0, 1, 0]), null);
+});
+
+test("a tight rope held at both ends cannot hang, and one of double length hangs like a V", () => {
+  const count = 11;
+  const positions = Array.from({ length: count }, (_, i) => [i * 0.1, 2, 0]).flat();
+  const scene = sceneOf(positions, Array.from({ length: count - 1 }, (_, i) => [i, i + 1]).flat(), new Array(count - 1).fill(0));
+  assert.ok(Math.abs(lowestReach(scene, [0, count - 1], [0, 1, 0]) - 2) < 1e-3);
+  scene.restLengths.fill(0.2);
+  const deepest = 2 - Math.sqrt(1 - 0.25);
+  assert.ok(Math.abs(lowestReach(scene, [0, count - 1], [0, 1, 0]) - deepest) < 0.02);
+});
+
+test("two balls meet lowest between their middles, or nowhere", () => {
+  assert.ok(Math.abs(lowestWithin(5, 5, 6, 0) + 4) < 1e-12, "the triangle of sides 3, 4, 5");
+  assert.equal(lowestWithin(1, 1, 3, 0), null);
+});

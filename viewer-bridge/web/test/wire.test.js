@@ -1,0 +1,99 @@
+// The bridge's own golden messages, byte for byte, decoded by the page: what Rust encodes and what
+// JavaScript reads cannot drift apart.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+import { decode } from "../js/wire.js";
+
+const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
+const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders"];
+
+/** An array buffer of its own: a slice of a shared one would begin anywhere. */
+const bufferOf = (hex) => Uint8Array.from(hex.match(/../g), (byte) => parseInt(byte, 16)).buffer;
+
+const triples = (flat) => Array.from({ length: flat.length / 3 }, (_, i) => [...flat.subarray(3 * i, 3 * i + 3)]);
+
+/** What each kind of message has to say, in the golden file's words. */
+const readers = {
+  scene: (m) => ({
+    positions: triples(m.positions), rest_lengths: [...m.restLengths], triangles: triples(m.triangles), kinds: [...m.constraintKinds],
+    ends: Array.from({ length: m.constraintCount }, (_, i) => [m.ends[2 * i], m.ends[2 * i + 1]]),
+    min: m.min, max: m.max, origin: m.origin, rate_hz: m.rateHz,
+    flags: (m.isPlanar ? 1 : 0) | (m.canTear ? 2 : 0) | (m.hasTethers ? 4 : 0) | (m.isPbd ? 8 : 0),
+    text: { name: m.name, unit: m.unit, up: m.up, run_id: m.runId, grids: m.grids },
+  }),
+  frame: (m) => ({
+    sim_time_s: m.simTime, number: m.number, torn_count: m.tornCount, solve_us: m.solveUs, wake_late_us: m.wakeLateUs,
+    publish_monotonic_ns: Number(m.publishedNs), not_finite: [...m.nonFinite],
+    flags: (m.isPaused ? 1 : 0) | (m.isReplay ? 2 : 0) | (m.isSaturated ? 4 : 0),
+    positions: Array.from({ length: m.particleCount }, (_, i) => [0, 1, 2].map((k) => m.lo[k] + m.scale[k] * m.positions[3 * i + k])),
+  }),
+  tear: (m) => ({ first: m.first, constraints: [...m.constraints], causes: [...m.causes] }),
+  pins: (m) => ({ held: [...m.particles].map((particle, i) => [particle, m.flags[i]]) }),
+  stats: (m) => ({
+    solve_us: [m.solveUsP50, m.solveUsP99], wake_late_us: [m.wakeLateUsP50, m.wakeLateUsP99], period_us: m.deadlineUs,
+    real_time_factor: m.realTimeFactor, time_scale: m.timeScale, stretch_mean: m.stretchMean, stretch_max: m.stretchMax,
+    stretch_max_constraint: m.stretchMaxConstraint, kinetic_j: m.kineticJ, potential_j: m.potentialJ,
+    late_steps: m.lateSteps, skipped_periods: m.skippedPeriods, outcome_count: m.outcomes, rejected_count: m.rejected,
+    frozen_count: m.frozenCount, torn_count: m.tornCount, reader_count: m.readers, client_count: m.clients,
+    encode_us: m.encodeUs, frames_per_second: m.framesPerSecond, flags: (m.isPaused ? 1 : 0) | (m.isReplay ? 2 : 0),
+  }),
+  colliders: (m) => ({ colliders: m.colliders }),
+};
+
+for (const { name, hex, fields } of golden) {
+  test(`the golden message "${name}" is read as it was written`, () => {
+    const message = decode(bufferOf(hex));
+    assert.equal(message.kind, KINDS[fields.kind]);
+    assert.deepEqual([message.epoch, message.step], [fields.epoch, fields.step]);
+    const read = readers[message.kind](message);
+    for (const [field, value] of Object.entries(read)) {
+      if (field === "colliders") compareColliders(value, fields.colliders);
+      else if (field === "positions" && message.kind === "frame") compareNumbers(value.flat(), fields.positions.flat());
+      else assert.deepEqual(value, fields[field], field);
+    }
+    // Nothing that the bridge names is left unread.
+    const known = new Set([...Object.keys(read), "epoch", "kind", "step", "lo", "scale"]);
+    assert.deepEqual(Object.keys(fields).filter((field) => !known.has(field)), []);
+  });
+}
+
+function compareNumbers(read, written) {
+  assert.equal(read.length, written.length);
+  read.forEach((value, i) => assert.ok(Math.abs(value - written[i]) <= 1e-6 * Math.max(1, Math.abs(written[i])), `${i}: ${value} is not ${written[i]}`));
+}
+
+function compareColliders(read, written) {
+  assert.equal(read.length, written.length);
+  read.forEach((one, i) => {
+    const other = written[i];
+    assert.deepEqual([one.radius, one.offset, one.normal, one.center, one.a, one.b], [other.radius, other.offset, other.normal, other.center, other.a, other.b]);
+    assert.deepEqual([one.halfExtents, one.rotation, one.velocity], [other.half_extents, other.rotation, other.velocity]);
+  });
+}
+
+test("a kind and a version of a later bridge are passed over", () => {
+  const buffer = new ArrayBuffer(16);
+  const view = new DataView(buffer);
+  view.setUint16(0, 99, true);
+  view.setUint16(2, 1, true);
+  assert.equal(decode(buffer), null);
+  view.setUint16(0, 4, true);
+  view.setUint16(2, 2, true);
+  assert.equal(decode(buffer), null);
+});
+
+test("a message that ends too early is refused at every length", () => {
+  for (const { name, hex, fields } of golden) {
+    const whole = bufferOf(hex);
+    for (const length of [4, 15, 20, Math.floor(whole.byteLength / 2 / 4) * 4, whole.byteLength - 4]) {
+      if (length >= whole.byteLength) continue;
+      // The padding behind the last array may be missing.
+      if (length === whole.byteLength - 4 && endsInPadding(fields)) continue;
+      assert.throws(() => decode(whole.slice(0, length)), RangeError, `${name} cut to ${length}`);
+    }
+  }
+});
+
+const endsInPadding = (fields) => fields.kind === 3 || fields.kind === 4 || fields.kind === 1 || fields.kind === 6;
