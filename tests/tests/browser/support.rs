@@ -9,4 +9,4 @@ mod tab;
 pub(crate) use camera::{Camera, distance};
 pub(crate) use picture::{Area, Picture, is_cloth, is_held, is_particle, is_pin};
 pub(crate) use stage::{Stage, State};
-pub(crate) use tab::{Button, Tab};
+pub(crate) use tab::Button;

@@ -19,7 +19,7 @@ fn pause_freezes_the_picture_step_makes_one_and_reset_restores() {
     let frozen = stage.tab.hash();
     assert_ne!(frozen, first_picture);
     // Measurements still come, and pictures may be drawn: of the same step, the same to the bit.
-    stage.tab.ask("new Promise(done => setTimeout(done, 800))");
+    stage.tab.pass_animation_frames(40);
     assert_eq!(stage.tab.hash(), frozen);
     assert_eq!(stage.state().step, paused.step);
 

@@ -36,7 +36,8 @@ export class TimelineBar {
       this.gate.request(slider.valueAsNumber);
       this.say(slider.valueAsNumber);
     });
-    slider.addEventListener("change", () => { this.isScrubbing = false; });
+    // A slider that is let go where it was taken has not changed.
+    for (const type of ["change", "pointerup", "pointercancel", "blur"]) slider.addEventListener(type, () => { this.isScrubbing = false; });
     find("back", HTMLButtonElement).addEventListener("click", () => this.step(-1));
     find("forward", HTMLButtonElement).addEventListener("click", () => this.step(1));
     this.play.addEventListener("click", () => this.togglePlay());

@@ -1,30 +1,33 @@
-//! The browser: Debian's Chromium, driven by the DevTools protocol over a pair of pipes.
-//!
-//! Pipes rather than a port: nobody else reaches the browser, and it ends when the process of the
-//! tests ends, in whatever way that ends. The shell that starts it then removes its profile.
+//! The browser: Debian's Chromium, driven by the DevTools protocol over a WebSocket on loopback.
 
 use std::cell::RefCell;
 use std::env;
-use std::io::{BufRead, BufReader, Write};
+use std::fmt::Display;
+use std::io::{BufRead, BufReader};
+use std::net::TcpStream;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use integration_tests::DEADLINE;
 use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket};
 
-/// The DevTools pipes are descriptors 3 and 4 of the browser. A shell puts them there: in Rust it
-/// would take unsafe code between fork and exec.
-const LAUNCH: &str = r#"profile=$0; "$@" 3<&0 4>&1 >/dev/null; rm -rf -- "$profile""#;
+/// A shell stands between, so that the browser ends with the process of the tests, in whatever way
+/// that ends: its end closes the shell's input. Then the profile, which is `$0`, goes too.
+const LAUNCH: &str = r#""$@" & read -r _; kill "$!"; wait "$!"; rm -rf -- "$0""#;
+
+/// What Chromium writes before its address.
+const LISTENING: &str = "DevTools listening on ";
 
 /// No sandbox: tests run as root in containers, and open only a page of our own. Software drawing
 /// of WebGL has to be asked for. The last three keep a page at work that nobody looks at.
 const FLAGS: [&str; 18] = [
     "--headless",
-    "--remote-debugging-pipe",
+    "--remote-debugging-port=0",
     "--no-sandbox",
     "--no-first-run",
     "--disable-background-networking",
@@ -48,9 +51,9 @@ static BROWSER: Mutex<Option<Chromium>> = Mutex::new(None);
 
 /// A running browser.
 struct Chromium {
-    child: Child,
-    input: ChildStdin,
-    messages: Receiver<Value>,
+    /// Its input stays open for as long as the browser is wanted.
+    _shell: Child,
+    socket: WebSocket<TcpStream>,
     last_id: u64,
     /// What sessions were told, until they end.
     events: Vec<Value>,
@@ -104,17 +107,19 @@ impl Chromium {
         let mut command = Command::new("sh");
         command.args(["-c", LAUNCH]).arg(&profile).arg(program).args(FLAGS).arg(profile_flag);
         command.arg("about:blank").process_group(0);
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
-        let mut child = command.spawn().unwrap();
-        let input = child.stdin.take().unwrap();
-        let messages = receive(child.stdout.take().unwrap());
-        let mut browser = Self { child, input, messages, last_id: 0, events: Vec::new() };
-        browser.call(None, "Browser.getVersion", json!({})).unwrap();
-        browser
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut shell = command.spawn().unwrap();
+        let url = address(&lines(shell.stderr.take().unwrap()));
+        let host = url.trim_start_matches("ws://").split('/').next().unwrap();
+        let stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(DEADLINE)).unwrap();
+        stream.set_nodelay(true).unwrap();
+        let (socket, _) = tungstenite::client(&url, stream).unwrap();
+        Self { _shell: shell, socket, last_id: 0, events: Vec::new() }
     }
 
     fn is_running(&mut self) -> bool {
-        self.child.try_wait().unwrap().is_none()
+        self.call(None, "Browser.getVersion", json!({})).is_ok()
     }
 
     fn call(
@@ -129,23 +134,46 @@ impl Chromium {
         if let Some(session) = session {
             message["sessionId"] = session.into();
         }
-        self.input
-            .write_all(format!("{message}\0").as_bytes())
-            .map_err(|error| error.to_string())?;
+        self.socket.send(Message::text(message.to_string())).map_err(text)?;
         loop {
-            let answer = self.messages.recv_timeout(DEADLINE);
-            let mut answer = answer.map_err(|error| format!("no answer: {error}"))?;
+            let Message::Text(answer) = self.socket.read().map_err(text)? else { continue };
+            let mut answer: Value = serde_json::from_str(&answer).map_err(text)?;
             if answer["method"].is_string() {
                 self.events.push(answer);
             } else if answer["id"] == id {
                 let error = &answer["error"];
-                return if error.is_null() {
-                    Ok(answer["result"].take())
-                } else {
-                    Err(error.to_string())
-                };
+                return if error.is_null() { Ok(answer["result"].take()) } else { Err(text(error)) };
             }
         }
+    }
+}
+
+fn text(error: impl Display) -> String {
+    error.to_string()
+}
+
+/// Reads lines in a thread of its own, to the end, so that the browser never waits for us.
+fn lines(output: ChildStderr) -> Receiver<String> {
+    let (sender, lines) = channel();
+    thread::spawn(move || {
+        for line in BufReader::new(output).lines().map_while(Result::ok) {
+            // Nobody listens once the address is known.
+            let _heard = sender.send(line);
+        }
+    });
+    lines
+}
+
+/// Where the browser listens: it says so once it does.
+fn address(lines: &Receiver<String>) -> String {
+    let mut said = String::new();
+    loop {
+        let Ok(line) = lines.recv_timeout(DEADLINE) else { panic!("no Chromium: {said}") };
+        if let Some(address) = line.strip_prefix(LISTENING) {
+            return address.to_owned();
+        }
+        said += &line;
+        said.push('\n');
     }
 }
 
@@ -157,22 +185,4 @@ fn program() -> PathBuf {
         .into_iter()
         .find(|path| path.is_file())
         .expect("these tests drive Chromium, which is not there; Debian: apt-get install chromium")
-}
-
-/// Reads messages, each ended by a zero byte, in a thread of its own: so waiting has a deadline.
-fn receive(output: ChildStdout) -> Receiver<Value> {
-    let (sender, messages) = channel();
-    thread::spawn(move || {
-        let mut output = BufReader::new(output);
-        let mut message = Vec::new();
-        while output.read_until(0, &mut message).is_ok_and(|length| length > 0) {
-            message.pop();
-            let Ok(value) = serde_json::from_slice(&message) else { break };
-            if sender.send(value).is_err() {
-                break;
-            }
-            message.clear();
-        }
-    });
-    messages
 }

@@ -127,10 +127,14 @@ impl Tab {
         wait_for(condition, || (self.evaluate(condition).ok()? == true).then_some(()));
     }
 
-    /// Waits until that many more pictures were drawn.
-    pub(crate) fn wait_for_pictures(&self, count: u32) {
-        let before = self.number("viewer.framesDrawn");
-        self.wait(&format!("viewer.framesDrawn >= {}", before + f64::from(count)));
+    /// Lets the page have so many turns to draw, whether it does or not.
+    pub(crate) fn pass_animation_frames(&self, count: u32) {
+        self.ask(&format!(
+            "new Promise(done => {{ \
+                let left = {count}; \
+                const pass = () => left-- > 0 ? requestAnimationFrame(pass) : done(); \
+                pass(); }})"
+        ));
     }
 
     pub(crate) fn press(&self, at: [f64; 2], button: Button) {

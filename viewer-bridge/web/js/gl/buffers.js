@@ -38,6 +38,8 @@ export class SceneBuffers {
     if (scene === null || topology === null) throw new Error("no scene to draw");
     this.topology = topology;
     this.epoch = scene.epoch;
+    /** What lies between neighbours: the middle of the rest lengths. */
+    this.spacing = medianLength(scene.restLengths, simulation.radius() * 0.5);
     const formats = layouts(gl);
     this.positions = new ArrayTexture(gl, 0, drawers.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
     this.fanRanges = new ArrayTexture(gl, 1, formats.u32x2, scene.particleCount);
@@ -92,4 +94,12 @@ function lookOf(flags) {
   if (flags & PIN.frozen) return POINT.frozen;
   if (flags & PIN.grabbed) return POINT.held;
   return flags & PIN.pinned ? POINT.pin : POINT.anchor;
+}
+
+/** @param {Float32Array} lengths @param {number} fallback */
+function medianLength(lengths, fallback) {
+  if (lengths.length === 0) return fallback;
+  // A sample is enough for the width of a line.
+  const sample = lengths.filter((_, index) => index % Math.ceil(lengths.length / 500) === 0).sort();
+  return sample[sample.length >> 1];
 }

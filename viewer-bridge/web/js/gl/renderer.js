@@ -185,7 +185,7 @@ export class Renderer {
    * @param {number} ratio @param {boolean} hasSurface @param {boolean} isFlat @returns {Uniforms} */
   sizes(ratio, hasSurface, isFlat) {
     const { simulation } = this;
-    const spacing = medianLength(simulation.scene?.restLengths ?? new Float32Array(0), simulation.radius());
+    const spacing = this.buffers?.spacing ?? simulation.radius() * 0.5;
     const count = simulation.scene?.particleCount ?? 0;
     const thick = Math.min(spacing * 0.13, simulation.radius() * (count > FEW_PARTICLES ? 0.006 : 0.02));
     return {
@@ -298,12 +298,4 @@ export class Renderer {
   hasSurface() {
     return (this.simulation.scene?.triangleCount ?? 0) > 0;
   }
-}
-
-/** @param {Float32Array} lengths @param {number} fallback */
-function medianLength(lengths, fallback) {
-  if (lengths.length === 0) return fallback * 0.5;
-  // A sample is enough for the width of a line.
-  const sample = lengths.filter((_, index) => index % Math.ceil(lengths.length / 500) === 0).sort();
-  return sample[sample.length >> 1];
 }
