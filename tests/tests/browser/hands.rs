@@ -13,7 +13,7 @@ const ROWS: usize = 12;
 
 /// A square lattice of particles that nothing joins and nothing pulls, looked at straight on: what
 /// they do is what hands did to them.
-const LATTICE_LOOK: &str = "camera=0,0,0,3,0,0&show.particles=1";
+const LATTICE_LOOK: &str = "camera=0,0,0,3.4,0,0&show.particles=1";
 const LATTICE_SIDE: usize = 7;
 const LATTICE_SPACING: f64 = 0.2;
 /// Of the page's brush at first, px.

@@ -142,7 +142,11 @@ impl Chromium {
                 self.events.push(answer);
             } else if answer["id"] == id {
                 let error = &answer["error"];
-                return if error.is_null() { Ok(answer["result"].take()) } else { Err(text(error)) };
+                return if error.is_null() {
+                    Ok(answer["result"].take())
+                } else {
+                    Err(text(error))
+                };
             }
         }
     }

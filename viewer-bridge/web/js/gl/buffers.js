@@ -77,11 +77,13 @@ export class SceneBuffers {
     this.drawers.points.particles.set(new Uint32Array(words));
   }
 
-  /** What is held, and by what. */
+  /** What does not move freely, and why; what hands hold apart from the rest. */
   writeMarks() {
-    const words = [];
-    for (const [particle, flags] of this.simulation.pins) words.push(particle, lookOf(flags));
-    this.drawers.points.marks.set(new Uint32Array(words));
+    const { points } = this.drawers;
+    const looks = [...this.simulation.pins].map(([particle, flags]) => [particle, lookOf(flags)]);
+    const isHeld = (/** @type {number[]} */ [, look]) => look === POINT.held;
+    points.marks.set(new Uint32Array(looks.filter((one) => !isHeld(one)).flat()));
+    points.held.set(new Uint32Array(looks.filter(isHeld).flat()));
   }
 
   delete() {

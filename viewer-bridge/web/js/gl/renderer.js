@@ -292,7 +292,11 @@ export class Renderer {
     const particles = { ...uniforms, u_radius: uniforms.u_point_radius, u_radius_min: uniforms.u_point_min };
     if (toggles.particles) drawers.points.draw(drawers.points.particles, particles);
     const marks = { ...particles, u_radius_min: uniforms.u_mark_min, u_forward: /** @type {number} */ (uniforms.u_forward) * 2 };
-    if (toggles.pins) drawers.points.draw(drawers.points.marks, marks);
+    if (!toggles.pins) return;
+    drawers.points.draw(drawers.points.marks, marks);
+    // What a hand holds is seen through the fold that it has gone behind.
+    this.gl.disable(this.gl.DEPTH_TEST);
+    drawers.points.draw(drawers.points.held, marks);
   }
 
   hasSurface() {
