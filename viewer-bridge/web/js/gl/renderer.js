@@ -173,7 +173,8 @@ export class Renderer {
       u_heat_max: this.toggles.heat ? this.heatMax : 0, u_heat_stops: HEAT_COLORS,
       u_front: palette.front, u_back: palette.back, u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
       u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick, u_stick_faint: palette.stickFaint,
-      u_particle: palette.particle, u_ring: palette.ring, u_collider: palette.collider,
+      // A dark ball is not seen on the dark end of the heat map.
+      u_particle: this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle, u_ring: palette.ring, u_collider: palette.collider,
       u_marks: [...palette.pin, ...palette.anchor, ...palette.held, ...palette.frozen],
       u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
       u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
