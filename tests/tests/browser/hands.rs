@@ -1,6 +1,7 @@
 //! What hands do: what they drag, cut, pin and brush is seen in the node's own snapshots.
 
 use integration_tests::{DEADLINE, wait_for};
+use serde_json::json;
 use sim_contract::{ParticleFlags, ParticleState};
 
 use crate::support::{Area, Button, Stage, State, distance, is_held};
@@ -189,4 +190,35 @@ fn a_brush_moves_the_particles_in_its_circle_only() {
         assert!(!is_far || speed(particle) == 0.0, "particle {index}: {particle:?}");
         assert!(particle.velocity[0] >= 0.0 && particle.velocity[1].abs() < 1e-3);
     }
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_finger_drags_and_where_it_rests_it_pins() {
+    let mut stage = Stage::new(&["curtain"], "");
+    let touch = json!({ "enabled": true, "maxTouchPoints": 1 });
+    stage.tab.call("Emulation.setTouchEmulationEnabled", touch);
+    let camera = stage.tab.camera();
+    let from = camera.project(stage.state().particles[DRAGGED].position);
+    let to = [from[0] + 40.0, from[1] - 30.0];
+    stage.tab.finger("touchStart", Some(from));
+    stage.wait_for_state("the particle to be held", |state| is_grabbed(&state.particles[DRAGGED]));
+    stage.tab.finger("touchMove", Some(to));
+    stage.wait_for_state("the particle under the finger", |state| {
+        distance(camera.project(state.particles[DRAGGED].position), to) < 1.0
+    });
+    stage.tab.finger("touchEnd", None);
+    stage.wait_for_state("the particle to be let go", |state| {
+        !state.particles.iter().any(is_grabbed)
+    });
+
+    // Away from the folds that swing: next to the upper edge.
+    let still = 15;
+    let at = camera.project(stage.state().particles[still].position);
+    stage.tab.finger("touchStart", Some(at));
+    let state = stage.wait_for_state("the pin", |state| {
+        state.particles.iter().filter(|one| is_pinned(one)).count() > COLUMNS
+    });
+    stage.tab.finger("touchEnd", None);
+    assert!(is_pinned(&state.particles[still]));
 }

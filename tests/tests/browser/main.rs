@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a panic is how a test fails")]
 
 mod hands;
+mod pages;
 mod picture;
 mod support;
 mod time;

@@ -79,7 +79,23 @@ fn the_page_says_that_the_node_is_gone_and_goes_on_when_it_is_back() {
     stage.tab.wait(&format!("viewer.epoch !== {epoch} && viewer.step > 10"));
     // And commands reach the new one.
     stage.pause();
-    assert!(stage.is_bridge_running());
+    assert!(stage.bridge.is_running());
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn the_page_comes_back_to_a_bridge_that_was_killed() {
+    let mut stage = Stage::new(&["curtain"], "");
+    stage.bridge.signal(Signal::KILL);
+    stage.tab.wait("viewer.connection !== 'open' && viewer.banner !== ''");
+    // The browser itself says so in the console, each time that the page tries in vain.
+    stage.tab.expect_error("ERR_CONNECTION_REFUSED");
+    let step = stage.state().step;
+    stage.restart_bridge();
+    stage.tab.wait(&format!(
+        "viewer.connection === 'open' && viewer.banner === '' && viewer.step > {step}"
+    ));
+    stage.pause();
 }
 
 #[test]

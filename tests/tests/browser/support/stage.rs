@@ -8,6 +8,8 @@ use sim_contract::{Client, ParticleState};
 use super::chromium::Turn;
 use super::tab::Tab;
 
+const ANY_PORT: &str = "127.0.0.1:0";
+
 /// What the node published last, read from its shared memory and not through the bridge.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct State {
@@ -20,7 +22,7 @@ pub(crate) struct Stage {
     pub(crate) tab: Tab,
     client: Client,
     state: State,
-    bridge: Process,
+    pub(crate) bridge: Process,
     pub(crate) node: Process,
     pub(crate) sandbox: Sandbox,
     url: String,
@@ -43,9 +45,7 @@ impl Stage {
     fn within(sandbox: Sandbox, args: &[&str], look: &str) -> Self {
         let turn = Rc::new(Turn::take());
         let node = start_node(&sandbox, args);
-        let mut bridge =
-            Process::start(Program::ViewerBridge, &sandbox, &["--listen", "127.0.0.1:0"]);
-        let url = bridge.wait_for_line("ready http://").trim_start_matches("ready ").to_owned();
+        let (bridge, url) = start_bridge(&sandbox, ANY_PORT);
         let tab = Tab::open(&turn, &address(&url, look));
         let client = Client::attach(&sandbox.endpoint()).unwrap();
         Self { tab, client, state: State::default(), bridge, node, sandbox, url, turn }
@@ -105,14 +105,22 @@ impl Stage {
         self.node = start_node(&self.sandbox, args);
     }
 
-    /// Whether the bridge has not ended.
-    pub(crate) fn is_bridge_running(&mut self) -> bool {
-        self.bridge.is_running()
+    /// Starts another bridge at the address of one that has ended.
+    pub(crate) fn restart_bridge(&mut self) {
+        let address = self.url.trim_start_matches("http://").trim_end_matches('/');
+        (self.bridge, self.url) = start_bridge(&self.sandbox, address);
     }
 }
 
 fn start_node(sandbox: &Sandbox, args: &[&str]) -> Process {
     Process::start_ready(Program::SimNode, sandbox, &[&["run"], args].concat())
+}
+
+/// Starts a bridge, and returns it with its address.
+fn start_bridge(sandbox: &Sandbox, listen: &str) -> (Process, String) {
+    let mut bridge = Process::start(Program::ViewerBridge, sandbox, &["--listen", listen]);
+    let url = bridge.wait_for_line("ready http://").trim_start_matches("ready ").to_owned();
+    (bridge, url)
 }
 
 /// Without smoothed edges: in software they cost more than all the rest.

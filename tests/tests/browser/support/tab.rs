@@ -182,12 +182,23 @@ impl Tab {
 
     /// Clicks the middle of the element of that selector.
     pub(crate) fn click(&self, selector: &str) {
-        let middle = format!(
-            "(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])(document.querySelector({selector:?}).getBoundingClientRect())"
+        self.click_within(selector, 0.5);
+    }
+
+    /// Clicks an element at that part of its width.
+    pub(crate) fn click_within(&self, selector: &str, part: f64) {
+        let place = format!(
+            "(({{ x, y, width, height }}) => [x + width * {part}, y + height / 2])(document.querySelector({selector:?}).getBoundingClientRect())"
         );
-        let middle: [f64; 2] = serde_json::from_value(self.ask(&middle)).unwrap();
-        self.press(middle, Button::Left);
-        self.release(middle);
+        let place: [f64; 2] = serde_json::from_value(self.ask(&place)).unwrap();
+        self.press(place, Button::Left);
+        self.release(place);
+    }
+
+    /// Puts a finger down, moves it, or with `None` lifts it.
+    pub(crate) fn finger(&self, kind: &str, at: Option<[f64; 2]>) {
+        let points: Vec<_> = at.iter().map(|[x, y]| json!({ "x": x, "y": y })).collect();
+        self.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
     }
 
     /// Strikes a key that types one character.
