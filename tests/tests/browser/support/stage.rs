@@ -45,7 +45,7 @@ impl Stage {
     fn within(sandbox: Sandbox, args: &[&str], look: &str) -> Self {
         let turn = Rc::new(Turn::take());
         let node = start_node(&sandbox, args);
-        let (bridge, url) = start_bridge(&sandbox, ANY_PORT);
+        let (bridge, url) = start_bridge(&sandbox, &["--listen", ANY_PORT]);
         let tab = Tab::open(&turn, &address(&url, look));
         let client = Client::attach(&sandbox.endpoint()).unwrap();
         Self { tab, client, state: State::default(), bridge, node, sandbox, url, turn }
@@ -108,7 +108,7 @@ impl Stage {
     /// Starts another bridge at the address of one that has ended.
     pub(crate) fn restart_bridge(&mut self) {
         let address = self.url.trim_start_matches("http://").trim_end_matches('/');
-        (self.bridge, self.url) = start_bridge(&self.sandbox, address);
+        (self.bridge, self.url) = start_bridge(&self.sandbox, &["--listen", address]);
     }
 }
 
@@ -117,8 +117,8 @@ fn start_node(sandbox: &Sandbox, args: &[&str]) -> Process {
 }
 
 /// Starts a bridge, and returns it with its address.
-fn start_bridge(sandbox: &Sandbox, listen: &str) -> (Process, String) {
-    let mut bridge = Process::start(Program::ViewerBridge, sandbox, &["--listen", listen]);
+fn start_bridge(sandbox: &Sandbox, args: &[&str]) -> (Process, String) {
+    let mut bridge = Process::start(Program::ViewerBridge, sandbox, args);
     let url = bridge.wait_for_line("ready http://").trim_start_matches("ready ").to_owned();
     (bridge, url)
 }

@@ -187,12 +187,17 @@ impl Tab {
 
     /// Clicks an element at that part of its width.
     pub(crate) fn click_within(&self, selector: &str, part: f64) {
+        let place = self.place(selector, part);
+        self.press(place, Button::Left);
+        self.release(place);
+    }
+
+    /// The pixel at that part of an element's width, in the middle of its height.
+    pub(crate) fn place(&self, selector: &str, part: f64) -> [f64; 2] {
         let place = format!(
             "(({{ x, y, width, height }}) => [x + width * {part}, y + height / 2])(document.querySelector({selector:?}).getBoundingClientRect())"
         );
-        let place: [f64; 2] = serde_json::from_value(self.ask(&place)).unwrap();
-        self.press(place, Button::Left);
-        self.release(place);
+        serde_json::from_value(self.ask(&place)).unwrap()
     }
 
     /// Puts a finger down, moves it, or with `None` lifts it.
