@@ -81,9 +81,8 @@ fn what_is_let_go_keeps_the_velocity_of_the_hand() {
     let from = camera.project(stage.state().particles[corner].position);
     stage.tab.press(from, Button::Left);
     stage.wait_for_state("the particle to be held", |state| is_grabbed(&state.particles[corner]));
-    let to = [from[0] - 24.0, from[1]];
-    stage.tab.stroke(from, to, 8);
-    stage.tab.release(to);
+    stage.tab.stroke(from, [from[0] - 12.0, from[1]], 4);
+    stage.tab.fling([from[0] - 24.0, from[1]]);
     let first = stage.wait_for_state("the particle to be let go", |state| {
         let particle = &state.particles[corner];
         particle.position[0] < -0.61 && !is_grabbed(particle)
@@ -149,7 +148,8 @@ fn a_double_click_and_a_key_pin_and_free() {
     stage.tab.move_to(at);
     stage.tab.double_click(at);
     stage.wait_for_state("the pin", |state| is_pinned(&state.particles[DRAGGED]));
-    stage.tab.wait(&format!("viewer.pins.some(([particle]) => particle === {DRAGGED})"));
+    let is_shown = format!("viewer.pins.some(([particle]) => particle === {DRAGGED})");
+    stage.tab.wait(&is_shown);
     let pinned =
         stage.wait_for_state("free hands", |state| !state.particles.iter().any(is_grabbed));
     assert_eq!(pinned.particles.iter().filter(|one| is_pinned(one)).count(), COLUMNS + 1);
@@ -157,6 +157,7 @@ fn a_double_click_and_a_key_pin_and_free() {
     stage.tab.move_to(at);
     stage.tab.key('p');
     stage.wait_for_state("the particle to be freed", |state| !is_pinned(&state.particles[DRAGGED]));
+    stage.tab.wait(&format!("!{is_shown}"));
     stage.tab.click("button[data-mode=pin]");
     stage.tab.press(at, Button::Left);
     stage.tab.release(at);

@@ -10,16 +10,16 @@ const HELD: usize = 90;
 fn a_slider_sets_a_parameter_of_the_node() {
     let mut stage = Stage::new(&["curtain"], "");
     let corner = stage.state().particles.len() - 1;
-    let x = stage.state().particles[corner].position[0];
-    // The greatest wind to the right; the air gets a drag, because without one nothing would blow.
-    stage.tab.click_within("input[aria-label='Wind x']", 0.97);
+    let z = stage.state().particles[corner].position[2];
+    // The greatest wind from behind; the air gets a drag, because without one nothing would blow.
+    stage.tab.click_within("input[aria-label='Wind z']", 0.97);
     stage.wait_for_state("the curtain to be blown", |state| {
-        state.particles[corner].position[0] > x + 0.2
+        state.particles[corner].position[2] > z + 0.2
     });
     stage.tab.wait("document.querySelector('input[aria-label=\"Wind drag: on\"]').checked");
     stage.tab.click("button[aria-label='Wind as in the scene']");
     stage.wait_for_state("the curtain to hang again", |state| {
-        state.particles[corner].position[0] < x + 0.05
+        state.particles[corner].position[2] < z + 0.05
     });
 }
 

@@ -32,7 +32,7 @@ export class Hud {
     if (frame === null || scene === null) return "";
     const factor = stats === null || !Number.isFinite(stats.realTimeFactor) ? "" : ` · ${trim(stats.realTimeFactor)} × real time`;
     // What stands still is drawn when something asks for it: that is no rate.
-    const pace = frame.isPaused ? " · paused" : `${factor} · ${picturesPerSecond} pictures/s`;
+    const pace = this.simulation.isPaused ? " · paused" : `${factor} · ${picturesPerSecond} pictures/s`;
     const tears = torn.length > 0 ? ` · ${torn.length} torn` : "";
     return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${pace} · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}`;
   }

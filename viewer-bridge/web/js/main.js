@@ -141,7 +141,7 @@ function listenToSurroundings(renderer, connector) {
   };
   dark.addEventListener("change", recolor);
   recolor();
-  new ResizeObserver(() => { renderer.isDirty = true; }).observe(renderer.canvas);
+  new ResizeObserver(() => renderer.measure()).observe(renderer.canvas);
   addEventListener("online", () => connector.hurry());
   document.addEventListener("visibilitychange", () => { if (!document.hidden) connector.hurry(); });
   renderer.canvas.addEventListener("webglcontextlost", (event) => {

@@ -1,4 +1,4 @@
-//! The browser: Debian's Chromium, driven by the DevTools protocol over a WebSocket on loopback.
+//! The browser: Debian's Chromium, driven by the `DevTools` protocol over a WebSocket on loopback.
 
 use std::cell::RefCell;
 use std::env;
@@ -84,6 +84,12 @@ impl Turn {
         browser.call(session, method, params).map_err(|error| format!("{method}: {error}"))
     }
 
+    /// The same without waiting for the answer.
+    pub(crate) fn post(&self, session: &str, method: &str, params: Value) {
+        let mut browser = self.0.borrow_mut();
+        browser.as_mut().unwrap().send(Some(session), method, params).unwrap();
+    }
+
     /// What a session was told so far, oldest first.
     pub(crate) fn events(&self, session: &str) -> Vec<Value> {
         let browser = self.0.borrow();
@@ -122,19 +128,25 @@ impl Chromium {
         self.call(None, "Browser.getVersion", json!({})).is_ok()
     }
 
+    /// Sends a message, and returns the number of its answer.
+    fn send(&mut self, session: Option<&str>, method: &str, params: Value) -> Result<u64, String> {
+        self.last_id += 1;
+        let mut message = json!({ "id": self.last_id, "method": method });
+        message["params"] = params;
+        if let Some(session) = session {
+            message["sessionId"] = session.into();
+        }
+        self.socket.send(Message::text(message.to_string())).map_err(text)?;
+        Ok(self.last_id)
+    }
+
     fn call(
         &mut self,
         session: Option<&str>,
         method: &str,
         params: Value,
     ) -> Result<Value, String> {
-        self.last_id += 1;
-        let id = json!(self.last_id);
-        let mut message = json!({ "id": id, "method": method, "params": params });
-        if let Some(session) = session {
-            message["sessionId"] = session.into();
-        }
-        self.socket.send(Message::text(message.to_string())).map_err(text)?;
+        let id = self.send(session, method, params)?;
         loop {
             let Message::Text(answer) = self.socket.read().map_err(text)? else { continue };
             let mut answer: Value = serde_json::from_str(&answer).map_err(text)?;

@@ -1,6 +1,7 @@
 //! A node, a bridge and a page of it in a domain of their own.
 
 use std::rc::Rc;
+use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
 use sim_contract::{Client, ParticleState};
@@ -59,7 +60,7 @@ impl Stage {
     /// The newest state of the node.
     pub(crate) fn state(&mut self) -> &State {
         // While it is paused nothing new comes, and the last one holds.
-        let patience = if self.state.particles.is_empty() { DEADLINE } else { Default::default() };
+        let patience = if self.state.particles.is_empty() { DEADLINE } else { Duration::ZERO };
         if let Some(snapshot) = self.client.latest_snapshot(patience).unwrap() {
             let particles = snapshot.particles().to_vec();
             self.state = State { step: snapshot.header().step, particles };

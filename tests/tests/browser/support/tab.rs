@@ -160,6 +160,15 @@ impl Tab {
         self.held.set(Button::None);
     }
 
+    /// Moves there and lets go in the motion: the page hears of both at once, however busy it is.
+    pub(crate) fn fling(&self, at: [f64; 2]) {
+        for kind in ["mouseMoved", "mouseReleased"] {
+            let event = self.mouse_event(kind, at, u32::from(kind == "mouseReleased"));
+            self.turn.post(&self.session, "Input.dispatchMouseEvent", event);
+        }
+        self.held.set(Button::None);
+    }
+
     pub(crate) fn double_click(&self, at: [f64; 2]) {
         self.held.set(Button::Left);
         for count in [1, 2] {
@@ -169,15 +178,16 @@ impl Tab {
         self.held.set(Button::None);
     }
 
+    fn mouse(&self, kind: &str, at: [f64; 2], clicks: u32) {
+        self.call("Input.dispatchMouseEvent", self.mouse_event(kind, at, clicks));
+    }
+
     /// `clicks`: which click of a series it is, 0 for a motion.
-    fn mouse(&self, kind: &str, [x, y]: [f64; 2], clicks: u32) {
+    fn mouse_event(&self, kind: &str, [x, y]: [f64; 2], clicks: u32) -> Value {
         let button = self.held.get();
         let is_down = kind != "mouseReleased";
-        self.call(
-            "Input.dispatchMouseEvent",
-            json!({ "type": kind, "x": x, "y": y, "button": button.name(),
-                "buttons": if is_down { button.bit() } else { 0 }, "clickCount": clicks }),
-        );
+        json!({ "type": kind, "x": x, "y": y, "button": button.name(),
+            "buttons": if is_down { button.bit() } else { 0 }, "clickCount": clicks })
     }
 
     /// Clicks the middle of the element of that selector.

@@ -34,6 +34,8 @@ export class Renderer {
     if (gl === null) throw new Error("no WebGL2");
     this.gl = gl;
     this.isDark = false;
+    /** CSS pixels of the canvas. */
+    this.viewport = { width: 1, height: 1 };
     this.heatMax = 0.05;
     /** @type {Toggles} */
     this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true };
@@ -44,6 +46,7 @@ export class Renderer {
     this.isDirty = true;
     /** What has changed since it was uploaded. */
     this.stale = { topology: false, particles: false, marks: false, colliders: true };
+    this.measure();
     this.create();
     this.listen();
   }
@@ -81,9 +84,11 @@ export class Renderer {
     this.isDirty = true;
   }
 
-  /** CSS pixels of the canvas. */
-  get viewport() {
-    return { width: Math.max(1, this.canvas.clientWidth), height: Math.max(1, this.canvas.clientHeight) };
+  /** Asks for the size of the canvas: when it has changed, because asking can cost a layout. */
+  measure() {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.viewport = { width: Math.max(1, clientWidth), height: Math.max(1, clientHeight) };
+    this.isDirty = true;
   }
 
   /** Fits the picture to the element; true if it changed. */
