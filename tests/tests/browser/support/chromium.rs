@@ -24,8 +24,8 @@ const LAUNCH: &str = r#""$@" & read -r _; kill "$!"; wait "$!"; rm -rf -- "$0""#
 const LISTENING: &str = "DevTools listening on ";
 
 /// No sandbox: tests run as root in containers, and open only a page of our own. Software drawing
-/// of WebGL has to be asked for. The last three keep a page at work that nobody looks at.
-const FLAGS: [&str; 18] = [
+/// of WebGL has to be asked for. Containers have little shared memory, and the node needs it. The last three keep a page at work that nobody looks at.
+const FLAGS: [&str; 19] = [
     "--headless",
     "--remote-debugging-port=0",
     "--no-sandbox",
@@ -33,6 +33,7 @@ const FLAGS: [&str; 18] = [
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-default-apps",
+    "--disable-dev-shm-usage",
     "--disable-quic",
     "--disable-sync",
     "--use-angle=swiftshader",
