@@ -18,6 +18,7 @@ pub(super) const FILES: &[(&str, &str)] = files![
     "js/controls.js",
     "js/dom.js",
     "js/emitter.js",
+    "js/framing.js",
     "js/gl/buffers.js",
     "js/gl/cloth.js",
     "js/gl/colliders.js",

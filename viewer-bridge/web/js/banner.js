@@ -50,3 +50,6 @@ export class Banner {
     setTimeout(() => notice.remove(), NOTICE_MS);
   }
 }
+
+/** Programs say it in lower case and without an end. @param {string} text */
+export const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}${/[.!?…]$/.test(text) ? "" : "."}`;

@@ -31,7 +31,9 @@ export class Hud {
     const { frame, scene, stats, torn } = this.simulation;
     if (frame === null || scene === null) return "";
     const factor = stats === null || !Number.isFinite(stats.realTimeFactor) ? "" : ` · ${trim(stats.realTimeFactor)} × real time`;
+    // What stands still is drawn when something asks for it: that is no rate.
+    const pace = this.simulation.isPaused ? " · paused" : `${factor} · ${picturesPerSecond} pictures/s`;
     const tears = torn.length > 0 ? ` · ${torn.length} torn` : "";
-    return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${frame.isPaused ? " · paused" : factor} · ${picturesPerSecond} pictures/s · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}`;
+    return `step ${frame.step} · ${frame.simTime.toFixed(2)} s${pace} · ${scene.particleCount} particles · ${scene.constraintCount} constraints${tears}`;
   }
 }

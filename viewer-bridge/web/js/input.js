@@ -49,7 +49,8 @@ export class Input {
       canvas.addEventListener(type, (event) => this.lift(event));
     }
     canvas.addEventListener("pointerleave", () => this.leave());
-    canvas.addEventListener("dblclick", (event) => this.pinAt(this.pixel(event), REACH.mouse));
+    // Where each click pins, the second one has already undone the first.
+    canvas.addEventListener("dblclick", (event) => { if (this.mode !== "pin") this.pinAt(this.pixel(event), REACH.mouse); });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => this.turnWheel(event), { passive: false });
   }

@@ -1,6 +1,6 @@
 // The page: makes its parts, joins them, and runs one loop of animation frames.
 
-import { Banner } from "./banner.js";
+import { Banner, sentence } from "./banner.js";
 import { Camera } from "./camera.js";
 import { Charts } from "./charts.js";
 import { Commands } from "./commands.js";
@@ -68,6 +68,8 @@ function start(renderer) {
         commands.forget();
         input.abandon();
         timeline.gate.reset();
+        // The next connection counts its frames anew.
+        simulation.frameNumber = null;
       }
     },
     onFault: (text) => {
@@ -118,7 +120,7 @@ function start(renderer) {
 function listenToSimulation(input) {
   simulation.on("outcome", (outcome) => input.bench.commands.receive(outcome));
   simulation.on("notice", ({ text, level }) => banner.notify(text, level));
-  simulation.on("node", (node) => banner.set("node", node.state === "alive" || simulation.isReplay ? "" : node.text || "No node is running."));
+  simulation.on("node", (node) => banner.set("node", node.state === "alive" || simulation.isReplay ? "" : sentence(node.text || "no node is running")));
   simulation.on("scene", (scene) => {
     input.abandon();
     document.title = `${scene.name} · Catenary`;
@@ -141,7 +143,7 @@ function listenToSurroundings(renderer, connector) {
   };
   dark.addEventListener("change", recolor);
   recolor();
-  new ResizeObserver(() => { renderer.isDirty = true; }).observe(renderer.canvas);
+  new ResizeObserver(() => renderer.measure()).observe(renderer.canvas);
   addEventListener("online", () => connector.hurry());
   document.addEventListener("visibilitychange", () => { if (!document.hidden) connector.hurry(); });
   renderer.canvas.addEventListener("webglcontextlost", (event) => {

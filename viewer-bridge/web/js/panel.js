@@ -40,6 +40,7 @@ export class Panel {
     }
     const reason = this.reasonAgainst();
     this.note.hidden = reason === "" && (simulation.parameters?.is_complete ?? true);
+    this.form.hidden = simulation.parameters?.values == null;
     this.note.textContent = reason || "The bridge came after some commands: values may be others.";
     for (const refresh of this.refreshers) refresh();
     for (const element of this.form.querySelectorAll("fieldset")) element.disabled = reason !== "";

@@ -6,7 +6,7 @@ import { lowestReach } from "./hanging.js";
 import { Topology } from "./topology.js";
 import { PIN } from "./wire.js";
 import { axesOf } from "./camera.js";
-import { add, addScaled, boxOf, dot, length, scale, subtract } from "./math.js";
+import { add, boxOf, dot, length, scale, subtract } from "./math.js";
 
 /** @typedef {import("./math.js").Vec3} Vec3 */
 /** @typedef {import("./math.js").Box} Box */
@@ -165,14 +165,21 @@ export class Simulation extends Emitter {
   settleGround() {
     if (this.scene === null || this.scene.isPlanar) return;
     const { up } = this.axes();
-    const floors = this.colliders.flatMap((one) => floorOf(one, up));
-    if (floors.length > 0) this.ground = floors.reduce((best, one) => (one.offset > best.offset ? one : best));
-    else {
+    this.ground = this.floor();
+    if (this.ground === null) {
       const lowest = lowestReach(this.scene, [...this.pins.keys()], up);
       this.ground = lowest === null ? null : { normal: up, offset: lowest - this.radius() * GROUND_GAP };
     }
     this.groundIsSettled = true;
     this.emit("ground", undefined);
+  }
+
+  /** The highest floor among the colliders. @returns {Plane | null} */
+  floor() {
+    const { up } = this.axes();
+    /** @type {Plane[]} */
+    const floors = this.colliders.flatMap((one) => floorOf(one, up));
+    return floors.length === 0 ? null : floors.reduce((best, one) => (one.offset > best.offset ? one : best));
   }
 
   axes() {
@@ -225,25 +232,6 @@ export class Simulation extends Emitter {
     return frame.particleCount === 0 ? raw : { min: at(raw.min), max: at(raw.max) };
   }
 
-  /** The box that a first look should show: with the floor, the walls, and both sides of a swing. @returns {Box} */
-  stage() {
-    const box = this.box();
-    const bounds = this.colliders.find((one) => one.shape === "bounds");
-    if (bounds) return { min: bounds.a, max: bounds.b };
-    const { up } = this.axes();
-    const size = Math.max(length(subtract(box.max, box.min)), 1e-3);
-    if (this.ground !== null) {
-      const middle = scale(add(box.min, box.max), 0.5);
-      const drop = dot(this.ground.normal, middle) - this.ground.offset;
-      if (drop > 0 && drop < 3 * size) include(box, addScaled(middle, up, -drop));
-    }
-    if (this.pins.size === 1) {
-      const pivot = this.position([...this.pins.keys()][0]);
-      if (pivot !== null) for (const axis of [0, 2]) mirror(box, pivot, axis);
-    }
-    return box;
-  }
-
   /** @param {TextMessage} message */
   receiveText(message) {
     switch (message.type) {
@@ -266,22 +254,6 @@ function sameNumbers(a, b) {
   if (a.length !== b.length) return false;
   for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
   return true;
-}
-
-/** @param {Box} box @param {Vec3} point */
-function include(box, point) {
-  for (const axis of [0, 1, 2]) {
-    box.min[axis] = Math.min(box.min[axis], point[axis]);
-    box.max[axis] = Math.max(box.max[axis], point[axis]);
-  }
-}
-
-/** Makes a box reach as far on one side of a pivot as on the other. @param {Box} box @param {Vec3} pivot @param {number} axis */
-function mirror(box, pivot, axis) {
-  const reach = Math.max(box.max[axis] - pivot[axis], pivot[axis] - box.min[axis]);
-  if (reach < 1e-6) return;
-  box.min[axis] = pivot[axis] - reach;
-  box.max[axis] = pivot[axis] + reach;
 }
 
 /** @param {Collider} one @param {Vec3} up @returns {Plane[]} */

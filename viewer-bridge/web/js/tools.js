@@ -1,7 +1,7 @@
 // What a hand can do: hold a particle, brush many, cut along a stroke, pin. Each sends at most one
 // message an animation frame, however often the pointer moves.
 
-import { clamp, subtract } from "./math.js";
+import { addScaled, clamp, length, scale, subtract } from "./math.js";
 import { crossedSticks, particlesWithin, pickParticle, projectAll } from "./pick.js";
 import { PIN } from "./wire.js";
 
@@ -18,6 +18,10 @@ const BRUSH_PIXELS_MAX = 20;
 /** The least and most time that a motion is spread over, seconds. */
 const OVER_S = { min: 1 / 240, max: 0.25 };
 const BRUSH_OVER_S_MIN = 0.001;
+/** The velocity of a hand is that of its last motions, within so many milliseconds: older is rest. */
+const SWING_MS = 80;
+/** Motions of a hand happen between two pictures at the least. */
+const SWING_MS_MIN = 16;
 /** Points of a stroke that stay drawn. */
 const STROKE_POINTS_MAX = 60;
 
@@ -45,6 +49,8 @@ export class Hand {
     this.pointer = start;
     this.isMoved = false;
     this.sentMs = performance.now();
+    /** Where the pointer was of late: the first is where it began, or was before the swing. */
+    this.trail = [{ ms: this.sentMs, at: start }];
     this.anchor = /** @type {Vec3} */ (bench.simulation.position(particle));
     bench.commands.run("drag_begin", { particle, target: this.anchor });
   }
@@ -53,25 +59,49 @@ export class Hand {
   move(to) {
     this.pointer = to;
     this.isMoved = true;
+    const ms = performance.now();
+    this.trail.push({ ms, at: to });
+    while (this.trail.length > 1 && this.trail[1].ms < ms - SWING_MS) this.trail.shift();
   }
 
   /** @param {number} nowMs */
   tick(nowMs) {
     if (!this.isMoved) return;
     const over_s = clamp((nowMs - this.sentMs) / 1000, OVER_S.min, OVER_S.max);
-    this.bench.commands.stream("drag_move", { particle: this.particle, target: this.target(), over_s });
+    this.bench.commands.stream("drag_move", { particle: this.particle, target: this.on(this.pointer), over_s });
     this.sentMs = nowMs;
     this.isMoved = false;
   }
 
-  target() {
+  /** @param {Pixel} at @returns {Vec3} */
+  on(at) {
     const { camera, renderer } = this.bench;
-    return camera.onPlaneThrough(this.pointer.x, this.pointer.y, renderer.viewport, this.anchor);
+    return camera.onPlaneThrough(at.x, at.y, renderer.viewport, this.anchor);
   }
 
+  /** Metres a second, of the last motions. @param {number} nowMs @returns {Vec3} */
+  velocity(nowMs) {
+    const last = this.trail[this.trail.length - 1];
+    if (last.ms < nowMs - SWING_MS) return [0, 0, 0];
+    const [first] = this.trail;
+    const span = Math.max(last.ms - Math.max(first.ms, last.ms - SWING_MS), SWING_MS_MIN);
+    return scale(subtract(this.on(last.at), this.on(first.at)), 1000 / span);
+  }
+
+  /** What is let go has the velocity of its last step. A motion that was sent may be over by then, or
+   * not have begun: so the hand goes on as it went, and lets go when the node has taken that up. */
   end() {
-    this.tick(performance.now());
-    this.bench.commands.run("drag_end", { particle: this.particle });
+    const { commands } = this.bench;
+    const { particle } = this;
+    const letGo = () => commands.run("drag_end", { particle });
+    const velocity = this.velocity(performance.now());
+    if (length(velocity) === 0) {
+      this.tick(performance.now());
+      letGo();
+      return;
+    }
+    const target = addScaled(this.on(this.pointer), velocity, OVER_S.max);
+    commands.run("drag_move", { particle, target, over_s: OVER_S.max }, letGo);
   }
 
   describe() {

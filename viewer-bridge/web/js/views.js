@@ -1,6 +1,7 @@
 // What is shown and how: the toggles, the strain scale, the first look at a scene, pictures, links.
 
 import { find, sharpContext } from "./dom.js";
+import { stageOf } from "./framing.js";
 import { formatLink } from "./link.js";
 import { niceCeiling, readable } from "./plot.js";
 import { HEAT_STOPS } from "./theme.js";
@@ -59,7 +60,7 @@ export class Views {
     const { width, height } = renderer.viewport;
     camera.yaw = FIRST_LOOK.yaw;
     camera.pitch = FIRST_LOOK.pitch;
-    camera.frame(simulation.stage(), width / height);
+    camera.frame(stageOf(simulation), width / height);
     if (this.linkedPose !== null && simulation.frame !== null) {
       Object.assign(camera, this.linkedPose);
       this.linkedPose = null;
@@ -74,7 +75,7 @@ export class Views {
   frame() {
     const { camera, renderer, simulation } = this.bench;
     const { width, height } = renderer.viewport;
-    camera.frame(simulation.stage(), width / height);
+    camera.frame(stageOf(simulation), width / height);
     this.isFramed = true;
     renderer.isDirty = true;
   }

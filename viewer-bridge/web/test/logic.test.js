@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Commands } from "../js/commands.js";
+import { stageOf } from "../js/framing.js";
 import { formatLink, parseLink } from "../js/link.js";
 import { ROWS, SLIDER_STEPS, placeOf, rangeOf, rowsOf, valueAt, valueOf } from "../js/parameters.js";
 import { Series, niceCeiling, readable } from "../js/plot.js";
@@ -160,10 +161,10 @@ test("each outcome goes to who asked, and a refusal is also told to the user", (
   assert.equal(commands.waiting.size, 0);
 });
 
-const scene = (epoch) => ({
+const scene = (epoch, rest = {}) => ({
   kind: "scene", epoch, step: 0, particleCount: 2, constraintCount: 1, triangleCount: 0, isPlanar: false, up: "y",
   positions: Float32Array.from([0, 1, 0, 0, 0, 0]), ends: Uint32Array.from([0, 1]), restLengths: Float32Array.from([1]),
-  triangles: new Uint32Array(0), constraintKinds: new Uint8Array(1), min: [0, 0, 0], max: [0, 1, 0], name: "two",
+  triangles: new Uint32Array(0), constraintKinds: new Uint8Array(1), min: [0, 0, 0], max: [0, 1, 0], name: "two", ...rest,
 });
 const frame = (epoch, number, rest = {}) => ({
   kind: "frame", epoch, step: number, number, particleCount: 2, lo: [0, 0, 0], scale: [1, 1, 1],
@@ -216,4 +217,19 @@ test("the ground is a floor where there is one, else below what can hang lowest"
   assert.ok(simulation.ground.offset < 0 && simulation.ground.offset > -0.1);
   simulation.receive({ kind: "colliders", epoch: 1, colliders: [{ shape: "plane", normal: [0, 1, 0], offset: -2 }] });
   assert.equal(simulation.ground.offset, -2);
+});
+
+test("the first look has room for a point, a floor below, and what anchors carry", () => {
+  const point = new Simulation();
+  point.receive(scene(1, { particleCount: 1, constraintCount: 0, positions: Float32Array.of(1, 2, 3), min: [1, 2, 3], max: [1, 2, 3] }));
+  assert.deepEqual(stageOf(point), { min: [0.5, 1.5, 2.5], max: [1.5, 2.5, 3.5] });
+  const plane = new Simulation();
+  plane.receive(scene(1, { isPlanar: true }));
+  const before = stageOf(plane);
+  plane.receive({ kind: "colliders", epoch: 1, colliders: [{ shape: "plane", normal: [0, 1, 0], offset: before.min[1] - 1 }] });
+  assert.equal(stageOf(plane).min[1], before.min[1] - 1);
+  const carried = new Simulation();
+  carried.receive(scene(1));
+  carried.receive({ kind: "pins", epoch: 1, particles: Uint32Array.of(0, 1), flags: Uint32Array.of(4, 4) });
+  assert.ok(stageOf(carried).max[0] > carried.box().max[0]);
 });

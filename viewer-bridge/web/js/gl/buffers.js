@@ -38,6 +38,8 @@ export class SceneBuffers {
     if (scene === null || topology === null) throw new Error("no scene to draw");
     this.topology = topology;
     this.epoch = scene.epoch;
+    /** What lies between neighbours: the middle of the rest lengths. */
+    this.spacing = medianLength(scene.restLengths, simulation.radius() * 0.5);
     const formats = layouts(gl);
     this.positions = new ArrayTexture(gl, 0, drawers.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
     this.fanRanges = new ArrayTexture(gl, 1, formats.u32x2, scene.particleCount);
@@ -75,11 +77,13 @@ export class SceneBuffers {
     this.drawers.points.particles.set(new Uint32Array(words));
   }
 
-  /** What is held, and by what. */
+  /** What does not move freely, and why; what hands hold apart from the rest. */
   writeMarks() {
-    const words = [];
-    for (const [particle, flags] of this.simulation.pins) words.push(particle, lookOf(flags));
-    this.drawers.points.marks.set(new Uint32Array(words));
+    const { points } = this.drawers;
+    const looks = [...this.simulation.pins].map(([particle, flags]) => [particle, lookOf(flags)]);
+    const isHeld = (/** @type {number[]} */ [, look]) => look === POINT.held;
+    points.marks.set(new Uint32Array(looks.filter((one) => !isHeld(one)).flat()));
+    points.held.set(new Uint32Array(looks.filter(isHeld).flat()));
   }
 
   delete() {
@@ -92,4 +96,12 @@ function lookOf(flags) {
   if (flags & PIN.frozen) return POINT.frozen;
   if (flags & PIN.grabbed) return POINT.held;
   return flags & PIN.pinned ? POINT.pin : POINT.anchor;
+}
+
+/** @param {Float32Array} lengths @param {number} fallback */
+function medianLength(lengths, fallback) {
+  if (lengths.length === 0) return fallback;
+  // A sample is enough for the width of a line.
+  const sample = lengths.filter((_, index) => index % Math.ceil(lengths.length / 500) === 0).sort();
+  return sample[sample.length >> 1];
 }

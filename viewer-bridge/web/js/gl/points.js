@@ -73,6 +73,7 @@ export class Points {
     this.program.samplers({ u_positions: 0 });
     this.particles = new PointList(gl);
     this.marks = new PointList(gl);
+    this.held = new PointList(gl);
   }
 
   /** @param {PointList} list @param {Record<string, number | number[]>} uniforms */

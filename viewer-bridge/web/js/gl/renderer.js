@@ -34,6 +34,8 @@ export class Renderer {
     if (gl === null) throw new Error("no WebGL2");
     this.gl = gl;
     this.isDark = false;
+    /** CSS pixels of the canvas. */
+    this.viewport = { width: 1, height: 1 };
     this.heatMax = 0.05;
     /** @type {Toggles} */
     this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true };
@@ -44,6 +46,7 @@ export class Renderer {
     this.isDirty = true;
     /** What has changed since it was uploaded. */
     this.stale = { topology: false, particles: false, marks: false, colliders: true };
+    this.measure();
     this.create();
     this.listen();
   }
@@ -81,9 +84,11 @@ export class Renderer {
     this.isDirty = true;
   }
 
-  /** CSS pixels of the canvas. */
-  get viewport() {
-    return { width: Math.max(1, this.canvas.clientWidth), height: Math.max(1, this.canvas.clientHeight) };
+  /** Asks for the size of the canvas: when it has changed, because asking can cost a layout. */
+  measure() {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.viewport = { width: Math.max(1, clientWidth), height: Math.max(1, clientHeight) };
+    this.isDirty = true;
   }
 
   /** Fits the picture to the element; true if it changed. */
@@ -173,7 +178,8 @@ export class Renderer {
       u_heat_max: this.toggles.heat ? this.heatMax : 0, u_heat_stops: HEAT_COLORS,
       u_front: palette.front, u_back: palette.back, u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
       u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick, u_stick_faint: palette.stickFaint,
-      u_particle: palette.particle, u_ring: palette.ring, u_collider: palette.collider,
+      // A dark ball is not seen on the dark end of the heat map.
+      u_particle: this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle, u_ring: palette.ring, u_collider: palette.collider,
       u_marks: [...palette.pin, ...palette.anchor, ...palette.held, ...palette.frozen],
       u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
       u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
@@ -185,7 +191,7 @@ export class Renderer {
    * @param {number} ratio @param {boolean} hasSurface @param {boolean} isFlat @returns {Uniforms} */
   sizes(ratio, hasSurface, isFlat) {
     const { simulation } = this;
-    const spacing = medianLength(simulation.scene?.restLengths ?? new Float32Array(0), simulation.radius());
+    const spacing = this.buffers?.spacing ?? simulation.radius() * 0.5;
     const count = simulation.scene?.particleCount ?? 0;
     const thick = Math.min(spacing * 0.13, simulation.radius() * (count > FEW_PARTICLES ? 0.006 : 0.02));
     return {
@@ -292,18 +298,14 @@ export class Renderer {
     const particles = { ...uniforms, u_radius: uniforms.u_point_radius, u_radius_min: uniforms.u_point_min };
     if (toggles.particles) drawers.points.draw(drawers.points.particles, particles);
     const marks = { ...particles, u_radius_min: uniforms.u_mark_min, u_forward: /** @type {number} */ (uniforms.u_forward) * 2 };
-    if (toggles.pins) drawers.points.draw(drawers.points.marks, marks);
+    if (!toggles.pins) return;
+    drawers.points.draw(drawers.points.marks, marks);
+    // What a hand holds is seen through the fold that it has gone behind.
+    this.gl.disable(this.gl.DEPTH_TEST);
+    drawers.points.draw(drawers.points.held, marks);
   }
 
   hasSurface() {
     return (this.simulation.scene?.triangleCount ?? 0) > 0;
   }
-}
-
-/** @param {Float32Array} lengths @param {number} fallback */
-function medianLength(lengths, fallback) {
-  if (lengths.length === 0) return fallback * 0.5;
-  // A sample is enough for the width of a line.
-  const sample = lengths.filter((_, index) => index % Math.ceil(lengths.length / 500) === 0).sort();
-  return sample[sample.length >> 1];
 }
