@@ -197,6 +197,7 @@ impl Bodies {
         Place::new(0, self.graph.particles.binary_search(&particle).unwrap_or_default())
     }
 
+    #[inline(always)]
     pub(crate) fn position(&self, place: Place) -> [f32; 3] {
         match place.patch() {
             None => three(&self.graph.bodies[place.at()].0, 0),
@@ -204,6 +205,7 @@ impl Bodies {
         }
     }
 
+    #[inline(always)]
     pub(crate) fn inverse_mass(&self, place: Place) -> f32 {
         match place.patch() {
             None => self.graph.bodies[place.at()].0[3],
@@ -211,6 +213,7 @@ impl Bodies {
         }
     }
 
+    #[inline(always)]
     pub(crate) fn displacement(&self, place: Place) -> [f32; 3] {
         match place.patch() {
             None => three(&self.graph.bodies[place.at()].0, 4),
@@ -327,6 +330,7 @@ fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<Vec<Family>> {
     has_family.into_iter().map(chosen).collect()
 }
 
+#[inline(always)]
 fn three(body: &[f32; 8], first: usize) -> [f32; 3] {
     [body[first], body[first + 1], body[first + 2]]
 }

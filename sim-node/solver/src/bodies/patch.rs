@@ -311,6 +311,7 @@ impl Patch {
     }
 
     /// A vector of a particle: fields `field`, `field` + 1, `field` + 2.
+    #[inline(always)]
     fn vector(&self, number: usize, field: usize) -> [f32; 3] {
         let numbers: &[f32] = bytemuck::cast_slice(&self.lines);
         axes(|axis| numbers[number + (field + axis) * self.shape.stride])
@@ -324,15 +325,18 @@ impl Patch {
         }
     }
 
+    #[inline(always)]
     pub(crate) fn position(&self, number: usize) -> [f32; 3] {
         self.vector(number, 0)
     }
 
+    #[inline(always)]
     pub(crate) fn inverse_mass(&self, number: usize) -> f32 {
         let numbers: &[f32] = bytemuck::cast_slice(&self.lines);
         numbers[number + 3 * self.shape.stride]
     }
 
+    #[inline(always)]
     pub(crate) fn displacement(&self, number: usize) -> [f32; 3] {
         self.vector(number, 4)
     }
