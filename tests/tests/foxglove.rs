@@ -7,10 +7,12 @@
 #[allow(dead_code, reason = "its other half is used by the tests that have no node")]
 mod foxglove_client;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, wait_for};
+use recorder::{FrameReader, LogReader};
 use serde_json::{Value, json};
 use sim_contract::{Client as Reader, ParticleFlags, ParticleState};
 
@@ -97,6 +99,36 @@ fn what_a_client_grabs_follows_it_and_is_let_go_when_it_goes() {
     });
     drop(client);
     stand.wait_for_particle(90, |particle| !is_grabbed(particle));
+}
+
+#[test]
+fn a_recording_is_wound_to_where_a_client_wants_it() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let args = ["simulate", "curtain", "--steps", "480", "-o", &file];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let args = ["--listen", "127.0.0.1:0", "--foxglove", "127.0.0.1:0", "--replay", &file];
+    let mut bridge = Process::start(Program::ViewerBridge, &sandbox, &args);
+    let url = bridge.wait_for_line("foxglove ws://").replace("foxglove ", "");
+    let (mut client, server) = Client::start(&url);
+    assert!(server["capabilities"].as_array().unwrap().contains(&json!("playbackControl")));
+    client.subscribe(1, "/particles");
+    client.subscribe(2, "/steps");
+    let mut frames = FrameReader::new(LogReader::open(Path::new(&file)).unwrap());
+    let run = frames.log().run().clone();
+    let mut states = BTreeMap::new();
+    while let Some(frame) = frames.next_frame().unwrap() {
+        states.insert(frame.row.step, frame.particles);
+    }
+    for step in [300, 1, 480, 299] {
+        let time_ns = run.time_of_step_ns(step);
+        client.play(1, 1.0, Some(time_ns), &format!("to step {step}"));
+        // Its header comes first.
+        while client.json(2)["step"] != step {}
+        let (at_ns, payload) = client.message(1);
+        assert_eq!(at_ns, time_ns);
+        assert!(payload.ends_with(bytemuck::cast_slice::<_, u8>(&states[&step])), "step {step}");
+    }
 }
 
 #[test]
