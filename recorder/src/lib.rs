@@ -43,12 +43,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! mcap's own types stay inside.
+//! [`LogReader`] and [`FrameReader`] read a file from its start, [`Tape`] at any step. mcap's own types
+//! stay inside.
 #![forbid(unsafe_code)]
 
 mod collider_rows;
 mod descriptor;
 mod frames;
+mod index;
+mod keyframe_tears;
 mod message;
 mod part_file;
 mod protobuf;
@@ -56,11 +59,16 @@ mod reader;
 mod records;
 mod rows;
 mod run;
+mod state_hash;
+mod tape;
+mod tears;
 mod topic;
 mod writer;
 
 pub use collider_rows::{ColliderRow, CollidersRow, ShapeRow};
 pub use frames::{Frame, FrameReader};
+pub use index::{ChunkEntry, IndexedLog};
+pub use keyframe_tears::{KeyframeTears, cause_of};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
 pub use reader::{LogReader, Logged, ReadError};
@@ -69,5 +77,8 @@ pub use rows::{
     EventRow, OutcomeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
 pub use run::{Closing, FORMAT_VERSION, RunDescription};
+pub use state_hash::state_hash;
+pub use tape::{Tape, TapeError, TapeState};
+pub use tears::{Torn, TornFollower};
 pub use topic::{AllCounts, Topic, TopicCounts};
 pub use writer::{Compression, LogOptions, LogWriter, WriteError};

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::{
-    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
+    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow, cause_of,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Endpoint, Stop, TearCause};
@@ -24,7 +24,6 @@ use crate::endpoint_args::EndpointArgs;
 use crate::exit::Exit;
 use crate::output;
 use crate::scene_source::scene_of;
-use crate::solver_rows::cause_of;
 use control::Control;
 use pace::Pace;
 use position::Position;

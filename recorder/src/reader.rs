@@ -64,6 +64,14 @@ pub enum ReadError {
         /// What is wrong with it.
         what: String,
     },
+    /// A chunk that is not what was written.
+    #[error("the chunk at byte {byte} is damaged: {cause}")]
+    DamagedChunk {
+        /// Where it begins.
+        byte: u64,
+        /// What is wrong with it.
+        cause: String,
+    },
     /// A snapshot without a header.
     #[error("the snapshot of step {step} has no row of its step before it in /steps")]
     NoRow {
@@ -237,7 +245,7 @@ fn read_run(map: &BTreeMap<String, String>) -> Result<RunDescription, ReadError>
 }
 
 /// `None` for a topic that is not read back.
-fn read_message(
+pub(crate) fn read_message(
     topic: Topic,
     header: &MessageHeader,
     data: &[u8],

@@ -10,7 +10,7 @@ use crate::reader::ReadError;
 
 /// Longest record and largest chunk, in bytes, that is read: a snapshot or topology of the most
 /// elements that a scene can have is below it, and a damaged length is not followed further.
-const RECORD_SIZE_BYTES_MAX: usize = 1 << 30;
+pub(crate) const RECORD_SIZE_BYTES_MAX: usize = 1 << 30;
 /// Most bytes that are asked of the file at a time.
 pub(crate) const READ_SIZE_BYTES_MAX: usize = 1 << 20;
 
@@ -62,11 +62,17 @@ pub(crate) struct RecordReader<R> {
 
 impl<R: Read> RecordReader<R> {
     pub(crate) fn new(source: R) -> Self {
-        let options = LinearReaderOptions::default()
-            .with_prevalidate_chunk_crcs(true)
-            .with_validate_data_section_crc(true)
-            .with_validate_summary_section_crc(true)
-            .with_record_length_limit(RECORD_SIZE_BYTES_MAX);
+        let options =
+            options().with_validate_data_section_crc(true).with_validate_summary_section_crc(true);
+        Self::with_options(source, options)
+    }
+
+    /// Reads records out of the middle of a file.
+    pub(crate) fn of_records(source: R) -> Self {
+        Self::with_options(source, options().with_skip_start_magic(true).with_skip_end_magic(true))
+    }
+
+    fn with_options(source: R, options: LinearReaderOptions) -> Self {
         Self {
             linear: LinearReader::new_with_options(options),
             source,
@@ -121,6 +127,12 @@ impl<R: Read> RecordReader<R> {
     }
 }
 
+fn options() -> LinearReaderOptions {
+    LinearReaderOptions::default()
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(RECORD_SIZE_BYTES_MAX)
+}
+
 /// An index record reads as an unknown one: a damaged one must not stop the reading.
 fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<Record<'_>> {
     match opcode {
@@ -131,7 +143,7 @@ fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<Record<'_>> {
     }
 }
 
-fn read_some(source: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+pub(crate) fn read_some(source: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
     loop {
         match source.read(buffer) {
             Err(error) if error.kind() == ErrorKind::Interrupted => {}

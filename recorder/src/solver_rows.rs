@@ -1,7 +1,7 @@
 //! From the state of a solver to the rows of `/colliders` and `/tears`.
 
-use recorder::{CollidersRow, TearsRow};
-use sim_contract::{ColliderShape, ColliderState, TearCause};
+use recorder::{CollidersRow, TearsRow, cause_of};
+use sim_contract::{ColliderShape, ColliderState};
 use sim_solver::{PlacedCollider, Solver};
 
 /// The colliders as they stand after `step`.
@@ -25,16 +25,6 @@ pub(crate) fn newest_tears_row(solver: &Solver, step: u64, count: usize) -> Tear
         step,
         constraints: solver.torn()[first..].to_vec(),
         causes: causes.map(|cause| cause_of(*cause).name().to_owned()).collect(),
-    }
-}
-
-/// The cause as the contract numbers and names it.
-pub(crate) fn cause_of(cause: sim_solver::TearCause) -> TearCause {
-    match cause {
-        sim_solver::TearCause::Force => TearCause::Force,
-        sim_solver::TearCause::Stretch => TearCause::Stretch,
-        sim_solver::TearCause::Distance => TearCause::Distance,
-        sim_solver::TearCause::Cut => TearCause::Cut,
     }
 }
 

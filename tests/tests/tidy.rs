@@ -12,7 +12,7 @@ const ARROWS: [(&str, &[&str]); 6] = [
     ("sim-contract", &["iceoryx2"]),
     ("sim-node", &["sim-contract", "sim-solver"]),
     ("recorder", &["mcap", "sim-contract", "sim-solver"]),
-    ("viewer-bridge", &["sim-contract"]),
+    ("viewer-bridge", &["recorder", "sim-contract"]),
     ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),
 ];
 

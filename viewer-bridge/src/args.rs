@@ -10,6 +10,7 @@ use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 ///
 /// Open the address that is printed: the particles of the node can be dragged, pinned, pushed and
 /// cut there, its parameters changed, its pace watched. The node may come later, go, and come back.
+/// With --replay, a recording is shown there instead, with a timeline to play and scrub.
 #[derive(Debug, Parser)]
 #[command(
     name = "viewer-bridge",
@@ -19,6 +20,7 @@ use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
         viewer-bridge                               show the node `sim` at http://127.0.0.1:8080/\n  \
         viewer-bridge --listen 127.0.0.1:0          on any free port; the address is printed\n  \
         viewer-bridge --name left --domain lab      show another node\n  \
+        viewer-bridge --replay run.mcap             show a recording; no node is needed\n  \
         viewer-bridge --listen 0.0.0.0:8080         for other machines; the address has a token"
 )]
 pub(crate) struct Args {
@@ -30,6 +32,10 @@ pub(crate) struct Args {
     /// more than once
     #[arg(long = "host", value_name = "HOST")]
     pub(crate) hosts: Vec<String>,
+    /// Recording to show instead of a node, as `recorder record` and `recorder simulate` write it;
+    /// one that was cut off is shown as far as it goes
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "name")]
+    pub(crate) replay: Option<PathBuf>,
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = name)]
     name: String,

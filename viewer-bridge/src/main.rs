@@ -1,4 +1,4 @@
-//! `viewer-bridge`: shows a running simulation in a browser, and lets it be touched.
+//! `viewer-bridge`: shows a running simulation in a browser, and lets it be touched; or a recording.
 #![forbid(unsafe_code)]
 
 mod args;
@@ -14,6 +14,7 @@ use sim_contract::Stop;
 use tokio::runtime;
 use viewer_bridge::assets::Assets;
 use viewer_bridge::live::Live;
+use viewer_bridge::replay::Replay;
 use viewer_bridge::{Hub, Server, ServerOptions, Source};
 
 use args::Args;
@@ -36,7 +37,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = Stop::install()?;
-    let source = Live::new(args.endpoint()?);
+    let source = source(args)?;
     let assets = match &args.assets {
         None => Assets::Embedded,
         Some(folder) => Assets::folder(folder)
@@ -51,8 +52,16 @@ fn run(args: &Args) -> anyhow::Result<()> {
     runtime.block_on(serve(source, options, stop))
 }
 
+/// What is shown: a recording, or whatever node has the name.
+fn source(args: &Args) -> anyhow::Result<Box<dyn Source>> {
+    Ok(match &args.replay {
+        Some(path) => Box::new(Replay::open(path, &mut note)?),
+        None => Box::new(Live::new(args.endpoint()?)),
+    })
+}
+
 /// Serves until asked to stop, or until the source fails.
-async fn serve(source: Live, options: ServerOptions, stop: Stop) -> anyhow::Result<()> {
+async fn serve(source: Box<dyn Source>, options: ServerOptions, stop: Stop) -> anyhow::Result<()> {
     let server = Server::bind(options).await?;
     let (hub, feeding) = feed(source)?;
     say_ready(&server);
@@ -63,28 +72,32 @@ async fn serve(source: Live, options: ServerOptions, stop: Stop) -> anyhow::Resu
         hub.close();
     };
     tokio::join!(server.serve(Arc::clone(&hub)), watch);
-    feeding.join().map_err(|_| anyhow!("the thread that reads the node panicked"))?
+    feeding
+        .join()
+        .map_err(|_| anyhow!("the thread that reads the node or the recording panicked"))?
 }
 
 /// Starts the thread of the source.
-fn feed(mut source: Live) -> anyhow::Result<(Arc<Hub>, JoinHandle<anyhow::Result<()>>)> {
+fn feed(mut source: Box<dyn Source>) -> anyhow::Result<(Arc<Hub>, JoinHandle<anyhow::Result<()>>)> {
     let (hub, requests) = Hub::new(source.mode());
     let hub = Arc::new(hub);
     let fed = Arc::clone(&hub);
     let feeding = thread::Builder::new()
         .name("source".to_owned())
         .spawn(move || source.run(&fed, &requests))
-        .context("starting the thread that reads the node")?;
+        .context("starting the thread that reads the node or the recording")?;
     Ok((hub, feeding))
 }
 
-#[allow(clippy::print_stderr, reason = "messages to the user")]
 fn say_ready(server: &Server) {
     let url = server.url();
-    eprintln!("ready {url}");
+    note(&format!("ready {url}"));
     if url.contains('#') {
-        eprintln!(
-            "warning: other machines can reach this; whoever has the token can command the node"
-        );
+        note("warning: other machines can reach this; whoever has the token can command the node");
     }
+}
+
+#[allow(clippy::print_stderr, reason = "messages to the user")]
+fn note(text: &str) {
+    eprintln!("{text}");
 }

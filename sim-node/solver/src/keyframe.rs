@@ -122,6 +122,16 @@ pub enum RestoreError {
 }
 
 impl Keyframe {
+    /// The torn constraints, in the order of tearing.
+    pub fn torn(&self) -> &[u32] {
+        &self.torn
+    }
+
+    /// Why each of [`Self::torn`] tore.
+    pub fn tear_causes(&self) -> &[TearCause] {
+        &self.tear_causes
+    }
+
     /// As bytes: the version as u32 little-endian, then the fields in postcard's encoding.
     ///
     /// # Panics

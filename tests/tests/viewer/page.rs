@@ -25,7 +25,12 @@ pub(crate) struct Page {
 
 impl Bridge {
     pub(crate) fn start(sandbox: &Sandbox) -> Self {
-        let args = ["--listen", "127.0.0.1:0"];
+        Self::start_with(sandbox, &[])
+    }
+
+    /// With more arguments.
+    pub(crate) fn start_with(sandbox: &Sandbox, more: &[&str]) -> Self {
+        let args: Vec<_> = ["--listen", "127.0.0.1:0"].iter().chain(more).copied().collect();
         let mut process = Process::start(Program::ViewerBridge, sandbox, &args);
         let line = process.wait_for_line("ready http://");
         let host = line.trim_start_matches("ready http://").trim_end_matches('/').to_owned();

@@ -12,11 +12,12 @@ use sim_contract::{
 
 use super::actions::Context;
 use super::dispatch::Dispatch;
-use super::load::{Load, Parts};
+use super::load::Parts;
 use super::news::News;
 use crate::Hub;
 use crate::hub::Slot;
 use crate::limits::FRAMES_PER_SECOND_MAX;
+use crate::load::Load;
 use crate::message::{Level, Node, NodeState, ToPage};
 use crate::source::{Ask, Request, Requests};
 use crate::stage::{Stage, single};

@@ -21,7 +21,7 @@ pub struct Timeline {
     pub last_time_s: f64,
     /// What happened, ascending by step; at most [`crate::limits::MARKS_MAX`].
     pub marks: Vec<Mark>,
-    /// Whether the recording was simulated again.
+    /// Whether its states have their recorded hashes.
     pub hashes: Hashes,
     /// The same for the user.
     pub hash_text: String,
@@ -52,17 +52,17 @@ pub enum MarkKind {
     Late,
 }
 
-/// Whether a recording was simulated again with the same bits.
+/// Whether every recorded state has the hash that was recorded with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Hashes {
-    /// It was not.
+    /// Nobody looked.
     Unchecked,
-    /// It is being.
+    /// It is being read.
     Checking,
-    /// It was, and all are equal.
+    /// All that could be checked have.
     Verified,
-    /// It was, and they are not.
+    /// At least one has not.
     Diverged,
     /// The recording has none.
     Absent,

@@ -1,0 +1,305 @@
+//! A recording that is wound to any step shows there what the solver had in that step, and what a
+//! reading of the file from its start finds.
+//!
+//! A scene is simulated here with cuts, resets and colliders, and written in small chunks; what the
+//! solver had is kept beside it.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
+
+use std::fs;
+use std::path::PathBuf;
+
+use recorder::{
+    Closing, CollidersRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message,
+    OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow, TopologyRow,
+    cause_of, state_hash,
+};
+use sim_contract::{
+    Action, Command, ConstraintState, LoadHeader, Outcome, ParticleState, TearCause,
+};
+use sim_solver::{Scene, Solver};
+
+const SCENE: &str = "
+    version = 1
+    [solver]
+    rate_hz = 60
+    [[generate]]
+    shape = 'cloth'
+    columns = 6
+    rows = 6
+    spacing = 0.1
+    pinned = 'top'";
+
+/// Steps that are simulated, and what happens in some of them.
+const STEPS: u64 = 300;
+const CUTS: [(u64, u32); 6] = [(7, 3), (40, 11), (41, 2), (125, 30), (210, 5), (250, 12)];
+const RESETS: [u64; 2] = [90, 210];
+/// Steps between two keyframes.
+const KEYFRAME_PERIOD: u64 = 60;
+
+/// What the solver had after a step.
+#[derive(Debug, Clone, PartialEq)]
+struct Expected {
+    step: u64,
+    particles: Vec<ParticleState>,
+    torn: Vec<u32>,
+    causes: Vec<Option<TearCause>>,
+    hash: u64,
+}
+
+/// How a recording is written.
+#[derive(Debug, Clone, Copy)]
+struct Style {
+    every: u64,
+    has_keyframes: bool,
+    chunk_size_bytes: u64,
+}
+
+const PLAIN: Style = Style { every: 1, has_keyframes: true, chunk_size_bytes: 6000 };
+
+fn expected(solver: &Solver, step: u64) -> Expected {
+    Expected {
+        step,
+        particles: bytemuck::cast_slice(solver.particles()).to_vec(),
+        torn: solver.torn().to_vec(),
+        causes: solver.tear_causes().iter().map(|cause| Some(cause_of(*cause))).collect(),
+        hash: solver.state_hash(),
+    }
+}
+
+fn reset_outcome(step: u64) -> Message {
+    let command = Command::new(1, step, Action::Reset);
+    Message::Outcome(OutcomeRow::from(&Outcome::new(0, step, command, Ok(()))))
+}
+
+/// The messages of a step, its snapshot not among them, in the order of publication.
+fn updates(solver: &Solver, step: u64, style: Style) -> Vec<Message> {
+    let mut messages = Vec::new();
+    if step.is_multiple_of(25) {
+        messages.push(Message::Colliders(CollidersRow { step, colliders: Vec::new() }));
+    }
+    let new = solver.torn().len() - solver.new_torn_count();
+    if solver.new_torn_count() > 0 {
+        let causes = solver.tear_causes()[new..].iter().map(|one| cause_of(*one).name().to_owned());
+        let constraints = solver.torn()[new..].to_vec();
+        messages.push(Message::Tears(TearsRow { step, constraints, causes: causes.collect() }));
+    }
+    if style.has_keyframes && step.is_multiple_of(KEYFRAME_PERIOD) {
+        messages.push(Message::Keyframe { step, bytes: solver.keyframe().encode() });
+    }
+    if RESETS.contains(&step) {
+        messages.push(reset_outcome(step));
+    }
+    messages
+}
+
+/// Makes a step with all that happens in it.
+fn advance(solver: &mut Solver, step: u64) {
+    if RESETS.contains(&step) {
+        solver.reset();
+    }
+    for (_, constraint) in CUTS.iter().filter(|(of, _)| *of == step) {
+        solver.cut(*constraint).unwrap();
+    }
+    solver.step();
+}
+
+fn topology(solver: &Solver) -> Message {
+    let constraints: Vec<_> = solver
+        .constraints()
+        .map(|one| ConstraintState {
+            a: one.a,
+            b: one.b,
+            rest_length: one.rest_length,
+            compliance: one.compliance,
+            kind: one.kind as u32,
+        })
+        .collect();
+    Message::Topology(TopologyRow::new(&LoadHeader::default(), &constraints))
+}
+
+fn written(style: Style) -> (Vec<u8>, Vec<Expected>) {
+    let scene = Scene::from_toml(SCENE, "scene.toml").unwrap();
+    let mut solver = Solver::new(&scene);
+    let run = RunDescription {
+        run_id: 7,
+        epoch_ns: 1_700_000_000_000_000_001,
+        scene_name: "cloth".to_owned(),
+        origin: [0.0; 3],
+        rate_hz: 60,
+        method: 0,
+        particle_count: 36,
+        constraint_count: u32::try_from(solver.constraint_count()).unwrap(),
+        solver_version: 1,
+        contract_version: 1,
+        recorder_version: "0.1.0".to_owned(),
+    };
+    let options = LogOptions { chunk_size_bytes: style.chunk_size_bytes, ..LogOptions::default() };
+    let mut log = LogWriter::create(Vec::new(), options, &run, SCENE.as_bytes(), 0).unwrap();
+    log.write(&topology(&solver), 0).unwrap();
+    let surface = SurfaceRow { step: 0, triangles: Vec::new() };
+    log.write(&Message::Surface(surface), 0).unwrap();
+    let mut all = Vec::new();
+    for step in 0..=STEPS {
+        if step > 0 {
+            advance(&mut solver, step);
+        }
+        for message in updates(&solver, step, style) {
+            log.write(&message, step).unwrap();
+        }
+        if step.is_multiple_of(style.every) {
+            let state = expected(&solver, step);
+            log.write(&Message::Step(row(&solver, step)), step).unwrap();
+            let particles = state.particles.clone();
+            log.write(&Message::Particles { step, particles }, step).unwrap();
+            all.push(state);
+        }
+    }
+    (log.finish(&Closing::default()).unwrap(), all)
+}
+
+fn row(solver: &Solver, step: u64) -> StepRow {
+    StepRow {
+        step,
+        scene_step: solver.scene_step(),
+        state_hash: solver.state_hash(),
+        torn_count: u32::try_from(solver.torn().len()).unwrap(),
+        ..StepRow::default()
+    }
+}
+
+/// A file that goes with its guard.
+struct TestFile(PathBuf);
+
+impl TestFile {
+    fn new(name: &str, bytes: &[u8]) -> Self {
+        let path = std::env::temp_dir().join(format!("tape-{}-{name}.mcap", std::process::id()));
+        fs::write(&path, bytes).unwrap();
+        Self(path)
+    }
+
+    fn open(&self) -> Result<Tape, TapeError> {
+        Tape::open(&self.0, &mut |_, _| {})
+    }
+}
+
+impl Drop for TestFile {
+    fn drop(&mut self) {
+        let _left = fs::remove_file(&self.0);
+    }
+}
+
+/// Steps forwards, backwards and far apart.
+fn tour() -> impl Iterator<Item = u64> {
+    let scattered = (0..=STEPS).map(|step| step * 127 % (STEPS + 1));
+    scattered.chain(0..=STEPS).chain((0..=STEPS).rev())
+}
+
+fn assert_shows(tape: &mut Tape, step: u64, all: &[Expected]) {
+    let expected = all.iter().rfind(|one| one.step <= step).unwrap();
+    let state = tape.state_at(step).unwrap();
+    let found = Expected {
+        step: state.row.step,
+        particles: state.particles.to_vec(),
+        torn: state.torn.constraints.clone(),
+        causes: state.torn.causes,
+        hash: state_hash(&state.particles, &state.torn.constraints),
+    };
+    assert_eq!(found, *expected, "wound to step {step}");
+    let colliders_step = state.colliders.unwrap().step;
+    assert_eq!(colliders_step, expected.step / 25 * 25, "wound to step {step}");
+}
+
+#[test]
+fn a_tape_shows_at_any_step_what_the_solver_had() {
+    let styles = [
+        ("plain", PLAIN),
+        ("decimated", Style { every: 4, ..PLAIN }),
+        ("without-keyframes", Style { has_keyframes: false, ..PLAIN }),
+        ("one-chunk", Style { chunk_size_bytes: 1 << 20, ..PLAIN }),
+        ("tiny-chunks", Style { chunk_size_bytes: 1, ..PLAIN }),
+    ];
+    for (name, style) in styles {
+        let (bytes, all) = written(style);
+        let file = TestFile::new(name, &bytes);
+        let mut tape = file.open().unwrap();
+        assert_eq!((tape.first_step(), tape.last_step(), tape.stride()), (0, STEPS, style.every));
+        tour().for_each(|step| assert_shows(&mut tape, step, &all));
+        assert_eq!(tape.take_faults(), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn what_a_fresh_tape_shows_is_what_the_file_has_there() {
+    let (bytes, all) = written(PLAIN);
+    let file = TestFile::new("linear", &bytes);
+    let mut frames = FrameReader::new(LogReader::new(bytes.as_slice()).unwrap());
+    let mut step = 0;
+    while let Some(frame) = frames.next_frame().unwrap() {
+        // Opened anew, now and then: nothing is known of what came before.
+        if step % 37 == 0 {
+            let state = file.open().unwrap().state_at(step).unwrap();
+            assert_eq!((state.row, &*state.particles), (frame.row, &frame.particles));
+            assert_shows(&mut file.open().unwrap(), step, &all);
+        }
+        step += 1;
+    }
+    assert_eq!(step, STEPS + 1);
+}
+
+#[test]
+fn neighbours_are_found_across_chunks() {
+    let (bytes, all) = written(Style { every: 3, ..PLAIN });
+    let file = TestFile::new("neighbours", &bytes);
+    let mut tape = file.open().unwrap();
+    for pair in all.windows(2) {
+        assert_eq!(tape.step_after(pair[0].step).unwrap(), pair[1].step);
+        assert_eq!(tape.step_at(pair[1].step - 1).unwrap(), pair[0].step);
+    }
+    assert_eq!(tape.step_after(tape.last_step()).unwrap(), STEPS);
+}
+
+#[test]
+fn a_file_without_its_end_is_shown_as_far_as_it_goes() {
+    let (bytes, all) = written(PLAIN);
+    let file = TestFile::new("cut", &bytes[..bytes.len() / 2]);
+    let mut reports = Vec::new();
+    let mut tape = Tape::open(&file.0, &mut |at, of| reports.push((at, of))).unwrap();
+    assert!(matches!(tape.log().end(), LogEnd::Truncated { .. }) && !tape.log().has_index());
+    assert!(reports.first().is_some_and(|(at, of)| at < of), "{reports:?}");
+    let last_step = tape.last_step();
+    assert!((50..STEPS - 50).contains(&last_step), "ends with step {last_step}");
+    for step in tour().filter(|step| *step <= last_step) {
+        assert_shows(&mut tape, step, &all);
+    }
+}
+
+#[test]
+fn around_a_damaged_chunk_everything_else_is_shown() {
+    let (mut bytes, all) = written(PLAIN);
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    let file = TestFile::new("damaged", &bytes);
+    let mut tape = file.open().unwrap();
+    let steps: Vec<_> = (0..=STEPS).map(|step| tape.step_at(step).unwrap()).collect();
+    let missing: Vec<_> = (0..=STEPS).filter(|step| !steps.contains(step)).collect();
+    assert!(!missing.is_empty() && missing.len() < 60, "{missing:?}");
+    let faults = tape.take_faults();
+    assert!(faults.len() == 1 && faults[0].contains("is damaged"), "{faults:?}");
+    let behind = missing.last().unwrap().next_multiple_of(KEYFRAME_PERIOD);
+    for step in (0..missing[0]).chain(behind..=STEPS) {
+        assert_shows(&mut tape, step, &all);
+    }
+    assert_eq!(tape.step_after(missing[0] - 1).unwrap(), missing.last().unwrap() + 1);
+}
+
+#[test]
+fn what_is_nothing_to_show_says_why() {
+    let (bytes, _) = written(PLAIN);
+    let open = |name: &str, bytes: &[u8]| {
+        TestFile::new(name, bytes).open().err().map(|error| error.to_string()).unwrap()
+    };
+    assert_eq!(open("empty", &[]), "is not an MCAP file");
+    assert_eq!(open("other", b"version = 1\n[solver]\nrate_hz = 60\n"), "is not an MCAP file");
+    let head = open("head", &bytes[..bytes.len() / 100]);
+    assert!(head.contains("head") || head.contains("/topology"), "{head}");
+}

@@ -1,0 +1,400 @@
+//! A recording in the viewer: pages see in every step what the file has there, and share one place.
+//!
+//! What is expected is read from the file from its start, by the recorder's library.
+
+use std::path::Path;
+
+use integration_tests::{Process, Program, Sandbox, wait_for};
+use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
+use serde_json::{Value, json};
+use sim_contract::ParticleFlags;
+use viewer_bridge::wire::Message;
+
+use super::page::{Bridge, Page};
+
+const STEPS: u64 = 960;
+/// Cuts, pins and settings on both sides of a reset; the last cut in the step of another reset.
+const COMMANDS: &str = r#"{"step":20,"kind":"pin","particle":100}
+{"step":50,"kind":"cut","constraint":300}
+{"step":51,"kind":"cut","constraint":20}
+{"step":120,"kind":"set","parameter":"damping","value":2.5}
+{"step":200,"kind":"unpin","particle":100}
+{"step":333,"kind":"cut","constraint":301}
+{"step":500,"kind":"reset"}
+{"step":640,"kind":"cut","constraint":7}
+{"step":700,"kind":"reset","client_id":1}
+{"step":700,"kind":"cut","constraint":9,"client_id":2}
+{"step":701,"kind":"cut","constraint":8}
+"#;
+
+/// A recorded state.
+#[derive(Debug, Clone, PartialEq)]
+struct State {
+    step: u64,
+    positions: Vec<[f32; 3]>,
+    torn: Vec<u32>,
+    /// Particle and flags.
+    held: Vec<[u32; 2]>,
+}
+
+fn recording(sandbox: &Sandbox) -> String {
+    let commands = sandbox.write("commands.jsonl", COMMANDS);
+    let file = sandbox.path("run.mcap");
+    let steps = STEPS.to_string();
+    let args = ["simulate", "curtain", "--steps", &steps, "--commands", &commands, "-o", &file];
+    Process::run(Program::Recorder, sandbox, &args).success();
+    file
+}
+
+/// All states of a recording, and what it is of.
+fn states(file: &str) -> (Vec<State>, RunDescription) {
+    let mut frames = FrameReader::new(LogReader::open(Path::new(file)).unwrap());
+    let mut torn = Vec::new();
+    let mut states = Vec::new();
+    while let Some(frame) = frames.next_frame().unwrap() {
+        follow_tears(&mut torn, &frame);
+        let held = (0_u32..).zip(&frame.particles).filter(|(_, one)| one.flags != 0);
+        states.push(State {
+            step: frame.row.step,
+            positions: frame.particles.iter().map(|one| one.position).collect(),
+            torn: torn.clone(),
+            held: held.map(|(particle, one)| [particle, one.flags]).collect(),
+        });
+    }
+    (states, frames.log().run().clone())
+}
+
+fn follow_tears(torn: &mut Vec<u32>, frame: &Frame) {
+    for update in &frame.updates {
+        if let Logged::Topology(row) = update {
+            torn.clone_from(&row.torn);
+        }
+    }
+    if frame.updates.iter().any(|update| update.reset_step().is_some()) {
+        torn.clear();
+    }
+    for update in &frame.updates {
+        if let Logged::Tears(row) = update {
+            torn.extend(&row.constraints);
+        }
+    }
+}
+
+/// A page that keeps what it was told of tears and pins.
+struct View {
+    page: Page,
+    torn: Vec<u32>,
+    held: Vec<[u32; 2]>,
+}
+
+impl View {
+    fn new(bridge: &Bridge) -> Self {
+        Self { page: bridge.page(), torn: Vec::new(), held: Vec::new() }
+    }
+
+    /// What the page shows with the next frame like that.
+    fn shown(&mut self, is_meant: impl Fn(u64) -> bool) -> State {
+        loop {
+            match self.page.binary() {
+                Message::Tear(tear) => {
+                    self.torn.truncate(tear.first as usize);
+                    self.torn.extend(tear.constraints);
+                }
+                Message::Pins(pins) => self.held = pins.held,
+                Message::Frame(frame) if is_meant(frame.head.stamp.step) => {
+                    assert_eq!(frame.head.torn_count as usize, self.torn.len());
+                    return State {
+                        step: frame.head.stamp.step,
+                        positions: frame.positions,
+                        torn: self.torn.clone(),
+                        held: self.held.clone(),
+                    };
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Goes to another step.
+    fn seek(&mut self, step: u64) -> State {
+        self.page.send(&json!({ "type": "seek", "step": step }));
+        self.shown(|shown| shown == step)
+    }
+}
+
+fn seek(step: u64) -> Value {
+    json!({ "type": "seek", "step": step })
+}
+
+#[test]
+fn scrubbing_shows_what_the_recording_has_in_each_step() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let (states, _) = states(&file);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    let mut view = View::new(&bridge);
+    assert_eq!(view.shown(|_| true), states[0]);
+    // Forwards and backwards, to the steps around each event, from near and from far.
+    let steps = [
+        19, 20, 21, 960, 51, 50, 49, 52, 640, 333, 332, 499, 500, 501, 334, 639, 641, 699, 700,
+        701, 0, 702, 700, 199, 200, 959, 1, 700,
+    ];
+    for step in steps {
+        assert_eq!(view.seek(step), states[usize::try_from(step).unwrap()], "at step {step}");
+    }
+    assert_eq!(states[700].torn, [9]);
+    assert!(states[100].held.contains(&[100, ParticleFlags::PINNED]));
+    // One that comes now sees the same.
+    assert_eq!(View::new(&bridge).shown(|_| true), states[700]);
+}
+
+#[test]
+fn the_timeline_has_marks_and_whether_the_hashes_are_right() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    let mut page = bridge.page();
+    let timeline = page.told("timeline", "hashes", &json!("verified"));
+    assert_eq!(timeline["hash_text"], "961 hashes verified");
+    assert_eq!((&timeline["file"], &timeline["scene"]), (&json!("run.mcap"), &json!("curtain")));
+    assert_eq!((&timeline["first_step"], &timeline["last_step"]), (&json!(0), &json!(STEPS)));
+    assert_eq!((&timeline["rate_hz"], &timeline["last_time_s"]), (&json!(240), &json!(4.0)));
+    let mark =
+        |kind: &str, step: u64, count: u32| json!({ "kind": kind, "step": step, "count": count });
+    let marks = [
+        mark("pin", 20, 1),
+        mark("tear", 50, 1),
+        mark("command", 50, 1),
+        mark("tear", 51, 1),
+        mark("command", 51, 1),
+        mark("command", 120, 1),
+        mark("pin", 200, 1),
+        mark("tear", 333, 1),
+        mark("command", 333, 1),
+        mark("command", 500, 1),
+        mark("tear", 640, 1),
+        mark("command", 640, 1),
+        mark("tear", 700, 1),
+        mark("command", 700, 2),
+        mark("tear", 701, 1),
+        mark("command", 701, 1),
+    ];
+    assert_eq!(timeline["marks"], json!(marks));
+    // The parameters are those of the step.
+    page.send(&seek(119));
+    page.text(|text| text["type"] == "parameters" && text["is_complete"] == true);
+    page.send(&seek(120));
+    page.text(|text| text["values"]["damping"] == 2.5);
+    page.send(&seek(500));
+    page.text(|text| text["type"] == "parameters" && text["values"]["damping"] != 2.5);
+}
+
+#[test]
+fn a_state_that_was_changed_is_found() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let changed = sandbox.path("changed.mcap");
+    change_one_particle(&file, &changed, 321);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &changed]);
+    let timeline = bridge.page().told("timeline", "hashes", &json!("diverged"));
+    assert_eq!(timeline["hash_text"], "1 of 961 hashes differ, first at step 321");
+}
+
+/// Writes a recording anew with another bit in one state.
+fn change_one_particle(from: &str, to: &str, changed_step: u64) {
+    let mut log = LogReader::open(Path::new(from)).unwrap();
+    let (run, scene) = (log.run().clone(), log.scene().to_vec());
+    let out = std::fs::File::create(to).unwrap();
+    let options = recorder::LogOptions::default();
+    let mut copy = recorder::LogWriter::create(out, options, &run, &scene, 0).unwrap();
+    while let Some(mut logged) = log.next_message().unwrap() {
+        if let Logged::Particles { step, particles } = &mut logged.message
+            && *step == changed_step
+        {
+            particles[90].velocity[1] += 0.25;
+        }
+        copy.write(&logged.message, logged.log_time_ns).unwrap();
+    }
+    copy.finish(&recorder::Closing::default()).unwrap();
+}
+
+#[test]
+fn pages_play_pause_step_and_loop_one_recording_together() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    let (mut page, mut other) = (bridge.page(), bridge.page());
+    assert_eq!(page.told("node", "state", &json!("alive"))["is_replay"], true);
+    let playback = page.text(|text| text["type"] == "playback");
+    assert_eq!((&playback["is_playing"], &playback["step"]), (&json!(false), &json!(0)));
+
+    assert_eq!(page.applied(seek(100)), 100);
+    other.frame(|frame| frame.head.stamp.step == 100);
+    assert_eq!(other.applied(json!({ "type": "step" })), 101);
+    assert_eq!(other.applied(json!({ "type": "step", "count": -3 })), 98);
+    assert_eq!(other.applied(json!({ "type": "step", "count": 40 })), 138);
+    page.frame(|frame| frame.head.stamp.step == 138);
+    assert_eq!(page.applied(seek(1 << 40)), STEPS);
+    assert_eq!(page.applied(json!({ "type": "step", "count": -10_000 })), 0);
+
+    page.applied(json!({ "type": "rate", "value": 10 }));
+    other.told("playback", "rate", &json!(10.0));
+    page.applied(json!({ "type": "resume" }));
+    other.told("playback", "is_playing", &json!(true));
+    // It stands at its end, and plays from there from the beginning.
+    other.frame(|frame| frame.head.stamp.step == STEPS);
+    assert_eq!(other.told("playback", "is_playing", &json!(false))["step"], STEPS);
+    page.applied(json!({ "type": "loop", "is_on": true }));
+    page.applied(json!({ "type": "rate", "value": 0.1 }));
+    page.applied(seek(STEPS - 2));
+    page.applied(json!({ "type": "resume" }));
+    assert_eq!(page.rejected(json!({ "type": "step" })), "no_effect_here");
+    page.applied(json!({ "type": "rate", "value": 5 }));
+    page.frame(|frame| frame.head.stamp.step > STEPS / 2);
+    page.frame(|frame| frame.head.stamp.step < STEPS / 2);
+    let step = page.applied(json!({ "type": "pause" }));
+    other.frame(|frame| frame.head.stamp.step == step);
+}
+
+#[test]
+fn a_recording_cannot_be_changed() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    let mut page = bridge.page();
+    let epoch = page.scene().stamp.epoch;
+    for message in [
+        json!({ "type": "drag_begin", "particle": 90, "target": [0, 0, 0] }),
+        json!({ "type": "drag_end", "particle": 90 }),
+        json!({ "type": "pin", "particle": 90 }),
+        json!({ "type": "cut", "epoch": epoch, "constraints": [1] }),
+        json!({ "type": "cut_radius", "center": [0, 0, 0], "radius": 1 }),
+        json!({ "type": "set", "parameter": "damping", "value": 1 }),
+        json!({ "type": "reset" }),
+        json!({ "type": "load", "scene": "rope" }),
+    ] {
+        assert_eq!(page.rejected(message.clone()), "only_live", "{message}");
+    }
+    assert_eq!(page.rejected(json!({ "type": "rate", "value": 11 })), "out_of_range");
+}
+
+#[test]
+fn a_live_recording_is_shown_as_it_was() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("live.mcap");
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    let live = Bridge::start(&sandbox);
+    let mut page = live.page();
+    let epoch = page.scene().stamp.epoch;
+    page.applied(json!({ "type": "cut", "epoch": epoch, "constraints": [300, 301, 302] }));
+    page.applied(json!({ "type": "pin", "particle": 100 }));
+    let reset = page.applied(json!({ "type": "reset" }));
+    page.applied(json!({ "type": "cut", "epoch": epoch, "constraints": [4] }));
+    page.frame(|frame| frame.head.stamp.step > reset + 100);
+    recording.interrupt();
+    node.interrupt();
+    let (states, run) = states(&file);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    let mut view = View::new(&bridge);
+    let hex = json!(format!("{:016x}", run.run_id));
+    assert_eq!(view.page.told("node", "run_id", &hex)["scene"], "curtain");
+    let timeline = view.page.told("timeline", "hashes", &json!("verified"));
+    assert_eq!(timeline["first_step"], states[0].step);
+    // The texts above were waited for in place of its first frame.
+    let mut view = View::new(&bridge);
+    assert_eq!(view.shown(|_| true), states[0]);
+    let count = states.len();
+    for place in [count - 1, 1, count / 2, count / 3, count / 3 * 2, 2] {
+        assert_eq!(view.seek(states[place].step), states[place]);
+    }
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_shown_as_far_as_it_goes() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let bytes = std::fs::read(&file).unwrap();
+    let cut = sandbox.path("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() * 6 / 10]).unwrap();
+    let (states, _) = states(&cut);
+    let mut bridge = Bridge::start_with(&sandbox, &["--replay", &cut]);
+    bridge.process.wait_for_line(&format!("{cut} has no index"));
+    bridge.process.wait_for_line(&format!("warning: {cut} is truncated"));
+    let mut view = View::new(&bridge);
+    for place in [states.len() - 1, states.len() / 2, 1] {
+        assert_eq!(view.seek(states[place].step), states[place]);
+    }
+    let timeline = bridge.page().told("timeline", "hashes", &json!("verified"));
+    assert_eq!(timeline["last_step"], states.last().unwrap().step);
+    let text = timeline["hash_text"].as_str().unwrap();
+    assert!(text.contains("truncated"), "{text}");
+}
+
+#[test]
+fn a_damaged_part_is_left_out_and_said() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let mut bytes = std::fs::read(&file).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    let damaged = sandbox.path("damaged.mcap");
+    std::fs::write(&damaged, &bytes).unwrap();
+    // Read from its start, it ends before the damage.
+    let (before, all) = (states(&damaged).0, states(&file).0);
+    let bridge = Bridge::start_with(&sandbox, &["--replay", &damaged]);
+    let mut view = View::new(&bridge);
+    assert_eq!(view.seek(1), all[1]);
+    assert_eq!(view.seek(STEPS), *all.last().unwrap());
+    let last = before.last().unwrap();
+    view.page.send(&seek(last.step + 1));
+    assert_eq!(view.shown(|step| step != STEPS), *last);
+    let notice = view.page.text(|text| text["type"] == "notice");
+    assert!(notice["text"].as_str().unwrap().contains("is damaged"), "{notice}");
+    let timeline = bridge.page().text(|text| {
+        text["hash_text"].as_str().is_some_and(|text| text.contains("damaged chunks left out: 1"))
+    });
+    assert_eq!(timeline["hashes"], "verified");
+}
+
+#[test]
+fn files_that_are_no_recordings_are_named_before_anything_is_served() {
+    let sandbox = Sandbox::new();
+    let whole = std::fs::read(recording(&sandbox)).unwrap();
+    let head = sandbox.path("head.mcap");
+    std::fs::write(&head, &whole[..300]).unwrap();
+    let give = "give a file that `recorder record` or `recorder simulate` has written";
+    let again = "record again with `recorder record`";
+    let folder = sandbox.path("");
+    let cases = [
+        (sandbox.path("missing.mcap"), "there is no such file", give),
+        (sandbox.write("empty.mcap", ""), "is empty", again),
+        (sandbox.write("text.mcap", "this is no recording, but long"), "is not an MCAP file", give),
+        (folder, "is not a file", give),
+        (head, "has no readable head", again),
+    ];
+    for (file, what, cure) in cases {
+        let args = ["--listen", "127.0.0.1:0", "--replay", &file];
+        let ended = Process::run(Program::ViewerBridge, &sandbox, &args);
+        assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""), "{}", ended.stderr);
+        let start = format!("error: {file}: ");
+        assert!(ended.stderr.starts_with(&start), "{}", ended.stderr);
+        assert!(ended.stderr.contains(what) && ended.stderr.contains(cure), "{}", ended.stderr);
+    }
+    let both = Process::run(Program::ViewerBridge, &sandbox, &["--replay", "a", "--name", "b"]);
+    assert_eq!(both.code, Some(2), "{}", both.stderr);
+}
+
+#[test]
+fn a_replay_ends_as_programs_should_while_it_plays() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let mut bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
+    let mut page = bridge.page();
+    page.applied(json!({ "type": "loop", "is_on": true }));
+    page.applied(json!({ "type": "resume" }));
+    page.frame(|frame| frame.head.stamp.step > 10);
+    wait_for("a program that runs", || bridge.process.is_running().then_some(()));
+    let ended = bridge.process.interrupt();
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), ""), "{}", ended.stderr);
+}
