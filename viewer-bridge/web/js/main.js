@@ -68,6 +68,8 @@ function start(renderer) {
         commands.forget();
         input.abandon();
         timeline.gate.reset();
+        // The next connection counts its frames anew.
+        simulation.frameNumber = null;
       }
     },
     onFault: (text) => {
