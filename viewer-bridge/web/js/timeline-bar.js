@@ -23,7 +23,10 @@ export class TimelineBar {
     this.loop = find("loop", HTMLButtonElement);
     this.hashes = find("hashes", HTMLOutputElement);
     // An answer frees the gate with the next picture: then it was drawn, or a newer one will be.
-    this.gate = new SeekGate((step, done) => commands.run("seek", { step }, () => requestAnimationFrame(done)));
+    this.gate = new SeekGate((step, done) => commands.run("seek", { step }, () => requestAnimationFrame(() => {
+      done();
+      if (simulation.frame !== null) this.follow(simulation.frame.step);
+    })));
     this.isScrubbing = false;
     this.saidMs = 0;
     this.listen();
@@ -83,12 +86,13 @@ export class TimelineBar {
     this.follow(playback.step);
   }
 
-  /** Goes along with what is shown, but not from under the user's hand. @param {number} step */
+  /** Goes along with what is shown, but not from under the user's hand, nor back to what was asked for
+   * before. @param {number} step */
   follow(step) {
-    if (this.element.hidden || this.isScrubbing) return;
+    if (this.element.hidden || this.isScrubbing || this.gate.isBusy) return;
     this.slider.valueAsNumber = step;
     const now = performance.now();
-    if (now - this.saidMs < 100) return;
+    if (now - this.saidMs < 100 && !this.simulation.isPaused) return;
     this.saidMs = now;
     this.say(step);
   }
