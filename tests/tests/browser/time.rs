@@ -49,7 +49,7 @@ fn another_scene_is_loaded_and_shown() {
     stage.wait_for_state("the rope in the node", |state| state.particles.len() == 41);
     stage.tab.wait("viewer.scene === 'rope' && viewer.particleCount === 41 && viewer.frame >= 0");
     stage.tab.wait("document.title.startsWith('rope')");
-    assert_eq!(stage.tab.ask("document.querySelector('#scene').value"), "rope");
+    stage.tab.wait("document.querySelector('#scene').value === 'rope'");
     wait_for("a picture without cloth", || {
         (stage.tab.screenshot().count(&area, is_cloth) < 100).then_some(())
     });
