@@ -11,5 +11,6 @@
 mod hands;
 mod pages;
 mod picture;
+mod replay;
 mod support;
 mod time;

@@ -9,7 +9,7 @@ use sim_contract::{Client, ParticleState};
 use super::chromium::Turn;
 use super::tab::Tab;
 
-const ANY_PORT: &str = "127.0.0.1:0";
+pub(super) const ANY_PORT: &str = "127.0.0.1:0";
 
 /// What the node published last, read from its shared memory and not through the bridge.
 #[derive(Debug, Clone, Default)]
@@ -118,13 +118,13 @@ fn start_node(sandbox: &Sandbox, args: &[&str]) -> Process {
 }
 
 /// Starts a bridge, and returns it with its address.
-fn start_bridge(sandbox: &Sandbox, args: &[&str]) -> (Process, String) {
+pub(super) fn start_bridge(sandbox: &Sandbox, args: &[&str]) -> (Process, String) {
     let mut bridge = Process::start(Program::ViewerBridge, sandbox, args);
     let url = bridge.wait_for_line("ready http://").trim_start_matches("ready ").to_owned();
     (bridge, url)
 }
 
 /// Without smoothed edges: in software they cost more than all the rest.
-fn address(url: &str, look: &str) -> String {
+pub(super) fn address(url: &str, look: &str) -> String {
     format!("{url}?aa=0#{look}")
 }

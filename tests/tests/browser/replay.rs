@@ -1,0 +1,58 @@
+//! A recording in the page: where its bar is scrubbed to, the recorded positions are seen.
+
+use std::path::Path;
+
+use integration_tests::{Process, Program, Sandbox};
+use recorder::{FrameReader, LogReader};
+
+use crate::picture::{ERROR_MAX, NAMED, SWINGING, errors};
+use crate::support::{Button, Replay};
+
+/// Far enough away that the sheet swings within the picture.
+const LOOK: &str = "show.particles=1&camera=0.5,-0.35,0,3,0.42,0.16";
+/// Parts of the bar's length.
+const PLACES: [f64; 3] = [0.8, 0.25, 0.55];
+
+/// The positions of each step of a recording, read from its start.
+fn recorded(file: &str) -> Vec<Vec<[f32; 3]>> {
+    let mut frames = FrameReader::new(LogReader::open(Path::new(file)).unwrap());
+    let mut positions = Vec::new();
+    while let Some(frame) = frames.next_frame().unwrap() {
+        assert_eq!(frame.row.step, positions.len() as u64);
+        positions.push(frame.particles.iter().map(|one| one.position).collect());
+    }
+    positions
+}
+
+#[test]
+#[ignore = "needs Chromium"]
+fn scrubbing_a_recording_shows_the_recorded_positions() {
+    let sandbox = Sandbox::new();
+    let scene = sandbox.write("swinging.toml", SWINGING);
+    let file = sandbox.path("run.mcap");
+    let args = ["simulate", &scene, "--steps", "240", "-o", &file];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let recorded = recorded(&file);
+
+    let replay = Replay::open(sandbox, &file, LOOK);
+    let tab = &replay.tab;
+    let mut from = tab.place("#seek", 0.1);
+    for part in PLACES {
+        let to = tab.place("#seek", part);
+        tab.press(from, Button::Left);
+        tab.stroke(from, to, 8);
+        tab.release(to);
+        from = to;
+        let step = tab.ask("document.querySelector('#seek').valueAsNumber");
+        let step: usize = serde_json::from_value(step).unwrap();
+        assert!((step as f64 / 240.0 - part).abs() < 0.03, "step {step} at {part} of the bar");
+        tab.wait(&format!("viewer.paused && viewer.step === {step}"));
+        let (camera, picture) = (tab.camera(), tab.screenshot());
+        let positions = &recorded[step];
+        for (at, error) in NAMED.iter().zip(errors(&picture, &camera, positions)) {
+            assert!(error <= ERROR_MAX, "{at:?} is {error} px from where it was recorded");
+        }
+        let earlier = errors(&picture, &camera, &recorded[step - 20]);
+        assert!(earlier.iter().any(|error| *error > ERROR_MAX), "nothing would be seen of it");
+    }
+}
