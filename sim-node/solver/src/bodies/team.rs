@@ -49,11 +49,14 @@ impl Team {
     /// If there are more parts than members.
     pub(crate) fn each<P: Send>(
         &mut self,
-        parts: impl Iterator<Item = P>,
+        mut parts: impl Iterator<Item = P>,
         work: impl Fn(&mut P, &mut Scratch) + Sync,
         mut done: impl FnMut(P),
     ) {
-        if self.members() == 1 {
+        let (first, second) = (parts.next(), parts.next());
+        let is_alone = self.members() == 1 || second.is_none();
+        let parts = first.into_iter().chain(second).chain(parts);
+        if is_alone {
             for mut part in parts {
                 work(&mut part, &mut self.scratches[0]);
                 done(part);
@@ -68,11 +71,14 @@ impl Team {
             *place = scratch.map(|scratch| (part, scratch));
             count += 1;
         }
-        self.crew.each(&mut pairs[..count], |pair| {
+        let pairs = &mut pairs[..count];
+        self.crew.each(pairs, |pair| {
             if let Some((part, scratch)) = pair {
                 work(part, scratch);
             }
         });
-        pairs.into_iter().flatten().for_each(|(part, _)| done(part));
+        for (part, _) in pairs.iter_mut().filter_map(Option::take) {
+            done(part);
+        }
     }
 }
