@@ -12,4 +12,4 @@ pub use process::{Finished, Process, ctl};
 pub use programs::Program;
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;
-pub use wait::{DEADLINE, wait_for};
+pub use wait::{DEADLINE, Deadline, wait_for};

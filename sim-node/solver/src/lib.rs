@@ -40,6 +40,7 @@ mod hash;
 mod kernels;
 mod keyframe;
 mod order;
+mod pages;
 mod parameters;
 mod particles;
 mod project;

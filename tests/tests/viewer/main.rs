@@ -10,7 +10,7 @@ use std::time::Duration;
 use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
 use serde_json::{Value, json};
 use sim_contract::{Client, ParticleFlags, ParticleState};
-use viewer_bridge::wire::{Message, scene_flag};
+use viewer_bridge::wire::scene_flag;
 
 use page::{Bridge, Page};
 
@@ -45,11 +45,7 @@ fn a_page_sees_what_the_node_publishes() {
     assert_eq!((scene.positions.len(), scene.ends.len(), scene.rate_hz), (168, 596, 240));
     assert_eq!((scene.text.name.as_str(), scene.text.grids.len()), ("curtain", 1));
     assert_eq!(scene.flags, scene_flag::TETHERS);
-    let pins = loop {
-        if let Message::Pins(pins) = page.binary() {
-            break pins;
-        }
-    };
+    let pins = page.pins();
     assert_eq!(pins.held, (0..14).map(|particle| [particle, 1]).collect::<Vec<_>>());
     page.frame(|frame| frame.head.stamp.step > 60);
     page.applied(json!({ "type": "pause" }));
@@ -61,13 +57,7 @@ fn a_page_sees_what_the_node_publishes() {
     let frame = late.frame(|frame| frame.head.stamp.step == step);
     let positions: Vec<_> = snapshot.particles().iter().map(|one| one.position).collect();
     assert_eq!(frame.positions, positions);
-    let statistics = loop {
-        if let Message::Statistics(statistics) = page.binary()
-            && statistics.client_count == 2
-        {
-            break statistics;
-        }
-    };
+    let statistics = page.statistics(|statistics| statistics.client_count == 2);
     assert!(statistics.stretch_max < 0.2 && statistics.stretch_max >= statistics.stretch_mean);
     assert_eq!(statistics.torn_count, 0);
 }
@@ -105,11 +95,7 @@ fn pages_pin_cut_brush_set_step_reset_and_load() {
     let cut = json!({ "type": "cut", "epoch": epoch, "constraints": [300, 301, 302] });
     let outcome = page.command(cut.clone());
     assert_eq!((&outcome["applied"], &outcome["rejected"]), (&json!(3), &json!(0)));
-    let tear = loop {
-        if let Message::Tear(tear) = page.binary() {
-            break tear;
-        }
-    };
+    let tear = page.tear();
     assert_eq!((tear.first, tear.constraints, tear.causes), (0, vec![300, 301, 302], vec![3; 3]));
     assert_eq!(page.rejected(cut), "already_torn");
     let stale = json!({ "type": "cut", "epoch": epoch + 1, "constraints": [1] });
@@ -136,11 +122,7 @@ fn pages_pin_cut_brush_set_step_reset_and_load() {
     page.frame(|frame| frame.head.stamp.step == paused_before + 2);
     page.applied(json!({ "type": "resume" }));
     let reset = page.applied(json!({ "type": "reset" }));
-    let tear = loop {
-        if let Message::Tear(tear) = page.binary() {
-            break tear;
-        }
-    };
+    let tear = page.tear();
     assert!(tear.constraints.is_empty() && tear.first == 0 && tear.stamp.step >= reset);
     refusals(&mut page);
     page.send(&json!({ "type": "load", "scene": "rope" }));

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 use std::net::TcpStream;
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox};
+use integration_tests::{DEADLINE, Deadline, Process, Program, Sandbox};
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
-use viewer_bridge::wire::{self, Frame, Scene, decode};
+use viewer_bridge::wire::{self, Frame, Pins, Scene, Statistics, Tear, decode};
 
 /// A bridge, and where it listens.
 pub(crate) struct Bridge {
@@ -55,17 +55,24 @@ impl Page {
         self.socket.send(Message::text(message.to_string())).unwrap();
     }
 
-    /// The next binary message; texts are kept, frames acknowledged.
-    pub(crate) fn binary(&mut self) -> wire::Message {
+    /// The next binary message of which something is to be had; texts are kept, frames acknowledged.
+    pub(crate) fn find<T>(
+        &mut self,
+        what: &str,
+        mut take: impl FnMut(wire::Message) -> Option<T>,
+    ) -> T {
+        let deadline = Deadline::start();
         loop {
+            deadline.check(what);
             match self.socket.read().unwrap() {
                 Message::Binary(bytes) => {
                     let message = decode(&bytes).unwrap();
                     if let wire::Message::Frame(frame) = &message {
-                        let ack = json!({ "type": "ack", "frame": frame.head.number });
-                        self.say(&ack);
+                        self.say(&json!({ "type": "ack", "frame": frame.head.number }));
                     }
-                    return message;
+                    if let Some(found) = take(message) {
+                        return found;
+                    }
                 }
                 Message::Text(text) => self.texts.push_back(serde_json::from_str(&text).unwrap()),
                 _ => {}
@@ -75,7 +82,9 @@ impl Page {
 
     /// The next text like that, out of those that came or will come; those before it are dropped.
     pub(crate) fn text(&mut self, is_meant: impl Fn(&Value) -> bool) -> Value {
+        let deadline = Deadline::start();
         loop {
+            deadline.check("a text");
             while let Some(text) = self.texts.pop_front() {
                 if is_meant(&text) {
                     return text;
@@ -99,22 +108,40 @@ impl Page {
     }
 
     pub(crate) fn scene(&mut self) -> Scene {
-        loop {
-            if let wire::Message::Scene(scene) = self.binary() {
-                return scene;
-            }
-        }
+        self.find("a scene", |message| match message {
+            wire::Message::Scene(scene) => Some(scene),
+            _ => None,
+        })
+    }
+
+    pub(crate) fn pins(&mut self) -> Pins {
+        self.find("pins", |message| match message {
+            wire::Message::Pins(pins) => Some(pins),
+            _ => None,
+        })
+    }
+
+    pub(crate) fn tear(&mut self) -> Tear {
+        self.find("a tear", |message| match message {
+            wire::Message::Tear(tear) => Some(tear),
+            _ => None,
+        })
+    }
+
+    /// The next statistics like that.
+    pub(crate) fn statistics(&mut self, is_meant: impl Fn(&Statistics) -> bool) -> Statistics {
+        self.find("statistics", |message| match message {
+            wire::Message::Statistics(statistics) => Some(*statistics).filter(&is_meant),
+            _ => None,
+        })
     }
 
     /// The next frame like that.
     pub(crate) fn frame(&mut self, is_meant: impl Fn(&Frame) -> bool) -> Frame {
-        loop {
-            if let wire::Message::Frame(frame) = self.binary()
-                && is_meant(&frame)
-            {
-                return frame;
-            }
-        }
+        self.find("a frame", |message| match message {
+            wire::Message::Frame(frame) => Some(frame).filter(&is_meant),
+            _ => None,
+        })
     }
 
     /// Sends a command without waiting for what becomes of it.

@@ -94,25 +94,28 @@ impl View {
 
     /// What the page shows with the next frame like that.
     fn shown(&mut self, is_meant: impl Fn(u64) -> bool) -> State {
-        loop {
-            match self.page.binary() {
-                Message::Tear(tear) => {
-                    self.torn.truncate(tear.first as usize);
-                    self.torn.extend(tear.constraints);
-                }
-                Message::Pins(pins) => self.held = pins.held,
-                Message::Frame(frame) if is_meant(frame.head.stamp.step) => {
-                    assert_eq!(frame.head.torn_count as usize, self.torn.len());
-                    return State {
-                        step: frame.head.stamp.step,
-                        positions: frame.positions,
-                        torn: self.torn.clone(),
-                        held: self.held.clone(),
-                    };
-                }
-                _ => {}
+        let Self { page, torn, held } = self;
+        page.find("a step", |message| match message {
+            Message::Tear(tear) => {
+                torn.truncate(tear.first as usize);
+                torn.extend(tear.constraints);
+                None
             }
-        }
+            Message::Pins(pins) => {
+                *held = pins.held;
+                None
+            }
+            Message::Frame(frame) if is_meant(frame.head.stamp.step) => {
+                assert_eq!(frame.head.torn_count as usize, torn.len());
+                Some(State {
+                    step: frame.head.stamp.step,
+                    positions: frame.positions,
+                    torn: torn.clone(),
+                    held: held.clone(),
+                })
+            }
+            _ => None,
+        })
     }
 
     /// Goes to another step.

@@ -14,6 +14,7 @@ use super::team::{Scratch, Team};
 use super::terms::{Features, Fields, Give, Pass, Term};
 use crate::kernels::{Body, Eight};
 use crate::order::Order;
+use crate::pages::refill;
 use crate::particles::Particle;
 use crate::scene::Model;
 
@@ -76,11 +77,8 @@ impl Graph {
         particles: Vec<u32>,
         body_of: impl Fn(u32) -> Option<u32>,
     ) -> (Self, Vec<(u32, usize)>) {
-        let mut graph = Self {
-            bodies: vec![Body::default(); particles.len() + 1],
-            particles,
-            ..Self::default()
-        };
+        let mut graph = Self { particles, ..Self::default() };
+        refill(&mut graph.bodies, graph.particles.len() + 1, Body::default());
         let mut places = Vec::new();
         for (group, range) in order.groups.iter().enumerate() {
             let links: Vec<_> = order.indices[range.clone()]
@@ -94,7 +92,7 @@ impl Graph {
                 graph.push(&links, group < order.independent_count, &mut places);
             }
         }
-        graph.weights = vec![[[0.0; 8]; 2]; graph.ends.len()];
+        refill(&mut graph.weights, graph.ends.len(), [[0.0; 8]; 2]);
         (graph, places)
     }
 
@@ -133,7 +131,7 @@ impl Graph {
         let none = Tether { root: [0.0; 3], length: f32::INFINITY };
         self.tethers = vec![none; count(extras.tethers)];
         let length = 8 * self.ends.len();
-        self.terms = vec![0.0; features.field_count() * length];
+        refill(&mut self.terms, features.field_count() * length, 0.0);
         for pad in 0..length {
             self.set_term(pad, &Term::NONE);
         }

@@ -15,6 +15,7 @@ use super::team::{Scratch, Team};
 use super::terms::{Features, Fields, Give, Pass, Term};
 use crate::families::{Family, Sheet};
 use crate::kernels::axes;
+use crate::pages::refill;
 use crate::particles::Particle;
 use wave::{Band, Span, Stage, Sweep, SweepWork, stages, total_reach};
 
@@ -183,8 +184,7 @@ impl Patch {
         let stages = |pass| stages(&self.shape.families, pass, features.max_lengths);
         self.stages = passes.map(stages).collect();
         let length = self.shape.rows * self.shape.row_length;
-        self.lines.clear();
-        self.lines.resize(length / LINE, Line([0.0; LINE]));
+        refill(&mut self.lines, length / LINE, Line([0.0; LINE]));
         for place in 0..self.shape.rows * self.shape.families.len() * self.shape.stride {
             self.set_term(place, &Term::NONE);
         }
