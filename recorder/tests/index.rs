@@ -130,6 +130,31 @@ fn a_file_without_its_end_is_walked_up_to_the_cut() {
 }
 
 #[test]
+fn an_index_that_is_too_short_ends_the_walk() {
+    let mut bytes = written();
+    let size = |bytes: &[u8], at: usize| {
+        9 + usize::try_from(u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap())).unwrap()
+    };
+    let mut at = 8;
+    while bytes[at] != 0x07 {
+        at += size(&bytes, at);
+    }
+    bytes[at + 1] = 1;
+    // Without its end it has to be walked.
+    bytes.truncate(bytes.len() - 20);
+    let file = TestFile::new("short", &bytes);
+    let whole = in_order(&written());
+    let mut log = file.open().unwrap();
+    assert!(
+        matches!(log.end(), LogEnd::Damaged { byte, .. } if *byte == at as u64),
+        "{:?}",
+        log.end()
+    );
+    let read = read_all(&mut log);
+    assert!(!read.is_empty() && read == whole[..read.len()]);
+}
+
+#[test]
 fn a_flipped_bit_spoils_its_chunk_only_and_never_gives_another_message() {
     let bytes = written();
     let whole = in_order(&bytes);

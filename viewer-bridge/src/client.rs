@@ -6,6 +6,7 @@ use axum::Error;
 use axum::extract::ws::{CloseFrame, Message, WebSocket};
 use bytes::Bytes;
 use sim_contract::clock::monotonic_ns;
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use crate::check::check;
@@ -31,6 +32,7 @@ const REASON_SIZE_BYTES_MAX: usize = 123;
 
 const SERVER_ENDS: u16 = 1001;
 const TOO_BIG: u16 = 1009;
+const FULL: u16 = 1013;
 const MALFORMED: u16 = 4400;
 const NO_TOKEN: u16 = 4401;
 const TOO_SLOW: u16 = 4408;
@@ -41,22 +43,28 @@ fn end(code: u16, reason: impl Into<String>) -> End {
     End { code, reason: reason.into() }
 }
 
-/// Serves a page until it goes, or breaks the rules.
-pub(crate) async fn serve(mut socket: WebSocket, site: &Site) {
+/// Serves a page until it goes, or breaks the rules. Until it has said who it is, it only waits.
+pub(crate) async fn serve(mut socket: WebSocket, site: &Site, waiting: OwnedSemaphorePermit) {
     let ended = match timeout(HELLO_TIMEOUT, greet(&mut socket, site)).await {
-        Ok(Ok(hello)) => {
-            let connection = site.hub.join(hello.format);
-            let client = connection.client;
-            let ended = converse(&mut socket, &site.hub, connection).await;
-            site.hub.leave(client);
-            ended
-        }
+        Ok(Ok(hello)) => match site.places.try_acquire() {
+            Ok(_place) => {
+                drop(waiting);
+                return take_in(socket, &site.hub, &hello).await;
+            }
+            Err(_) => Some(end(FULL, "too many pages are open already; close one")),
+        },
         Ok(Err(ended)) => ended,
         Err(_) => Some(end(TOO_SLOW, "no hello came")),
     };
-    if let Some(ended) = ended {
-        close(&mut socket, ended).await;
-    }
+    close(&mut socket, ended).await;
+}
+
+async fn take_in(mut socket: WebSocket, hub: &Hub, hello: &Hello) {
+    let connection = hub.join(hello.format);
+    let client = connection.client;
+    let ended = converse(&mut socket, hub, connection).await;
+    hub.leave(client);
+    close(&mut socket, ended).await;
 }
 
 /// Waits for the first message, and checks it. `None` as an error: the page has gone.
@@ -209,7 +217,8 @@ fn broken(error: &Error) -> Option<End> {
 }
 
 /// Says why, and gives the page a moment to read it.
-async fn close(socket: &mut WebSocket, ended: End) {
+async fn close(socket: &mut WebSocket, ended: Option<End>) {
+    let Some(ended) = ended else { return };
     let cut = ended.reason.floor_char_boundary(REASON_SIZE_BYTES_MAX);
     let reason = ended.reason[..cut].into();
     let frame = Message::Close(Some(CloseFrame { code: ended.code, reason }));

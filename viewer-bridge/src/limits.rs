@@ -6,8 +6,10 @@ use std::time::Duration;
 pub const PROTOCOL: u32 = 1;
 /// Pages at the same time: each has a thread's worth of memory and a share of the network.
 pub const CLIENTS_MAX: usize = 16;
-/// Connections at the same time, sockets and requests for files together.
+/// Connections at the same time that ask for files, or have not become sockets yet.
 pub const CONNECTIONS_MAX: usize = 128;
+/// Sockets at the same time that have not said who they are.
+pub const WAITING_MAX: usize = 64;
 /// Longest message of a page: what a stroke that cuts 256 constraints takes, many times over.
 pub const MESSAGE_SIZE_BYTES_MAX: usize = 64 << 10;
 /// Messages of a page per second: a drag and an acknowledgement per frame of a 120 Hz display.
@@ -45,6 +47,8 @@ pub const SILENCE_MAX: Duration = Duration::from_secs(10);
 pub const PING_PERIOD: Duration = Duration::from_secs(3);
 /// How long a connection has for its first message, and for the head of a request.
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long a connection may last that is no socket: browsers open another one.
+pub const CONNECTION_TIMEOUT: Duration = Duration::from_mins(1);
 /// How long a command may go unanswered.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);
 /// How long clients have to take their leave at the end.

@@ -24,8 +24,8 @@ use crate::client;
 use crate::guard::{Guard, HEADERS};
 use crate::hub::Hub;
 use crate::limits::{
-    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTIONS_MAX, FAREWELL_TIMEOUT, HELLO_TIMEOUT,
-    MESSAGE_SIZE_BYTES_MAX,
+    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, CONNECTIONS_MAX, FAREWELL_TIMEOUT,
+    HELLO_TIMEOUT, MESSAGE_SIZE_BYTES_MAX, WAITING_MAX,
 };
 
 /// What a server is told.
@@ -71,7 +71,9 @@ pub(crate) struct Site {
     pub(crate) guard: Guard,
     assets: Assets,
     /// A permit for each page.
-    places: Arc<Semaphore>,
+    pub(crate) places: Arc<Semaphore>,
+    /// A permit for each socket that has not said who it is: whoever has no token takes no place.
+    waiting: Arc<Semaphore>,
 }
 
 impl Server {
@@ -101,6 +103,7 @@ impl Server {
             guard: self.guard,
             assets: self.assets,
             places: Arc::clone(&places),
+            waiting: Arc::new(Semaphore::new(WAITING_MAX)),
         };
         let router = router(Arc::new(site));
         tokio::select! {
@@ -150,8 +153,9 @@ async fn converse(stream: TcpStream, router: Router) {
         .header_read_timeout(HELLO_TIMEOUT)
         .serve_connection(TokioIo::new(stream), service)
         .with_upgrades();
-    // Whoever breaks off in the middle is gone; nobody is left to be told.
-    let _ended = connection.await;
+    // Whoever breaks off in the middle is gone; nobody is left to be told. A socket has ended this
+    // connection, and is served beside it.
+    let _ended = timeout(CONNECTION_TIMEOUT, connection).await;
 }
 
 /// Checks every request, known path or not, and gives every answer the headers of the site.
@@ -178,7 +182,9 @@ async fn file(
 }
 
 async fn socket(State(site): State<Arc<Site>>, upgrade: WebSocketUpgrade) -> Response {
-    let Ok(place) = Arc::clone(&site.places).try_acquire_owned() else {
+    let waiting = Arc::clone(&site.waiting).try_acquire_owned();
+    let is_full = site.places.available_permits() == 0;
+    let Some(waiting) = waiting.ok().filter(|_| !is_full) else {
         let text = format!("{CLIENTS_MAX} pages are open already; close one\n");
         return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
     };
@@ -186,8 +192,5 @@ async fn socket(State(site): State<Arc<Site>>, upgrade: WebSocketUpgrade) -> Res
         .max_message_size(MESSAGE_SIZE_BYTES_MAX)
         .max_frame_size(MESSAGE_SIZE_BYTES_MAX)
         .write_buffer_size(0)
-        .on_upgrade(async move |socket| {
-            client::serve(socket, &site).await;
-            drop(place);
-        })
+        .on_upgrade(async move |socket| client::serve(socket, &site, waiting).await)
 }

@@ -54,8 +54,10 @@ pub(super) fn read(
             op::DATA_END => return Ok((chunks, LogEnd::Truncated { byte })),
             _ => {}
         }
-        let behind_head = i64::try_from(record_size - head.len() as u64).unwrap_or(i64::MAX);
-        source.seek_relative(behind_head)?;
+        let Some(behind_head) = record_size.checked_sub(head.len() as u64) else {
+            return Ok((chunks, damaged(byte, "an index without a channel")));
+        };
+        source.seek_relative(i64::try_from(behind_head).unwrap_or(i64::MAX))?;
         byte += record_size;
     }
 }

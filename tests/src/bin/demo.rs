@@ -8,7 +8,7 @@ use std::net::TcpListener;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use integration_tests::{Process, Program};
+use integration_tests::{Finished, Process, Program};
 use sim_contract::clock::{SECOND_NS, realtime_ns};
 use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint, Stop};
 
@@ -60,8 +60,12 @@ fn main() -> anyhow::Result<()> {
     let ended = node.interrupt();
     eprint!("{}{}{}", recorded.stderr, shown.stderr, ended.stderr);
     // Exit code 3: finished, and it says itself what was lost.
-    if !matches!(recorded.code, Some(0 | 3)) || ended.code != Some(0) {
-        bail!("the recorder ended with {:?}, the node with {:?}", recorded.code, ended.code);
+    let is_well = |ended: &Finished| ended.code == Some(0);
+    if !matches!(recorded.code, Some(0 | 3)) || !is_well(&shown) || !is_well(&ended) {
+        let [recorder, viewer, node] = [recorded.code, shown.code, ended.code];
+        bail!(
+            "the recorder ended with {recorder:?}, the viewer with {viewer:?}, the node with {node:?}"
+        );
     }
     println!("{file}");
     let info = Process::start_in(Program::Recorder, &domain, &["info", file]).wait();

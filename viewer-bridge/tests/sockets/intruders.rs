@@ -89,3 +89,12 @@ fn the_seventeenth_page_is_refused_until_another_one_goes() {
     site.wait_for_clients(15);
     wait_for("a place", || site.open(site.request(None)).ok());
 }
+
+#[test]
+fn sockets_that_say_nothing_take_no_place() {
+    let site = Site::start();
+    let silent: Vec<_> = (0..40).map(|_| site.silent_page()).collect();
+    let pages: Vec<_> = (0..16).map(|_| site.page()).collect();
+    assert_eq!(site.open(site.request(None)).err(), Some(503));
+    assert_eq!((silent.len(), pages.len()), (40, 16));
+}

@@ -138,7 +138,10 @@ impl Page {
 
     /// The next message that is no ping.
     pub(crate) fn next(&mut self) -> Result<Message, tungstenite::Error> {
+        // Pings come for ever.
+        let end_ns = deadline_ns();
         loop {
+            assert!(monotonic_ns() < end_ns, "waited {DEADLINE:?} in vain for a message");
             match self.socket.read()? {
                 Message::Ping(_) | Message::Pong(_) => {}
                 message => return Ok(message),
@@ -197,9 +200,13 @@ impl Page {
     }
 }
 
+fn deadline_ns() -> u64 {
+    monotonic_ns() + u64::try_from(DEADLINE.as_nanos()).unwrap()
+}
+
 /// Polls until the condition gives a value.
 pub(crate) fn wait_for<T>(what: &str, mut condition: impl FnMut() -> Option<T>) -> T {
-    let end_ns = monotonic_ns() + u64::try_from(DEADLINE.as_nanos()).unwrap();
+    let end_ns = deadline_ns();
     loop {
         if let Some(value) = condition() {
             return value;
