@@ -52,7 +52,9 @@ export class Simulation extends Emitter {
     this.frameNumber = null;
     /** Constraints in the order of tearing. @type {number[]} */
     this.torn = [];
-    /** Flags of the particles that are not free. @type {Map<number, number>} */
+    /** Flags of the particles that are not free, as the bridge said last. @type {Map<number, number>} */
+    this.pinsReceived = new Map();
+    /** The same with what is expected of the node. @type {Map<number, number>} */
     this.pins = new Map();
     /** @type {Collider[]} */
     this.colliders = [];
@@ -106,6 +108,7 @@ export class Simulation extends Emitter {
     this.topology = new Topology(scene);
     this.frame = null;
     this.torn = [];
+    this.pinsReceived = new Map();
     this.pins = new Map();
     this.colliders = [];
     this.nonFinite = [];
@@ -147,8 +150,9 @@ export class Simulation extends Emitter {
 
   /** @param {import("./wire.js").Pins} pins */
   receivePins(pins) {
-    this.pins = new Map();
-    pins.particles.forEach((particle, k) => this.pins.set(particle, pins.flags[k]));
+    this.pinsReceived = new Map();
+    pins.particles.forEach((particle, k) => this.pinsReceived.set(particle, pins.flags[k]));
+    this.pins = new Map(this.pinsReceived);
     this.emit("pins", undefined);
     if (!this.groundIsSettled) this.settleGround();
   }
@@ -207,11 +211,20 @@ export class Simulation extends Emitter {
     this.emit("pins", undefined);
   }
 
-  /** The same for a cut. @param {number} epoch @param {number[]} constraints */
+  /** The same for a cut, which is not in the list of what is torn before the bridge says so. @param {number} epoch @param {number[]} constraints */
   expectCut(epoch, constraints) {
     if (epoch !== this.scene?.epoch) return;
     this.topology?.remove(constraints);
     this.emit("tear", undefined);
+  }
+
+  /** Takes back what was expected and not yet said: a reset may undo it before the bridge has sent it,
+   * which then has nothing to correct. */
+  receiveReset() {
+    this.pins = new Map(this.pinsReceived);
+    this.emit("pins", undefined);
+    this.rebuild();
+    this.emit("reset", undefined);
   }
 
   /** @param {number} particle @returns {Vec3 | null} */
@@ -242,7 +255,7 @@ export class Simulation extends Emitter {
       case "playback": this.playback = message; return this.emit("playback", message);
       case "clients": this.clients = message.count; return this.emit("clients", message.count);
       case "outcome": return this.emit("outcome", message);
-      case "reset": return this.emit("reset", undefined);
+      case "reset": return this.receiveReset();
       case "notice": return this.emit("notice", message);
       default: // A later bridge may say more.
     }
