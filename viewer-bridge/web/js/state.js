@@ -134,7 +134,8 @@ export class Simulation extends Emitter {
   receiveTear(tear) {
     const isMore = tear.first === this.torn.length;
     this.torn.length = Math.min(tear.first, this.torn.length);
-    this.torn.push(...tear.constraints);
+    // One by one: as arguments of a call, a long list is more than the stack takes.
+    for (const constraint of tear.constraints) this.torn.push(constraint);
     if (!isMore) return this.rebuild();
     this.topology?.remove(tear.constraints);
     this.emit("tear", undefined);

@@ -192,6 +192,14 @@ test("a list of tears is cut and continued, and an empty one mends everything", 
   assert.deepEqual([simulation.torn, simulation.topology.isGone[0]], [[], 0]);
 });
 
+test("a list of tears may be as long as a big sheet has constraints", () => {
+  const simulation = new Simulation();
+  simulation.receive(scene(1));
+  const count = 1_000_000;
+  simulation.receive({ kind: "tear", epoch: 1, first: 0, constraints: new Uint32Array(count) });
+  assert.equal(simulation.torn.length, count);
+});
+
 test("a reset takes back cuts and pins that were expected and never published", () => {
   const simulation = new Simulation();
   simulation.receive(scene(1, { constraintCount: 2, ends: Uint32Array.of(0, 1, 1, 0), restLengths: Float32Array.of(1, 1), constraintKinds: new Uint8Array(2) }));
