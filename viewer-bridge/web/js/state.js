@@ -31,7 +31,7 @@ const FLOOR_COSINE = 0.99;
 /**
  * @typedef {{
  *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
- *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage, playback: Playback,
+ *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
  *   outcome: import("./messages.js").OutcomeMessage, reset: void, clients: number,
  *   notice: { level: string, text: string }, ground: void,
  * }} Topics
@@ -219,6 +219,18 @@ export class Simulation extends Emitter {
     this.emit("tear", undefined);
   }
 
+  /** A bridge of another mode may have come to the address of the one before. @param {Hello} hello */
+  receiveHello(hello) {
+    this.hello = hello;
+    if (hello.mode === "live") {
+      this.timeline = null;
+      this.playback = null;
+      this.emit("timeline", null);
+      this.emit("playback", null);
+    }
+    this.emit("hello", hello);
+  }
+
   /** Takes back what was expected and not yet said: a reset may undo it before the bridge has sent it,
    * which then has nothing to correct. */
   receiveReset() {
@@ -249,7 +261,7 @@ export class Simulation extends Emitter {
   /** @param {TextMessage} message */
   receiveText(message) {
     switch (message.type) {
-      case "hello": this.hello = message; return this.emit("hello", message);
+      case "hello": return this.receiveHello(message);
       case "node": this.node = message; return this.emit("node", message);
       case "parameters": this.parameters = message; return this.emit("parameters", message);
       case "timeline": this.timeline = message; return this.emit("timeline", message);

@@ -192,6 +192,18 @@ test("a list of tears is cut and continued, and an empty one mends everything", 
   assert.deepEqual([simulation.torn, simulation.topology.isGone[0]], [[], 0]);
 });
 
+test("a live bridge at the address of a replay leaves nothing of the recording", () => {
+  const simulation = new Simulation();
+  simulation.receiveText({ type: "hello", mode: "replay" });
+  simulation.receiveText({ type: "timeline", marks: [] });
+  simulation.receiveText({ type: "playback", is_playing: false });
+  const heard = [];
+  for (const topic of ["timeline", "playback"]) simulation.on(topic, (what) => heard.push([topic, what]));
+  simulation.receiveText({ type: "hello", mode: "live" });
+  assert.deepEqual([simulation.timeline, simulation.playback, simulation.isPaused], [null, null, false]);
+  assert.deepEqual(heard, [["timeline", null], ["playback", null]]);
+});
+
 test("a list of tears may be as long as a big sheet has constraints", () => {
   const simulation = new Simulation();
   simulation.receive(scene(1));
