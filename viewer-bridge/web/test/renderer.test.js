@@ -63,3 +63,14 @@ test("scenes of both formats in turn take no more than the first two", () => {
   assert.equal(kept[1].bytes, kept[0].bytes, "lists of a scene that is gone are gone");
   assert.deepEqual(kept.slice(2), [kept[1], kept[1], kept[1], kept[1]]);
 });
+
+test("a scene of another bridge that has the same number is uploaded", () => {
+  const simulation = new Simulation();
+  const { renderer } = rendererOf(simulation);
+  for (const number of [1, 2]) {
+    simulation.receive(scene(1));
+    simulation.receive(frame(1, number, false));
+    renderer.upload();
+    assert.equal(renderer.buffers.topology, simulation.topology);
+  }
+});

@@ -46,7 +46,8 @@ export class SceneBuffers {
     const topology = simulation.topology;
     if (scene === null || topology === null) throw new Error("no scene to draw");
     this.topology = topology;
-    this.epoch = scene.epoch;
+    /** Another bridge may number its scenes alike: the same scene is the same object. */
+    this.scene = scene;
     /** What lies between neighbours: the middle of the rest lengths. */
     this.spacing = medianLength(scene.restLengths, simulation.radius() * 0.5);
     const formats = layouts(gl);

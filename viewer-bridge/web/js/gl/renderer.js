@@ -133,7 +133,7 @@ export class Renderer {
     }
     const drawers = this.drawersOf(frame.isQuantised);
     this.drawers = drawers;
-    if (this.buffers === null || this.buffers.epoch !== scene.epoch || this.buffers.drawers !== drawers) {
+    if (this.buffers === null || this.buffers.scene !== scene || this.buffers.drawers !== drawers) {
       this.buffers?.delete();
       this.buffers = new SceneBuffers(this.gl, simulation, drawers);
       this.frameDrawn = null;
