@@ -137,6 +137,46 @@ impl Tab {
         ));
     }
 
+    /// Notes the number and the step of each picture that the page draws from now on.
+    pub(crate) fn note_pictures(&self) {
+        self.ask(
+            "void (() => { \
+                window.pictures = []; \
+                const look = () => { \
+                    if (viewer.frame !== pictures.at(-1)?.[0]) pictures.push([viewer.frame, viewer.step]); \
+                    requestAnimationFrame(look); }; \
+                requestAnimationFrame(look); })()",
+        );
+    }
+
+    /// The noted number and step of each picture after the one of that number, once there is one of
+    /// such a step.
+    pub(crate) fn pictures_until(&self, last_number: u64, step: u64) -> Vec<[u64; 2]> {
+        self.wait(&format!("pictures.some(([, step]) => step >= {step})"));
+        let mut pictures: Vec<[u64; 2]> = serde_json::from_value(self.ask("pictures")).unwrap();
+        pictures.retain(|[number, _]| *number > last_number);
+        pictures
+    }
+
+    /// Holds the page's script up, as a long computation does, until it may go on. Returns the
+    /// number of the picture that it then shows.
+    pub(crate) fn stand_still(&self) -> u64 {
+        self.ask(
+            "void setTimeout(() => { window.stillNumber = viewer.frame; alert(stillNumber); })",
+        );
+        wait_for("the page to stand still", || {
+            // Events come with answers; this call asks nothing of the page.
+            self.turn.call(None, "Browser.getVersion", json!({})).unwrap();
+            let events = self.turn.events(&self.session);
+            let opening = events.iter().find(|one| one["method"] == "Page.javascriptDialogOpening");
+            opening?["params"]["message"].as_str()?.parse().ok()
+        })
+    }
+
+    pub(crate) fn go_on(&self) {
+        self.call("Page.handleJavaScriptDialog", json!({ "accept": true }));
+    }
+
     pub(crate) fn press(&self, at: [f64; 2], button: Button) {
         self.mouse("mouseMoved", at, 0);
         self.held.set(button);
