@@ -2,7 +2,6 @@
 //! page that is slow.
 
 use integration_tests::{Signal, wait_for};
-use serde_json::json;
 
 use crate::support::{Stage, is_cloth};
 
@@ -133,11 +132,14 @@ fn a_page_that_stood_still_is_at_most_three_frames_behind() {
 #[ignore = "needs Chromium"]
 fn a_hidden_tab_gets_no_frames_and_shows_the_newest_when_it_is_seen_again() {
     let mut stage = Stage::new(&["curtain"], "");
-    stage.tab.call("Page.setWebLifecycleState", json!({ "state": "frozen" }));
+    stage.tab.note_pictures();
+    let last_number = stage.tab.hide();
     let begin = stage.state().step;
-    let newest = stage.wait_for_state("later steps", |state| state.step > begin + 480).step;
-    stage.tab.call("Page.setWebLifecycleState", json!({ "state": "active" }));
-    stage.tab.wait(&format!("viewer.step >= {newest}"));
+    let newest =
+        stage.wait_for_state("later steps", |state| state.step > begin + STEPS_MISSED).step;
+    assert_eq!(stage.tab.ask("viewer.frame"), last_number, "it drew while it was hidden");
+    stage.tab.show();
+    assert_only_owed_pictures_are_old(&stage, last_number, newest);
     let area = stage.tab.camera().area();
     assert!(stage.tab.screenshot().count(&area, is_cloth) > 1000);
 }

@@ -89,7 +89,7 @@ impl Tab {
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1,
             "mobile": false });
         tab.call("Emulation.setDeviceMetricsOverride", metrics);
-        tab.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": true }));
+        tab.set_focused(true);
         let light = json!([{ "name": "prefers-color-scheme", "value": "light" }]);
         tab.call("Emulation.setEmulatedMedia", json!({ "features": light }));
         tab
@@ -175,6 +175,28 @@ impl Tab {
 
     pub(crate) fn go_on(&self) {
         self.call("Page.handleJavaScriptDialog", json!({ "accept": true }));
+    }
+
+    /// Hides the page behind another tab of its window. Returns the number of the picture that it
+    /// then has.
+    pub(crate) fn hide(&self) -> u64 {
+        // What has the focus is never hidden.
+        self.set_focused(false);
+        let front = json!({ "url": "about:blank", "browserContextId": self.context });
+        self.turn.call(None, "Target.createTarget", front).unwrap();
+        self.wait("document.hidden");
+        serde_json::from_value(self.ask("viewer.frame")).unwrap()
+    }
+
+    /// Brings the page to the front again.
+    pub(crate) fn show(&self) {
+        self.call("Page.bringToFront", json!({}));
+        self.set_focused(true);
+        self.wait("!document.hidden");
+    }
+
+    fn set_focused(&self, is_focused: bool) {
+        self.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": is_focused }));
     }
 
     pub(crate) fn press(&self, at: [f64; 2], button: Button) {
