@@ -354,8 +354,8 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
             marks: [MarkKind::Tear, MarkKind::Pin, MarkKind::Command, MarkKind::Late]
                 .map(|kind| Mark { kind, step: 60, count: 1 })
                 .to_vec(),
-            hashes: Hashes::Unchecked,
-            hash_text: String::new(),
+            hashes: Hashes::Checking,
+            hash_text: "checking hashes".to_owned(),
         })),
         ToPage::Playback(Playback {
             is_playing: true,

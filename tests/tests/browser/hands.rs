@@ -166,6 +166,32 @@ fn a_double_click_and_a_key_pin_and_free() {
 
 #[test]
 #[ignore = "needs Chromium"]
+fn a_reset_undoes_in_the_picture_what_was_cut_and_pinned_in_the_same_pause() {
+    let mut stage = Stage::new(&["curtain", "--paused"], "");
+    let state = stage.settled();
+    let whole = stage.tab.hash();
+    let camera = stage.tab.camera();
+    let pixel = |particle: usize| camera.project(state.particles[particle].position);
+    // Beside the particle, down through what joins two columns.
+    let [from, to] = [DRAGGED, DRAGGED + COLUMNS].map(|particle| {
+        let (left, right) = (pixel(particle), pixel(particle + 1));
+        [0, 1].map(|axis| f64::midpoint(left[axis], right[axis]))
+    });
+    stage.tab.press(from, Button::Right);
+    stage.tab.stroke(from, to, 4);
+    stage.tab.release(to);
+    wait_for("the cut in the picture", || (stage.tab.hash() != whole).then_some(()));
+    stage.tab.move_to(pixel(DRAGGED));
+    stage.tab.key('p');
+    stage.tab.wait(&format!("viewer.pins.some(([particle]) => particle === {DRAGGED})"));
+
+    stage.tab.key('r');
+    wait_for("the first picture", || (stage.tab.hash() == whole).then_some(()));
+    assert_eq!(stage.tab.ask("viewer.pins.length"), COLUMNS);
+}
+
+#[test]
+#[ignore = "needs Chromium"]
 fn a_brush_moves_the_particles_in_its_circle_only() {
     let mut stage = Stage::with_scene(&lattice(), &[], LATTICE_LOOK);
     let camera = stage.tab.camera();

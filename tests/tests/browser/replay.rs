@@ -56,3 +56,19 @@ fn scrubbing_a_recording_shows_the_recorded_positions() {
         assert!(earlier.iter().any(|error| *error > ERROR_MAX), "nothing would be seen of it");
     }
 }
+
+#[test]
+#[ignore = "needs Chromium"]
+fn a_live_bridge_at_the_address_of_a_replay_has_no_bar_of_the_recording() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let args = ["simulate", "rope", "--steps", "24", "-o", &file];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let mut replay = Replay::open(sandbox, &file, "");
+    let bar = "document.querySelector('#timeline').checkVisibility()";
+    replay.tab.wait(bar);
+    replay.end();
+    replay.go_live("curtain");
+    replay.tab.wait("viewer.connection === 'open' && viewer.scene === 'curtain'");
+    replay.tab.wait(&format!("!{bar} && viewer.step > 0 && viewer.mode === 'live'"));
+}

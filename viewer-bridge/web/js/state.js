@@ -31,7 +31,7 @@ const FLOOR_COSINE = 0.99;
 /**
  * @typedef {{
  *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
- *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage, playback: Playback,
+ *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
  *   outcome: import("./messages.js").OutcomeMessage, reset: void, clients: number,
  *   notice: { level: string, text: string }, ground: void,
  * }} Topics
@@ -52,7 +52,9 @@ export class Simulation extends Emitter {
     this.frameNumber = null;
     /** Constraints in the order of tearing. @type {number[]} */
     this.torn = [];
-    /** Flags of the particles that are not free. @type {Map<number, number>} */
+    /** Flags of the particles that are not free, as the bridge said last. @type {Map<number, number>} */
+    this.pinsReceived = new Map();
+    /** The same with what is expected of the node. @type {Map<number, number>} */
     this.pins = new Map();
     /** @type {Collider[]} */
     this.colliders = [];
@@ -106,6 +108,7 @@ export class Simulation extends Emitter {
     this.topology = new Topology(scene);
     this.frame = null;
     this.torn = [];
+    this.pinsReceived = new Map();
     this.pins = new Map();
     this.colliders = [];
     this.nonFinite = [];
@@ -131,7 +134,8 @@ export class Simulation extends Emitter {
   receiveTear(tear) {
     const isMore = tear.first === this.torn.length;
     this.torn.length = Math.min(tear.first, this.torn.length);
-    this.torn.push(...tear.constraints);
+    // One by one: as arguments of a call, a long list is more than the stack takes.
+    for (const constraint of tear.constraints) this.torn.push(constraint);
     if (!isMore) return this.rebuild();
     this.topology?.remove(tear.constraints);
     this.emit("tear", undefined);
@@ -147,8 +151,9 @@ export class Simulation extends Emitter {
 
   /** @param {import("./wire.js").Pins} pins */
   receivePins(pins) {
-    this.pins = new Map();
-    pins.particles.forEach((particle, k) => this.pins.set(particle, pins.flags[k]));
+    this.pinsReceived = new Map();
+    pins.particles.forEach((particle, k) => this.pinsReceived.set(particle, pins.flags[k]));
+    this.pins = new Map(this.pinsReceived);
     this.emit("pins", undefined);
     if (!this.groundIsSettled) this.settleGround();
   }
@@ -207,11 +212,32 @@ export class Simulation extends Emitter {
     this.emit("pins", undefined);
   }
 
-  /** The same for a cut. @param {number} epoch @param {number[]} constraints */
+  /** The same for a cut, which is not in the list of what is torn before the bridge says so. @param {number} epoch @param {number[]} constraints */
   expectCut(epoch, constraints) {
     if (epoch !== this.scene?.epoch) return;
     this.topology?.remove(constraints);
     this.emit("tear", undefined);
+  }
+
+  /** A bridge of another mode may have come to the address of the one before. @param {Hello} hello */
+  receiveHello(hello) {
+    this.hello = hello;
+    if (hello.mode === "live") {
+      this.timeline = null;
+      this.playback = null;
+      this.emit("timeline", null);
+      this.emit("playback", null);
+    }
+    this.emit("hello", hello);
+  }
+
+  /** Takes back what was expected and not yet said: a reset may undo it before the bridge has sent it,
+   * which then has nothing to correct. */
+  receiveReset() {
+    this.pins = new Map(this.pinsReceived);
+    this.emit("pins", undefined);
+    this.rebuild();
+    this.emit("reset", undefined);
   }
 
   /** @param {number} particle @returns {Vec3 | null} */
@@ -235,14 +261,14 @@ export class Simulation extends Emitter {
   /** @param {TextMessage} message */
   receiveText(message) {
     switch (message.type) {
-      case "hello": this.hello = message; return this.emit("hello", message);
+      case "hello": return this.receiveHello(message);
       case "node": this.node = message; return this.emit("node", message);
       case "parameters": this.parameters = message; return this.emit("parameters", message);
       case "timeline": this.timeline = message; return this.emit("timeline", message);
       case "playback": this.playback = message; return this.emit("playback", message);
       case "clients": this.clients = message.count; return this.emit("clients", message.count);
       case "outcome": return this.emit("outcome", message);
-      case "reset": return this.emit("reset", undefined);
+      case "reset": return this.receiveReset();
       case "notice": return this.emit("notice", message);
       default: // A later bridge may say more.
     }

@@ -192,6 +192,42 @@ test("a list of tears is cut and continued, and an empty one mends everything", 
   assert.deepEqual([simulation.torn, simulation.topology.isGone[0]], [[], 0]);
 });
 
+test("a live bridge at the address of a replay leaves nothing of the recording", () => {
+  const simulation = new Simulation();
+  simulation.receiveText({ type: "hello", mode: "replay" });
+  simulation.receiveText({ type: "timeline", marks: [] });
+  simulation.receiveText({ type: "playback", is_playing: false });
+  const heard = [];
+  for (const topic of ["timeline", "playback"]) simulation.on(topic, (what) => heard.push([topic, what]));
+  simulation.receiveText({ type: "hello", mode: "live" });
+  assert.deepEqual([simulation.timeline, simulation.playback, simulation.isPaused], [null, null, false]);
+  assert.deepEqual(heard, [["timeline", null], ["playback", null]]);
+});
+
+test("a list of tears may be as long as a big sheet has constraints", () => {
+  const simulation = new Simulation();
+  simulation.receive(scene(1));
+  const count = 1_000_000;
+  simulation.receive({ kind: "tear", epoch: 1, first: 0, constraints: new Uint32Array(count) });
+  assert.equal(simulation.torn.length, count);
+});
+
+test("a reset takes back cuts and pins that were expected and never published", () => {
+  const simulation = new Simulation();
+  simulation.receive(scene(1, { constraintCount: 2, ends: Uint32Array.of(0, 1, 1, 0), restLengths: Float32Array.of(1, 1), constraintKinds: new Uint8Array(2) }));
+  simulation.receive({ kind: "pins", epoch: 1, particles: Uint32Array.of(0), flags: Uint32Array.of(1) });
+  simulation.receive(tear(1, 0, 0));
+  simulation.expectCut(1, [1]);
+  simulation.expectPin(0, false);
+  simulation.expectPin(1, true);
+  assert.deepEqual([[...simulation.topology.isGone], [...simulation.pins]], [[1, 1], [[1, 1]]]);
+  const heard = [];
+  for (const topic of ["tear", "pins", "reset"]) simulation.on(topic, () => heard.push(topic));
+  simulation.receiveText({ type: "reset", step: 0 });
+  assert.deepEqual([[...simulation.topology.isGone], [...simulation.pins]], [[1, 0], [[0, 1]]]);
+  assert.deepEqual(heard.sort(), ["pins", "reset", "tear"], "what draws them hears of it");
+});
+
 test("what joins a particle that is not finite is away, and comes back with it", () => {
   const simulation = new Simulation();
   simulation.receive(scene(1));

@@ -108,12 +108,11 @@ impl Stage {
 
     /// Starts another bridge at the address of one that has ended.
     pub(crate) fn restart_bridge(&mut self) {
-        let address = self.url.trim_start_matches("http://").trim_end_matches('/');
-        (self.bridge, self.url) = start_bridge(&self.sandbox, &["--listen", address]);
+        self.bridge = start_bridge_at(&self.sandbox, &self.url);
     }
 }
 
-fn start_node(sandbox: &Sandbox, args: &[&str]) -> Process {
+pub(super) fn start_node(sandbox: &Sandbox, args: &[&str]) -> Process {
     Process::start_ready(Program::SimNode, sandbox, &[&["run"], args].concat())
 }
 
@@ -122,6 +121,12 @@ pub(super) fn start_bridge(sandbox: &Sandbox, args: &[&str]) -> (Process, String
     let mut bridge = Process::start(Program::ViewerBridge, sandbox, args);
     let url = bridge.wait_for_line("ready http://").trim_start_matches("ready ").to_owned();
     (bridge, url)
+}
+
+/// Starts a live bridge at the address of one that has ended.
+pub(super) fn start_bridge_at(sandbox: &Sandbox, url: &str) -> Process {
+    let address = url.trim_start_matches("http://").trim_end_matches('/');
+    start_bridge(sandbox, &["--listen", address]).0
 }
 
 /// Without smoothed edges: in software they cost more than all the rest.

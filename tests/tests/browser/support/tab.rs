@@ -89,7 +89,7 @@ impl Tab {
         let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1,
             "mobile": false });
         tab.call("Emulation.setDeviceMetricsOverride", metrics);
-        tab.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": true }));
+        tab.set_focused(true);
         let light = json!([{ "name": "prefers-color-scheme", "value": "light" }]);
         tab.call("Emulation.setEmulatedMedia", json!({ "features": light }));
         tab
@@ -135,6 +135,68 @@ impl Tab {
                 const pass = () => left-- > 0 ? requestAnimationFrame(pass) : done(); \
                 pass(); }})"
         ));
+    }
+
+    /// Notes the number and the step of each picture that the page draws from now on.
+    pub(crate) fn note_pictures(&self) {
+        self.ask(
+            "void (() => { \
+                window.pictures = []; \
+                const look = () => { \
+                    if (viewer.frame !== pictures.at(-1)?.[0]) pictures.push([viewer.frame, viewer.step]); \
+                    requestAnimationFrame(look); }; \
+                requestAnimationFrame(look); })()",
+        );
+    }
+
+    /// The noted number and step of each picture after the one of that number, once there is one of
+    /// such a step.
+    pub(crate) fn pictures_until(&self, last_number: u64, step: u64) -> Vec<[u64; 2]> {
+        self.wait(&format!("pictures.some(([, step]) => step >= {step})"));
+        let mut pictures: Vec<[u64; 2]> = serde_json::from_value(self.ask("pictures")).unwrap();
+        pictures.retain(|[number, _]| *number > last_number);
+        pictures
+    }
+
+    /// Holds the page's script up, as a long computation does, until it may go on. Returns the
+    /// number of the picture that it then shows.
+    pub(crate) fn stand_still(&self) -> u64 {
+        self.ask(
+            "void setTimeout(() => { window.stillNumber = viewer.frame; alert(stillNumber); })",
+        );
+        wait_for("the page to stand still", || {
+            // Events come with answers; this call asks nothing of the page.
+            self.turn.call(None, "Browser.getVersion", json!({})).unwrap();
+            let events = self.turn.events(&self.session);
+            let opening = events.iter().find(|one| one["method"] == "Page.javascriptDialogOpening");
+            opening?["params"]["message"].as_str()?.parse().ok()
+        })
+    }
+
+    pub(crate) fn go_on(&self) {
+        self.call("Page.handleJavaScriptDialog", json!({ "accept": true }));
+    }
+
+    /// Hides the page behind another tab of its window. Returns the number of the picture that it
+    /// then has.
+    pub(crate) fn hide(&self) -> u64 {
+        // What has the focus is never hidden.
+        self.set_focused(false);
+        let front = json!({ "url": "about:blank", "browserContextId": self.context });
+        self.turn.call(None, "Target.createTarget", front).unwrap();
+        self.wait("document.hidden");
+        serde_json::from_value(self.ask("viewer.frame")).unwrap()
+    }
+
+    /// Brings the page to the front again.
+    pub(crate) fn show(&self) {
+        self.call("Page.bringToFront", json!({}));
+        self.set_focused(true);
+        self.wait("!document.hidden");
+    }
+
+    fn set_focused(&self, is_focused: bool) {
+        self.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": is_focused }));
     }
 
     pub(crate) fn press(&self, at: [f64; 2], button: Button) {

@@ -56,9 +56,7 @@ pub enum MarkKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Hashes {
-    /// Nobody looked.
-    Unchecked,
-    /// It is being read.
+    /// It is being read, from the start of the server on.
     Checking,
     /// All that could be checked have.
     Verified,

@@ -16,6 +16,8 @@ export const STICKS_MAX = 30_000;
 /** Particles that are drawn as balls at most. */
 export const PARTICLES_MAX = 60_000;
 
+const NOTHING = new Uint32Array(0);
+
 /** Programs by the kind of positions that they read. */
 export class Drawers {
   /** @param {WebGL2RenderingContext} gl @param {boolean} isQuantised */
@@ -24,6 +26,13 @@ export class Drawers {
     this.cloth = new Cloth(gl, isQuantised);
     this.sticks = new Sticks(gl, isQuantised);
     this.points = new Points(gl, isQuantised);
+  }
+
+  /** Draws nothing any more, and gives back what the lists of a scene take. */
+  clear() {
+    this.cloth.setTriangles(NOTHING);
+    this.sticks.clear();
+    for (const list of [this.points.particles, this.points.marks, this.points.held]) list.set(NOTHING);
   }
 }
 
@@ -37,7 +46,8 @@ export class SceneBuffers {
     const topology = simulation.topology;
     if (scene === null || topology === null) throw new Error("no scene to draw");
     this.topology = topology;
-    this.epoch = scene.epoch;
+    /** Another bridge may number its scenes alike: the same scene is the same object. */
+    this.scene = scene;
     /** What lies between neighbours: the middle of the rest lengths. */
     this.spacing = medianLength(scene.restLengths, simulation.radius() * 0.5);
     const formats = layouts(gl);
@@ -88,6 +98,7 @@ export class SceneBuffers {
 
   delete() {
     for (const texture of [this.positions, this.fanRanges, this.fans]) texture.delete();
+    this.drawers.clear();
   }
 }
 

@@ -59,7 +59,9 @@ export class Renderer {
   create() {
     this.ground = new Ground(this.gl);
     this.colliders = new Colliders(this.gl);
-    /** @type {Drawers | null} */
+    /** By whether they read quantised positions: kept, because compiling takes long. @type {Map<boolean, Drawers>} */
+    this.drawersByFormat = new Map();
+    /** Those of the frame's format. @type {Drawers | null} */
     this.drawers = null;
     /** @type {SceneBuffers | null} */
     this.buffers = null;
@@ -129,13 +131,11 @@ export class Renderer {
       this.buffers = null;
       return;
     }
-    if (this.drawers === null || this.drawers.isQuantised !== frame.isQuantised) {
-      this.drawers = new Drawers(this.gl, frame.isQuantised);
-      this.buffers = null;
-    }
-    if (this.buffers === null || this.buffers.epoch !== scene.epoch) {
+    const drawers = this.drawersOf(frame.isQuantised);
+    this.drawers = drawers;
+    if (this.buffers === null || this.buffers.scene !== scene || this.buffers.drawers !== drawers) {
       this.buffers?.delete();
-      this.buffers = new SceneBuffers(this.gl, simulation, this.drawers);
+      this.buffers = new SceneBuffers(this.gl, simulation, drawers);
       this.frameDrawn = null;
       stale.topology = stale.particles = stale.marks = false;
       stale.colliders = true;
@@ -148,6 +148,13 @@ export class Renderer {
     this.frameDrawn = frame;
     this.stepDrawn = frame.step;
     this.stale = { topology: false, particles: false, marks: false, colliders: false };
+  }
+
+  /** @param {boolean} isQuantised */
+  drawersOf(isQuantised) {
+    const drawers = this.drawersByFormat.get(isQuantised) ?? new Drawers(this.gl, isQuantised);
+    this.drawersByFormat.set(isQuantised, drawers);
+    return drawers;
   }
 
   /** @param {boolean} isPlanar */

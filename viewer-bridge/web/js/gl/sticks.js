@@ -131,6 +131,14 @@ export class Sticks {
     gl.bindVertexArray(null);
   }
 
+  clear() {
+    const { gl } = this;
+    this.drawn = new Uint32Array(0);
+    this.words = new Uint32Array(0);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, this.words, gl.DYNAMIC_DRAW);
+  }
+
   /** @param {Uint8Array} styles of all constraints */
   setStyles(styles) {
     const { gl } = this;
