@@ -47,6 +47,8 @@ pub const PING_PERIOD: Duration = Duration::from_secs(3);
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long a command may go unanswered.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long a server that ends waits for the node to let go of what pages hold.
+pub const RELEASE_TIMEOUT: Duration = Duration::from_millis(500);
 /// How long clients have to take their leave at the end.
 pub const FAREWELL_TIMEOUT: Duration = Duration::from_secs(2);
 /// Pause after a connection could not be taken.

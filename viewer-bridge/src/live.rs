@@ -84,7 +84,7 @@ impl Source for Live {
                     Err(end) => break end,
                 }
             };
-            link.leave(hub);
+            link.leave(hub, &end);
             match end {
                 LinkEnd::Closed => break,
                 // Found again at once, under its new number.

@@ -20,10 +20,18 @@ pub(super) struct Dispatch {
     /// Unanswered commands by number, ascending in time.
     tickets: BTreeMap<u64, Ticket>,
     last_ticket: u64,
-    /// What has not been sent yet, for which ticket; what nobody waits for has none.
-    outbox: VecDeque<(Option<u64>, Action)>,
-    /// Tickets by the sequence number that the node was told.
-    sent: BTreeMap<u64, u64>,
+    /// What has not been sent yet.
+    outbox: VecDeque<Part>,
+    /// What has no outcome yet, by the sequence number that the node was told.
+    sent: BTreeMap<u64, Part>,
+}
+
+/// An action, and the command that it is a part of.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    /// None where nobody waits for the outcome.
+    ticket: Option<u64>,
+    action: Action,
 }
 
 /// A command that a page waits for.
@@ -71,7 +79,8 @@ impl Dispatch {
                 let deadline_ns = monotonic_ns() + timeout_ns;
                 let ticket = Ticket { client, deadline_ns, open: parts.len(), outcome };
                 self.tickets.insert(number, ticket);
-                self.outbox.extend(parts.into_iter().map(|action| (Some(number), action)));
+                self.outbox
+                    .extend(parts.into_iter().map(|action| Part { ticket: Some(number), action }));
                 None
             }
         }
@@ -112,37 +121,55 @@ impl Dispatch {
     /// A page has gone: what it holds is let go.
     pub(super) fn leave(&mut self, client: u32) {
         let held = self.holders.extract_if(.., |_, holder| *holder == client);
-        let releases = held.map(|(particle, _)| (None, Action::Release { particle }));
-        self.outbox.extend(releases);
+        self.outbox.extend(held.map(|(particle, _)| release(particle)));
         self.tickets.retain(|_, ticket| ticket.client != client);
+    }
+
+    /// All pages go: what they hold is let go.
+    pub(super) fn release_all(&mut self) {
+        let held = std::mem::take(&mut self.holders);
+        self.outbox.extend(held.into_keys().map(release));
+    }
+
+    /// Whether the node has yet to let go of something.
+    pub(super) fn is_releasing(&self) -> bool {
+        let mut on_their_way = self.outbox.iter().chain(self.sent.values());
+        on_their_way.any(|part| matches!(part.action, Action::Release { .. }))
     }
 
     /// Hands the node as much as it takes.
     pub(super) fn flush(&mut self, node: &mut Client, hub: &Hub) {
-        while let Some((ticket, action)) = self.outbox.pop_front() {
-            match node.send(action) {
+        while let Some(part) = self.outbox.pop_front() {
+            match node.send(part.action) {
                 Ok(sequence) => {
-                    if let Some(ticket) = ticket {
-                        self.sent.insert(sequence, ticket);
-                    }
+                    self.sent.insert(sequence, part);
                 }
                 Err(RequestError::QueueFull { .. }) => {
-                    self.outbox.push_front((ticket, action));
+                    self.outbox.push_front(part);
                     return;
                 }
-                Err(_) => self.close_part(hub, ticket, None, Err(reason::NO_NODE)),
+                Err(_) => self.close_part(hub, part.ticket, None, Err(reason::NO_NODE)),
             }
         }
     }
 
     /// Takes the outcome of what this bridge sent.
     pub(super) fn take_outcome(&mut self, hub: &Hub, outcome: &Outcome) {
-        let ticket = self.sent.remove(&outcome.command.sequence);
+        let ticket = self.answered(outcome.command.sequence);
         let result = if outcome.is_applied() { Ok(()) } else { Err(outcome.reason_name()) };
         if let (Err(_), Action::Grab { particle, .. }) = (result, outcome.command.action()) {
             self.holders.remove(&particle);
         }
         self.close_part(hub, ticket, Some(outcome.step), result);
+    }
+
+    /// The ticket of what the node has answered. It answers in the order of sending: what was sent
+    /// before has been answered as well, and that was missed.
+    fn answered(&mut self, sequence: u64) -> Option<u64> {
+        let mut later = self.sent.split_off(&sequence);
+        let part = later.remove(&sequence);
+        self.sent = later;
+        part?.ticket
     }
 
     /// The state is another one: nobody holds anything any more.
@@ -179,8 +206,7 @@ impl Dispatch {
             && first.get().deadline_ns <= now_ns
         {
             let (number, mut ticket) = first.remove_entry();
-            self.sent.retain(|_, ticket| *ticket != number);
-            self.outbox.retain(|(ticket, _)| *ticket != Some(number));
+            self.outbox.retain(|part| part.ticket != Some(number));
             if ticket.outcome.applied + ticket.outcome.rejected == 0 {
                 ticket.outcome.status = Status::Unanswered;
             }
@@ -199,6 +225,11 @@ impl Ticket {
             hub.send(self.client, &ToPage::Outcome(self.outcome));
         }
     }
+}
+
+/// Lets go of a particle for whoever cannot ask for it any more.
+fn release(particle: u32) -> Part {
+    Part { ticket: None, action: Action::Release { particle } }
 }
 
 fn refuse(outcome: &mut OutcomeText, reason: &'static str) {

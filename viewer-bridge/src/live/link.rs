@@ -17,7 +17,7 @@ use super::load::Parts;
 use super::news::News;
 use crate::Hub;
 use crate::hub::Slot;
-use crate::limits::FRAMES_PER_SECOND_MAX;
+use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
 use crate::load::Load;
 use crate::message::{Level, Node, NodeState, ToPage};
 use crate::source::{Ask, Request, Requests};
@@ -350,9 +350,31 @@ impl Link {
         }
     }
 
-    /// Answers what is open; nobody else will.
-    pub(super) fn leave(mut self, hub: &Hub) {
+    /// Answers what is open; nobody else will. Where the node goes on without this bridge, it lets
+    /// go of what pages hold.
+    pub(super) fn leave(mut self, hub: &Hub, end: &LinkEnd) {
         self.dispatch.expire(hub, u64::MAX);
+        if *end == LinkEnd::Closed {
+            self.let_go(hub);
+        }
         hub.latch(Slot::Parameters, &Known::default().to_message());
+    }
+
+    /// Pages cannot do this any more: their tasks end with the server. A node that does not answer
+    /// is waited for only so long.
+    fn let_go(&mut self, hub: &Hub) {
+        self.dispatch.release_all();
+        let wait_ns = u64::try_from(RELEASE_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
+        let end_ns = monotonic_ns() + wait_ns;
+        loop {
+            self.dispatch.flush(&mut self.client, hub);
+            let news = News::drain(&mut self.tap);
+            self.take_outcomes(&news, hub);
+            let left_ns = end_ns.saturating_sub(monotonic_ns());
+            if !self.dispatch.is_releasing() || left_ns == 0 {
+                return;
+            }
+            self.tap.wait(Duration::from_nanos(left_ns).min(IDLE_PERIOD));
+        }
     }
 }
