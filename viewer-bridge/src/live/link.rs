@@ -2,6 +2,8 @@
 
 mod known;
 mod statistics;
+#[cfg(test)]
+mod tests;
 
 use std::time::Duration;
 
