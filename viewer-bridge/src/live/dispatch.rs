@@ -253,11 +253,20 @@ impl Dispatch {
         }
     }
 
-    /// Sends no more of a command.
+    /// Sends no more of a command, but for what lets go of a particle: nobody else would.
     fn withdraw(&mut self, number: u64) {
-        let is_of = |part: &&Part| part.ticket == Some(number);
-        let withdrawn: Vec<_> = self.outbox.iter().filter(is_of).map(|part| part.action).collect();
-        self.outbox.retain(|part| part.ticket != Some(number));
+        let mut withdrawn = Vec::new();
+        self.outbox.retain_mut(|part| {
+            if part.ticket != Some(number) {
+                return true;
+            }
+            part.ticket = None;
+            let is_release = matches!(part.action, Action::Release { .. });
+            if !is_release {
+                withdrawn.push(part.action);
+            }
+            is_release
+        });
         for action in withdrawn {
             self.forget_unsent(action);
         }

@@ -108,6 +108,8 @@ impl Link {
     ) -> Result<(), LinkEnd> {
         let is_awaited = hub.demand(self.particle_count()).is_any();
         self.take_requests(stage, hub, requests, is_awaited);
+        // What had no room the last time has some now, whether pages ask for more or not.
+        self.dispatch.flush(&mut self.client, hub);
         let is_due = is_awaited && monotonic_ns() >= self.due_ns;
         if is_due && self.is_fast() {
             // There is always a state that was not shown; this waits for one that comes now. What

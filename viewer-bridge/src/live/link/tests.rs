@@ -2,8 +2,8 @@
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    Command as Sent, ConstraintState, Load as OwnerLoad, LoadHeader, Outcome, Owner, ParticleState,
-    SnapshotHeader,
+    COMMANDS_BUFFERED, Command as Sent, ConstraintState, Load as OwnerLoad, LoadHeader, Outcome,
+    Owner, ParticleState, SnapshotHeader,
 };
 
 use super::*;
@@ -19,7 +19,7 @@ struct Site {
     link: Link,
     stage: Stage,
     hub: Hub,
-    _requests: Requests,
+    requests: Requests,
     _page: Connection,
     owner: Owner,
     outcome_count: u64,
@@ -60,7 +60,7 @@ impl Site {
             link,
             stage,
             hub,
-            _requests: requests,
+            requests,
             _page: page,
             owner,
             outcome_count: 0,
@@ -176,4 +176,23 @@ fn a_grab_of_a_page_that_left_before_a_reset_was_answered_is_let_go() {
     site.ask(Ask::Left);
     let sent = site.arrived();
     assert_eq!(actions(&sent)[1..], [RELEASE]);
+}
+
+#[test]
+fn what_lets_go_is_sent_however_long_the_node_has_no_room_and_without_another_request() {
+    let mut site = Site::start();
+    site.command(grab());
+    let sent = site.arrived();
+    site.answer(sent[0]);
+    site.read();
+    for _ in 0..COMMANDS_BUFFERED {
+        site.command(pull());
+    }
+    site.command(pull());
+    site.command(Command::DragEnd { particle: 1 });
+    site.link.dispatch.expire(&site.hub, u64::MAX);
+    assert_eq!(actions(&site.arrived()), vec![MOVE; COMMANDS_BUFFERED]);
+    while site.requests.next(Duration::ZERO).is_some() {}
+    site.link.round(&mut site.stage, &site.hub, &site.requests).unwrap();
+    assert_eq!(actions(&site.arrived()), [RELEASE]);
 }
