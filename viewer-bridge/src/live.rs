@@ -6,6 +6,7 @@ mod dispatch;
 mod link;
 mod load;
 mod news;
+mod waiting;
 
 use std::time::Duration;
 

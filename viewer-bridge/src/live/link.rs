@@ -10,13 +10,15 @@ use std::time::Duration;
 use recorder::{Message, OutcomeRow, StatusRow, StepRow, Topic};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    Action, AttachError, Client, Endpoint, NodeStatus, Snapshot, SnapshotFlags, StatusFlags, Tap,
+    Action, AttachError, Client, ColliderState, Endpoint, NodeStatus, Snapshot, SnapshotFlags,
+    StatusFlags, Tap,
 };
 
 use super::actions::Context;
 use super::dispatch::Dispatch;
 use super::load::Parts;
 use super::news::News;
+use super::waiting::Waiting;
 use crate::Hub;
 use crate::hub::Slot;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
@@ -51,6 +53,28 @@ pub(super) enum LinkEnd {
     NewRun,
 }
 
+/// Tears and colliders, until the state that shows them is there.
+#[derive(Debug, Default)]
+struct Changes {
+    torn: Waiting<Vec<u32>>,
+    causes: Waiting<Vec<u8>>,
+    colliders: Waiting<Vec<ColliderState>>,
+}
+
+impl Changes {
+    fn take(&mut self, news: News) {
+        for (header, torn) in news.tears {
+            self.torn.add(header.step, torn);
+        }
+        for (header, causes) in news.tear_causes {
+            self.causes.add(header.step, causes);
+        }
+        for (header, colliders) in news.colliders {
+            self.colliders.add(header.step, colliders);
+        }
+    }
+}
+
 /// The connection to one run of a node.
 #[derive(Debug)]
 pub(super) struct Link {
@@ -64,11 +88,10 @@ pub(super) struct Link {
     status: Option<NodeStatus>,
     known: Known,
     dispatch: Dispatch,
-    /// The torn list with its causes, until a load is there that it belongs to.
     is_torn: Vec<bool>,
+    /// Why constraints tore, in the order of tearing.
     causes: Vec<u8>,
-    torn: Option<(u64, Vec<u32>)>,
-    colliders: Option<(u64, Vec<sim_contract::ColliderState>)>,
+    changes: Changes,
     /// The state that was shown last.
     shown_step: Option<u64>,
     due_ns: u64,
@@ -90,8 +113,7 @@ impl Link {
             dispatch: Dispatch::default(),
             is_torn: Vec::new(),
             causes: Vec::new(),
-            torn: None,
-            colliders: None,
+            changes: Changes::default(),
             shown_step: None,
             due_ns: 0,
             next_owner_look_ns: 0,
@@ -205,15 +227,7 @@ impl Link {
             hub.say(Topic::Status, || Message::Status(StatusRow::from(status)));
         }
         self.status = news.status.or(self.status);
-        if let Some((header, torn)) = news.tears {
-            self.torn = Some((header.step, torn));
-        }
-        if let Some(causes) = news.tear_causes {
-            self.causes = causes;
-        }
-        if let Some((header, colliders)) = news.colliders {
-            self.colliders = Some((header.step, colliders));
-        }
+        self.changes.take(news);
         self.begin_load(stage, hub);
         self.known.set_time_scale(self.status.as_ref());
         self.known.tell(hub);
@@ -273,9 +287,12 @@ impl Link {
     /// Puts tears, colliders and pins on the stage.
     fn set_changes(&mut self, stage: &mut Stage, hub: &Hub) {
         let Some((load, snapshot)) = self.on_show() else { return };
-        let (step, constraint_count) = (snapshot.header().step, load.constraints.len());
-        stage.set_pins(hub, step, snapshot.particles());
-        if let Some((step, torn)) = self.torn.take()
+        let (shown_step, constraint_count) = (snapshot.header().step, load.constraints.len());
+        stage.set_pins(hub, shown_step, snapshot.particles());
+        if let Some((_, causes)) = self.changes.causes.take_until(shown_step) {
+            self.causes = causes;
+        }
+        if let Some((step, torn)) = self.changes.torn.take_until(shown_step)
             && torn.iter().all(|constraint| (*constraint as usize) < constraint_count)
         {
             stage.set_torn(hub, step, &torn, &self.causes);
@@ -284,7 +301,7 @@ impl Link {
                 self.is_torn[*constraint as usize] = true;
             }
         }
-        if let Some((step, colliders)) = self.colliders.take() {
+        if let Some((step, colliders)) = self.changes.colliders.take_until(shown_step) {
             stage.set_colliders(step, &colliders);
         }
     }

@@ -2,13 +2,14 @@
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    COMMANDS_BUFFERED, Command as Sent, ConstraintState, Load as OwnerLoad, LoadHeader, Outcome,
-    Owner, ParticleState, SnapshotHeader,
+    COMMANDS_BUFFERED, CollidersHeader, Command as Sent, ConstraintState, Load as OwnerLoad,
+    LoadHeader, Outcome, Owner, ParticleState, SnapshotHeader, TearsHeader,
 };
 
 use super::*;
 use crate::hub::Connection;
 use crate::message::{Choice, Command, Mode};
+use crate::wire::{Message as Wire, decode};
 
 const RUN_ID: u64 = 7;
 const PAGE: u32 = 1;
@@ -20,7 +21,7 @@ struct Site {
     stage: Stage,
     hub: Hub,
     requests: Requests,
-    _page: Connection,
+    page: Connection,
     owner: Owner,
     outcome_count: u64,
     _domain: TestDomain,
@@ -56,16 +57,8 @@ impl Site {
         let (hub, requests) = Hub::new(Mode::Live);
         let page = hub.join(Choice::F32);
         let stage = Stage::default();
-        let mut site = Self {
-            link,
-            stage,
-            hub,
-            requests,
-            _page: page,
-            owner,
-            outcome_count: 0,
-            _domain: domain,
-        };
+        let mut site =
+            Self { link, stage, hub, requests, page, owner, outcome_count: 0, _domain: domain };
         site.owner.refresh();
         site.publish(0, 0, 2);
         site.read();
@@ -89,6 +82,14 @@ impl Site {
         self.link.read(&mut self.stage, &self.hub).unwrap();
         self.link.due_ns = 0;
         self.link.show(&mut self.stage, &self.hub);
+    }
+
+    /// The radii of the colliders in the newest frame.
+    fn radii(&self) -> Vec<f32> {
+        let frame = self.page.frames.borrow();
+        let Some(set) = &frame.colliders else { return Vec::new() };
+        let Ok(Wire::Colliders(all)) = decode(&set.bytes) else { panic!("no colliders") };
+        all.colliders.iter().map(|collider| collider.radius).collect()
     }
 
     fn command(&mut self, command: Command) {
@@ -134,6 +135,33 @@ fn actions(commands: &[Sent]) -> Vec<Action> {
 
 const MOVE: Action = Action::Move { particle: 1, target: TARGET, over_s: 0.0 };
 const RELEASE: Action = Action::Release { particle: 1 };
+
+#[test]
+fn colliders_that_come_before_the_first_state_of_their_load_are_shown_with_it() {
+    let mut site = Site::start();
+    let collider = ColliderState { shape: 2, radius: 0.5, ..ColliderState::default() };
+    site.owner.load(&load(1, 1)).unwrap();
+    let header = CollidersHeader { run_id: RUN_ID, step: 1, ..CollidersHeader::default() };
+    site.owner.publish_colliders(header, &[collider]).unwrap();
+    site.read();
+    assert_eq!((site.stage.epoch(), site.radii()), (1, vec![]));
+    site.publish(1, 1, 2);
+    site.read();
+    assert_eq!((site.stage.epoch(), site.radii()), (2, vec![0.5]));
+}
+
+#[test]
+fn tears_are_shown_with_the_state_that_they_are_of() {
+    let mut site = Site::start();
+    let header = TearsHeader { run_id: RUN_ID, step: 2, new_count: 1, ..TearsHeader::default() };
+    site.owner.publish_tears(header, &[0], &[3]).unwrap();
+    site.publish(1, 0, 2);
+    site.read();
+    assert!(site.stage.torn().is_empty());
+    site.publish(2, 0, 2);
+    site.read();
+    assert_eq!(site.stage.torn(), [0]);
+}
 
 #[test]
 fn a_grab_that_the_node_applies_after_a_reset_is_still_the_pages() {
