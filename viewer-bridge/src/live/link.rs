@@ -16,7 +16,7 @@ use sim_contract::{
 
 use super::actions::Context;
 use super::dispatch::Dispatch;
-use super::load::Parts;
+use super::load::{Parts, is_of};
 use super::news::News;
 use super::waiting::Waiting;
 use crate::Hub;
@@ -306,13 +306,12 @@ impl Link {
         }
     }
 
-    /// Load and newest state, if they belong together.
+    /// Load and newest state, if they belong together. Any process of the user can publish a state:
+    /// one of another size is none of this load.
     fn on_show(&self) -> Option<(&Load, &Snapshot)> {
         let (load, snapshot) = (self.load.as_ref()?, self.snapshot.as_ref()?);
         let header = snapshot.header();
-        let is_of_load = (header.run_id, header.topology_revision)
-            == (load.header.run_id, load.header.topology_revision);
-        is_of_load.then_some((load, snapshot))
+        is_of(&load.header, header).then_some((load, snapshot))
     }
 
     /// Shows the newest state, if it is due and was not shown.

@@ -164,6 +164,25 @@ fn tears_are_shown_with_the_state_that_they_are_of() {
 }
 
 #[test]
+fn a_state_of_another_size_is_not_shown_nor_measured() {
+    let mut site = Site::start();
+    let status = NodeStatus { run_id: RUN_ID, rate_hz: 60, time_scale: 1.0, ..Default::default() };
+    site.owner.publish_status(&status).unwrap();
+    site.publish(1, 0, 1);
+    site.read();
+    site.link.tell_statistics(&mut site.stage, &site.hub);
+    assert_eq!(site.page.frames.borrow().particle_count, 2);
+    // Nor does it begin a load.
+    site.owner.load(&load(2, 1)).unwrap();
+    site.publish(2, 1, 1);
+    site.read();
+    assert_eq!(site.stage.epoch(), 1);
+    site.publish(3, 1, 2);
+    site.read();
+    assert_eq!(site.stage.epoch(), 2);
+}
+
+#[test]
 fn a_grab_that_the_node_applies_after_a_reset_is_still_the_pages() {
     let mut site = Site::start();
     site.command(grab());
