@@ -185,7 +185,7 @@ impl Link {
             let until_due = Duration::from_nanos(self.due_ns.saturating_sub(monotonic_ns()));
             let timeout = if is_awaited { until_due } else { IDLE_PERIOD };
             let Some(request) = requests.next(timeout) else { return };
-            let is_new_demand = request.ask == Ask::Frame;
+            let is_new_demand = matches!(request.ask, Ask::Frame | Ask::Credit);
             self.take(request, stage, hub);
             self.dispatch.flush(&mut self.client, hub);
             if is_new_demand {
@@ -197,6 +197,7 @@ impl Link {
     fn take(&mut self, request: Request, stage: &Stage, hub: &Hub) {
         match request.ask {
             Ask::Frame => self.shown_step = None,
+            Ask::Credit => {}
             Ask::Left => self.dispatch.leave(request.client),
             Ask::Command { id, command } => {
                 let context = Context {
