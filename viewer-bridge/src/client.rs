@@ -10,7 +10,7 @@ use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use crate::check::check;
-use crate::hub::{Connection, Hub, Shown};
+use crate::hub::{Connection, Hub, Shown, Taken};
 use crate::limits::{HELLO_TIMEOUT, PING_PERIOD, PROTOCOL, SILENCE_MAX};
 use crate::message::{Command, FromPage, Hello, OutcomeText, ToPage};
 use crate::rate_limit::RateLimit;
@@ -121,7 +121,7 @@ async fn converse(socket: &mut WebSocket, hub: &Hub, mut connection: Connection)
                 }
             }
             changed = connection.frames.changed(), if has_credit => match changed {
-                Ok(()) => send_frame(socket, &mut connection, &mut shown).await,
+                Ok(()) => send_frame(socket, hub, &mut connection, &mut shown).await,
                 Err(_) => return Some(given_up(hub)),
             },
             _ = ping.tick() => {
@@ -141,10 +141,18 @@ async fn converse(socket: &mut WebSocket, hub: &Hub, mut connection: Connection)
 /// Sends the newest frame, after everything reliable that it builds on.
 async fn send_frame(
     socket: &mut WebSocket,
+    hub: &Hub,
     connection: &mut Connection,
     shown: &mut Shown,
 ) -> Result<(), Option<End>> {
-    let frame = connection.take_frame(shown);
+    let frame = match connection.take_frame(shown) {
+        Taken::Frame(frame) => frame,
+        Taken::Nothing => return Ok(()),
+        Taken::Missed => {
+            hub.request(connection.client, Ask::Frame);
+            return Ok(());
+        }
+    };
     while let Ok(message) = connection.queue.try_recv() {
         send(socket, message).await?;
     }
@@ -177,7 +185,7 @@ fn take(
     match FromPage::parse(&text) {
         Ok(FromPage::Ack { frame }) => {
             if connection.acknowledge(frame, shown) {
-                hub.request(connection.client, Ask::Frame);
+                hub.request(connection.client, Ask::Credit);
             }
         }
         Ok(FromPage::Command { id, command }) => hand_over(hub, connection.client, id, command),

@@ -15,7 +15,7 @@ use bytes::Bytes;
 use recorder::Topic;
 use tokio::sync::{mpsc, watch};
 
-pub(crate) use connection::{Connection, Credit, Shown};
+pub(crate) use connection::{Connection, Credit, Shown, Taken};
 
 use crate::foxglove_server::{CLIENT_FIRST, Publisher};
 use crate::limits::{F32_PARTICLES_MAX, PROTOCOL, RELIABLE_QUEUED_MAX};

@@ -51,6 +51,8 @@ pub const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 pub const CONNECTION_TIMEOUT: Duration = Duration::from_mins(1);
 /// How long a command may go unanswered.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long a server that ends waits for the node to let go of what pages hold.
+pub const RELEASE_TIMEOUT: Duration = Duration::from_millis(500);
 /// How long clients have to take their leave at the end.
 pub const FAREWELL_TIMEOUT: Duration = Duration::from_secs(2);
 /// Pause after a connection could not be taken.

@@ -6,6 +6,7 @@ mod dispatch;
 mod link;
 mod load;
 mod news;
+mod waiting;
 
 use std::time::Duration;
 
@@ -84,7 +85,7 @@ impl Source for Live {
                     Err(end) => break end,
                 }
             };
-            link.leave(hub);
+            link.leave(hub, &end);
             match end {
                 LinkEnd::Closed => break,
                 // Found again at once, under its new number.

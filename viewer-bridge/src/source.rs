@@ -44,8 +44,10 @@ pub struct Request {
 /// What a page did.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ask {
-    /// It came, or has room for frames again: it needs one even if nothing moves.
+    /// It came, or missed the newest frame: it needs one even if nothing moves.
     Frame,
+    /// It has room for frames again: it needs the next one.
+    Credit,
     /// It left: what it holds is to be let go.
     Left,
     /// It wants something done. The numbers in it are finite and in range.

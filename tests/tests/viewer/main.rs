@@ -10,7 +10,7 @@ use std::time::Duration;
 use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
 use serde_json::{Value, json};
 use sim_contract::{Client, ParticleFlags, ParticleState};
-use viewer_bridge::wire::scene_flag;
+use viewer_bridge::wire::{scene_flag, statistics_flag};
 
 use page::{Bridge, Page};
 
@@ -81,6 +81,25 @@ fn what_a_page_grabs_follows_it_and_is_let_go_when_the_page_goes() {
     wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
     other.applied(drag("begin", [0.2, 0.5, 0.5]));
     other.applied(json!({ "type": "drag_end", "particle": 90 }));
+    wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
+}
+
+#[test]
+fn what_a_page_grabs_is_let_go_when_the_bridge_ends() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let bridge = Bridge::start(&sandbox);
+    let mut node = Client::attach(&sandbox.endpoint()).unwrap();
+    let mut page = bridge.page();
+    page.applied(drag("begin", [0.2, 0.5, 0.5]));
+    wait_for_particle(&mut node, 90, "the particle to be held", is_grabbed);
+    // A bridge that waits for a state of the node hears of no page that leaves.
+    page.applied(json!({ "type": "pause" }));
+    page.statistics(|statistics| statistics.flags & statistics_flag::PAUSED != 0);
+    page.statistics(|_| true);
+    let ended = bridge.process.interrupt();
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    ctl(&sandbox, &["resume"]);
     wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
 }
 

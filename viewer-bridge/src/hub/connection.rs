@@ -44,18 +44,34 @@ pub(crate) struct Connection {
 pub(crate) struct Shown {
     /// Numbers of the frames that were sent and not acknowledged, ascending.
     unacknowledged: VecDeque<u32>,
+    /// Number of the frame that was sent last, or of one that was missed since.
+    last: Option<u32>,
     /// The colliders that were sent last.
     colliders: Option<u64>,
 }
 
+/// What a page is sent of the newest frame.
+#[derive(Debug)]
+pub(crate) enum Taken {
+    /// The frame, with the colliders before it if they have changed.
+    Frame(Vec<Bytes>),
+    /// It has had it.
+    Nothing,
+    /// It was not encoded as this page wants it: the page had no credit when it was shown.
+    Missed,
+}
+
 impl Connection {
-    /// The newest frame, with the colliders before it if they have changed; nothing where it was not
-    /// encoded as this page wants it.
-    pub(crate) fn take_frame(&mut self, shown: &mut Shown) -> Vec<Bytes> {
+    /// Takes the newest frame. That one was missed is said once.
+    pub(crate) fn take_frame(&mut self, shown: &mut Shown) -> Taken {
         let frame = Arc::clone(&self.frames.borrow_and_update());
         let wants_f32 = wants_f32(self.choice, frame.particle_count);
         let encoded = if wants_f32 { &frame.f32 } else { &frame.u16 };
-        let Some(encoded) = encoded else { return Vec::new() };
+        if shown.last == Some(frame.number) || (frame.f32.is_none() && frame.u16.is_none()) {
+            return Taken::Nothing;
+        }
+        shown.last = Some(frame.number);
+        let Some(encoded) = encoded else { return Taken::Missed };
         let mut messages = Vec::with_capacity(2);
         if let Some(colliders) = &frame.colliders
             && shown.colliders != Some(colliders.number)
@@ -66,7 +82,7 @@ impl Connection {
         messages.push(encoded.clone());
         shown.unacknowledged.push_back(frame.number);
         self.credit.set_used(shown.unacknowledged.len());
-        messages
+        Taken::Frame(messages)
     }
 
     /// The page has drawn that frame. Whether it had no credit before, and has some now.

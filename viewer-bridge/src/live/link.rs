@@ -2,22 +2,26 @@
 
 mod known;
 mod statistics;
+#[cfg(test)]
+mod tests;
 
 use std::time::Duration;
 
 use recorder::{Message, OutcomeRow, StatusRow, StepRow, Topic};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    Action, AttachError, Client, Endpoint, NodeStatus, Snapshot, SnapshotFlags, StatusFlags, Tap,
+    Action, AttachError, Client, ColliderState, Endpoint, NodeStatus, Snapshot, SnapshotFlags,
+    StatusFlags, Tap,
 };
 
 use super::actions::Context;
 use super::dispatch::Dispatch;
-use super::load::Parts;
+use super::load::{Parts, is_of};
 use super::news::News;
+use super::waiting::Waiting;
 use crate::Hub;
 use crate::hub::Slot;
-use crate::limits::FRAMES_PER_SECOND_MAX;
+use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
 use crate::load::Load;
 use crate::message::{Level, Node, NodeState, ToPage};
 use crate::source::{Ask, Request, Requests};
@@ -49,6 +53,28 @@ pub(super) enum LinkEnd {
     NewRun,
 }
 
+/// Tears and colliders, until the state that shows them is there.
+#[derive(Debug, Default)]
+struct Changes {
+    torn: Waiting<Vec<u32>>,
+    causes: Waiting<Vec<u8>>,
+    colliders: Waiting<Vec<ColliderState>>,
+}
+
+impl Changes {
+    fn take(&mut self, news: News) {
+        for (header, torn) in news.tears {
+            self.torn.add(header.step, torn);
+        }
+        for (header, causes) in news.tear_causes {
+            self.causes.add(header.step, causes);
+        }
+        for (header, colliders) in news.colliders {
+            self.colliders.add(header.step, colliders);
+        }
+    }
+}
+
 /// The connection to one run of a node.
 #[derive(Debug)]
 pub(super) struct Link {
@@ -62,11 +88,10 @@ pub(super) struct Link {
     status: Option<NodeStatus>,
     known: Known,
     dispatch: Dispatch,
-    /// The torn list with its causes, until a load is there that it belongs to.
     is_torn: Vec<bool>,
+    /// Why constraints tore, in the order of tearing.
     causes: Vec<u8>,
-    torn: Option<(u64, Vec<u32>)>,
-    colliders: Option<(u64, Vec<sim_contract::ColliderState>)>,
+    changes: Changes,
     /// The state that was shown last.
     shown_step: Option<u64>,
     due_ns: u64,
@@ -88,8 +113,7 @@ impl Link {
             dispatch: Dispatch::default(),
             is_torn: Vec::new(),
             causes: Vec::new(),
-            torn: None,
-            colliders: None,
+            changes: Changes::default(),
             shown_step: None,
             due_ns: 0,
             next_owner_look_ns: 0,
@@ -106,6 +130,8 @@ impl Link {
     ) -> Result<(), LinkEnd> {
         let is_awaited = hub.demand(self.particle_count()).is_any();
         self.take_requests(stage, hub, requests, is_awaited);
+        // What had no room the last time has some now, whether pages ask for more or not.
+        self.dispatch.flush(&mut self.client, hub);
         let is_due = is_awaited && monotonic_ns() >= self.due_ns;
         if is_due && self.is_fast() {
             // There is always a state that was not shown; this waits for one that comes now. What
@@ -159,7 +185,7 @@ impl Link {
             let until_due = Duration::from_nanos(self.due_ns.saturating_sub(monotonic_ns()));
             let timeout = if is_awaited { until_due } else { IDLE_PERIOD };
             let Some(request) = requests.next(timeout) else { return };
-            let is_new_demand = request.ask == Ask::Frame;
+            let is_new_demand = matches!(request.ask, Ask::Frame | Ask::Credit);
             self.take(request, stage, hub);
             self.dispatch.flush(&mut self.client, hub);
             if is_new_demand {
@@ -171,6 +197,7 @@ impl Link {
     fn take(&mut self, request: Request, stage: &Stage, hub: &Hub) {
         match request.ask {
             Ask::Frame => self.shown_step = None,
+            Ask::Credit => {}
             Ask::Left => self.dispatch.leave(request.client),
             Ask::Command { id, command } => {
                 let context = Context {
@@ -201,15 +228,7 @@ impl Link {
             hub.say(Topic::Status, || Message::Status(StatusRow::from(status)));
         }
         self.status = news.status.or(self.status);
-        if let Some((header, torn)) = news.tears {
-            self.torn = Some((header.step, torn));
-        }
-        if let Some(causes) = news.tear_causes {
-            self.causes = causes;
-        }
-        if let Some((header, colliders)) = news.colliders {
-            self.colliders = Some((header.step, colliders));
-        }
+        self.changes.take(news);
         self.begin_load(stage, hub);
         self.known.set_time_scale(self.status.as_ref());
         self.known.tell(hub);
@@ -269,9 +288,12 @@ impl Link {
     /// Puts tears, colliders and pins on the stage.
     fn set_changes(&mut self, stage: &mut Stage, hub: &Hub) {
         let Some((load, snapshot)) = self.on_show() else { return };
-        let (step, constraint_count) = (snapshot.header().step, load.constraints.len());
-        stage.set_pins(hub, step, snapshot.particles());
-        if let Some((step, torn)) = self.torn.take()
+        let (shown_step, constraint_count) = (snapshot.header().step, load.constraints.len());
+        stage.set_pins(hub, shown_step, snapshot.particles());
+        if let Some((_, causes)) = self.changes.causes.take_until(shown_step) {
+            self.causes = causes;
+        }
+        if let Some((step, torn)) = self.changes.torn.take_until(shown_step)
             && torn.iter().all(|constraint| (*constraint as usize) < constraint_count)
         {
             stage.set_torn(hub, step, &torn, &self.causes);
@@ -280,18 +302,17 @@ impl Link {
                 self.is_torn[*constraint as usize] = true;
             }
         }
-        if let Some((step, colliders)) = self.colliders.take() {
+        if let Some((step, colliders)) = self.changes.colliders.take_until(shown_step) {
             stage.set_colliders(step, &colliders);
         }
     }
 
-    /// Load and newest state, if they belong together.
+    /// Load and newest state, if they belong together. Any process of the user can publish a state:
+    /// one of another size is none of this load.
     fn on_show(&self) -> Option<(&Load, &Snapshot)> {
         let (load, snapshot) = (self.load.as_ref()?, self.snapshot.as_ref()?);
         let header = snapshot.header();
-        let is_of_load = (header.run_id, header.topology_revision)
-            == (load.header.run_id, load.header.topology_revision);
-        is_of_load.then_some((load, snapshot))
+        is_of(&load.header, header).then_some((load, snapshot))
     }
 
     /// Shows the newest state, if it is due and was not shown.
@@ -350,9 +371,31 @@ impl Link {
         }
     }
 
-    /// Answers what is open; nobody else will.
-    pub(super) fn leave(mut self, hub: &Hub) {
+    /// Answers what is open; nobody else will. Where the node goes on without this bridge, it lets
+    /// go of what pages hold.
+    pub(super) fn leave(mut self, hub: &Hub, end: &LinkEnd) {
         self.dispatch.expire(hub, u64::MAX);
+        if *end == LinkEnd::Closed {
+            self.let_go(hub);
+        }
         hub.latch(Slot::Parameters, &Known::default().to_message());
+    }
+
+    /// Pages cannot do this any more: their tasks end with the server. A node that does not answer
+    /// is waited for only so long.
+    fn let_go(&mut self, hub: &Hub) {
+        self.dispatch.release_all();
+        let wait_ns = u64::try_from(RELEASE_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
+        let end_ns = monotonic_ns() + wait_ns;
+        loop {
+            self.dispatch.flush(&mut self.client, hub);
+            let news = News::drain(&mut self.tap);
+            self.take_outcomes(&news, hub);
+            let left_ns = end_ns.saturating_sub(monotonic_ns());
+            if !self.dispatch.is_releasing() || left_ns == 0 {
+                return;
+            }
+            self.tap.wait(Duration::from_nanos(left_ns).min(IDLE_PERIOD));
+        }
     }
 }

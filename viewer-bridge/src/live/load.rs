@@ -27,13 +27,9 @@ impl Parts {
         &mut self,
         snapshot: &SnapshotHeader,
     ) -> Option<Result<Load, &'static str>> {
-        let is_of = |header: &LoadHeader| {
-            (header.run_id, header.topology_revision)
-                == (snapshot.run_id, snapshot.topology_revision)
-        };
-        let is_complete = self.scene.as_ref().is_some_and(|(header, _)| is_of(header))
-            && self.topology.as_ref().is_some_and(|(header, _)| is_of(header))
-            && self.surface.as_ref().is_some_and(|(header, _)| is_of(header));
+        let is_complete = self.scene.as_ref().is_some_and(|(header, _)| is_of(header, snapshot))
+            && self.topology.as_ref().is_some_and(|(header, _)| is_of(header, snapshot))
+            && self.surface.as_ref().is_some_and(|(header, _)| is_of(header, snapshot));
         if !is_complete {
             return None;
         }
@@ -43,6 +39,12 @@ impl Parts {
         let summary = SceneSummary::read(&String::from_utf8_lossy(&text));
         Some(Load { header, summary, constraints, triangles }.checked(snapshot.particle_count))
     }
+}
+
+/// Whether a state is one of a load.
+pub(super) fn is_of(load: &LoadHeader, snapshot: &SnapshotHeader) -> bool {
+    (load.run_id, load.topology_revision, load.particle_count)
+        == (snapshot.run_id, snapshot.topology_revision, snapshot.particle_count)
 }
 
 fn take_newer<T>(place: &mut Option<T>, newer: &mut Option<T>) {

@@ -5,15 +5,15 @@ use sim_contract::{
     TearsHeader, Triangle, Update,
 };
 
-/// The newest message of each kind that came, and all outcomes.
+/// The newest message of each kind that came; all of what belongs to a step, and all outcomes.
 #[derive(Debug, Default)]
 pub(super) struct News {
     pub(super) scene: Option<(LoadHeader, Vec<u8>)>,
     pub(super) topology: Option<(LoadHeader, Vec<ConstraintState>)>,
     pub(super) surface: Option<(LoadHeader, Vec<Triangle>)>,
-    pub(super) colliders: Option<(CollidersHeader, Vec<ColliderState>)>,
-    pub(super) tears: Option<(TearsHeader, Vec<u32>)>,
-    pub(super) tear_causes: Option<Vec<u8>>,
+    pub(super) colliders: Vec<(CollidersHeader, Vec<ColliderState>)>,
+    pub(super) tears: Vec<(TearsHeader, Vec<u32>)>,
+    pub(super) tear_causes: Vec<(TearsHeader, Vec<u8>)>,
     pub(super) outcomes: Vec<Outcome>,
     pub(super) status: Option<NodeStatus>,
 }
@@ -31,9 +31,9 @@ impl News {
             Update::Scene(header, text) => self.scene = Some((*header, text.to_vec())),
             Update::Topology(header, all) => self.topology = Some((*header, all.to_vec())),
             Update::Surface(header, all) => self.surface = Some((*header, all.to_vec())),
-            Update::Colliders(header, all) => self.colliders = Some((*header, all.to_vec())),
-            Update::Tears(header, all) => self.tears = Some((*header, all.to_vec())),
-            Update::TearCauses(_, all) => self.tear_causes = Some(all.to_vec()),
+            Update::Colliders(header, all) => self.colliders.push((*header, all.to_vec())),
+            Update::Tears(header, all) => self.tears.push((*header, all.to_vec())),
+            Update::TearCauses(header, all) => self.tear_causes.push((*header, all.to_vec())),
             Update::Outcome(outcome) => self.outcomes.push(*outcome),
             Update::Status(status) => self.status = Some(*status),
             // It is for the solver.

@@ -134,7 +134,7 @@ impl<'a> Player<'a> {
         match ask {
             Ask::Frame => self.shown_step = None,
             // Nothing is held.
-            Ask::Left => {}
+            Ask::Credit | Ask::Left => {}
             Ask::Command { id, command } => {
                 let result = self.obey(&command)?;
                 let outcome = outcome(id, &command, result);

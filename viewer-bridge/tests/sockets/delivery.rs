@@ -3,12 +3,16 @@
 use std::time::Duration;
 
 use viewer_bridge::hub::{Demand, Slot};
+use viewer_bridge::limits::FRAMES_UNACKNOWLEDGED_MAX;
 use viewer_bridge::message::{Node, ToPage};
 use viewer_bridge::source::{Ask, Request};
 use viewer_bridge::wire::Format::{F32, U16};
 use viewer_bridge::wire::Message;
 
 use crate::support::{Site, wait_for};
+
+/// How long a request of a page is waited for.
+const PATIENCE: Duration = Duration::from_mins(1);
 
 fn ack(frame: u32) -> String {
     format!(r#"{{"type":"ack","frame":{frame}}}"#)
@@ -73,6 +77,47 @@ fn a_page_gets_two_frames_and_then_the_newest_when_it_has_drawn_one() {
     wait_for("demand", || site.hub.demand(1).is_any().then_some(()));
     site.show(50, 1);
     assert_eq!(page.frame().0, 50);
+}
+
+#[test]
+fn a_page_that_has_drawn_the_newest_frame_asks_for_no_other() {
+    let mut site = Site::start();
+    let mut page = site.page();
+    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Frame }));
+    site.begin(1);
+    for step in 1..=FRAMES_UNACKNOWLEDGED_MAX {
+        site.show(step.into(), 1);
+        assert_eq!(page.frame().1, step);
+    }
+    page.say(&ack(FRAMES_UNACKNOWLEDGED_MAX));
+    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Credit }));
+    // Nor does it get the same once more, if somebody else needs it.
+    site.hub.show_again();
+    site.show(9, 1);
+    assert_eq!(page.frame().0, 9);
+}
+
+#[test]
+fn a_page_that_missed_the_newest_frame_asks_for_it() {
+    let mut site = Site::start();
+    let mut slow = site.silent_page();
+    slow.say(r#"{"type":"hello","protocol":1,"format":"u16"}"#);
+    slow.text_of("hello");
+    site.begin(1);
+    for step in 1..=2 {
+        site.show(step, 1);
+        assert_eq!(slow.frame().0, step);
+    }
+    let _quick = site.page();
+    site.wait_for_clients(2);
+    // Nobody waits for u16.
+    site.show(3, 1);
+    while site.requests.next(Duration::ZERO).is_some() {}
+    slow.say(&ack(2));
+    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Credit }));
+    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Frame }));
+    site.show(3, 1);
+    assert_eq!(slow.frame().0, 3);
 }
 
 #[test]
@@ -165,11 +210,10 @@ fn nobody_to_show_to_is_no_demand() {
 fn the_source_is_told_who_comes_and_goes() {
     let site = Site::start();
     let page = site.page();
-    let patience = Duration::from_mins(1);
-    assert_eq!(site.requests.next(patience), Some(Request { client: 1, ask: Ask::Frame }));
+    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Frame }));
     // Torn off, without a farewell.
     drop(page);
-    assert_eq!(site.requests.next(patience), Some(Request { client: 1, ask: Ask::Left }));
+    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Left }));
 }
 
 #[test]

@@ -320,7 +320,7 @@ fn what_is_no_command_is_refused_and_reaches_nobody() {
     client.publish(2, &json!({ "kind": "resume" }));
     let command = wait_for("a command", || match site.requests.next(Duration::ZERO)?.ask {
         Ask::Command { command, .. } => Some(command),
-        Ask::Left | Ask::Frame => None,
+        Ask::Left | Ask::Frame | Ask::Credit => None,
     });
     assert_eq!(command, Command::Resume {});
 }
