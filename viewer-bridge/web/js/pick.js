@@ -70,23 +70,33 @@ export function projectAll(points, viewProjection, viewport) {
 }
 
 /**
- * The constraints whose picture crosses the stroke from `from` to `to`.
- * @param {Float32Array} pixels of projectAll @param {Uint32Array} ends @param {Uint8Array} isGone @param {Pixel} from @param {Pixel} to
+ * The constraints that a blade and they have come across each other: those that moved over it where it
+ * stood (as they were, to as they are), and those over which it then went along `path`.
+ * @param {Float32Array} pixels of projectAll @param {Float32Array} past the same of the picture before
+ * @param {Uint32Array} ends @param {Uint8Array} isGone @param {Pixel[]} path from where the blade stood
  */
-export function crossedSticks(pixels, ends, isGone, from, to) {
+export function crossedSticks(pixels, past, ends, isGone, path) {
   /** @type {number[]} */
   const crossed = [];
-  const left = Math.min(from.x, to.x), right = Math.max(from.x, to.x);
-  const top = Math.min(from.y, to.y), bottom = Math.max(from.y, to.y);
+  const at = path[0];
   for (let i = 0; i < isGone.length; i++) {
     if (isGone[i]) continue;
     const a = 2 * ends[2 * i], b = 2 * ends[2 * i + 1];
     const ax = pixels[a], ay = pixels[a + 1], bx = pixels[b], by = pixels[b + 1];
-    // The boxes first: they rule out nearly all. A comparison with NaN is false, and rules out nothing.
-    if ((ax < left && bx < left) || (ax > right && bx > right) || (ay < top && by < top) || (ay > bottom && by > bottom)) continue;
-    if (segmentsCross(ax, ay, bx, by, from, to)) crossed.push(i);
+    // Seen from the stick, it is the blade that has moved: by as much as the stick's middle, in reverse.
+    const x = at.x + (ax - past[a] + bx - past[b]) / 2;
+    const y = at.y + (ay - past[a + 1] + by - past[b + 1]) / 2;
+    if (crosses(ax, ay, bx, by, { x, y }, at) || path.some((to, k) => k > 0 && crosses(ax, ay, bx, by, path[k - 1], to))) crossed.push(i);
   }
   return crossed;
+}
+
+/** As segmentsCross; boxes that are apart rule out nearly all. A comparison with NaN is false, and rules out nothing.
+ * @param {number} ax @param {number} ay @param {number} bx @param {number} by @param {Pixel} from @param {Pixel} to */
+function crosses(ax, ay, bx, by, from, to) {
+  if ((ax < from.x && bx < from.x && ax < to.x && bx < to.x) || (ax > from.x && bx > from.x && ax > to.x && bx > to.x)) return false;
+  if ((ay < from.y && by < from.y && ay < to.y && by < to.y) || (ay > from.y && by > from.y && ay > to.y && by > to.y)) return false;
+  return segmentsCross(ax, ay, bx, by, from, to);
 }
 
 /** Whether each segment has its ends on both sides of the other's line; a touch counts, parallels never cross.

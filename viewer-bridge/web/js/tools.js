@@ -162,23 +162,26 @@ export function depthUnder({ simulation, camera, renderer }, at, radius) {
   return simulation.position(found.reduce((best, one) => (one.w < best.w ? one : best)).particle);
 }
 
-/** Cuts every constraint whose picture the stroke crosses. @implements {Tool} */
+/** Cuts every constraint that the blade under the pointer crosses, whichever of them moves. @implements {Tool} */
 export class Knife {
   /** @param {Bench} bench @param {Pixel} start */
   constructor(bench, start) {
     this.bench = bench;
     this.start = start;
-    this.before = start;
-    this.pointer = start;
     /** @type {Pixel[]} */
     this.stroke = [start];
+    /** The way since the last look, from where the blade stood then. @type {Pixel[]} */
+    this.path = [start];
+    /** What was seen at the last look. */
+    this.seen = bench.simulation.frame;
+    this.scene = bench.simulation.scene;
     /** Cut already, though the answer is not here yet. @type {Set<number>} */
     this.cut = new Set();
   }
 
   /** @param {Pixel} to */
   move(to) {
-    this.pointer = to;
+    this.path.push(to);
     this.stroke.push(to);
     if (this.stroke.length > STROKE_POINTS_MAX) this.stroke.shift();
   }
@@ -187,10 +190,13 @@ export class Knife {
     const { simulation, camera, renderer, commands } = this.bench;
     const { frame, scene, topology } = simulation;
     if (frame === null || scene === null || topology === null) return;
-    if (this.pointer.x === this.before.x && this.pointer.y === this.before.y) return;
-    const pixels = projectAll(frame, camera.viewProjection(renderer.viewport), renderer.viewport);
-    const crossed = crossedSticks(pixels, scene.ends, topology.isGone, this.before, this.pointer).filter((one) => !this.cut.has(one));
-    this.before = this.pointer;
+    if (this.path.length === 1 && frame === this.seen) return;
+    const past = scene === this.scene && this.seen !== null ? this.seen : frame;
+    // Both by the camera of now: that it was turned meanwhile is no motion of the cloth.
+    const [now, before] = [frame, past].map((one) => projectAll(one, camera.viewProjection(renderer.viewport), renderer.viewport));
+    const crossed = crossedSticks(now, before, scene.ends, topology.isGone, this.path).filter((one) => !this.cut.has(one));
+    this.path = this.path.slice(-1);
+    [this.seen, this.scene] = [frame, scene];
     const most = simulation.hello?.limits.constraints_per_cut ?? 256;
     for (let first = 0; first < crossed.length; first += most) {
       const constraints = crossed.slice(first, first + most);

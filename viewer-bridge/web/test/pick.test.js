@@ -35,16 +35,34 @@ test("quantised positions are picked like the ones that they stand for", () => {
   assert.ok(Math.abs(pixels[0] - expected.x) < 1e-3 && Math.abs(pixels[1] - expected.y) < 1e-3);
 });
 
+const flat = Object.assign(new Camera(), { isFlat: true, axes: axesOf("y", 2) });
+const on = (x, y) => flat.project([x, y, 0], VIEWPORT);
+/** A ladder: rungs at heights 0, 1, 2, 3 between x = -1 and x = 1, or higher. */
+const ladder = (height = 0) => {
+  const points = frame([0, 1, 2, 3].flatMap((y) => [-1, y + height, 0, 1, y + height, 0]));
+  return projectAll(points, flat.viewProjection(VIEWPORT), VIEWPORT);
+};
+const RUNGS = Uint32Array.from([0, 1, 2, 3, 4, 5, 6, 7]);
+const cut = (pixels, past, path, isGone = [0, 0, 0, 0]) => crossedSticks(pixels, past, RUNGS, Uint8Array.from(isGone), path);
+
 test("a stroke crosses the sticks on its way, and only those that are whole", () => {
-  const flat = Object.assign(new Camera(), { isFlat: true, axes: axesOf("y", 2) });
-  // A ladder: rungs at heights 0, 1, 2, 3 between x = -1 and x = 1.
-  const points = frame([0, 1, 2, 3].flatMap((y) => [-1, y, 0, 1, y, 0]));
-  const pixels = projectAll(points, flat.viewProjection(VIEWPORT), VIEWPORT);
-  const ends = Uint32Array.from([0, 1, 2, 3, 4, 5, 6, 7]);
-  const from = flat.project([0, -0.5, 0], VIEWPORT);
-  const to = flat.project([0.2, 2.5, 0], VIEWPORT);
-  assert.deepEqual(crossedSticks(pixels, ends, new Uint8Array(4), from, to), [0, 1, 2]);
-  assert.deepEqual(crossedSticks(pixels, ends, Uint8Array.from([0, 1, 0, 0]), from, to), [0, 2]);
+  const path = [on(0, -0.5), on(0.2, 2.5)];
+  assert.deepEqual(cut(ladder(), ladder(), path), [0, 1, 2]);
+  assert.deepEqual(cut(ladder(), ladder(), path, [0, 1, 0, 0]), [0, 2]);
+});
+
+test("a stroke goes by every point of its way", () => {
+  // Round the end of rung 1, not through it.
+  assert.deepEqual(cut(ladder(), ladder(), [on(0, 0.5), on(1.5, 0.5), on(1.5, 1.5), on(0, 1.5)]), []);
+  assert.deepEqual(cut(ladder(), ladder(), [on(0, 0.5), on(0, 1.5)]), [1]);
+});
+
+test("a stick that moves over a blade is cut, wherever the stroke goes on", () => {
+  const past = ladder(0.25);
+  assert.deepEqual(cut(ladder(-0.25), past, [on(0, 1)]), [1]);
+  assert.deepEqual(cut(ladder(-0.25), past, [on(0, 1), on(0, 1.5)]), [1], "it is behind the blade already");
+  assert.deepEqual(cut(ladder(-0.25), past, [on(0, 0.5)]), [], "no stick has come by there");
+  assert.deepEqual(cut(ladder(-0.25), past, [on(2, 1)]), [], "beside the ladder");
 });
 
 test("segments cross where each has its ends on both sides of the other", () => {
