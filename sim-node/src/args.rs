@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use clap::error::ErrorKind;
 use clap::{Args as ClapArgs, CommandFactory, Parser, Subcommand};
-use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
+use sim_contract::{Endpoint, NAME_DEFAULT};
 use sim_solver::THREADS_MAX;
 
 pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
@@ -90,24 +90,11 @@ pub(crate) enum Verb {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct EndpointArgs {
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
-    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = name)]
+    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     pub(crate) name: String,
     /// Domain that keeps services apart from others on this host [default: that of iceoryx2]
-    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = domain)]
+    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
     pub(crate) domain: Option<String>,
-}
-
-fn name(text: &str) -> Result<String, EndpointError> {
-    Endpoint::new(None, text).map(|_| text.to_owned())
-}
-
-fn domain(text: &str) -> Result<String, EndpointError> {
-    endpoint(Some(text), NAME_DEFAULT).map(|_| text.to_owned())
-}
-
-/// The node of that name; an empty domain is the default one.
-pub(crate) fn endpoint(domain: Option<&str>, name: &str) -> Result<Endpoint, EndpointError> {
-    Endpoint::new(domain.filter(|domain| !domain.is_empty()), name)
 }
 
 #[derive(Debug, ClapArgs)]

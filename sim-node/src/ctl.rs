@@ -5,13 +5,15 @@ mod hint;
 
 use anyhow::{Context, bail};
 use serde::Serialize;
-use sim_contract::{Action, CONSOLE_CLIENT_ID, Client, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome};
+use sim_contract::{
+    Action, CONSOLE_CLIENT_ID, Client, Endpoint, NodeStatus, OUTCOME_FLAG_CONTROL, Outcome,
+};
 
-use crate::args::{CtlArgs, CtlVerb, endpoint};
+use crate::args::{CtlArgs, CtlVerb};
 
 /// Sends one command, or asks one question.
 pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<()> {
-    let endpoint = endpoint(args.domain.as_deref(), &args.name)?;
+    let endpoint = Endpoint::of_options(args.domain.as_deref(), &args.name)?;
     let mut client = Client::attach_as(&endpoint, CONSOLE_CLIENT_ID)?;
     match args.verb {
         CtlVerb::Status => status(&mut client, args),

@@ -8,7 +8,7 @@ use serde::Serialize;
 use sim_contract::{Endpoint, Stop};
 use sim_solver::Scene;
 
-use crate::args::{RunArgs, endpoint};
+use crate::args::RunArgs;
 use crate::node::{Node, Options};
 use crate::scene_source;
 
@@ -34,7 +34,7 @@ struct Summary {
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     let mut scene = scene_source::load(&args.scene)?;
     scene.override_solver(args.rate, args.substeps).map_err(|problem| anyhow!("--{problem}"))?;
-    let endpoint = endpoint(args.endpoint.domain.as_deref(), &args.endpoint.name)?;
+    let endpoint = Endpoint::of_options(args.endpoint.domain.as_deref(), &args.endpoint.name)?;
     let options = Options {
         rate_hz: args.rate,
         substeps: args.substeps,

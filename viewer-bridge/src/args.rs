@@ -58,10 +58,10 @@ pub(crate) struct Args {
     #[arg(long, requires = "foxglove")]
     allow_commands: bool,
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
-    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = name)]
+    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: String,
     /// Domain that keeps services apart from others on this host [default: that of iceoryx2]
-    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = domain)]
+    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
     domain: Option<String>,
     /// Folder to read the page's files from, for who works on them [default: those built in]
     #[arg(long, value_name = "DIR")]
@@ -70,9 +70,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
-        // An empty variable counts as absent.
-        let domain = self.domain.as_deref().filter(|domain| !domain.is_empty());
-        Endpoint::new(domain, &self.name)
+        Endpoint::of_options(self.domain.as_deref(), &self.name)
     }
 
     /// What the Foxglove server is told, where there is to be one.
@@ -90,15 +88,4 @@ fn foxglove_address(text: &str) -> Result<SocketAddr, String> {
     let address = text.parse().map_err(|_| "an address and a port, as in 127.0.0.1:8765")?;
     FoxgloveOptions::check_address(address).map_err(|error| error.to_string())?;
     Ok(address)
-}
-
-fn name(text: &str) -> Result<String, EndpointError> {
-    Endpoint::new(None, text).map(|_| text.to_owned())
-}
-
-fn domain(text: &str) -> Result<String, EndpointError> {
-    if !text.is_empty() {
-        Endpoint::new(Some(text), NAME_DEFAULT)?;
-    }
-    Ok(text.to_owned())
 }

@@ -88,6 +88,31 @@ impl Endpoint {
         Ok(Self { domain: domain.map(str::to_owned), name: name.to_owned() })
     }
 
+    /// As [`Endpoint::new`], of the options `--domain` and `--name` of a program: there an empty
+    /// domain, as an empty variable gives it, counts as absent.
+    ///
+    /// # Errors
+    /// As [`Endpoint::new`].
+    pub fn of_options(domain: Option<&str>, name: &str) -> Result<Self, EndpointError> {
+        Self::new(domain.filter(|domain| !domain.is_empty()), name)
+    }
+
+    /// The value of an option `--domain`, if it is one.
+    ///
+    /// # Errors
+    /// As [`Endpoint::of_options`].
+    pub fn parse_domain(text: &str) -> Result<String, EndpointError> {
+        Self::of_options(Some(text), NAME_DEFAULT).map(|_| text.to_owned())
+    }
+
+    /// The value of an option `--name`, if it is one.
+    ///
+    /// # Errors
+    /// As [`Endpoint::new`].
+    pub fn parse_name(text: &str) -> Result<String, EndpointError> {
+        Self::new(None, text).map(|_| text.to_owned())
+    }
+
     /// Reads `--domain` and `--name` from the command line and `CATENARY_DOMAIN` from the
     /// environment (the option wins, and an empty variable counts as absent). Also returns the
     /// other arguments, in order and without the program's name. For programs that are too small

@@ -3,9 +3,7 @@
 use std::time::Duration;
 
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
-use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, NAME_DEFAULT, SettingValue};
-
-use super::{domain, name};
+use sim_contract::{ConstraintKind, Endpoint, GRAB_OVER_S_DEFAULT, NAME_DEFAULT, SettingValue};
 
 #[derive(Debug, ClapArgs)]
 #[command(
@@ -36,11 +34,11 @@ pub(crate) struct CtlArgs {
     pub(crate) json: bool,
     /// Name of the node
     #[arg(long, global = true, default_value = NAME_DEFAULT, value_name = "NAME",
-        value_parser = name)]
+        value_parser = Endpoint::parse_name)]
     pub(crate) name: String,
     /// Domain of the node [default: that of iceoryx2]
     #[arg(long, global = true, env = "CATENARY_DOMAIN", value_name = "DOMAIN",
-        value_parser = domain)]
+        value_parser = Endpoint::parse_domain)]
     pub(crate) domain: Option<String>,
 }
 
