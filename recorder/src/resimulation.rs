@@ -4,10 +4,9 @@ mod side_rows;
 
 use std::collections::BTreeMap;
 
-use recorder::{Frame, Message, OutcomeRow, StepRow};
+use recorder::{Frame, Message, OutcomeRow, StepRow, state_hash};
 use sim_contract::{Action, Outcome, ParticleState};
 use sim_solver::{Keyframe, Scene, Solver};
-use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 use crate::apply::{apply, is_control};
 use crate::difference::{Difference, first_difference};
@@ -263,7 +262,7 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
         return diverged(what, None);
     }
     let simulated_hash = solver.state_hash();
-    if payload_hash(solver, particles) != simulated_hash {
+    if state_hash(particles, solver.torn()) != simulated_hash {
         let simulated: Vec<ParticleState> =
             (0..expected_count).map(|index| bytemuck::cast(solver.particle(index))).collect();
         let difference = first_difference(particles, &simulated);
@@ -289,12 +288,4 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
         return diverged(what, None);
     }
     Finding::Identical
-}
-
-/// The hash that the recorded bytes have, by the rule for the state hash.
-fn payload_hash(solver: &Solver, particles: &[ParticleState]) -> u64 {
-    let mut torn = solver.torn().to_vec();
-    torn.sort_unstable();
-    let seed = if torn.is_empty() { 0 } else { xxh3_64(bytemuck::cast_slice(&torn)) };
-    xxh3_64_with_seed(bytemuck::cast_slice(particles), seed)
 }

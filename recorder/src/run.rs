@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::str::FromStr;
 
+use sim_contract::LoadHeader;
+
+use crate::rows::TopologyRow;
 use crate::topic::{AllCounts, Topic};
 
 /// Version of what is in a file: topics, rows, metadata. It changes with any change of these.
@@ -62,6 +65,20 @@ impl RunDescription {
         let step = (since_epoch * u128::from(self.rate_hz)).div_ceil(NS_PER_S);
         let step = u64::try_from(step).ok()?;
         (self.time_of_step_ns(step) == time_ns).then_some(step)
+    }
+
+    /// The header under which the load of this run is published, with its topology.
+    pub fn load_header(&self, topology: &TopologyRow) -> LoadHeader {
+        LoadHeader {
+            run_id: self.run_id,
+            step: topology.step,
+            origin: self.origin,
+            topology_revision: topology.revision,
+            particle_count: self.particle_count,
+            rate_hz: self.rate_hz,
+            method: self.method,
+            ..LoadHeader::default()
+        }
     }
 
     pub(crate) fn to_map(&self) -> BTreeMap<String, String> {

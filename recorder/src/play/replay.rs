@@ -53,16 +53,7 @@ impl Replay {
         let run_id = getrandom::u64().context("no random number for the run")?;
         let constraints = topology.constraints().context("/topology has unequal columns")?;
         let triangles = surface.triangles().context("/surface has half a triangle")?;
-        let header = LoadHeader {
-            run_id,
-            step: topology.step,
-            origin: run.origin,
-            topology_revision: topology.revision,
-            particle_count: run.particle_count,
-            rate_hz: run.rate_hz,
-            method: run.method,
-            ..LoadHeader::default()
-        };
+        let header = LoadHeader { run_id, ..run.load_header(topology) };
         let load = Load {
             header,
             scene,

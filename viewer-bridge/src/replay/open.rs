@@ -6,7 +6,6 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use recorder::{LogEnd, ReadError, Tape, TapeError};
-use sim_contract::LoadHeader;
 
 use super::Replay;
 use crate::load::Load;
@@ -62,16 +61,7 @@ fn with_cure(error: TapeError) -> anyhow::Error {
 
 fn load_of(tape: &Tape) -> anyhow::Result<Load> {
     let (run, topology, surface) = (tape.run(), tape.topology(), tape.surface());
-    let header = LoadHeader {
-        run_id: run.run_id,
-        step: topology.step,
-        origin: run.origin,
-        topology_revision: topology.revision,
-        particle_count: run.particle_count,
-        rate_hz: run.rate_hz,
-        method: run.method,
-        ..LoadHeader::default()
-    };
+    let header = run.load_header(topology);
     let mut summary = SceneSummary::read(&String::from_utf8_lossy(tape.log().scene()));
     if summary.name.is_empty() {
         summary.name.clone_from(&run.scene_name);
