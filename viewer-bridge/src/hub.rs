@@ -267,7 +267,7 @@ impl Hub {
     }
 
     /// Waits for the end of the server.
-    pub(crate) async fn closed(&self) {
+    pub async fn closed(&self) {
         let mut closed = self.closed.subscribe();
         // The sender is ours: it cannot be gone.
         let _ended = closed.wait_for(|is_closed| *is_closed).await;

@@ -3,15 +3,16 @@
 
 mod args;
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use clap::Parser;
 use sim_contract::Stop;
 use tokio::runtime;
+use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::assets::Assets;
 use viewer_bridge::live::Live;
 use viewer_bridge::replay::Replay;
@@ -22,8 +23,6 @@ use args::Args;
 
 /// Threads of the server: encoding is not among its work, only sending.
 const SERVER_THREADS: usize = 2;
-/// How often signals and the source are looked at.
-const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
 #[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
 fn main() -> ExitCode {
@@ -69,6 +68,7 @@ async fn serve(
     foxglove: Option<FoxgloveOptions>,
     stop: Stop,
 ) -> anyhow::Result<()> {
+    let asked_to_stop = asked(&stop)?;
     let server = Server::bind(options).await?;
     let (hub, requests) = Hub::new(source.mode());
     let hub = Arc::new(hub);
@@ -85,8 +85,10 @@ async fn serve(
         }
     };
     let watch = async {
-        while !stop.is_asked() && !feeding.is_finished() {
-            tokio::time::sleep(LOOK_PERIOD).await;
+        tokio::select! {
+            () = asked_to_stop => {}
+            // The source has ended.
+            () = hub.closed() => {}
         }
         hub.close();
     };
@@ -96,7 +98,23 @@ async fn serve(
         .map_err(|_| anyhow!("the thread that reads the node or the recording panicked"))?
 }
 
-/// Starts the thread of the source.
+/// Waits for the signals that [`Stop`] knows of: it has taken note of what came before.
+fn asked(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> {
+    let listen = |kind| signal(kind).context("listening to signals");
+    let (mut interrupt, mut terminate) =
+        (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
+    let is_asked = stop.is_asked();
+    Ok(async move {
+        if !is_asked {
+            tokio::select! {
+                _ = interrupt.recv() => {}
+                _ = terminate.recv() => {}
+            }
+        }
+    })
+}
+
+/// Starts the thread of the source. With its end, however it ends, the hub is closed.
 fn feed(
     mut source: Box<dyn Source>,
     hub: &Arc<Hub>,
@@ -105,7 +123,11 @@ fn feed(
     let hub = Arc::clone(hub);
     thread::Builder::new()
         .name("source".to_owned())
-        .spawn(move || source.run(&hub, &requests))
+        .spawn(move || {
+            let ended = catch_unwind(AssertUnwindSafe(|| source.run(&hub, &requests)));
+            hub.close();
+            ended.unwrap_or_else(|panic| resume_unwind(panic))
+        })
         .context("starting the thread that reads the node or the recording")
 }
 
