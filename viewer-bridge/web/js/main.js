@@ -1,22 +1,22 @@
 // The page: makes its parts, joins them, and runs one loop of animation frames.
 
-import { Banner, sentence } from "./banner.js";
-import { Camera } from "./camera.js";
-import { Charts } from "./charts.js";
-import { Commands } from "./commands.js";
-import { Controls } from "./controls.js";
-import { find } from "./dom.js";
+import { Banner, sentence } from "./ui/banner.js";
+import { Camera } from "./geometry/camera.js";
+import { Charts } from "./panel/charts.js";
+import { Commands } from "./net/commands.js";
+import { Controls } from "./ui/controls.js";
+import { find } from "./ui/dom.js";
 import { Renderer } from "./gl/renderer.js";
-import { Hud } from "./hud.js";
-import { Input } from "./input.js";
-import { parseLink } from "./link.js";
-import { Overlay } from "./overlay.js";
-import { Panel } from "./panel.js";
-import { Connector } from "./socket.js";
-import { Simulation } from "./state.js";
-import { TimelineBar } from "./timeline-bar.js";
+import { Hud } from "./ui/hud.js";
+import { Input } from "./tools/input.js";
+import { parseLink } from "./ui/link.js";
+import { Overlay } from "./ui/overlay.js";
+import { Panel } from "./panel/panel.js";
+import { Connector } from "./net/socket.js";
+import { Simulation } from "./state/simulation.js";
+import { TimelineBar } from "./ui/timeline-bar.js";
 import { viewerOf } from "./viewer.js";
-import { Views } from "./views.js";
+import { Views } from "./ui/views.js";
 
 /** Where the token is kept, so that a reload still has it. */
 const TOKEN_KEY = "catenary-token";

@@ -2,8 +2,8 @@
 
 /**
  * @typedef {{
- *   bench: import("./tools.js").Bench, connector: import("./socket.js").Connector,
- *   banner: import("./banner.js").Banner, input: import("./input.js").Input, faults: string[],
+ *   bench: import("./tools/tools.js").Bench, connector: import("./net/socket.js").Connector,
+ *   banner: import("./ui/banner.js").Banner, input: import("./tools/input.js").Input, faults: string[],
  *   scriptMs: () => number,
  * }} Parts
  */

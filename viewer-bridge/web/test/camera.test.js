@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera, axesOf } from "../js/camera.js";
-import { addScaled, cross, dot, length, subtract } from "../js/math.js";
+import { Camera, axesOf } from "../js/geometry/camera.js";
+import { addScaled, cross, dot, length, subtract } from "../js/geometry/math.js";
 
 const VIEWPORT = { width: 800, height: 500 };
 

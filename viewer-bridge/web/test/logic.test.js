@@ -2,14 +2,15 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Commands } from "../js/commands.js";
-import { stageOf } from "../js/framing.js";
-import { formatLink, parseLink } from "../js/link.js";
-import { ROWS, SLIDER_STEPS, placeOf, rangeOf, rowsOf, valueAt, valueOf } from "../js/parameters.js";
-import { Series, niceCeiling, readable } from "../js/plot.js";
-import { closedText, delayBefore } from "../js/socket.js";
-import { Simulation } from "../js/state.js";
-import { Scale, SeekGate, clockText, marksByPixel } from "../js/timeline.js";
+import { Commands } from "../js/net/commands.js";
+import { stageOf } from "../js/state/framing.js";
+import { formatLink, parseLink } from "../js/ui/link.js";
+import { ROWS, SLIDER_STEPS, placeOf, rangeOf, rowsOf, valueAt, valueOf } from "../js/panel/parameters.js";
+import { Series } from "../js/panel/series.js";
+import { niceCeiling, readable } from "../js/ui/format.js";
+import { closedText, delayBefore } from "../js/net/socket.js";
+import { Simulation } from "../js/state/simulation.js";
+import { Scale, SeekGate, clockText, marksByPixel } from "../js/ui/timeline.js";
 
 test("a series keeps the newest samples, and a column shows its least and greatest", () => {
   const series = new Series(4);

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { boxOf, cross, dot, frameOf, identity, multiply, normalize, rotate, scaleThenMove, shadowOnto, tangents, transform } from "../js/math.js";
+import { boxOf, cross, dot, frameOf, identity, multiply, normalize, rotate, scaleThenMove, shadowOnto, tangents, transform } from "../js/geometry/math.js";
 
 const near = (a, b, within = 1e-12) => a.forEach((value, i) => assert.ok(Math.abs(value - b[i]) <= within, `${a} is not ${b}`));
 

@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera, axesOf } from "../js/camera.js";
-import { crossedSticks, pickParticle, projectAll, segmentsCross } from "../js/pick.js";
+import { Camera, axesOf } from "../js/geometry/camera.js";
+import { crossedSticks, pickParticle, projectAll, segmentsCross } from "../js/geometry/pick.js";
 
 const VIEWPORT = { width: 800, height: 600 };
 const camera = Object.assign(new Camera(), { yaw: 0, pitch: 0, distance: 5 });

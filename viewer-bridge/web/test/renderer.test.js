@@ -3,9 +3,9 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera } from "../js/camera.js";
+import { Camera } from "../js/geometry/camera.js";
 import { Renderer } from "../js/gl/renderer.js";
-import { Simulation } from "../js/state.js";
+import { Simulation } from "../js/state/simulation.js";
 
 /** A context that draws nothing: constants are their names, and `live` has how many of each kind there are. */
 function countingContext() {

@@ -1,15 +1,15 @@
 // What a scene holds on the graphics card: positions, the fans of triangles, the lists of what is
 // drawn. Written when something has changed, and only what has.
 
-import { drawnSticks } from "../topology.js";
+import { drawnSticks } from "../state/topology.js";
 import { ArrayTexture, layouts } from "./context.js";
 import { Cloth } from "./cloth.js";
 import { POINT, Points } from "./points.js";
 import { Sticks } from "./sticks.js";
-import { PIN } from "../wire.js";
+import { PIN } from "../net/wire.js";
 
-/** @typedef {import("../wire.js").Frame} Frame */
-/** @typedef {import("../state.js").Simulation} Simulation */
+/** @typedef {import("../net/wire.js").Frame} Frame */
+/** @typedef {import("../state/simulation.js").Simulation} Simulation */
 
 /** Sticks that are drawn at most: more are a grey carpet, and slow on weak machines. */
 export const STICKS_MAX = 30_000;
@@ -78,7 +78,7 @@ export class SceneBuffers {
 
   /** All particles that have a position, those of a big scene up to a limit. */
   writeParticles() {
-    const scene = /** @type {import("../wire.js").Scene} */ (this.simulation.scene);
+    const scene = /** @type {import("../net/wire.js").Scene} */ (this.simulation.scene);
     const lost = new Set(Array.from(this.simulation.nonFinite));
     const words = [];
     for (let particle = 0; particle < Math.min(scene.particleCount, PARTICLES_MAX); particle++) {

@@ -1,12 +1,12 @@
 // What particles collide with: solids in three dimensions, filled shapes in two.
 
-import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../math.js";
+import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../geometry/math.js";
 import { Program } from "./context.js";
 import { HEADER, LIGHT, SCREEN, SHADOW } from "./shaders.js";
 import { VERTEX_FLOATS, ball, cube, cubeEdges } from "./solids.js";
 
-/** @typedef {import("../math.js").Vec3} Vec3 */
-/** @typedef {import("../wire.js").Collider} Collider */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../net/wire.js").Collider} Collider */
 /** @typedef {Record<string, number | number[]>} Uniforms */
 /** Axes of a solid scaled by its size, where both ends of its axis are, and its axes for normals.
  * @typedef {{ solid: "ball" | "cube" | "edges", shape: number[], turn: number[], a: Vec3, b: Vec3 }} Placed */

@@ -1,16 +1,16 @@
 // The picture: everything in the order that it is drawn in. It asks the simulation what has changed
 // since the last picture, and draws only when something has.
 
-import { add, addScaled, dot, multiply, normalize, scale, shadowOnto, tangents } from "../math.js";
-import { HEAT_STOPS, linear, paletteOf } from "../theme.js";
+import { add, addScaled, dot, multiply, normalize, scale, shadowOnto, tangents } from "../geometry/math.js";
+import { HEAT_STOPS, linear, paletteOf } from "./theme.js";
 import { openContext, rendererName } from "./context.js";
 import { Drawers, SceneBuffers } from "./buffers.js";
 import { Colliders, place } from "./colliders.js";
 import { Ground } from "./ground.js";
 
-/** @typedef {import("../math.js").Vec3} Vec3 */
-/** @typedef {import("../state.js").Simulation} Simulation */
-/** @typedef {import("../camera.js").Camera} Camera */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../state/simulation.js").Simulation} Simulation */
+/** @typedef {import("../geometry/camera.js").Camera} Camera */
 /** @typedef {Record<string, number | number[]>} Uniforms */
 /** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean }} Toggles */
 
@@ -41,7 +41,7 @@ export class Renderer {
     this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true };
     this.framesDrawn = 0;
     this.stepDrawn = -1;
-    /** @type {import("../wire.js").Frame | null} */
+    /** @type {import("../net/wire.js").Frame | null} */
     this.frameDrawn = null;
     this.isDirty = true;
     /** What has changed since it was uploaded. */
@@ -225,7 +225,7 @@ export class Renderer {
   }
 
   /** A plane as a fading piece of ground, its lines at round numbers of the scene.
-   * @param {import("../state.js").Plane} plane @param {Uniforms} uniforms @param {Vec3} near */
+   * @param {import("../state/simulation.js").Plane} plane @param {Uniforms} uniforms @param {Vec3} near */
   drawPlane(plane, uniforms, near) {
     const palette = paletteOf(this.isDark);
     const size = Math.max(this.simulation.radius(), this.camera.distance * 0.4) * GROUND_RADII;
@@ -241,7 +241,7 @@ export class Renderer {
   }
 
   /** Each pixel of the ground is darkened once, however many things are over it: the stencil counts.
-   * @param {import("../state.js").Plane} plane @param {Uniforms} uniforms */
+   * @param {import("../state/simulation.js").Plane} plane @param {Uniforms} uniforms */
   drawShadows(plane, uniforms) {
     const { gl } = this;
     const eye = /** @type {Vec3} */ (uniforms.u_eye);

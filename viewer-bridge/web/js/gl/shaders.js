@@ -1,6 +1,6 @@
 // What all programs share: reading a particle's position by its index, the heat ramp, the light.
 
-import { HEAT_STOPS } from "../theme.js";
+import { HEAT_STOPS } from "./theme.js";
 
 /** Both stages of a program need the same precisions, or it does not link. */
 export const HEADER = `#version 300 es

@@ -1,7 +1,7 @@
 // Constraints as sticks: one instanced quad each, wide enough for a capsule in the picture, because
 // lines of WebGL are one pixel wide everywhere.
 
-import { STICK } from "../topology.js";
+import { STICK } from "../state/topology.js";
 import { Program } from "./context.js";
 import { CORNER, HEADER, HEAT, SCREEN, SHADOW, positionReader } from "./shaders.js";
 
@@ -106,7 +106,7 @@ export class Sticks {
     this.words = new Uint32Array(0);
   }
 
-  /** @param {import("../wire.js").Scene} scene @param {Uint32Array} drawn @param {Uint8Array} styles */
+  /** @param {import("../net/wire.js").Scene} scene @param {Uint32Array} drawn @param {Uint8Array} styles */
   setSticks(scene, drawn, styles) {
     const { gl } = this;
     this.drawn = drawn;

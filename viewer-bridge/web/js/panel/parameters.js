@@ -1,11 +1,11 @@
 // The logic of the panel: which parameters it shows, over what range, and how a slider's place is a
 // value. No elements here.
 
-import { niceCeiling } from "./plot.js";
-import { toNumber } from "./messages.js";
+import { niceCeiling } from "../ui/format.js";
+import { toNumber } from "../net/messages.js";
 
-/** @typedef {import("./messages.js").Values} Values */
-/** @typedef {import("./messages.js").SettingValue} SettingValue */
+/** @typedef {import("../net/messages.js").Values} Values */
+/** @typedef {import("../net/messages.js").SettingValue} SettingValue */
 /**
  * One row. "log" sliders go by powers of ten, and begin with 0 where `hasZero`. `whenOn` is the value
  * that a parameter gets when it is switched on, and the middle of its range.

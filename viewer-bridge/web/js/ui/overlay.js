@@ -3,13 +3,13 @@
 
 import { sharpContext } from "./dom.js";
 
-/** @typedef {import("./pick.js").Pixel} Pixel */
+/** @typedef {import("../geometry/pick.js").Pixel} Pixel */
 
 const HELD = "#ff8a1f";
 const CUT = "#e03546";
 
 export class Overlay {
-  /** @param {HTMLCanvasElement} canvas @param {import("./tools.js").Bench} bench @param {import("./input.js").Input} input */
+  /** @param {HTMLCanvasElement} canvas @param {import("../tools/tools.js").Bench} bench @param {import("../tools/input.js").Input} input */
   constructor(canvas, bench, input) {
     this.canvas = canvas;
     this.bench = bench;

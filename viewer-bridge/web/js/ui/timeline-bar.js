@@ -10,7 +10,7 @@ const MARKS = { tear: ["--accent", 0], pin: ["--plot-a", 1], command: ["--plot-c
 const ROW_HEIGHT = 5;
 
 export class TimelineBar {
-  /** @param {import("./state.js").Simulation} simulation @param {import("./commands.js").Commands} commands */
+  /** @param {import("../state/simulation.js").Simulation} simulation @param {import("../net/commands.js").Commands} commands */
   constructor(simulation, commands) {
     this.simulation = simulation;
     this.commands = commands;

@@ -1,13 +1,13 @@
 // What a hand can do: hold a particle, brush many, cut along a stroke, pin. Each sends at most one
 // message an animation frame, however often the pointer moves.
 
-import { addScaled, clamp, length, scale, subtract } from "./math.js";
-import { crossedSticks, particlesWithin, pickParticle, projectAll } from "./pick.js";
-import { PIN } from "./wire.js";
+import { addScaled, clamp, length, scale, subtract } from "../geometry/math.js";
+import { crossedSticks, particlesWithin, pickParticle, projectAll } from "../geometry/pick.js";
+import { PIN } from "../net/wire.js";
 
-/** @typedef {import("./math.js").Vec3} Vec3 */
-/** @typedef {import("./pick.js").Pixel} Pixel */
-/** @typedef {{ simulation: import("./state.js").Simulation, camera: import("./camera.js").Camera, renderer: import("./gl/renderer.js").Renderer, commands: import("./commands.js").Commands }} Bench */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/pick.js").Pixel} Pixel */
+/** @typedef {{ simulation: import("../state/simulation.js").Simulation, camera: import("../geometry/camera.js").Camera, renderer: import("../gl/renderer.js").Renderer, commands: import("../net/commands.js").Commands }} Bench */
 /** @typedef {{ start: Pixel, move(to: Pixel): void, tick(nowMs: number): void, end(): void, describe(): Trace }} Tool */
 /** What the overlay draws of a tool. @typedef {{ line?: { particle: number, to: Pixel }, circle?: { at: Pixel, radius: number }, stroke?: Pixel[] }} Trace */
 

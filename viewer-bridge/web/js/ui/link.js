@@ -1,6 +1,6 @@
 // What a link says behind its "#": the token, which scene, where the camera stands, what is shown.
 
-/** @typedef {{ target: import("./math.js").Vec3, distance: number, yaw: number, pitch: number }} CameraPose */
+/** @typedef {{ target: import("../geometry/math.js").Vec3, distance: number, yaw: number, pitch: number }} CameraPose */
 /** @typedef {{ token: string | null, scene: string | null, camera: CameraPose | null, toggles: Record<string, boolean> }} Link */
 
 /** Digits of a pose: a thousandth of what is seen, in any unit. */

@@ -1,12 +1,12 @@
 // The panel of parameters: a row for each, that shows what the node has and sends what the user
 // wants. A value on its way is not overwritten by an older answer while the slider is held.
 
-import { make } from "./dom.js";
+import { make } from "../ui/dom.js";
 import { SLIDER_STEPS, placeOf, rangeOf, rowsOf, valueAt, valueOf, vectorOf } from "./parameters.js";
-import { trim } from "./plot.js";
+import { trim } from "../ui/format.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
-/** @typedef {import("./messages.js").SettingValue} SettingValue */
+/** @typedef {import("../net/messages.js").SettingValue} SettingValue */
 
 const KINDS = ["structural", "shear", "bend", "tether"];
 const AXES = ["x", "y", "z"];
@@ -14,7 +14,7 @@ const AXES = ["x", "y", "z"];
 const WIND_DRAG = 0.6;
 
 export class Panel {
-  /** @param {HTMLFormElement} form @param {HTMLElement} note @param {import("./state.js").Simulation} simulation @param {import("./commands.js").Commands} commands */
+  /** @param {HTMLFormElement} form @param {HTMLElement} note @param {import("../state/simulation.js").Simulation} simulation @param {import("../net/commands.js").Commands} commands */
   constructor(form, note, simulation, commands) {
     this.form = form;
     this.note = note;

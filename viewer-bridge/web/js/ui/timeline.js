@@ -1,7 +1,7 @@
 // The logic of the replay bar: where a step is on it, which marks share a pixel, and scrubbing that
 // never has more than one seek under way.
 
-/** @typedef {import("./messages.js").Mark} Mark */
+/** @typedef {import("../net/messages.js").Mark} Mark */
 
 export class Scale {
   /** @param {number} first @param {number} last steps */

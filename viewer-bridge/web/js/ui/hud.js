@@ -1,12 +1,12 @@
 // The line of figures under the picture. It changes four times a second at most: faster is not read,
 // and a screen reader would never stop.
 
-import { trim } from "./plot.js";
+import { trim } from "./format.js";
 
 const INTERVAL_MS = 250;
 
 export class Hud {
-  /** @param {HTMLOutputElement} output @param {import("./state.js").Simulation} simulation @param {import("./gl/renderer.js").Renderer} renderer */
+  /** @param {HTMLOutputElement} output @param {import("../state/simulation.js").Simulation} simulation @param {import("../gl/renderer.js").Renderer} renderer */
   constructor(output, simulation, renderer) {
     this.output = output;
     this.simulation = simulation;

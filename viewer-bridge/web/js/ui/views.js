@@ -1,10 +1,10 @@
 // What is shown and how: the toggles, the strain scale, the first look at a scene, pictures, links.
 
 import { find, sharpContext } from "./dom.js";
-import { stageOf } from "./framing.js";
+import { stageOf } from "../state/framing.js";
 import { formatLink } from "./link.js";
-import { niceCeiling, readable } from "./plot.js";
-import { HEAT_STOPS } from "./theme.js";
+import { niceCeiling, readable } from "./format.js";
+import { HEAT_STOPS } from "../gl/theme.js";
 
 /** @typedef {import("./link.js").CameraPose} CameraPose */
 
@@ -18,7 +18,7 @@ const FIRST_LOOK = { yaw: 0.42, pitch: 0.16 };
 const SHOW_PARTICLES_MAX = 400;
 
 export class Views {
-  /** @param {import("./tools.js").Bench} bench @param {import("./banner.js").Banner} banner */
+  /** @param {import("../tools/tools.js").Bench} bench @param {import("./banner.js").Banner} banner */
   constructor(bench, banner) {
     this.bench = bench;
     this.banner = banner;
@@ -40,7 +40,7 @@ export class Views {
     bench.simulation.on("reset", () => { if (this.isFollowing) this.look(); });
   }
 
-  /** @param {import("./wire.js").Scene} scene */
+  /** @param {import("../net/wire.js").Scene} scene */
   begin(scene) {
     const { camera, renderer, simulation } = this.bench;
     camera.axes = simulation.axes();

@@ -1,10 +1,10 @@
 // The buttons of the bar, the scene picker, the help, and the keys that press them.
 
 import { find, make } from "./dom.js";
-import { MODES } from "./input.js";
+import { MODES } from "../tools/input.js";
 import { listenToKeys } from "./keys.js";
 
-/** @typedef {import("./input.js").Mode} Mode */
+/** @typedef {import("../tools/input.js").Mode} Mode */
 
 /** Below this width the panel covers the picture: it is away until it is asked for. */
 const PANEL_BESIDE_MIN = "(min-width: 761px)";
@@ -14,7 +14,7 @@ const KEY_ZOOM = 1.2;
 
 export class Controls {
   /**
-   * @param {import("./tools.js").Bench} bench @param {import("./input.js").Input} input
+   * @param {import("../tools/tools.js").Bench} bench @param {import("../tools/input.js").Input} input
    * @param {import("./views.js").Views} views @param {import("./timeline-bar.js").TimelineBar} timeline
    * @param {import("./banner.js").Banner} banner
    */

@@ -1,7 +1,8 @@
 // The plots: four small ones, drawn when a new measurement has come, and figures below them.
 
-import { cssColor, make, sharpContext } from "./dom.js";
-import { Series, niceCeiling, readable } from "./plot.js";
+import { cssColor, make, sharpContext } from "../ui/dom.js";
+import { niceCeiling, readable } from "../ui/format.js";
+import { Series } from "./series.js";
 
 /** Samples of what comes with every frame (20 s), and with every measurement, 4 a second (20 s). */
 const FRAME_SAMPLES = 1200;
@@ -11,7 +12,7 @@ const STATS_SAMPLES = 80;
 /** @typedef {{ title: string, unit: string, lines: Line[], limit: (() => number) | null, canvas: HTMLCanvasElement, output: HTMLOutputElement, text: () => string, lastTop: number }} Chart */
 
 export class Charts {
-  /** @param {HTMLElement} element @param {HTMLElement} figures @param {import("./state.js").Simulation} simulation */
+  /** @param {HTMLElement} element @param {HTMLElement} figures @param {import("../state/simulation.js").Simulation} simulation */
   constructor(element, figures, simulation) {
     this.simulation = simulation;
     this.figures = figures;
@@ -109,7 +110,7 @@ function rule(context, width, y, color, dash) {
   context.setLineDash([]);
 }
 
-/** A band from least to greatest in each column, so that a single peak is seen. @param {CanvasRenderingContext2D} context @param {import("./plot.js").Column[]} columns @param {number} width @param {(value: number) => number} y @param {string} color */
+/** A band from least to greatest in each column, so that a single peak is seen. @param {CanvasRenderingContext2D} context @param {import("./series.js").Column[]} columns @param {number} width @param {(value: number) => number} y @param {string} color */
 function drawLine(context, columns, width, y, color) {
   context.strokeStyle = color;
   context.lineWidth = 1.4;

@@ -1,7 +1,7 @@
 // How low a scene can hang: where its ground has to be so that nothing sinks into it.
 
-/** @typedef {import("./math.js").Vec3} Vec3 */
-/** @typedef {import("./wire.js").Scene} Scene */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../net/wire.js").Scene} Scene */
 
 /** A way along constraints is found in a few sweeps, because scenes number their particles in order. */
 const SWEEPS_MAX = 40;

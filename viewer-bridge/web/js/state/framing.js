@@ -1,11 +1,11 @@
 // The box that a first look at a scene should show: what is there, and where it is going to be.
 
-import { add, addScaled, dot, length, scale, subtract } from "./math.js";
-import { PIN } from "./wire.js";
+import { add, addScaled, dot, length, scale, subtract } from "../geometry/math.js";
+import { PIN } from "../net/wire.js";
 
-/** @typedef {import("./math.js").Vec3} Vec3 */
-/** @typedef {import("./math.js").Box} Box */
-/** @typedef {import("./wire.js").Collider} Collider */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/math.js").Box} Box */
+/** @typedef {import("../net/wire.js").Collider} Collider */
 
 /** Half of the box round a scene that is a single point, in the scene's unit. */
 const POINT_ROOM = 0.5;
@@ -15,7 +15,7 @@ const SOLID_SIZES = 1;
 /** Part of its size that what anchors carry is given on each side, to move in. */
 const CARRIED_ROOM = 0.2;
 
-/** @param {import("./state.js").Simulation} simulation @returns {Box} */
+/** @param {import("./simulation.js").Simulation} simulation @returns {Box} */
 export function stageOf(simulation) {
   const bounds = simulation.colliders.find((one) => one.shape === "bounds");
   if (bounds) return { min: bounds.a, max: bounds.b };

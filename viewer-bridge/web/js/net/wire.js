@@ -1,7 +1,7 @@
 // Decodes the bridge's binary messages; viewer-bridge/PROTOCOL.md is their definition. This is the
 // only module that knows an offset. Arrays are views into the message, not copies.
 
-/** @typedef {import("./math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 
 /** What every message begins with. `step` is exact: the protocol keeps it below 2^53.
  * @typedef {{ version: number, epoch: number, step: number }} Header */

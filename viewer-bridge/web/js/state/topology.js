@@ -1,9 +1,9 @@
 // What joins what in a scene, and what of it is still whole: which triangles and sticks are drawn,
 // and the triangles round each particle that its normal is made of.
 
-import { CONSTRAINT } from "./wire.js";
+import { CONSTRAINT } from "../net/wire.js";
 
-/** @typedef {import("./wire.js").Scene} Scene */
+/** @typedef {import("../net/wire.js").Scene} Scene */
 
 /** Stands for "no constraint joins these corners". */
 const NONE = -1;

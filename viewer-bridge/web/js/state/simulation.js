@@ -4,23 +4,23 @@
 import { Emitter } from "./emitter.js";
 import { lowestReach } from "./hanging.js";
 import { Topology } from "./topology.js";
-import { PIN } from "./wire.js";
-import { axesOf } from "./camera.js";
-import { add, boxOf, dot, length, scale, subtract } from "./math.js";
+import { PIN } from "../net/wire.js";
+import { axesOf } from "../geometry/camera.js";
+import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 
-/** @typedef {import("./math.js").Vec3} Vec3 */
-/** @typedef {import("./math.js").Box} Box */
-/** @typedef {import("./wire.js").Message} Message */
-/** @typedef {import("./wire.js").Scene} Scene */
-/** @typedef {import("./wire.js").Frame} Frame */
-/** @typedef {import("./wire.js").Stats} Stats */
-/** @typedef {import("./wire.js").Collider} Collider */
-/** @typedef {import("./messages.js").Hello} Hello */
-/** @typedef {import("./messages.js").NodeState} NodeState */
-/** @typedef {import("./messages.js").Parameters} Parameters */
-/** @typedef {import("./messages.js").TimelineMessage} TimelineMessage */
-/** @typedef {import("./messages.js").Playback} Playback */
-/** @typedef {import("./messages.js").TextMessage} TextMessage */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/math.js").Box} Box */
+/** @typedef {import("../net/wire.js").Message} Message */
+/** @typedef {import("../net/wire.js").Scene} Scene */
+/** @typedef {import("../net/wire.js").Frame} Frame */
+/** @typedef {import("../net/wire.js").Stats} Stats */
+/** @typedef {import("../net/wire.js").Collider} Collider */
+/** @typedef {import("../net/messages.js").Hello} Hello */
+/** @typedef {import("../net/messages.js").NodeState} NodeState */
+/** @typedef {import("../net/messages.js").Parameters} Parameters */
+/** @typedef {import("../net/messages.js").TimelineMessage} TimelineMessage */
+/** @typedef {import("../net/messages.js").Playback} Playback */
+/** @typedef {import("../net/messages.js").TextMessage} TextMessage */
 /** A plane to stand on: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
 
 /** Room under what hangs, in radii of the scene. */
@@ -32,7 +32,7 @@ const FLOOR_COSINE = 0.99;
  * @typedef {{
  *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
  *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
- *   outcome: import("./messages.js").OutcomeMessage, reset: void, clients: number,
+ *   outcome: import("../net/messages.js").OutcomeMessage, reset: void, clients: number,
  *   notice: { level: string, text: string }, ground: void,
  * }} Topics
  */
@@ -130,7 +130,7 @@ export class Simulation extends Emitter {
     this.emit("frame", frame);
   }
 
-  /** @param {import("./wire.js").Tear} tear */
+  /** @param {import("../net/wire.js").Tear} tear */
   receiveTear(tear) {
     const isMore = tear.first === this.torn.length;
     this.torn.length = Math.min(tear.first, this.torn.length);
@@ -149,7 +149,7 @@ export class Simulation extends Emitter {
     this.emit("tear", undefined);
   }
 
-  /** @param {import("./wire.js").Pins} pins */
+  /** @param {import("../net/wire.js").Pins} pins */
   receivePins(pins) {
     this.pinsReceived = new Map();
     pins.particles.forEach((particle, k) => this.pinsReceived.set(particle, pins.flags[k]));

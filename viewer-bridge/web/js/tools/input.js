@@ -1,9 +1,9 @@
 // Pointers and wheel on the picture: which tool a press begins, and when two fingers are the view's.
 
-import { clamp } from "./math.js";
+import { clamp } from "../geometry/math.js";
 import { Brush, Hand, Knife, REACH, View, depthUnder, particleAt, togglePin } from "./tools.js";
 
-/** @typedef {import("./pick.js").Pixel} Pixel */
+/** @typedef {import("../geometry/pick.js").Pixel} Pixel */
 /** @typedef {import("./tools.js").Tool} Tool */
 /** @typedef {"grab" | "brush" | "cut" | "pin"} Mode */
 
