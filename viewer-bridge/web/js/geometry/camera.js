@@ -1,33 +1,33 @@
-// One camera for both views: it turns about a target in three dimensions, and looks straight at the
-// plane in two. The orthographic height follows the distance by the same angle, so that zooming and
-// framing are one formula.
+// One camera for both kinds of scene: it orbits a target in 3-D, and looks straight at the plane in
+// 2-D. The orthographic height is derived from the distance and the same field of view, so zooming
+// and framing share one formula.
 
 import { add, addScaled, clamp, dot, length, multiply, normalize, scale, subtract, transform } from "./math.js";
 
 /** @typedef {import("./math.js").Vec3} Vec3 */
 /** @typedef {import("./math.js").Mat4} Mat4 */
-/** @typedef {{ right: Vec3, up: Vec3, toward: Vec3 }} Axes  of the unturned camera, in the world */
-/** @typedef {{ width: number, height: number }} Viewport  CSS pixels */
+/** @typedef {{ right: Vec3, up: Vec3, toward: Vec3 }} Axes  axes of the camera at zero yaw and pitch, in world space */
+/** @typedef {{ width: number, height: number }} Viewport  in CSS pixels */
 /** @typedef {{ origin: Vec3, direction: Vec3 }} Ray */
 
 /** Vertical field of view, radians. */
 const FIELD_OF_VIEW = (38 * Math.PI) / 180;
-/** Just short of the pole, where yaw would lose its meaning. */
+/** Just short of the pole, where yaw is undefined. */
 const PITCH_MAX = Math.PI / 2 - 0.02;
-/** Radians that a drag across 1 CSS pixel turns. */
+/** Rotation in radians per CSS pixel of pointer motion. */
 const TURN_PER_PIXEL = 0.008;
-/** How much deeper than wide the room of a plane scene is. */
+/** Depth range of a planar scene, relative to its width. */
 const FLAT_DEPTH = 100;
-/** Share of the picture that a framed box fills. */
+/** Fraction of the picture that a framed box fills. */
 const FRAME_FILL = 0.8;
 
 /**
- * The axes of a scene. In two dimensions x goes right and z towards the viewer whatever is up, so
- * that "-y" mirrors the picture as a screen does; in three nothing is mirrored.
+ * The axes of a scene. In 2-D, x always points right and z points at the viewer, so "-y" mirrors the
+ * picture, as screen coordinates do. In 3-D nothing is mirrored.
  * @param {string} up "y", "-y" or "z" @param {number} dimensions
  * @returns {Axes}
  */
-export function axesOf(up, dimensions) {
+export function sceneAxes(up, dimensions) {
   if (up === "z") return { right: [1, 0, 0], up: [0, 0, 1], toward: [0, -1, 0] };
   if (up !== "-y") return { right: [1, 0, 0], up: [0, 1, 0], toward: [0, 0, 1] };
   return { right: [1, 0, 0], up: [0, -1, 0], toward: [0, 0, dimensions === 2 ? 1 : -1] };
@@ -36,17 +36,15 @@ export function axesOf(up, dimensions) {
 export class Camera {
   constructor() {
     /** @type {Axes} */
-    this.axes = axesOf("y", 3);
+    this.axes = sceneAxes("y", 3);
     this.isFlat = false;
     /** @type {Vec3} */
     this.target = [0, 0, 0];
     this.distance = 3;
     this.yaw = 0.5;
     this.pitch = 0.2;
-    /** Radius of the scene: bounds the distance and the clipping planes. */
+    /** Radius of the scene: limits the distance and the clipping planes. */
     this.sceneRadius = 1;
-    /** Counts the changes, so that a picture knows whether it is the newest. */
-    this.revision = 0;
   }
 
   /** Unit vectors of the picture: right, up, and from the target to the eye. */
@@ -67,12 +65,12 @@ export class Camera {
     return addScaled(this.target, this.basis().back, this.distance);
   }
 
-  /** Half of the height of the picture, in the world, at the target. */
+  /** Half the height of the picture at the target, in world units. */
   halfHeight() {
     return this.distance * Math.tan(FIELD_OF_VIEW / 2);
   }
 
-  /** World units under one CSS pixel, at a point's depth. @param {Vec3} point @param {Viewport} viewport */
+  /** World units per CSS pixel at the depth of a point. @param {Vec3} point @param {Viewport} viewport */
   unitsPerPixel(point, viewport) {
     const depth = this.isFlat ? this.distance : dot(subtract(this.eye(), point), this.basis().back);
     return (2 * Math.max(depth, 0) * Math.tan(FIELD_OF_VIEW / 2)) / viewport.height;
@@ -90,7 +88,7 @@ export class Camera {
     const reach = this.distance + this.sceneRadius * 4;
     if (this.isFlat) {
       const h = this.halfHeight();
-      // The plane of the scene is in the middle of the depths: nothing is ever behind the eye.
+      // The plane of the scene lies in the middle of the depth range: nothing is ever behind the eye.
       const depth = reach * FLAT_DEPTH;
       return [1 / (h * aspect), 0, 0, 0, 0, 1 / h, 0, 0, 0, 0, -1 / depth, 0, 0, 0, -this.distance / depth, 1];
     }
@@ -117,9 +115,9 @@ export class Camera {
     return { origin, direction: normalize(subtract(onTarget, origin)) };
   }
 
-  /** Where a ray through a pixel meets the plane through `point` that faces the camera: a drag stays there.
+  /** The intersection of the ray through a pixel with the camera-facing plane through `point`. A grab stays on this plane.
    * @param {number} x @param {number} y @param {Viewport} viewport @param {Vec3} point @returns {Vec3} */
-  onPlaneThrough(x, y, viewport, point) {
+  intersectFacingPlane(x, y, viewport, point) {
     const { origin, direction } = this.ray(x, y, viewport);
     const { back } = this.basis();
     const slope = dot(direction, back);
@@ -129,39 +127,36 @@ export class Camera {
     return hit;
   }
 
-  /** CSS pixels of a point, or null behind the eye. @param {Vec3} point @param {Viewport} viewport */
+  /** The CSS pixel of a point, or null behind the eye. @param {Vec3} point @param {Viewport} viewport */
   project(point, viewport) {
     const [x, y, z, w] = transform(this.viewProjection(viewport), point);
     if (w <= 0) return null;
     return { x: ((x / w + 1) / 2) * viewport.width, y: ((1 - y / w) / 2) * viewport.height, depth: z / w };
   }
 
-  /** Turns about the target; in two dimensions there is nothing to turn. @param {number} dx @param {number} dy CSS pixels */
+  /** Orbits the target; does nothing in 2-D. @param {number} dx @param {number} dy CSS pixels */
   orbit(dx, dy) {
     if (this.isFlat) return;
     this.yaw -= dx * TURN_PER_PIXEL;
     this.pitch = clamp(this.pitch + dy * TURN_PER_PIXEL, -PITCH_MAX, PITCH_MAX);
-    this.revision++;
   }
 
-  /** Moves the target so that it stays under the pointer. @param {number} dx @param {number} dy @param {Viewport} viewport */
+  /** Moves the target along with the pointer. @param {number} dx @param {number} dy @param {Viewport} viewport */
   pan(dx, dy, viewport) {
     const { right, up } = this.basis();
     const unit = this.unitsPerPixel(this.target, viewport);
     this.target = addScaled(addScaled(this.target, right, -dx * unit), up, dy * unit);
-    this.revision++;
   }
 
-  /** Comes nearer by `factor`, keeping what is under the pixel where it is. @param {number} factor @param {number} x @param {number} y @param {Viewport} viewport */
+  /** Moves closer by `factor`, and keeps the point under the pixel in place. @param {number} factor @param {number} x @param {number} y @param {Viewport} viewport */
   zoom(factor, x, y, viewport) {
-    const before = this.onPlaneThrough(x, y, viewport, this.target);
+    const before = this.intersectFacingPlane(x, y, viewport, this.target);
     this.distance = clamp(this.distance / factor, this.sceneRadius * 0.02, this.sceneRadius * 60);
-    const after = this.onPlaneThrough(x, y, viewport, this.target);
+    const after = this.intersectFacingPlane(x, y, viewport, this.target);
     this.target = add(this.target, subtract(before, after));
-    this.revision++;
   }
 
-  /** Shows a whole box, from the direction that the camera has. @param {import("./math.js").Box} box @param {number} aspect */
+  /** Fits a box into the picture, seen from the current direction. @param {import("./math.js").Box} box @param {number} aspect */
   frame(box, aspect) {
     const half = scale(subtract(box.max, box.min), 0.5);
     this.target = scale(add(box.min, box.max), 0.5);
@@ -172,6 +167,5 @@ export class Camera {
     const needed = Math.max(extent(up), extent(right) / aspect, radius * 0.2) / FRAME_FILL;
     const depth = this.isFlat ? 0 : extent(this.basis().back);
     this.distance = needed / Math.tan(FIELD_OF_VIEW / 2) + depth;
-    this.revision++;
   }
 }

@@ -1,5 +1,5 @@
-// Vectors of three and column-major 4 x 4 matrices, as plain arrays of doubles: the page transforms
-// a handful of points a frame, and WebGL takes plain arrays for uniforms.
+// 3-vectors and column-major 4 x 4 matrices, as plain arrays of doubles: the page transforms only a
+// handful of points per frame, and WebGL accepts plain arrays for uniforms.
 
 /** @typedef {[number, number, number]} Vec3 */
 /** @typedef {number[]} Mat4  16 numbers, column-major */
@@ -26,7 +26,7 @@ export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * 
 /** @param {Vec3} a */
 export const length = (a) => Math.hypot(a[0], a[1], a[2]);
 
-/** A zero vector stays one: it has no direction. @param {Vec3} a @returns {Vec3} */
+/** A unit vector along `a`; the zero vector stays zero. @param {Vec3} a @returns {Vec3} */
 export function normalize(a) {
   const norm = length(a);
   return norm > 0 ? scale(a, 1 / norm) : [0, 0, 0];
@@ -35,14 +35,14 @@ export function normalize(a) {
 /** @param {number} value @param {number} low @param {number} high */
 export const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 
-/** Two unit vectors that, with the unit vector `n`, are a right-handed basis. @param {Vec3} n @returns {[Vec3, Vec3]} */
+/** Two unit vectors that form a right-handed basis with the unit vector `n`. @param {Vec3} n @returns {[Vec3, Vec3]} */
 export function tangents(n) {
   const helper = /** @type {Vec3} */ (Math.abs(n[0]) < 0.6 ? [1, 0, 0] : [0, 0, 1]);
   const u = normalize(subtract(helper, scale(n, dot(n, helper))));
   return [u, cross(n, u)];
 }
 
-/** The rotation of `v` by the quaternion x, y, z, w. @param {number[]} q @param {Vec3} v @returns {Vec3} */
+/** `v` rotated by the quaternion x, y, z, w. @param {number[]} q @param {Vec3} v @returns {Vec3} */
 export function rotate(q, v) {
   const axis = /** @type {Vec3} */ ([q[0], q[1], q[2]]);
   const twice = scale(cross(axis, v), 2);
@@ -65,7 +65,7 @@ export function multiply(a, b) {
   return product;
 }
 
-/** Scales by `factors`, then moves by `offset`. @param {Vec3} offset @param {Vec3} factors @returns {Mat4} */
+/** Scales by `factors`, then translates by `offset`. @param {Vec3} offset @param {Vec3} factors @returns {Mat4} */
 export const scaleThenMove = (offset, factors) => [
   factors[0], 0, 0, 0, 0, factors[1], 0, 0, 0, 0, factors[2], 0, offset[0], offset[1], offset[2], 1,
 ];
@@ -73,7 +73,7 @@ export const scaleThenMove = (offset, factors) => [
 /** The matrix with these columns. @param {Vec3} x @param {Vec3} y @param {Vec3} z @param {Vec3} origin @returns {Mat4} */
 export const frameOf = (x, y, z, origin) => [...x, 0, ...y, 0, ...z, 0, ...origin, 1];
 
-/** m · (p, 1) with its fourth number. @param {Mat4} m @param {Vec3} p @returns {[number, number, number, number]} */
+/** m · (p, 1), in homogeneous coordinates. @param {Mat4} m @param {Vec3} p @returns {[number, number, number, number]} */
 export const transform = (m, p) => [
   m[0] * p[0] + m[4] * p[1] + m[8] * p[2] + m[12],
   m[1] * p[0] + m[5] * p[1] + m[9] * p[2] + m[13],
@@ -82,11 +82,11 @@ export const transform = (m, p) => [
 ];
 
 /**
- * Projects along `light` onto the plane normal · x = offset: what a shadow does.
+ * The projection of a shadow: along `light` onto the plane normal · x = offset.
  *
  * x' = x - light · (normal · x - offset) / (normal · light), times normal · light to stay linear.
- * A light along the plane has no shadow: the matrix is singular then.
- * @param {Vec3} normal @param {number} offset @param {Vec3} light towards the light
+ * A light parallel to the plane casts no shadow: the matrix is then singular.
+ * @param {Vec3} normal @param {number} offset @param {Vec3} light direction towards the light
  * @returns {Mat4}
  */
 export function shadowOnto(normal, offset, light) {
@@ -102,7 +102,7 @@ export function shadowOnto(normal, offset, light) {
   return m;
 }
 
-/** The smallest box around three numbers a point; of no points, a unit box. @param {ArrayLike<number>} xyz @returns {Box} */
+/** The bounding box of points given as x, y, z triples; a unit box if there are none. @param {ArrayLike<number>} xyz @returns {Box} */
 export function boxOf(xyz) {
   if (xyz.length < 3) return { min: [-0.5, -0.5, -0.5], max: [0.5, 0.5, 0.5] };
   const min = /** @type {Vec3} */ ([Infinity, Infinity, Infinity]);

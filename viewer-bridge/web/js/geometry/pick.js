@@ -1,5 +1,5 @@
-// What is under the pointer: the particle of a grab, and the sticks that a cutting stroke crosses.
-// Linear scans over all particles: well under a millisecond at 20,000, and only when a hand moves.
+// Picking: the particle under the pointer, and the sticks that a cutting stroke crosses. Linear scans
+// over all particles take well under a millisecond at 20,000, and run only when the pointer moves.
 
 import { multiply, scaleThenMove } from "./math.js";
 
@@ -8,32 +8,32 @@ import { multiply, scaleThenMove } from "./math.js";
 /** @typedef {{ positions: ArrayLike<number>, lo: import("./math.js").Vec3, scale: import("./math.js").Vec3 }} Points */
 /** @typedef {{ x: number, y: number }} Pixel */
 
-/** How much nearer to the eye than another a particle has to be, in radii of the search, to be in front of it. */
+/** Depth of the foremost layer, in search radii: a particle that much nearer to the eye is in front. */
 const LAYER_RADII = 2;
 
-/** The matrix that takes the numbers of a frame to the clip space. @param {Mat4} viewProjection @param {Points} points */
-export const fromFrame = (viewProjection, points) => multiply(viewProjection, scaleThenMove(points.lo, points.scale));
+/** The matrix from the values of a frame to clip space. @param {Mat4} viewProjection @param {Points} points */
+export const frameToClip = (viewProjection, points) => multiply(viewProjection, scaleThenMove(points.lo, points.scale));
 
 /**
- * The particle at a pixel: of those within `radius`, the ones of the foremost layer count, and of
- * these the one that is nearest to the pixel.
+ * The particle at a pixel: of the particles within `radius`, the one in the foremost layer that is
+ * nearest to the pixel.
  * @param {Points} points @param {Mat4} viewProjection @param {Viewport} viewport
  * @param {Pixel} at @param {number} radius CSS pixels
  * @returns {number | null}
  */
 export function pickParticle(points, viewProjection, viewport, at, radius) {
-  const found = particlesWithin(points, viewProjection, viewport, at, radius);
-  if (found.length === 0) return null;
-  const front = found.reduce((least, one) => Math.min(least, one.w), Infinity);
-  // At distance w, a pixel is w times a constant: the same for all, so that it can stand for a length.
+  const candidates = particlesWithin(points, viewProjection, viewport, at, radius);
+  if (candidates.length === 0) return null;
+  const front = candidates.reduce((least, one) => Math.min(least, one.w), Infinity);
+  // The size of a pixel in the world is proportional to its depth w, so depths compare with the radius.
   const layer = front * (1 + (LAYER_RADII * radius) / viewport.height);
-  const inFront = found.filter((one) => one.w <= layer);
+  const inFront = candidates.filter((one) => one.w <= layer);
   return inFront.reduce((best, one) => (one.squared < best.squared ? one : best)).particle;
 }
 
 /** @param {Points} points @param {Mat4} viewProjection @param {Viewport} viewport @param {Pixel} at @param {number} radius */
 export function particlesWithin(points, viewProjection, viewport, at, radius) {
-  const m = fromFrame(viewProjection, points);
+  const m = frameToClip(viewProjection, points);
   const p = points.positions;
   const [m0, m4, m8, m12] = [m[0], m[4], m[8], m[12]];
   const [m1, m5, m9, m13] = [m[1], m[5], m[9], m[13]];
@@ -42,7 +42,7 @@ export function particlesWithin(points, viewProjection, viewport, at, radius) {
   const halfHeight = viewport.height / 2;
   const limit = radius * radius;
   /** @type {{ particle: number, squared: number, w: number }[]} */
-  const found = [];
+  const particles = [];
   for (let i = 0; i + 2 < p.length; i += 3) {
     const x = p[i], y = p[i + 1], z = p[i + 2];
     const w = m3 * x + m7 * y + m11 * z + m15;
@@ -50,14 +50,14 @@ export function particlesWithin(points, viewProjection, viewport, at, radius) {
     const dx = ((m0 * x + m4 * y + m8 * z + m12) / w + 1) * halfWidth - at.x;
     const dy = (1 - (m1 * x + m5 * y + m9 * z + m13) / w) * halfHeight - at.y;
     const squared = dx * dx + dy * dy;
-    if (squared <= limit) found.push({ particle: i / 3, squared, w });
+    if (squared <= limit) particles.push({ particle: i / 3, squared, w });
   }
-  return found;
+  return particles;
 }
 
-/** CSS pixels of every particle, x and y; NaN behind the eye. @param {Points} points @param {Mat4} viewProjection @param {Viewport} viewport */
+/** The CSS pixel of every particle, as x, y pairs; NaN behind the eye. @param {Points} points @param {Mat4} viewProjection @param {Viewport} viewport */
 export function projectAll(points, viewProjection, viewport) {
-  const m = fromFrame(viewProjection, points);
+  const m = frameToClip(viewProjection, points);
   const p = points.positions;
   const pixels = new Float32Array((p.length / 3) * 2);
   for (let i = 0, o = 0; i + 2 < p.length; i += 3, o += 2) {
@@ -70,10 +70,10 @@ export function projectAll(points, viewProjection, viewport) {
 }
 
 /**
- * The constraints that a blade and they have come across each other: those that moved over it where it
- * stood (as they were, to as they are), and those over which it then went along `path`.
- * @param {Float32Array} pixels of projectAll @param {Float32Array} past the same of the picture before
- * @param {Uint32Array} ends @param {Uint8Array} isGone @param {Pixel[]} path from where the blade stood
+ * The constraints that a blade crosses: those that moved over its position between two frames, and
+ * those that it then crosses along `path`.
+ * @param {Float32Array} pixels from projectAll @param {Float32Array} past the same for the frame before
+ * @param {Uint32Array} ends @param {Uint8Array} isGone @param {Pixel[]} path starts at the position of the blade
  */
 export function crossedSticks(pixels, past, ends, isGone, path) {
   /** @type {number[]} */
@@ -83,7 +83,7 @@ export function crossedSticks(pixels, past, ends, isGone, path) {
     if (isGone[i]) continue;
     const a = 2 * ends[2 * i], b = 2 * ends[2 * i + 1];
     const ax = pixels[a], ay = pixels[a + 1], bx = pixels[b], by = pixels[b + 1];
-    // Seen from the stick, it is the blade that has moved: by as much as the stick's middle, in reverse.
+    // Relative to the stick, the blade moved by the opposite of the motion of the stick's middle.
     const x = at.x + (ax - past[a] + bx - past[b]) / 2;
     const y = at.y + (ay - past[a + 1] + by - past[b + 1]) / 2;
     if (crosses(ax, ay, bx, by, { x, y }, at) || path.some((to, k) => k > 0 && crosses(ax, ay, bx, by, path[k - 1], to))) crossed.push(i);
@@ -91,7 +91,7 @@ export function crossedSticks(pixels, past, ends, isGone, path) {
   return crossed;
 }
 
-/** As segmentsCross; boxes that are apart rule out nearly all. A comparison with NaN is false, and rules out nothing.
+/** segmentsCross behind a test of bounding boxes, which rules out most pairs. NaN passes the box test.
  * @param {number} ax @param {number} ay @param {number} bx @param {number} by @param {Pixel} from @param {Pixel} to */
 function crosses(ax, ay, bx, by, from, to) {
   if ((ax < from.x && bx < from.x && ax < to.x && bx < to.x) || (ax > from.x && bx > from.x && ax > to.x && bx > to.x)) return false;
@@ -99,7 +99,7 @@ function crosses(ax, ay, bx, by, from, to) {
   return segmentsCross(ax, ay, bx, by, from, to);
 }
 
-/** Whether each segment has its ends on both sides of the other's line; a touch counts, parallels never cross.
+/** True if two segments cross. A touch counts; parallel segments never cross.
  * @param {number} ax @param {number} ay @param {number} bx @param {number} by @param {Pixel} from @param {Pixel} to */
 export function segmentsCross(ax, ay, bx, by, from, to) {
   const sx = to.x - from.x, sy = to.y - from.y;

@@ -1,5 +1,5 @@
-// Colours of the picture, for light and dark surroundings, and the ramp of the heat map. Colours are
-// sRGB here and linear in the shaders.
+// Colours of the picture for the light and dark colour schemes, and the ramp of the heat map. Colours
+// are sRGB here and linear in the shaders.
 
 /** @typedef {[number, number, number]} Color  linear light, 0..=1 */
 
@@ -10,8 +10,8 @@ export function linear(hex) {
 }
 
 /**
- * Dark blue over grey to yellow: lightness rises evenly and red is never told from green, so that
- * it reads the same for colour-blind eyes and in print.
+ * Dark blue through grey to yellow. Lightness rises evenly, and no two colours differ only in red and
+ * green, so the ramp is readable in print and with colour blindness.
  */
 export const HEAT_STOPS = ["#0b2f6b", "#41527a", "#7b7b7b", "#b9a85a", "#fde737"];
 
@@ -21,12 +21,12 @@ export const HEAT_STOPS = ["#0b2f6b", "#41527a", "#7b7b7b", "#b9a85a", "#fde737"
  *   sky: Color, bounce: Color, key: number,
  *   front: Color, back: Color, stick: Color, stickFaint: Color, particle: Color, collider: Color,
  *   flatSurface: Color, flatStick: Color,
- *   pin: Color, anchor: Color, held: Color, frozen: Color, ring: Color,
+ *   pin: Color, anchor: Color, grabbed: Color, frozen: Color, ring: Color,
  * }} Palette
  */
 
 const MARKS = {
-  pin: linear("#2f6fde"), anchor: linear("#7a4fd0"), held: linear("#ff8a1f"), frozen: linear("#e0218a"), ring: linear("#ffffff"),
+  pin: linear("#2f6fde"), anchor: linear("#7a4fd0"), grabbed: linear("#ff8a1f"), frozen: linear("#e0218a"), ring: linear("#ffffff"),
 };
 
 /** @type {Palette} */

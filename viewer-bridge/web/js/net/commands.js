@@ -1,13 +1,13 @@
-// Commands with an id, and who waits for their outcome.
+// Sends commands, and routes their outcomes to the callers by id.
 
 /** @typedef {import("./messages.js").OutcomeMessage} Outcome */
 /** @typedef {(outcome: Outcome) => void} OnOutcome */
 
-/** Commands that may wait for their outcome; the oldest is forgotten beyond. */
+/** Limit on commands without an outcome yet; the oldest callback is dropped beyond it. */
 const WAITING_MAX = 1024;
 
 export class Commands {
-  /** @param {(message: object) => boolean} send @param {(outcome: Outcome) => void} onRefused hears of every command that had no effect */
+  /** @param {(message: object) => boolean} send @param {(outcome: Outcome) => void} onRefused receives the outcome of every command that was not applied */
   constructor(send, onRefused) {
     this.send = send;
     this.onRefused = onRefused;
@@ -16,7 +16,7 @@ export class Commands {
     this.waiting = new Map();
   }
 
-  /** Sends a command, and later calls `onOutcome` with what became of it. False without a connection.
+  /** Sends a command, and later calls `onOutcome` with its outcome. Returns false without a connection.
    * @param {string} type @param {object} [fields] @param {OnOutcome} [onOutcome] */
   run(type, fields = {}, onOutcome = () => {}) {
     this.lastId = (this.lastId + 1) % 2 ** 32;
@@ -26,7 +26,7 @@ export class Commands {
     return isSent;
   }
 
-  /** For what is sent with every frame: only a refusal is answered. @param {string} type @param {object} fields */
+  /** Sends a command without an id, for those sent once per frame: the bridge answers only a refusal. @param {string} type @param {object} fields */
   stream(type, fields) {
     return this.send({ type, ...fields });
   }
@@ -39,8 +39,8 @@ export class Commands {
     if (outcome.status !== "applied") this.onRefused(outcome);
   }
 
-  /** The connection is gone, and with it all answers. */
-  forget() {
+  /** Drops all callbacks: a lost connection brings no more outcomes. */
+  clear() {
     this.waiting.clear();
   }
 }

@@ -1,4 +1,4 @@
-// The types of the text messages of viewer-bridge/PROTOCOL.md, section 3, as the page reads them.
+// Types of the text messages that the page receives (viewer-bridge/PROTOCOL.md, section 3).
 
 /** @typedef {number | number[] | null} SettingValue */
 /** @typedef {{ name: string, unit: string, value: "vector" | "number" | "whole", min: number, max: number, above_min: boolean, off: boolean, per_kind: boolean }} Setting */
@@ -25,7 +25,7 @@
  *   | { type: "reset", step: number } | { type: "notice", level: string, text: string }} TextMessage
  */
 
-/** JSON has no infinities: the protocol writes them as words. @param {unknown} value @returns {number} */
+/** Reads a number. JSON has no infinities, so the protocol writes them as words. @param {unknown} value @returns {number} */
 export function toNumber(value) {
   if (typeof value === "number") return value;
   if (value === "inf") return Infinity;

@@ -1,5 +1,5 @@
-// The connection to the bridge: it says hello, hands on what comes, acknowledges what was drawn, and
-// comes back by itself with growing, random pauses.
+// The connection to the bridge: introduces the page, passes messages on, acknowledges drawn frames,
+// and reconnects with growing, randomised delays.
 
 import { decode } from "./wire.js";
 
@@ -17,23 +17,23 @@ import { decode } from "./wire.js";
 export const PROTOCOL = 1;
 const FIRST_DELAY_MS = 250;
 const DELAY_MAX_MS = 5000;
-/** Closed for a reason that another try does not change. */
+/** Close codes after which another attempt cannot succeed. */
 const FINAL_CODES = new Set([4400, 4401, 4426]);
 
 /**
- * How long to wait before the next try: doubling, with a random part, so that the pages of a node
- * that comes back do not all knock at once.
- * @param {number} failures so far, from 0 @param {number} random 0..1
+ * Delay before the next attempt, in ms. It doubles each time and has a random part, so that many
+ * pages do not reconnect at the same moment.
+ * @param {number} failures number of failures so far @param {number} random 0..1
  */
 export const delayBefore = (failures, random) => Math.min(DELAY_MAX_MS, FIRST_DELAY_MS * 2 ** failures) * (1 + random / 2);
 
-/** What a closed connection means to the user. @param {number} code @param {string} reason */
+/** A message for the user about a closed connection. @param {number} code @param {string} reason */
 export function closedText(code, reason) {
-  if (code === 4401) return "This bridge asks for a token: open the address that it printed, with everything behind the “#”.";
-  if (code === 4426) return `The page and the bridge are of different versions (${reason}): reload the page.`;
-  if (code === 4400) return `The bridge did not understand this page (${reason}): reload the page.`;
-  if (code === 4429) return "Too many messages in a second.";
-  if (code === 4408) return "The connection was too slow.";
+  if (code === 4401) return "This bridge requires a token. Open the full address that it printed, including everything after the “#”.";
+  if (code === 4426) return `The page and the bridge have different versions (${reason}). Reload the page.`;
+  if (code === 4400) return `The bridge could not read a message from this page (${reason}). Reload the page.`;
+  if (code === 4429) return "The page sent too many messages per second.";
+  if (code === 4408) return "The connection was too slow or timed out.";
   return "No connection to the bridge.";
 }
 
@@ -64,8 +64,8 @@ export class Connector {
     socket.onclose = ({ code, reason }) => this.closed(socket, code, reason);
   }
 
-  /** Tries at once: the tab is visible again, or the network is back. */
-  hurry() {
+  /** Skips the rest of the delay: the tab is visible again, or the network is back. */
+  retryNow() {
     if (this.connection.state === "waiting") this.connect();
   }
 
@@ -89,7 +89,7 @@ export class Connector {
   receiveText(data) {
     const message = JSON.parse(data);
     if (message.type === "hello") {
-      // Only now has the bridge let this page in: a refusal also begins with an open socket.
+      // The socket also opens before a refusal: only `hello` shows that the bridge accepted the page.
       this.failures = 0;
       this.change({ state: "open", text: "" });
     }
@@ -106,14 +106,14 @@ export class Connector {
     }
   }
 
-  /** @param {object} message @returns {boolean} whether there was a connection to send it by */
+  /** @param {object} message @returns {boolean} false if there is no connection */
   send(message) {
     if (this.socket?.readyState !== WebSocket.OPEN) return false;
     this.socket.send(JSON.stringify(message));
     return true;
   }
 
-  /** @param {number} frame number of the frame that was drawn */
+  /** @param {number} frame number of the drawn frame */
   acknowledge(frame) {
     if (this.send({ type: "ack", frame })) this.framesAcknowledged++;
   }

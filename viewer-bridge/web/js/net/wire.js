@@ -1,9 +1,9 @@
-// Decodes the bridge's binary messages; viewer-bridge/PROTOCOL.md is their definition. This is the
-// only module that knows an offset. Arrays are views into the message, not copies.
+// Decodes the binary messages of the bridge, as viewer-bridge/PROTOCOL.md defines them. No other
+// module knows an offset. Arrays are views into the message, not copies.
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 
-/** What every message begins with. `step` is exact: the protocol keeps it below 2^53.
+/** The header of every message. `step` is exact: the protocol keeps it below 2^53.
  * @typedef {{ version: number, epoch: number, step: number }} Header */
 
 /**
@@ -14,7 +14,7 @@
  *   positions: Float32Array, ends: Uint32Array, restLengths: Float32Array, triangles: Uint32Array,
  *   constraintKinds: Uint8Array, name: string, unit: string, up: string, runId: string,
  *   grids: { first: number, columns: number, rows: number }[],
- * }} Scene  arrays: 3 n, 2 s, s, 3 t, s
+ * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s
  *
  * @typedef {Header & {
  *   kind: "frame", simTime: number, particleCount: number,
@@ -22,7 +22,7 @@
  *   lo: Vec3, scale: Vec3, tornCount: number, solveUs: number, wakeLateUs: number,
  *   number: number, publishedNs: bigint, isQuantised: boolean,
  *   positions: Float32Array | Uint16Array, nonFinite: Uint32Array,
- * }} Frame  coordinate = lo + scale · value where quantised; else lo is 0 and scale 1
+ * }} Frame  coordinate = lo + scale · value; lo is 0 and scale 1 unless quantised
  *
  * @typedef {Header & { kind: "tear", first: number, constraints: Uint32Array, causes: Uint8Array }} Tear
  * @typedef {Header & { kind: "pins", particles: Uint32Array, flags: Uint32Array }} Pins
@@ -46,16 +46,16 @@
  * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders} Message
  */
 
-/** Bits of a particle in PINS. */
+/** Flags of a particle in PINS. */
 export const PIN = Object.freeze({ pinned: 1, grabbed: 2, anchored: 4, frozen: 8 });
-/** Constraint kinds of SCENE. */
+/** Constraint kinds in SCENE. */
 export const CONSTRAINT = Object.freeze({ structural: 0, shear: 1, bend: 2, tether: 3 });
 
 const VERSION = 1;
 const SHAPES = /** @type {const} */ (["plane", "box", "sphere", "capsule", "bounds"]);
 const COLLIDER_BYTES = 120;
 
-/** Reads what lies one behind the other in a message, and refuses what would end beyond it. */
+/** Reads consecutive fields of a message. Throws a RangeError beyond its end. */
 class Reader {
   /** @param {ArrayBuffer} buffer */
   constructor(buffer) {
@@ -93,7 +93,7 @@ class Reader {
     return [this.f32(), this.f32(), this.f32()];
   }
 
-  /** A view of `count` elements, and the padding behind it.
+  /** Returns a view of `count` elements, and skips the padding after it.
    * @template {Uint8Array | Uint16Array | Uint32Array | Float32Array} T
    * @param {{ new (buffer: ArrayBuffer, at: number, count: number): T, BYTES_PER_ELEMENT: number }} Type
    * @param {number} count @returns {T} */
@@ -115,10 +115,10 @@ const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => M
 });
 
 /**
- * The message in a buffer, or null for a kind or a version that this page does not know.
+ * Decodes a message. Returns null for a kind or version that this page does not know.
  * @param {ArrayBuffer} buffer
  * @returns {Message | null}
- * @throws {RangeError} where a message is shorter than it says
+ * @throws {RangeError} if the message is shorter than its counts require
  */
 export function decode(buffer) {
   const reader = new Reader(buffer);
@@ -200,7 +200,7 @@ function decodePins(reader, header) {
 
 /** @param {Reader} reader @param {Header} header @returns {Stats} */
 function decodeStats(reader, header) {
-  // The fields stand in the order of the message: each call reads the next one.
+  // The fields are in the order of the message: each call reads the next one.
   const stats = {
     kind: /** @type {const} */ ("stats"), ...header,
     solveUsP50: reader.f32(), solveUsP99: reader.f32(),
@@ -221,7 +221,7 @@ function decodeStats(reader, header) {
 function decodeColliders(reader, header) {
   const count = reader.u32();
   reader.u32();
-  if (reader.at + count * COLLIDER_BYTES > reader.view.byteLength) throw new RangeError("colliders end beyond the message");
+  if (reader.at + count * COLLIDER_BYTES > reader.view.byteLength) throw new RangeError("the message ends within its colliders");
   /** @type {Collider[]} */
   const colliders = [];
   for (let index = 0; index < count; index++) {
@@ -231,7 +231,7 @@ function decodeColliders(reader, header) {
   return { kind: "colliders", ...header, colliders };
 }
 
-/** A shape of a later version is read over. @param {Reader} reader @returns {Collider | null} */
+/** Skips a shape of a later version. @param {Reader} reader @returns {Collider | null} */
 function decodeCollider(reader) {
   const shape = SHAPES[reader.u32()];
   const restitution = reader.f32();

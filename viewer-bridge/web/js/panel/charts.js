@@ -1,10 +1,10 @@
-// The plots: four small ones, drawn when a new measurement has come, and figures below them.
+// The measurements: four small plots, redrawn with each STATS message, and figures below them.
 
 import { cssColor, make, sharpContext } from "../ui/dom.js";
 import { niceCeiling, readable } from "../ui/format.js";
 import { Series } from "./series.js";
 
-/** Samples of what comes with every frame (20 s), and with every measurement, 4 a second (20 s). */
+/** Capacity of the series: 20 s of frames, and 20 s of STATS messages (four per second). */
 const FRAME_SAMPLES = 1200;
 const STATS_SAMPLES = 80;
 
@@ -24,7 +24,7 @@ export class Charts {
         () => `${readable(stats()?.solveUsP50 ?? NaN, "µs")} of ${readable(stats()?.deadlineUs ?? NaN, "µs")}`),
       chart("Wake-up latency", "µs", [{ name: "late", series: wake, color: "--plot-b" }], null,
         () => `99 %: ${readable(stats()?.wakeLateUsP99 ?? NaN, "µs")}`),
-      chart("Stretch", "%", [{ name: "greatest", series: most, color: "--plot-b" }, { name: "mean", series: mean, color: "--plot-a" }], null,
+      chart("Stretch", "%", [{ name: "maximum", series: most, color: "--plot-b" }, { name: "mean", series: mean, color: "--plot-a" }], null,
         () => `max ${readable(most.last(), "%")}, mean ${readable(mean.last(), "%")}`),
       chart("Energy", "J", [{ name: "potential", series: potential, color: "--plot-c" }, { name: "kinetic", series: kinetic, color: "--plot-a" }, { name: "sum", series: total, color: "--plot-b" }], null,
         () => `kinetic ${readable(kinetic.last(), "J")}, sum ${readable(total.last(), "J")}`),
@@ -87,13 +87,13 @@ function drawChart(one) {
   context.fillText(readable(top, one.unit), 4, 11);
 }
 
-/** Round ends of the scale; they widen at once and shrink only when much is empty. @param {Chart} one */
+/** Round ends of the scale. It grows at once, and shrinks only when less than a third is used. @param {Chart} one */
 function scaleOf(one) {
   const ranges = one.lines.map((line) => line.series.range()).filter((range) => range !== null);
   const least = Math.min(0, ...ranges.map((range) => range.min));
   const limit = one.limit?.() ?? NaN;
   const greatest = Math.max(0, ...ranges.map((range) => range.max));
-  // The deadline is shown once the solver comes near it: else its line would press all others flat.
+  // The deadline is in range only once the solver comes near it; otherwise it would flatten the plot.
   const wanted = niceCeiling(greatest > 0.2 * limit ? Math.max(greatest, limit * 1.1) : greatest);
   one.lastTop = wanted > one.lastTop || wanted < one.lastTop * 0.3 ? wanted : one.lastTop;
   return { bottom: least < 0 ? -niceCeiling(-least) : 0, top: one.lastTop };
@@ -110,7 +110,7 @@ function rule(context, width, y, color, dash) {
   context.setLineDash([]);
 }
 
-/** A band from least to greatest in each column, so that a single peak is seen. @param {CanvasRenderingContext2D} context @param {import("./series.js").Column[]} columns @param {number} width @param {(value: number) => number} y @param {string} color */
+/** Draws a band from minimum to maximum in each column, so that a single peak is visible. @param {CanvasRenderingContext2D} context @param {import("./series.js").Column[]} columns @param {number} width @param {(value: number) => number} y @param {string} color */
 function drawLine(context, columns, width, y, color) {
   context.strokeStyle = color;
   context.lineWidth = 1.4;

@@ -1,8 +1,8 @@
-// The panel of parameters: a row for each, that shows what the node has and sends what the user
-// wants. A value on its way is not overwritten by an older answer while the slider is held.
+// The parameter panel: each row shows the value of the node and sends changes of the user. An older
+// answer never moves a slider while the user holds it.
 
 import { make } from "../ui/dom.js";
-import { SLIDER_STEPS, placeOf, rangeOf, rowsOf, valueAt, valueOf, vectorOf } from "./parameters.js";
+import { SLIDER_STEPS, positionOf, rangeOf, rowsOf, valueAt, valueOf, vectorOf } from "./parameters.js";
 import { trim } from "../ui/format.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
@@ -10,7 +10,7 @@ import { trim } from "../ui/format.js";
 
 const KINDS = ["structural", "shear", "bend", "tether"];
 const AXES = ["x", "y", "z"];
-/** Still air does nothing: a wind needs a drag, and this one is the scenes' default. */
+/** Wind drag set along with a wind velocity if there is none, as wind has no effect without drag: the default of scenes, in kg/m³. */
 const WIND_DRAG = 0.6;
 
 export class Panel {
@@ -20,7 +20,7 @@ export class Panel {
     this.note = note;
     this.simulation = simulation;
     this.commands = commands;
-    /** Newest value of each parameter that has yet to be sent. @type {Map<string, () => void>} */
+    /** Sends the newest unsent value of each parameter. @type {Map<string, () => void>} */
     this.unsent = new Map();
     /** @type {(() => void)[]} */
     this.refreshers = [];
@@ -29,7 +29,7 @@ export class Panel {
     for (const topic of /** @type {const} */ (["hello", "node", "parameters", "scene"])) simulation.on(topic, () => this.update());
   }
 
-  /** Builds the rows anew for another scene or method, else only refreshes their values. */
+  /** Rebuilds the rows for another scene or method; otherwise refreshes their values. */
   update() {
     const { simulation } = this;
     const key = `${simulation.scene?.epoch} ${simulation.node?.method}`;
@@ -41,20 +41,20 @@ export class Panel {
     const reason = this.reasonAgainst();
     this.note.hidden = reason === "" && (simulation.parameters?.is_complete ?? true);
     this.form.hidden = simulation.parameters?.values == null;
-    this.note.textContent = reason || "The bridge came after some commands: values may be others.";
+    this.note.textContent = reason || "The bridge started after some commands: values may differ.";
     for (const refresh of this.refreshers) refresh();
     for (const element of this.form.querySelectorAll("fieldset")) element.disabled = reason !== "";
   }
 
-  /** Why nothing can be set now, or "". */
+  /** The reason why nothing can be set now, or "". */
   reasonAgainst() {
     const { simulation } = this;
-    if (simulation.isReplay || simulation.node?.is_replay) return "This is a recording: its parameters are what they were.";
-    if (simulation.parameters?.values == null) return "No scene: there is nothing to set.";
+    if (simulation.isReplay || simulation.node?.is_replay) return "The parameters of a recording cannot be changed.";
+    if (simulation.parameters?.values == null) return "No scene is loaded.";
     return "";
   }
 
-  /** Sends the newest value of each parameter that was changed since the last frame. */
+  /** Sends the parameters that changed since the last animation frame. */
   tick() {
     for (const send of this.unsent.values()) send();
     this.unsent.clear();
@@ -68,16 +68,16 @@ export class Panel {
     }));
   }
 
-  /** The button at the end of a row that gives back the scene's own value. @param {Row} row @param {() => void} undo */
+  /** The button at the end of a row that restores the value of the scene. @param {Row} row @param {() => void} undo */
   undoButton(row, undo) {
-    const text = `${row.label} as in the scene`;
+    const text = `Reset ${row.label} to the value of the scene`;
     const button = make("button", { type: "button", class: "undo", title: text, "aria-label": text });
     button.innerHTML = `<svg viewBox="0 0 20 20" aria-hidden="true"><path d="M4.5 6.5A7 7 0 1 1 3.2 11M4 2.5v4.3h4.3"/></svg>`;
     button.addEventListener("click", undo);
     return button;
   }
 
-  /** Three sliders, of which a plane scene uses two. @param {Row} row */
+  /** A row with three sliders; a planar scene uses two. @param {Row} row */
   vectorRow(row) {
     const { simulation } = this;
     const output = make("output");
@@ -87,12 +87,12 @@ export class Panel {
     const range = () => rangeOf(row, ...read(), ...initial());
     const sliders = AXES.map((axis) => make("input", { type: "range", min: 0, max: SLIDER_STEPS, "aria-label": `${row.label} ${axis}` }));
     const shown = () => /** @type {[number, number, number]} */ (sliders.map((slider) => valueAt(row, range(), slider.valueAsNumber)));
-    const say = (/** @type {number[]} */ vector) => { output.textContent = `${vector.map(trim).join(", ")} ${this.unit(row)}`; };
+    const showValue = (/** @type {number[]} */ vector) => { output.textContent = `${vector.map(trim).join(", ")} ${this.unit(row)}`; };
     sliders.forEach((slider, axis) => slider.addEventListener("input", () => {
-      // The axes that were not touched keep every digit.
+      // The other axes keep their exact values.
       const vector = read();
       vector[axis] = shown()[axis];
-      say(vector);
+      showValue(vector);
       this.set(row.name, vector);
       if (row.name === "wind_velocity" && !valueOf(simulation.parameters?.values ?? null, "wind_drag", "")) this.set("wind_drag", WIND_DRAG);
     }));
@@ -101,21 +101,21 @@ export class Panel {
     this.refreshers.push(() => {
       const vector = read();
       sliders.forEach((slider, axis) => {
-        if (!slider.matches(":active")) slider.valueAsNumber = placeOf(row, range(), vector[axis]);
+        if (!slider.matches(":active")) slider.valueAsNumber = positionOf(row, range(), vector[axis]);
         slider.disabled = axis === 2 && (simulation.scene?.isPlanar ?? false);
       });
-      say(vector);
+      showValue(vector);
       button.classList.toggle("is-idle", String(vector) === String(initial()));
     });
     return shell;
   }
 
-  /** A slider, with a switch where the parameter can be off, and a choice of constraints where it has one. @param {Row} row */
+  /** A row with one slider, a switch if the parameter can be off, and a choice of the constraint kind if it is per kind. @param {Row} row */
   numberRow(row) {
     const { simulation } = this;
     const output = make("output");
     const slider = make("input", { type: "range", min: 0, max: SLIDER_STEPS, id: `set-${row.name}` });
-    const kinds = make("select", { "aria-label": `${row.label} of which constraints` }, ...["all", ...KINDS].map((kind) => make("option", {}, kind)));
+    const kinds = make("select", { "aria-label": `${row.label}: constraint kind` }, ...["all", ...KINDS].map((kind) => make("option", {}, kind)));
     const isOn = make("input", { type: "checkbox", "aria-label": `${row.label}: on` });
     const kind = () => (row.perKind ? kinds.value : "all");
     const read = (/** @type {"values" | "initial"} */ which) => valueOf(simulation.parameters?.[which] ?? null, row.name, kind() === "all" ? "structural" : kind());
@@ -128,28 +128,28 @@ export class Panel {
     if (row.perKind) slider.before(kinds);
     if (row.perKind) shell.append(slider);
     slider.classList.toggle("all", row.perKind ?? false);
-    const say = (/** @type {SettingValue} */ value) => { output.textContent = typeof value === "number" && !(row.canBeOff && value === 0 && row.least === 0) ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
+    const showValue = (/** @type {SettingValue} */ value) => { output.textContent = typeof value === "number" && !(row.canBeOff && value === 0 && row.least === 0) ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
     slider.addEventListener("input", () => {
       const value = valueAt(row, range(), slider.valueAsNumber);
       isOn.checked = true;
-      say(value);
+      showValue(value);
       send(value);
     });
     isOn.addEventListener("change", () => send(isOn.checked ? row.whenOn ?? row.least : null));
     kinds.addEventListener("change", () => this.update());
     this.refreshers.push(() => {
       const value = read("values");
-      if (!slider.matches(":active")) slider.valueAsNumber = placeOf(row, range(), typeof value === "number" ? value : row.whenOn ?? row.least);
-      // No drag and no air are the same thing.
+      if (!slider.matches(":active")) slider.valueAsNumber = positionOf(row, range(), typeof value === "number" ? value : row.whenOn ?? row.least);
+      // A value of 0 has the same effect as off.
       isOn.checked = value !== null && !(value === 0 && row.least === 0);
-      say(value);
-      // What each constraint has for itself cannot be given back but by a reset.
+      showValue(value);
+      // Only a reset restores values that differ between constraints.
       button.classList.toggle("is-idle", String(value) === String(read("initial")) || (read("initial") === null && !row.canBeOff));
     });
     return shell;
   }
 
-  /** The scene may count in other lengths than metres. @param {Row} row */
+  /** The unit of a row, with the length unit of the scene in place of metres. @param {Row} row */
   unit(row) {
     const length = this.simulation.scene?.unit ?? "m";
     return length === "m" ? row.unit : row.unit.replace(/^m\b/, length);

@@ -1,5 +1,5 @@
-// The logic of the panel: which parameters it shows, over what range, and how a slider's place is a
-// value. No elements here.
+// The logic of the parameter panel: rows, ranges, and the mapping between slider positions and values.
+// No DOM here.
 
 import { niceCeiling } from "../ui/format.js";
 import { toNumber } from "../net/messages.js";
@@ -7,18 +7,18 @@ import { toNumber } from "../net/messages.js";
 /** @typedef {import("../net/messages.js").Values} Values */
 /** @typedef {import("../net/messages.js").SettingValue} SettingValue */
 /**
- * One row. "log" sliders go by powers of ten, and begin with 0 where `hasZero`. `whenOn` is the value
- * that a parameter gets when it is switched on, and the middle of its range.
+ * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
+ * of a parameter when it is switched on.
  * @typedef {{
  *   name: string, label: string, unit: string, kind: "vector" | "linear" | "log" | "whole",
  *   least: number, most: number, canBeOff?: boolean, hasZero?: boolean, whenOn?: number, method?: "xpbd" | "pbd", perKind?: boolean,
  * }} Row
  */
 
-/** Positions of a slider. */
+/** Number of intervals of a slider. */
 export const SLIDER_STEPS = 400;
 
-/** Units are of a scene in metres; another scene's own values widen a range. @type {Row[]} */
+/** The rows, in units of a scene in metres. The values of a scene can widen a range. @type {Row[]} */
 export const ROWS = [
   { name: "gravity", label: "Gravity", unit: "m/s²", kind: "vector", least: -20, most: 20 },
   { name: "wind_velocity", label: "Wind", unit: "m/s", kind: "vector", least: -20, most: 20 },
@@ -34,18 +34,18 @@ export const ROWS = [
   { name: "time_scale", label: "Pace", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
 
-/** The rows of a scene's method. @param {string | null} method */
+/** The rows for a method. @param {string | null} method */
 export const rowsOf = (method) => ROWS.filter((row) => row.method === undefined || row.method === (method ?? "xpbd"));
 
-/** The range of a row, wide enough for the scene's own value and the present one. @param {Row} row @param {...number} values */
+/** The range of a row, wide enough for the initial and current values of the scene. @param {Row} row @param {...number} values */
 export function rangeOf(row, ...values) {
   const greatest = Math.max(0, ...values.filter(Number.isFinite).map(Math.abs));
   const most = greatest > row.most ? niceCeiling(greatest * (row.kind === "vector" ? 2 : 1)) : row.most;
   return { least: row.kind === "vector" ? -most : row.least, most };
 }
 
-/** A slider's place, 0..=SLIDER_STEPS, for a value. @param {Row} row @param {{ least: number, most: number }} range @param {number} value */
-export function placeOf(row, { least, most }, value) {
+/** Slider position for a value, 0..=SLIDER_STEPS. @param {Row} row @param {{ least: number, most: number }} range @param {number} value */
+export function positionOf(row, { least, most }, value) {
   if (row.kind !== "log") return Math.round(((value - least) / (most - least)) * SLIDER_STEPS);
   if (row.hasZero && value <= 0) return 0;
   const first = row.hasZero ? 1 : 0;
@@ -53,27 +53,27 @@ export function placeOf(row, { least, most }, value) {
   return Math.round(first + Math.min(1, fraction) * (SLIDER_STEPS - first));
 }
 
-/** The value at a slider's place, with as many digits as a hand can mean. @param {Row} row @param {{ least: number, most: number }} range @param {number} place */
-export function valueAt(row, { least, most }, place) {
+/** Value at a slider position, rounded to the precision of the slider. @param {Row} row @param {{ least: number, most: number }} range @param {number} position */
+export function valueAt(row, { least, most }, position) {
   if (row.kind !== "log") {
-    const value = least + (place / SLIDER_STEPS) * (most - least);
+    const value = least + (position / SLIDER_STEPS) * (most - least);
     if (row.kind === "whole") return Math.round(value);
-    // Rounded to a hundredth of the range's last digit: 0 is met, and 9.81 is not 9.8099995.
+    // Rounded to a fraction of a slider step, so that 0 is exact and 9.81 is not 9.8099995.
     const grain = niceCeiling((most - least) / 1000) / 2;
     return Number((Math.round(value / grain) * grain).toPrecision(6));
   }
-  if (row.hasZero && place === 0) return 0;
+  if (row.hasZero && position === 0) return 0;
   const first = row.hasZero ? 1 : 0;
-  return Number((least * (most / least) ** ((place - first) / (SLIDER_STEPS - first))).toPrecision(2));
+  return Number((least * (most / least) ** ((position - first) / (SLIDER_STEPS - first))).toPrecision(2));
 }
 
-/** The three numbers of a vector; 0 where it is off. @param {unknown} value @returns {[number, number, number]} */
+/** The components of a vector parameter; zeros if it is off. @param {unknown} value @returns {[number, number, number]} */
 export function vectorOf(value) {
   if (!Array.isArray(value)) return [0, 0, 0];
   return [toNumber(value[0]), toNumber(value[1]), toNumber(value[2])];
 }
 
-/** A parameter of all kinds or of one; null where it is off, or each constraint has its own.
+/** A parameter, for one kind of constraint if it is per kind. Null if it is off, or if each constraint has its own value.
  * @param {Values | null} values @param {string} name @param {string} kind @returns {SettingValue} */
 export function valueOf(values, name, kind) {
   const value = values?.[name] ?? null;

@@ -1,16 +1,16 @@
 // Time series for the plots: a ring of samples, reduced to minimum and maximum per pixel column.
 // No canvas here.
 
-/** @typedef {{ min: number, max: number } | null} Column  null where there is no sample */
+/** @typedef {{ min: number, max: number } | null} Column  null without a sample */
 
 export class Series {
-  /** @param {number} capacity samples that are kept */
+  /** @param {number} capacity number of samples kept */
   constructor(capacity) {
     this.samples = new Float64Array(capacity).fill(NaN);
     this.count = 0;
   }
 
-  /** @param {number} value NaN for "not known" */
+  /** @param {number} value NaN if unknown */
   push(value) {
     this.samples[this.count++ % this.samples.length] = value;
   }
@@ -20,19 +20,19 @@ export class Series {
     this.samples.fill(NaN);
   }
 
-  /** The newest sample, NaN before the first. */
+  /** The newest sample, or NaN before the first. */
   last() {
     return this.count === 0 ? NaN : this.samples[(this.count - 1) % this.samples.length];
   }
 
-  /** Sample by age: 0 is the oldest one that a full ring has. @param {number} index */
+  /** Sample by position in a full ring: 0 is the oldest. @param {number} index */
   at(index) {
     const capacity = this.samples.length;
     const sample = this.count - capacity + index;
     return sample < 0 ? NaN : this.samples[sample % capacity];
   }
 
-  /** Least and greatest of the samples under each of `width` columns, oldest first. @param {number} width @returns {Column[]} */
+  /** Minimum and maximum of the samples in each of `width` columns, oldest first. @param {number} width @returns {Column[]} */
   columns(width) {
     const capacity = this.samples.length;
     /** @type {Column[]} */
@@ -52,7 +52,7 @@ export class Series {
     return columns;
   }
 
-  /** Least and greatest of all samples that are numbers, or null. @returns {Column} */
+  /** Minimum and maximum of all samples except NaN, or null. @returns {Column} */
   range() {
     return this.columns(1)[0];
   }

@@ -1,4 +1,4 @@
-// Who wants to know of what: the parts of the page hear of changes by topic and know no other part.
+// Events by topic: modules subscribe to changes without knowing their source.
 
 /** @template {Record<string, unknown>} Topics */
 export class Emitter {

@@ -1,4 +1,4 @@
-// The box that a first look at a scene should show: what is there, and where it is going to be.
+// The box that the first view of a scene shows: the scene, and the space that it will move into.
 
 import { add, addScaled, dot, length, scale, subtract } from "../geometry/math.js";
 import { PIN } from "../net/wire.js";
@@ -7,16 +7,16 @@ import { PIN } from "../net/wire.js";
 /** @typedef {import("../geometry/math.js").Box} Box */
 /** @typedef {import("../net/wire.js").Collider} Collider */
 
-/** Half of the box round a scene that is a single point, in the scene's unit. */
+/** Half the size of the box around a scene that is a single point, in the unit of the scene. */
 const POINT_ROOM = 0.5;
-/** A floor or a solid is shown with what is at most so many times its own size away from it. */
+/** Greatest distance of a floor and of a solid that are still framed, in sizes of the scene. */
 const FLOOR_SIZES = 3;
 const SOLID_SIZES = 1;
-/** Part of its size that what anchors carry is given on each side, to move in. */
+/** Margin on each side of a scene that anchors move, as a fraction of its size. */
 const CARRIED_ROOM = 0.2;
 
 /** @param {import("./simulation.js").Simulation} simulation @returns {Box} */
-export function stageOf(simulation) {
+export function firstViewBox(simulation) {
   const bounds = simulation.colliders.find((one) => one.shape === "bounds");
   if (bounds) return { min: bounds.a, max: bounds.b };
   const { up } = simulation.axes();
@@ -38,9 +38,9 @@ export function stageOf(simulation) {
   return box;
 }
 
-/** A solid that is near enough, and not so big that nothing else would be seen. @param {Box} box @param {Collider} one @param {Vec3} middle @param {number} size */
+/** Includes a solid that is close enough, and no bigger than the scene. @param {Box} box @param {Collider} one @param {Vec3} middle @param {number} size */
 function includeSolid(box, one, middle, size) {
-  const [center, reach] = ballRound(one);
+  const [center, reach] = boundingSphere(one);
   if (reach > size || length(subtract(center, middle)) > SOLID_SIZES * size + reach) return;
   for (const axis of [0, 1, 2]) {
     box.min[axis] = Math.min(box.min[axis], center[axis] - reach);
@@ -48,8 +48,8 @@ function includeSolid(box, one, middle, size) {
   }
 }
 
-/** Middle and radius of a ball round a solid; that of a plane has no end. @param {Collider} one @returns {[Vec3, number]} */
-function ballRound(one) {
+/** Centre and radius of a bounding sphere of a solid; infinite for a plane. @param {Collider} one @returns {[Vec3, number]} */
+function boundingSphere(one) {
   if (one.shape === "sphere") return [one.center, one.radius];
   if (one.shape === "box") return [one.center, length(one.halfExtents)];
   if (one.shape === "capsule") return [scale(add(one.a, one.b), 0.5), length(subtract(one.b, one.a)) / 2 + one.radius];
@@ -72,7 +72,7 @@ function include(box, point) {
   }
 }
 
-/** Makes a box reach as far on one side of a pivot as on the other. @param {Box} box @param {Vec3} pivot @param {number} axis */
+/** Makes a box symmetric about a pivot along one axis. @param {Box} box @param {Vec3} pivot @param {number} axis */
 function mirror(box, pivot, axis) {
   const reach = Math.max(box.max[axis] - pivot[axis], pivot[axis] - box.min[axis]);
   if (reach < 1e-6) return;

@@ -1,28 +1,29 @@
-// How low a scene can hang: where its ground has to be so that nothing sinks into it.
+// The lowest height that a scene can hang to: the ground is drawn below it, so that nothing sinks in.
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../net/wire.js").Scene} Scene */
 
-/** A way along constraints is found in a few sweeps, because scenes number their particles in order. */
+/** Limit on sweeps. A few suffice, because scenes number their particles in order. */
 const SWEEPS_MAX = 40;
-/** Scenes up to so many particles are looked at between their outermost pins. */
+/** Limit on particles for the analysis between the outermost pins. */
 const BETWEEN_PINS_MAX = 5000;
-/** Places between two pins at which the lowest point is looked for. */
-const PLACES = 16;
+/** Number of samples between two pins in the search for the lowest point. */
+const SAMPLES = 16;
 
 /**
- * The lowest height that any particle can hang at; null where one hangs from nothing.
+ * The lowest height that any particle can hang at; null if some particle hangs from nothing.
  *
- * A particle is no farther from what holds it than the shortest way along constraints, d: so no
- * lower than height - d under each pin, and within both balls of two pins.
- * @param {Scene} scene @param {ArrayLike<number>} held particles that do not fall @param {Vec3} up
+ * The distance of a particle from a pin is at most d, the length of the shortest path along
+ * constraints. So its height is at least height - d for each pin, and for two pins it lies in the
+ * intersection of both balls.
+ * @param {Scene} scene @param {ArrayLike<number>} pins particles that do not fall @param {Vec3} up
  */
-export function lowestReach(scene, held, up) {
-  if (held.length === 0) return null;
+export function lowestReach(scene, pins, up) {
+  if (pins.length === 0) return null;
   const height = (/** @type {number} */ p) => along(scene, p, up);
-  const lowest = sweep(scene, Array.from(held, (p) => [p, height(p)]));
+  const lowest = sweep(scene, Array.from(pins, (p) => [p, height(p)]));
   if (scene.particleCount <= BETWEEN_PINS_MAX) {
-    for (const pair of outermostPairs(scene, held, up)) raiseBetween(scene, pair, up, lowest);
+    for (const pair of outermostPairs(scene, pins, up)) raiseBetween(scene, pair, up, lowest);
   }
   const least = lowest.reduce((a, b) => Math.min(a, b), Infinity);
   return Number.isFinite(least) ? least : null;
@@ -31,7 +32,7 @@ export function lowestReach(scene, held, up) {
 /** @param {Scene} scene @param {number} p @param {Vec3} axis */
 const along = ({ positions }, p, axis) => positions[3 * p] * axis[0] + positions[3 * p + 1] * axis[1] + positions[3 * p + 2] * axis[2];
 
-/** The greatest of value - way from each source, for each particle. @param {Scene} scene @param {number[][]} sources particle, value */
+/** For each particle, the maximum of (value - path length) over all sources. @param {Scene} scene @param {number[][]} sources particle, value */
 function sweep(scene, sources) {
   const { ends, restLengths, constraintCount } = scene;
   const best = new Float64Array(scene.particleCount).fill(-Infinity);
@@ -54,16 +55,16 @@ function sweep(scene, sources) {
   return best;
 }
 
-/** The pins that are farthest apart along each level axis. @param {Scene} scene @param {ArrayLike<number>} held @param {Vec3} up */
-function outermostPairs(scene, held, up) {
+/** The two pins that are farthest apart along each horizontal axis. @param {Scene} scene @param {ArrayLike<number>} pins @param {Vec3} up */
+function outermostPairs(scene, pins, up) {
   const axes = /** @type {Vec3[]} */ ([[1, 0, 0], [0, 1, 0], [0, 0, 1]]).filter((axis) => axis.every((one, k) => one * up[k] === 0));
   return axes.map((axis) => {
-    const sorted = Array.from(held).sort((a, b) => along(scene, a, axis) - along(scene, b, axis));
+    const sorted = Array.from(pins).sort((a, b) => along(scene, a, axis) - along(scene, b, axis));
     return [sorted[0], sorted[sorted.length - 1]];
   }).filter(([first, last]) => first !== last);
 }
 
-/** Raises what two pins hold up together. @param {Scene} scene @param {number[]} pair @param {Vec3} up @param {Float64Array} lowest */
+/** Raises the lower bounds of particles that hang between two pins. @param {Scene} scene @param {number[]} pair @param {Vec3} up @param {Float64Array} lowest */
 function raiseBetween(scene, [first, last], up, lowest) {
   const { positions } = scene;
   const rise = along(scene, last, up) - along(scene, first, up);
@@ -77,16 +78,16 @@ function raiseBetween(scene, [first, last], up, lowest) {
   }
 }
 
-/** The lowest height, over the first pin, within both balls: of radius a round it, and of radius b round
- * the other pin, `level` away and `rise` higher; null where they do not meet at any place that is tried.
+/** The lowest height in the intersection of two balls, relative to the first pin: radius a around that
+ * pin, and radius b around the other pin, `level` away and `rise` higher. Null if no sample is in both.
  * @param {number} a @param {number} b @param {number} level @param {number} rise */
 export function lowestWithin(a, b, level, rise) {
   let least = Infinity;
   const from = Math.max(-a, level - b);
   const to = Math.min(a, level + b);
   if (!(from <= to) || !Number.isFinite(from) || !Number.isFinite(to)) return null;
-  for (let place = 0; place <= PLACES; place++) {
-    const s = from + ((to - from) * place) / PLACES;
+  for (let sample = 0; sample <= SAMPLES; sample++) {
+    const s = from + ((to - from) * sample) / SAMPLES;
     const underFirst = -Math.sqrt(Math.max(0, a * a - s * s));
     const underLast = rise - Math.sqrt(Math.max(0, b * b - (level - s) * (level - s)));
     least = Math.min(least, Math.max(underFirst, underLast));

@@ -1,11 +1,11 @@
-// What the page knows of the simulation: the last scene, the newest frame, what is torn and held.
-// Messages go in, topics come out. It has no clock, no socket and no picture.
+// The state of the simulation as the page knows it: the last scene, the newest frame, torn constraints
+// and pins. Messages go in, events come out. It uses no clock, no socket and no picture.
 
 import { Emitter } from "./emitter.js";
 import { lowestReach } from "./hanging.js";
 import { Topology } from "./topology.js";
 import { PIN } from "../net/wire.js";
-import { axesOf } from "../geometry/camera.js";
+import { sceneAxes } from "../geometry/camera.js";
 import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
@@ -21,11 +21,11 @@ import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
 /** @typedef {import("../net/messages.js").TimelineMessage} TimelineMessage */
 /** @typedef {import("../net/messages.js").Playback} Playback */
 /** @typedef {import("../net/messages.js").TextMessage} TextMessage */
-/** A plane to stand on: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
+/** A floor: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
 
-/** Room under what hangs, in radii of the scene. */
+/** Gap between the lowest point that can be reached and the ground, in radii of the scene. */
 const GROUND_GAP = 0.06;
-/** A plane is a floor if its normal is that much upward. */
+/** Least cosine between the normal of a floor and the up axis. */
 const FLOOR_COSINE = 0.99;
 
 /**
@@ -47,14 +47,14 @@ export class Simulation extends Emitter {
     this.topology = null;
     /** @type {Frame | null} */
     this.frame = null;
-    /** Number of the newest frame that came, shown or not: one that a scene has overtaken has to be
+    /** Number of the newest frame received, shown or not. A frame that a new scene overtook must be
      * acknowledged too, or its credit is lost. @type {number | null} */
     this.frameNumber = null;
-    /** Constraints in the order of tearing. @type {number[]} */
+    /** Torn constraints, in the order of tearing. @type {number[]} */
     this.torn = [];
-    /** Flags of the particles that are not free, as the bridge said last. @type {Map<number, number>} */
+    /** Flags of the particles that are not free, as last received. @type {Map<number, number>} */
     this.pinsReceived = new Map();
-    /** The same with what is expected of the node. @type {Map<number, number>} */
+    /** The same, with expected changes that the node has yet to publish. @type {Map<number, number>} */
     this.pins = new Map();
     /** @type {Collider[]} */
     this.colliders = [];
@@ -87,7 +87,7 @@ export class Simulation extends Emitter {
     return this.node?.is_paused ?? false;
   }
 
-  /** A decoded binary message; one of another epoch than the scene's is not of this picture. @param {Message} message */
+  /** Applies a binary message; drops one whose epoch is not that of the scene. @param {Message} message */
   receive(message) {
     if (message.kind === "stats") {
       this.stats = message;
@@ -132,16 +132,16 @@ export class Simulation extends Emitter {
 
   /** @param {import("../net/wire.js").Tear} tear */
   receiveTear(tear) {
-    const isMore = tear.first === this.torn.length;
+    const isAppended = tear.first === this.torn.length;
     this.torn.length = Math.min(tear.first, this.torn.length);
-    // One by one: as arguments of a call, a long list is more than the stack takes.
+    // One by one: spreading a long list as arguments overflows the stack.
     for (const constraint of tear.constraints) this.torn.push(constraint);
-    if (!isMore) return this.rebuild();
+    if (!isAppended) return this.rebuild();
     this.topology?.remove(tear.constraints);
     this.emit("tear", undefined);
   }
 
-  /** Works out anew what is whole: after a reset, or when particles lost their position. */
+  /** Recomputes which constraints and triangles are intact: after a reset, or when particles become non-finite. */
   rebuild() {
     this.topology?.restore();
     this.topology?.remove(this.torn);
@@ -166,7 +166,7 @@ export class Simulation extends Emitter {
     if (!hadFloor) this.settleGround();
   }
 
-  /** The floor: a collider's where there is one; else a little below what can hang lowest; else none. */
+  /** Chooses the ground: a floor among the colliders, else a little below the lowest point that can be reached, else none. */
   settleGround() {
     if (this.scene === null || this.scene.isPlanar) return;
     const { up } = this.axes();
@@ -183,27 +183,26 @@ export class Simulation extends Emitter {
   floor() {
     const { up } = this.axes();
     /** @type {Plane[]} */
-    const floors = this.colliders.flatMap((one) => floorOf(one, up));
+    const floors = this.colliders.flatMap((one) => floorsOf(one, up));
     return floors.length === 0 ? null : floors.reduce((best, one) => (one.offset > best.offset ? one : best));
   }
 
   axes() {
-    return axesOf(this.scene?.up ?? "y", this.scene?.isPlanar ? 2 : 3);
+    return sceneAxes(this.scene?.up ?? "y", this.scene?.isPlanar ? 2 : 3);
   }
 
-  /** Half the diagonal of the box round the scene's positions. */
+  /** Half the diagonal of the bounding box of the scene's positions. */
   radius() {
     if (this.scene === null || this.scene.particleCount === 0) return 1;
     return Math.max(length(subtract(this.scene.max, this.scene.min)) / 2, 1e-3);
   }
 
-  /** The middle of the box round the scene's positions. @returns {Vec3} */
+  /** The centre of the bounding box of the scene's positions. @returns {Vec3} */
   middle() {
     return this.scene === null ? [0, 0, 0] : scale(add(this.scene.min, this.scene.max), 0.5);
   }
 
-  /** Shows at once what the node has answered but will publish with its next step only: while it is
-   * paused, that may be long. @param {number} particle @param {boolean} isPinned */
+  /** Shows an applied pin at once: a paused node publishes it only with its next step. @param {number} particle @param {boolean} isPinned */
   expectPin(particle, isPinned) {
     const others = (this.pins.get(particle) ?? 0) & ~PIN.pinned;
     if (isPinned) this.pins.set(particle, others | PIN.pinned);
@@ -212,14 +211,14 @@ export class Simulation extends Emitter {
     this.emit("pins", undefined);
   }
 
-  /** The same for a cut, which is not in the list of what is torn before the bridge says so. @param {number} epoch @param {number[]} constraints */
+  /** Shows an applied cut at once; `torn` changes only when the bridge reports it. @param {number} epoch @param {number[]} constraints */
   expectCut(epoch, constraints) {
     if (epoch !== this.scene?.epoch) return;
     this.topology?.remove(constraints);
     this.emit("tear", undefined);
   }
 
-  /** A bridge of another mode may have come to the address of the one before. @param {Hello} hello */
+  /** Drops the recording if a live bridge now serves this address. @param {Hello} hello */
   receiveHello(hello) {
     this.hello = hello;
     if (hello.mode === "live") {
@@ -231,8 +230,8 @@ export class Simulation extends Emitter {
     this.emit("hello", hello);
   }
 
-  /** Takes back what was expected and not yet said: a reset may undo it before the bridge has sent it,
-   * which then has nothing to correct. */
+  /** Reverts expected pins and cuts. If the reset undid them before the bridge published them, no later
+   * message corrects the page. */
   receiveReset() {
     this.pins = new Map(this.pinsReceived);
     this.emit("pins", undefined);
@@ -249,7 +248,7 @@ export class Simulation extends Emitter {
     return [lo[0] + unit[0] * p[i], lo[1] + unit[1] * p[i + 1], lo[2] + unit[2] * p[i + 2]];
   }
 
-  /** The box round the newest positions. @returns {Box} */
+  /** The bounding box of the newest positions. @returns {Box} */
   box() {
     const { frame, scene } = this;
     if (frame === null) return scene === null ? boxOf([]) : boxOf(scene.positions);
@@ -270,7 +269,7 @@ export class Simulation extends Emitter {
       case "outcome": return this.emit("outcome", message);
       case "reset": return this.receiveReset();
       case "notice": return this.emit("notice", message);
-      default: // A later bridge may say more.
+      default: // A message of a later bridge.
     }
   }
 }
@@ -283,7 +282,7 @@ function sameNumbers(a, b) {
 }
 
 /** @param {Collider} one @param {Vec3} up @returns {Plane[]} */
-function floorOf(one, up) {
+function floorsOf(one, up) {
   if (one.shape === "plane" && dot(one.normal, up) > FLOOR_COSINE) return [{ normal: one.normal, offset: one.offset }];
   if (one.shape === "bounds") return [{ normal: up, offset: Math.min(dot(one.a, up), dot(one.b, up)) }];
   return [];

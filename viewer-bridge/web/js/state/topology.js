@@ -1,19 +1,19 @@
-// What joins what in a scene, and what of it is still whole: which triangles and sticks are drawn,
-// and the triangles round each particle that its normal is made of.
+// The topology of a scene, and which parts of it are intact: the triangles and sticks that are drawn,
+// and the fan of triangles around each particle that gives its normal.
 
 import { CONSTRAINT } from "../net/wire.js";
 
 /** @typedef {import("../net/wire.js").Scene} Scene */
 
-/** Stands for "no constraint joins these corners". */
+/** No constraint joins these corners. */
 const NONE = -1;
-/** Words of a fan's entry: two corners, the rest length to the first as f32 bits, and 0. */
+/** Words of a fan entry: two corners, the rest length to the first as f32 bits, and 0. */
 export const FAN_WORDS = 4;
 
-/** Bits of a stick's style, as the shader reads them. */
+/** Bits of the style of a stick, as the shader reads them. */
 export const STICK = Object.freeze({
   kindMask: 3,
-  /** An edge of a whole triangle: the surface shows it already. */
+  /** The edge of an intact triangle: the surface shows it already. */
   isCovered: 4,
   isGone: 8,
 });
@@ -22,30 +22,30 @@ export class Topology {
   /** @param {Scene} scene */
   constructor(scene) {
     this.scene = scene;
-    /** Constraint along each edge of each triangle: 3 t, NONE where there is none. */
+    /** Constraint along each edge of each triangle, or NONE: 3 t. */
     this.edgeConstraints = edgeConstraints(scene);
     const { starts, triangles } = trianglesOf(this.edgeConstraints, scene.constraintCount);
     /** Triangles along constraint i: edgeTriangles[edgeStarts[i] .. edgeStarts[i + 1]]. */
     this.edgeStarts = starts;
     this.edgeTriangles = triangles;
     const fans = buildFans(scene, this.edgeConstraints);
-    /** Start and count of the fan of each particle: 2 n. */
+    /** Start and length of the fan of each particle: 2 n. */
     this.fanRanges = fans.ranges;
-    /** Entries of FAN_WORDS words, one for each corner of each triangle. */
+    /** Entries of FAN_WORDS words, one per corner of each triangle. */
     this.fans = fans.entries;
-    /** Entry of each corner: 3 t. */
-    this.fanEntries = fans.ofCorner;
+    /** Index of the entry of each corner: 3 t. */
+    this.fanEntries = fans.entryByCorner;
     this.isDead = new Uint8Array(scene.triangleCount);
-    /** Corners of the triangles, those of dead ones all 0: without area, they draw nothing. */
+    /** Corners of the triangles. Those of dead triangles are all 0: a triangle without area draws nothing. */
     this.indices = new Uint32Array(scene.triangles.length);
-    /** Entries of fans that the graphics card has not yet. */
+    /** Fan entries not uploaded yet. */
     this.dirtyFans = new DirtyRange();
     this.isGone = new Uint8Array(scene.constraintCount);
     this.styles = new Uint8Array(scene.constraintCount);
     this.restore();
   }
 
-  /** Makes all whole again. */
+  /** Restores every constraint and triangle. */
   restore() {
     this.isDead.fill(0);
     this.isGone.fill(0);
@@ -57,7 +57,7 @@ export class Topology {
     this.indices.set(this.scene.triangles);
   }
 
-  /** Takes constraints, and the triangles along them, out of the picture. @param {ArrayLike<number>} constraints */
+  /** Removes constraints, and the triangles along them. @param {ArrayLike<number>} constraints */
   remove(constraints) {
     for (let k = 0; k < constraints.length; k++) {
       const i = constraints[k];
@@ -68,7 +68,7 @@ export class Topology {
     }
   }
 
-  /** Takes away all that joins particles that have no position. @param {Uint32Array} particles */
+  /** Removes the constraints and triangles of particles without a position. @param {Uint32Array} particles */
   removeAround(particles) {
     if (particles.length === 0) return;
     const lost = new Set(particles);
@@ -88,7 +88,7 @@ export class Topology {
     this.isDead[triangle] = 1;
     this.indices.fill(0, 3 * triangle, 3 * triangle + 3);
     for (let corner = 3 * triangle; corner < 3 * triangle + 3; corner++) {
-      // Equal corners have no area, and so no part in a normal.
+      // Equal corners have no area, so they do not contribute to a normal.
       const entry = this.fanEntries[corner] * FAN_WORDS;
       this.fans[entry + 1] = this.fans[entry];
       this.fans[entry + 2] = 0;
@@ -97,7 +97,7 @@ export class Topology {
     }
   }
 
-  /** A thread that no triangle covers any more is drawn as a stick. @param {number} constraint */
+  /** Draws a constraint as a stick once no triangle covers it. @param {number} constraint */
   uncover(constraint) {
     if (constraint === NONE) return;
     for (let e = this.edgeStarts[constraint]; e < this.edgeStarts[constraint + 1]; e++) {
@@ -120,7 +120,7 @@ export class Topology {
   }
 }
 
-/** The smallest range that holds all that was added. */
+/** The smallest range of indices that contains all added ones. */
 class DirtyRange {
   constructor() {
     this.first = Infinity;
@@ -133,7 +133,7 @@ class DirtyRange {
     if (index > this.last) this.last = index;
   }
 
-  /** From the first to before the end; empty where nothing was added. */
+  /** Half-open range, empty if nothing was added. */
   range() {
     return this.last < this.first ? { first: 0, end: 0 } : { first: this.first, end: this.last + 1 };
   }
@@ -152,22 +152,22 @@ function floatBits(value) {
   return scratch.getUint32(0);
 }
 
-/** The constraint along each edge of each triangle; edge k of a triangle goes from corner k to the next.
+/** The constraint along each edge of each triangle. Edge k of a triangle runs from corner k to the next.
  * @param {Scene} scene */
 function edgeConstraints(scene) {
   const { ends, triangles, particleCount } = scene;
   const constraintOf = new Map();
   const key = (/** @type {number} */ a, /** @type {number} */ b) => Math.min(a, b) * particleCount + Math.max(a, b);
   if (triangles.length > 0) for (let i = 0; i < ends.length / 2; i++) constraintOf.set(key(ends[2 * i], ends[2 * i + 1]), i);
-  const found = new Int32Array(triangles.length);
+  const edges = new Int32Array(triangles.length);
   for (let corner = 0; corner < triangles.length; corner++) {
     const next = corner - (corner % 3) + ((corner + 1) % 3);
-    found[corner] = constraintOf.get(key(triangles[corner], triangles[next])) ?? NONE;
+    edges[corner] = constraintOf.get(key(triangles[corner], triangles[next])) ?? NONE;
   }
-  return found;
+  return edges;
 }
 
-/** The triangles along each constraint, one list behind the other. @param {Int32Array} edges @param {number} constraintCount */
+/** The triangles along each constraint, as concatenated lists with their starts. @param {Int32Array} edges @param {number} constraintCount */
 function trianglesOf(edges, constraintCount) {
   const starts = new Uint32Array(constraintCount + 1);
   for (const constraint of edges) if (constraint !== NONE) starts[constraint + 1]++;
@@ -180,23 +180,23 @@ function trianglesOf(edges, constraintCount) {
   return { starts, triangles };
 }
 
-/** Gives each particle one run of entries, and each corner its place in it. @param {Scene} scene @param {Int32Array} edges */
+/** Allocates a contiguous run of entries per particle, and an entry of it per corner. @param {Scene} scene @param {Int32Array} edges */
 function buildFans(scene, edges) {
   const { triangles, particleCount } = scene;
   const ranges = new Uint32Array(2 * particleCount);
   for (const particle of triangles) ranges[2 * particle + 1]++;
   for (let p = 1; p < particleCount; p++) ranges[2 * p] = ranges[2 * p - 2] + ranges[2 * p - 1];
   const used = new Uint32Array(particleCount);
-  const ofCorner = new Uint32Array(edges.length);
+  const entryByCorner = new Uint32Array(edges.length);
   triangles.forEach((particle, corner) => {
-    ofCorner[corner] = ranges[2 * particle] + used[particle]++;
+    entryByCorner[corner] = ranges[2 * particle] + used[particle]++;
   });
-  return { ranges, ofCorner, entries: new Uint32Array(edges.length * FAN_WORDS) };
+  return { ranges, entryByCorner, entries: new Uint32Array(edges.length * FAN_WORDS) };
 }
 
 /**
- * The constraints that are drawn as sticks, at most `limit`: structural ones first, then shears and
- * tethers; bends lie along or across other sticks and only hide them.
+ * The constraints that are drawn as sticks, at most `limit`: first structural, then shear, then tether.
+ * Bend constraints lie along or across other sticks and would only hide them.
  * @param {Scene} scene @param {number} limit
  */
 export function drawnSticks(scene, limit) {

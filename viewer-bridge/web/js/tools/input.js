@@ -1,38 +1,43 @@
-// Pointers and wheel on the picture: which tool a press begins, and when two fingers are the view's.
+// Pointer and wheel input on the picture: a press starts a tool, two fingers move the view.
 
 import { clamp } from "../geometry/math.js";
-import { Brush, Hand, Knife, REACH, View, depthUnder, particleAt, togglePin } from "./tools.js";
+import { BrushTool } from "./brush.js";
+import { CutTool } from "./cut.js";
+import { GrabTool } from "./grab.js";
+import { togglePin } from "./pin.js";
+import { REACH, depthUnder, particleAt } from "./tool.js";
+import { ViewTool } from "./view.js";
 
 /** @typedef {import("../geometry/pick.js").Pixel} Pixel */
-/** @typedef {import("./tools.js").Tool} Tool */
+/** @typedef {import("./tool.js").Tool} Tool */
 /** @typedef {"grab" | "brush" | "cut" | "pin"} Mode */
 
 export const MODES = /** @type {const} */ (["grab", "brush", "cut", "pin"]);
-/** Radius of the brush in CSS pixels: as in the documents. */
+/** Radius of the brush, in CSS pixels. */
 export const BRUSH = { min: 20, max: 100, step: 10, start: 50 };
-/** A finger that rests so long on a particle pins it. */
+/** Duration after which a finger that rests on a particle pins it. */
 const LONG_PRESS_MS = 550;
-/** What moves less than this is a press and no drag, CSS pixels. */
+/** Limit on the motion of a press that still counts as at rest, in CSS pixels. */
 const SLACK = 6;
-/** Part of the distance that one notch of a wheel (100 units) zooms by. */
+/** Exponent of the zoom factor per unit of the wheel; a notch is 100 units. */
 const ZOOM_PER_UNIT = 0.0012;
-/** Hovering asks for the nearest particle with each frame: only where that is quick. */
+/** Limit on particles for hovering, which picks the nearest particle once per frame. */
 const HOVER_PARTICLES_MAX = 20_000;
 
 export class Input {
-  /** @param {HTMLCanvasElement} canvas @param {import("./tools.js").Bench} bench @param {() => boolean} canChange whether commands may change the simulation */
-  constructor(canvas, bench, canChange) {
+  /** @param {HTMLCanvasElement} canvas @param {import("./tool.js").App} app @param {() => boolean} canChange returns true if commands may change the simulation */
+  constructor(canvas, app, canChange) {
     this.canvas = canvas;
-    this.bench = bench;
+    this.app = app;
     this.canChange = canChange;
     /** @type {Mode} */
     this.mode = "grab";
     this.brushRadius = BRUSH.start;
-    /** Where each pressed pointer is. @type {Map<number, Pixel>} */
+    /** Position of each pressed pointer. @type {Map<number, Pixel>} */
     this.pointers = new Map();
     /** @type {Tool | null} */
     this.tool = null;
-    /** Where the mouse is, null outside of the picture. @type {Pixel | null} */
+    /** Position of the mouse, or null outside the picture. @type {Pixel | null} */
     this.hover = null;
     /** @type {number | null} */
     this.hovered = null;
@@ -44,12 +49,12 @@ export class Input {
   listen() {
     const { canvas } = this;
     canvas.addEventListener("pointerdown", (event) => this.press(event));
-    canvas.addEventListener("pointermove", (event) => this.drag(event));
+    canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const type of /** @type {const} */ (["pointerup", "pointercancel", "lostpointercapture"])) {
-      canvas.addEventListener(type, (event) => this.lift(event));
+      canvas.addEventListener(type, (event) => this.release(event));
     }
     canvas.addEventListener("pointerleave", () => this.leave());
-    // Where each click pins, the second one has already undone the first.
+    // In pin mode, each click already toggles the pin.
     canvas.addEventListener("dblclick", (event) => { if (this.mode !== "pin") this.pinAt(this.pixel(event), REACH.mouse); });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => this.turnWheel(event), { passive: false });
@@ -68,43 +73,43 @@ export class Input {
     this.canvas.setPointerCapture(event.pointerId);
     clearTimeout(this.longPress);
     if (this.pointers.size > 1) {
-      // The second finger takes the first one's work away: two fingers move the view.
+      // A second finger ends the tool of the first: two fingers move the view.
       this.finish();
       return;
     }
     this.tool = this.begin(event, at);
-    if (event.pointerType === "touch" && this.tool instanceof Hand) this.waitForLongPress(this.tool);
-    this.bench.renderer.isDirty = true;
+    if (event.pointerType === "touch" && this.tool instanceof GrabTool) this.waitForLongPress(this.tool);
+    this.app.renderer.isDirty = true;
   }
 
   /** @param {PointerEvent} event @param {Pixel} at @returns {Tool | null} */
   begin(event, at) {
-    const { bench } = this;
+    const { app } = this;
     const reach = event.pointerType === "touch" ? REACH.touch : REACH.mouse;
-    if (event.button === 1 || (event.button === 0 && event.shiftKey)) return new View(bench, at, "pan");
-    if (event.button === 0 && event.altKey) return new View(bench, at, "orbit");
-    if (!this.canChange()) return new View(bench, at, "orbit");
-    if (event.button === 2 || this.mode === "cut") return new Knife(bench, at);
-    if (this.mode === "brush") return depthUnder(bench, at, this.brushRadius) === null ? new View(bench, at, "orbit") : new Brush(bench, at, this.brushRadius);
-    const particle = particleAt(bench, at, reach);
-    if (particle === null) return new View(bench, at, "orbit");
-    if (this.mode === "grab") return new Hand(bench, particle, at);
-    togglePin(bench, particle);
+    if (event.button === 1 || (event.button === 0 && event.shiftKey)) return new ViewTool(app, at, "pan");
+    if (event.button === 0 && event.altKey) return new ViewTool(app, at, "orbit");
+    if (!this.canChange()) return new ViewTool(app, at, "orbit");
+    if (event.button === 2 || this.mode === "cut") return new CutTool(app, at);
+    if (this.mode === "brush") return depthUnder(app, at, this.brushRadius) === null ? new ViewTool(app, at, "orbit") : new BrushTool(app, at, this.brushRadius);
+    const particle = particleAt(app, at, reach);
+    if (particle === null) return new ViewTool(app, at, "orbit");
+    if (this.mode === "grab") return new GrabTool(app, particle, at);
+    togglePin(app, particle);
     return null;
   }
 
-  /** @param {Hand} hand */
-  waitForLongPress(hand) {
+  /** @param {GrabTool} grab */
+  waitForLongPress(grab) {
     this.longPress = setTimeout(() => {
-      if (this.tool !== hand || distance(hand.start, hand.pointer) > SLACK) return;
+      if (this.tool !== grab || distance(grab.start, grab.pointer) > SLACK) return;
       this.finish();
-      togglePin(this.bench, hand.particle);
+      togglePin(this.app, grab.particle);
       navigator.vibrate?.(15);
     }, LONG_PRESS_MS);
   }
 
   /** @param {PointerEvent} event */
-  drag(event) {
+  move(event) {
     const at = this.pixel(event);
     if (event.pointerType !== "touch") this.hover = at;
     this.isHoverStale = true;
@@ -115,9 +120,9 @@ export class Input {
     this.tool?.move(at);
   }
 
-  /** Two fingers: what is between them stays between them. @param {number} id @param {Pixel} before @param {Pixel} at */
+  /** Zooms and pans with two fingers: the point between them stays between them. @param {number} id @param {Pixel} before @param {Pixel} at */
   pinch(id, before, at) {
-    const { camera, renderer } = this.bench;
+    const { camera, renderer } = this.app;
     const other = [...this.pointers].find(([one]) => one !== id)?.[1];
     if (other === undefined) return;
     const middle = { x: (at.x + other.x) / 2, y: (at.y + other.y) / 2 };
@@ -127,20 +132,20 @@ export class Input {
   }
 
   /** @param {PointerEvent} event */
-  lift(event) {
+  release(event) {
     if (!this.pointers.delete(event.pointerId)) return;
     clearTimeout(this.longPress);
     this.finish();
   }
 
-  /** Ends the tool in use: its particle is let go. */
+  /** Ends the tool in use; a grab releases its particle. */
   finish() {
     this.tool?.end();
     this.tool = null;
-    this.bench.renderer.isDirty = true;
+    this.app.renderer.isDirty = true;
   }
 
-  /** The connection or the scene is gone: there is nobody left to let go of. */
+  /** Drops the tool without ending it, when its connection or scene is gone. */
   abandon() {
     this.tool = null;
     this.hovered = null;
@@ -153,15 +158,15 @@ export class Input {
 
   /** @param {Pixel} at @param {number} reach */
   pinAt(at, reach) {
-    const particle = this.canChange() ? particleAt(this.bench, at, reach) : null;
-    if (particle !== null) togglePin(this.bench, particle);
+    const particle = this.canChange() ? particleAt(this.app, at, reach) : null;
+    if (particle !== null) togglePin(this.app, particle);
     return particle !== null;
   }
 
-  /** P over a particle, or while one is held. */
+  /** Toggles the pin of the grabbed particle, or of the one under the mouse. Returns false if there is none. */
   pinHovered() {
-    if (this.tool instanceof Hand) {
-      togglePin(this.bench, this.tool.particle);
+    if (this.tool instanceof GrabTool) {
+      togglePin(this.app, this.tool.particle);
       return true;
     }
     return this.hover !== null && this.pinAt(this.hover, REACH.mouse);
@@ -170,13 +175,13 @@ export class Input {
   /** @param {WheelEvent} event */
   turnWheel(event) {
     event.preventDefault();
-    const { camera, renderer } = this.bench;
+    const { camera, renderer } = this.app;
     const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1;
     if (this.mode === "brush" && !event.ctrlKey) {
       this.brushRadius = clamp(this.brushRadius - Math.sign(event.deltaY) * BRUSH.step, BRUSH.min, BRUSH.max);
-      if (this.tool instanceof Brush) this.tool.radius = this.brushRadius;
+      if (this.tool instanceof BrushTool) this.tool.radius = this.brushRadius;
     } else {
-      // A pinch on a touchpad comes as a wheel with ctrl, in much smaller units.
+      // Browsers report a pinch on a touchpad as a wheel with ctrl, in much smaller units.
       const units = clamp(event.deltaY * lines, -300, 300) * (event.ctrlKey ? 5 : 1);
       const at = this.pixel(event);
       camera.zoom(Math.exp(-units * ZOOM_PER_UNIT), at.x, at.y, renderer.viewport);
@@ -184,14 +189,14 @@ export class Input {
     renderer.isDirty = true;
   }
 
-  /** Once an animation frame: what the tool has to send, and what the mouse is over. @param {number} nowMs */
+  /** Lets the tool send its message, and updates the hovered particle, once per animation frame. @param {number} nowMs */
   tick(nowMs) {
     this.tool?.tick(nowMs);
     if (!this.isHoverStale || this.tool !== null) return;
     this.isHoverStale = false;
-    const isQuick = (this.bench.simulation.scene?.particleCount ?? 0) <= HOVER_PARTICLES_MAX;
-    const canHold = this.hover !== null && isQuick && this.canChange() && (this.mode === "grab" || this.mode === "pin");
-    this.hovered = canHold && this.hover !== null ? particleAt(this.bench, this.hover, REACH.mouse) : null;
+    const isQuick = (this.app.simulation.scene?.particleCount ?? 0) <= HOVER_PARTICLES_MAX;
+    const canPick = this.hover !== null && isQuick && this.canChange() && (this.mode === "grab" || this.mode === "pin");
+    this.hovered = canPick && this.hover !== null ? particleAt(this.app, this.hover, REACH.mouse) : null;
     this.canvas.dataset.cursor = this.mode === "cut" ? "cut" : this.hovered === null ? this.mode : "over";
   }
 }

@@ -1,12 +1,14 @@
-// What the user has to be told: one banner for a state that lasts, notices for what passes.
+// Messages to the user: one banner for a lasting state, notices for events.
 
 import { make } from "./dom.js";
 
-/** How long a notice stays, and how many there are at once. */
+/** Lifetime of a notice, and limit on visible notices. */
 const NOTICE_MS = 5000;
 const NOTICES_MAX = 3;
+/** Limit on notices kept for tests. */
+const HISTORY_MAX = 100;
 
-/** Reasons for a banner, the gravest first: only one is shown. */
+/** Causes of a banner, most severe first. Only one is shown. */
 const ORDER = /** @type {const} */ (["fatal", "context", "connection", "node", "nonFinite", "saturated"]);
 
 /** @typedef {typeof ORDER[number]} Cause */
@@ -18,30 +20,30 @@ export class Banner {
     this.notices = notices;
     /** @type {Map<Cause, string>} */
     this.causes = new Map();
-    /** Everything that was said, for tests. @type {string[]} */
-    this.said = [];
+    /** Texts of the last notices, for tests. @type {string[]} */
+    this.history = [];
   }
 
-  /** Sets or, with "", takes away what is said for a cause. @param {Cause} cause @param {string} text */
+  /** Sets the text for a cause, or clears it with "". @param {Cause} cause @param {string} text */
   set(cause, text) {
     if ((this.causes.get(cause) ?? "") === text) return;
     if (text === "") this.causes.delete(cause);
     else this.causes.set(cause, text);
-    const gravest = ORDER.find((one) => this.causes.has(one));
-    this.element.hidden = gravest === undefined;
-    this.element.textContent = gravest === undefined ? "" : this.causes.get(gravest) ?? "";
-    this.element.classList.toggle("is-error", gravest === "fatal" || gravest === "context" || gravest === "nonFinite");
+    const worst = ORDER.find((one) => this.causes.has(one));
+    this.element.hidden = worst === undefined;
+    this.element.textContent = worst === undefined ? "" : this.causes.get(worst) ?? "";
+    this.element.classList.toggle("is-error", worst === "fatal" || worst === "context" || worst === "nonFinite");
   }
 
-  /** The text of the banner, "" without one. */
+  /** The text of the banner, or "". */
   get text() {
     return this.element.textContent ?? "";
   }
 
   /** @param {string} text @param {string} [level] "info", "warning" or "error" */
   notify(text, level = "info") {
-    this.said.push(text);
-    if (this.said.length > 100) this.said.shift();
+    this.history.push(text);
+    if (this.history.length > HISTORY_MAX) this.history.shift();
     const same = [...this.notices.children].find((one) => one.textContent === text);
     same?.remove();
     const notice = make("li", { class: `is-${level}` }, text);
@@ -51,5 +53,5 @@ export class Banner {
   }
 }
 
-/** Programs say it in lower case and without an end. @param {string} text */
+/** Turns a message of a program, in lower case and without a full stop, into a sentence. @param {string} text */
 export const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}${/[.!?…]$/.test(text) ? "" : "."}`;

@@ -1,4 +1,4 @@
-// The buttons of the bar, the scene picker, the help, and the keys that press them.
+// The top bar: buttons, scene picker and help, with their keyboard shortcuts.
 
 import { find, make } from "./dom.js";
 import { MODES } from "../tools/input.js";
@@ -6,20 +6,20 @@ import { listenToKeys } from "./keys.js";
 
 /** @typedef {import("../tools/input.js").Mode} Mode */
 
-/** Below this width the panel covers the picture: it is away until it is asked for. */
+/** Below this width the panel covers the picture, so it is hidden at first. */
 const PANEL_BESIDE_MIN = "(min-width: 761px)";
-/** CSS pixels that an arrow key turns or moves the view by, and what + zooms by. */
+/** Motion of the view per arrow key, in CSS pixels, and zoom factor of the + key. */
 const KEY_PIXELS = 30;
 const KEY_ZOOM = 1.2;
 
 export class Controls {
   /**
-   * @param {import("../tools/tools.js").Bench} bench @param {import("../tools/input.js").Input} input
+   * @param {import("../tools/tool.js").App} app @param {import("../tools/input.js").Input} input
    * @param {import("./views.js").Views} views @param {import("./timeline-bar.js").TimelineBar} timeline
    * @param {import("./banner.js").Banner} banner
    */
-  constructor(bench, input, views, timeline, banner) {
-    this.bench = bench;
+  constructor(app, input, views, timeline, banner) {
+    this.app = app;
     this.input = input;
     this.views = views;
     this.timeline = timeline;
@@ -33,14 +33,14 @@ export class Controls {
     this.panelToggle = find("panel-toggle", HTMLButtonElement);
     this.listen();
     listenToKeys(this.keymap());
-    const { simulation } = bench;
+    const { simulation } = app;
     for (const topic of /** @type {const} */ (["hello", "node", "playback", "scene", "parameters"])) simulation.on(topic, () => this.show());
   }
 
   listen() {
     this.pause.addEventListener("click", () => this.togglePause());
     this.step.addEventListener("click", () => this.stepOnce(1));
-    this.reset.addEventListener("click", () => this.bench.commands.run("reset"));
+    this.reset.addEventListener("click", () => this.app.commands.run("reset"));
     this.scene.addEventListener("change", () => this.load(this.scene.value));
     for (const button of this.modes) button.addEventListener("click", () => this.setMode(/** @type {Mode} */ (button.dataset.mode)));
     find("frame", HTMLButtonElement).addEventListener("click", () => this.views.frame());
@@ -54,13 +54,13 @@ export class Controls {
 
   /** @returns {import("./keys.js").Keymap} */
   keymap() {
-    const { views, bench } = this;
+    const { views, app } = this;
     /** @type {import("./keys.js").Keymap} */
     const keymap = {
       " ": () => this.togglePause(),
       ".": () => this.stepOnce(1),
-      ",": () => { if (bench.simulation.isReplay) this.stepOnce(-1); },
-      r: () => { if (!this.reset.disabled) bench.commands.run("reset"); },
+      ",": () => { if (app.simulation.isReplay) this.stepOnce(-1); },
+      r: () => { if (!this.reset.disabled) app.commands.run("reset"); },
       f: () => views.frame(),
       s: () => views.savePicture(),
       v: () => this.togglePanel(),
@@ -87,7 +87,7 @@ export class Controls {
 
   /** @param {number} x @param {number} y */
   arrow(x, y) {
-    const { camera, renderer, simulation } = this.bench;
+    const { camera, renderer, simulation } = this.app;
     if (simulation.isReplay && x !== 0) return this.stepOnce(x);
     if (camera.isFlat) camera.pan(-x * KEY_PIXELS, -y * KEY_PIXELS, renderer.viewport);
     else camera.orbit(-x * KEY_PIXELS, -y * KEY_PIXELS);
@@ -96,27 +96,27 @@ export class Controls {
 
   /** @param {number} factor */
   zoom(factor) {
-    const { camera, renderer } = this.bench;
+    const { camera, renderer } = this.app;
     camera.zoom(factor, renderer.viewport.width / 2, renderer.viewport.height / 2, renderer.viewport);
     renderer.isDirty = true;
   }
 
   togglePause() {
     if (this.pause.disabled) return;
-    this.bench.commands.run(this.bench.simulation.isPaused ? "resume" : "pause");
+    this.app.commands.run(this.app.simulation.isPaused ? "resume" : "pause");
   }
 
-  /** A step of what runs is a pause and a step. @param {number} count */
+  /** Makes one step; pauses a running simulation first. @param {number} count */
   stepOnce(count) {
     if (this.step.disabled) return;
-    if (this.bench.simulation.isReplay) return this.timeline.step(count);
-    if (!this.bench.simulation.isPaused) this.bench.commands.run("pause");
-    this.bench.commands.run("step", { count });
+    if (this.app.simulation.isReplay) return this.timeline.step(count);
+    if (!this.app.simulation.isPaused) this.app.commands.run("pause");
+    this.app.commands.run("step", { count });
   }
 
   /** @param {string} scene */
   load(scene) {
-    this.bench.commands.run("load", { scene }, (outcome) => {
+    this.app.commands.run("load", { scene }, (outcome) => {
       if (outcome.status !== "applied") this.show();
     });
   }
@@ -142,33 +142,33 @@ export class Controls {
   }
 
   canChange() {
-    const { simulation } = this.bench;
+    const { simulation } = this.app;
     return !simulation.isReplay && !(simulation.node?.is_replay ?? false) && simulation.node?.state === "alive";
   }
 
-  /** Brings the controls to what is true now, and says of disabled ones why. */
+  /** Updates the controls. The tooltip of a disabled control gives the reason. */
   show() {
-    const { simulation } = this.bench;
+    const { simulation } = this.app;
     const isAlive = simulation.node?.state === "alive" || simulation.isReplay;
     const isRecording = simulation.isReplay || (simulation.node?.is_replay ?? false);
     this.pause.setAttribute("aria-pressed", String(simulation.isPaused));
     setText(this.pause, simulation.isPaused ? "Go on" : "Pause");
     enable(this.pause, isAlive, "No node is running.");
     enable(this.step, isAlive, "No node is running.");
-    enable(this.reset, isAlive && !isRecording, isRecording ? "A recording cannot be reset: drag its bar." : "No node is running.");
+    enable(this.reset, isAlive && !isRecording, isRecording ? "A recording cannot be reset. Use the timeline to go back." : "No node is running.");
     for (const button of this.modes) enable(button, isAlive && !isRecording, isRecording ? "A recording cannot be changed." : "No node is running.");
     this.showScenes(isAlive && !isRecording);
   }
 
   /** @param {boolean} canLoad */
   showScenes(canLoad) {
-    const { hello, node, scene, timeline } = this.bench.simulation;
+    const { hello, node, scene, timeline } = this.app.simulation;
     const name = node?.scene ?? scene?.name ?? timeline?.scene ?? "No scene";
     const scenes = hello?.scenes ?? [];
     const known = scenes.some((one) => one.name === name);
     const options = scenes.map((one) => {
       const isOther = node !== null && node.rate_hz > 0 && one.rate_hz !== node.rate_hz;
-      // Whether a node takes another rate, only its answer tells: the label warns, the outcome decides.
+      // Some nodes accept scenes of another rate, so the scene stays enabled and its label shows the rate.
       return make("option", { value: one.name, title: one.text }, isOther ? `${one.name} (${one.rate_hz} Hz)` : one.name);
     });
     if (!known) options.unshift(make("option", { value: name }, name));
@@ -178,7 +178,7 @@ export class Controls {
       this.scene.dataset.signature = signature;
     }
     this.scene.value = name;
-    enable(this.scene, canLoad && scenes.length > 0, canLoad ? "" : "A scene is loaded by a running node.");
+    enable(this.scene, canLoad && scenes.length > 0, canLoad ? "" : "Loading a scene needs a running node.");
   }
 }
 

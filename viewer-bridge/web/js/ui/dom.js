@@ -1,6 +1,6 @@
-// Elements: found by id, or made in one expression.
+// Helpers for DOM elements and 2-D canvases.
 
-/** The element with an id; the page is broken without it. @template {Element} T @param {string} id @param {{ new (): T }} Type @returns {T} */
+/** Returns the element with an id, and throws if it is missing. @template {Element} T @param {string} id @param {{ new (): T }} Type @returns {T} */
 export function find(id, Type) {
   const element = document.getElementById(id);
   if (!(element instanceof Type)) throw new Error(`the page has no ${Type.name} #${id}`);
@@ -8,6 +8,7 @@ export function find(id, Type) {
 }
 
 /**
+ * Creates an element with attributes and children.
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag @param {Record<string, string | number | boolean>} [attributes] @param {(Node | string)[]} children
  * @returns {HTMLElementTagNameMap[K]}
@@ -22,7 +23,7 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
-/** A context for drawing on a canvas, as fine as the screen; cleared. @param {HTMLCanvasElement} canvas */
+/** Clears a canvas, sizes it to device pixels, and returns its context with the size in CSS pixels. @param {HTMLCanvasElement} canvas */
 export function sharpContext(canvas) {
   const ratio = Math.min(devicePixelRatio || 1, 2);
   const width = Math.max(1, canvas.clientWidth);
@@ -37,5 +38,5 @@ export function sharpContext(canvas) {
   return { context, width, height };
 }
 
-/** A colour of the style sheet, by its custom property. @param {string} name */
+/** Value of a custom property of the style sheet. @param {string} name */
 export const cssColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -1,6 +1,6 @@
 // Numbers as text, and round numbers for the ends of scales.
 
-/** The least of 1, 2, 5 times a power of ten that is not below `value`. @param {number} value */
+/** The smallest 1, 2 or 5 times a power of ten that is at least `value`. @param {number} value */
 export function niceCeiling(value) {
   if (!(value > 0) || !Number.isFinite(value)) return 1;
   const power = 10 ** Math.floor(Math.log10(value));
@@ -8,14 +8,13 @@ export function niceCeiling(value) {
   return step * power;
 }
 
-/** What is less is noise and written as 0: a hundred-thousandth of a percent, a nanojoule. */
-const LEAST = /** @type {Record<string, number>} */ ({ "%": 1e-5, J: 1e-9 });
+/** Values below these are noise and shown as 0: a thousandth of a percent, a nanojoule. */
+const NOISE = /** @type {Record<string, number>} */ ({ "%": 1e-5, J: 1e-9 });
 
-/** A number with three digits and its prefix: 1234 µs is "1.23 ms" by the caller's unit. @param {number} value @param {string} unit */
+/** Formats a value with three digits and a metric prefix: 1234 µs becomes "1.23 ms". @param {number} value @param {string} unit */
 export function readable(value, unit) {
   if (!Number.isFinite(value)) return "–";
-  const least = LEAST[unit] ?? 0;
-  if (Math.abs(value) < least) return `0 ${unit}`;
+  if (Math.abs(value) < (NOISE[unit] ?? 0)) return `0 ${unit}`;
   if (unit === "%") return `${trim(value * 100)} %`;
   if (unit === "µs" && Math.abs(value) >= 1000) return `${trim(value / 1000)} ms`;
   if (unit === "J" && value !== 0) {
@@ -27,7 +26,7 @@ export function readable(value, unit) {
   return `${trim(value)} ${unit}`;
 }
 
-/** Three digits, without an exponent where it can be. @param {number} value */
+/** Formats a number with three digits, without an exponent if possible. @param {number} value */
 export function trim(value) {
   if (value === 0) return "0";
   const size = Math.abs(value);

@@ -1,9 +1,9 @@
-// What a link says behind its "#": the token, which scene, where the camera stands, what is shown.
+// The fragment of the address: the token, the scene, the camera pose, and the display toggles.
 
 /** @typedef {{ target: import("../geometry/math.js").Vec3, distance: number, yaw: number, pitch: number }} CameraPose */
 /** @typedef {{ token: string | null, scene: string | null, camera: CameraPose | null, toggles: Record<string, boolean> }} Link */
 
-/** Digits of a pose: a thousandth of what is seen, in any unit. */
+/** Significant digits of a pose: well below a thousandth of the picture, in any unit. */
 const DIGITS = 5;
 
 /** @param {string} hash with or without its "#" @returns {Link} */
@@ -15,7 +15,7 @@ export function parseLink(hash) {
   return { token: fields.get("token") || null, scene: fields.get("scene") || null, camera: parsePose(fields.get("camera")), toggles };
 }
 
-/** What is no pose is ignored: a link may be cut or written by hand. @param {string | null} text @returns {CameraPose | null} */
+/** Parses a pose. Returns null for anything else: a link may be truncated or edited by hand. @param {string | null} text @returns {CameraPose | null} */
 function parsePose(text) {
   if (text === null) return null;
   const numbers = text.split(",").map(Number);
@@ -24,7 +24,7 @@ function parsePose(text) {
   return { target: [x, y, z], distance, yaw, pitch };
 }
 
-/** The part behind "#"; the token is never in it. @param {Omit<Link, "token">} link */
+/** Formats the fragment, without a token. @param {Omit<Link, "token">} link */
 export function formatLink(link) {
   const fields = [];
   if (link.scene !== null) fields.push(`scene=${encodeURIComponent(link.scene)}`);

@@ -1,18 +1,18 @@
-// What a hand does, drawn over the picture: the line from the pointer to the particle that it pulls,
-// the circle of the brush, the stroke of a cut. The particle itself is where the simulation has it.
+// Feedback of the pointer tools over the picture: a line from the grabbed particle to the pointer, the
+// circle of the brush, the stroke of a cut. The particle itself is drawn where the simulation has it.
 
 import { sharpContext } from "./dom.js";
 
 /** @typedef {import("../geometry/pick.js").Pixel} Pixel */
 
-const HELD = "#ff8a1f";
-const CUT = "#e03546";
+const GRAB_COLOR = "#ff8a1f";
+const CUT_COLOR = "#e03546";
 
 export class Overlay {
-  /** @param {HTMLCanvasElement} canvas @param {import("../tools/tools.js").Bench} bench @param {import("../tools/input.js").Input} input */
-  constructor(canvas, bench, input) {
+  /** @param {HTMLCanvasElement} canvas @param {import("../tools/tool.js").App} app @param {import("../tools/input.js").Input} input */
+  constructor(canvas, app, input) {
     this.canvas = canvas;
-    this.bench = bench;
+    this.app = app;
     this.input = input;
     this.isEmpty = true;
   }
@@ -34,7 +34,7 @@ export class Overlay {
 
   /** @param {number} particle */
   pixelOf(particle) {
-    const { simulation, camera, renderer } = this.bench;
+    const { simulation, camera, renderer } = this.app;
     const at = simulation.position(particle);
     return at === null ? null : camera.project(at, renderer.viewport);
   }
@@ -43,7 +43,7 @@ export class Overlay {
   ring(context, particle) {
     const at = this.pixelOf(particle);
     if (at === null) return;
-    outline(context, () => context.arc(at.x, at.y, 8, 0, 2 * Math.PI), HELD, 2);
+    outline(context, () => context.arc(at.x, at.y, 8, 0, 2 * Math.PI), GRAB_COLOR, 2);
   }
 
   /** @param {CanvasRenderingContext2D} context @param {number} particle @param {Pixel} to */
@@ -53,12 +53,12 @@ export class Overlay {
     outline(context, () => {
       context.moveTo(from.x, from.y);
       context.lineTo(to.x, to.y);
-    }, HELD, 2);
-    outline(context, () => context.arc(to.x, to.y, 4, 0, 2 * Math.PI), HELD, 2);
+    }, GRAB_COLOR, 2);
+    outline(context, () => context.arc(to.x, to.y, 4, 0, 2 * Math.PI), GRAB_COLOR, 2);
   }
 }
 
-/** A line with a thin dark seam round it, readable on every ground. @param {CanvasRenderingContext2D} context @param {() => void} path @param {string} color @param {number} width */
+/** Strokes a path with a thin dark outline, so that it is visible on any background. @param {CanvasRenderingContext2D} context @param {() => void} path @param {string} color @param {number} width */
 function outline(context, path, color, width) {
   for (const [style, wide] of /** @type {const} */ ([["rgb(0 0 0 / 35%)", width + 2], [color, width]])) {
     context.beginPath();
@@ -75,17 +75,17 @@ function drawCircle(context, at, radius, isPressed) {
   context.arc(at.x, at.y, radius, 0, 2 * Math.PI);
   context.fillStyle = isPressed ? "rgb(255 138 31 / 26%)" : "rgb(255 138 31 / 12%)";
   context.fill();
-  outline(context, () => context.arc(at.x, at.y, radius, 0, 2 * Math.PI), HELD, 1.5);
+  outline(context, () => context.arc(at.x, at.y, radius, 0, 2 * Math.PI), GRAB_COLOR, 1.5);
 }
 
-/** Fades towards its beginning. @param {CanvasRenderingContext2D} context @param {Pixel[]} stroke */
+/** Draws a stroke that fades towards its start. @param {CanvasRenderingContext2D} context @param {Pixel[]} stroke */
 function drawStroke(context, stroke) {
   for (let i = 1; i < stroke.length; i++) {
     context.globalAlpha = i / stroke.length;
     outline(context, () => {
       context.moveTo(stroke[i - 1].x, stroke[i - 1].y);
       context.lineTo(stroke[i].x, stroke[i].y);
-    }, CUT, 2.5);
+    }, CUT_COLOR, 2.5);
   }
   context.globalAlpha = 1;
 }

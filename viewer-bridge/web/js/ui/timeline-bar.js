@@ -1,13 +1,15 @@
-// The bar of a recording: marks, scrubbing, playing. Steps are what it counts in, as commands do.
+// The timeline of a recording: marks, scrubbing and playback. Positions are steps, as in commands.
 
 import { cssColor, find, make, sharpContext } from "./dom.js";
 import { Scale, SeekGate, clockText, marksByPixel } from "./timeline.js";
 
-/** Rates to choose from; what another page set beside them is added. */
+/** Rates to choose from; a different rate set by another page is added. */
 const RATES = [0.1, 0.25, 0.5, 1, 2, 5, 10];
-/** Colour and row of each kind of mark. */
+/** Colour and row per kind of mark. */
 const MARKS = { tear: ["--accent", 0], pin: ["--plot-a", 1], command: ["--plot-c", 1], late: ["--plot-b", 2] };
 const ROW_HEIGHT = 5;
+/** Least interval between updates of the clock during playback. */
+const SHOW_INTERVAL_MS = 100;
 
 export class TimelineBar {
   /** @param {import("../state/simulation.js").Simulation} simulation @param {import("../net/commands.js").Commands} commands */
@@ -22,13 +24,13 @@ export class TimelineBar {
     this.play = find("play", HTMLButtonElement);
     this.loop = find("loop", HTMLButtonElement);
     this.hashes = find("hashes", HTMLOutputElement);
-    // An answer frees the gate with the next picture: then it was drawn, or a newer one will be.
+    // An answer reopens the gate in the next animation frame, once the step has been drawn.
     this.gate = new SeekGate((step, done) => commands.run("seek", { step }, () => requestAnimationFrame(() => {
       done();
       if (simulation.frame !== null) this.follow(simulation.frame.step);
     })));
     this.isScrubbing = false;
-    this.saidMs = 0;
+    this.shownMs = 0;
     this.listen();
   }
 
@@ -37,9 +39,9 @@ export class TimelineBar {
     slider.addEventListener("input", () => {
       this.isScrubbing = true;
       this.gate.request(slider.valueAsNumber);
-      this.say(slider.valueAsNumber);
+      this.showStep(slider.valueAsNumber);
     });
-    // A slider that is let go where it was taken has not changed.
+    // A slider that is released where it was pressed fires no change event.
     for (const type of ["change", "pointerup", "pointercancel", "blur"]) slider.addEventListener(type, () => { this.isScrubbing = false; });
     find("back", HTMLButtonElement).addEventListener("click", () => this.step(-1));
     find("forward", HTMLButtonElement).addEventListener("click", () => this.step(1));
@@ -86,19 +88,18 @@ export class TimelineBar {
     this.follow(playback.step);
   }
 
-  /** Goes along with what is shown, but not from under the user's hand, nor back to what was asked for
-   * before. @param {number} step */
+  /** Moves the slider to the shown step, except while the user scrubs or a seek is in flight. @param {number} step */
   follow(step) {
     if (this.element.hidden || this.isScrubbing || this.gate.isBusy) return;
     this.slider.valueAsNumber = step;
     const now = performance.now();
-    if (now - this.saidMs < 100 && !this.simulation.isPaused) return;
-    this.saidMs = now;
-    this.say(step);
+    if (now - this.shownMs < SHOW_INTERVAL_MS && !this.simulation.isPaused) return;
+    this.shownMs = now;
+    this.showStep(step);
   }
 
   /** @param {number} step */
-  say(step) {
+  showStep(step) {
     const rate = this.simulation.timeline?.rate_hz ?? 1;
     const last = this.simulation.timeline?.last_step ?? 0;
     this.clock.textContent = `${clockText(step / rate)} / ${clockText(last / rate)}`;

@@ -1,5 +1,5 @@
-// The logic of the replay bar: where a step is on it, which marks share a pixel, and scrubbing that
-// never has more than one seek under way.
+// The logic of the replay timeline: the position of a step, marks that share a pixel, and scrubbing
+// with at most one seek in flight.
 
 /** @typedef {import("../net/messages.js").Mark} Mark */
 
@@ -10,19 +10,19 @@ export class Scale {
     this.last = Math.max(first, last);
   }
 
-  /** 0..=1. @param {number} step */
+  /** Position of a step on the bar, 0..=1. @param {number} step */
   fraction(step) {
     if (this.last === this.first) return 0;
     return Math.min(1, Math.max(0, (step - this.first) / (this.last - this.first)));
   }
 
-  /** The nearest step. @param {number} fraction */
+  /** The step nearest to a position. @param {number} fraction */
   step(fraction) {
     return Math.round(this.first + Math.min(1, Math.max(0, fraction)) * (this.last - this.first));
   }
 }
 
-/** How many of each kind are marked in each pixel of a bar. @param {Mark[]} marks @param {Scale} scale @param {number} width */
+/** The number of marked events per kind and pixel. @param {Mark[]} marks @param {Scale} scale @param {number} width */
 export function marksByPixel(marks, scale, width) {
   /** @type {Map<string, Map<number, number>>} */
   const rows = new Map();
@@ -35,30 +35,30 @@ export function marksByPixel(marks, scale, width) {
   return rows;
 }
 
-/** Lets one seek through at a time, and keeps the newest of those that were asked for meanwhile. */
+/** Sends one seek at a time, and keeps only the newest step requested meanwhile. */
 export class SeekGate {
-  /** @param {(step: number, done: () => void) => boolean} seek whether it could be sent */
+  /** @param {(step: number, done: () => void) => boolean} seek returns false if it could not be sent */
   constructor(seek) {
     this.seek = seek;
     this.isBusy = false;
     /** @type {number | null} */
-    this.wanted = null;
+    this.requested = null;
   }
 
   /** @param {number} step */
   request(step) {
-    this.wanted = step;
+    this.requested = step;
     this.next();
   }
 
   next() {
-    if (this.isBusy || this.wanted === null) return;
-    const step = this.wanted;
-    this.wanted = null;
+    if (this.isBusy || this.requested === null) return;
+    const step = this.requested;
+    this.requested = null;
     this.isBusy = true;
     let isAnswered = false;
     const isSent = this.seek(step, () => {
-      // An answer that comes twice must not open the gate for a third.
+      // A repeated answer must not start another seek.
       if (isAnswered) return;
       isAnswered = true;
       this.isBusy = false;
@@ -67,14 +67,14 @@ export class SeekGate {
     if (!isSent) this.isBusy = false;
   }
 
-  /** The connection is gone: no answer will come. */
+  /** Drops the seek in flight: a lost connection brings no answer. */
   reset() {
     this.isBusy = false;
-    this.wanted = null;
+    this.requested = null;
   }
 }
 
-/** Minutes, seconds and milliseconds. @param {number} seconds */
+/** A time as minutes, seconds and milliseconds. @param {number} seconds */
 export function clockText(seconds) {
   const whole = Math.max(0, Math.round(seconds * 1000));
   const minutes = Math.floor(whole / 60_000);

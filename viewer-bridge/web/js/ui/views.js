@@ -1,48 +1,48 @@
-// What is shown and how: the toggles, the strain scale, the first look at a scene, pictures, links.
+// The view: display toggles, strain scale, first view of a scene, saved pictures, links.
 
 import { find, sharpContext } from "./dom.js";
-import { stageOf } from "../state/framing.js";
+import { firstViewBox } from "../state/framing.js";
 import { formatLink } from "./link.js";
 import { niceCeiling, readable } from "./format.js";
 import { HEAT_STOPS } from "../gl/theme.js";
 
 /** @typedef {import("./link.js").CameraPose} CameraPose */
 
-/** The end of an automatic strain scale is never below this: rounding is no load. */
-const HEAT_LEAST = 0.002;
-/** An automatic scale ends at so many times the mean strain, or at the greatest. */
+/** Least end of an automatic strain scale: below it is only rounding. */
+const HEAT_MIN = 0.002;
+/** End of an automatic scale as a multiple of the mean strain; the greatest strain limits it. */
 const HEAT_MEANS = 8;
-/** Yaw and pitch of the first look. */
-const FIRST_LOOK = { yaw: 0.42, pitch: 0.16 };
-/** Scenes up to so many particles without a surface show them. */
+/** Yaw and pitch of the first view, in radians. */
+const FIRST_VIEW = { yaw: 0.42, pitch: 0.16 };
+/** Limit on particles up to which scenes without a surface show them. */
 const SHOW_PARTICLES_MAX = 400;
 
 export class Views {
-  /** @param {import("../tools/tools.js").Bench} bench @param {import("./banner.js").Banner} banner */
-  constructor(bench, banner) {
-    this.bench = bench;
+  /** @param {import("../tools/tool.js").App} app @param {import("./banner.js").Banner} banner */
+  constructor(app, banner) {
+    this.app = app;
     this.banner = banner;
     this.range = find("heat-range", HTMLSelectElement);
     this.legend = find("legend", HTMLElement);
-    /** Toggles that the user has set: they stay from scene to scene. @type {Map<string, boolean>} */
+    /** Toggles set by the user. They persist across scenes. @type {Map<string, boolean>} */
     this.chosen = new Map();
-    /** A pose out of a link, for the first scene only. @type {CameraPose | null} */
+    /** The pose of a link, for the first scene only. @type {CameraPose | null} */
     this.linkedPose = null;
     this.isFramed = false;
     this.isFollowing = false;
     this.buttons = [...find("toggles", HTMLElement).querySelectorAll("button")];
     for (const button of this.buttons) button.addEventListener("click", () => this.toggle(button.dataset.toggle ?? ""));
     this.range.addEventListener("change", () => this.scaleHeat());
-    bench.simulation.on("scene", (scene) => this.begin(scene));
-    bench.simulation.on("ground", () => { if (!this.isFramed) this.look(); });
-    bench.simulation.on("frame", () => this.follow());
-    bench.simulation.on("stats", () => this.scaleHeat());
-    bench.simulation.on("reset", () => { if (this.isFollowing) this.look(); });
+    app.simulation.on("scene", (scene) => this.begin(scene));
+    app.simulation.on("ground", () => { if (!this.isFramed) this.showFirstView(); });
+    app.simulation.on("frame", () => this.follow());
+    app.simulation.on("stats", () => this.scaleHeat());
+    app.simulation.on("reset", () => { if (this.isFollowing) this.showFirstView(); });
   }
 
   /** @param {import("../net/wire.js").Scene} scene */
   begin(scene) {
-    const { camera, renderer, simulation } = this.bench;
+    const { camera, renderer, simulation } = this.app;
     camera.axes = simulation.axes();
     camera.isFlat = scene.isPlanar;
     this.isFramed = false;
@@ -51,39 +51,39 @@ export class Views {
     const defaults = { heat: false, sticks: !hasSurface || scene.isPlanar, particles: !hasSurface && scene.particleCount <= SHOW_PARTICLES_MAX };
     Object.assign(renderer.toggles, defaults, Object.fromEntries(this.chosen));
     this.show();
-    this.look();
+    this.showFirstView();
   }
 
-  /** The first look at a scene, or all of it again. */
-  look() {
-    const { camera, renderer, simulation } = this.bench;
+  /** Shows the whole scene from the default direction, or the pose of a link. */
+  showFirstView() {
+    const { camera, renderer, simulation } = this.app;
     const { width, height } = renderer.viewport;
-    camera.yaw = FIRST_LOOK.yaw;
-    camera.pitch = FIRST_LOOK.pitch;
-    camera.frame(stageOf(simulation), width / height);
+    camera.yaw = FIRST_VIEW.yaw;
+    camera.pitch = FIRST_VIEW.pitch;
+    camera.frame(firstViewBox(simulation), width / height);
     if (this.linkedPose !== null && simulation.frame !== null) {
       Object.assign(camera, this.linkedPose);
       this.linkedPose = null;
       this.isFramed = true;
     }
-    // What nothing holds and nothing catches falls out of every picture: the camera goes with it.
+    // A scene without pins and without ground falls out of view, so the camera follows it.
     this.isFollowing = !camera.isFlat && simulation.frame !== null && simulation.ground === null && simulation.pins.size === 0;
     renderer.isDirty = true;
   }
 
-  /** All of what is there now, from where the camera looks. */
+  /** Shows the whole scene as it is now, from the current direction. */
   frame() {
-    const { camera, renderer, simulation } = this.bench;
+    const { camera, renderer, simulation } = this.app;
     const { width, height } = renderer.viewport;
-    camera.frame(stageOf(simulation), width / height);
+    camera.frame(firstViewBox(simulation), width / height);
     this.isFramed = true;
     renderer.isDirty = true;
   }
 
   follow() {
-    const { camera, simulation } = this.bench;
+    const { camera, simulation } = this.app;
     if (simulation.frame !== null && !this.isFramed) {
-      this.look();
+      this.showFirstView();
       this.isFramed = true;
     }
     if (!this.isFollowing) return;
@@ -93,7 +93,7 @@ export class Views {
 
   /** @param {string} name */
   toggle(name) {
-    const { toggles } = this.bench.renderer;
+    const { toggles } = this.app.renderer;
     const key = /** @type {keyof typeof toggles} */ (name);
     toggles[key] = !toggles[key];
     this.chosen.set(name, toggles[key]);
@@ -101,7 +101,7 @@ export class Views {
   }
 
   show() {
-    const { renderer } = this.bench;
+    const { renderer } = this.app;
     for (const button of this.buttons) {
       const key = /** @type {keyof typeof renderer.toggles} */ (button.dataset.toggle);
       button.setAttribute("aria-pressed", String(renderer.toggles[key]));
@@ -111,13 +111,13 @@ export class Views {
     renderer.isDirty = true;
   }
 
-  /** The scale's end: what was chosen, or a round number above what is measured, that does not flutter. */
+  /** Sets the end of the scale: the chosen value, or a round number above the measured strain. Hysteresis keeps it steady. */
   scaleHeat() {
-    const { renderer, simulation } = this.bench;
+    const { renderer, simulation } = this.app;
     if (!renderer.toggles.heat) return;
     const { stretchMax, stretchMean } = simulation.stats ?? { stretchMax: 0, stretchMean: 0 };
-    // A single edge at a pin is stretched far more than the rest: it may be beyond the scale.
-    const measured = Math.max(Math.min(stretchMax, stretchMean * HEAT_MEANS) || 0, HEAT_LEAST);
+    // A single edge at a pin can be stretched far more than the rest, and may exceed the scale.
+    const measured = Math.max(Math.min(stretchMax, stretchMean * HEAT_MEANS) || 0, HEAT_MIN);
     const isFixed = this.range.value !== "auto";
     if (isFixed) renderer.heatMax = Number(this.range.value);
     else if (measured > renderer.heatMax || measured < renderer.heatMax * 0.3) renderer.heatMax = niceCeiling(measured);
@@ -127,7 +127,7 @@ export class Views {
   }
 
   savePicture() {
-    const { renderer, simulation } = this.bench;
+    const { renderer, simulation } = this.app;
     renderer.draw();
     renderer.canvas.toBlob((blob) => {
       if (blob === null) return this.banner.notify("The picture could not be saved.", "error");
@@ -139,9 +139,9 @@ export class Views {
     }, "image/png");
   }
 
-  /** Puts the view into the address, and the address onto the clipboard. */
+  /** Writes the view into the address, and copies the address to the clipboard. */
   async copyLink() {
-    const { camera, simulation } = this.bench;
+    const { camera, simulation } = this.app;
     const { target, distance, yaw, pitch } = camera;
     const hash = formatLink({
       scene: simulation.isReplay ? null : simulation.scene?.name ?? null,
@@ -150,7 +150,7 @@ export class Views {
     history.replaceState(null, "", `#${hash}`);
     try {
       await navigator.clipboard.writeText(location.href);
-      this.banner.notify("The link to this view is copied.");
+      this.banner.notify("Copied a link to this view.");
     } catch {
       this.banner.notify("The link to this view is in the address bar.");
     }
