@@ -89,7 +89,7 @@ impl Demand {
 }
 
 /// How that page gets a scene of that many particles.
-fn wants_f32(choice: Choice, particle_count: usize) -> bool {
+pub(super) fn wants_f32(choice: Choice, particle_count: usize) -> bool {
     match choice {
         Choice::Auto => particle_count <= F32_PARTICLES_MAX,
         Choice::F32 => true,

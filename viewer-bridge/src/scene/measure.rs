@@ -6,21 +6,21 @@ use crate::shown_state::single;
 
 /// Stretch and energy of a state. NaN where there is nothing to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measures {
+pub(crate) struct Measures {
     /// Mean of length / rest length - 1, over live structural constraints.
-    pub stretch_mean: f32,
+    pub(crate) stretch_mean: f32,
     /// Its maximum.
-    pub stretch_max: f32,
+    pub(crate) stretch_max: f32,
     /// The constraint of the maximum.
-    pub stretch_max_constraint: u32,
+    pub(crate) stretch_max_constraint: u32,
     /// Of the free particles: m v^2 / 2, in J.
-    pub kinetic_j: f64,
+    pub(crate) kinetic_j: f64,
     /// Of the free particles: -m g.x, in J.
-    pub potential_j: f64,
+    pub(crate) potential_j: f64,
 }
 
 /// Measures a state. The ends of the constraints are particles of it.
-pub fn measure(
+pub(crate) fn measure(
     particles: &[ParticleState],
     constraints: &[ConstraintState],
     is_torn: &[bool],

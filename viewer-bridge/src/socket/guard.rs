@@ -34,7 +34,7 @@ pub(crate) const HEADERS: [(HeaderName, HeaderValue); 7] = [
 
 /// The rules of one server.
 #[derive(Debug, Clone)]
-pub struct Guard {
+pub(crate) struct Guard {
     address: SocketAddr,
     /// Names by which it may be called beside its addresses.
     names: Vec<String>,
@@ -60,7 +60,7 @@ impl Guard {
     ///
     /// # Errors
     /// The system gives no random number.
-    pub fn new(address: SocketAddr, names: Vec<String>) -> Result<Self, getrandom::Error> {
+    pub(crate) fn new(address: SocketAddr, names: Vec<String>) -> Result<Self, getrandom::Error> {
         let token = if address.ip().is_loopback() {
             None
         } else {
@@ -76,7 +76,7 @@ impl Guard {
     }
 
     /// The token, where there has to be one.
-    pub fn token(&self) -> Option<&str> {
+    pub(crate) fn token(&self) -> Option<&str> {
         self.token.as_deref()
     }
 
