@@ -178,31 +178,34 @@ fn document() -> Table {
     let lines = [top, bottom];
     let first = lines.each_ref().map(|lines| lines[0].0);
     let last = lines.each_ref().map(|lines| lines[lines.len() - 1]);
-    Table::new("print", "the loop of a tutorial, while (time <= 10), with the print statement in two places")
-        .column(Column::new(Origin::Given, "printed", "where the loop prints").cells(["top", "bottom"]))
-        .column(Column::new(Origin::Loop, "passes", "through the loop").cells([END_S + 1; 2]))
-        .column(Column::new(Origin::Loop, "first", "position in the line for time = 0, m").cells(first))
-        .column(
-            Column::new(Origin::Loop, "position", "in the line for time = 10, m")
-                .cells(last.map(|(position, _)| position)),
-        )
-        .column(
-            Column::new(Origin::Loop, "velocity", "in the line for time = 10, m/s")
-                .cells(last.map(|(_, velocity)| velocity)),
-        )
-        .column(
-            Column::new(Origin::Document, "doc_position", "as the tutorial prints it, m")
-                .cells([Some(550.0), None]),
-        )
-        .column(
-            Column::new(Origin::Document, "doc_velocity", "as the tutorial prints it, m/s")
-                .cells([Some(100.0), None]),
-        )
-        .note(
-            "The loop runs 11 times, for the times 0, 1, ... 10. The tutorial's table matches a loop \
+    Table::new(
+        "print",
+        "the loop of a tutorial, while (time <= 10), with the print statement in two places",
+    )
+    .column(Column::new(Origin::Given, "printed", "where the loop prints").cells(["top", "bottom"]))
+    .column(Column::new(Origin::Loop, "passes", "through the loop").cells([END_S + 1; 2]))
+    .column(Column::new(Origin::Loop, "first", "position in the line for time = 0, m").cells(first))
+    .column(
+        Column::new(Origin::Loop, "position", "in the line for time = 10, m")
+            .cells(last.map(|(position, _)| position)),
+    )
+    .column(
+        Column::new(Origin::Loop, "velocity", "in the line for time = 10, m/s")
+            .cells(last.map(|(_, velocity)| velocity)),
+    )
+    .column(
+        Column::new(Origin::Document, "doc_position", "as the tutorial prints it, m")
+            .cells([Some(550.0), None]),
+    )
+    .column(
+        Column::new(Origin::Document, "doc_velocity", "as the tutorial prints it, m/s")
+            .cells([Some(100.0), None]),
+    )
+    .note(
+        "The loop runs 11 times, for the times 0, 1, ... 10. The tutorial's table matches a loop \
              that prints before the update. A loop that prints after it shows the state of 11 s, \
              660 m and 110 m/s, in the line for 10 s.",
-        )
+    )
 }
 
 /// Tabulates the errors at the end of the fall, for smaller and smaller steps.

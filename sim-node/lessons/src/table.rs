@@ -254,7 +254,9 @@ mod tests {
     fn example() -> Table {
         Table::new("fall", "two rows")
             .column(Column::new(Origin::Given, "t", "time, s").cells([1_u32, 10]))
-            .column(Column::new(Origin::Law, "x", "distance, m").decimals(2).cells([-0.001, 12.345]))
+            .column(
+                Column::new(Origin::Law, "x", "distance, m").decimals(2).cells([-0.001, 12.345]),
+            )
             .column(
                 Column::new(Origin::Document, "printed", "m").decimals(1).cells([Some(2.5), None]),
             )

@@ -5,13 +5,15 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use sim_lessons::{Lesson, UnknownLesson};
 
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "Every number is computed when you ask for it, except in the columns marked \
+#[command(
+    after_help = "Every number is computed when you ask for it, except in the columns marked \
     `document`, which a tutorial prints. `law` is a closed form, `loop` a few lines of plain \
     arithmetic, `solver` a scene in the solver.\n\n\
     Examples:\n  \
     sim-node lesson               list the lessons\n  \
     sim-node lesson euler         why one table ends at 450, one at 550, and one at 500\n  \
-    sim-node lesson f32 --json    the rows, for a plot")]
+    sim-node lesson f32 --json    the rows, for a plot"
+)]
 pub(crate) struct LessonArgs {
     /// Lesson to print [default: list all]
     #[arg(value_parser = lesson_parser())]
