@@ -12,9 +12,9 @@ use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
-use crate::command_file::{self, TimedCommand};
-use crate::simulation::{Job, Outcomes, simulate};
-use crate::verify::{Report, Verdict, verify};
+use crate::commands::verify::{Report, Verdict, verify};
+use crate::input::command_file::{self, TimedCommand};
+use crate::simulation::{Job, SimulationResult, simulate};
 
 const COMMANDS: &str = r#"
     {"step":10,"kind":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.1}
@@ -33,7 +33,7 @@ fn job(scene: &str, commands: &str, steps: u64) -> Job {
     Job { scene, commands: command_file::parse(commands, "test").unwrap(), steps }
 }
 
-fn record(job: &Job) -> (Vec<u8>, Outcomes) {
+fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
     let solver = Solver::new(&job.scene);
     let (run, scene) = (job.description(&solver), job.scene.to_toml());
     // Small chunks, so that a cut leaves something.

@@ -5,9 +5,9 @@ use recorder::{Message, OutcomeRow};
 use sim_solver::{PARAMETERS, Scene};
 
 use super::{check, rebuild, record};
-use crate::command_file;
+use crate::commands::verify::Verdict;
+use crate::input::command_file;
 use crate::simulation::Job;
-use crate::verify::Verdict;
 
 /// A cloth between two anchors, in the wind, above a floor, beside a box that turns.
 pub(super) const SCENE: &str = r#"

@@ -6,7 +6,7 @@ use sim_contract::ParticleFlags;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
 use super::{check, rebuild, record};
-use crate::verify::Verdict;
+use crate::commands::verify::Verdict;
 
 fn tears(file: &[u8]) -> Vec<TearsRow> {
     collect(file, |message| match message {
@@ -190,6 +190,9 @@ fn a_recording_that_begins_in_a_torn_scene_is_bit_identical_from_there() {
         assert_eq!(report.to_string(), expected);
         let report = begin_at(first_step, Vec::new());
         assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(first_step)));
-        assert!(report.to_string().contains("other torn constraints"), "{report}");
+        assert!(
+            report.to_string().contains("torn constraints in /topology and /tears differ"),
+            "{report}"
+        );
     }
 }
