@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::MetadataCommand;
 
 /// The allowed arrows: crate -> workspace crates and restricted libraries that it may name.
-const ARROWS: [(&str, &[&str]); 6] = [
+const ARROWS: [(&str, &[&str]); 7] = [
     ("sim-solver", &[]),
     ("sim-contract", &["iceoryx2"]),
-    ("sim-node", &["sim-contract", "sim-solver"]),
+    ("sim-lessons", &["sim-solver"]),
+    ("sim-node", &["sim-contract", "sim-lessons", "sim-solver"]),
     ("recorder", &["mcap", "sim-contract", "sim-solver"]),
     ("viewer-bridge", &["foxglove", "recorder", "sim-contract"]),
     ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),
