@@ -1,4 +1,4 @@
-//! `recorder record`: everything that a node publishes, into one file.
+//! `recorder record`: records everything that a node publishes into one file.
 
 mod accepted;
 mod batch;
@@ -28,18 +28,19 @@ use intake::{Intake, Now};
 use queue::{Content, Item, Popped, Queue};
 use report::Report;
 
-/// Longest wait for something to read, before the signals are looked at.
+/// Longest wait for messages before the next check for signals.
 const WAIT_MAX: Duration = Duration::from_millis(50);
-/// How often the owner is looked for.
-const OWNER_LOOK_NS: u64 = SECOND_NS / 5;
-/// How often everything goes to the operating system: what a killed recorder loses at most.
+/// Period of the check whether the owner is alive.
+const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
+/// Flush period: the most that a killed recorder loses.
 const FLUSH_NS: u64 = SECOND_NS;
-/// Reads of a batch: one takes at most one buffer of each service.
+/// Most reads per batch. Each read empties at most one buffer of each service.
 const READS_PER_BATCH_MAX: usize = 8;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Ends cleanly with Ctrl-C, SIGTERM, a limit, the node, or another run (as of play --loop).\n\n\
+    after_help = "Ends cleanly on Ctrl-C, on SIGTERM, at a limit, when the node ends, or when another run \
+    starts (as with play --loop).\n\n\
     Exit codes: 0 all recorded; 1 failed; 3 messages lost.\n\nExamples:\n  \
     recorder record -o run.mcap\n  \
     recorder record --name left --duration 10s --compression none\n  \
@@ -48,17 +49,17 @@ const READS_PER_BATCH_MAX: usize = 8;
 pub(crate) struct RecordArgs {
     #[command(flatten)]
     endpoint: EndpointArgs,
-    /// File to write; until it is finished it has `.part` behind its name
+    /// File to write. Its name ends in `.part` until it is finished
     /// [default: NAME_<UTC time>.mcap]
     #[arg(short, long, value_name = "OUT.mcap")]
     output: Option<PathBuf>,
-    /// End when this much time has passed, such as 10s or 500ms [default: no limit]
+    /// End after this time, such as 10s or 500ms [default: no limit]
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     duration: Option<Duration>,
-    /// End this many steps after the first recorded one [default: no limit]
+    /// End N steps after the first recorded step [default: no limit]
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
-    /// Memory for snapshots between reading and writing, in bytes, at least 1 MiB; those that do
+    /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
     /// not fit are lost and counted
     #[arg(long, value_name = "BYTES", default_value_t = 256 << 20, value_parser = clap::value_parser!(u64).range(1 << 20..=1 << 40))]
     queue_bytes: u64,
@@ -85,7 +86,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         writing: None,
         last_step: 0,
         begin_ns: monotonic_ns(),
-        next_owner_look_ns: 0,
+        next_owner_check_ns: 0,
         is_owner_alive: true,
         unreadable: 0,
     };
@@ -95,7 +96,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     Ok(if report.is_complete() { Exit::Done } else { Exit::Loss })
 }
 
-/// Why a recording ended.
+/// The reason why a recording ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StopReason {
     Signal,
@@ -119,36 +120,36 @@ impl StopReason {
     }
 }
 
-/// A recording while it goes on.
+/// A recording in progress.
 #[derive(Debug)]
 struct Recording {
     tap: Tap,
     intake: Intake,
     queue: Arc<Queue>,
-    /// The file, until it has a head.
+    /// The file, until its header is written.
     file: Option<PartFile>,
-    /// The thread that writes, once there is a head.
+    /// The writing thread, once the recording has started.
     writing: Option<JoinHandle<anyhow::Result<LogFile>>>,
-    /// The last step handed over for writing.
+    /// The last step in the queue.
     last_step: u64,
     begin_ns: u64,
-    next_owner_look_ns: u64,
+    next_owner_check_ns: u64,
     is_owner_alive: bool,
-    /// Messages that came and could not be read.
+    /// Number of messages that arrived but could not be read.
     unreadable: u64,
 }
 
 impl Recording {
-    /// Reads until something ends it.
+    /// Reads until the recording ends.
     fn run(&mut self, args: &RecordArgs, stop: &Stop) -> anyhow::Result<StopReason> {
         loop {
-            // Looked at before reading, so that what was published before the end is read.
+            // Checked before reading, so that messages from before the end are read.
             let reason = self.reason_to_stop(args, stop);
             let (batch, log_time_ns) = self.read();
             let now = Now { realtime_ns: log_time_ns, monotonic_ns: monotonic_ns() };
             let accepted = self.intake.accept(batch, now)?;
             let end = accepted.end.map(StopReason::Run);
-            self.hand_over(accepted, args, log_time_ns)?;
+            self.enqueue(accepted, args, log_time_ns)?;
             if let Some(reason) = end.or(reason) {
                 return Ok(reason);
             }
@@ -158,8 +159,8 @@ impl Recording {
 
     fn reason_to_stop(&mut self, args: &RecordArgs, stop: &Stop) -> Option<StopReason> {
         let now_ns = monotonic_ns();
-        if now_ns >= self.next_owner_look_ns {
-            self.next_owner_look_ns = now_ns + OWNER_LOOK_NS;
+        if now_ns >= self.next_owner_check_ns {
+            self.next_owner_check_ns = now_ns + OWNER_CHECK_NS;
             self.is_owner_alive = self.tap.is_owner_alive();
         }
         let passed = Duration::from_nanos(now_ns - self.begin_ns);
@@ -174,7 +175,8 @@ impl Recording {
         }
     }
 
-    /// Copies out of shared memory: the particles first, so that what belongs to them is there.
+    /// Copies messages out of shared memory. Particles come first, so that the messages that belong
+    /// to them have arrived.
     fn read(&mut self) -> (Batch, u64) {
         let mut batch = Batch::default();
         let drained =
@@ -190,7 +192,7 @@ impl Recording {
         (batch, realtime_ns())
     }
 
-    /// Counts messages that came and could not be read, and tells of the first.
+    /// Counts messages that could not be read, and reports the first one.
     fn note_unreadable(&mut self, errors: &[ReadError]) {
         if let (Some(error), 0) = (errors.first(), self.unreadable) {
             output::note(&format!("warning: a message was not recorded: {error}"));
@@ -198,8 +200,8 @@ impl Recording {
         self.unreadable += errors.len() as u64;
     }
 
-    /// Hands a batch to the writing thread.
-    fn hand_over(
+    /// Passes a batch to the writing thread.
+    fn enqueue(
         &mut self,
         accepted: Accepted,
         args: &RecordArgs,
@@ -217,7 +219,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Starts the writing thread, which begins with the head: no disk is waited for here.
+    /// Starts the writing thread, which writes the header. The reading thread never waits for the disk.
     fn begin(
         &mut self,
         args: &RecordArgs,
@@ -234,7 +236,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Writes what is left and how it ended, and gives the file its name.
+    /// Writes the rest of the queue and the closing metadata, and gives the file its name.
     fn finish(
         self,
         result: anyhow::Result<StopReason>,
@@ -247,12 +249,13 @@ impl Recording {
             }
             let reason = result?.text();
             bail!(
-                "nothing was recorded ({reason}): no snapshot with its keyframe came from {endpoint}"
+                "nothing was recorded ({reason}): {endpoint} published no snapshot with a keyframe"
             );
         };
         let written = writing.join().map_err(|_| anyhow!("the writing thread panicked"))?;
-        let log = written
-            .context("the recording is cut off; what is readable has .part behind its name")?;
+        let log = written.context(
+            "the recording is incomplete; its readable part is the file with the suffix .part",
+        )?;
         let stop_reason = match &result {
             Ok(reason) => reason.text().to_owned(),
             Err(error) => format!("{error:#}"),
@@ -260,7 +263,8 @@ impl Recording {
         let mut closing = Closing { stop_reason, counts: self.intake.counts() };
         closing.counts.set_written(log.counts());
         closing.counts.set_lost(&self.queue.lost());
-        let kept = "the recording is whole but for its end, under its name with .part behind it";
+        let kept =
+            "the recording is complete except for its end, in the file with the suffix .part";
         let path = log.finish(&closing).context(kept)?.finish().context(kept)?;
         result?;
         let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
@@ -268,7 +272,7 @@ impl Recording {
     }
 }
 
-/// However the writing thread ends, nothing more is accepted in then, and the reading side sees it.
+/// Closes the queue when the writing thread ends for any reason, so that the reading thread sees it.
 struct CloseOnDrop(Arc<Queue>);
 
 impl Drop for CloseOnDrop {
@@ -277,7 +281,7 @@ impl Drop for CloseOnDrop {
     }
 }
 
-/// The writing thread: everything that comes, and a flush every second.
+/// The writing thread: writes every item and flushes every second.
 fn write(queue: &Queue, mut log: LogFile) -> Result<LogFile, WriteError> {
     let mut next_flush_ns = monotonic_ns() + FLUSH_NS;
     loop {
@@ -289,7 +293,7 @@ fn write(queue: &Queue, mut log: LogFile) -> Result<LogFile, WriteError> {
                 log.write(&Message::Step(row), log_time_ns)?;
                 log.write(&Message::Particles { step: row.step, particles }, log_time_ns)?;
             }
-            Popped::Nothing => {}
+            Popped::Timeout => {}
             Popped::Closed => return Ok(log),
         }
         let now_ns = monotonic_ns();

@@ -1,8 +1,8 @@
-//! What clients can do to a replay: pause it, let it go on, and step it.
+//! The commands that a replay obeys: pause, resume and step.
 
 use sim_contract::{Action, Reason};
 
-/// Whether and how far the replay goes on.
+/// The state of the playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Control {
     pub(crate) is_paused: bool,
@@ -11,7 +11,7 @@ pub(crate) struct Control {
 }
 
 impl Control {
-    /// Even a replay that starts paused shows its first snapshot.
+    /// A replay that starts paused still publishes its first snapshot.
     pub(crate) fn new(starts_paused: bool) -> Self {
         Self { is_paused: starts_paused, steps_due: u64::from(starts_paused) }
     }
@@ -20,12 +20,12 @@ impl Control {
         !self.is_paused || self.steps_due > 0
     }
 
-    /// A snapshot was published.
+    /// Counts a published snapshot.
     pub(crate) fn count_step(&mut self) {
         self.steps_due = self.steps_due.saturating_sub(1);
     }
 
-    /// Obeys, or says why not: a recording cannot be changed.
+    /// Executes a command. Rejects commands that would change the recording.
     pub(crate) fn obey(&mut self, action: Action) -> Result<(), Reason> {
         match action {
             Action::Pause => *self = Self { is_paused: true, steps_due: 0 },
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_replay_obeys_pause_resume_and_step_and_nothing_else() {
+    fn a_replay_obeys_only_pause_resume_and_step() {
         let mut control = Control::new(false);
         assert!(control.is_moving());
         assert_eq!(control.obey(Action::Step { count: 1 }), Err(Reason::NoEffectHere));
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn a_replay_that_starts_paused_shows_one_snapshot() {
+    fn a_replay_that_starts_paused_publishes_one_snapshot() {
         let mut control = Control::new(true);
         assert!(control.is_moving());
         control.count_step();

@@ -1,4 +1,4 @@
-//! The bounded queue between the thread that reads shared memory and the one that writes the file.
+//! The bounded queue from the thread that reads shared memory to the thread that writes the file.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -7,27 +7,27 @@ use std::time::Duration;
 use recorder::{AllCounts, Message, StepRow, Topic};
 use sim_contract::ParticleState;
 
-/// What is to be written.
+/// One or two messages to write.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Content {
-    /// Anything but a snapshot.
+    /// Any message except those of a snapshot.
     Update(Message),
-    /// A snapshot; its two messages stay together.
+    /// The two messages of a snapshot, which stay together.
     Snapshot(StepRow, Vec<ParticleState>),
 }
 
-/// What is to be written, and when it was received: wall clock, in nanoseconds since 1970.
+/// A content with the time of its reception: wall clock, in nanoseconds since 1970.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Item {
     pub(crate) content: Content,
     pub(crate) log_time_ns: u64,
 }
 
-/// A queue that never makes its reader wait: what does not fit is dropped and counted.
+/// A queue that never blocks the reading thread: it drops and counts items that do not fit.
 ///
-/// Above the limit no snapshot is accepted; the rest, which is small and which every later step
-/// builds on, is accepted up to twice the limit. The load, without which a file is useless, and
-/// whatever finds the queue empty are always accepted.
+/// The limit applies to snapshots. Other messages are small, and later steps build on them, so their
+/// limit is twice as high. The load, without which a file is useless, and an item that finds the
+/// queue empty are always accepted.
 #[derive(Debug)]
 pub(crate) struct Queue {
     state: Mutex<State>,
@@ -43,14 +43,14 @@ struct State {
     is_closed: bool,
 }
 
-/// What the writing thread gets.
+/// The result of [`Queue::pop`].
 #[derive(Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "moved once; a box for each item would cost more")]
 pub(crate) enum Popped {
     Item(Item),
-    /// Nothing came in the time given.
-    Nothing,
-    /// Nothing will come any more.
+    /// No item arrived before the timeout.
+    Timeout,
+    /// The queue is closed and empty.
     Closed,
 }
 
@@ -59,7 +59,7 @@ impl Queue {
         Self { state: Mutex::default(), changed: Condvar::new(), limit_bytes }
     }
 
-    /// Takes an item, or counts it as lost.
+    /// Adds an item, or counts it as lost.
     pub(crate) fn push(&self, item: Item) {
         let size_bytes = item.content.size_bytes();
         let mut state = self.lock();
@@ -81,18 +81,18 @@ impl Queue {
         self.changed.notify_one();
     }
 
-    /// Ends the queue: what is in it can still be accepted.
+    /// Closes the queue. Items in the queue can still be popped.
     pub(crate) fn close(&self) {
         self.lock().is_closed = true;
         self.changed.notify_one();
     }
 
-    /// Whether [`Queue::close`] was called, by either side.
+    /// Returns `true` if either side has called [`Queue::close`].
     pub(crate) fn is_closed(&self) -> bool {
         self.lock().is_closed
     }
 
-    /// The next item; waits at most `timeout` for one.
+    /// Returns the next item. Waits for one at most `timeout`.
     pub(crate) fn pop(&self, timeout: Duration) -> Popped {
         let is_idle = |state: &mut State| state.items.is_empty() && !state.is_closed;
         let waited = self.changed.wait_timeout_while(self.lock(), timeout, is_idle);
@@ -103,16 +103,16 @@ impl Queue {
                 Popped::Item(item)
             }
             None if state.is_closed => Popped::Closed,
-            None => Popped::Nothing,
+            None => Popped::Timeout,
         }
     }
 
-    /// What was dropped so far; nothing else is counted in it.
+    /// Returns the number of dropped messages by topic. The other counts are 0.
     pub(crate) fn lost(&self) -> AllCounts {
         self.lock().lost
     }
 
-    /// A thread that panicked leaves the queue as whole as it was.
+    /// Locks the state. A panic of the other thread cannot leave it inconsistent.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -148,13 +148,13 @@ mod tests {
     fn pop_steps(queue: &Queue) -> Vec<u64> {
         let next = || match queue.pop(Duration::ZERO) {
             Popped::Item(item) => Some(item.log_time_ns),
-            Popped::Nothing | Popped::Closed => None,
+            Popped::Timeout | Popped::Closed => None,
         };
         std::iter::from_fn(next).collect()
     }
 
     #[test]
-    fn a_full_queue_drops_snapshots_only_and_counts_them() {
+    fn a_full_queue_drops_and_counts_snapshots_only() {
         let queue = Queue::new(100_000);
         for step in 0..10 {
             queue.push(keyframe(100 + step, 100));
@@ -167,11 +167,11 @@ mod tests {
         let steps = pop_steps(&queue);
         assert_eq!(steps, [100, 0, 101, 1, 102, 2, 103, 104, 105, 106, 107, 108, 109]);
         queue.push(snapshot(10));
-        assert_eq!(pop_steps(&queue), [10], "an empty queue takes snapshots again");
+        assert_eq!(pop_steps(&queue), [10], "an empty queue accepts snapshots again");
     }
 
     #[test]
-    fn a_snapshot_above_the_limit_is_taken_by_an_empty_queue() {
+    fn an_empty_queue_accepts_a_snapshot_above_the_limit() {
         let queue = Queue::new(1000);
         queue.push(snapshot(1));
         queue.push(snapshot(2));
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn even_small_messages_have_a_limit() {
+    fn small_messages_have_a_limit_too() {
         let queue = Queue::new(1000);
         for step in 0..10 {
             queue.push(keyframe(step, 500));
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_closed_queue_gives_what_is_in_it_and_takes_nothing() {
+    fn a_closed_queue_returns_its_items_and_accepts_no_more() {
         let queue = Queue::new(100_000);
         queue.push(snapshot(1));
         queue.close();

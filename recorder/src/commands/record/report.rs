@@ -1,4 +1,4 @@
-//! What `record` says when it has ended.
+//! The report that `record` prints at its end.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,11 +15,11 @@ pub(crate) struct Report {
     output: String,
     first_step: u64,
     last_step: u64,
-    /// Snapshots in the file.
+    /// Number of snapshots in the file.
     snapshots: u64,
-    /// Outcomes in the file.
+    /// Number of outcomes in the file.
     outcomes: u64,
-    /// Messages that are not in the file and should be, by topic, where there are any.
+    /// Number of missing messages, for topics that have any.
     lost: BTreeMap<&'static str, u64>,
     stop_reason: String,
 }
@@ -43,7 +43,7 @@ impl Report {
         }
     }
 
-    /// With messages that came and could not be read, whatever their topic.
+    /// Adds messages that arrived but could not be read, on any topic.
     pub(crate) fn with_unreadable(mut self, count: u64) -> Self {
         if count > 0 {
             self.lost.insert("unreadable", count);
@@ -51,7 +51,7 @@ impl Report {
         self
     }
 
-    /// Whether everything that was published is in the file.
+    /// Returns `true` if every published message is in the file.
     pub(crate) fn is_complete(&self) -> bool {
         self.lost.is_empty()
     }
