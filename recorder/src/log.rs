@@ -22,7 +22,7 @@ pub use decode::LoggedMessage;
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
 pub use frames::{Frame, FrameReader};
 pub use index::{ChunkEntry, IndexedLog};
-pub use keyframe_tears::{KeyframeTears, cause_of};
+pub use keyframe_tears::KeyframeTears;
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
 pub use read_error::{LogEnd, ReadError};

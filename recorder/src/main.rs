@@ -2,7 +2,6 @@
 //! that a recording can be re-simulated bit for bit.
 #![forbid(unsafe_code)]
 
-mod apply;
 mod cli;
 mod commands;
 mod export;

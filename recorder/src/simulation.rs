@@ -1,5 +1,6 @@
 //! Steps a scene with commands in this process and writes the recording of a live run.
 
+pub(crate) mod apply;
 pub(crate) mod frozen;
 mod job;
 pub(crate) mod solver_rows;
@@ -9,11 +10,11 @@ use std::io::Write;
 use std::ops::ControlFlow;
 
 use recorder::{LogWriter, OutcomeRow, WriteError};
-use sim_contract::{Action, Command, Outcome};
-use sim_solver::Solver;
+use sim_contract::{Command, Outcome, Reason};
+use sim_solver::{Applied, Solver};
 
-use crate::apply::apply;
 use crate::input::command_file::TimedCommand;
+use apply::apply;
 pub(crate) use job::Job;
 use state_writer::{KeyframeDue, StateWriter};
 
@@ -52,10 +53,11 @@ pub(crate) fn simulate<W: Write>(
         let mut keyframe = KeyframeDue::OnTheSecond;
         let mut rows = Vec::new();
         while let Some((command, rest)) = pending.split_first().filter(|(c, _)| c.step <= step) {
-            let outcome = result.apply(&mut solver, command);
-            if outcome.is_applied() && !matches!(command.action, Action::Move { .. }) {
+            let answer = apply(&mut solver, command.client_id, &command.action);
+            if answer.is_ok_and(|applied| applied != Applied::Target) {
                 keyframe = KeyframeDue::Now;
             }
+            let outcome = result.count(command, answer.map(|_| ()));
             rows.push(OutcomeRow::from(&outcome));
             pending = rest;
         }
@@ -84,9 +86,9 @@ impl SimulationResult {
         }
     }
 
-    fn apply(&mut self, solver: &mut Solver, command: &TimedCommand) -> Outcome {
+    /// Counts a command and returns its outcome.
+    fn count(&mut self, command: &TimedCommand, result: Result<(), Reason>) -> Outcome {
         let TimedCommand { step, client_id, sequence, action, .. } = *command;
-        let result = apply(solver, client_id, action);
         let index = self.applied_count + self.rejected_count;
         let outcome = Outcome::new(index, step, Command::new(client_id, sequence, action), result);
         self.applied_count += u64::from(outcome.is_applied());

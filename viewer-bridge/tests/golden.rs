@@ -12,17 +12,16 @@ use serde_json::{Value, json};
 use sim_contract::{
     ColliderShape, ColliderState, ConstraintState, ParticleFlags, ParticleState, PlainF32, Triangle,
 };
-use viewer_bridge::message::parameters::Parameters;
-use viewer_bridge::message::settings;
 use viewer_bridge::message::{
     Choice, FromPage, Hashes, Level, Limits, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
     ParametersText, Playback, Status, Timeline, ToPage, Welcome,
 };
-use viewer_bridge::scene::catalog;
+use viewer_bridge::parameters::Parameters;
 use viewer_bridge::wire::{
     Colliders, Format, FrameHead, FrameLimits, Grid, Message, Pins, Scene, SceneText, Stamp,
     Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
 };
+use viewer_bridge::{scenes, settings};
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
 
@@ -303,7 +302,7 @@ fn to_page() -> Vec<ToPage> {
             client: 3,
             mode: Mode::Live,
             format: Choice::Auto,
-            scenes: catalog::all(),
+            scenes: scenes::all(),
             settings: &settings::SETTINGS,
             limits: Limits::default(),
         })),

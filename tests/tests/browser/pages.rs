@@ -17,7 +17,7 @@ fn a_slider_sets_a_parameter_of_the_node() {
         state.particles[corner].position[2] > z + 0.2
     });
     stage.tab.wait("document.querySelector('input[aria-label=\"Wind drag: on\"]').checked");
-    stage.tab.click("button[aria-label='Reset Wind to the value of the scene']");
+    stage.tab.click("button[aria-label='Wind as in the scene']");
     stage.wait_for_state("the curtain to hang again", |state| {
         state.particles[corner].position[2] < z + 0.05
     });

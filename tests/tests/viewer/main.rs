@@ -216,10 +216,9 @@ fn the_picker_has_the_scenes_of_the_node() {
     let sandbox = Sandbox::new();
     let listed = Process::run(Program::SimNode, &sandbox, &["scenes", "--json"]).json();
     let listed: Vec<_> = listed.as_array().unwrap().iter().map(|one| &one["name"]).collect();
-    let known: Vec<_> =
-        viewer_bridge::scene::catalog::all().iter().map(|one| json!(one.name)).collect();
+    let known: Vec<_> = viewer_bridge::scenes::all().iter().map(|one| json!(one.name)).collect();
     assert_eq!(listed, known.iter().collect::<Vec<_>>());
-    assert!(viewer_bridge::scene::catalog::all().iter().all(|one| !one.text.is_empty()));
+    assert!(viewer_bridge::scenes::all().iter().all(|one| !one.text.is_empty()));
 }
 
 #[test]

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use viewer_bridge::hub::{Demand, Slot};
 use viewer_bridge::limits::FRAMES_UNACKNOWLEDGED_MAX;
 use viewer_bridge::message::{Node, ToPage};
-use viewer_bridge::pages::hub::{Demand, Slot};
 use viewer_bridge::source::{Ask, Request};
 use viewer_bridge::wire::Format::{F32, U16};
 use viewer_bridge::wire::Message;

@@ -9,13 +9,13 @@ use bytemuck::cast_slice;
 use serde_json::{Value, json};
 use sim_contract::ParticleState;
 use tokio::runtime::Runtime;
-use viewer_bridge::message::parameters::Parameters;
+use viewer_bridge::hub::{Demand, Slot};
 use viewer_bridge::message::{
     Command, Mode, OutcomeText, ParametersText, Playback, Status, ToPage,
 };
-use viewer_bridge::pages::hub::{Demand, Slot};
-use viewer_bridge::shown_state::Stage;
+use viewer_bridge::parameters::Parameters;
 use viewer_bridge::source::{Ask, Requests};
+use viewer_bridge::stage::Stage;
 use viewer_bridge::wire::{FrameHead, Scene, Stamp};
 use viewer_bridge::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Hub, Recording};
 

@@ -14,10 +14,10 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::{HeaderValue, Request, header};
 use tungstenite::protocol::CloseFrame;
 use tungstenite::{Message, WebSocket};
+use viewer_bridge::assets::Assets;
 use viewer_bridge::message::Mode;
-use viewer_bridge::pages::assets::Assets;
-use viewer_bridge::shown_state::Stage;
 use viewer_bridge::source::Requests;
+use viewer_bridge::stage::Stage;
 use viewer_bridge::wire::{self, FrameHead, Scene, Stamp, decode};
 use viewer_bridge::{Hub, Server, ServerOptions};
 

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use recorder::{Frame, Message, OutcomeRow, StepRow, state_hash};
 use sim_contract::{Action, Outcome, ParticleState};
-use sim_solver::{Keyframe, Scene, Solver};
+use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
 use super::difference::{Difference, first_difference};
 use super::side_rows::SideRows;
-use crate::apply::{apply, is_control};
+use crate::simulation::apply::apply;
 
 /// The result of the comparison of one snapshot. The texts are for people.
 #[derive(Debug, Clone, PartialEq)]
@@ -214,10 +214,13 @@ impl Resimulation {
     /// pace of the node, and rejected loads, which change nothing.
     fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
         let is_rejected_load = matches!(row.action, Action::Load { .. }) && !row.is_applied();
-        if is_control(row.action) || is_rejected_load {
-            return None;
-        }
-        let result = apply(&mut self.solver, row.client_id, row.action);
+        let result = match apply(&mut self.solver, row.client_id, &row.action) {
+            Ok(Applied::Control(Control::Pause | Control::Resume | Control::Step { .. })) => {
+                return None;
+            }
+            Err(_) if is_rejected_load => return None,
+            result => result.map(|_| ()),
+        };
         let again = Outcome::new(row.index, row.step, Outcome::from(row).command, result);
         let again = OutcomeRow::from(&again);
         if again.status == row.status && again.reason == row.reason {
