@@ -374,7 +374,7 @@ fn files_that_are_no_recordings_are_named_before_anything_is_served() {
         (sandbox.write("empty.mcap", ""), "is empty", again),
         (sandbox.write("text.mcap", "this is no recording, but long"), "is not an MCAP file", give),
         (folder, "is not a file", give),
-        (head, "has no readable head", again),
+        (head, "has no readable header", again),
     ];
     for (file, what, cure) in cases {
         let args = ["--listen", "127.0.0.1:0", "--replay", &file];
