@@ -171,7 +171,7 @@ fn a_late_joiner_knows_what_is_torn_and_why_and_where_the_colliders_are() {
     // All of this was published before this reader came.
     let mut client = attach(&sandbox);
     let torn = client.torn(DEADLINE).unwrap();
-    let torn: Vec<_> = torn.constraints.iter().map(|one| (one.constraint, one.cause)).collect();
+    let torn: Vec<_> = torn.constraints.iter().map(|one| (one.constraint, one.cause())).collect();
     assert_eq!(torn, [(40, Some(TearCause::Cut)), (7, Some(TearCause::Cut))]);
     let colliders = client.colliders(DEADLINE).unwrap().colliders;
     assert_eq!(colliders.len(), 2);
