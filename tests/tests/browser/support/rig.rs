@@ -1,4 +1,4 @@
-//! A node, a bridge and a page of it in a domain of their own.
+//! The programs of a live test: a node, a bridge and a page, in a separate domain.
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -6,20 +6,20 @@ use std::time::Duration;
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
 use sim_contract::{Client, ParticleState};
 
-use super::chromium::Turn;
+use super::chromium::BrowserLock;
 use super::tab::Tab;
 
 pub(super) const ANY_PORT: &str = "127.0.0.1:0";
 
-/// What the node published last, read from its shared memory and not through the bridge.
+/// The newest state of the node, read from shared memory and not through the bridge.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct State {
     pub(crate) step: u64,
     pub(crate) particles: Vec<ParticleState>,
 }
 
-/// Everything that a test drives. It ends in the order of the fields.
-pub(crate) struct Stage {
+/// The programs of a live test. They end in the order of the fields.
+pub(crate) struct Rig {
     pub(crate) tab: Tab,
     client: Client,
     state: State,
@@ -27,52 +27,53 @@ pub(crate) struct Stage {
     pub(crate) node: Process,
     pub(crate) sandbox: Sandbox,
     url: String,
-    turn: Rc<Turn>,
+    browser: Rc<BrowserLock>,
 }
 
-impl Stage {
-    /// `args`: of the node, the scene first. `look`: what stands behind the "#" of the address.
-    pub(crate) fn new(args: &[&str], look: &str) -> Self {
-        Self::within(Sandbox::new(), args, look)
+impl Rig {
+    /// Starts a node with `args`, a bridge, and a page. The scene is the first argument. `fragment` is
+    /// the part of the address after "#".
+    pub(crate) fn new(args: &[&str], fragment: &str) -> Self {
+        Self::within(Sandbox::new(), args, fragment)
     }
 
-    /// The same with the text of a scene.
-    pub(crate) fn with_scene(text: &str, args: &[&str], look: &str) -> Self {
+    /// Starts the programs with the text of a scene.
+    pub(crate) fn with_scene(text: &str, args: &[&str], fragment: &str) -> Self {
         let sandbox = Sandbox::new();
         let file = sandbox.write("scene.toml", text);
-        Self::within(sandbox, &[&[file.as_str()], args].concat(), look)
+        Self::within(sandbox, &[&[file.as_str()], args].concat(), fragment)
     }
 
-    fn within(sandbox: Sandbox, args: &[&str], look: &str) -> Self {
-        let turn = Rc::new(Turn::take());
+    fn within(sandbox: Sandbox, args: &[&str], fragment: &str) -> Self {
+        let browser = Rc::new(BrowserLock::acquire());
         let node = start_node(&sandbox, args);
         let (bridge, url) = start_bridge(&sandbox, &["--listen", ANY_PORT]);
-        let tab = Tab::open(&turn, &address(&url, look));
+        let tab = Tab::open(&browser, &address(&url, fragment));
         let client = Client::attach(&sandbox.endpoint()).unwrap();
-        Self { tab, client, state: State::default(), bridge, node, sandbox, url, turn }
+        Self { tab, client, state: State::default(), bridge, node, sandbox, url, browser }
     }
 
-    /// One more page of the same bridge.
-    pub(crate) fn another_tab(&self, look: &str) -> Tab {
-        Tab::open(&self.turn, &address(&self.url, look))
+    /// Opens another page of the bridge.
+    pub(crate) fn another_tab(&self, fragment: &str) -> Tab {
+        Tab::open(&self.browser, &address(&self.url, fragment))
     }
 
-    /// The newest state of the node.
+    /// Returns the newest state of the node.
     pub(crate) fn state(&mut self) -> &State {
-        // While it is paused nothing new comes, and the last one holds.
-        let patience = if self.state.particles.is_empty() { DEADLINE } else { Duration::ZERO };
-        if let Some(snapshot) = self.client.latest_snapshot(patience).unwrap() {
+        // A paused node publishes nothing, so the last state remains the newest.
+        let timeout = if self.state.particles.is_empty() { DEADLINE } else { Duration::ZERO };
+        if let Some(snapshot) = self.client.latest_snapshot(timeout).unwrap() {
             let particles = snapshot.particles().to_vec();
             self.state = State { step: snapshot.header().step, particles };
         }
         &self.state
     }
 
-    /// Waits for a state of the node.
-    pub(crate) fn wait_for_state(&mut self, what: &str, is_so: impl Fn(&State) -> bool) -> State {
+    /// Waits for a state of the node that satisfies a condition.
+    pub(crate) fn wait_for_state(&mut self, what: &str, matches: impl Fn(&State) -> bool) -> State {
         wait_for(what, || {
             let state = self.state();
-            is_so(state).then(|| state.clone())
+            matches(state).then(|| state.clone())
         })
     }
 
@@ -84,13 +85,13 @@ impl Stage {
         })
     }
 
-    /// Pauses by the page, and returns the state that both then have.
+    /// Pauses through the page, and returns the state of the node that the page then shows.
     pub(crate) fn pause(&mut self) -> State {
         self.tab.pause();
         self.settled()
     }
 
-    /// Lets the paused node make steps, by another program than the page.
+    /// Steps the paused node with `ctl`, and returns its state.
     pub(crate) fn step(&mut self, count: u64) -> State {
         let step = self.state().step + count;
         ctl(&self.sandbox, &["step", &count.to_string()]);
@@ -101,12 +102,12 @@ impl Stage {
         &mut self.client
     }
 
-    /// Starts another node in the place of one that has ended.
+    /// Replaces a node that has ended.
     pub(crate) fn restart_node(&mut self, args: &[&str]) {
         self.node = start_node(&self.sandbox, args);
     }
 
-    /// Starts another bridge at the address of one that has ended.
+    /// Replaces a bridge that has ended, at the same address.
     pub(crate) fn restart_bridge(&mut self) {
         self.bridge = start_bridge_at(&self.sandbox, &self.url);
     }
@@ -116,20 +117,20 @@ pub(super) fn start_node(sandbox: &Sandbox, args: &[&str]) -> Process {
     Process::start_ready(Program::SimNode, sandbox, &[&["run"], args].concat())
 }
 
-/// Starts a bridge, and returns it with its address.
+/// Starts a bridge, and returns it with its URL.
 pub(super) fn start_bridge(sandbox: &Sandbox, args: &[&str]) -> (Process, String) {
     let mut bridge = Process::start(Program::ViewerBridge, sandbox, args);
     let url = bridge.wait_for_line("ready http://").trim_start_matches("ready ").to_owned();
     (bridge, url)
 }
 
-/// Starts a live bridge at the address of one that has ended.
+/// Starts a live bridge at the address of a URL.
 pub(super) fn start_bridge_at(sandbox: &Sandbox, url: &str) -> Process {
     let address = url.trim_start_matches("http://").trim_end_matches('/');
     start_bridge(sandbox, &["--listen", address]).0
 }
 
-/// Without smoothed edges: in software they cost more than all the rest.
-pub(super) fn address(url: &str, look: &str) -> String {
-    format!("{url}?aa=0#{look}")
+/// Returns the address of a page without antialiasing, which dominates the cost of drawing in software.
+pub(super) fn address(url: &str, fragment: &str) -> String {
+    format!("{url}?aa=0#{fragment}")
 }
