@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::MetadataCommand;
 
 /// The allowed dependencies: each crate with the workspace crates and restricted libraries it may use.
-const ARROWS: [(&str, &[&str]); 6] = [
-    ("sim-solver", &[]),
-    ("sim-contract", &["iceoryx2"]),
+const ARROWS: [(&str, &[&str]); 7] = [
+    ("sim-types", &[]),
+    ("sim-solver", &["sim-types"]),
+    ("sim-contract", &["iceoryx2", "sim-types"]),
     ("sim-node", &["sim-contract", "sim-solver"]),
     ("recorder", &["mcap", "sim-contract", "sim-solver"]),
     ("viewer-bridge", &["foxglove", "recorder", "sim-contract"]),
