@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::MetadataCommand;
 
 /// The allowed dependencies: each crate with the workspace crates and restricted libraries it may use.
-const ARROWS: [(&str, &[&str]); 7] = [
+const ARROWS: [(&str, &[&str]); 8] = [
     ("sim-types", &[]),
     ("sim-solver", &["sim-types"]),
     ("sim-contract", &["iceoryx2", "sim-types"]),
-    ("sim-node", &["sim-contract", "sim-solver"]),
+    ("sim-lessons", &["sim-solver"]),
+    ("sim-node", &["sim-contract", "sim-lessons", "sim-solver"]),
     ("recorder", &["mcap", "sim-contract", "sim-solver"]),
     ("viewer-bridge", &["foxglove", "recorder", "sim-contract"]),
     ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),
