@@ -38,7 +38,7 @@ pub(super) fn open(path: &Path, tell: &mut dyn FnMut(&str)) -> anyhow::Result<Re
         ));
     };
     let mut tape = Tape::open(path, &mut on_walk).map_err(with_cure)?;
-    if *tape.log().end() != LogEnd::Whole {
+    if *tape.log().end() != LogEnd::Complete {
         let (end, last) = (tape.log().end(), tape.last_step());
         tell(&format!("warning: {} is {end}; shown up to step {last}", path.display()));
     }

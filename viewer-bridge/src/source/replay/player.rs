@@ -196,7 +196,7 @@ impl<'a> Player<'a> {
                 Err(_) => {}
             }
         }
-        for text in self.replay.tape.take_faults() {
+        for text in self.replay.tape.drain_faults() {
             let text = format!("{}: {text}; it is left out", self.replay.file);
             self.hub.broadcast(&ToPage::Notice { level: Level::Warning, text });
         }
