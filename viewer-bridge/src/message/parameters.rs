@@ -6,7 +6,7 @@ use sim_contract::{ConstraintKind, PlainF32, SettingKind, SettingValue};
 /// A limit, or a softness that is not set for all; `None` is off.
 pub type Limit = Option<PlainF32>;
 
-/// The value of each parameter, in the units of [`crate::message::settings::SETTINGS`].
+/// The value of each parameter, in the units of [`super::settings::SETTINGS`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[allow(missing_docs, reason = "named as in commands, which the contract's README explains")]
 pub struct Parameters {

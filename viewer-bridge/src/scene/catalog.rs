@@ -1,23 +1,23 @@
-//! The scenes that every node knows by name.
+//! The built-in scenes, which every node knows by name.
 
 use serde::Serialize;
 
-use crate::scene::summary::SceneSummary;
+use super::summary::SceneSummary;
 
-/// A scene of the picker.
+/// A scene in the picker of a page.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SceneEntry {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Steps per second.
     pub rate_hz: u32,
-    /// 2 or 3.
+    /// Number of dimensions: 2 or 3.
     pub dimensions: u32,
-    /// What it is, in one line.
+    /// Description in one line.
     pub text: &'static str,
 }
 
-/// The texts that `sim-node` is built with. A test compares the names with what it lists.
+/// The scenes of `sim-node`. A test compares the names with its list.
 const SCENES: [(&str, &str); 14] = [
     ("curtain", include_str!("../../../sim-node/scenes/curtain.toml")),
     ("rope", include_str!("../../../sim-node/scenes/rope.toml")),
@@ -35,18 +35,18 @@ const SCENES: [(&str, &str); 14] = [
     ("free-fall", include_str!("../../../sim-node/scenes/free-fall.toml")),
 ];
 
-/// All of them, in the order of the picker.
+/// All built-in scenes, in the order of the picker.
 pub fn all() -> Vec<SceneEntry> {
     SCENES.iter().map(|(name, text)| entry(name, text)).collect()
 }
 
-/// Whether a node knows a scene of that name.
+/// Returns whether a built-in scene has this name.
 pub fn is_known(name: &str) -> bool {
     SCENES.iter().any(|(known, _)| *known == name)
 }
 
 fn entry(name: &'static str, text: &'static str) -> SceneEntry {
-    let summary = SceneSummary::read(text);
+    let summary = SceneSummary::parse(text);
     SceneEntry {
         name,
         rate_hz: summary.rate_hz,

@@ -1,19 +1,18 @@
-//! The parameters of the node, as far as they are known.
+//! The parameters of the node, as far as they are tracker.
 //!
 //! A node does not publish them in plain numbers: they are those of the scene, changed by every `set`
 //! that was applied. Whoever came later than one of these cannot know, and says so.
 
 use sim_contract::{Action, NodeStatus, Outcome, PlainF32, SettingKind, SettingValue, Text};
 
+use crate::convert::to_f32;
+use crate::message::ParametersText;
 use crate::message::parameters::Parameters;
-use crate::message::{ParametersText, ToPage};
-use crate::pages::hub::Hub;
-use crate::pages::hub::Slot;
-use crate::shown_state::single;
+use crate::sink::{Sinks, Update};
 
-/// The parameters, as far as they are known.
+/// The parameters, as far as they are tracker.
 #[derive(Debug, Default)]
-pub(super) struct Known {
+pub(super) struct ParameterTracker {
     initial: Option<Parameters>,
     values: Option<Parameters>,
     /// Settings of a load that is not on show yet.
@@ -22,16 +21,16 @@ pub(super) struct Known {
     /// The index of the next outcome.
     next_index: Option<u64>,
     is_complete: bool,
-    told: Option<ToPage>,
+    published: Option<ParametersText>,
 }
 
 /// Most settings that wait for their load: many times what a panel has.
 const WAITING_MAX: usize = 1024;
 
-impl Known {
+impl ParameterTracker {
     /// Another load: its parameters are those of its scene, and what was set since. The first one
     /// of a link is complete if the node had answered nothing that this link has not seen.
-    pub(super) fn begin(&mut self, parameters: Parameters, outcome_count: u64) {
+    pub(super) fn begin_load(&mut self, parameters: Parameters, outcome_count: u64) {
         match (self.initial, self.next_index) {
             (None, None) => {
                 self.is_complete = outcome_count == 0;
@@ -50,7 +49,7 @@ impl Known {
     }
 
     /// Follows what the node has answered, by whomever it was asked.
-    pub(super) fn follow(&mut self, outcome: &Outcome) {
+    pub(super) fn apply(&mut self, outcome: &Outcome) {
         match self.next_index {
             None => self.is_complete = outcome.index == 0,
             Some(expected) if expected != outcome.index => self.is_complete = false,
@@ -86,7 +85,7 @@ impl Known {
     /// The pace is the node's: a reset does not change it, and the status has it.
     pub(super) fn set_time_scale(&mut self, status: Option<&NodeStatus>) {
         if let (Some(values), Some(status)) = (&mut self.values, status) {
-            values.time_scale = PlainF32(single(status.time_scale));
+            values.time_scale = PlainF32(to_f32(status.time_scale));
         }
     }
 
@@ -94,20 +93,16 @@ impl Known {
         self.values.map_or([0.0; 3], |values| values.gravity.map(|axis| axis.0))
     }
 
-    pub(super) fn to_message(&self) -> ToPage {
-        ToPage::Parameters(Box::new(ParametersText {
-            is_complete: self.is_complete,
-            values: self.values,
-            initial: self.initial,
-        }))
+    pub(super) fn text(&self) -> ParametersText {
+        ParametersText { is_complete: self.is_complete, values: self.values, initial: self.initial }
     }
 
-    /// Tells pages what has changed.
-    pub(super) fn tell(&mut self, hub: &Hub) {
-        let message = self.to_message();
-        if self.values.is_some() && self.told.as_ref() != Some(&message) {
-            hub.latch(Slot::Parameters, &message);
-            self.told = Some(message);
+    /// Publishes the parameters if they have changed.
+    pub(super) fn publish(&mut self, sinks: &Sinks) {
+        let text = self.text();
+        if self.values.is_some() && self.published.as_ref() != Some(&text) {
+            sinks.publish(&Update::Parameters(&text));
+            self.published = Some(text);
         }
     }
 }
@@ -127,51 +122,51 @@ mod tests {
         Action::Set { parameter, value: SettingValue::Number(value), constraint_kind: None }
     }
 
-    fn begun(outcome_count: u64) -> Known {
-        let mut known = Known::default();
-        known.begin(Parameters::default(), outcome_count);
-        known
+    fn begun(outcome_count: u64) -> ParameterTracker {
+        let mut tracker = ParameterTracker::default();
+        tracker.begin_load(Parameters::default(), outcome_count);
+        tracker
     }
 
-    fn damping_of(known: &Known) -> f32 {
-        known.values.unwrap().damping.0
+    fn damping_of(tracker: &ParameterTracker) -> f32 {
+        tracker.values.unwrap().damping.0
     }
 
     #[test]
     fn who_came_after_a_command_does_not_know_until_a_reset() {
-        let mut known = begun(3);
-        assert!(!known.is_complete);
-        known.follow(&outcome(3, damping(2.0)));
-        assert!(!known.is_complete && damping_of(&known) == 2.0);
-        known.follow(&outcome(4, Action::Reset));
-        assert!(known.is_complete && damping_of(&known) == 0.0);
+        let mut tracker = begun(3);
+        assert!(!tracker.is_complete);
+        tracker.apply(&outcome(3, damping(2.0)));
+        assert!(!tracker.is_complete && damping_of(&known) == 2.0);
+        tracker.apply(&outcome(4, Action::Reset));
+        assert!(tracker.is_complete && damping_of(&known) == 0.0);
     }
 
     #[test]
     fn a_gap_in_the_outcomes_is_noticed() {
-        let mut known = begun(0);
-        known.follow(&outcome(0, Action::Pause));
-        assert!(known.is_complete);
-        known.follow(&outcome(2, Action::Pause));
-        assert!(!known.is_complete);
+        let mut tracker = begun(0);
+        tracker.apply(&outcome(0, Action::Pause));
+        assert!(tracker.is_complete);
+        tracker.apply(&outcome(2, Action::Pause));
+        assert!(!tracker.is_complete);
     }
 
     #[test]
     fn what_is_set_after_a_load_waits_for_it() {
-        let mut known = begun(0);
-        known.follow(&outcome(0, damping(1.0)));
-        known.follow(&outcome(1, Action::Load { scene: Text::new("rope") }));
-        known.follow(&outcome(2, damping(2.0)));
+        let mut tracker = begun(0);
+        tracker.apply(&outcome(0, damping(1.0)));
+        tracker.apply(&outcome(1, Action::Load { scene: Text::new("rope") }));
+        tracker.apply(&outcome(2, damping(2.0)));
         assert_eq!(damping_of(&known), 1.0);
-        known.begin(Parameters::default(), 3);
-        assert!(known.is_complete && damping_of(&known) == 2.0);
+        tracker.begin_load(Parameters::default(), 3);
+        assert!(tracker.is_complete && damping_of(&known) == 2.0);
     }
 
     #[test]
     fn a_rejected_command_changes_nothing() {
-        let mut known = begun(0);
+        let mut tracker = begun(0);
         let command = Command::new(1, 0, damping(1.0));
-        known.follow(&Outcome::new(0, 10, command, Err(Reason::OutOfRange)));
+        tracker.apply(&Outcome::new(0, 10, command, Err(Reason::OutOfRange)));
         assert_eq!(damping_of(&known), 0.0);
     }
 }

@@ -1,13 +1,13 @@
-//! What came from the node since the last look: copies, for shared memory is on loan.
+//! The messages of the node since the last read. They are copies, because shared memory is on loan.
 
 use sim_contract::{
     ColliderState, CollidersHeader, ConstraintState, LoadHeader, NodeStatus, Outcome, Tap,
     TearsHeader, Triangle, Update,
 };
 
-/// The newest message of each kind that came; all of what belongs to a step, and all outcomes.
+/// The newest message of each service, but all tears, colliders and outcomes.
 #[derive(Debug, Default)]
-pub(super) struct News {
+pub(super) struct Updates {
     pub(super) scene: Option<(LoadHeader, Vec<u8>)>,
     pub(super) topology: Option<(LoadHeader, Vec<ConstraintState>)>,
     pub(super) surface: Option<(LoadHeader, Vec<Triangle>)>,
@@ -18,12 +18,12 @@ pub(super) struct News {
     pub(super) status: Option<NodeStatus>,
 }
 
-impl News {
-    /// Takes what has come. Messages that cannot be read are dropped: a viewer shows the next one.
+impl Updates {
+    /// Reads the messages that have arrived. Drops unreadable ones: a viewer shows the next one.
     pub(super) fn drain(tap: &mut Tap) -> Self {
-        let mut news = Self::default();
-        tap.drain_updates(|update| news.add(update));
-        news
+        let mut updates = Self::default();
+        tap.drain_updates(|update| updates.add(update));
+        updates
     }
 
     fn add(&mut self, update: Update<'_>) {
@@ -36,12 +36,12 @@ impl News {
             Update::TearCauses(header, all) => self.tear_causes.push((*header, all.to_vec())),
             Update::Outcome(outcome) => self.outcomes.push(*outcome),
             Update::Status(status) => self.status = Some(*status),
-            // It is for the solver.
+            // Only the solver reads it.
             Update::Keyframe(..) => {}
         }
     }
 
-    /// The run that the newest of it belongs to, if anything of it says.
+    /// The run of the newest message, if it is known.
     pub(super) fn run_id(&self) -> Option<u64> {
         let load = self.topology.as_ref().map(|(header, _)| header.run_id);
         load.or(self.status.map(|status| status.run_id))

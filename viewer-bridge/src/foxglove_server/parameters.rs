@@ -1,17 +1,18 @@
-//! Parameters as Foxglove has them: a name and a plain value. What is switched off has the value
-//! "off": one without a value would not be told to anybody. A softness has a name for each kind of
-//! constraints, and one for all.
+//! Parameters in Foxglove's form: a name and a plain value.
+//!
+//! A parameter that is off has the value "off", because clients never see a parameter without a value.
+//! A softness has one name for all constraints and one for each kind.
 
 use foxglove::websocket::{Parameter, ParameterType, ParameterValue};
-use sim_contract::{ConstraintKind, PlainF32, SettingKind, SettingValue};
+use sim_contract::{ConstraintKind, PlainF32, Reason, SettingKind, SettingValue};
 
 use crate::message::Command;
 use crate::message::parameters::{Limit, Parameters, PerKind};
 use crate::message::settings::{SETTINGS, ValueKind};
 
-/// The value of what is switched off.
+/// Value of a parameter that is off.
 const OFF: &str = "off";
-/// The value of a softness that was not set: each constraint has its own.
+/// Value of a softness that was not set: each constraint has its own.
 const OWN: &str = "as in the scene";
 const KINDS: [ConstraintKind; 4] = [
     ConstraintKind::Structural,
@@ -20,12 +21,12 @@ const KINDS: [ConstraintKind; 4] = [
     ConstraintKind::Tether,
 ];
 
-/// All parameters with their values.
+/// Lists all parameters with their values.
 pub(super) fn list(parameters: &Parameters) -> Vec<Parameter> {
     SETTINGS.iter().flat_map(|setting| named(setting.name, parameters)).collect()
 }
 
-/// The parameters of one setting.
+/// Lists the parameters of one setting.
 fn named(name: &str, all: &Parameters) -> Vec<Parameter> {
     let one = |value| vec![Parameter { name: name.to_owned(), ..value }];
     match name {
@@ -49,10 +50,10 @@ fn named(name: &str, all: &Parameters) -> Vec<Parameter> {
 }
 
 fn per_kind(name: &str, values: &PerKind) -> Vec<Parameter> {
-    let of = [values.structural, values.shear, values.bend, values.tether];
-    let common = if of.iter().all(|value| *value == of[0]) { of[0] } else { None };
+    let each = [values.structural, values.shear, values.bend, values.tether];
+    let common = if each.iter().all(|value| *value == each[0]) { each[0] } else { None };
     let mut parameters = vec![Parameter { name: name.to_owned(), ..limit(common, OWN) }];
-    parameters.extend(KINDS.iter().zip(of).map(|(kind, value)| Parameter {
+    parameters.extend(KINDS.iter().zip(each).map(|(kind, value)| Parameter {
         name: format!("{name}.{}", kind.name()),
         ..limit(value, OWN)
     }));
@@ -68,7 +69,7 @@ fn number(value: PlainF32) -> Parameter {
 }
 
 fn whole(value: PlainF32) -> Parameter {
-    #[allow(clippy::cast_possible_truncation, reason = "the node has only whole ones up to 1000")]
+    #[allow(clippy::cast_possible_truncation, reason = "the node accepts whole numbers up to 1000")]
     let value = value.0 as i64;
     unnamed(None, ParameterValue::Integer(value))
 }
@@ -83,42 +84,44 @@ fn limit(value: Limit, absent: &str) -> Parameter {
     value.map_or_else(absent, number)
 }
 
-/// The f64 that is written like the f32: 0.1, not 0.10000000149.
+/// Returns the f64 with the same decimals as the f32: 0.1, not 0.10000000149.
 fn plain(value: PlainF32) -> f64 {
     value.0.to_string().parse().unwrap_or(f64::from(value.0))
 }
 
-/// The command that gives a parameter a value. `Err` is the word of a reason.
-pub(super) fn command(parameter: &Parameter) -> Result<Command, &'static str> {
+/// Creates the command that sets a parameter.
+pub(super) fn command(parameter: &Parameter) -> Result<Command, Reason> {
     let (name, kind) = match parameter.name.split_once('.') {
         None => (parameter.name.as_str(), None),
         Some((name, kind)) => (name, Some(kind)),
     };
     let setting = SETTINGS.iter().find(|setting| setting.name == name);
-    let setting = setting.ok_or("unknown_parameter")?;
+    let setting = setting.ok_or(Reason::UnknownParameter)?;
     let constraint_kind = match kind.map(SettingKind::from_name) {
         None => None,
         Some(known @ SettingKind::Known(_)) if setting.per_kind => Some(known),
-        Some(_) => return Err("unknown_parameter"),
+        Some(_) => return Err(Reason::UnknownParameter),
     };
     let value = match (&parameter.value, setting.value) {
         (Some(ParameterValue::String(word)), _) if word == OFF && setting.off => SettingValue::Off,
         (Some(ParameterValue::Array(axes)), ValueKind::Vector) => {
-            let [x, y, z] = axes.as_slice() else { return Err("out_of_range") };
-            SettingValue::Vector([single(x)?, single(y)?, single(z)?])
+            let [x, y, z] = axes.as_slice() else { return Err(Reason::OutOfRange) };
+            SettingValue::Vector([number_of(x)?, number_of(y)?, number_of(z)?])
         }
-        (Some(value), ValueKind::Number | ValueKind::Whole) => SettingValue::Number(single(value)?),
-        _ => return Err("out_of_range"),
+        (Some(value), ValueKind::Number | ValueKind::Whole) => {
+            SettingValue::Number(number_of(value)?)
+        }
+        _ => return Err(Reason::OutOfRange),
     };
     Ok(Command::Set { parameter: name.to_owned(), value, constraint_kind })
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "this is the one rounding to f32")]
-fn single(value: &ParameterValue) -> Result<f32, &'static str> {
+#[allow(clippy::cast_possible_truncation, reason = "the value is rounded once, here")]
+fn number_of(value: &ParameterValue) -> Result<f32, Reason> {
     match value {
         ParameterValue::Integer(number) => Ok(*number as f32),
         ParameterValue::Float64(number) => Ok(*number as f32),
-        _ => Err("out_of_range"),
+        _ => Err(Reason::OutOfRange),
     }
 }
 
@@ -131,12 +134,12 @@ mod tests {
         all.into_iter().find(|one| one.name == name).unwrap().value.unwrap()
     }
 
-    fn asked(name: &str, value: ParameterValue) -> Result<Command, &'static str> {
+    fn asked(name: &str, value: ParameterValue) -> Result<Command, Reason> {
         command(&Parameter { name: name.to_owned(), r#type: None, value: Some(value) })
     }
 
     #[test]
-    fn every_setting_is_listed_and_can_be_set_to_what_it_is() {
+    fn every_parameter_is_listed_and_can_be_set_to_its_own_value() {
         let all = list(&Parameters::default());
         for setting in SETTINGS {
             let listed = all.iter().find(|one| one.name == setting.name);
@@ -147,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_those_of_the_scene_in_plain_decimals() {
+    fn numbers_have_the_decimals_of_the_scene() {
         let mut parameters = Parameters::default();
         assert_eq!(value_of("tear_force", &parameters), ParameterValue::String(OFF.to_owned()));
         parameters.tear_force = Some(PlainF32(0.1));
@@ -186,7 +189,7 @@ mod tests {
     fn a_wrong_name_or_value_is_refused() {
         let number = || ParameterValue::Float64(1.0);
         for name in ["", "dance", "damping.shear", "stiffness.silk", "stiffness."] {
-            assert_eq!(asked(name, number()), Err("unknown_parameter"), "{name}");
+            assert_eq!(asked(name, number()), Err(Reason::UnknownParameter), "{name}");
         }
         let word = |word: &str| ParameterValue::String(word.to_owned());
         for (name, value) in [
@@ -197,9 +200,9 @@ mod tests {
             ("stiffness", word(OWN)),
             ("damping", ParameterValue::Bool(true)),
         ] {
-            assert_eq!(asked(name, value), Err("out_of_range"), "{name}");
+            assert_eq!(asked(name, value), Err(Reason::OutOfRange), "{name}");
         }
         let absent = Parameter { name: "damping".to_owned(), r#type: None, value: None };
-        assert_eq!(command(&absent), Err("out_of_range"));
+        assert_eq!(command(&absent), Err(Reason::OutOfRange));
     }
 }
