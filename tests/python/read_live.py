@@ -65,7 +65,7 @@ def main(prefix, root):
     count = header.particle_count
     first = [list(floats[index].position) for index in range(min(count, 3))]
     print(json.dumps({"step": header.step, "particle_count": count, "first": first}))
-    # The interpreter's own order at exit leaves a dead node behind.
+    # Destroyed in any other order at exit, the ports leave a dead node behind.
     del sample, subscriber, service, node
 
 

@@ -2,9 +2,7 @@
 
 mod check;
 mod from_page;
-pub mod parameters;
 mod refusal;
-pub mod settings;
 mod timeline;
 mod to_page;
 

@@ -3,113 +3,87 @@
 //! A parameter that is off has the value "off", because clients never see a parameter without a value.
 //! A softness has one name for all constraints and one for each kind.
 
-use foxglove::websocket::{Parameter, ParameterType, ParameterValue};
-use sim_contract::{ConstraintKind, PlainF32, Reason, SettingKind, SettingValue};
+use foxglove::websocket::{Parameter as NamedValue, ParameterType, ParameterValue as FoxgloveValue};
+use sim_contract::{
+    ConstraintKind, KindFilter, OffMeaning, Parameter, ParameterInfo, ParameterValue,
+    ParameterValues, Reason, ValueForm,
+};
 
 use crate::message::Command;
-use crate::message::parameters::{Limit, Parameters, PerKind};
-use crate::message::settings::{SETTINGS, ValueKind};
 
 /// Value of a parameter that is off.
 const OFF: &str = "off";
 /// Value of a softness that was not set: each constraint has its own.
-const OWN: &str = "as in the scene";
-const KINDS: [ConstraintKind; 4] = [
-    ConstraintKind::Structural,
-    ConstraintKind::Shear,
-    ConstraintKind::Bend,
-    ConstraintKind::Tether,
-];
+const OWN_OF_EACH: &str = "as in the scene";
 
 /// Lists all parameters with their values.
-pub(super) fn list(parameters: &Parameters) -> Vec<Parameter> {
-    SETTINGS.iter().flat_map(|setting| named(setting.name, parameters)).collect()
+pub(super) fn list(values: &ParameterValues) -> Vec<NamedValue> {
+    Parameter::ALL.into_iter().flat_map(|parameter| named_values(parameter, values)).collect()
 }
 
-/// Lists the parameters of one setting.
-fn named(name: &str, all: &Parameters) -> Vec<Parameter> {
-    let one = |value| vec![Parameter { name: name.to_owned(), ..value }];
-    match name {
-        "gravity" => one(vector(all.gravity)),
-        "wind_velocity" => one(vector(all.wind_velocity)),
-        "wind_drag" => one(number(all.wind_drag)),
-        "damping" => one(number(all.damping)),
-        "substeps" => one(whole(all.substeps)),
-        "iterations" => one(whole(all.iterations)),
-        "relaxation" => one(number(all.relaxation)),
-        "max_stretch" => one(limit(all.max_stretch, OFF)),
-        "tear_stretch" => one(limit(all.tear_stretch, OFF)),
-        "tear_distance" => one(limit(all.tear_distance, OFF)),
-        "tear_force" => one(limit(all.tear_force, OFF)),
-        "max_speed" => one(number(all.max_speed)),
-        "time_scale" => one(number(all.time_scale)),
-        "compliance" => per_kind(name, &all.compliance),
-        "stiffness" => per_kind(name, &all.stiffness),
-        _ => Vec::new(),
+/// Lists the values of one parameter: one, or one for all kinds of constraints and one for each.
+fn named_values(parameter: Parameter, values: &ParameterValues) -> Vec<NamedValue> {
+    let info = parameter.info();
+    if !info.is_per_kind {
+        return vec![named(info.name, info, values.get(parameter, None))];
     }
-}
-
-fn per_kind(name: &str, values: &PerKind) -> Vec<Parameter> {
-    let each = [values.structural, values.shear, values.bend, values.tether];
-    let common = if each.iter().all(|value| *value == each[0]) { each[0] } else { None };
-    let mut parameters = vec![Parameter { name: name.to_owned(), ..limit(common, OWN) }];
-    parameters.extend(KINDS.iter().zip(each).map(|(kind, value)| Parameter {
-        name: format!("{name}.{}", kind.name()),
-        ..limit(value, OWN)
+    let each = ConstraintKind::ALL.map(|kind| values.get(parameter, Some(kind)));
+    let is_same = each.iter().all(|value| *value == each[0]);
+    let common = if is_same { each[0] } else { ParameterValue::Off };
+    let mut list = vec![named(info.name, info, common)];
+    list.extend(ConstraintKind::ALL.iter().zip(each).map(|(kind, value)| {
+        named(&format!("{}.{}", info.name, kind.name()), info, value)
     }));
-    parameters
+    list
 }
 
-fn unnamed(r#type: Option<ParameterType>, value: ParameterValue) -> Parameter {
-    Parameter { name: String::new(), r#type, value: Some(value) }
-}
-
-fn number(value: PlainF32) -> Parameter {
-    unnamed(Some(ParameterType::Float64), ParameterValue::Float64(plain(value)))
-}
-
-fn whole(value: PlainF32) -> Parameter {
-    #[allow(clippy::cast_possible_truncation, reason = "the node accepts whole numbers up to 1000")]
-    let value = value.0 as i64;
-    unnamed(None, ParameterValue::Integer(value))
-}
-
-fn vector(value: [PlainF32; 3]) -> Parameter {
-    let axes = value.map(|axis| ParameterValue::Float64(plain(axis)));
-    unnamed(Some(ParameterType::Float64Array), ParameterValue::Array(axes.into()))
-}
-
-fn limit(value: Limit, absent: &str) -> Parameter {
-    let absent = || unnamed(None, ParameterValue::String(absent.to_owned()));
-    value.map_or_else(absent, number)
+fn named(name: &str, info: &ParameterInfo, value: ParameterValue) -> NamedValue {
+    let (r#type, value) = match value {
+        ParameterValue::Off => {
+            let word = if info.off == OffMeaning::OwnOfEach { OWN_OF_EACH } else { OFF };
+            (None, FoxgloveValue::String(word.to_owned()))
+        }
+        ParameterValue::Vector(vector) => {
+            let axes = vector.map(|axis| FoxgloveValue::Float64(same_decimals(axis)));
+            (Some(ParameterType::Float64Array), FoxgloveValue::Array(axes.into()))
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "counts are at most 1000")]
+        ParameterValue::Number(number) if info.form == ValueForm::Whole => {
+            (None, FoxgloveValue::Integer(number as i64))
+        }
+        ParameterValue::Number(number) => {
+            (Some(ParameterType::Float64), FoxgloveValue::Float64(same_decimals(number)))
+        }
+    };
+    NamedValue { name: name.to_owned(), r#type, value: Some(value) }
 }
 
 /// Returns the f64 with the same decimals as the f32: 0.1, not 0.10000000149.
-fn plain(value: PlainF32) -> f64 {
-    value.0.to_string().parse().unwrap_or(f64::from(value.0))
+fn same_decimals(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
 }
 
 /// Creates the command that sets a parameter.
-pub(super) fn command(parameter: &Parameter) -> Result<Command, Reason> {
-    let (name, kind) = match parameter.name.split_once('.') {
-        None => (parameter.name.as_str(), None),
+pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
+    let (name, kind) = match named.name.split_once('.') {
+        None => (named.name.as_str(), None),
         Some((name, kind)) => (name, Some(kind)),
     };
-    let setting = SETTINGS.iter().find(|setting| setting.name == name);
-    let setting = setting.ok_or(Reason::UnknownParameter)?;
-    let constraint_kind = match kind.map(SettingKind::from_name) {
+    let info = Parameter::from_name(name).ok_or(Reason::UnknownParameter)?.info();
+    let constraint_kind = match kind.map(KindFilter::from_name) {
         None => None,
-        Some(known @ SettingKind::Known(_)) if setting.per_kind => Some(known),
+        Some(known @ KindFilter::Known(_)) if info.is_per_kind => Some(known),
         Some(_) => return Err(Reason::UnknownParameter),
     };
-    let value = match (&parameter.value, setting.value) {
-        (Some(ParameterValue::String(word)), _) if word == OFF && setting.off => SettingValue::Off,
-        (Some(ParameterValue::Array(axes)), ValueKind::Vector) => {
+    let can_be_off = matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit);
+    let value = match (&named.value, info.form) {
+        (Some(FoxgloveValue::String(word)), _) if word == OFF && can_be_off => ParameterValue::Off,
+        (Some(FoxgloveValue::Array(axes)), ValueForm::Vector) => {
             let [x, y, z] = axes.as_slice() else { return Err(Reason::OutOfRange) };
-            SettingValue::Vector([number_of(x)?, number_of(y)?, number_of(z)?])
+            ParameterValue::Vector([number(x)?, number(y)?, number(z)?])
         }
-        (Some(value), ValueKind::Number | ValueKind::Whole) => {
-            SettingValue::Number(number_of(value)?)
+        (Some(value), ValueForm::Number | ValueForm::Whole) => {
+            ParameterValue::Number(number(value)?)
         }
         _ => return Err(Reason::OutOfRange),
     };
@@ -117,10 +91,10 @@ pub(super) fn command(parameter: &Parameter) -> Result<Command, Reason> {
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "the value is rounded once, here")]
-fn number_of(value: &ParameterValue) -> Result<f32, Reason> {
+fn number(value: &FoxgloveValue) -> Result<f32, Reason> {
     match value {
-        ParameterValue::Integer(number) => Ok(*number as f32),
-        ParameterValue::Float64(number) => Ok(*number as f32),
+        FoxgloveValue::Integer(number) => Ok(*number as f32),
+        FoxgloveValue::Float64(number) => Ok(*number as f32),
         _ => Err(Reason::OutOfRange),
     }
 }
@@ -129,38 +103,40 @@ fn number_of(value: &ParameterValue) -> Result<f32, Reason> {
 mod tests {
     use super::*;
 
-    fn value_of(name: &str, parameters: &Parameters) -> ParameterValue {
-        let all = list(parameters);
+    fn value_of(name: &str, values: &ParameterValues) -> FoxgloveValue {
+        let all = list(values);
         all.into_iter().find(|one| one.name == name).unwrap().value.unwrap()
     }
 
-    fn asked(name: &str, value: ParameterValue) -> Result<Command, Reason> {
-        command(&Parameter { name: name.to_owned(), r#type: None, value: Some(value) })
+    fn command_for(name: &str, value: FoxgloveValue) -> Result<Command, Reason> {
+        command(&NamedValue { name: name.to_owned(), r#type: None, value: Some(value) })
     }
 
     #[test]
     fn every_parameter_is_listed_and_can_be_set_to_its_own_value() {
-        let all = list(&Parameters::default());
-        for setting in SETTINGS {
-            let listed = all.iter().find(|one| one.name == setting.name);
-            let listed = listed.unwrap_or_else(|| panic!("{} is not listed", setting.name));
-            let is_own = listed.value == Some(ParameterValue::String(OWN.to_owned()));
-            assert_eq!(command(listed).is_ok(), !is_own, "{}", setting.name);
+        let all = list(&ParameterValues::default());
+        for parameter in Parameter::ALL {
+            let name = parameter.name();
+            let listed = all.iter().find(|one| one.name == name);
+            let listed = listed.unwrap_or_else(|| panic!("{name} is not listed"));
+            let is_own = listed.value == Some(FoxgloveValue::String(OWN_OF_EACH.to_owned()));
+            assert_eq!(command(listed).is_ok(), !is_own, "{name}");
         }
     }
 
     #[test]
     fn numbers_have_the_decimals_of_the_scene() {
-        let mut parameters = Parameters::default();
-        assert_eq!(value_of("tear_force", &parameters), ParameterValue::String(OFF.to_owned()));
-        parameters.tear_force = Some(PlainF32(0.1));
-        assert_eq!(value_of("tear_force", &parameters), ParameterValue::Float64(0.1));
-        let gravity = [0.0, -9.81, 0.0].map(ParameterValue::Float64);
-        assert_eq!(value_of("gravity", &parameters), ParameterValue::Array(gravity.into()));
-        assert_eq!(value_of("substeps", &parameters), ParameterValue::Integer(4));
-        parameters.compliance.bend = Some(PlainF32(0.5));
-        assert_eq!(value_of("compliance.bend", &parameters), ParameterValue::Float64(0.5));
-        assert_eq!(value_of("compliance", &parameters), ParameterValue::String(OWN.to_owned()));
+        let mut values = ParameterValues::default();
+        assert_eq!(value_of("tear_force", &values), FoxgloveValue::String(OFF.to_owned()));
+        values.tear_force = Some(0.1);
+        assert_eq!(value_of("tear_force", &values), FoxgloveValue::Float64(0.1));
+        let gravity = [0.0, -9.81, 0.0].map(FoxgloveValue::Float64);
+        assert_eq!(value_of("gravity", &values), FoxgloveValue::Array(gravity.into()));
+        assert_eq!(value_of("substeps", &values), FoxgloveValue::Integer(4));
+        values.compliance.bend = Some(0.5);
+        assert_eq!(value_of("compliance.bend", &values), FoxgloveValue::Float64(0.5));
+        let own = FoxgloveValue::String(OWN_OF_EACH.to_owned());
+        assert_eq!(value_of("compliance", &values), own);
     }
 
     #[test]
@@ -171,38 +147,40 @@ mod tests {
             constraint_kind,
         };
         let axes = vec![
-            ParameterValue::Integer(0),
-            ParameterValue::Float64(-1.5),
-            ParameterValue::Integer(0),
+            FoxgloveValue::Integer(0),
+            FoxgloveValue::Float64(-1.5),
+            FoxgloveValue::Integer(0),
         ];
-        let value = SettingValue::Vector([0.0, -1.5, 0.0]);
-        assert_eq!(asked("gravity", ParameterValue::Array(axes)), Ok(set("gravity", value, None)));
-        let off = ParameterValue::String(OFF.to_owned());
-        assert_eq!(asked("tear_force", off), Ok(set("tear_force", SettingValue::Off, None)));
-        let kind = Some(SettingKind::Known(ConstraintKind::Shear));
-        let value = SettingValue::Number(0.5);
-        let command = asked("stiffness.shear", ParameterValue::Float64(0.5));
+        let value = ParameterValue::Vector([0.0, -1.5, 0.0]);
+        let command = command_for("gravity", FoxgloveValue::Array(axes));
+        assert_eq!(command, Ok(set("gravity", value, None)));
+        let off = FoxgloveValue::String(OFF.to_owned());
+        let command = command_for("tear_force", off);
+        assert_eq!(command, Ok(set("tear_force", ParameterValue::Off, None)));
+        let kind = Some(KindFilter::Known(ConstraintKind::Shear));
+        let value = ParameterValue::Number(0.5);
+        let command = command_for("stiffness.shear", FoxgloveValue::Float64(0.5));
         assert_eq!(command, Ok(set("stiffness", value, kind)));
     }
 
     #[test]
     fn a_wrong_name_or_value_is_refused() {
-        let number = || ParameterValue::Float64(1.0);
+        let number = || FoxgloveValue::Float64(1.0);
         for name in ["", "dance", "damping.shear", "stiffness.silk", "stiffness."] {
-            assert_eq!(asked(name, number()), Err(Reason::UnknownParameter), "{name}");
+            assert_eq!(command_for(name, number()), Err(Reason::UnknownParameter), "{name}");
         }
-        let word = |word: &str| ParameterValue::String(word.to_owned());
+        let word = |word: &str| FoxgloveValue::String(word.to_owned());
         for (name, value) in [
             ("gravity", number()),
-            ("gravity", ParameterValue::Array(vec![number(), number()])),
+            ("gravity", FoxgloveValue::Array(vec![number(), number()])),
             ("damping", word("much")),
             ("substeps", word(OFF)),
-            ("stiffness", word(OWN)),
-            ("damping", ParameterValue::Bool(true)),
+            ("stiffness", word(OWN_OF_EACH)),
+            ("damping", FoxgloveValue::Bool(true)),
         ] {
-            assert_eq!(asked(name, value), Err(Reason::OutOfRange), "{name}");
+            assert_eq!(command_for(name, value), Err(Reason::OutOfRange), "{name}");
         }
-        let absent = Parameter { name: "damping".to_owned(), r#type: None, value: None };
+        let absent = NamedValue { name: "damping".to_owned(), r#type: None, value: None };
         assert_eq!(command(&absent), Err(Reason::OutOfRange));
     }
 }

@@ -12,11 +12,10 @@ use foxglove::websocket::{
     AnyClient, Client, ClientId as LibraryClientId, Parameter, PlaybackControlRequest,
     PlaybackState, SetParametersResponder, Status as LibraryStatus,
 };
-use sim_contract::Reason;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{ParameterValues, Reason};
 
 use super::{parameters, playback, published_command};
-use crate::message::parameters::Parameters;
 use crate::message::{Command, OutcomeText, Playback, Refusal, Status, check};
 use crate::recording_times::RecordingTimes;
 use crate::request::{ClientId, RequestKind, RequestSender};
@@ -49,7 +48,7 @@ struct BridgeState {
     last_parameter_request: u32,
     /// Earliest time of the next complaint to a client.
     next_complaint_ns: BTreeMap<u32, u64>,
-    parameters: Option<Parameters>,
+    parameters: Option<ParameterValues>,
     playback: Option<Playback>,
     /// Number of the load on show.
     epoch: u32,
@@ -109,7 +108,7 @@ impl RequestBridge {
     }
 
     /// Sets the present parameters and sends the changes to the clients that follow them.
-    pub(super) fn set_parameters(&self, new: Option<Parameters>) {
+    pub(super) fn set_parameters(&self, new: Option<ParameterValues>) {
         let old = std::mem::replace(&mut self.state().parameters, new);
         let library = self.library();
         let (Some(new), Some(library)) = (new, library.as_ref()) else { return };

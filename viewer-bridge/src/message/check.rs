@@ -1,6 +1,6 @@
 //! Range checks of the numbers in a command, before it reaches the source.
 
-use sim_contract::{Reason, SettingValue};
+use sim_contract::{Reason, ParameterValue};
 
 use super::from_page::Command;
 use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
@@ -51,9 +51,9 @@ pub(crate) fn check(command: &Command) -> Result<(), Reason> {
         Command::Set { parameter, value, .. } => {
             at_most(parameter.len(), NAME_SIZE_BYTES_MAX)?;
             match value {
-                SettingValue::Number(number) => within(*number, f32::MIN, f32::MAX),
-                SettingValue::Vector(vector) => numbers(vector),
-                SettingValue::Off => Ok(()),
+                ParameterValue::Number(number) => within(*number, f32::MIN, f32::MAX),
+                ParameterValue::Vector(vector) => numbers(vector),
+                ParameterValue::Off => Ok(()),
             }
         }
         Command::Rate { value } => within(*value, *RATES.start(), *RATES.end()),

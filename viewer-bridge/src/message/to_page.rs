@@ -1,9 +1,9 @@
 //! Messages from the server to a page.
 
 use serde::{Serialize, Serializer};
+use sim_contract::ParameterValues;
 
 use super::from_page::Choice;
-use super::parameters::Parameters;
 use super::refusal::Refusal;
 use super::timeline::{Playback, Timeline};
 use crate::limits;
@@ -157,9 +157,9 @@ pub struct ParametersText {
     /// Every command that changed a parameter has been seen.
     pub is_complete: bool,
     /// Present values.
-    pub values: Option<Parameters>,
+    pub values: Option<ParameterValues>,
     /// Values of the scene.
-    pub initial: Option<Parameters>,
+    pub initial: Option<ParameterValues>,
 }
 
 /// Fate of a command.

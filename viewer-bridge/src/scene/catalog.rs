@@ -1,6 +1,7 @@
 //! The built-in scenes, which every node knows by name.
 
 use serde::Serialize;
+use sim_solver::builtin;
 
 use super::summary::SceneSummary;
 
@@ -17,40 +18,24 @@ pub struct SceneEntry {
     pub text: &'static str,
 }
 
-/// The scenes of `sim-node`. A test compares the names with its list.
-const SCENES: [(&str, &str); 14] = [
-    ("curtain", include_str!("../../../sim-node/scenes/curtain.toml")),
-    ("rope", include_str!("../../../sim-node/scenes/rope.toml")),
-    ("flag", include_str!("../../../sim-node/scenes/flag.toml")),
-    ("ragdoll", include_str!("../../../sim-node/scenes/ragdoll.toml")),
-    ("spider-web", include_str!("../../../sim-node/scenes/spider-web.toml")),
-    ("rope-bridge", include_str!("../../../sim-node/scenes/rope-bridge.toml")),
-    ("elastic-mesh", include_str!("../../../sim-node/scenes/elastic-mesh.toml")),
-    ("tearable-cloth", include_str!("../../../sim-node/scenes/tearable-cloth.toml")),
-    ("spring-cloth", include_str!("../../../sim-node/scenes/spring-cloth.toml")),
-    ("carried-cloth", include_str!("../../../sim-node/scenes/carried-cloth.toml")),
-    ("drop-box", include_str!("../../../sim-node/scenes/drop-box.toml")),
-    ("drop-box-braced", include_str!("../../../sim-node/scenes/drop-box-braced.toml")),
-    ("pendulum", include_str!("../../../sim-node/scenes/pendulum.toml")),
-    ("free-fall", include_str!("../../../sim-node/scenes/free-fall.toml")),
-];
-
 /// All built-in scenes, in the order of the picker.
 pub fn all() -> Vec<SceneEntry> {
-    SCENES.iter().map(|(name, text)| entry(name, text)).collect()
+    builtin::names().map(entry).collect()
 }
 
 /// Returns whether a built-in scene has this name.
 pub fn is_known(name: &str) -> bool {
-    SCENES.iter().any(|(known, _)| *known == name)
+    builtin::text(name).is_some()
 }
 
-fn entry(name: &'static str, text: &'static str) -> SceneEntry {
-    let summary = SceneSummary::parse(text);
+#[allow(clippy::expect_used, reason = "a miss is a fault of the built-in scenes")]
+fn entry(name: &'static str) -> SceneEntry {
+    let summary = builtin::text(name).and_then(SceneSummary::from_toml);
+    let summary = summary.expect("a built-in scene is valid");
     SceneEntry {
         name,
         rate_hz: summary.rate_hz,
         dimensions: if summary.is_planar { 2 } else { 3 },
-        text: text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']),
+        text: builtin::summary(name).expect("a built-in scene has a description"),
     }
 }

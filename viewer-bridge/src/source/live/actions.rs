@@ -1,6 +1,6 @@
 //! Translates a command of a client into actions of the node.
 
-use sim_contract::{Action, ParticleState, Reason, SettingValue, Text};
+use sim_contract::{Action, Parameter, ParameterValue, ParticleState, Reason, Text};
 
 use super::brush::Stroke;
 use crate::message::{Command, Refusal};
@@ -56,13 +56,16 @@ pub(super) fn actions(
         Command::Load { scene } if !catalog::is_known(&scene) => {
             return Err(Reason::OutOfRange.into());
         }
-        Command::Load { scene } => Action::Load { scene: Text::new(&scene) },
+        Command::Load { scene } => {
+            Action::Load { scene: Text::new(&scene).map_err(|_| Reason::OutOfRange)? }
+        }
         Command::Set { parameter, value, constraint_kind } => {
-            Action::Set { parameter: Text::new(&parameter), value, constraint_kind }
+            let parameter = Text::new(&parameter).map_err(|_| Reason::UnknownParameter)?;
+            Action::Set { parameter, value, constraint_kind }
         }
         Command::Rate { value } => Action::Set {
-            parameter: Text::new("time_scale"),
-            value: SettingValue::Number(value),
+            parameter: Text::cut(Parameter::TimeScale.name()),
+            value: ParameterValue::Number(value),
             constraint_kind: None,
         },
         Command::Seek { .. } | Command::Loop { .. } => return Err(Refusal::OnlyReplay),

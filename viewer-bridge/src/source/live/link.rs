@@ -289,7 +289,7 @@ impl Link {
         if let Some((step, torn)) = self.changes.torn.take_until(step)
             && torn.iter().all(|constraint| (*constraint as usize) < constraint_count)
         {
-            let cause = |index| self.causes.get(index).copied().and_then(TearCause::from_number);
+            let cause = |index: usize| self.causes.get(index).and_then(|cause| TearCause::from_number((*cause).into()));
             let torn: Vec<_> = torn
                 .into_iter()
                 .enumerate()

@@ -37,7 +37,7 @@ impl LoadParts {
         let (_, text) = self.scene.take()?;
         let (header, constraints) = self.topology.take()?;
         let (_, triangles) = self.surface.take()?;
-        let summary = SceneSummary::parse(&String::from_utf8_lossy(&text));
+        let summary = SceneSummary::from_toml(&String::from_utf8_lossy(&text)).unwrap_or_default();
         Some(Load { header, summary, constraints, triangles }.checked(snapshot.particle_count))
     }
 }

@@ -3,20 +3,19 @@
 //! A node does not publish them in plain numbers: they are those of the scene, changed by every `set`
 //! that was applied. Whoever came later than one of these cannot know, and says so.
 
-use sim_contract::{Action, NodeStatus, Outcome, PlainF32, SettingKind, SettingValue, Text};
+use sim_contract::{Action, KindFilter, NodeStatus, Outcome, Parameter, ParameterValue, ParameterValues, Setting, Text};
 
 use crate::convert::to_f32;
 use crate::message::ParametersText;
-use crate::message::parameters::Parameters;
 use crate::sink::{Sinks, Update};
 
 /// The parameters, as far as they are tracker.
 #[derive(Debug, Default)]
 pub(super) struct ParameterTracker {
-    initial: Option<Parameters>,
-    values: Option<Parameters>,
+    initial: Option<ParameterValues>,
+    values: Option<ParameterValues>,
     /// Settings of a load that is not on show yet.
-    waiting: Vec<(Text, SettingValue, Option<SettingKind>)>,
+    waiting: Vec<(Text, ParameterValue, Option<KindFilter>)>,
     is_load_due: bool,
     /// The index of the next outcome.
     next_index: Option<u64>,
@@ -30,7 +29,7 @@ const WAITING_MAX: usize = 1024;
 impl ParameterTracker {
     /// Another load: its parameters are those of its scene, and what was set since. The first one
     /// of a link is complete if the node had answered nothing that this link has not seen.
-    pub(super) fn begin_load(&mut self, parameters: Parameters, outcome_count: u64) {
+    pub(super) fn begin_load(&mut self, parameters: ParameterValues, outcome_count: u64) {
         match (self.initial, self.next_index) {
             (None, None) => {
                 self.is_complete = outcome_count == 0;
@@ -41,7 +40,7 @@ impl ParameterTracker {
         }
         let mut values = parameters;
         for (parameter, value, kind) in self.waiting.drain(..) {
-            values.follow(parameter.as_str(), value, kind);
+            apply_set(&mut values, parameter, value, kind);
         }
         self.initial = Some(parameters);
         self.values = Some(values);
@@ -62,7 +61,7 @@ impl ParameterTracker {
         match outcome.command.action() {
             Action::Set { parameter, value, constraint_kind } => match &mut self.values {
                 Some(values) if !self.is_load_due => {
-                    values.follow(parameter.as_str(), value, constraint_kind);
+                    apply_set(values, parameter, value, constraint_kind);
                 }
                 _ if self.waiting.len() < WAITING_MAX => {
                     self.waiting.push((parameter, value, constraint_kind));
@@ -85,12 +84,12 @@ impl ParameterTracker {
     /// The pace is the node's: a reset does not change it, and the status has it.
     pub(super) fn set_time_scale(&mut self, status: Option<&NodeStatus>) {
         if let (Some(values), Some(status)) = (&mut self.values, status) {
-            values.time_scale = PlainF32(to_f32(status.time_scale));
+            values.time_scale = to_f32(status.time_scale);
         }
     }
 
     pub(super) fn gravity(&self) -> [f32; 3] {
-        self.values.map_or([0.0; 3], |values| values.gravity.map(|axis| axis.0))
+        self.values.map_or([0.0; 3], |values| values.gravity)
     }
 
     pub(super) fn text(&self) -> ParametersText {
@@ -107,6 +106,22 @@ impl ParameterTracker {
     }
 }
 
+/// Applies a `set` that the node has applied. A parameter of a later version has no effect.
+fn apply_set(
+    values: &mut ParameterValues,
+    parameter: Text,
+    value: ParameterValue,
+    kind: Option<KindFilter>,
+) {
+    let constraint_kind = match kind {
+        Some(KindFilter::Known(kind)) => Some(kind),
+        Some(KindFilter::Unknown) | None => None,
+    };
+    if let Some(parameter) = Parameter::from_name(parameter.as_str()) {
+        values.set(Setting { parameter, constraint_kind, value });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use sim_contract::{Command, Reason};
@@ -118,18 +133,18 @@ mod tests {
     }
 
     fn damping(value: f32) -> Action {
-        let parameter = Text::new("damping");
-        Action::Set { parameter, value: SettingValue::Number(value), constraint_kind: None }
+        let parameter = Text::cut("damping");
+        Action::Set { parameter, value: ParameterValue::Number(value), constraint_kind: None }
     }
 
     fn begun(outcome_count: u64) -> ParameterTracker {
         let mut tracker = ParameterTracker::default();
-        tracker.begin_load(Parameters::default(), outcome_count);
+        tracker.begin_load(ParameterValues::default(), outcome_count);
         tracker
     }
 
     fn damping_of(tracker: &ParameterTracker) -> f32 {
-        tracker.values.unwrap().damping.0
+        tracker.values.unwrap().damping
     }
 
     #[test]
@@ -155,10 +170,10 @@ mod tests {
     fn what_is_set_after_a_load_waits_for_it() {
         let mut tracker = begun(0);
         tracker.apply(&outcome(0, damping(1.0)));
-        tracker.apply(&outcome(1, Action::Load { scene: Text::new("rope") }));
+        tracker.apply(&outcome(1, Action::Load { scene: Text::cut("rope") }));
         tracker.apply(&outcome(2, damping(2.0)));
         assert_eq!(damping_of(&known), 1.0);
-        tracker.begin_load(Parameters::default(), 3);
+        tracker.begin_load(ParameterValues::default(), 3);
         assert!(tracker.is_complete && damping_of(&known) == 2.0);
     }
 

@@ -1,9 +1,8 @@
 //! The parameters at each step of a recording: those of its scene, and what was set until then.
 
 use recorder::OutcomeRow;
-use sim_contract::{Action, SettingKind, SettingValue, Text};
+use sim_contract::{Action, KindFilter, Parameter, ParameterValue, ParameterValues, Setting, Text};
 
-use crate::message::parameters::Parameters;
 
 /// Most settings of a recording: hours of moving a slider. What is beyond is not known.
 const CHANGES_MAX: usize = 1 << 18;
@@ -17,7 +16,7 @@ pub(super) struct ParameterLog {
 
 #[derive(Debug, Clone, Copy)]
 enum Change {
-    Set(Text, SettingValue, Option<SettingKind>),
+    Set(Text, ParameterValue, Option<KindFilter>),
     /// Everything is as the scene has it.
     Reset,
     /// There may have been settings that the recording has lost.
@@ -68,18 +67,34 @@ impl ParameterLog {
     }
 
     /// The parameters after that many changes, and whether nothing can be missing.
-    pub(super) fn after(&self, count: usize, initial: Parameters) -> (Parameters, bool) {
+    pub(super) fn after(&self, count: usize, initial: ParameterValues) -> (ParameterValues, bool) {
         let (mut values, mut is_complete) = (initial, true);
         for (_, change) in &self.changes[..count.min(self.changes.len())] {
             match change {
                 Change::Set(parameter, value, kind) => {
-                    values.follow(parameter.as_str(), *value, *kind);
+                    apply_set(&mut values, *parameter, *value, *kind);
                 }
                 Change::Reset => (values, is_complete) = (initial, true),
                 Change::Gap => is_complete = false,
             }
         }
         (values, is_complete)
+    }
+}
+
+/// Applies a `set` that the node has applied. A parameter of a later version has no effect.
+fn apply_set(
+    values: &mut ParameterValues,
+    parameter: Text,
+    value: ParameterValue,
+    kind: Option<KindFilter>,
+) {
+    let constraint_kind = match kind {
+        Some(KindFilter::Known(kind)) => Some(kind),
+        Some(KindFilter::Unknown) | None => None,
+    };
+    if let Some(parameter) = Parameter::from_name(parameter.as_str()) {
+        values.set(Setting { parameter, constraint_kind, value });
     }
 }
 
@@ -94,14 +109,14 @@ mod tests {
     }
 
     fn damping(value: f32) -> Action {
-        let parameter = Text::new("damping");
-        Action::Set { parameter, value: SettingValue::Number(value), constraint_kind: None }
+        let parameter = Text::cut("damping");
+        Action::Set { parameter, value: ParameterValue::Number(value), constraint_kind: None }
     }
 
     /// Damping, and whether everything is known.
     fn at(log: &ParameterLog, step: u64) -> (f32, bool) {
-        let (values, is_complete) = log.after(log.count_until(step), Parameters::default());
-        (values.damping.0, is_complete)
+        let (values, is_complete) = log.after(log.count_until(step), ParameterValues::default());
+        (values.damping, is_complete)
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use recorder::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{PlainF32, Reason};
+use sim_contract::Reason;
 
 use super::check::Report;
 use super::open::Recording;
@@ -260,7 +260,7 @@ impl<'a> Player<'a> {
             Some((log, count)) => log.after(count, initial),
             None => (initial, false),
         };
-        values.time_scale = PlainF32(self.playhead.rate);
+        values.time_scale = self.playhead.rate;
         let text = ParametersText { is_complete, values: Some(values), initial: Some(initial) };
         self.sinks.publish(&Update::Parameters(&text));
         self.parameters = Some(text);
@@ -366,7 +366,7 @@ impl<'a> Player<'a> {
         }
         if self.sinks.has_demand(Demand::Statistics) {
             let values = self.parameters.as_ref().and_then(|text| text.values);
-            let gravity = values.map_or([0.0; 3], |values| values.gravity.map(|axis| axis.0));
+            let gravity = values.map_or([0.0; 3], |values| values.gravity);
             let (state, shown, playhead) = (&self.state, &self.shown, &self.playhead);
             let statistics = statistics(self.recording, state, shown, playhead, gravity);
             self.sinks.publish(&Update::Statistics(&statistics));
