@@ -3,7 +3,9 @@
 //! A parameter that is off has the value "off", because clients never see a parameter without a value.
 //! A softness has one name for all constraints and one for each kind.
 
-use foxglove::websocket::{Parameter as NamedValue, ParameterType, ParameterValue as FoxgloveValue};
+use foxglove::websocket::{
+    Parameter as NamedValue, ParameterType, ParameterValue as FoxgloveValue,
+};
 use sim_contract::{
     ConstraintKind, KindFilter, OffMeaning, Parameter, ParameterInfo, ParameterValue,
     ParameterValues, Reason, ValueForm,
@@ -31,9 +33,12 @@ fn named_values(parameter: Parameter, values: &ParameterValues) -> Vec<NamedValu
     let is_same = each.iter().all(|value| *value == each[0]);
     let common = if is_same { each[0] } else { ParameterValue::Off };
     let mut list = vec![named(info.name, info, common)];
-    list.extend(ConstraintKind::ALL.iter().zip(each).map(|(kind, value)| {
-        named(&format!("{}.{}", info.name, kind.name()), info, value)
-    }));
+    list.extend(
+        ConstraintKind::ALL
+            .iter()
+            .zip(each)
+            .map(|(kind, value)| named(&format!("{}.{}", info.name, kind.name()), info, value)),
+    );
     list
 }
 

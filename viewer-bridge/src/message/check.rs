@@ -1,6 +1,6 @@
 //! Range checks of the numbers in a command, before it reaches the source.
 
-use sim_contract::{Reason, ParameterValue};
+use sim_contract::{ParameterValue, Reason};
 
 use super::from_page::Command;
 use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};

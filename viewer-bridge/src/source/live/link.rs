@@ -289,7 +289,9 @@ impl Link {
         if let Some((step, torn)) = self.changes.torn.take_until(step)
             && torn.iter().all(|constraint| (*constraint as usize) < constraint_count)
         {
-            let cause = |index: usize| self.causes.get(index).and_then(|cause| TearCause::from_number((*cause).into()));
+            let cause = |index: usize| {
+                self.causes.get(index).and_then(|cause| TearCause::from_number((*cause).into()))
+            };
             let torn: Vec<_> = torn
                 .into_iter()
                 .enumerate()

@@ -3,7 +3,10 @@
 //! A node does not publish them in plain numbers: they are those of the scene, changed by every `set`
 //! that was applied. Whoever came later than one of these cannot know, and says so.
 
-use sim_contract::{Action, KindFilter, NodeStatus, Outcome, Parameter, ParameterValue, ParameterValues, Setting, Text};
+use sim_contract::{
+    Action, KindFilter, NodeStatus, Outcome, Parameter, ParameterValue, ParameterValues, Setting,
+    Text,
+};
 
 use crate::convert::to_f32;
 use crate::message::ParametersText;
@@ -152,9 +155,9 @@ mod tests {
         let mut tracker = begun(3);
         assert!(!tracker.is_complete);
         tracker.apply(&outcome(3, damping(2.0)));
-        assert!(!tracker.is_complete && damping_of(&known) == 2.0);
+        assert!(!tracker.is_complete && damping_of(&tracker) == 2.0);
         tracker.apply(&outcome(4, Action::Reset));
-        assert!(tracker.is_complete && damping_of(&known) == 0.0);
+        assert!(tracker.is_complete && damping_of(&tracker) == 0.0);
     }
 
     #[test]
@@ -172,9 +175,9 @@ mod tests {
         tracker.apply(&outcome(0, damping(1.0)));
         tracker.apply(&outcome(1, Action::Load { scene: Text::cut("rope") }));
         tracker.apply(&outcome(2, damping(2.0)));
-        assert_eq!(damping_of(&known), 1.0);
+        assert_eq!(damping_of(&tracker), 1.0);
         tracker.begin_load(ParameterValues::default(), 3);
-        assert!(tracker.is_complete && damping_of(&known) == 2.0);
+        assert!(tracker.is_complete && damping_of(&tracker) == 2.0);
     }
 
     #[test]
@@ -182,6 +185,6 @@ mod tests {
         let mut tracker = begun(0);
         let command = Command::new(1, 0, damping(1.0));
         tracker.apply(&Outcome::new(0, 10, command, Err(Reason::OutOfRange)));
-        assert_eq!(damping_of(&known), 0.0);
+        assert_eq!(damping_of(&tracker), 0.0);
     }
 }

@@ -178,7 +178,7 @@ impl Check {
             text += &format!(", {} could not be checked", self.unknown_count);
         }
         if self.damaged_count > 0 {
-            text += &format!("; {} damaged chunks were skipped", self.damaged_count);
+            text += &format!("; damaged chunks skipped: {}", self.damaged_count);
         }
         if *end != LogEnd::Whole {
             text += &format!("; the file is {end}");

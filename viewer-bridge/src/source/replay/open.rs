@@ -70,7 +70,8 @@ fn with_remedy(error: TapeError) -> anyhow::Error {
 fn load_of(tape: &Tape) -> anyhow::Result<Load> {
     let (run, topology, surface) = (tape.run(), tape.topology(), tape.surface());
     let header = run.load_header(topology);
-    let mut summary = SceneSummary::from_toml(&String::from_utf8_lossy(tape.log().scene())).unwrap_or_default();
+    let mut summary =
+        SceneSummary::from_toml(&String::from_utf8_lossy(tape.log().scene())).unwrap_or_default();
     if summary.name.is_empty() {
         summary.name.clone_from(&run.scene_name);
     }

@@ -3,7 +3,6 @@
 use recorder::OutcomeRow;
 use sim_contract::{Action, KindFilter, Parameter, ParameterValue, ParameterValues, Setting, Text};
 
-
 /// Most settings of a recording: hours of moving a slider. What is beyond is not known.
 const CHANGES_MAX: usize = 1 << 18;
 

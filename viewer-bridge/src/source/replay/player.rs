@@ -4,8 +4,8 @@ use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use recorder::{ReadError, TapeError, TapeState};
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::Reason;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
 use super::check::Report;
 use super::open::Recording;
