@@ -16,15 +16,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
-mod convert;
 mod foxglove_server;
 pub mod limits;
 pub mod message;
 pub mod pages;
-mod recording_times;
 pub mod request;
 pub mod scene;
-pub mod shown_state;
 mod shutdown;
 pub mod sink;
 mod socket;
@@ -36,7 +33,7 @@ pub use foxglove_server::{
 };
 pub use pages::hub::Hub;
 pub use pages::server::{Server, ServerOptions};
-pub use recording_times::RecordingTimes;
 pub use shutdown::Shutdown;
 pub use sink::Sinks;
 pub use source::Source;
+pub use source::recording_times::RecordingTimes;

@@ -6,9 +6,9 @@ use std::time::Duration;
 pub const PROTOCOL: u32 = 2;
 /// Pages at a time, and Foxglove clients at a time: each costs memory and a share of the network.
 pub const CLIENTS_MAX: usize = 16;
-/// HTTP connections at a time that request files or have not become WebSockets yet.
+/// HTTP connections at a time that request files or await their upgrade to a socket.
 pub const CONNECTIONS_MAX: usize = 128;
-/// WebSockets at a time that have not sent a valid `hello`.
+/// Sockets at a time that have not sent a valid `hello`.
 pub const WAITING_MAX: usize = 64;
 /// Size of a message from a client. A cut of 256 constraints needs a few KiB.
 pub const MESSAGE_SIZE_BYTES_MAX: usize = 64 << 10;

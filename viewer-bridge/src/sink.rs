@@ -87,7 +87,7 @@ pub struct Torn<'a> {
 /// The state after a step.
 #[derive(Debug, Clone, Copy)]
 pub struct State<'a> {
-    /// Number of the load. [`crate::shown_state::ShownState`] fills it in.
+    /// Number of the load. [`crate::source::shown_state::ShownState`] fills it in.
     pub epoch: u32,
     /// The step and its timing.
     pub row: StepRow,

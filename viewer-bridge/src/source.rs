@@ -2,6 +2,8 @@
 
 mod feed;
 pub mod live;
+pub mod recording_times;
 pub mod replay;
+pub mod shown_state;
 
 pub use feed::Source;

@@ -2,6 +2,7 @@
 //!
 //! All numbers are little-endian. Every array begins at a multiple of four bytes.
 
+pub(crate) mod convert;
 mod cursor;
 mod decode;
 mod decode_error;

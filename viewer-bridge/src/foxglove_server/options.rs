@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use foxglove::FoxgloveError;
 use thiserror::Error;
 
-use crate::recording_times::RecordingTimes;
+use crate::source::recording_times::RecordingTimes;
 
 /// Options of a Foxglove server.
 #[derive(Debug, Clone)]

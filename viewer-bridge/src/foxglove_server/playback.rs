@@ -4,7 +4,7 @@
 use foxglove::websocket::{PlaybackCommand, PlaybackControlRequest, PlaybackState, PlaybackStatus};
 
 use crate::message::{Command, Playback, check};
-use crate::recording_times::RecordingTimes;
+use crate::source::recording_times::RecordingTimes;
 
 /// Translates a request into commands, in order. Leaves out what is so already.
 pub(super) fn commands(

@@ -34,7 +34,7 @@ pub(super) fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
         Action::Push { .. } => return Err("push is not accepted here".to_owned()),
-        _ => return Err("no such command".to_owned()),
+        Action::Unknown { .. } => return Err("no such command".to_owned()),
     })
 }
 

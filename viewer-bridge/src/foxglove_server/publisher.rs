@@ -18,8 +18,8 @@ use sim_contract::TearCause;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
 use super::picture::Picture;
-use crate::recording_times::{RecordingTimes, step_ns};
 use crate::sink::{State, Torn, TornConstraint};
+use crate::source::recording_times::{RecordingTimes, step_ns};
 use crate::wire::Scene;
 
 /// Topics with the messages of a recording.

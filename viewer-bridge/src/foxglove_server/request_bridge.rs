@@ -17,8 +17,8 @@ use sim_contract::{ParameterValues, Reason};
 
 use super::{parameters, playback, published_command};
 use crate::message::{Command, OutcomeText, Playback, Refusal, Status, check};
-use crate::recording_times::RecordingTimes;
 use crate::request::{ClientId, RequestKind, RequestSender};
+use crate::source::recording_times::RecordingTimes;
 
 /// The sender of requests that belong to no client. The library numbers its clients from 1.
 pub(super) const ANY_CLIENT: ClientId = ClientId::FoxgloveCaller(0);

@@ -9,8 +9,8 @@ use sim_contract::ParticleState;
 use sim_contract::clock::SECOND_NS;
 
 use super::publisher::Publisher;
-use crate::recording_times::RecordingTimes;
 use crate::sink::{State, Torn, TornConstraint};
+use crate::source::recording_times::RecordingTimes;
 use crate::wire::{Scene, Stamp};
 
 /// A subscriber that keeps its messages.

@@ -46,7 +46,9 @@ pub(crate) fn check(command: &Command) -> Result<(), Reason> {
             direction(rotation)
         }
         Command::Step { count: 0 } => Err(Reason::OutOfRange),
-        Command::Step { count } => at_most(count.unsigned_abs(), STEPS_AT_ONCE_MAX),
+        Command::Step { count } => {
+            at_most(count.unsigned_abs() as usize, STEPS_AT_ONCE_MAX as usize)
+        }
         Command::Load { scene } => at_most(scene.len(), NAME_SIZE_BYTES_MAX),
         Command::Set { parameter, value, .. } => {
             at_most(parameter.len(), NAME_SIZE_BYTES_MAX)?;
@@ -68,7 +70,7 @@ pub(crate) fn check(command: &Command) -> Result<(), Reason> {
     }
 }
 
-fn at_most<T: Ord>(count: T, max: T) -> Result<(), Reason> {
+fn at_most(count: usize, max: usize) -> Result<(), Reason> {
     if count <= max { Ok(()) } else { Err(Reason::OutOfRange) }
 }
 

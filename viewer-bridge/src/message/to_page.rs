@@ -196,6 +196,11 @@ pub struct OutcomeText {
     pub text: String,
 }
 
+#[allow(
+    clippy::ref_option,
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes the field by reference"
+)]
 fn name_or_empty<S: Serializer>(
     reason: &Option<Refusal>,
     serializer: S,

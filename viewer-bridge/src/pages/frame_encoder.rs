@@ -3,8 +3,8 @@
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
 use super::frame_set::{ColliderSet, Formats, FrameSet};
-use crate::convert::{microseconds, to_f32};
 use crate::sink::State;
+use crate::wire::convert::{microseconds, to_f32};
 use crate::wire::{Colliders, Format, FrameHead, FrameLimits, Scene, Stamp, encode_frame};
 
 /// Encodes states for the pages.

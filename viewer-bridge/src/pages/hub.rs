@@ -16,12 +16,12 @@ use super::connection::{Connection, Credit, SentFrames};
 use super::frame_encoder::FrameEncoder;
 pub use super::frame_set::Formats;
 use super::frame_set::{FrameSet, format_for};
-use crate::convert::count_u32;
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
 use crate::message::{Choice, Mode, PageLimits, ToPage, Welcome};
 use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog;
 use crate::sink::{Demand, Sink, Torn, Update};
+use crate::wire::convert::count_u32;
 use crate::wire::{Statistics, Tear};
 
 /// Latched messages, in the order in which a new page receives them.
@@ -41,14 +41,14 @@ enum Slot {
 #[derive(Debug)]
 pub struct Hub {
     mode: Mode,
-    pages: Mutex<Pages>,
+    state: Mutex<HubState>,
     encoder: Mutex<FrameEncoder>,
     frames: watch::Sender<Arc<FrameSet>>,
     requests: RequestSender,
 }
 
 #[derive(Debug, Default)]
-struct Pages {
+struct HubState {
     latched: BTreeMap<Slot, Message>,
     pages: BTreeMap<ClientId, Page>,
     last_number: u32,
@@ -62,7 +62,7 @@ struct Page {
     credit: Arc<Credit>,
 }
 
-impl Pages {
+impl HubState {
     /// Queues a message for every page. Removes a page whose queue is full: its task sees the end of
     /// the queue and closes the connection.
     fn queue(&mut self, message: &Message) {
@@ -99,7 +99,7 @@ impl Hub {
     pub fn new(mode: Mode, requests: RequestSender) -> Self {
         Self {
             mode,
-            pages: Mutex::default(),
+            state: Mutex::default(),
             encoder: Mutex::default(),
             frames: watch::Sender::default(),
             requests,
@@ -109,7 +109,7 @@ impl Hub {
     /// Returns the formats that pages with credit wait for, in a scene of this many particles.
     pub fn awaited_formats(&self, particle_count: usize) -> Formats {
         let mut formats = Formats::default();
-        for page in lock(&self.pages).pages.values().filter(|page| page.credit.is_left()) {
+        for page in lock(&self.state).pages.values().filter(|page| page.credit.is_left()) {
             formats.add(format_for(page.choice, particle_count));
         }
         formats
@@ -117,19 +117,19 @@ impl Hub {
 
     /// Number of pages.
     pub fn client_count(&self) -> usize {
-        lock(&self.pages).pages.len()
+        lock(&self.state).pages.len()
     }
 
     fn latch(&self, slot: Slot, message: &ToPage) {
-        lock(&self.pages).latch(slot, text(message));
+        lock(&self.state).latch(slot, text(message));
     }
 
     fn latch_binary(&self, slot: Slot, bytes: Bytes) {
-        lock(&self.pages).latch(slot, Message::Binary(bytes));
+        lock(&self.state).latch(slot, Message::Binary(bytes));
     }
 
     fn broadcast(&self, message: &ToPage) {
-        lock(&self.pages).queue(&text(message));
+        lock(&self.state).queue(&text(message));
     }
 
     /// Sends the change of the list to the pages, and keeps the whole list for later ones.
@@ -139,30 +139,30 @@ impl Hub {
             let tear = Tear { stamp: *stamp, first: count_u32(first), constraints };
             Message::Binary(tear.encode())
         };
-        let mut pages = lock(&self.pages);
-        pages.queue(&tear(*known_count));
-        pages.latched.insert(Slot::Tear, tear(0));
+        let mut state = lock(&self.state);
+        state.queue(&tear(*known_count));
+        state.latched.insert(Slot::Tear, tear(0));
     }
 
     fn publish_statistics(&self, statistics: &Statistics) {
         let rate = lock(&self.encoder).take_rate();
-        let mut pages = lock(&self.pages);
+        let mut state = lock(&self.state);
         let statistics = Statistics {
-            client_count: count_u32(pages.pages.len()),
+            client_count: count_u32(state.pages.len()),
             encode_us: rate.encode_us,
             frames_per_second: rate.frames_per_second,
             ..*statistics
         };
-        pages.queue(&Message::Binary(statistics.encode()));
+        state.queue(&Message::Binary(statistics.encode()));
     }
 
     /// Sends a message to one page, if it is still there.
     pub(super) fn send(&self, client: ClientId, message: &ToPage) {
-        let mut pages = lock(&self.pages);
-        if let Some(page) = pages.pages.get(&client)
+        let mut state = lock(&self.state);
+        if let Some(page) = state.pages.get(&client)
             && page.queue.try_send(text(message)).is_err()
         {
-            pages.pages.remove(&client);
+            state.pages.remove(&client);
         }
     }
 
@@ -170,22 +170,22 @@ impl Hub {
     pub(crate) fn join(&self, choice: Choice) -> Connection {
         let (queue, receiver) = mpsc::channel(RELIABLE_QUEUED_MAX);
         let credit = Arc::new(Credit::default());
-        let mut pages = lock(&self.pages);
-        if pages.pages.is_empty() {
+        let mut state = lock(&self.state);
+        if state.pages.is_empty() {
             // Frames before a pause without pages are not part of the rate.
             lock(&self.encoder).take_rate();
         }
-        pages.last_number += 1;
-        let number = pages.last_number;
+        state.last_number += 1;
+        let number = state.last_number;
         let client = ClientId::Page(number);
         let welcome = text(&ToPage::Hello(Box::new(self.welcome(number, choice))));
-        for message in std::iter::once(&welcome).chain(pages.latched.values()) {
+        for message in std::iter::once(&welcome).chain(state.latched.values()) {
             // The queue has room for all of them.
             let _queued = queue.try_send(message.clone());
         }
-        pages.pages.insert(client, Page { queue, choice, credit: Arc::clone(&credit) });
-        pages.queue_count();
-        drop(pages);
+        state.pages.insert(client, Page { queue, choice, credit: Arc::clone(&credit) });
+        state.queue_count();
+        drop(state);
         let mut frames = self.frames.subscribe();
         frames.mark_unchanged();
         self.request(client, RequestKind::State);
@@ -211,10 +211,10 @@ impl Hub {
 
     /// Removes a page.
     pub(super) fn leave(&self, client: ClientId) {
-        let mut pages = lock(&self.pages);
-        pages.pages.remove(&client);
-        pages.queue_count();
-        drop(pages);
+        let mut state = lock(&self.state);
+        state.pages.remove(&client);
+        state.queue_count();
+        drop(state);
         self.request(client, RequestKind::Left);
     }
 
@@ -233,7 +233,7 @@ impl Hub {
 impl Sink for Hub {
     fn has_demand(&self, demand: Demand) -> bool {
         match demand {
-            Demand::State => lock(&self.pages).pages.values().any(|page| page.credit.is_left()),
+            Demand::State => lock(&self.state).pages.values().any(|page| page.credit.is_left()),
             Demand::Statistics => self.client_count() > 0,
         }
     }

@@ -2,8 +2,8 @@
 
 use sim_contract::{ConstraintKind, ConstraintState, ParticleState};
 
-use crate::convert::to_f32;
 use crate::sink::TornConstraint;
+use crate::wire::convert::to_f32;
 
 /// Stretch and energy of a state. NaN without any structural constraint.
 #[derive(Debug, Clone, Copy, PartialEq)]

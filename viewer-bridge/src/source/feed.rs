@@ -1,9 +1,9 @@
 //! The interface of a source.
 
 use crate::message::Mode;
-use crate::recording_times::RecordingTimes;
 use crate::request::Requests;
 use crate::sink::Sinks;
+use crate::source::recording_times::RecordingTimes;
 
 /// A simulation that is shown to clients. It runs in a thread of its own.
 pub trait Source: Send {

@@ -20,8 +20,8 @@ use sim_contract::{AttachError, Endpoint};
 use super::feed::Source;
 use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, Refusal};
 use crate::request::{RequestKind, Requests};
-use crate::shown_state::ShownState;
 use crate::sink::{Sinks, Update};
+use crate::source::shown_state::ShownState;
 use link::{Link, LinkEnd};
 
 /// Time between two searches for a node.
@@ -93,7 +93,7 @@ impl Source for Live {
         sinks.publish(&Update::Parameters(&unknown));
         while let Some(mut link) = self.search(sinks, requests) {
             let end = self.show(&mut link, sinks, requests);
-            link.close(sinks, &end);
+            link.close(sinks, end);
             match end {
                 LinkEnd::ShuttingDown => break,
                 // The search finds the new run at once.

@@ -21,9 +21,9 @@ use recorder::Torn;
 
 use super::feed::Source;
 use crate::message::Mode;
-use crate::recording_times::RecordingTimes;
 use crate::request::Requests;
 use crate::sink::Sinks;
+use crate::source::recording_times::RecordingTimes;
 use check::{Job, check};
 use open::Recording;
 use player::Player;

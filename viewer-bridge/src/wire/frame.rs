@@ -96,9 +96,9 @@ impl Bounds {
     pub fn around(positions: impl Iterator<Item = [f32; 3]>) -> Self {
         let empty = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
         let bounds = positions.filter(is_finite).fold(empty, |mut bounds, position| {
-            for axis in 0..3 {
-                bounds.min[axis] = bounds.min[axis].min(position[axis]);
-                bounds.max[axis] = bounds.max[axis].max(position[axis]);
+            for (axis, coordinate) in position.into_iter().enumerate() {
+                bounds.min[axis] = bounds.min[axis].min(coordinate);
+                bounds.max[axis] = bounds.max[axis].max(coordinate);
             }
             bounds
         });

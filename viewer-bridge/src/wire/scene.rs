@@ -77,6 +77,9 @@ impl Scene {
     }
 
     /// Encodes the message.
+    ///
+    /// # Panics
+    /// Never: the names have a JSON form.
     pub fn encode(&self) -> Bytes {
         #[allow(clippy::expect_used, reason = "a miss is a fault of the type")]
         let json = serde_json::to_vec(&self.text).expect("strings have a JSON form");

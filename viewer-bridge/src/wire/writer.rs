@@ -3,7 +3,7 @@
 use bytes::Bytes;
 
 use super::header::{KIND_VERSION, Kind, Stamp};
-use crate::convert::count_u32;
+use crate::wire::convert::count_u32;
 
 /// A message in progress.
 #[derive(Debug)]

@@ -10,8 +10,8 @@ use sim_contract::{ParameterValues, ParticleState, Reason, TearCause};
 use tokio::runtime::Runtime;
 use viewer_bridge::message::{Command, OutcomeText, ParametersText, Playback, Status};
 use viewer_bridge::request::{ClientId, RequestKind, Requests, requests};
-use viewer_bridge::shown_state::ShownState;
 use viewer_bridge::sink::{Demand, TornConstraint, Update};
+use viewer_bridge::source::shown_state::ShownState;
 use viewer_bridge::wire::Scene;
 use viewer_bridge::{
     FoxgloveOptions, FoxglovePermission, FoxgloveServer, FoxgloveServerError, RecordingTimes,
@@ -280,9 +280,7 @@ fn a_client_can_read_set_and_subscribe_to_parameters() {
     site.apply(sender, id, "set");
     assert!(client.text("status")["message"].as_str().unwrap().contains("dance"));
     assert_eq!(parameter(&client.text("parameterValues"), "damping"), json!(3.5));
-    let mut values = ParameterValues::default();
-    values.damping = 3.5;
-    site.set_parameters(values);
+    site.set_parameters(ParameterValues { damping: 3.5, ..ParameterValues::default() });
     assert_eq!(parameter(&other.text("parameterValues"), "damping"), json!(3.5));
 }
 

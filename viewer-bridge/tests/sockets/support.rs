@@ -17,8 +17,8 @@ use tungstenite::{Message, WebSocket};
 use viewer_bridge::message::Mode;
 use viewer_bridge::pages::assets::Assets;
 use viewer_bridge::request::{Requests, requests};
-use viewer_bridge::shown_state::ShownState;
 use viewer_bridge::sink::{State, Update};
+use viewer_bridge::source::shown_state::ShownState;
 use viewer_bridge::wire::{self, Scene, decode};
 use viewer_bridge::{Hub, Server, ServerOptions, Shutdown, Sinks};
 

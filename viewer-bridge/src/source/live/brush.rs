@@ -2,7 +2,7 @@
 
 use sim_contract::{Action, ParticleState};
 
-use crate::convert::to_f32;
+use crate::wire::convert::to_f32;
 
 /// A brush stroke, in the units of the protocol.
 #[derive(Debug, Clone, Copy)]

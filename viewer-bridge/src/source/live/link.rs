@@ -20,8 +20,8 @@ use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
 use crate::message::{Level, Node, NodeState};
 use crate::request::{Request, RequestKind, Requests};
 use crate::scene::load::Load;
-use crate::shown_state::ShownState;
 use crate::sink::{Demand, Sinks, State, TornConstraint, Update};
+use crate::source::shown_state::ShownState;
 use crate::wire::frame_flag;
 
 /// Time between two frames. It is slightly shorter than the display's period, so that a node with the
@@ -371,9 +371,9 @@ impl Link {
     }
 
     /// Answers the open commands. If the node goes on without this bridge, ends the clients' grabs.
-    pub(super) fn close(mut self, sinks: &Sinks, end: &LinkEnd) {
+    pub(super) fn close(mut self, sinks: &Sinks, end: LinkEnd) {
         self.dispatch.expire(sinks, u64::MAX);
-        if *end == LinkEnd::ShuttingDown {
+        if end == LinkEnd::ShuttingDown {
             self.release_grabs(sinks);
         }
         sinks.publish(&Update::Parameters(&ParameterTracker::default().text()));

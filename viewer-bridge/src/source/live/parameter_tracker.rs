@@ -8,9 +8,9 @@ use sim_contract::{
     Text,
 };
 
-use crate::convert::to_f32;
 use crate::message::ParametersText;
 use crate::sink::{Sinks, Update};
+use crate::wire::convert::to_f32;
 
 /// The parameters, as far as they are tracker.
 #[derive(Debug, Default)]

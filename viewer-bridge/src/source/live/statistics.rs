@@ -2,10 +2,10 @@
 
 use sim_contract::{NodeStatus, Snapshot, StatusFlags};
 
-use crate::convert::{microseconds, to_f32};
 use crate::scene::load::Load;
 use crate::scene::measure::{measure, torn_flags};
-use crate::shown_state::ShownState;
+use crate::source::shown_state::ShownState;
+use crate::wire::convert::{microseconds, to_f32};
 use crate::wire::{Percentiles, Stamp, Statistics, statistics_flag};
 
 /// Collects the statistics of the node and measures the state.

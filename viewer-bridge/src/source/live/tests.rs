@@ -15,8 +15,8 @@ use crate::message::{Choice, Command, Mode};
 use crate::pages::connection::Connection;
 use crate::pages::hub::Hub;
 use crate::request::{ClientId, Request, RequestKind, Requests, requests};
-use crate::shown_state::ShownState;
 use crate::sink::Sinks;
+use crate::source::shown_state::ShownState;
 use crate::wire::{Message as Wire, decode};
 
 const RUN_ID: u64 = 7;

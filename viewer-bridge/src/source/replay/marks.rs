@@ -15,7 +15,7 @@ const PER_KIND_MAX: u64 = (MARKS_MAX / KINDS.len()) as u64;
 pub(super) struct Marks {
     first_step: u64,
     last_step: u64,
-    marks: BTreeMap<Place, Merged>,
+    merged: BTreeMap<Place, Merged>,
 }
 
 /// A section of the timeline, and a kind by its index in [`KINDS`].
@@ -34,7 +34,7 @@ struct Merged {
 impl Marks {
     /// Creates the marks of a timeline between these steps.
     pub(super) fn new(first_step: u64, last_step: u64) -> Self {
-        Self { first_step, last_step, marks: BTreeMap::new() }
+        Self { first_step, last_step, merged: BTreeMap::new() }
     }
 
     /// Adds `count` events at a step. Events after the last step count as being at it.
@@ -50,7 +50,7 @@ impl Marks {
         #[allow(clippy::expect_used, reason = "a miss is a fault of the list of kinds")]
         let kind_index =
             KINDS.iter().position(|one| *one == kind).expect("every kind is in the list");
-        let merged = self.marks.entry(Place { section, kind_index });
+        let merged = self.merged.entry(Place { section, kind_index });
         let merged = merged.or_insert(Merged { first_step: step, count: 0 });
         merged.first_step = merged.first_step.min(step);
         merged.count = merged.count.saturating_add(count);
@@ -58,7 +58,7 @@ impl Marks {
 
     /// All marks, ascending by step.
     pub(super) fn list(&self) -> Vec<Mark> {
-        let marks = self.marks.iter().map(|(place, merged)| Mark {
+        let marks = self.merged.iter().map(|(place, merged)| Mark {
             kind: KINDS[place.kind_index],
             step: merged.first_step,
             count: merged.count,

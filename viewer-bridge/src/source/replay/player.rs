@@ -17,8 +17,8 @@ use crate::message::{
     Timeline,
 };
 use crate::request::{ClientId, Request, RequestKind, Requests};
-use crate::shown_state::ShownState;
 use crate::sink::{Demand, Sinks, State, TornConstraint, Update};
+use crate::source::shown_state::ShownState;
 use crate::wire::frame_flag;
 
 /// Time between two frames.

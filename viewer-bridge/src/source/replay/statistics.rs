@@ -6,9 +6,9 @@ use sim_contract::ParticleFlags;
 
 use super::open::Recording;
 use super::playhead::Playhead;
-use crate::convert::{count_u32, microseconds, to_f32};
 use crate::scene::measure::{measure, torn_flags};
-use crate::shown_state::ShownState;
+use crate::source::shown_state::ShownState;
+use crate::wire::convert::{count_u32, microseconds, to_f32};
 use crate::wire::{Percentiles, Stamp, Statistics, statistics_flag};
 
 /// Collects the recorded statistics and measures the state.
