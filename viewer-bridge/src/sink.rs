@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use recorder::{OutcomeRow, StatusRow, StepRow};
-use sim_contract::{ParticleState, TearCause};
+use sim_contract::{ParticleState, TornConstraint};
 
 use crate::message::{Level, Node, OutcomeText, ParametersText, Playback, Timeline};
 use crate::request::ClientId;
@@ -62,15 +62,6 @@ pub enum Update<'a> {
         /// The answer.
         outcome: &'a OutcomeText,
     },
-}
-
-/// A torn constraint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TornConstraint {
-    /// Its index.
-    pub constraint: u32,
-    /// Its cause, if known.
-    pub cause: Option<TearCause>,
 }
 
 /// The list of torn constraints after a step, in the order of tearing.

@@ -382,7 +382,7 @@ fn a_file_that_is_not_a_recording_is_named_before_anything_is_served() {
             give,
         ),
         (folder, "is not a file", give),
-        (head, "has no readable head", again),
+        (head, "has no readable header", again),
     ];
     for (file, cause, remedy) in cases {
         let args = ["--listen", "127.0.0.1:0", "--replay", &file];

@@ -8,10 +8,9 @@ use foxglove::messages::{
     TriangleListPrimitive, Vector3,
 };
 use recorder::WORLD_FRAME;
-use sim_contract::ParticleState;
 use sim_contract::clock::SECOND_NS;
+use sim_contract::{ParticleState, TornConstraint};
 
-use crate::sink::TornConstraint;
 use crate::wire::Scene;
 
 /// Width of a stick in pixels, at any distance.
@@ -165,7 +164,7 @@ mod tests {
     #[test]
     fn torn_constraints_and_the_triangles_along_them_are_not_drawn() {
         let mut picture = picture();
-        let torn = [2, 99].map(|constraint| TornConstraint { constraint, cause: None });
+        let torn = [2, 99].map(|constraint| TornConstraint::new(constraint, None));
         picture.set_torn(&torn);
         assert_eq!(indices(&picture.draw(0, &particles())), (&[0, 1, 1, 2][..], &[0, 1, 2][..]));
         picture.set_torn(&[]);

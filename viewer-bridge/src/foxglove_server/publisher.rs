@@ -14,11 +14,11 @@ use recorder::{
     Message, MessageEncoder, OutcomeRow, StatusRow, StepRow, TearsRow, Topic, TopicFormat,
     encode_transform,
 };
-use sim_contract::TearCause;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
+use sim_contract::{TearCause, TornConstraint};
 
 use super::picture::Picture;
-use crate::sink::{State, Torn, TornConstraint};
+use crate::sink::{State, Torn};
 use crate::source::recording_times::{RecordingTimes, step_ns};
 use crate::wire::Scene;
 
@@ -96,7 +96,7 @@ impl TornList {
     fn row(&self, first: usize) -> Message {
         let rows = self.all[first..].iter();
         let cause =
-            |torn: &TornConstraint| torn.cause.map_or("unknown", TearCause::name).to_owned();
+            |torn: &TornConstraint| torn.cause().map_or("unknown", TearCause::name).to_owned();
         let causes = rows.clone().map(cause).collect();
         let constraints = rows.map(|torn| torn.constraint).collect();
         Message::Tears(TearsRow { step: self.step, constraints, causes })
@@ -127,7 +127,7 @@ impl Publisher {
         let mut channels = Vec::new();
         for topic in TOPICS {
             let builder = context.channel_builder(topic.name());
-            let builder = builder.message_encoding(TopicFormat::of(topic).encoding);
+            let builder = builder.message_encoding(TopicFormat::for_topic(topic).encoding);
             channels.push(builder.schema(schema(topic)).build_raw()?);
         }
         let Ok(channels) = channels.try_into() else { unreachable!("one channel for each topic") };
@@ -357,7 +357,7 @@ fn schema(topic: Topic) -> Option<Schema> {
         Topic::Tf => FrameTransform::get_schema(),
         Topic::Particles => PointCloud::get_schema(),
         _ => {
-            let schema = TopicFormat::of(topic).schema;
+            let schema = TopicFormat::for_topic(topic).schema;
             schema.map(|schema| Schema::new(schema.name, schema.encoding, schema.data))
         }
     }

@@ -5,11 +5,11 @@ use std::sync::{Arc, Mutex};
 
 use foxglove::{ChannelId, Context, FoxgloveError, Metadata, RawChannel, Sink, SinkId};
 use recorder::StepRow;
-use sim_contract::ParticleState;
 use sim_contract::clock::SECOND_NS;
+use sim_contract::{ParticleState, TornConstraint};
 
 use super::publisher::Publisher;
-use crate::sink::{State, Torn, TornConstraint};
+use crate::sink::{State, Torn};
 use crate::source::recording_times::RecordingTimes;
 use crate::wire::{Scene, Stamp};
 
@@ -142,7 +142,7 @@ fn a_state_is_sent_once_and_the_scene_ten_times_a_second() {
 fn a_late_subscriber_receives_the_earlier_messages_even_if_nothing_moves() {
     let bench = Bench::new(None);
     bench.begin_load(1);
-    bench.set_torn(3, &[TornConstraint { constraint: 0, cause: None }]);
+    bench.set_torn(3, &[TornConstraint::new(0, None)]);
     bench.show(0, 3);
     let first = bench.listen(&["/particles", "/scene", "/tears", "/steps", "/tf"]);
     bench.show(1, 3);

@@ -162,6 +162,11 @@ pub struct ParametersText {
     pub initial: Option<ParameterValues>,
 }
 
+impl ParametersText {
+    /// The message without a scene.
+    pub(crate) const UNKNOWN: Self = Self { is_complete: false, values: None, initial: None };
+}
+
 /// Fate of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]

@@ -1,8 +1,7 @@
 //! Stretch and energy of a state.
 
-use sim_contract::{ConstraintKind, ConstraintState, ParticleState};
+use sim_contract::{ConstraintKind, ConstraintState, ParticleState, TornConstraint};
 
-use crate::sink::TornConstraint;
 use crate::wire::convert::to_f32;
 
 /// Stretch and energy of a state. NaN without any structural constraint.

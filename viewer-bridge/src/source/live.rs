@@ -5,7 +5,6 @@ mod brush;
 mod dispatch;
 mod link;
 mod load_parts;
-mod parameter_tracker;
 mod statistics;
 #[cfg(test)]
 mod tests;
@@ -89,8 +88,7 @@ impl Source for Live {
 
     fn run(&mut self, sinks: &Sinks, requests: &Requests) -> anyhow::Result<()> {
         sinks.publish(&Update::Node(&self.node));
-        let unknown = ParametersText { is_complete: false, values: None, initial: None };
-        sinks.publish(&Update::Parameters(&unknown));
+        sinks.publish(&Update::Parameters(&ParametersText::UNKNOWN));
         while let Some(mut link) = self.search(sinks, requests) {
             let end = self.show(&mut link, sinks, requests);
             link.close(sinks, end);

@@ -1,9 +1,9 @@
 //! The state on show: one load at a time, and what has changed in it. A live node and a recording
 //! both show their states here. It numbers the loads and publishes only changes.
 
-use sim_contract::{ColliderState, ParticleState};
+use sim_contract::{ColliderState, ParticleState, TornConstraint};
 
-use crate::sink::{Demand, Sinks, State, Torn, TornConstraint, Update};
+use crate::sink::{Demand, Sinks, State, Torn, Update};
 use crate::wire::{Colliders, Pins, Scene, Stamp};
 
 /// The state on show.

@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
+use sim_contract::TornConstraint;
 use viewer_bridge::limits::FRAMES_UNACKNOWLEDGED_MAX;
 use viewer_bridge::message::Node;
 use viewer_bridge::pages::hub::Formats;
 use viewer_bridge::request::{ClientId, Request, RequestKind};
-use viewer_bridge::sink::{TornConstraint, Update};
+use viewer_bridge::sink::Update;
 use viewer_bridge::wire::Format::{F32, U16};
 use viewer_bridge::wire::Message;
 
@@ -20,7 +21,7 @@ const PAGE: ClientId = ClientId::Page(1);
 
 fn torn(constraints: &[u32]) -> Vec<TornConstraint> {
     let torn = constraints.iter();
-    torn.map(|constraint| TornConstraint { constraint: *constraint, cause: None }).collect()
+    torn.map(|constraint| TornConstraint::new(*constraint, None)).collect()
 }
 
 fn ack(frame: u32) -> String {

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use bytemuck::cast_slice;
 use serde_json::{Value, json};
-use sim_contract::{ParameterValues, ParticleState, Reason, TearCause};
+use sim_contract::{ParameterValues, ParticleState, Reason, TearCause, TornConstraint};
 use tokio::runtime::Runtime;
 use viewer_bridge::message::{Command, OutcomeText, ParametersText, Playback, Status};
 use viewer_bridge::request::{ClientId, RequestKind, Requests, requests};
-use viewer_bridge::sink::{Demand, TornConstraint, Update};
+use viewer_bridge::sink::{Demand, Update};
 use viewer_bridge::source::shown_state::ShownState;
 use viewer_bridge::wire::Scene;
 use viewer_bridge::{
@@ -166,7 +166,7 @@ fn a_client_receives_only_the_topics_that_it_subscribed_to() {
     client.subscribe(4, "/scene");
     (0..3).for_each(|_| site.wait_for_subscription());
     let torn = [(2, TearCause::Force), (0, TearCause::Cut)]
-        .map(|(constraint, cause)| TornConstraint { constraint, cause: Some(cause) });
+        .map(|(constraint, cause)| TornConstraint::new(constraint, Some(cause)));
     site.shown.set_torn(&site.sinks, 8, &torn);
     site.show(8, &state);
     let tears = json!({ "step": 8, "constraints": [2, 0], "causes": ["force", "cut"] });

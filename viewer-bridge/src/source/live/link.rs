@@ -5,22 +5,21 @@ use std::time::Duration;
 use recorder::{OutcomeRow, StatusRow, StepRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    Action, AttachError, Client, ColliderState, Endpoint, NodeStatus, Snapshot, SnapshotFlags,
-    StatusFlags, Tap, TearCause,
+    Action, AttachError, Client, ColliderState, Endpoint, NodeStatus, ParameterValues, Snapshot,
+    SnapshotFlags, StatusFlags, Tap, TornConstraint,
 };
 
 use super::actions::CommandContext;
 use super::dispatch::Dispatch;
 use super::load_parts::{LoadParts, is_same_load};
-use super::parameter_tracker::ParameterTracker;
 use super::statistics::statistics;
 use super::until_step::UntilStep;
 use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
-use crate::message::{Level, Node, NodeState};
+use crate::message::{Level, Node, NodeState, ParametersText};
 use crate::request::{Request, RequestKind, Requests};
 use crate::scene::load::Load;
-use crate::sink::{Demand, Sinks, State, TornConstraint, Update};
+use crate::sink::{Demand, Sinks, State, Update};
 use crate::source::shown_state::ShownState;
 use crate::wire::frame_flag;
 
@@ -52,8 +51,7 @@ pub(super) enum LinkEnd {
 /// Tears and colliders that wait for the state to which they belong.
 #[derive(Debug, Default)]
 struct Changes {
-    torn: UntilStep<Vec<u32>>,
-    causes: UntilStep<Vec<u8>>,
+    torn: UntilStep<Vec<TornConstraint>>,
     colliders: UntilStep<Vec<ColliderState>>,
 }
 
@@ -61,9 +59,6 @@ impl Changes {
     fn add(&mut self, updates: Updates) {
         for (header, torn) in updates.tears {
             self.torn.add(header.step, torn);
-        }
-        for (header, causes) in updates.tear_causes {
-            self.causes.add(header.step, causes);
         }
         for (header, colliders) in updates.colliders {
             self.colliders.add(header.step, colliders);
@@ -82,10 +77,10 @@ pub(super) struct Link {
     /// The newest state, in shared memory.
     snapshot: Option<Snapshot>,
     status: Option<NodeStatus>,
-    parameters: ParameterTracker,
+    parameters: Option<ParameterValues>,
+    /// The parameters that were published last.
+    published_parameters: Option<ParametersText>,
     pub(super) dispatch: Dispatch,
-    /// The causes of the torn constraints, in the order of tearing.
-    causes: Vec<u8>,
     changes: Changes,
     shown_step: Option<u64>,
     pub(super) next_frame_ns: u64,
@@ -103,9 +98,9 @@ impl Link {
             load: None,
             snapshot: None,
             status: None,
-            parameters: ParameterTracker::default(),
+            parameters: None,
+            published_parameters: None,
             dispatch: Dispatch::default(),
-            causes: Vec::new(),
             changes: Changes::default(),
             shown_step: None,
             next_frame_ns: 0,
@@ -222,10 +217,10 @@ impl Link {
             sinks.publish(&Update::Status(&StatusRow::from(status)));
             self.status = Some(*status);
         }
+        self.parameters = updates.parameters.or(self.parameters);
         self.changes.add(updates);
         self.begin_load(shown, sinks);
-        self.parameters.set_time_scale(self.status.as_ref());
-        self.parameters.publish(sinks);
+        self.publish_parameters(sinks);
         self.publish_changes(shown, sinks);
         Ok(())
     }
@@ -243,7 +238,6 @@ impl Link {
     fn handle_outcomes(&mut self, updates: &Updates, sinks: &Sinks) {
         for outcome in &updates.outcomes {
             sinks.publish(&Update::Outcome(&OutcomeRow::from(outcome)));
-            self.parameters.apply(outcome);
             let action = outcome.command.action();
             if outcome.is_applied() && matches!(action, Action::Reset | Action::Load { .. }) {
                 self.dispatch.end_applied_grabs();
@@ -271,7 +265,6 @@ impl Link {
             }
             Some(Ok(load)) => {
                 shown.begin_load(sinks, load.to_scene(header.step, snapshot.particles()));
-                self.parameters.begin_load(load.summary.parameters, header.outcome_count);
                 self.load = Some(load);
                 self.shown_step = None;
             }
@@ -283,24 +276,25 @@ impl Link {
         let Some((load, snapshot)) = self.current() else { return };
         let (step, constraint_count) = (snapshot.header().step, load.constraints.len());
         shown.set_pins(sinks, step, snapshot.particles());
-        if let Some((_, causes)) = self.changes.causes.take_until(step) {
-            self.causes = causes;
-        }
         if let Some((step, torn)) = self.changes.torn.take_until(step)
-            && torn.iter().all(|constraint| (*constraint as usize) < constraint_count)
+            && torn.iter().all(|torn| (torn.constraint as usize) < constraint_count)
         {
-            let cause = |index: usize| {
-                self.causes.get(index).and_then(|cause| TearCause::from_number((*cause).into()))
-            };
-            let torn: Vec<_> = torn
-                .into_iter()
-                .enumerate()
-                .map(|(index, constraint)| TornConstraint { constraint, cause: cause(index) })
-                .collect();
             shown.set_torn(sinks, step, &torn);
         }
         if let Some((step, colliders)) = self.changes.colliders.take_until(step) {
             shown.set_colliders(sinks, step, &colliders);
+        }
+    }
+
+    /// Publishes the parameters of the load on show if they have changed. They take effect at once, even
+    /// if the node is paused, so they do not wait for a state.
+    fn publish_parameters(&mut self, sinks: &Sinks) {
+        let Some(load) = &self.load else { return };
+        let initial = Some(load.summary.parameters);
+        let text = ParametersText { is_complete: true, values: self.parameters, initial };
+        if self.published_parameters.as_ref() != Some(&text) {
+            sinks.publish(&Update::Parameters(&text));
+            self.published_parameters = Some(text);
         }
     }
 
@@ -341,7 +335,7 @@ impl Link {
             return;
         }
         if let (Some(status), Some((load, snapshot))) = (&self.status, self.current()) {
-            let gravity = self.parameters.gravity();
+            let gravity = self.parameters.map_or([0.0; 3], |values| values.gravity);
             let statistics = statistics(status, load, snapshot, shown, gravity);
             sinks.publish(&Update::Statistics(&statistics));
         }
@@ -376,7 +370,7 @@ impl Link {
         if end == LinkEnd::ShuttingDown {
             self.release_grabs(sinks);
         }
-        sinks.publish(&Update::Parameters(&ParameterTracker::default().text()));
+        sinks.publish(&Update::Parameters(&ParametersText::UNKNOWN));
     }
 
     /// Releases all grabs, because the tasks of the clients end with the server. Waits for the node no

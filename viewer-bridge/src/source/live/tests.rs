@@ -6,8 +6,8 @@ use std::time::Duration;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     Action, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command as Sent, ConstraintState,
-    Load as OwnerLoad, LoadHeader, NodeStatus, Outcome, Owner, ParticleState, SnapshotHeader,
-    TearsHeader,
+    Load as OwnerLoad, LoadHeader, NodeStatus, Outcome, Owner, ParameterValues, ParticleState,
+    SnapshotHeader, TearsHeader, TornConstraint,
 };
 
 use super::link::Link;
@@ -53,6 +53,7 @@ fn load(step: u64, topology_revision: u32) -> OwnerLoad<'static> {
         triangles: &[],
         collider_count: 1,
         keyframe_size_bytes_max: 8,
+        parameters: ParameterValues::default(),
     }
 }
 
@@ -164,7 +165,7 @@ fn colliders_that_arrive_before_the_first_state_of_their_load_are_shown_with_it(
 fn tears_are_shown_with_their_state() {
     let mut fixture = Fixture::start();
     let header = TearsHeader { run_id: RUN_ID, step: 2, new_count: 1, ..TearsHeader::default() };
-    fixture.owner.publish_tears(header, &[0], &[3]).unwrap();
+    fixture.owner.publish_tears(header, &[TornConstraint::new(0, None)]).unwrap();
     fixture.publish(1, 0, 2);
     fixture.read();
     assert!(fixture.shown.torn().is_empty());

@@ -1,8 +1,8 @@
 //! The messages of the node since the last read. They are copies, because shared memory is on loan.
 
 use sim_contract::{
-    ColliderState, CollidersHeader, ConstraintState, LoadHeader, NodeStatus, Outcome, Tap,
-    TearsHeader, Triangle, Update,
+    ColliderState, CollidersHeader, ConstraintState, LoadHeader, NodeStatus, Outcome,
+    ParameterValues, Tap, TearsHeader, TornConstraint, Triangle, Update,
 };
 
 /// The newest message of each service, but all tears, colliders and outcomes.
@@ -12,8 +12,8 @@ pub(super) struct Updates {
     pub(super) topology: Option<(LoadHeader, Vec<ConstraintState>)>,
     pub(super) surface: Option<(LoadHeader, Vec<Triangle>)>,
     pub(super) colliders: Vec<(CollidersHeader, Vec<ColliderState>)>,
-    pub(super) tears: Vec<(TearsHeader, Vec<u32>)>,
-    pub(super) tear_causes: Vec<(TearsHeader, Vec<u8>)>,
+    pub(super) tears: Vec<(TearsHeader, Vec<TornConstraint>)>,
+    pub(super) parameters: Option<ParameterValues>,
     pub(super) outcomes: Vec<Outcome>,
     pub(super) status: Option<NodeStatus>,
 }
@@ -33,7 +33,7 @@ impl Updates {
             Update::Surface(header, all) => self.surface = Some((*header, all.to_vec())),
             Update::Colliders(header, all) => self.colliders.push((*header, all.to_vec())),
             Update::Tears(header, all) => self.tears.push((*header, all.to_vec())),
-            Update::TearCauses(header, all) => self.tear_causes.push((*header, all.to_vec())),
+            Update::Parameters(_, values) => self.parameters = Some(*values),
             Update::Outcome(outcome) => self.outcomes.push(*outcome),
             Update::Status(status) => self.status = Some(*status),
             // Only the solver reads it.

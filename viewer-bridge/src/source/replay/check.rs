@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 
 use recorder::{
-    IndexedLog, LogEnd, Logged, Message, OutcomeRow, ReadError, StepRow, Torn, TornFollower,
+    IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, Torn, TornFollower,
     state_hash,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -94,7 +94,7 @@ impl Check {
         }
     }
 
-    fn add_chunk(&mut self, read: Result<Vec<Logged>, ReadError>) {
+    fn add_chunk(&mut self, read: Result<Vec<LoggedMessage>, ReadError>) {
         let Ok(messages) = read else {
             self.damaged_count += 1;
             self.torn.lose();
@@ -180,7 +180,7 @@ impl Check {
         if self.damaged_count > 0 {
             text += &format!("; damaged chunks skipped: {}", self.damaged_count);
         }
-        if *end != LogEnd::Whole {
+        if *end != LogEnd::Complete {
             text += &format!("; the file is {end}");
         }
         let (marks, parameters) = (self.marks.list(), Some(self.parameters));

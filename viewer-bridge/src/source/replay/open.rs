@@ -46,7 +46,7 @@ pub(super) fn open(path: &Path, note: &mut dyn FnMut(&str)) -> anyhow::Result<Re
         ));
     };
     let mut tape = Tape::open(path, &mut on_walk).map_err(with_remedy)?;
-    if *tape.log().end() != LogEnd::Whole {
+    if *tape.log().end() != LogEnd::Complete {
         let (end, last) = (tape.log().end(), tape.last_step());
         note(&format!("warning: {} is {end}; shown up to step {last}", path.display()));
     }

@@ -4,8 +4,8 @@ use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use recorder::{ReadError, TapeError, TapeState};
-use sim_contract::Reason;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{Reason, TornConstraint};
 
 use super::check::Report;
 use super::open::Recording;
@@ -17,7 +17,7 @@ use crate::message::{
     Timeline,
 };
 use crate::request::{ClientId, Request, RequestKind, Requests};
-use crate::sink::{Demand, Sinks, State, TornConstraint, Update};
+use crate::sink::{Demand, Sinks, State, Update};
 use crate::source::shown_state::ShownState;
 use crate::wire::frame_flag;
 
@@ -206,7 +206,7 @@ impl<'a> Player<'a> {
                 Err(_) => {}
             }
         }
-        for fault in self.recording.tape.take_faults() {
+        for fault in self.recording.tape.drain_faults() {
             let text = &format!("{}: {fault}; it is skipped", self.recording.file);
             self.sinks.publish(&Update::Notice { level: Level::Warning, text });
         }
@@ -236,7 +236,7 @@ impl<'a> Player<'a> {
                 .constraints
                 .iter()
                 .zip(causes)
-                .map(|(constraint, cause)| TornConstraint { constraint: *constraint, cause })
+                .map(|(constraint, cause)| TornConstraint::new(*constraint, cause))
                 .collect();
             self.shown.set_torn(self.sinks, step, &torn);
         }
