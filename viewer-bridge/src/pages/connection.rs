@@ -35,7 +35,7 @@ pub(crate) struct Connection {
     pub(super) client: ClientId,
     pub(super) choice: Choice,
     /// Reliable messages. The queue ends when the hub gives the page up.
-    pub(super) queue: mpsc::Receiver<Message>,
+    pub(crate) queue: mpsc::Receiver<Message>,
     pub(crate) frames: watch::Receiver<Arc<FrameSet>>,
     pub(super) credit: Arc<Credit>,
     pub(super) sent: SentFrames,

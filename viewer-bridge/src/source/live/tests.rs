@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::extract::ws::Message;
+use serde_json::{Value, json};
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     Action, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command as Sent, ConstraintState,
@@ -95,6 +97,16 @@ impl Fixture {
         self.link.show(&self.shown, &self.sinks);
     }
 
+    /// The newest message with parameters in the queue of the page.
+    fn page_parameters(&mut self) -> Value {
+        let texts = std::iter::from_fn(|| self.page.queue.try_recv().ok());
+        let texts = texts.filter_map(|message| match message {
+            Message::Text(text) => serde_json::from_str::<Value>(&text).ok(),
+            _ => None,
+        });
+        texts.filter(|text| text["type"] == "parameters").last().unwrap()
+    }
+
     /// The radii of the colliders in the newest frame.
     fn radii(&self) -> Vec<f32> {
         let frame = self.page.frames.borrow();
@@ -173,6 +185,22 @@ fn tears_are_shown_with_their_state() {
     fixture.read();
     let torn: Vec<_> = fixture.shown.torn().iter().map(|torn| torn.constraint).collect();
     assert_eq!(torn, [0]);
+}
+
+#[test]
+fn published_parameters_take_effect_at_once_and_keep_the_initial_values() {
+    let mut fixture = Fixture::start();
+    let parameters = fixture.page_parameters();
+    assert_eq!(parameters["values"]["damping"], 0.0);
+    let values = ParameterValues { damping: 1.5, ..ParameterValues::default() };
+    fixture.owner.publish_parameters(RUN_ID, 1, &values).unwrap();
+    fixture.read();
+    let parameters = fixture.page_parameters();
+    assert_eq!(parameters["values"]["damping"], 1.5);
+    assert_eq!(
+        (&parameters["initial"]["damping"], &parameters["is_complete"]),
+        (&json!(0.0), &json!(true))
+    );
 }
 
 #[test]
