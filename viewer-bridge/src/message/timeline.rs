@@ -1,8 +1,8 @@
-//! What a recording holds, and how it is played.
+//! Messages about a recording: its contents and its playback.
 
 use serde::Serialize;
 
-/// What a recording holds.
+/// The contents of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Timeline {
     /// Name of the file.
@@ -11,34 +11,34 @@ pub struct Timeline {
     pub scene: String,
     /// Steps per second.
     pub rate_hz: u32,
-    /// The first recorded step.
+    /// First recorded step.
     pub first_step: u64,
-    /// The last recorded step.
+    /// Last recorded step.
     pub last_step: u64,
     /// Simulated time of the first step, in s.
     pub first_time_s: f64,
     /// Simulated time of the last step, in s.
     pub last_time_s: f64,
-    /// What happened, ascending by step; at most [`crate::limits::MARKS_MAX`].
+    /// Events, ascending by step; at most [`crate::limits::MARKS_MAX`].
     pub marks: Vec<Mark>,
-    /// Whether its states have their recorded hashes.
+    /// Result of the check of the recorded hashes.
     pub hashes: Hashes,
     /// The same for the user.
     pub hash_text: String,
 }
 
-/// Something that happened in a recording.
+/// Events of one kind at a place on the timeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Mark {
-    /// What.
+    /// Kind of event.
     pub kind: MarkKind,
-    /// When.
+    /// Step of the first one.
     pub step: u64,
-    /// How many.
+    /// Number of events.
     pub count: u32,
 }
 
-/// What happened.
+/// Kind of event in a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MarkKind {
@@ -46,37 +46,37 @@ pub enum MarkKind {
     Tear,
     /// Particles were pinned or unpinned.
     Pin,
-    /// Other commands.
+    /// Other commands were applied.
     Command,
-    /// Late steps.
+    /// Steps began late.
     Late,
 }
 
-/// Whether every recorded state has the hash that was recorded with it.
+/// Result of the comparison of each recorded state with its recorded hash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Hashes {
-    /// It is being read, from the start of the server on.
+    /// The check is not finished.
     Checking,
-    /// All that could be checked have.
+    /// Every state that could be checked has its hash.
     Verified,
-    /// At least one has not.
+    /// At least one state has another hash.
     Diverged,
-    /// The recording has none.
+    /// The recording has no hashes.
     Absent,
 }
 
-/// How a recording is played.
+/// The playback of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Playback {
-    /// Whether it goes on.
+    /// Time advances.
     pub is_playing: bool,
-    /// Simulated time per time.
+    /// Simulated seconds per second.
     pub rate: f32,
-    /// Whether it begins again at its end.
+    /// The playback starts again at its end.
     pub is_looping: bool,
-    /// Where it is.
+    /// Step on show.
     pub step: u64,
-    /// The same in s.
+    /// Simulated time on show, in s.
     pub time_s: f64,
 }

@@ -1,36 +1,34 @@
-//! What came before the state that it belongs to.
+//! Messages that arrived before their state.
 
 use std::collections::VecDeque;
 
-/// Messages of the steps that are not on show yet. An owner publishes them before the snapshot of
-/// their step: a reader may meet them first, and with them what belongs to a load that is not on
-/// show.
+/// Messages of steps that are not on show yet. An owner publishes them before the snapshot of their
+/// step, so a reader may see them first.
 #[derive(Debug)]
-pub(super) struct Waiting<T> {
+pub(super) struct UntilStep<T> {
     /// By step, in the order of arrival.
     items: VecDeque<(u64, T)>,
 }
 
-/// Most messages that wait: more than come while one snapshot is read.
+/// Messages that wait: more than arrive while one snapshot is read.
 const WAITING_MAX: usize = 16;
 
-impl<T> Default for Waiting<T> {
+impl<T> Default for UntilStep<T> {
     fn default() -> Self {
         Self { items: VecDeque::new() }
     }
 }
 
-impl<T> Waiting<T> {
-    /// Adds a message. Where too many wait, it takes the place of the newest: the older ones are
-    /// those that are about to be shown.
+impl<T> UntilStep<T> {
+    /// Adds a message. If too many wait, it replaces the newest: the older ones are shown next.
     pub(super) fn add(&mut self, step: u64, item: T) {
         self.items.truncate(WAITING_MAX - 1);
         self.items.push_back((step, item));
     }
 
-    /// The newest message of that step or one before it; those that came before it are void.
+    /// Removes and returns the newest message up to a step. Drops the ones before it.
     pub(super) fn take_until(&mut self, step: u64) -> Option<(u64, T)> {
-        let place = self.items.iter().rposition(|(of, _)| *of <= step)?;
+        let place = self.items.iter().rposition(|(message_step, _)| *message_step <= step)?;
         self.items.drain(..=place).next_back()
     }
 }
@@ -41,7 +39,7 @@ mod tests {
 
     #[test]
     fn a_message_waits_for_its_step() {
-        let mut waiting = Waiting::default();
+        let mut waiting = UntilStep::default();
         waiting.add(3, 'a');
         waiting.add(4, 'b');
         waiting.add(6, 'c');
@@ -52,8 +50,8 @@ mod tests {
     }
 
     #[test]
-    fn where_too_many_wait_the_first_and_the_last_stay() {
-        let mut waiting = Waiting::default();
+    fn if_too_many_messages_wait_the_first_and_the_last_stay() {
+        let mut waiting = UntilStep::default();
         for step in 0..1000 {
             waiting.add(step, step);
         }

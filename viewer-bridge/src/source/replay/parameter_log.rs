@@ -1,16 +1,14 @@
 //! The parameters at each step of a recording: those of its scene, and what was set until then.
 
 use recorder::OutcomeRow;
-use sim_contract::{Action, KindFilter, ParameterValue, Text};
-
-use crate::message::parameters::Parameters;
+use sim_contract::{Action, KindFilter, Parameter, ParameterValue, ParameterValues, Setting, Text};
 
 /// Most settings of a recording: hours of moving a slider. What is beyond is not known.
 const CHANGES_MAX: usize = 1 << 18;
 
 /// What has changed the parameters of a recording, in order.
 #[derive(Debug, Clone)]
-pub(super) struct SettingsLog {
+pub(super) struct ParameterLog {
     changes: Vec<(u64, Change)>,
     next_index: u64,
 }
@@ -24,7 +22,7 @@ enum Change {
     Gap,
 }
 
-impl SettingsLog {
+impl ParameterLog {
     /// Of a recording whose first state has had that many outcomes.
     pub(super) fn new(first_step: u64, outcome_count: u64) -> Self {
         let changes = if outcome_count == 0 { Vec::new() } else { vec![(first_step, Change::Gap)] };
@@ -32,7 +30,7 @@ impl SettingsLog {
     }
 
     /// Takes the next outcome of the recording.
-    pub(super) fn take(&mut self, row: &OutcomeRow) {
+    pub(super) fn add_outcome(&mut self, row: &OutcomeRow) {
         if row.index > self.next_index {
             self.add_gap(row.step);
         }
@@ -68,18 +66,34 @@ impl SettingsLog {
     }
 
     /// The parameters after that many changes, and whether nothing can be missing.
-    pub(super) fn after(&self, count: usize, initial: Parameters) -> (Parameters, bool) {
+    pub(super) fn after(&self, count: usize, initial: ParameterValues) -> (ParameterValues, bool) {
         let (mut values, mut is_complete) = (initial, true);
         for (_, change) in &self.changes[..count.min(self.changes.len())] {
             match change {
                 Change::Set(parameter, value, kind) => {
-                    values.follow(parameter.as_str(), *value, *kind);
+                    apply_set(&mut values, *parameter, *value, *kind);
                 }
                 Change::Reset => (values, is_complete) = (initial, true),
                 Change::Gap => is_complete = false,
             }
         }
         (values, is_complete)
+    }
+}
+
+/// Applies a `set` that the node has applied. A parameter of a later version has no effect.
+fn apply_set(
+    values: &mut ParameterValues,
+    parameter: Text,
+    value: ParameterValue,
+    kind: Option<KindFilter>,
+) {
+    let constraint_kind = match kind {
+        Some(KindFilter::Known(kind)) => Some(kind),
+        Some(KindFilter::Unknown) | None => None,
+    };
+    if let Some(parameter) = Parameter::from_name(parameter.as_str()) {
+        values.set(Setting { parameter, constraint_kind, value });
     }
 }
 
@@ -99,35 +113,35 @@ mod tests {
     }
 
     /// Damping, and whether everything is known.
-    fn at(log: &SettingsLog, step: u64) -> (f32, bool) {
-        let (values, is_complete) = log.after(log.count_until(step), Parameters::default());
-        (values.damping.0, is_complete)
+    fn at(log: &ParameterLog, step: u64) -> (f32, bool) {
+        let (values, is_complete) = log.after(log.count_until(step), ParameterValues::default());
+        (values.damping, is_complete)
     }
 
     #[test]
     fn parameters_are_what_was_set_until_a_step() {
-        let mut log = SettingsLog::new(0, 0);
-        log.take(&outcome(0, 10, damping(1.0)));
-        log.take(&outcome(1, 20, damping(2.0)));
-        log.take(&outcome(2, 30, Action::Reset));
+        let mut log = ParameterLog::new(0, 0);
+        log.add_outcome(&outcome(0, 10, damping(1.0)));
+        log.add_outcome(&outcome(1, 20, damping(2.0)));
+        log.add_outcome(&outcome(2, 30, Action::Reset));
         assert_eq!([9, 10, 29, 30].map(|step| at(&log, step).0), [0.0, 1.0, 2.0, 0.0]);
         assert!([9, 10, 29, 30].iter().all(|step| at(&log, *step).1));
     }
 
     #[test]
     fn what_may_be_missing_is_known_again_after_a_reset() {
-        let mut log = SettingsLog::new(5, 3);
-        log.take(&outcome(3, 10, Action::Reset));
-        log.take(&outcome(5, 20, damping(2.0)));
+        let mut log = ParameterLog::new(5, 3);
+        log.add_outcome(&outcome(3, 10, Action::Reset));
+        log.add_outcome(&outcome(5, 20, damping(2.0)));
         assert_eq!([5, 10, 20].map(|step| at(&log, step).1), [false, true, false]);
     }
 
     #[test]
     fn what_was_rejected_has_set_nothing() {
-        let mut log = SettingsLog::new(0, 0);
+        let mut log = ParameterLog::new(0, 0);
         let command = Command::new(1, 0, damping(1.0));
         let rejected = Outcome::new(0, 10, command, Err(Reason::OutOfRange));
-        log.take(&OutcomeRow::from(&rejected));
+        log.add_outcome(&OutcomeRow::from(&rejected));
         assert_eq!(at(&log, 10), (0.0, true));
     }
 }
