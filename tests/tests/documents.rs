@@ -2,6 +2,8 @@
 //! every kind of command and every built-in scene.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use std::path::Path;
+
 use integration_tests::{Process, Program, Sandbox};
 
 const README: &str = include_str!("../../README.md");
@@ -112,5 +114,26 @@ fn every_command_in_the_reference_is_accepted_and_every_kind_has_an_example() {
     for kind in allowed(&wrong.stderr) {
         let field = format!(r#""kind":"{kind}""#);
         assert!(commands.iter().any(|(_, text)| text.contains(&field)), "{kind} has no example");
+    }
+}
+
+/// The paths that a document names in backticks: those with a folder and an extension.
+fn named_paths(document: &str) -> Vec<&str> {
+    let spans = document.split('`').skip(1).step_by(2);
+    let is_path = |span: &&str| span.contains('/') && span.ends_with(".rs");
+    spans.filter(is_path).collect()
+}
+
+#[test]
+fn the_architecture_names_files_that_exist_and_fits_a_sitting() {
+    const ARCHITECTURE: &str = include_str!("../../ARCHITECTURE.md");
+    assert!(ARCHITECTURE.lines().count() <= 200, "at most 200 lines");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let paths = named_paths(ARCHITECTURE);
+    assert!(paths.len() > 20, "only {} paths found", paths.len());
+    for path in paths {
+        // Within the section on the step, paths are relative to the solver's sources.
+        let candidates = [root.join(path), root.join("sim-node/solver/src").join(path)];
+        assert!(candidates.iter().any(|file| file.is_file()), "{path} does not exist");
     }
 }
