@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use recorder::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Reason, TornConstraint};
+use sim_contract::{ParameterValues, Reason, TornConstraint};
 
 use super::check::Report;
 use super::open::Recording;
+use super::parameter_log::LoggedParameters;
 use super::playhead::{Advanced, Playhead};
 use super::statistics::statistics;
 use crate::limits::FRAMES_PER_SECOND_MAX;
@@ -256,11 +257,10 @@ impl<'a> Player<'a> {
         }
         self.parameters_origin = origin;
         let initial = self.recording.load.summary.parameters;
-        let (mut values, is_complete) = match log.zip(change_count) {
-            Some((log, count)) => log.after(count, initial),
-            None => (initial, false),
-        };
-        values.time_scale = self.playhead.rate;
+        let unknown = LoggedParameters { values: initial, is_complete: false };
+        let logged = log.zip(change_count).map(|(log, count)| log.after(count, initial));
+        let LoggedParameters { values, is_complete } = logged.unwrap_or(unknown);
+        let values = ParameterValues { time_scale: self.playhead.rate, ..values };
         let text = ParametersText { is_complete, values: Some(values), initial: Some(initial) };
         self.sinks.publish(&Update::Parameters(&text));
         self.parameters = Some(text);
