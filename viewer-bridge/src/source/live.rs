@@ -5,6 +5,7 @@ mod brush;
 mod dispatch;
 mod link;
 mod load_parts;
+mod node_text;
 mod statistics;
 #[cfg(test)]
 mod tests;

@@ -12,11 +12,12 @@ use sim_contract::{
 use super::actions::CommandContext;
 use super::dispatch::Dispatch;
 use super::load_parts::{LoadParts, is_same_load};
+use super::node_text::node_text;
 use super::statistics::statistics;
 use super::until_step::UntilStep;
 use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
-use crate::message::{Level, Node, NodeState, ParametersText};
+use crate::message::{Level, Node, ParametersText};
 use crate::request::{Request, RequestKind, Requests};
 use crate::scene::load::Load;
 use crate::sink::{Demand, Sinks, State, Update};
@@ -343,25 +344,7 @@ impl Link {
 
     /// The state of the node for clients.
     pub(super) fn node(&self) -> Node {
-        let Some(status) = &self.status else {
-            return Node {
-                state: NodeState::Alive,
-                text: "a node runs, but has not published its status yet".to_owned(),
-                ..Node::default()
-            };
-        };
-        Node {
-            state: NodeState::Alive,
-            text: String::new(),
-            run_id: Some(format!("{:016x}", status.run_id)),
-            scene: Some(status.scene_name()),
-            method: self.load.as_ref().map(Load::method),
-            rate_hz: status.rate_hz,
-            is_paused: status.is_paused(),
-            is_replay: status.flags & StatusFlags::REPLAY != 0,
-            time_scale: status.time_scale,
-            process_id: Some(status.process_id),
-        }
+        node_text(self.status.as_ref(), self.load.as_ref().map(Load::method))
     }
 
     /// Answers the open commands. If the node goes on without this bridge, ends the clients' grabs.
