@@ -6,7 +6,7 @@ use recorder::{OutcomeRow, StatusRow, StepRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     Action, AttachError, Client, ColliderState, Endpoint, NodeStatus, ParameterValues, Snapshot,
-    SnapshotFlags, StatusFlags, Tap, TornConstraint,
+    SnapshotFlags, Tap, TornConstraint,
 };
 
 use super::actions::CommandContext;
