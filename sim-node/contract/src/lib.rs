@@ -56,6 +56,7 @@ mod service;
 mod services;
 mod session;
 mod snapshot;
+mod state;
 mod status;
 mod stop;
 mod tap;
@@ -87,6 +88,7 @@ pub use sim_types::{
     ValueForm,
 };
 pub use snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
+pub use state::{Change, LoadedScene, State};
 pub use status::{NodeStatus, StatusFlags};
 pub use stop::Stop;
 pub use tap::{Tap, Update};

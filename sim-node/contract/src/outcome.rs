@@ -5,12 +5,14 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{Command, Reason};
 
-/// What became of a command: 288 bytes, alignment 8. Written by the owner of the name for every
+/// Outcome of a command: 296 bytes, alignment 8. Written by the owner of the name for every
 /// command that it takes, in the order of application, which a re-simulation follows.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Outcome")]
 pub struct Outcome {
+    /// Same as in [`crate::SnapshotHeader`].
+    pub run_id: u64,
     /// Place in the run's log, from 0, without gaps.
     pub index: u64,
     /// The first step that shows the effect.
@@ -27,7 +29,7 @@ pub struct Outcome {
     pub command: Command,
 }
 
-const _: () = assert!(size_of::<Outcome>() == 288 && align_of::<Outcome>() == 8);
+const _: () = assert!(size_of::<Outcome>() == 296 && align_of::<Outcome>() == 8);
 
 /// Bit of [`Outcome::flags`]: answers a command to a replay (pause, step, ...); it is not part of
 /// the replayed run's log, and its index is the number of outcomes replayed so far.
@@ -44,14 +46,14 @@ pub enum OutcomeStatus {
 }
 
 impl Outcome {
-    /// The outcome of `command`: `Ok` is applied, `Err` rejected. `index` and `step` as in the
-    /// fields of that name.
+    /// Outcome of `command`, of no run yet: `Ok` is applied, `Err` rejected. `index` and `step` as in
+    /// the fields of that name.
     pub fn new(index: u64, step: u64, command: Command, result: Result<(), Reason>) -> Self {
         let (status, reason) = match result {
             Ok(()) => (OutcomeStatus::Applied, 0),
             Err(reason) => (OutcomeStatus::Rejected, reason as u32),
         };
-        Self { index, step, status: status as u32, reason, flags: 0, spare: 0, command }
+        Self { index, step, status: status as u32, reason, command, ..Self::default() }
     }
 
     /// Whether the command took effect.

@@ -59,7 +59,9 @@ pub(crate) const TOPOLOGY: ServiceSpec = ServiceSpec { suffix: "topology", ..LAT
 pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCHED };
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };
 pub(crate) const TEARS: ServiceSpec = ServiceSpec { suffix: "tears", ..LATCHED };
-pub(crate) const PARAMETERS: ServiceSpec = ServiceSpec { suffix: "parameters", ..LATCHED };
+/// As many as snapshots: each step can change one.
+pub(crate) const PARAMETERS: ServiceSpec =
+    ServiceSpec { suffix: "parameters", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
 /// As many as snapshots: while one moves, each step has its own.
 pub(crate) const COLLIDERS: ServiceSpec =
     ServiceSpec { suffix: "colliders", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };

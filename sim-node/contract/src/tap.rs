@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use crate::parameters::to_values;
-use crate::reader::{Drained, ReadError, SliceReader, ValueReader};
+use crate::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
 use crate::service::{
     COLLIDERS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError,
     TEARS, TOPOLOGY,
 };
 use crate::services::{AttachError, Attachment};
 use crate::session::Session;
+use crate::state::{Change, State, StateAssembler};
 use crate::wake::WakeListener;
 use crate::watch::listen;
 use crate::{
@@ -18,10 +19,10 @@ use crate::{
     Snapshot, SnapshotHeader, TearsHeader, TornConstraint, Triangle,
 };
 
-/// Reads everything that an owner publishes, without a copy.
-///
-/// An owner publishes the particles of a step last. So drain the particles first and the updates
-/// after them: then all that belongs to those snapshots has been seen.
+/// Times that every service is read for one state: each read takes at most one buffer.
+const READS_MAX: usize = 8;
+
+/// Reads everything that an owner publishes. The particles are not copied.
 #[derive(Debug)]
 pub struct Tap {
     listener: WakeListener,
@@ -35,6 +36,10 @@ pub struct Tap {
     surface: SliceReader<Triangle, LoadHeader>,
     keyframe: SliceReader<u8, KeyframeHeader>,
     particles: SliceReader<ParticleState, SnapshotHeader>,
+    assembler: StateAssembler,
+    /// The snapshot of the newest state.
+    held: Option<SliceSample<ParticleState, SnapshotHeader>>,
+    errors: Vec<ReadError>,
     // Services and node go last.
     attachment: Attachment,
 }
@@ -88,8 +93,74 @@ impl Tap {
             surface: SliceReader::create(&services.surface, &SURFACE)?,
             keyframe: SliceReader::create(&services.keyframe, &KEYFRAME)?,
             particles: SliceReader::create(&services.particles, &PARTICLES)?,
+            assembler: StateAssembler::default(),
+            held: None,
+            errors: Vec::new(),
             attachment,
         })
+    }
+
+    /// Returns the oldest state that was not read, with everything that belongs to it; `None` if all
+    /// were read. A reader more than [`crate::SNAPSHOTS_BUFFERED`] states behind misses some.
+    ///
+    /// `on_message` receives every other message as it arrives, before its state if that has not
+    /// been published: outcomes and statuses of a paused node, for example.
+    pub fn next_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
+        let arrived = self.particles.next();
+        self.assemble(arrived, on_message)
+    }
+
+    /// Returns the newest state and skips those before it; `None` if all were read. The changes are
+    /// those since the last state that was returned. `on_message` as in [`Tap::next_state`].
+    pub fn latest_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
+        let arrived = self.particles.newest();
+        self.assemble(arrived, on_message)
+    }
+
+    /// An owner publishes the particles of a step last. So once a snapshot is there, the messages
+    /// that belong to it can be read.
+    fn assemble(
+        &mut self,
+        arrived: Result<Option<SliceSample<ParticleState, SnapshotHeader>>, ReadError>,
+        mut on_message: impl FnMut(&Update<'_>),
+    ) -> Option<State<'_>> {
+        let mut assembler = std::mem::take(&mut self.assembler);
+        for _ in 0..READS_MAX {
+            let drained = self.drain_updates(|update| {
+                on_message(&update);
+                assembler.add(&update);
+            });
+            self.errors.extend(drained.errors);
+            if drained.count == 0 {
+                break;
+            }
+        }
+        self.assembler = assembler;
+        match arrived {
+            Ok(sample) => self.held = sample,
+            Err(error) => {
+                self.held = None;
+                self.errors.push(error);
+            }
+        }
+        let sample = self.held.as_ref()?;
+        self.assembler.assemble(sample.user_header(), sample.payload())
+    }
+
+    /// Changes that have arrived and belong to no state yet, such as those of a paused node. They
+    /// are not returned again.
+    pub fn take_pending_changes(&mut self) -> Vec<Change> {
+        self.assembler.take_waiting()
+    }
+
+    /// Errors of messages that were dropped since the last call.
+    pub fn take_errors(&mut self) -> Vec<ReadError> {
+        std::mem::take(&mut self.errors)
+    }
+
+    /// Number of changes that were dropped because their state did not arrive.
+    pub fn lost_change_count(&self) -> u64 {
+        self.assembler.lost_count()
     }
 
     /// Shows the snapshots that have come to `sink`, oldest first, at most
