@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::MetadataCommand;
 
 /// The allowed arrows: crate -> workspace crates and restricted libraries that it may name.
-const ARROWS: [(&str, &[&str]); 6] = [
+const ARROWS: [(&str, &[&str]); 7] = [
+    ("build-features", &[]),
     ("sim-solver", &[]),
     ("sim-contract", &["iceoryx2"]),
     ("sim-node", &["sim-contract", "sim-solver"]),
