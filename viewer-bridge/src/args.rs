@@ -60,8 +60,9 @@ pub(crate) struct Args {
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: String,
-    /// Domain that keeps services apart from others on this host [default: that of iceoryx2]
-    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
+    /// Domain that keeps services apart from others on this host [env: CATENARY_DOMAIN]
+    /// [default: that of iceoryx2]
+    #[arg(long, value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
     domain: Option<String>,
     /// Folder to read the page's files from, for who works on them [default: those built in]
     #[arg(long, value_name = "DIR")]
@@ -70,7 +71,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
-        Endpoint::of_options(self.domain.as_deref(), &self.name)
+        Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
     }
 
     /// What the Foxglove server is told, where there is to be one.
