@@ -104,9 +104,12 @@ impl Node {
                 break;
             }
             self.apply_commands()?;
-            match due {
-                Some(wake_late_ns) if self.progress.is_stepping() => self.make_step(wake_late_ns)?,
-                _ => self.publisher.publish_between(&self.solver, self.position())?,
+            if let Some(wake_late_ns) = due
+                && self.progress.is_stepping()
+            {
+                self.make_step(wake_late_ns)?;
+            } else {
+                self.publisher.publish_between(&self.solver, self.position())?;
             }
             self.observe(&observer)?;
         }

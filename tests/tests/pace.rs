@@ -7,8 +7,7 @@ use sim_contract::{Action, Client, SettingValue, Text};
 
 /// A node at 1 Hz and a thousandth of real time, and the last step that it made.
 fn slow_node(sandbox: &Sandbox) -> (Process, u64) {
-    let node =
-        Process::start_ready(Program::SimNode, sandbox, &["run", "curtain", "--rate", "1"]);
+    let node = Process::start_ready(Program::SimNode, sandbox, &["run", "curtain", "--rate", "1"]);
     let outcome = ctl(sandbox, &["set", "time_scale", "0.001"]);
     (node, outcome["step"].as_u64().unwrap())
 }

@@ -1,14 +1,16 @@
-//! What to do about a rejected command, where its reason alone does not tell.
+//! Advice on an outcome, where the outcome alone does not explain itself.
 
-use sim_contract::{Action, Outcome, Reason};
+use std::time::Duration;
+
+use sim_contract::{Action, Client, Outcome, Reason};
 use sim_solver::PARAMETERS;
 
-/// Words behind the reason, or none.
-pub(super) fn of(action: &Action, outcome: &Outcome) -> String {
+/// Cause or remedy of a rejection, to print behind its reason; may be empty.
+pub(super) fn for_rejection(action: &Action, outcome: &Outcome) -> String {
     let Some(reason) = Reason::from_name(outcome.reason_name()) else { return String::new() };
     match (action, reason) {
         (Action::Set { .. }, Reason::UnknownParameter) => {
-            format!(" (there are {})", PARAMETERS.join(", "))
+            format!(" (allowed: {})", PARAMETERS.join(", "))
         }
         (Action::Set { parameter, .. }, Reason::OutOfRange) => allowed(parameter.as_str())
             .map_or_else(String::new, |text| format!(" (allowed: {text})")),
@@ -31,7 +33,22 @@ pub(super) fn of(action: &Action, outcome: &Outcome) -> String {
     }
 }
 
-/// The range of a parameter, in words.
+/// Explains an applied command that changes nothing visible.
+pub(super) fn for_applied(
+    client: &mut Client,
+    timeout: Duration,
+    action: &Action,
+) -> Option<&'static str> {
+    let Action::Set { parameter, .. } = action else { return None };
+    if parameter.as_str() != "wind_velocity" {
+        return None;
+    }
+    // Without an answer there is no advice either; the command was applied all the same.
+    let surface = client.surface(timeout).ok()??;
+    surface.triangles.is_empty().then_some("this has no effect: the scene has no surface")
+}
+
+/// Allowed values of a parameter, in words.
 fn allowed(parameter: &str) -> Option<&'static str> {
     Some(match parameter {
         "gravity" | "wind_velocity" => "three numbers within 1e7, z 0 in 2-D, or off for 0 0 0",
