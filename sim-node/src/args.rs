@@ -17,7 +17,7 @@ use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcomma
 pub(crate) use command::{CommandVerb, PoseArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb};
 use endpoint::EndpointArgs;
-pub(crate) use lesson::{LessonArgs, LessonName};
+pub(crate) use lesson::LessonArgs;
 pub(crate) use run::RunArgs;
 pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 

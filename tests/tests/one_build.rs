@@ -8,8 +8,16 @@ use std::process::Command;
 
 /// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
 const PROGRAMS: [&str; 4] = ["sim-node", "recorder", "viewer-bridge", "integration-tests"];
-const PACKAGES: [&str; 6] =
-    ["sim-node", "recorder", "viewer-bridge", "integration-tests", "sim-contract", "sim-solver"];
+const PACKAGES: [&str; 8] = [
+    "sim-types",
+    "sim-contract",
+    "sim-solver",
+    "sim-lessons",
+    "sim-node",
+    "recorder",
+    "viewer-bridge",
+    "integration-tests",
+];
 
 /// Third-party crates of a selection, each with its version and features. A crate that is used by
 /// build scripts as well appears twice if its features differ there.

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
-use sim_contract::{Action, Client, SettingValue, Text};
+use sim_contract::{Action, Client, ParameterValue, Text};
 
 /// A node at 1 Hz and a thousandth of real time, and the last step that it made.
 fn slow_node(sandbox: &Sandbox) -> (Process, u64) {
@@ -30,8 +30,8 @@ fn a_new_time_scale_moves_the_step_that_the_node_waits_for() {
     let (_node, _) = slow_node(&sandbox);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let action = Action::Set {
-        parameter: Text::new("time_scale"),
-        value: SettingValue::Number(1000.0),
+        parameter: Text::new("time_scale").unwrap(),
+        value: ParameterValue::Number(1000.0),
         constraint_kind: None,
     };
     let step = client.request(action, DEADLINE).unwrap().step;

@@ -7,11 +7,13 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::MetadataCommand;
 
 /// The allowed arrows: crate -> workspace crates and restricted libraries that it may name.
-const ARROWS: [(&str, &[&str]); 7] = [
+const ARROWS: [(&str, &[&str]); 9] = [
     ("build-features", &[]),
-    ("sim-solver", &[]),
-    ("sim-contract", &["iceoryx2"]),
-    ("sim-node", &["sim-contract", "sim-solver"]),
+    ("sim-types", &[]),
+    ("sim-solver", &["sim-types"]),
+    ("sim-contract", &["iceoryx2", "sim-types"]),
+    ("sim-lessons", &["sim-solver"]),
+    ("sim-node", &["sim-contract", "sim-lessons", "sim-solver"]),
     ("recorder", &["mcap", "sim-contract", "sim-solver"]),
     ("viewer-bridge", &["foxglove", "recorder", "sim-contract"]),
     ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),

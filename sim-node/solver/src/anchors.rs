@@ -2,10 +2,12 @@
 
 use glam::{DQuat, DVec3, Vec3};
 
+use sim_types::ParticleFlags;
+
 use crate::bodies::Bodies;
 use crate::drive::step_towards;
 use crate::frame::{Frame, Pose};
-use crate::particles::{Particles, flag};
+use crate::particles::Particles;
 use crate::scene::{SceneAnchor, SceneParticle, Waypoint};
 
 /// All anchors of a scene.
@@ -89,7 +91,7 @@ impl Anchors {
         particles: &Particles,
         (substeps_left, reach): (u32, f32),
     ) {
-        const HELD: u32 = flag::PINNED | flag::FROZEN;
+        const HELD: u32 = ParticleFlags::PINNED | ParticleFlags::FROZEN;
         for (follower, target) in self.followers.iter().zip(&self.targets) {
             if particles.states[follower.particle as usize].flags & HELD == 0 {
                 let place = bodies.place(follower.particle);

@@ -8,11 +8,13 @@ mod patch;
 mod team;
 mod terms;
 
+use sim_types::ParticleFlags;
+
 use crate::constraints::Recipe;
 use crate::families::{Family, Sheet};
 use crate::kernels::Kernels;
 use crate::order::Order;
-use crate::particles::{Particle, flag};
+use crate::particles::Particle;
 use crate::scene::Model;
 use graph::{Graph, RUN};
 pub(crate) use motion::{Fall, Motion};
@@ -348,7 +350,7 @@ fn pack(state: &mut Particle, position: [f32; 3], displacement: [f32; 3], h: f32
     } else {
         state.velocity = [0.0; 3];
         state.inverse_mass = 0.0;
-        state.flags = (state.flags | flag::FROZEN) & !flag::GRABBED;
+        state.flags = (state.flags | ParticleFlags::FROZEN) & !ParticleFlags::GRABBED;
     }
     !is_finite
 }

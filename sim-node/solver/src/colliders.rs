@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Quat, Vec3};
 
-use crate::Rejection;
+use crate::Reason;
 use crate::frame::{Frame, angular_velocity, rotation_about};
 use crate::scene::{ColliderShape, SceneCollider};
 
@@ -98,9 +98,9 @@ impl Collider {
     }
 
     /// Puts it into a frame by the end of the next step.
-    pub(crate) fn move_to(&mut self, frame: Frame) -> Result<(), Rejection> {
+    pub(crate) fn move_to(&mut self, frame: Frame) -> Result<(), Reason> {
         if !self.can_take(&frame) {
-            return Err(Rejection::OutOfRange);
+            return Err(Reason::OutOfRange);
         }
         self.moved = Some(frame);
         Ok(())

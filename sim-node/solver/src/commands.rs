@@ -1,19 +1,13 @@
 //! What can be done to the state at the boundary before a step. A rejected command changes nothing.
 
-use thiserror::Error;
-
 use glam::Vec3;
+use sim_types::{COORDINATE_MAX, ConstraintKind, ParameterValue, ParticleFlags, Reason};
 
 use crate::Solver;
-use crate::constraints::ConstraintKind;
 use crate::cut::Ball;
 use crate::drive::Grab;
 use crate::frame::{Frame, Pose};
-use crate::parameters::{Affected, Context, Setting};
-use crate::particles::flag;
-
-/// Largest coordinate that a command may name: f32 resolves 1 m there.
-pub const COORDINATE_MAX: f32 = 1e7;
+use crate::parameters::{Affected, Context};
 
 /// Longest time, in seconds, that a grabbed particle may take to its target.
 pub const GRAB_OVER_S_MAX: f32 = 0.25;
@@ -23,9 +17,9 @@ pub(crate) fn is_near(numbers: &[f32]) -> bool {
     numbers.iter().all(|number| number.abs() <= COORDINATE_MAX)
 }
 
-pub(crate) fn check_finite(numbers: &[f32]) -> Result<(), Rejection> {
+pub(crate) fn check_finite(numbers: &[f32]) -> Result<(), Reason> {
     let is_finite = numbers.iter().all(|number| number.is_finite());
-    if is_finite { Ok(()) } else { Err(Rejection::NonFinite) }
+    if is_finite { Ok(()) } else { Err(Reason::NonFinite) }
 }
 
 /// A wish to drive a particle somewhere.
@@ -50,76 +44,19 @@ pub struct Push {
     pub limit: Option<f32>,
 }
 
-/// Why a command changed nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-pub enum Rejection {
-    /// A number is NaN or infinite.
-    #[error("a number is not finite")]
-    NonFinite,
-    /// A coordinate beyond [`COORDINATE_MAX`], or a value outside of its range.
-    #[error("a value is out of its range")]
-    OutOfRange,
-    /// There is no such particle.
-    #[error("there is no such particle")]
-    UnknownParticle,
-    /// There is no such constraint.
-    #[error("there is no such constraint")]
-    UnknownConstraint,
-    /// There is no such anchor.
-    #[error("there is no such anchor")]
-    UnknownAnchor,
-    /// There is no such collider.
-    #[error("there is no such collider")]
-    UnknownCollider,
-    /// There is no such parameter.
-    #[error("there is no such parameter")]
-    UnknownParameter,
-    /// The constraint is torn already.
-    #[error("the constraint is torn already")]
-    AlreadyTorn,
-    /// The particle is not grabbed.
-    #[error("the particle is not grabbed")]
-    NotGrabbed,
-    /// Another client holds the particle.
-    #[error("another client holds the particle")]
-    GrabbedByOther,
-    /// The particle is frozen, or the parameter means nothing in this scene.
-    #[error("it has no effect here")]
-    NoEffectHere,
-}
-
-impl Rejection {
-    /// The word for it in logs and outcomes.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NonFinite => "non_finite",
-            Self::OutOfRange => "out_of_range",
-            Self::UnknownParticle => "unknown_particle",
-            Self::UnknownConstraint => "unknown_constraint",
-            Self::UnknownAnchor => "unknown_anchor",
-            Self::UnknownCollider => "unknown_collider",
-            Self::UnknownParameter => "unknown_parameter",
-            Self::AlreadyTorn => "already_torn",
-            Self::NotGrabbed => "not_grabbed",
-            Self::GrabbedByOther => "grabbed_by_other",
-            Self::NoEffectHere => "no_effect_here",
-        }
-    }
-}
-
 impl Solver {
     /// Holds a particle where it stands, until [`Self::unpin`]. Pinning a pinned one is fine.
     ///
     /// # Errors
     /// Unknown or frozen particle.
-    pub fn pin(&mut self, particle: u32) -> Result<(), Rejection> {
+    pub fn pin(&mut self, particle: u32) -> Result<(), Reason> {
         let index = self.living_particle(particle)?;
-        if self.has_flag(index, flag::PINNED) {
+        if self.has_flag(index, ParticleFlags::PINNED) {
             return Ok(());
         }
-        self.particles.change_flags(index, flag::PINNED, 0);
+        self.particles.change_flags(index, ParticleFlags::PINNED, 0);
         // A grabbed one goes on with the hand that holds it, and stands where it is let go.
-        if !self.has_flag(index, flag::GRABBED) {
+        if !self.has_flag(index, ParticleFlags::GRABBED) {
             self.particles.stop(index);
         }
         self.due.tethers = true;
@@ -130,10 +67,10 @@ impl Solver {
     ///
     /// # Errors
     /// Unknown or frozen particle.
-    pub fn unpin(&mut self, particle: u32) -> Result<(), Rejection> {
+    pub fn unpin(&mut self, particle: u32) -> Result<(), Reason> {
         let index = self.living_particle(particle)?;
-        if self.has_flag(index, flag::PINNED) {
-            self.particles.change_flags(index, 0, flag::PINNED);
+        if self.has_flag(index, ParticleFlags::PINNED) {
+            self.particles.change_flags(index, 0, ParticleFlags::PINNED);
             self.due.tethers = true;
         }
         Ok(())
@@ -143,7 +80,7 @@ impl Solver {
     ///
     /// # Errors
     /// Bad target or time, unknown or frozen particle, or another client holds it.
-    pub fn grab(&mut self, client_id: u64, grip: Grip) -> Result<(), Rejection> {
+    pub fn grab(&mut self, client_id: u64, grip: Grip) -> Result<(), Reason> {
         self.check_target(&grip)?;
         let index = self.living_particle(grip.particle)?;
         let steps_left = self.steps_of(grip.over_s);
@@ -151,12 +88,12 @@ impl Solver {
         let grab = Grab { particle, client_id, target, steps_left };
         match self.find_grab(particle) {
             Ok(place) if self.grabs[place].client_id != client_id => {
-                return Err(Rejection::GrabbedByOther);
+                return Err(Reason::GrabbedByOther);
             }
             Ok(place) => self.grabs[place] = grab,
             Err(place) => self.grabs.insert(place, grab),
         }
-        self.particles.change_flags(index, flag::GRABBED, 0);
+        self.particles.change_flags(index, ParticleFlags::GRABBED, 0);
         self.tie_if_root(index);
         Ok(())
     }
@@ -165,7 +102,7 @@ impl Solver {
     ///
     /// # Errors
     /// Bad target or time, unknown particle, or this client does not hold it.
-    pub fn move_grabbed(&mut self, client_id: u64, grip: Grip) -> Result<(), Rejection> {
+    pub fn move_grabbed(&mut self, client_id: u64, grip: Grip) -> Result<(), Reason> {
         self.check_target(&grip)?;
         self.living_particle(grip.particle)?;
         let place = self.find_own_grab(client_id, grip.particle)?;
@@ -179,12 +116,12 @@ impl Solver {
     ///
     /// # Errors
     /// Unknown particle, or this client does not hold it.
-    pub fn release(&mut self, client_id: u64, particle: u32) -> Result<(), Rejection> {
+    pub fn release(&mut self, client_id: u64, particle: u32) -> Result<(), Reason> {
         let index = self.living_particle(particle)?;
         let place = self.find_own_grab(client_id, particle)?;
         self.grabs.remove(place);
-        self.particles.change_flags(index, 0, flag::GRABBED);
-        if self.has_flag(index, flag::PINNED) {
+        self.particles.change_flags(index, 0, ParticleFlags::GRABBED);
+        if self.has_flag(index, ParticleFlags::PINNED) {
             self.particles.stop(index);
         }
         self.tie_if_root(index);
@@ -193,25 +130,25 @@ impl Solver {
 
     /// What is in a hand is no root of tethers.
     fn tie_if_root(&mut self, index: usize) {
-        self.due.tethers |= self.has_flag(index, flag::PINNED | flag::ANCHORED);
+        self.due.tethers |= self.has_flag(index, ParticleFlags::PINNED | ParticleFlags::ANCHORED);
     }
 
     /// Gives every free particle strictly within a ball the velocity of a brush.
     ///
     /// # Errors
     /// A wrong number.
-    pub fn push(&mut self, push: Push) -> Result<(), Rejection> {
+    pub fn push(&mut self, push: Push) -> Result<(), Reason> {
         self.check_ball(&push.ball)?;
         check_finite(&push.delta)?;
         check_finite(push.limit.as_slice())?;
         let limit = push.limit.unwrap_or(f32::MAX);
         let is_in_plane = !self.is_planar || push.delta[2] == 0.0;
         if !is_in_plane || limit < 0.0 {
-            return Err(Rejection::OutOfRange);
+            return Err(Reason::OutOfRange);
         }
         let delta = push.delta.map(|axis| axis.clamp(-limit, limit));
         if !is_near(&delta) {
-            return Err(Rejection::OutOfRange);
+            return Err(Reason::OutOfRange);
         }
         let [x, y, z] = delta.map(|axis| axis * self.settings.rate_hz as f32);
         for state in &mut self.particles.states {
@@ -226,10 +163,10 @@ impl Solver {
     ///
     /// # Errors
     /// Unknown anchor, or a wrong number.
-    pub fn move_anchor(&mut self, anchor: u32, pose: Pose) -> Result<(), Rejection> {
+    pub fn move_anchor(&mut self, anchor: u32, pose: Pose) -> Result<(), Reason> {
         let frame = Frame::check(&pose, self.context())?;
         let moved = self.anchors.moved.get_mut(anchor as usize);
-        *moved.ok_or(Rejection::UnknownAnchor)? = Some(frame);
+        *moved.ok_or(Reason::UnknownAnchor)? = Some(frame);
         Ok(())
     }
 
@@ -239,10 +176,10 @@ impl Solver {
     ///
     /// # Errors
     /// Unknown collider, or a wrong number.
-    pub fn move_collider(&mut self, collider: u32, pose: Pose) -> Result<(), Rejection> {
+    pub fn move_collider(&mut self, collider: u32, pose: Pose) -> Result<(), Reason> {
         let frame = Frame::check(&pose, self.context())?;
         let moved = self.colliders.get_mut(collider as usize);
-        moved.ok_or(Rejection::UnknownCollider)?.move_to(frame)
+        moved.ok_or(Reason::UnknownCollider)?.move_to(frame)
     }
 
     /// Sets a parameter, one of [`crate::PARAMETERS`], from the next step on; `kind` chooses the
@@ -256,10 +193,10 @@ impl Solver {
     pub fn set(
         &mut self,
         name: &str,
-        setting: Setting,
+        value: ParameterValue,
         kind: Option<ConstraintKind>,
-    ) -> Result<(), Rejection> {
-        let affected = self.parameters.set(name, setting, kind, self.context())?;
+    ) -> Result<(), Reason> {
+        let affected = self.parameters.set(name, value, kind, self.context())?;
         self.due.constraints |= affected != Affected::Nothing;
         self.due.tethers |= affected == Affected::RigidPaths;
         Ok(())
@@ -269,25 +206,29 @@ impl Solver {
         Context { method: self.settings.method, is_planar: self.is_planar }
     }
 
-    fn living_particle(&self, particle: u32) -> Result<usize, Rejection> {
+    fn living_particle(&self, particle: u32) -> Result<usize, Reason> {
         let index = particle as usize;
         if index >= self.particle_count() {
-            return Err(Rejection::UnknownParticle);
+            return Err(Reason::UnknownParticle);
         }
-        if self.has_flag(index, flag::FROZEN) { Err(Rejection::NoEffectHere) } else { Ok(index) }
+        if self.has_flag(index, ParticleFlags::FROZEN) {
+            Err(Reason::NoEffectHere)
+        } else {
+            Ok(index)
+        }
     }
 
     fn has_flag(&self, index: usize, flag: u32) -> bool {
         self.particles.states[index].flags & flag != 0
     }
 
-    fn check_target(&self, grip: &Grip) -> Result<(), Rejection> {
+    fn check_target(&self, grip: &Grip) -> Result<(), Reason> {
         check_finite(&grip.target)?;
         check_finite(&[grip.over_s])?;
         let is_near = is_near(&grip.target);
         let is_in_plane = !self.is_planar || grip.target[2] == 0.0;
         let is_timely = (0.0..=GRAB_OVER_S_MAX).contains(&grip.over_s);
-        if is_near && is_in_plane && is_timely { Ok(()) } else { Err(Rejection::OutOfRange) }
+        if is_near && is_in_plane && is_timely { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
     /// Whole steps in `over_s`, rounded up, at least one. A time that is a whole number of steps but
@@ -308,12 +249,12 @@ impl Solver {
         self.grabs.binary_search_by_key(&particle, |grab| grab.particle)
     }
 
-    fn find_own_grab(&self, client_id: u64, particle: u32) -> Result<usize, Rejection> {
-        let place = self.find_grab(particle).map_err(|_| Rejection::NotGrabbed)?;
+    fn find_own_grab(&self, client_id: u64, particle: u32) -> Result<usize, Reason> {
+        let place = self.find_grab(particle).map_err(|_| Reason::NotGrabbed)?;
         if self.grabs[place].client_id == client_id {
             Ok(place)
         } else {
-            Err(Rejection::GrabbedByOther)
+            Err(Reason::GrabbedByOther)
         }
     }
 }

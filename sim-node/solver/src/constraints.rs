@@ -2,36 +2,12 @@
 
 use std::cell::Cell;
 
-use serde::{Deserialize, Serialize};
+use sim_types::{ConstraintKind, Method, TearCause};
 
 use crate::bodies::{Give, Term};
 use crate::parameters::Parameters;
 use crate::project::Rest;
-use crate::scene::{Limits, Method, Model};
-use crate::tear::TearCause;
-
-/// What a constraint is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[repr(u32)]
-pub enum ConstraintKind {
-    /// Between direct neighbours.
-    #[default]
-    Structural = 0,
-    /// Across a diagonal.
-    Shear = 1,
-    /// Between next neighbours but one.
-    Bend = 2,
-    /// Acts only when longer than its rest length.
-    Tether = 3,
-}
-
-impl ConstraintKind {
-    /// The kind of that number, if there is one.
-    pub fn from_number(number: u32) -> Option<Self> {
-        [Self::Structural, Self::Shear, Self::Bend, Self::Tether].get(number as usize).copied()
-    }
-}
+use crate::scene::{Limits, Model};
 
 /// One constraint as the scene gives it. Its index is its place in the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::{COORDINATE_MAX, Constraint, Rejection, Solver, TearCause, check_finite, is_near};
+use sim_types::{COORDINATE_MAX, Reason, TearCause};
+
+use crate::{Constraint, Solver, check_finite, is_near};
 
 /// The way of a cursor, extended along the direction of view: a strip that cuts what crosses it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,12 +31,12 @@ impl Solver {
     ///
     /// # Errors
     /// Unknown, or torn already.
-    pub fn cut(&mut self, constraint: u32) -> Result<(), Rejection> {
+    pub fn cut(&mut self, constraint: u32) -> Result<(), Reason> {
         if constraint as usize >= self.constraint_count() {
-            return Err(Rejection::UnknownConstraint);
+            return Err(Reason::UnknownConstraint);
         }
         if self.torn.is_torn(constraint) {
-            return Err(Rejection::AlreadyTorn);
+            return Err(Reason::AlreadyTorn);
         }
         self.tear(constraint, TearCause::Cut);
         self.tethers.drop_torn(&self.torn, &mut self.bodies);
@@ -45,7 +47,7 @@ impl Solver {
     ///
     /// # Errors
     /// A wrong number.
-    pub fn cut_radius(&mut self, ball: Ball) -> Result<(), Rejection> {
+    pub fn cut_radius(&mut self, ball: Ball) -> Result<(), Reason> {
         self.check_ball(&ball)?;
         self.tear_all(|a, b| ball.has(a) || ball.has(b));
         Ok(())
@@ -56,7 +58,7 @@ impl Solver {
     ///
     /// # Errors
     /// A wrong number, or no direction.
-    pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Rejection> {
+    pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Reason> {
         let Sweep { from, to, direction } = sweep;
         for vector in [from, to, direction] {
             check_finite(&vector)?;
@@ -64,20 +66,20 @@ impl Solver {
         let is_near = is_near(&from) && is_near(&to) && is_near(&direction);
         let leaves_plane = self.is_planar && (from[2] != 0.0 || to[2] != 0.0);
         if !is_near || leaves_plane || direction == [0.0; 3] {
-            return Err(Rejection::OutOfRange);
+            return Err(Reason::OutOfRange);
         }
         let strip = Strip::new(&sweep);
         self.tear_all(|a, b| strip.is_crossed(a, b));
         Ok(())
     }
 
-    pub(crate) fn check_ball(&self, ball: &Ball) -> Result<(), Rejection> {
+    pub(crate) fn check_ball(&self, ball: &Ball) -> Result<(), Reason> {
         check_finite(&ball.center)?;
         check_finite(&[ball.radius])?;
         let is_near = is_near(&ball.center);
         let is_in_plane = !self.is_planar || ball.center[2] == 0.0;
         let is_size = (0.0..=COORDINATE_MAX).contains(&ball.radius);
-        if is_near && is_in_plane && is_size { Ok(()) } else { Err(Rejection::OutOfRange) }
+        if is_near && is_in_plane && is_size { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
     /// Tears what is whole and meets a condition on its two ends.

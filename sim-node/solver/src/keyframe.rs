@@ -7,14 +7,15 @@ use thiserror::Error;
 
 use glam::{Quat, Vec3};
 
+use sim_types::{ParticleFlags, TearCause};
+
 use crate::Solver;
 use crate::drive::Grab;
 use crate::frame::{Frame, Pose};
 use crate::hash::state_hash;
 use crate::parameters::Parameters;
-use crate::particles::{Particle, flag};
+use crate::particles::Particle;
 use crate::solver::Due;
-use crate::tear::TearCause;
 use crate::tethers::{Basis, Tethers};
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
@@ -250,6 +251,6 @@ impl Solver {
     }
 
     fn is_fixed(&self, particle: u32) -> bool {
-        self.particles.states[particle as usize].flags & flag::FIXED != 0
+        self.particles.states[particle as usize].flags & ParticleFlags::ALL != 0
     }
 }

@@ -25,6 +25,7 @@
 )]
 
 mod anchors;
+mod apply;
 mod bodies;
 pub mod builtin;
 mod colliders;
@@ -52,20 +53,23 @@ mod tear;
 mod tethers;
 mod wind;
 
+pub use apply::{Applied, Control};
 pub use colliders::PlacedCollider;
-pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Push, Rejection};
+pub use commands::{GRAB_OVER_S_MAX, Grip, Push};
 pub(crate) use commands::{check_finite, is_near};
-pub use constraints::{Constraint, ConstraintKind};
+pub use constraints::Constraint;
 pub use crew::THREADS_MAX;
 pub use cut::{Ball, Sweep};
 pub use frame::Pose;
 pub use kernels::Kernels;
 pub use keyframe::{Keyframe, KeyframeError, RestoreError};
-pub use parameters::{PARAMETERS, Setting};
-pub use particles::{Particle, flag};
-pub use scene::{ColliderShape, Method, Scene, SceneError, SolverSettings};
+pub use particles::Particle;
+pub use scene::{ColliderShape, Scene, SceneError, SolverSettings};
+pub use sim_types::{
+    Action, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter, ParameterValue,
+    ParameterValues, ParticleFlags, Reason, TearCause,
+};
 pub use solver::Solver;
-pub use tear::TearCause;
 
 /// Version of the arithmetic. It changes with any change of the bits that a step produces, and a
 /// recording is re-simulated only by the version that made it.

@@ -1,5 +1,7 @@
 //! The running state of a scene.
 
+use sim_types::{ParameterValues, TearCause};
+
 use crate::anchors::Anchors;
 use crate::bodies::{Bodies, Extras};
 use crate::colliders::{Collider, PlacedCollider};
@@ -12,7 +14,7 @@ use crate::order::Order;
 use crate::parameters::Parameters;
 use crate::particles::{Particle, Particles};
 use crate::scene::{Model, Scene, SceneAnchor, SolverSettings, substep_length};
-use crate::tear::{TearCause, Torn};
+use crate::tear::Torn;
 use crate::tethers::Tethers;
 use crate::wind::Air;
 
@@ -266,6 +268,12 @@ impl Solver {
     /// How many at the end of [`Self::torn`] are new in the last step.
     pub fn new_torn_count(&self) -> usize {
         self.torn.new_count()
+    }
+
+    /// The parameters as they are now. The time scale is that of a node at real time: the pace
+    /// belongs to the node.
+    pub fn parameter_values(&self) -> ParameterValues {
+        self.parameters.values(self.settings.method)
     }
 
     /// Number of colliders.

@@ -2,6 +2,8 @@
 //! allocated, locked, read from a clock or printed. (What commands left to be worked out at the
 //! boundary before it may allocate, once: `finish_boundary`.)
 
+use sim_types::{ParticleFlags, TearCause};
+
 use crate::Solver;
 use crate::bodies::{Fall, Motion};
 use crate::colliders::Moments;
@@ -9,9 +11,7 @@ use crate::constraints::Recipe;
 use crate::contact::{ContactStep, place_obstacles};
 use crate::drive::{Substep, count_step, drive_grabbed};
 use crate::hash::state_hash;
-use crate::particles::flag;
 use crate::project::BY_LENGTH;
-use crate::tear::TearCause;
 use crate::wind::Breeze;
 
 impl Solver {
@@ -123,7 +123,8 @@ impl Solver {
         if frozen_count > 0 {
             self.frozen_count += frozen_count;
             let states = &self.particles.states;
-            self.grabs.retain(|grab| states[grab.particle as usize].flags & flag::GRABBED != 0);
+            self.grabs
+                .retain(|grab| states[grab.particle as usize].flags & ParticleFlags::GRABBED != 0);
         }
         if is_any_marked {
             self.tear_marked();

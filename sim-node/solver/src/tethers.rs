@@ -4,12 +4,14 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use sim_types::ParticleFlags;
+
 use crate::bodies::{Bodies, Place};
-use crate::constraints::ConstraintKind;
 use crate::parameters::Parameters;
-use crate::particles::{Particles, flag};
+use crate::particles::Particles;
 use crate::scene::{Model, Softness};
 use crate::tear::Torn;
+use sim_types::ConstraintKind;
 
 /// The tethers of a scene. Empty where it has none.
 #[derive(Debug, Clone, Default)]
@@ -83,8 +85,10 @@ impl Tethers {
         particles: &Particles,
         torn: &[u32],
     ) -> Self {
-        let is_root =
-            |flags: u32| flags & (flag::PINNED | flag::ANCHORED) != 0 && flags & flag::GRABBED == 0;
+        let is_root = |flags: u32| {
+            flags & (ParticleFlags::PINNED | ParticleFlags::ANCHORED) != 0
+                && flags & ParticleFlags::GRABBED == 0
+        };
         let states = (0_u32..).zip(&particles.states);
         let roots = states.filter(|(_, one)| is_root(one.flags)).map(|(index, _)| index).collect();
         let mut torn = torn.to_vec();
@@ -153,7 +157,7 @@ impl Tethers {
             bodies.set_tether(particle, tether.length);
             let state = &particles.states[tether.root as usize];
             bodies.set_root(particle, state.position);
-            if state.flags & flag::ANCHORED != 0 {
+            if state.flags & ParticleFlags::ANCHORED != 0 {
                 self.leads.push(Lead { particle, root });
             }
         }

@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 use sim_solver::{
-    Ball, Grip, Keyframe, Particle, Pose, Push, RestoreError, Scene, Setting, Solver, Sweep,
-    builtin, flag,
+    Ball, Grip, Keyframe, ParameterValue, Particle, ParticleFlags, Pose, Push, RestoreError, Scene,
+    Solver, Sweep, builtin,
 };
 
 #[derive(Debug, Clone)]
@@ -87,7 +87,7 @@ fn apply(solver: &mut Solver, wish: &Wish) {
         }
         Wish::Set(which, share) => {
             let (name, low, high) = SETTINGS[which];
-            solver.set(name, Setting::Number(low + share * (high - low)), None)
+            solver.set(name, ParameterValue::Number(low + share * (high - low)), None)
         }
         Wish::Reset => {
             solver.reset();
@@ -209,7 +209,7 @@ proptest! {
                 let mut solver = if is_used { whole.clone() } else { Solver::new(&scene) };
                 if is_used {
                     solver.cut(3).ok();
-                    solver.set("substeps", Setting::Number(7.0), None).unwrap();
+                    solver.set("substeps", ParameterValue::Number(7.0), None).unwrap();
                     solver.step();
                 }
                 solver.restore(&particles(&whole), &keyframe).unwrap();
@@ -282,7 +282,7 @@ fn a_state_that_is_none_is_refused_and_changes_nothing() {
         changed(|one| one.flags = 1 << 9),
         changed(|one| one.flags = 0),
         changed(|one| (one.flags, one.inverse_mass) = (0, 1.0)),
-        changed(|one| one.flags = flag::PINNED),
+        changed(|one| one.flags = ParticleFlags::PINNED),
         good[1..].to_vec(),
     ];
     for particles in cases {

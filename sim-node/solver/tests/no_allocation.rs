@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use sim_solver::{Grip, Scene, Setting, Solver, builtin};
+use sim_solver::{Grip, ParameterValue, Scene, Solver, builtin};
 
 struct Counting;
 
@@ -56,7 +56,7 @@ fn neither_steps_nor_commands_allocate() {
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
         solver.step();
         // A parameter is worked out at its boundary, which may allocate.
-        solver.set("tear_distance", Setting::Number(0.0), None).unwrap();
+        solver.set("tear_distance", ParameterValue::Number(0.0), None).unwrap();
         solver.step();
         let before = allocations();
         for _ in 0..200 {

@@ -1,7 +1,9 @@
 //! Command lines of the commands of `ctl`: each one is applied by the node and has an outcome.
 
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
-use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, SettingValue};
+use sim_contract::{
+    ConstraintKind, GRAB_OVER_S_DEFAULT, PARAMETERS, ParameterInfo, ParameterValue,
+};
 use sim_solver::GRAB_OVER_S_MAX;
 
 #[derive(Debug, Subcommand)]
@@ -200,11 +202,7 @@ pub(crate) struct PoseArgs {
         sim-node ctl set compliance 1e-4 --kind bend"
 )]
 pub(crate) struct SetArgs {
-    #[arg(
-        help = "gravity (m/s^2), wind_velocity (m/s), wind_drag, damping (1/s), max_speed (m/s), \
-        substeps, iterations, relaxation, max_stretch and tear_stretch (ratios), tear_distance (m), \
-        tear_force (N), compliance (m/N), stiffness, time_scale"
-    )]
+    #[arg(help = parameters_help())]
     pub(crate) parameter: String,
     /// A number, three numbers for a vector, or "off"
     #[arg(num_args = 1..=3, required = true, value_name = "VALUE", value_parser = setting_word)]
@@ -212,6 +210,15 @@ pub(crate) struct SetArgs {
     /// Kind of the constraints that get the compliance or stiffness [default: all kinds]
     #[arg(long, value_name = "KIND", value_parser = ["structural", "shear", "bend", "tether"])]
     pub(crate) kind: Option<String>,
+}
+
+/// Names of the parameters, with their units.
+fn parameters_help() -> String {
+    let name = |info: &ParameterInfo| match info.unit {
+        "" => info.name.to_owned(),
+        unit => format!("{} ({unit})", info.name),
+    };
+    PARAMETERS.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
 /// One word of the value of a parameter.
@@ -231,12 +238,12 @@ fn setting_word(text: &str) -> Result<SettingWord, String> {
 
 impl SetArgs {
     /// Value that the words form together.
-    pub(crate) fn value(&self) -> Result<SettingValue, &'static str> {
+    pub(crate) fn value(&self) -> Result<ParameterValue, &'static str> {
         use SettingWord::{Number, Off};
         match *self.values {
-            [Off] => Ok(SettingValue::Off),
-            [Number(number)] => Ok(SettingValue::Number(number)),
-            [Number(x), Number(y), Number(z)] => Ok(SettingValue::Vector([x, y, z])),
+            [Off] => Ok(ParameterValue::Off),
+            [Number(number)] => Ok(ParameterValue::Number(number)),
+            [Number(x), Number(y), Number(z)] => Ok(ParameterValue::Vector([x, y, z])),
             _ => Err("VALUE must be one number, three numbers for a vector, or \"off\" alone"),
         }
     }

@@ -7,13 +7,6 @@ use sim_contract::{Client, ParticleFlags, ParticleState, Snapshot};
 use crate::args::CtlArgs;
 use crate::table::{Align, Table};
 
-const FLAG_NAMES: [(u32, &str); 4] = [
-    (ParticleFlags::PINNED, "pinned"),
-    (ParticleFlags::GRABBED, "grabbed"),
-    (ParticleFlags::ANCHORED, "anchored"),
-    (ParticleFlags::FROZEN, "frozen"),
-];
-
 /// A particle in JSON.
 #[derive(Serialize)]
 struct ParticleRow {
@@ -26,7 +19,7 @@ struct ParticleRow {
 
 impl ParticleRow {
     fn new(index: usize, particle: &ParticleState) -> Self {
-        let flags = FLAG_NAMES.iter().filter(|(bit, _)| particle.flags & bit != 0);
+        let flags = ParticleFlags::NAMES.iter().filter(|(bit, _)| particle.flags & bit != 0);
         Self {
             index,
             position: particle.position,

@@ -1,8 +1,10 @@
 //! Whether a snapshot and a keyframe are a state of a scene: both may come from anywhere.
 
 use super::{Keyframe, Moved, RestoreError};
+use sim_types::ParticleFlags;
+
 use crate::frame::{Frame, Pose};
-use crate::particles::{Particle, flag};
+use crate::particles::Particle;
 use crate::tethers::Basis;
 use crate::{GRAB_OVER_S_MAX, Solver, is_near};
 
@@ -29,14 +31,14 @@ impl Solver {
     }
 
     fn check_particle(&self, index: usize, particle: &Particle) -> Result<(), &'static str> {
-        let is_fixed = particle.flags & flag::FIXED != 0;
+        let is_fixed = particle.flags & ParticleFlags::ALL != 0;
         if !particle.position.iter().chain(&particle.velocity).all(|number| number.is_finite()) {
             return Err("a number is not finite");
         }
-        if particle.flags & !flag::KNOWN != 0 {
+        if particle.flags & !ParticleFlags::ALL != 0 {
             return Err("it has flags that this version does not know");
         }
-        if (particle.flags ^ self.particles.states[index].flags) & flag::ANCHORED != 0 {
+        if (particle.flags ^ self.particles.states[index].flags) & ParticleFlags::ANCHORED != 0 {
             return Err("other particles follow an anchor in this scene");
         }
         if is_fixed != (particle.inverse_mass == 0.0) {
@@ -129,10 +131,10 @@ fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'stat
         let indices = (0_u32..).zip(particles);
         indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
     };
-    if !with(flag::FIXED).eq(keyframe.fixed.iter().map(|one| one.particle)) {
+    if !with(ParticleFlags::ALL).eq(keyframe.fixed.iter().map(|one| one.particle)) {
         return Err("other particles are fixed");
     }
-    if !with(flag::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
+    if !with(ParticleFlags::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
         return Err("other particles are grabbed");
     }
     if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {

@@ -11,8 +11,10 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::model::Model;
-use super::{Limits, Method, SceneParticle, Softness, Up, decimal};
-use crate::constraints::{Constraint, ConstraintKind};
+use sim_types::{ConstraintKind, Method};
+
+use super::{Limits, SceneParticle, Softness, Up, decimal};
+use crate::constraints::Constraint;
 use crate::families::Sheet;
 pub use bridge::Bridge;
 pub use cloth::{Cloth, Diagonals};

@@ -131,7 +131,7 @@ fn bends_compliant_and_torn_constraints_make_no_path() {
     assert!(falls("structural", true) > 4.0, "a torn link makes none: it falls");
     let mut stiff = solver(text);
     step(&mut stiff, 1200);
-    stiff.set("compliance", sim_solver::Setting::Number(0.0), None).unwrap();
+    stiff.set("compliance", sim_solver::ParameterValue::Number(0.0), None).unwrap();
     step(&mut stiff, 600);
     assert_near("rigid, so tethered", 1.0, distance(&stiff, 0, 1), 1e-3);
 }
