@@ -3,6 +3,7 @@
 mod action;
 mod command;
 mod hint;
+mod parameters;
 mod particles;
 mod status;
 
@@ -18,7 +19,7 @@ pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {
         CtlVerb::Command(verb) => command::send(&mut client, args, action::from_verb(verb)?),
         CtlVerb::Query(query) => {
             match query {
-                QueryVerb::Get { .. } => anyhow::bail!("not yet"),
+                QueryVerb::Get { parameter } => parameters::print(&mut client, args, *parameter),
                 QueryVerb::Status => status::print(&mut client, args),
                 QueryVerb::Hash => particles::print_hash(&mut client, args),
                 QueryVerb::Particles { indices } => particles::print(&mut client, args, indices),

@@ -78,6 +78,38 @@ fn wind_without_a_surface_is_applied_with_a_hint() {
 }
 
 #[test]
+fn wind_without_drag_is_applied_with_a_hint() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let without = run(&sandbox, "ctl set wind_velocity 3 0 0");
+    assert_eq!(without.code, Some(0));
+    assert!(without.stderr.starts_with("hint: this has no effect while wind_drag is 0"));
+    run(&sandbox, "ctl set wind_drag 0.5").success();
+    assert_eq!(run(&sandbox, "ctl set wind_velocity 4 0 0").stderr, "");
+}
+
+#[test]
+fn get_shows_the_parameters_as_they_were_set() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    ctl(&sandbox, &["set", "gravity", "0", "-1.5", "0"]);
+    ctl(&sandbox, &["set", "compliance", "0.001", "--kind", "bend"]);
+    let all = ctl(&sandbox, &["get"]);
+    assert_eq!(all["gravity"], serde_json::json!([0.0, -1.5, 0.0]));
+    assert!(all["step"] == 1 && all["tear_force"].is_null(), "{all}");
+    let one = ctl(&sandbox, &["get", "substeps"]);
+    assert_eq!(one.as_object().unwrap().len(), 2, "{one}");
+    let table = run(&sandbox, "ctl get gravity").success();
+    assert_eq!(
+        table,
+        "since step 1\nparameter  constraints  value     unit\ngravity                 0 -1.5 0  m/s²\n"
+    );
+    let unknown = run(&sandbox, "ctl get colour");
+    assert_eq!(unknown.code, Some(2));
+    assert!(unknown.stderr.contains("(allowed: gravity, damping, "), "{}", unknown.stderr);
+}
+
+#[test]
 fn name_and_domain_are_accepted_before_the_subcommand() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "rope", "--paused", "--name", "left"]);

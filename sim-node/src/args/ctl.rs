@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use clap::{Args as ClapArgs, Subcommand};
+use sim_contract::{PARAMETERS, Parameter};
 
 use super::command::{CommandVerb, PointArgs};
 use super::endpoint::EndpointArgs;
@@ -58,7 +59,8 @@ pub(crate) enum QueryVerb {
     #[command(after_help = "Examples:\n  sim-node ctl get\n  sim-node ctl get gravity")]
     Get {
         /// Parameter to print [default: all]
-        parameter: Option<String>,
+        #[arg(value_parser = parameter)]
+        parameter: Option<Parameter>,
     },
     /// Print the state of the node: scene, step, pace, times, losses
     #[command(after_help = "Examples:\n  sim-node ctl status\n  sim-node ctl status --json")]
@@ -80,4 +82,13 @@ pub(crate) enum QueryVerb {
         after_help = "Example: sim-node ctl nearest 0.5 -0.2 0"
     )]
     Nearest(PointArgs),
+}
+
+fn parameter(text: &str) -> Result<Parameter, String> {
+    Parameter::from_name(text).ok_or_else(|| {
+        format!(
+            "there is no such parameter (allowed: {})",
+            PARAMETERS.map(|info| info.name).join(", ")
+        )
+    })
 }

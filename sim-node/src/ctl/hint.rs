@@ -47,8 +47,11 @@ pub(super) fn for_applied(
         return None;
     }
     // Without an answer there is no advice; the command was applied all the same.
-    let surface = client.surface(timeout).ok()??;
-    surface.triangles.is_empty().then_some("this has no effect: the scene has no surface")
+    if client.surface(timeout).ok()??.triangles.is_empty() {
+        return Some("this has no effect: the scene has no surface");
+    }
+    let is_still = client.parameters(timeout).ok()??.values.wind_drag == 0.0;
+    is_still.then_some("this has no effect while wind_drag is 0 (see `ctl set wind_drag`)")
 }
 
 /// Allowed values of a parameter, in words.
