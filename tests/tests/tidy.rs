@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::MetadataCommand;
 
 /// The allowed dependencies: each crate with the workspace crates and restricted libraries it may use.
-const ARROWS: [(&str, &[&str]); 8] = [
+const ARROWS: [(&str, &[&str]); 9] = [
+    ("build-features", &[]),
     ("sim-types", &[]),
     ("sim-solver", &["sim-types"]),
     ("sim-contract", &["iceoryx2", "sim-types"]),

@@ -1,10 +1,12 @@
 //! What a client reads.
 
-use crate::reader::SliceSample;
-use crate::{
-    ColliderState, CollidersHeader, ConstraintState, LoadHeader, ParameterValues, ParametersHeader,
-    ParticleState, SnapshotHeader, TearsHeader, TornConstraint, Triangle,
-};
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::parameters::ParametersHeader;
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
+use crate::ports::reader::SliceSample;
+use sim_types::ParameterValues;
 
 /// A snapshot in shared memory: holding it keeps the memory from being reused.
 #[derive(Debug)]

@@ -8,9 +8,9 @@ use iceoryx2::prelude::{BackpressureStrategy, IceoryxSend, PortFactory, ZeroCopy
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
 
-use crate::ports::{Counted, Places, create_port};
-use crate::service::{ServiceError, ServiceSpec};
-use crate::session::{Slices, Values};
+use crate::ports::port::{Counted, Places, create_port};
+use crate::ports::service::{ServiceError, ServiceSpec};
+use crate::ports::session::{Slices, Values};
 
 /// Why a message was not published. The owner is as before, and can go on.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

@@ -3,7 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{Command, Reason};
+use crate::messages::command::Command;
+use sim_types::Reason;
 
 /// Outcome of a command: 296 bytes, alignment 8. Written by the owner of the name for every
 /// command that it takes, in the order of application, which a re-simulation follows.

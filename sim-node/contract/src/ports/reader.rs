@@ -9,10 +9,10 @@ use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
 
-use crate::BORROWED_SAMPLES_MAX;
-use crate::ports::{Counted, Places, create_port};
-use crate::service::{ServiceError, ServiceSpec};
-use crate::session::{Slices, Values};
+use crate::limits::BORROWED_SAMPLES_MAX;
+use crate::ports::port::{Counted, Places, create_port};
+use crate::ports::service::{ServiceError, ServiceSpec};
+use crate::ports::session::{Slices, Values};
 
 /// Why a message could not be read.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -178,10 +178,10 @@ fn read_error(service: &str, error: ReceiveError) -> ReadError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::TEARS;
-    use crate::session::{Access, Session};
+    use crate::messages::tears::{TearsHeader, TornConstraint};
+    use crate::ports::service::TEARS;
+    use crate::ports::session::{Access, Session};
     use crate::testing::TestDomain;
-    use crate::{TearsHeader, TornConstraint};
 
     #[test]
     fn a_message_whose_header_lies_about_its_length_is_refused_and_the_next_one_is_read() {

@@ -4,16 +4,20 @@ use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory};
 use thiserror::Error;
 
-use crate::service::{
+use crate::endpoint::Endpoint;
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::command::Command;
+use crate::messages::outcome::Outcome;
+use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::status::NodeStatus;
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::ports::service::{
     COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
     ServiceError, TEARS, TOPOLOGY,
 };
-use crate::session::{Access, Events, Session, Slices, Values};
-use crate::{
-    ColliderState, CollidersHeader, Command, ConstraintState, Endpoint, KeyframeHeader, LoadHeader,
-    NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, SnapshotHeader,
-    TearsHeader, TornConstraint, Triangle,
-};
+use crate::ports::session::{Access, Events, Session, Slices, Values};
 
 /// The services of a name.
 #[derive(Debug)]
@@ -157,8 +161,11 @@ mod tests {
     use super::*;
     use sim_types::ParameterValues;
 
+    use crate::limits::CONTRACT_VERSION;
+    use crate::owner::Owner;
+    use crate::owner::error::OwnerError;
+    use crate::owner::load::Load;
     use crate::testing::TestDomain;
-    use crate::{CONTRACT_VERSION, Load, Owner, OwnerError};
 
     const EMPTY: Load<'_> = Load {
         header: LoadHeader {

@@ -1,16 +1,20 @@
 //! What an owner publishes per load, and the writers whose sizes follow from it.
 
-use crate::service::{
+use crate::limits::{
+    BORROWED_SAMPLES_MAX, COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, SNAPSHOTS_BUFFERED,
+};
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::owner::error::OwnerError;
+use crate::ports::service::{
     COLLIDERS, KEYFRAME, PARAMETERS, PARTICLES, ServiceError, ServiceSpec, TEARS,
 };
-use crate::services::Services;
-use crate::writer::{Capacity, SliceWriter};
-use crate::{
-    BORROWED_SAMPLES_MAX, COLLIDERS_MAX, ColliderState, CollidersHeader, ConstraintState,
-    ELEMENTS_MAX, KeyframeHeader, LoadHeader, OwnerError, ParameterState, ParametersHeader,
-    ParticleState, PublishError, SCENE_SIZE_BYTES_MAX, SNAPSHOTS_BUFFERED, SnapshotHeader,
-    TearsHeader, TornConstraint, Triangle,
-};
+use crate::ports::services::Services;
+use crate::ports::writer::PublishError;
+use crate::ports::writer::{Capacity, SliceWriter};
 use sim_types::{ParameterValues, SETTINGS_COUNT};
 
 /// What an owner publishes once per load, and what the sizes of its messages follow from.

@@ -12,9 +12,11 @@ use iceoryx2::prelude::{
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
 
-use crate::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE, WhenFull};
-use crate::wake::Wake;
-use crate::{BORROWED_SAMPLES_MAX, CONTRACT_VERSION, Endpoint, PARTICIPANTS_MAX, domain};
+use crate::endpoint::Endpoint;
+use crate::limits::{BORROWED_SAMPLES_MAX, CONTRACT_VERSION, PARTICIPANTS_MAX};
+use crate::ports::domain;
+use crate::ports::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE, WhenFull};
+use crate::ports::wake::Wake;
 
 /// A publish-subscribe service whose messages are slices of `T` with the header `H`.
 pub(crate) type Slices<T, H> = port_factory::publish_subscribe::PortFactory<ipc::Service, [T], H>;

@@ -2,22 +2,27 @@
 
 use std::time::Duration;
 
-use crate::parameters::to_values;
-use crate::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
-use crate::service::{
+use crate::client::state::{Change, State, StateAssembler};
+use crate::client::views::Snapshot;
+use crate::client::watch::listen;
+use crate::endpoint::Endpoint;
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::outcome::Outcome;
+use crate::messages::parameters::to_values;
+use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::status::NodeStatus;
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::messages::update::Update;
+use crate::ports::reader::{Drained, ReadError, SliceReader, SliceSample, ValueReader};
+use crate::ports::service::{
     COLLIDERS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError,
     TEARS, TOPOLOGY,
 };
-use crate::services::{AttachError, Attachment};
-use crate::session::Session;
-use crate::state::{Change, State, StateAssembler};
-use crate::wake::WakeListener;
-use crate::watch::listen;
-use crate::{
-    ColliderState, CollidersHeader, ConstraintState, Endpoint, KeyframeHeader, LoadHeader,
-    NodeStatus, Outcome, ParameterState, ParameterValues, ParametersHeader, ParticleState,
-    Snapshot, SnapshotHeader, TearsHeader, TornConstraint, Triangle,
-};
+use crate::ports::services::{AttachError, Attachment};
+use crate::ports::session::Session;
+use crate::ports::wake::WakeListener;
 
 /// Times that every service is read for one state: each read takes at most one buffer.
 const READS_MAX: usize = 8;
@@ -42,29 +47,6 @@ pub struct Tap {
     errors: Vec<ReadError>,
     // Services and node go last.
     attachment: Attachment,
-}
-
-/// A message that is not a snapshot, in shared memory.
-#[derive(Debug, Clone, Copy)]
-pub enum Update<'a> {
-    /// The scene of a load, as TOML.
-    Scene(&'a LoadHeader, &'a [u8]),
-    /// The constraints of a load.
-    Topology(&'a LoadHeader, &'a [ConstraintState]),
-    /// The triangles of a load; may be none.
-    Surface(&'a LoadHeader, &'a [Triangle]),
-    /// All colliders in their poses at the end of a step.
-    Colliders(&'a CollidersHeader, &'a [ColliderState]),
-    /// All constraints torn since the load or the last reset.
-    Tears(&'a TearsHeader, &'a [TornConstraint]),
-    /// The values of all parameters.
-    Parameters(&'a ParametersHeader, &'a ParameterValues),
-    /// What completes a snapshot.
-    Keyframe(&'a KeyframeHeader, &'a [u8]),
-    /// What became of a command.
-    Outcome(&'a Outcome),
-    /// How the node is doing.
-    Status(&'a NodeStatus),
 }
 
 impl Tap {

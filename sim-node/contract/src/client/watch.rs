@@ -5,12 +5,12 @@ use std::time::Duration;
 use iceoryx2::port::listener::ListenerCreateError;
 
 use crate::clock::Deadline;
-use crate::ports::{Places, create_port};
-use crate::reader::ReadError;
-use crate::service::{ServiceError, WAKE};
-use crate::services::Attachment;
-use crate::session::Events;
-use crate::wake::{Heard, WakeListener};
+use crate::ports::port::{Places, create_port};
+use crate::ports::reader::ReadError;
+use crate::ports::service::{ServiceError, WAKE};
+use crate::ports::services::Attachment;
+use crate::ports::session::Events;
+use crate::ports::wake::{Heard, WakeListener};
 
 /// How long to believe in an owner that says nothing. A killed one cannot say that it has gone.
 const SILENCE_MAX: Duration = Duration::from_millis(500);

@@ -59,9 +59,10 @@ impl ParameterState {
     /// The parameter and its value; `None` for a parameter, kind or form of another version.
     pub fn setting(&self) -> Option<Setting> {
         let parameter = Parameter::from_number(self.parameter)?;
-        let constraint_kind = match parameter.info().is_per_kind {
-            true => Some(ConstraintKind::from_number(self.constraint_kind)?),
-            false => None,
+        let constraint_kind = if parameter.info().is_per_kind {
+            Some(ConstraintKind::from_number(self.constraint_kind)?)
+        } else {
+            None
         };
         let value = match self.form {
             0 => ParameterValue::Off,

@@ -4,10 +4,10 @@ use std::fmt::Debug;
 
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::ports::Counted;
-use crate::reader::{ReadError, SliceReader, SliceSample};
-use crate::service::{ServiceError, ServiceSpec};
-use crate::session::Slices;
+use crate::ports::port::Counted;
+use crate::ports::reader::{ReadError, SliceReader, SliceSample};
+use crate::ports::service::{ServiceError, ServiceSpec};
+use crate::ports::session::Slices;
 
 /// A reader that remembers its newest message.
 #[derive(Debug)]

@@ -4,11 +4,14 @@ use std::collections::VecDeque;
 
 use sim_types::ParameterValues;
 
-use crate::{
-    ColliderState, CollidersHeader, ConstraintState, KeyframeHeader, LoadHeader,
-    OUTCOME_FLAG_CONTROL, Outcome, Parameters, ParametersHeader, ParticleState, SnapshotHeader,
-    TearsHeader, TornConstraint, Triangle, Update,
-};
+use crate::client::views::Parameters;
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome};
+use crate::messages::parameters::ParametersHeader;
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::messages::update::Update;
 
 /// A published state with everything that belongs to it, as of the end of its step.
 #[derive(Debug, Clone, Copy)]
@@ -354,7 +357,7 @@ mod tests {
     use sim_types::{Action, TearCause};
 
     use super::*;
-    use crate::Command;
+    use crate::messages::command::Command;
 
     const RUN_ID: u64 = 7;
 

@@ -8,14 +8,16 @@ use bytemuck::bytes_of;
 use thiserror::Error;
 
 use crate::clock::epoch_microseconds;
-use crate::ports::reader_count;
-use crate::reader::{Drained, ReadError, ValueReader};
-use crate::service::{COMMANDS, OUTCOMES, ServiceError};
-use crate::services::{Attachment, OwnerProcess};
-use crate::writer::{PublishError, ValueWriter};
-use crate::{
-    Action, COMMANDS_BUFFERED, CONSOLE_CLIENT_ID, Command, Endpoint, OUTCOMES_BUFFERED, Outcome,
-};
+use crate::endpoint::Endpoint;
+use crate::limits::{COMMANDS_BUFFERED, OUTCOMES_BUFFERED};
+use crate::messages::command::{CONSOLE_CLIENT_ID, Command};
+use crate::messages::outcome::Outcome;
+use crate::ports::port::reader_count;
+use crate::ports::reader::{Drained, ReadError, ValueReader};
+use crate::ports::service::{COMMANDS, OUTCOMES, ServiceError};
+use crate::ports::services::{Attachment, OwnerProcess};
+use crate::ports::writer::{PublishError, ValueWriter};
+use sim_types::Action;
 
 /// Why a command has no outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
