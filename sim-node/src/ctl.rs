@@ -13,7 +13,7 @@ use crate::args::{CtlArgs, CtlVerb};
 
 /// Sends one command, or asks one question.
 pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<()> {
-    let endpoint = Endpoint::of_options(args.domain.as_deref(), &args.name)?;
+    let endpoint = Endpoint::from_options(args.domain.as_deref(), &args.name)?;
     let mut client = Client::attach_as(&endpoint, CONSOLE_CLIENT_ID)?;
     match args.verb {
         CtlVerb::Status => status(&mut client, args),

@@ -94,9 +94,9 @@ impl Node {
         self.pace.restart(self.start_ns);
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.observe(&observer)?;
-        while !stop.is_asked() && !self.is_done() {
+        while !stop.is_requested() && !self.is_done() {
             let wake_late_ns = self.wait(stop, &observer)?;
-            if stop.is_asked() {
+            if stop.is_requested() {
                 break;
             }
             self.apply_commands()?;
@@ -131,7 +131,7 @@ impl Node {
         // At a few steps a second, late joiners and the status do not wait for the next one.
         while monotonic_ns() + STATUS_PERIOD_NS < deadline_ns {
             sleep_until(monotonic_ns() + STATUS_PERIOD_NS);
-            if stop.is_asked() {
+            if stop.is_requested() {
                 return Ok(0);
             }
             self.observe(observer)?;

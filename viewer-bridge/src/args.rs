@@ -69,7 +69,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
-        Endpoint::of_options(self.domain.as_deref(), &self.name)
+        Endpoint::from_options(self.domain.as_deref(), &self.name)
     }
 
     /// Options of the Foxglove server, if one is requested.

@@ -15,6 +15,6 @@ pub(crate) struct EndpointArgs {
 
 impl EndpointArgs {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
-        Endpoint::of_options(self.domain.as_deref(), &self.name)
+        Endpoint::from_options(self.domain.as_deref(), &self.name)
     }
 }

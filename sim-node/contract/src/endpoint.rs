@@ -93,16 +93,16 @@ impl Endpoint {
     ///
     /// # Errors
     /// As [`Endpoint::new`].
-    pub fn of_options(domain: Option<&str>, name: &str) -> Result<Self, EndpointError> {
+    pub fn from_options(domain: Option<&str>, name: &str) -> Result<Self, EndpointError> {
         Self::new(domain.filter(|domain| !domain.is_empty()), name)
     }
 
     /// The value of an option `--domain`, if it is one.
     ///
     /// # Errors
-    /// As [`Endpoint::of_options`].
+    /// As [`Endpoint::from_options`].
     pub fn parse_domain(text: &str) -> Result<String, EndpointError> {
-        Self::of_options(Some(text), NAME_DEFAULT).map(|_| text.to_owned())
+        Self::from_options(Some(text), NAME_DEFAULT).map(|_| text.to_owned())
     }
 
     /// The value of an option `--name`, if it is one.
