@@ -4,11 +4,11 @@ mod actions;
 mod brush;
 mod dispatch;
 mod link;
-mod load_parts;
+mod newest_state;
+mod node_text;
 mod statistics;
 #[cfg(test)]
 mod tests;
-mod until_step;
 mod updates;
 
 use std::time::Duration;

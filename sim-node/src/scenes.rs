@@ -7,35 +7,55 @@ use sim_solver::scene::SceneCounts;
 
 use crate::args::{CheckArgs, ScenesArgs, ShowArgs};
 use crate::scene_source;
+use crate::table::{Align, Table};
 
 /// One built-in scene in the list.
 #[derive(Serialize)]
-struct Listed {
+struct SceneRow {
     name: &'static str,
+    rate_hz: u32,
     particles: usize,
     constraints: usize,
     pins: usize,
     text: &'static str,
 }
 
+impl SceneRow {
+    fn new(name: &'static str) -> anyhow::Result<Self> {
+        let scene = scene_source::load(name)?;
+        let SceneCounts { particles, constraints, pins, .. } = scene.counts();
+        let text = builtin::summary(name).unwrap_or_default();
+        Ok(Self { name, rate_hz: scene.solver.rate_hz, particles, constraints, pins, text })
+    }
+}
+
 /// Lists the built-in scenes.
 #[allow(clippy::print_stdout, reason = "the result of the command")]
-pub(crate) fn scenes(args: &ScenesArgs) -> anyhow::Result<()> {
-    let listed = builtin::names().map(|name| {
-        let SceneCounts { particles, constraints, pins, .. } = scene_source::load(name)?.counts();
-        let text = builtin::summary(name).unwrap_or_default();
-        Ok(Listed { name, particles, constraints, pins, text })
-    });
-    let listed: Vec<Listed> = listed.collect::<anyhow::Result<_>>()?;
+pub(crate) fn list(args: &ScenesArgs) -> anyhow::Result<()> {
+    let rows: Vec<SceneRow> = builtin::names().map(SceneRow::new).collect::<Result<_, _>>()?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&listed)?);
+        println!("{}", serde_json::to_string_pretty(&rows)?);
         return Ok(());
     }
-    for Listed { name, particles, constraints, pins, text } in listed {
-        println!(
-            "{name:<10} {particles:>6} particles {constraints:>6} constraints {pins:>4} pins  {text}"
-        );
+    let mut table = Table::new([
+        ("scene", Align::Left),
+        ("rate", Align::Right),
+        ("particles", Align::Right),
+        ("constraints", Align::Right),
+        ("pins", Align::Right),
+        ("", Align::Left),
+    ]);
+    for SceneRow { name, rate_hz, particles, constraints, pins, text } in rows {
+        table.add([
+            name.to_owned(),
+            format!("{rate_hz} Hz"),
+            particles.to_string(),
+            constraints.to_string(),
+            pins.to_string(),
+            text.to_owned(),
+        ]);
     }
+    print!("{}", table.text());
     Ok(())
 }
 
@@ -46,9 +66,9 @@ pub(crate) fn show(args: &ShowArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The result of a check.
+/// Result of a check.
 #[derive(Serialize)]
-struct Checked {
+struct CheckedScene {
     name: String,
     #[serde(flatten)]
     counts: SceneCounts,
@@ -62,7 +82,7 @@ struct Checked {
 #[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let scene = scene_source::load(&args.scene)?;
-    let checked = Checked {
+    let checked = CheckedScene {
         counts: scene.counts(),
         rate_hz: scene.solver.rate_hz,
         substeps: scene.solver.substeps,
@@ -71,11 +91,11 @@ pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
         name: scene.name,
     };
     if args.json {
-        let text = serde_json::to_string(&checked).context("writing the result")?;
+        let text = serde_json::to_string(&checked).context("encoding the result")?;
         println!("{text}");
         return Ok(());
     }
-    let Checked { name, counts, rate_hz, substeps, iterations, warnings } = checked;
+    let CheckedScene { name, counts, rate_hz, substeps, iterations, warnings } = checked;
     println!(
         "{name}: {} particles, {} constraints, {} pins, {} triangles; {rate_hz} Hz x {substeps} \
          substeps x {iterations} iterations",
