@@ -123,7 +123,10 @@ fn a_command_that_cannot_be_queued_is_an_error_and_those_before_it_are_kept() {
         client.send(PIN).unwrap();
     }
     let error = client.send(RELEASE).unwrap_err();
-    assert!(matches!(error, RequestError::QueueFull { owner: OwnerState::Alive { .. } }), "{error}");
+    assert!(
+        matches!(error, RequestError::QueueFull { owner: OwnerState::Alive { .. } }),
+        "{error}"
+    );
     let commands = received(&owner);
     let expected: Vec<_> = (1..=COMMANDS_BUFFERED as u64).map(|number| (5, number, PIN)).collect();
     assert_eq!(commands, expected);
