@@ -1,4 +1,4 @@
-//! Where a scene comes from: built in, or a file.
+//! Reads scenes: built-in ones, and files.
 
 use std::fs::File;
 use std::io::Read;
@@ -25,23 +25,24 @@ pub(crate) fn load(source: &str) -> anyhow::Result<Scene> {
     Ok(Scene::from_toml(text, source)?)
 }
 
-/// Whether a scene is a file, and not built in.
+/// Returns `true` if the scene is a file, not a built-in one.
 #[allow(clippy::case_sensitive_file_extension_comparisons, reason = "exactly the documented rule")]
 pub(crate) fn is_path(source: &str) -> bool {
     source.contains('/') || source.ends_with(".toml")
 }
 
-/// Reads a file that a scene names, relative to the scene's own.
+/// Reads a file named in a scene, relative to the file of the scene.
 fn read_beside(scene: &str, path: &str) -> Result<String, String> {
     let folder = Path::new(scene).parent().unwrap_or(Path::new(""));
     read(folder.join(path)).map_err(|error| format!("{error:#}"))
 }
 
-/// Reads a file that can be a scene: a running node must not wait for a pipe, nor read a device.
+/// Reads a regular file of the size of a scene. A running node must not wait for a pipe or read a
+/// device.
 pub(crate) fn read(path: impl AsRef<Path>) -> anyhow::Result<String> {
     let path = path.as_ref();
     if !std::fs::metadata(path)?.is_file() {
-        bail!("it is no regular file");
+        bail!("it is not a regular file");
     }
     let mut text = String::new();
     let limit = SCENE_SIZE_BYTES_MAX as u64;
