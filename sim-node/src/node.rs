@@ -108,9 +108,9 @@ impl Node {
         self.pace.restart(self.start_ns);
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.observe(&observer)?;
-        while !stop.is_asked() && !self.is_done() {
+        while !stop.is_requested() && !self.is_done() {
             let due = self.wait();
-            if stop.is_asked() {
+            if stop.is_requested() {
                 break;
             }
             self.apply_commands()?;

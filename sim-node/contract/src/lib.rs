@@ -48,7 +48,7 @@ mod stop;
 pub mod testing;
 
 pub use client::Client;
-pub use client::request::{OwnerSeen, RequestError};
+pub use client::request::{OwnerState, RequestError};
 pub use client::state::{Change, LoadedScene, State};
 pub use client::tap::Tap;
 pub use client::views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
