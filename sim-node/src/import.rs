@@ -18,7 +18,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         .with_context(|| format!("{}: cannot read the mesh", args.mesh))?;
     let text = scene_text(args);
     let scene = Scene::from_toml_with_files(&text, &args.mesh, &|_| Ok(mesh.clone()))
-        .map_err(|error| anyhow!("{}: {}", args.mesh, error.problem))?;
+        .map_err(|error| import_error(&args.mesh, &error.problem))?;
     let counts = scene.counts();
     for warning in scene.warnings() {
         eprintln!("warning: {warning}");
@@ -42,6 +42,11 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         counts.triangles
     );
     Ok(())
+}
+
+/// Error that names the mesh once: the scene names it too if the fault is in the mesh.
+fn import_error(mesh: &str, problem: &str) -> anyhow::Error {
+    anyhow!("{mesh}: {}", problem.strip_prefix(&format!("{mesh}: ")).unwrap_or(problem))
 }
 
 /// TOML of a scene with one generator, which reads the mesh.
