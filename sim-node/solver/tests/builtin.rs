@@ -1,7 +1,7 @@
 //! The built-in scenes: the counts of the documents, and that each moves as its name says.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{ColliderShape, Scene, Solver, builtin};
+use sim_solver::{ColliderGeometry, Scene, Solver, builtin};
 
 fn scene(name: &str) -> Scene {
     Scene::from_toml(builtin::text(name).unwrap(), name).unwrap()
@@ -134,7 +134,7 @@ fn the_box_goes_through_the_carried_cloth_and_holds_none_of_it() {
     let mut pushed = 0.0;
     for _ in 0..60 * 6 {
         solver.step();
-        let ColliderShape::Box { center, .. } = solver.colliders().next().unwrap().shape else {
+        let ColliderGeometry::Box { center, .. } = solver.colliders().next().unwrap().shape else {
             continue;
         };
         for index in 0..solver.particle_count() {

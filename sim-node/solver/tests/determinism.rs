@@ -133,7 +133,7 @@ fn a_collider_moved_at_the_boundary_of_a_reset_is_there_in_its_step() {
     solver.move_collider(0, pose).unwrap();
     solver.step();
     let shape = solver.colliders().next().unwrap().shape;
-    assert!(matches!(shape, sim_solver::ColliderShape::Plane { offset: 0.5, .. }), "{shape:?}");
+    assert!(matches!(shape, sim_solver::ColliderGeometry::Plane { offset: 0.5, .. }), "{shape:?}");
     assert_go_on_alike(solver, &scene);
 }
 

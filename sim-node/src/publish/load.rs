@@ -64,19 +64,19 @@ pub(super) fn to_collider_state(collider: &PlacedCollider) -> ColliderState {
     };
     let of = |shape: ColliderShape| ColliderState { shape: shape as u32, ..common };
     match collider.shape {
-        scene::ColliderShape::Plane { normal, offset } => {
+        scene::ColliderGeometry::Plane { normal, offset } => {
             ColliderState { normal, offset, ..of(ColliderShape::Plane) }
         }
-        scene::ColliderShape::Box { center, half_extents, rotation } => {
+        scene::ColliderGeometry::Box { center, half_extents, rotation } => {
             ColliderState { center, half_extents, rotation, ..of(ColliderShape::Box) }
         }
-        scene::ColliderShape::Sphere { center, radius } => {
+        scene::ColliderGeometry::Sphere { center, radius } => {
             ColliderState { center, radius, ..of(ColliderShape::Sphere) }
         }
-        scene::ColliderShape::Capsule { a, b, radius } => {
+        scene::ColliderGeometry::Capsule { a, b, radius } => {
             ColliderState { a, b, radius, ..of(ColliderShape::Capsule) }
         }
-        scene::ColliderShape::Bounds { min, max } => {
+        scene::ColliderGeometry::Bounds { min, max } => {
             ColliderState { a: min, b: max, ..of(ColliderShape::Bounds) }
         }
     }

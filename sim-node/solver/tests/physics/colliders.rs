@@ -1,7 +1,7 @@
 //! Colliders: nothing penetrates them, nothing tunnels, and they move as they are told.
 
 use proptest::prelude::*;
-use sim_solver::{ColliderShape, Pose};
+use sim_solver::{ColliderGeometry, Pose};
 
 use super::{
     FLOOR, assert_at_most, assert_close, assert_near, position, rates, solver, step, stepped,
@@ -161,7 +161,7 @@ fn a_collider_goes_and_turns_with_its_own_velocities() {
            velocity = [0.5, 0, -1]\nangular_velocity = [0, 0, 2]\n";
     let solver = stepped(&text, 250);
     let placed = solver.colliders().next().unwrap();
-    let ColliderShape::Box { center, rotation, .. } = placed.shape else { panic!("{placed:?}") };
+    let ColliderGeometry::Box { center, rotation, .. } = placed.shape else { panic!("{placed:?}") };
     for (axis, expected) in [2.25, 2.0, 0.5].into_iter().enumerate() {
         assert_near("centre", expected, f64::from(center[axis]), 1e-5);
     }
@@ -209,7 +209,7 @@ fn a_client_moves_a_collider_with_the_velocity_that_its_way_implies() {
     assert_close("speed of the face", 20.0, velocity(&solver, 0)[0], 1e-4);
     let placed = solver.colliders().next().unwrap();
     assert!(
-        matches!(placed.shape, ColliderShape::Box { center: [x, ..], .. } if (x - 0.2).abs() < 1e-6)
+        matches!(placed.shape, ColliderGeometry::Box { center: [x, ..], .. } if (x - 0.2).abs() < 1e-6)
     );
     assert!(solver.has_moving_colliders());
     // From then on it stands.
@@ -250,13 +250,13 @@ proptest! {
 }
 
 /// How far a point is inside of a plane or a box, in f64 and by the definition of the shape.
-fn depth_in(shape: &ColliderShape, at: [f64; 3]) -> f64 {
+fn depth_in(shape: &ColliderGeometry, at: [f64; 3]) -> f64 {
     match *shape {
-        ColliderShape::Plane { normal, offset } => {
+        ColliderGeometry::Plane { normal, offset } => {
             let height: f64 = (0..3).map(|axis| f64::from(normal[axis]) * at[axis]).sum();
             f64::from(offset) - height
         }
-        ColliderShape::Box { center, half_extents, rotation } => {
+        ColliderGeometry::Box { center, half_extents, rotation } => {
             let [x, y, z, w] = rotation.map(f64::from);
             let arm: Vec<f64> = (0..3).map(|axis| at[axis] - f64::from(center[axis])).collect();
             // Columns of the rotation's matrix.
