@@ -8,13 +8,12 @@ use anyhow::Context;
 use sim_solver::Scene;
 
 use crate::args::ImportArgs;
-use crate::scene_source;
 
 /// Writes a scene with one mesh, which then needs the mesh file no more.
 #[allow(clippy::print_stdout, reason = "the result of the command")]
 #[allow(clippy::print_stderr, reason = "messages to the user")]
 pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
-    let mesh = scene_source::read(&args.mesh)
+    let mesh = sim_contract::read_scene_file(&args.mesh)
         .with_context(|| format!("{}: cannot read the mesh", args.mesh))?;
     let text = wish(args);
     let scene = Scene::from_toml_with_files(&text, &args.mesh, &|_| Ok(mesh.clone()))

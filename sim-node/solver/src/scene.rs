@@ -12,6 +12,7 @@ mod generate;
 mod mesh;
 mod model;
 mod read;
+mod source;
 mod warnings;
 
 pub use definition::anchor::{SceneAnchor, Waypoint};
@@ -34,3 +35,4 @@ pub use generate::web::Web;
 pub use generate::{Generator, Shape};
 pub use mesh::{Mesh, ParsedMesh};
 pub(crate) use model::Model;
+pub use source::{LoadError, is_path};

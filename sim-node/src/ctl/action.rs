@@ -74,7 +74,7 @@ fn numbers<const COUNT: usize>(values: &[f32]) -> anyhow::Result<[f32; COUNT]> {
 /// is said here, with its line; an outcome has no room for it.
 fn scene_of(source: &str) -> anyhow::Result<Text> {
     scene_source::load(source)?;
-    if !scene_source::is_path(source) {
+    if !sim_solver::scene::is_path(source) {
         return text(source);
     }
     let path = path::absolute(source).with_context(|| format!("{source}: no path"))?;
