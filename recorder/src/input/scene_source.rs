@@ -69,3 +69,34 @@ pub(crate) fn load_commands(source: &str) -> anyhow::Result<Vec<TimedCommand>> {
 fn has_extension(source: &str, extension: &str) -> bool {
     source.ends_with(extension)
 }
+
+#[cfg(test)]
+mod tests {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+
+    use super::*;
+
+    #[test]
+    fn a_fifo_in_place_of_a_scene_is_refused_without_waiting() {
+        let name = format!("{}-recorder-fifo.toml", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        let path = path.to_str().unwrap();
+        let error = load_scene(path).unwrap_err().to_string();
+        std::fs::remove_file(path).unwrap();
+        assert_eq!(
+            error,
+            format!("{path}: cannot read the scene: it is a FIFO, not a regular file")
+        );
+    }
+
+    #[test]
+    fn an_unknown_scene_is_refused_with_the_known_ones_and_the_recordings() {
+        let error = load_scene("knot").unwrap_err().to_string();
+        assert!(
+            error.starts_with("there is no built-in scene 'knot' (allowed: curtain,"),
+            "{error}"
+        );
+        assert!(error.ends_with("or give a recording ending in .mcap"), "{error}");
+    }
+}
