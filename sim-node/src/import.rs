@@ -1,7 +1,7 @@
-//! `import`: makes a scene from a mesh.
+//! `import`: converts a mesh to a scene.
 
 use std::fs::OpenOptions;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
@@ -10,7 +10,7 @@ use sim_solver::{Scene, SceneError};
 
 use crate::args::ImportArgs;
 
-/// Writes a scene that contains the mesh, so that it needs the mesh file no longer.
+/// Writes a scene that contains the mesh, and so does not need its file.
 #[allow(clippy::print_stdout, reason = "the result of the command")]
 #[allow(clippy::print_stderr, reason = "messages to the user")]
 pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
@@ -23,14 +23,16 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
     for warning in scene.warnings() {
         eprintln!("warning: {warning}");
     }
-    let result =
-        format!("# Made of {} by sim-node import.\n{}", file_name(&args.mesh), scene.to_toml());
+    let result = format!(
+        "# Converted from {} by sim-node import.\n{}",
+        file_name(&args.mesh),
+        scene.to_toml()
+    );
     let Some(path) = &args.output else {
         print!("{result}");
         return Ok(());
     };
-    write(path, &result, args.overwrite)
-        .with_context(|| format!("{}: cannot write the scene", path.display()))?;
+    write(path, &result, args)?;
     eprintln!(
         "{}: {} particles, {} constraints, {} pins, {} triangles",
         path.display(),
@@ -42,16 +44,17 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns the scene as you would write it by hand.
+/// TOML of a scene with one generator, which reads the mesh.
 fn scene_text(args: &ImportArgs) -> String {
     let ImportArgs { density, structural, shear, bend, .. } = args;
     format!(
         "version = 1\nname = {name}\n[solver]\nsubsteps = 8\n[[generate]]\nshape = \"obj\"\n\
          path = {path}\ndensity = {density}\npinned = {pin}\n\
          compliance = {{ structural = {structural}, shear = {shear}, bend = {bend} }}\n",
-        name = toml_text(&Path::new(&args.mesh).file_stem().unwrap_or_default().to_string_lossy()),
-        path = toml_text(&args.mesh),
-        pin = toml_text(&args.pin),
+        name =
+            quoted_text(&Path::new(&args.mesh).file_stem().unwrap_or_default().to_string_lossy()),
+        path = quoted_text(&args.mesh),
+        pin = quoted_text(&args.pin),
     )
 }
 
@@ -66,8 +69,8 @@ fn import_error(error: SceneError) -> anyhow::Error {
     }
 }
 
-/// Returns a basic string of TOML. It has the same escapes as JSON.
-fn toml_text(text: &str) -> String {
+/// Basic string of TOML, which has the escapes of JSON.
+fn quoted_text(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
@@ -75,11 +78,19 @@ fn file_name(path: &str) -> String {
     Path::new(path).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn write(path: &Path, text: &str, overwrites: bool) -> std::io::Result<()> {
+/// Writes the scene. An existing file is replaced only if [`ImportArgs::overwrite`] is set.
+fn write(path: &Path, text: &str, args: &ImportArgs) -> anyhow::Result<()> {
     let mut options = OpenOptions::new();
     options.write(true).truncate(true);
-    let options = if overwrites { options.create(true) } else { options.create_new(true) };
-    options.open(path)?.write_all(text.as_bytes())
+    let options = if args.overwrite { options.create(true) } else { options.create_new(true) };
+    let mut file = options.open(path).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => {
+            anyhow!("{}: the file exists (--overwrite replaces it)", path.display())
+        }
+        _ => anyhow!("{}: cannot create the file: {error}", path.display()),
+    })?;
+    file.write_all(text.as_bytes())
+        .with_context(|| format!("{}: cannot write the scene", path.display()))
 }
 
 #[cfg(test)]
