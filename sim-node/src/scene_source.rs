@@ -1,4 +1,4 @@
-//! Scenes from files, or built in.
+//! Reads scenes: built-in ones, and files.
 
 use sim_contract::read_scene_file;
 use sim_solver::Scene;

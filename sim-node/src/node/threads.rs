@@ -1,29 +1,30 @@
-//! How many threads step the solver. Their number changes no bit.
+//! Number of threads of the solver. It changes no bit.
 
 use std::num::NonZero;
 use std::thread::available_parallelism;
 
 use sim_solver::{Solver, THREADS_MAX};
 
-/// Particles from which on more than one thread is the default: the solver divides nothing smaller.
+/// Number of particles from which on the default is more than one thread. The solver does not divide
+/// smaller scenes.
 const SHARED_MIN: usize = 4000;
 
-/// Gives a solver that was just made its threads: as many as asked for, or the default of its scene.
-/// They start here, so that no step has to.
-pub(crate) fn with_threads(mut solver: Solver, asked: Option<u8>) -> Solver {
+/// Starts the threads of a new solver: the requested number, or the default of its scene. No step
+/// starts a thread.
+pub(crate) fn with_threads(mut solver: Solver, requested: Option<u8>) -> Solver {
     let by_default = || {
-        // Where the system does not say how many cores there are, one is there.
+        // One core, if the system does not tell their number.
         let core_count = available_parallelism().map_or(1, NonZero::get);
         default_count(solver.particle_count(), core_count)
     };
-    let count = asked.map_or_else(by_default, usize::from);
+    let count = requested.map_or_else(by_default, usize::from);
     solver.set_threads(count);
     solver
 }
 
-/// No more threads than free cores: one for a small scene, else the cores that this process may use
-/// less one for everything else, at least one and at most [`THREADS_MAX`]. Threads wait for each
-/// other several times a substep, so one that has to share its core delays all of them.
+/// Default number of threads: 1 for a small scene, else one less than the cores available to this
+/// process, at least 1 and at most [`THREADS_MAX`]. Threads wait for each other several times per
+/// substep, so a thread that shares its core delays all of them.
 fn default_count(particle_count: usize, core_count: usize) -> usize {
     if particle_count < SHARED_MIN {
         return 1;
@@ -33,13 +34,13 @@ fn default_count(particle_count: usize, core_count: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    //! The rule, and that both ways to a number reach the solver.
+    //! Checks the rule, and that requested and default numbers reach the solver.
     use sim_solver::Scene;
 
     use super::*;
 
     #[test]
-    fn a_small_scene_has_one_thread_and_a_big_one_all_cores_but_one() {
+    fn a_small_scene_has_one_thread_and_a_large_one_all_cores_but_one() {
         for (particle_count, core_count, expected) in [
             (0, 16, 1),
             (3999, 16, 1),
@@ -56,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn a_solver_has_the_threads_that_were_asked_for_or_those_of_its_scene() {
+    fn a_solver_has_the_requested_threads_or_the_default_of_its_scene() {
         let empty = || Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
         assert_eq!(with_threads(empty(), Some(3)).threads(), 3);
         assert_eq!(with_threads(empty(), Some(1)).threads(), 1);

@@ -1,6 +1,7 @@
-//! From the solver's state to what other processes read.
+//! Publishes the state of the solver to other processes.
 
 mod load;
+mod status;
 
 use anyhow::Context;
 use bytemuck::cast;
@@ -8,28 +9,27 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus, Outcome,
     Owner, OwnerError, ParameterValues, ParticleState, Reason, SnapshotFlags, SnapshotHeader,
-    StatusFlags, TearsHeader, TornConstraint, Wake,
+    TearsHeader, TornConstraint, Wake,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
-use crate::statistics::Statistics;
 use load::{LoadPlace, count, to_collider_state, with_load};
 
-/// How long a step took and how late it began.
+/// Solver time and lateness of a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StepTimes {
     pub(crate) wake_late_ns: u64,
     pub(crate) solve_ns: u64,
 }
 
-/// Where the run stands.
+/// Position of the run and state of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Position {
     pub(crate) step: u64,
     pub(crate) is_paused: bool,
-    /// The pace against real time.
+    /// Simulated time per wall-clock time.
     pub(crate) time_scale: f64,
-    /// No further step follows for now: whoever joins is to see this one.
+    /// No further step follows for now, so late subscribers need this one.
     pub(crate) is_last: bool,
 }
 
@@ -41,21 +41,21 @@ pub(crate) struct Publisher {
     rate_hz: u32,
     /// Loads of this run after the first one.
     topology_revision: u32,
-    /// Every how many steps a snapshot is published; the last one before a wait always is.
+    /// Number of steps between published snapshots. The last one before a pause is always published.
     every: u64,
     /// Header of the newest published snapshot.
     last: SnapshotHeader,
-    /// A keyframe is to go with the next snapshot.
+    /// The next snapshot needs a keyframe.
     is_keyframe_due: bool,
     keyframe_step: u64,
     keyframe_readers: usize,
-    /// Outcomes of the boundary that is waiting, not yet published.
+    /// Outcomes of the waiting boundary that are not published yet.
     outcomes: Vec<Outcome>,
     outcome_count: u64,
     rejected_count: u64,
-    /// The parameters that were published last.
+    /// Last published parameters.
     parameters: ParameterValues,
-    /// How many torn constraints, and which colliders, were published last.
+    /// Number of torn constraints, and the colliders, as last published.
     torn_count: usize,
     colliders: Vec<PlacedCollider>,
 }
@@ -91,10 +91,10 @@ impl Publisher {
         })
     }
 
-    /// Publishes another scene, which `step` is the first to show.
+    /// Publishes another scene; `step` is the first step that shows it.
     ///
     /// # Errors
-    /// It is beyond a limit of the contract or of shared memory; the old one stays published.
+    /// The scene exceeds a limit of the contract or of shared memory; the old one stays published.
     pub(crate) fn load(
         &mut self,
         scene: &Scene,
@@ -118,7 +118,7 @@ impl Publisher {
         self.owner.receive_commands(commands);
     }
 
-    /// Logs what became of a command at the boundary before `step`.
+    /// Logs the result of a command at the boundary before `step`.
     pub(crate) fn add_outcome(
         &mut self,
         step: u64,
@@ -132,7 +132,7 @@ impl Publisher {
         self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
     }
 
-    /// Publishes what belongs to a step, the particles last, and wakes the readers.
+    /// Publishes everything that belongs to a step, the particles last, and wakes the readers.
     pub(crate) fn publish_step(
         &mut self,
         solver: &Solver,
@@ -157,7 +157,7 @@ impl Publisher {
         Ok(())
     }
 
-    /// Publishes the colliders where they are not what was published last.
+    /// Publishes the colliders if they differ from the last published ones.
     fn publish_colliders(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
         if solver.colliders().eq(self.colliders.iter().copied()) {
             return Ok(());
@@ -169,7 +169,7 @@ impl Publisher {
         Ok(self.owner.publish_colliders(header, &states)?)
     }
 
-    /// Publishes all that is torn, where something tore in this step or is whole again.
+    /// Publishes all torn constraints if a constraint tore or was restored in this step.
     fn publish_tears(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
         let (torn, new_count) = (solver.torn(), solver.new_torn_count());
         if new_count == 0 && torn.len() == self.torn_count {
@@ -209,9 +209,9 @@ impl Publisher {
         Ok(self.owner.publish_parameters(self.run_id, step, &values)?)
     }
 
-    /// Publishes what can be published while the node waits: outcomes, and a keyframe of the last
-    /// snapshot for a reader that has joined since. Once a command has touched the state that
-    /// waits, there is no keyframe of that snapshot any more, and the reader gets the next one.
+    /// Publishes outcomes while the node waits, and a keyframe of the last snapshot for a reader that
+    /// has joined since. A command that has changed the waiting state makes that keyframe
+    /// impossible; the reader then receives the one of the next snapshot.
     pub(crate) fn publish_between(
         &mut self,
         solver: &Solver,
@@ -282,7 +282,7 @@ impl Publisher {
         }
     }
 
-    /// Lets late joiners have what is written seldom.
+    /// Gives late subscribers the latest message of each service that is seldom written.
     pub(crate) fn refresh(&self) {
         self.owner.refresh();
     }
@@ -292,54 +292,17 @@ impl Publisher {
         self.owner.wake(Wake::Status);
         Ok(())
     }
-
-    /// How the node does.
-    pub(crate) fn status(
-        &self,
-        scene: &Scene,
-        solver: &Solver,
-        position: Position,
-        statistics: &Statistics,
-    ) -> NodeStatus {
-        let last = &statistics.last;
-        let mut status = NodeStatus {
-            contract_version: CONTRACT_VERSION,
-            solver_version: SOLVER_VERSION,
-            run_id: self.run_id,
-            step: position.step,
-            real_time_factor: if position.is_paused { 0.0 } else { statistics.real_time_factor },
-            wake_late_ns_p50: last.wake_late_ns(0.5),
-            wake_late_ns_p99: last.wake_late_ns(0.99),
-            solve_ns_p50: last.solve_ns(0.5),
-            solve_ns_p99: last.solve_ns(0.99),
-            late_steps: statistics.late_steps,
-            skipped_periods: statistics.skipped_periods,
-            outcome_count: self.outcome_count,
-            rejected_count: self.rejected_count,
-            rate_hz: self.rate_hz,
-            particle_count: count(solver.particle_count()),
-            constraint_count: count(solver.constraint_count()),
-            reader_count: count(self.owner.reader_count()),
-            process_id: std::process::id(),
-            time_scale: position.time_scale,
-            frozen_count: solver.frozen_count(),
-            torn_count: count(solver.torn().len()),
-            flags: if position.is_paused { StatusFlags::PAUSED } else { 0 },
-            ..NodeStatus::default()
-        };
-        status.set_scene_name(&scene.name);
-        status
-    }
 }
 
-/// The parameters of a solver that a node steps at this pace.
+/// Parameters of a solver with the time scale of the node.
 fn parameter_values(solver: &Solver, time_scale: f64) -> ParameterValues {
-    #[allow(clippy::cast_possible_truncation, reason = "`set` gave it as an f32")]
+    #[allow(clippy::cast_possible_truncation, reason = "it came from an f32")]
     let time_scale = time_scale as f32;
     ParameterValues { time_scale, ..solver.parameter_values() }
 }
 
-/// step / rate in nanoseconds, rounded down; whole seconds apart, so that nothing overflows.
+/// step / rate in nanoseconds, rounded down. Whole seconds apart from the rest, so that nothing
+/// overflows.
 fn time_of_step_ns(step: u64, rate_hz: u32) -> u64 {
     let rate_hz = u64::from(rate_hz);
     step / rate_hz * SECOND_NS + step % rate_hz * SECOND_NS / rate_hz

@@ -1,13 +1,13 @@
-//! Times of steps: of the whole run, and of the last second.
+//! Times of steps: over the whole run, and over the last second.
 
 use anyhow::Context;
 use hdrhistogram::Histogram;
 use sim_contract::clock::SECOND_NS;
 
-/// Longest time that the histograms tell apart from longer ones: a minute.
+/// Longest time that the histograms resolve: a minute.
 const TIME_NS_MAX: u64 = 60 * SECOND_NS;
 
-/// Wake-up lateness and solver time of steps. Recording allocates nothing.
+/// Wake-up lateness and solver time of steps. Recording does not allocate.
 #[derive(Debug)]
 pub(crate) struct Times {
     wake_late: Histogram<u64>,
@@ -17,7 +17,8 @@ pub(crate) struct Times {
 impl Times {
     fn new() -> anyhow::Result<Self> {
         // Three digits are enough for a percentile.
-        let histogram = || Histogram::new_with_bounds(1, TIME_NS_MAX, 3).context("histograms");
+        let histogram =
+            || Histogram::new_with_bounds(1, TIME_NS_MAX, 3).context("creating the histograms");
         Ok(Self { wake_late: histogram()?, solve: histogram()? })
     }
 
@@ -44,11 +45,11 @@ impl Times {
     }
 }
 
-/// What is known of the times of a run.
+/// Times and losses of a run.
 #[derive(Debug)]
 pub(crate) struct Statistics {
     pub(crate) run: Times,
-    /// The last whole second.
+    /// Times of the last whole second.
     pub(crate) last: Times,
     current: Times,
     current_start_ns: u64,
@@ -56,7 +57,7 @@ pub(crate) struct Statistics {
     pub(crate) real_time_factor: f64,
     /// Steps that began more than a period late.
     pub(crate) late_steps: u64,
-    /// Periods given up because the node was too far behind.
+    /// Periods skipped because the node was too far behind.
     pub(crate) skipped_periods: u64,
 }
 
@@ -79,8 +80,8 @@ impl Statistics {
         self.late_steps += u64::from(wake_late_ns > period_ns);
     }
 
-    /// Once a second: the current second becomes the last one. Whether it did.
-    pub(crate) fn turn(&mut self, now_ns: u64, rate_hz: u32) -> bool {
+    /// Makes the current second the last one, if it is over. Returns `true` if it was.
+    pub(crate) fn end_second(&mut self, now_ns: u64, rate_hz: u32) -> bool {
         let elapsed_ns = now_ns - self.current_start_ns;
         if elapsed_ns < SECOND_NS {
             return false;

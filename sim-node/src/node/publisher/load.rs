@@ -1,4 +1,4 @@
-//! From a scene to what is published once per load.
+//! Messages that are published once per load.
 
 use sim_contract::{
     ColliderShape, ColliderState, ConstraintState, Load, LoadHeader, OwnerError, ParameterValues,
@@ -6,17 +6,17 @@ use sim_contract::{
 };
 use sim_solver::{PlacedCollider, Scene, Solver, scene};
 
-/// The run and the place in it that a load belongs to.
+/// Run and step of a load.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LoadPlace {
     pub(super) run_id: u64,
-    /// The first step that shows it.
+    /// First step that shows the load.
     pub(super) step: u64,
     pub(super) topology_revision: u32,
     pub(super) parameters: ParameterValues,
 }
 
-/// Hands a load to whoever publishes it.
+/// Calls `publish` with the load of a scene.
 pub(super) fn with_load<T>(
     scene: &Scene,
     solver: &Solver,
@@ -56,7 +56,7 @@ fn to_constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
     }
 }
 
-/// A collider as it is published.
+/// Converts a collider to its published form.
 pub(super) fn to_collider_state(collider: &PlacedCollider) -> ColliderState {
     let common = ColliderState {
         restitution: collider.restitution,
@@ -65,22 +65,22 @@ pub(super) fn to_collider_state(collider: &PlacedCollider) -> ColliderState {
         angular_velocity: collider.angular_velocity,
         ..ColliderState::default()
     };
-    let of = |shape: ColliderShape| ColliderState { shape: shape as u32, ..common };
+    let with_shape = |shape: ColliderShape| ColliderState { shape: shape as u32, ..common };
     match collider.shape {
         scene::ColliderGeometry::Plane { normal, offset } => {
-            ColliderState { normal, offset, ..of(ColliderShape::Plane) }
+            ColliderState { normal, offset, ..with_shape(ColliderShape::Plane) }
         }
         scene::ColliderGeometry::Box { center, half_extents, rotation } => {
-            ColliderState { center, half_extents, rotation, ..of(ColliderShape::Box) }
+            ColliderState { center, half_extents, rotation, ..with_shape(ColliderShape::Box) }
         }
         scene::ColliderGeometry::Sphere { center, radius } => {
-            ColliderState { center, radius, ..of(ColliderShape::Sphere) }
+            ColliderState { center, radius, ..with_shape(ColliderShape::Sphere) }
         }
         scene::ColliderGeometry::Capsule { a, b, radius } => {
-            ColliderState { a, b, radius, ..of(ColliderShape::Capsule) }
+            ColliderState { a, b, radius, ..with_shape(ColliderShape::Capsule) }
         }
         scene::ColliderGeometry::Bounds { min, max } => {
-            ColliderState { a: min, b: max, ..of(ColliderShape::Bounds) }
+            ColliderState { a: min, b: max, ..with_shape(ColliderShape::Bounds) }
         }
     }
 }
