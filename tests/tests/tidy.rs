@@ -33,7 +33,6 @@ const CROWDED_FOLDERS: &[&str] = &[
     "sim-node/contract/src",
     "sim-node/solver/benches/step",
     "sim-node/solver/src",
-    "sim-node/solver/src/scene",
 ];
 
 /// Words that do not begin a doc comment. It begins with a noun phrase or a third-person verb.

@@ -67,19 +67,19 @@ pub(super) fn to_collider_state(collider: &PlacedCollider) -> ColliderState {
     };
     let with_shape = |shape: ColliderShape| ColliderState { shape: shape as u32, ..common };
     match collider.shape {
-        scene::ColliderShape::Plane { normal, offset } => {
+        scene::ColliderGeometry::Plane { normal, offset } => {
             ColliderState { normal, offset, ..with_shape(ColliderShape::Plane) }
         }
-        scene::ColliderShape::Box { center, half_extents, rotation } => {
+        scene::ColliderGeometry::Box { center, half_extents, rotation } => {
             ColliderState { center, half_extents, rotation, ..with_shape(ColliderShape::Box) }
         }
-        scene::ColliderShape::Sphere { center, radius } => {
+        scene::ColliderGeometry::Sphere { center, radius } => {
             ColliderState { center, radius, ..with_shape(ColliderShape::Sphere) }
         }
-        scene::ColliderShape::Capsule { a, b, radius } => {
+        scene::ColliderGeometry::Capsule { a, b, radius } => {
             ColliderState { a, b, radius, ..with_shape(ColliderShape::Capsule) }
         }
-        scene::ColliderShape::Bounds { min, max } => {
+        scene::ColliderGeometry::Bounds { min, max } => {
             ColliderState { a: min, b: max, ..with_shape(ColliderShape::Bounds) }
         }
     }

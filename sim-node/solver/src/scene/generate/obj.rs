@@ -1,40 +1,31 @@
-//! A mesh of triangles, quads and more, as a cloth.
+//! A mesh of triangles, quads and larger polygons, as a cloth.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::{Serialize, Serializer};
-
-use super::super::obj::{Mesh, area, edges, fan};
-use super::{Builder, Pinned, round};
+use serde::Serialize;
 use sim_types::ConstraintKind;
 
-/// A mesh: vertices are particles; the edges are structural; the diagonals of quads, and those of
-/// bigger faces from their first corner, are shear; across
-/// each edge of two faces, the corners beside it on both sides are joined by bends.
+use super::builder::{Builder, round};
+use crate::scene::definition::decimal;
+use crate::scene::mesh::{Mesh, area, edges, fan};
+
+/// A mesh of polygons. Vertices become particles, and edges become structural constraints. The
+/// diagonals of quads, and those of larger faces from their first corner, become shear
+/// constraints. Across each edge of exactly two faces, bends join the neighbouring corners.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Obj {
-    /// Positions.
-    #[serde(serialize_with = "vertices")]
+    /// Positions of the particles.
+    #[serde(serialize_with = "decimal::vectors::serialize")]
     pub vertices: Vec<[f32; 3]>,
-    /// Corners of each face.
+    /// Corners of each face, as indices of vertices.
     pub faces: Vec<Vec<u32>>,
-    /// In kg per area; without it each particle has the mass of the block.
-    #[serde(serialize_with = "density", skip_serializing_if = "Option::is_none")]
+    /// Mass per area in kg/unit^2. Without it, each particle has the generator's mass.
+    #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
     pub density: Option<f32>,
 }
 
-fn vertices<S: Serializer>(vertices: &[[f32; 3]], serializer: S) -> Result<S::Ok, S::Error> {
-    let shortest = vertices.iter().map(|vertex| vertex.map(super::decimal::shortest));
-    serializer.collect_seq(shortest)
-}
-
-#[allow(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "as serde asks for")]
-fn density<S: Serializer>(density: &Option<f32>, serializer: S) -> Result<S::Ok, S::Error> {
-    super::decimal::optional::serialize(density, serializer)
-}
-
 impl Obj {
-    /// The mesh as a cloth.
+    /// Creates the shape of a mesh.
     pub fn new(mesh: &Mesh, density: Option<f32>) -> Self {
         Self { vertices: mesh.vertices.clone(), faces: mesh.faces.clone(), density }
     }
@@ -49,15 +40,11 @@ impl Obj {
 
     pub(super) fn build(&self, builder: &mut Builder<'_>) {
         let masses = self.density.map(|density| self.masses(f64::from(density)));
-        for (index, vertex) in (0_u32..).zip(&self.vertices) {
-            let is_pinned = match builder.pinned() {
-                Pinned::Word(_) => false,
-                Pinned::List(list) => list.binary_search(&index).is_ok(),
-            };
-            match &masses {
-                Some(masses) => builder.heavy_particle(*vertex, is_pinned, masses[index as usize]),
-                None => builder.particle(*vertex, is_pinned),
+        for (index, vertex) in self.vertices.iter().enumerate() {
+            if let Some(masses) = &masses {
+                builder.mass = masses[index];
             }
+            builder.particle(*vertex, |_| false);
         }
         for (pair, kind) in self.links() {
             builder.link(pair, kind);
@@ -67,7 +54,7 @@ impl Obj {
         }
     }
 
-    /// A third of the mass of each triangle goes to each of its corners.
+    /// Returns the masses of the particles. Each triangle gives a third of its mass to each corner.
     fn masses(&self, density: f64) -> Vec<f32> {
         let mut masses = vec![0.0; self.vertices.len()];
         for triangle in self.faces.iter().flat_map(|face| fan(face)) {
@@ -76,14 +63,15 @@ impl Obj {
                 masses[corner as usize] += density * area(corners) / 3.0;
             }
         }
-        // A corner of triangles without area only still has to have a mass.
+        // A vertex whose triangles all have no area still needs a mass.
         masses
             .into_iter()
             .map(|mass| round(mass.max(f64::from(f32::MIN_POSITIVE) * 1e10)))
             .collect()
     }
 
-    /// Edges face by face, then diagonals, then bends; each pair once, as what it is first.
+    /// Returns edges face by face, then diagonals, then bends. A pair occurs once, with the kind that
+    /// comes first.
     fn links(&self) -> Vec<([u32; 2], ConstraintKind)> {
         let mut links = Vec::new();
         let mut seen = BTreeSet::new();
@@ -111,8 +99,8 @@ impl Obj {
         links
     }
 
-    /// Across each edge of exactly two faces: from the neighbour of each of its ends in the one to
-    /// that in the other; for two triangles, both are their third corners.
+    /// Returns the bends across each edge of exactly two faces. A bend joins the neighbours that an
+    /// end of the edge has in the two faces. For two triangles, these are their third corners.
     fn bends(&self) -> Vec<[u32; 2]> {
         let mut faces_at: BTreeMap<[u32; 2], Vec<&[u32]>> = BTreeMap::new();
         for face in &self.faces {
@@ -124,7 +112,8 @@ impl Obj {
         for (edge, faces) in faces_at {
             let [left, right] = faces.as_slice() else { continue };
             for (end, other) in [(edge[0], edge[1]), (edge[1], edge[0])] {
-                let (from, to) = (beside(left, end, other), beside(right, end, other));
+                let (from, to) =
+                    (other_neighbour(left, end, other), other_neighbour(right, end, other));
                 bends.extend(from.zip(to).map(|(from, to)| [from, to]));
             }
         }
@@ -132,8 +121,8 @@ impl Obj {
     }
 }
 
-/// The neighbour of a corner in a face that is not `other`.
-fn beside(face: &[u32], corner: u32, other: u32) -> Option<u32> {
+/// Returns the neighbour of a corner in a face that is not `other`.
+fn other_neighbour(face: &[u32], corner: u32, other: u32) -> Option<u32> {
     let place = face.iter().position(|index| *index == corner)?;
     let next = face[(place + 1) % face.len()];
     let previous = face[(place + face.len() - 1) % face.len()];

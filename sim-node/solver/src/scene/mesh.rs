@@ -1,54 +1,54 @@
-//! Meshes from Wavefront OBJ text: vertices, faces and groups; all else of the format is passed
-//! over.
+//! Meshes from Wavefront OBJ text. Vertices, faces and groups are read; everything else is ignored.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Points and the faces between them.
+/// Vertices and the faces between them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mesh {
-    /// Positions; each belongs to a face.
+    /// Positions. Each vertex belongs to a face.
     pub vertices: Vec<[f32; 3]>,
-    /// Corners in order, at least 3 each, none twice in a face.
+    /// Corners of each face in order: at least 3 different vertices.
     pub faces: Vec<Vec<u32>>,
-    /// Vertices of the faces of each group and object, ascending.
+    /// Vertices of each group and object, ascending.
     pub groups: BTreeMap<String, Vec<u32>>,
 }
 
-/// A mesh, and what was left out of it or is hardly meant so: a sentence each.
+/// A parsed mesh with warnings.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct ReadMesh {
-    /// What can be simulated.
+pub struct ParsedMesh {
+    /// The part of the mesh that can be simulated.
     pub mesh: Mesh,
-    /// What was found in the text.
-    pub findings: Vec<String>,
+    /// Faces and vertices that were omitted, and doubtful edges: one sentence each.
+    pub warnings: Vec<String>,
 }
 
 impl Mesh {
-    /// Reads OBJ text. Faces without area, faces that stand twice and vertices of no face are left
-    /// out and named.
+    /// Parses OBJ text. Faces without area, duplicate faces and vertices without a face are omitted,
+    /// with a warning.
     ///
     /// # Errors
-    /// A line that is no vertex or face, or no face at all: the text says which line and why.
-    pub fn from_obj(text: &str) -> Result<ReadMesh, String> {
-        let mut raw = Raw::default();
+    /// A vertex or face is malformed, or the text has no face with an area. The text names the line.
+    pub fn from_obj(text: &str) -> Result<ParsedMesh, String> {
+        let mut raw = RawMesh::default();
         for (number, line) in (1..).zip(text.lines()) {
             raw.read_line(line).map_err(|problem| format!("line {number}: {problem}"))?;
         }
-        raw.check()
+        raw.into_mesh()
     }
 }
 
-/// The faces of the text, with all of its vertices.
+/// All vertices and faces of the text.
 #[derive(Debug, Default)]
-struct Raw {
+struct RawMesh {
     vertices: Vec<[f32; 3]>,
     faces: Vec<Vec<u32>>,
-    /// Face by face: its group.
+    /// By face: its group.
     groups: Vec<String>,
+    /// Group of the faces that follow.
     group: String,
 }
 
-impl Raw {
+impl RawMesh {
     fn read_line(&mut self, line: &str) -> Result<(), String> {
         let line = line.split('#').next().unwrap_or_default();
         let mut words = line.split_whitespace();
@@ -59,7 +59,7 @@ impl Raw {
                 let corners = corners?;
                 if corners.len() < 3 {
                     return Err(format!(
-                        "a face of {} corners (allowed: 3 or more)",
+                        "a face has {} corners (allowed: 3 or more)",
                         corners.len()
                     ));
                 }
@@ -72,41 +72,44 @@ impl Raw {
         Ok(())
     }
 
-    /// The vertex of `7`, `7/1`, `7//2`, `7/1/2`, or counted back from the last one, `-1`.
+    /// Returns the vertex index of `7`, `7/1`, `7//2` or `7/1/2`. Negative numbers count back from
+    /// the last vertex.
     fn corner(&self, word: &str) -> Result<u32, String> {
         let number = word.split('/').next().unwrap_or_default();
-        let number: i64 = number.parse().map_err(|_| format!("'{word}' is no corner of a face"))?;
+        let number: i64 = number.parse().map_err(|_| {
+            format!("'{word}' is not a corner of a face (allowed: the number of a vertex)")
+        })?;
         let count = i64::try_from(self.vertices.len()).unwrap_or(i64::MAX);
         let index = if number < 0 { count + number } else { number - 1 };
         if (0..count).contains(&index) {
             u32::try_from(index).map_err(|_| "too many vertices".to_owned())
         } else {
-            Err(format!("there is no vertex {number} yet (allowed: 1 to {count})"))
+            Err(format!("vertex {number} is not defined before this line (allowed: 1 to {count})"))
         }
     }
 
-    /// Leaves out what cannot be simulated, and says so.
-    fn check(self) -> Result<ReadMesh, String> {
-        let mut findings = Findings::default();
+    /// Omits everything that cannot be simulated, with warnings.
+    fn into_mesh(self) -> Result<ParsedMesh, String> {
+        let mut omitted = Omissions::default();
         let mut seen = BTreeSet::new();
         let mut kept = Vec::new();
-        for (place, (face, group)) in (1..).zip(self.faces.iter().zip(&self.groups)) {
+        for (number, (face, group)) in (1..).zip(self.faces.iter().zip(&self.groups)) {
             let mut sorted = face.clone();
             sorted.sort_unstable();
             if sorted.windows(2).any(|pair| pair[0] == pair[1]) || self.is_flat(face) {
-                findings.flat.push(place);
+                omitted.flat.push(number);
             } else if seen.insert(sorted) {
                 kept.push((face, group));
             } else {
-                findings.twice.push(place);
+                omitted.duplicate.push(number);
             }
         }
         if kept.is_empty() {
-            return Err("it has no face with an area".to_owned());
+            return Err("the mesh has no face with an area (allowed: at least one)".to_owned());
         }
         let used: BTreeSet<u32> = kept.iter().flat_map(|(face, _)| face.iter().copied()).collect();
-        findings.unused = self.vertices.len() - used.len();
-        findings.crowded = crowded_edges(kept.iter().map(|(face, _)| face.as_slice()));
+        omitted.unused = self.vertices.len() - used.len();
+        omitted.crowded = crowded_edges(kept.iter().map(|(face, _)| face.as_slice()));
         let new_index: BTreeMap<u32, u32> = used.iter().copied().zip(0..).collect();
         let mut mesh = Mesh::default();
         mesh.vertices.extend(used.iter().map(|index| self.vertices[*index as usize]));
@@ -119,7 +122,7 @@ impl Raw {
             members.sort_unstable();
             members.dedup();
         }
-        Ok(ReadMesh { mesh, findings: findings.sentences() })
+        Ok(ParsedMesh { mesh, warnings: omitted.sentences() })
     }
 
     fn is_flat(&self, face: &[u32]) -> bool {
@@ -132,15 +135,16 @@ fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> 
     let numbers: Result<Vec<f32>, _> = words.take(3).map(str::parse).collect();
     match numbers.ok().as_deref() {
         Some([x, y, z]) if [x, y, z].iter().all(|axis| axis.is_finite()) => Ok([*x, *y, *z]),
-        _ => Err("a vertex needs three finite numbers".to_owned()),
+        _ => Err("a vertex is malformed (allowed: three finite numbers)".to_owned()),
     }
 }
 
-/// A face as triangles from its first corner.
+/// Splits a face into triangles from its first corner.
 pub(super) fn fan(face: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
     (1..face.len() - 1).map(|corner| [face[0], face[corner], face[corner + 1]])
 }
 
+/// Returns the area of a triangle.
 pub(super) fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
     let side = |to: [f64; 3]| [to[0] - a[0], to[1] - a[1], to[2] - a[2]];
     let (u, v) = (side(b), side(c));
@@ -148,7 +152,7 @@ pub(super) fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
     (cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]).sqrt() / 2.0
 }
 
-/// The edges of a face, each from its lower to its higher vertex.
+/// Returns the edges of a face, each from the lower to the higher vertex.
 pub(super) fn edges(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
     (0..face.len()).map(|corner| {
         let (a, b) = (face[corner], face[(corner + 1) % face.len()]);
@@ -156,7 +160,7 @@ pub(super) fn edges(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
     })
 }
 
-/// How many edges have more than two faces.
+/// Counts the edges with more than two faces.
 fn crowded_edges<'a>(faces: impl Iterator<Item = &'a [u32]>) -> usize {
     let mut counts = BTreeMap::new();
     for edge in faces.flat_map(edges) {
@@ -165,40 +169,49 @@ fn crowded_edges<'a>(faces: impl Iterator<Item = &'a [u32]>) -> usize {
     counts.values().filter(|count| **count > 2).count()
 }
 
-/// What was found, by kind.
+/// Omitted and doubtful parts of a mesh.
 #[derive(Debug, Default)]
-struct Findings {
-    /// Numbers of faces, from 1.
+struct Omissions {
+    /// Faces without area, numbered from 1.
     flat: Vec<usize>,
-    twice: Vec<usize>,
+    /// Faces with the corners of an earlier one, numbered from 1.
+    duplicate: Vec<usize>,
+    /// Number of vertices without a face.
     unused: usize,
+    /// Number of edges with more than two faces.
     crowded: usize,
 }
 
-impl Findings {
+impl Omissions {
     fn sentences(&self) -> Vec<String> {
-        let mut all = Vec::new();
-        if let Some(first) = self.flat.first() {
-            all.push(format!(
-                "{} faces have no area, the first is face {first}: left out",
-                self.flat.len()
-            ));
-        }
-        if let Some(first) = self.twice.first() {
-            all.push(format!(
-                "{} faces stand twice, the first is face {first}: left out",
-                self.twice.len()
-            ));
-        }
-        if self.unused > 0 {
-            all.push(format!("{} vertices belong to no face: left out", self.unused));
-        }
-        if self.crowded > 0 {
-            all.push(format!(
-                "{} edges have more than two faces: no bends across them",
-                self.crowded
-            ));
-        }
-        all
+        let first = |faces: &[usize]| faces.first().map_or(0, |first| *first);
+        let (flat, duplicate) = (first(&self.flat), first(&self.duplicate));
+        let sentences = [
+            match self.flat.len() {
+                0 => None,
+                1 => Some(format!("face {flat} has no area and is omitted")),
+                n => Some(format!(
+                    "{n} faces have no area and are omitted; the first is face {flat}"
+                )),
+            },
+            match self.duplicate.len() {
+                0 => None,
+                1 => Some(format!("face {duplicate} is a duplicate and is omitted")),
+                n => Some(format!(
+                    "{n} faces are duplicates and are omitted; the first is face {duplicate}"
+                )),
+            },
+            match self.unused {
+                0 => None,
+                1 => Some("1 vertex belongs to no face and is omitted".to_owned()),
+                n => Some(format!("{n} vertices belong to no face and are omitted")),
+            },
+            match self.crowded {
+                0 => None,
+                1 => Some("1 edge has more than two faces and gets no bends".to_owned()),
+                n => Some(format!("{n} edges have more than two faces and get no bends")),
+            },
+        ];
+        sentences.into_iter().flatten().collect()
     }
 }
