@@ -50,6 +50,7 @@ mod owner;
 mod ports;
 mod stop;
 pub mod testing;
+mod text_file;
 
 pub use client::Client;
 pub use client::change::Change;
@@ -84,6 +85,7 @@ pub use sim_types::{
     ValueForm,
 };
 pub use stop::Stop;
+pub use text_file::{TextFileError, read_scene_file};
 
 /// Compiles the programs in the README.
 #[cfg(doctest)]

@@ -2,6 +2,7 @@
 
 mod actions;
 mod brush;
+mod command_context;
 mod dispatch;
 mod link;
 mod newest_state;

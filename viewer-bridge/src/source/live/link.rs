@@ -8,7 +8,7 @@ use sim_contract::{
     Action, AttachError, Client, Endpoint, NodeStatus, Outcome, ParameterValues, SnapshotFlags, Tap,
 };
 
-use super::actions::CommandContext;
+use super::command_context::CommandContext;
 use super::dispatch::Dispatch;
 use super::newest_state::{LoadedState, NewestState};
 use super::node_text::node_text;

@@ -44,12 +44,19 @@ pub(super) struct Player<'a> {
     /// The origin of the parameters.
     parameters_origin: Option<ParametersOrigin>,
     /// Applied commands, which are answered with the step that shows their effect.
-    answers: Vec<(ClientId, OutcomeText)>,
+    answers: Vec<Answer>,
     /// The playback has changed since it was published.
     is_playback_changed: bool,
     shown_step: Option<u64>,
     next_frame_ns: u64,
     next_statistics_ns: u64,
+}
+
+/// The answer to an applied command.
+#[derive(Debug)]
+struct Answer {
+    client: ClientId,
+    outcome: OutcomeText,
 }
 
 /// The changes of the recording and the pace from which the parameters follow.
@@ -145,7 +152,8 @@ impl<'a> Player<'a> {
                 Ok(()) => {
                     self.is_playback_changed = true;
                     let outcome = OutcomeText::pending(id, command.name());
-                    self.answers.push((client, OutcomeText { applied: 1, ..outcome }));
+                    let outcome = OutcomeText { applied: 1, ..outcome };
+                    self.answers.push(Answer { client, outcome });
                 }
                 Err(reason) => {
                     let outcome = &OutcomeText::refused(id, command.name(), reason);
@@ -289,7 +297,7 @@ impl<'a> Player<'a> {
 
     /// Answers the applied commands. The state on show has their effect.
     fn publish_answers(&mut self) {
-        for (client, mut outcome) in self.answers.drain(..) {
+        for Answer { client, mut outcome } in self.answers.drain(..) {
             outcome.step = Some(self.state.row.step);
             if outcome.id.is_some() {
                 self.sinks.publish(&Update::Answer { client, outcome: &outcome });
