@@ -86,7 +86,7 @@ impl Site {
     /// Opens a page, and reads the server's `hello`.
     pub(crate) fn page(&self) -> Page {
         let mut page = self.silent_page();
-        page.say(r#"{"type":"hello","protocol":1}"#);
+        page.send(r#"{"type":"hello","protocol":1}"#);
         assert_eq!(page.text()["type"], "hello");
         page
     }
@@ -132,7 +132,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    pub(crate) fn say(&mut self, text: &str) {
+    pub(crate) fn send(&mut self, text: &str) {
         self.socket.send(Message::text(text)).unwrap();
     }
 
@@ -176,7 +176,7 @@ impl Page {
     }
 
     /// Waits for the next text of a type.
-    pub(crate) fn text_of(&mut self, kind: &str) -> Value {
+    pub(crate) fn text_with_type(&mut self, kind: &str) -> Value {
         loop {
             let text = match self.next().unwrap() {
                 Message::Text(text) => serde_json::from_str::<Value>(&text).unwrap(),
