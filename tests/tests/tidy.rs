@@ -28,7 +28,7 @@ const FOLDER_FILES_MAX: usize = 14;
 
 /// Folders with more source files than that.
 const CROWDED_FOLDERS: &[&str] = &[
-    "recorder/src",
+    "recorder/src/log",
     "sim-node/contract/src",
     "sim-node/solver/benches/step",
     "sim-node/solver/src",
