@@ -32,7 +32,6 @@ const CROWDED_FOLDERS: &[&str] = &[
     "recorder/src/log",
     "sim-node/solver/benches/step",
     "sim-node/solver/src",
-    "sim-node/solver/src/scene",
 ];
 
 /// Words that do not begin a doc comment. It begins with a noun phrase or a third-person verb.
@@ -85,12 +84,16 @@ const PHRASES: &[&str] = &[
 const UNCHECKED: &[&str] = &[
     "ARCHITECTURE.md",
     "CHANGELOG.md",
-    "README.md",
     "recorder/src/commands",
     "recorder/src/input",
     "recorder/src/log",
     "recorder/tests",
-    "sim-node",
+    "sim-node/contract/src",
+    "sim-node/contract/tests",
+    "sim-node/lessons",
+    "sim-node/scenes",
+    "sim-node/solver",
+    "sim-node/types",
 ];
 
 fn root() -> PathBuf {
