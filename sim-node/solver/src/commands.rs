@@ -7,10 +7,10 @@ use glam::Vec3;
 use crate::Solver;
 use crate::constraints::ConstraintKind;
 use crate::cut::Ball;
-use crate::drive::Grab;
 use crate::frame::{Frame, Pose};
 use crate::parameters::{Affected, Context, Setting};
 use crate::particles::flag;
+use crate::step::drive::Grab;
 
 /// Largest coordinate that a command may name: f32 resolves 1 m there.
 pub const COORDINATE_MAX: f32 = 1e7;

@@ -37,7 +37,7 @@ impl Solver {
             return Err(Rejection::AlreadyTorn);
         }
         self.tear(constraint, TearCause::Cut);
-        self.tethers.drop_torn(&self.torn, &mut self.bodies);
+        self.tethers.drop_torn(&self.torn, &mut self.store);
         Ok(())
     }
 
@@ -93,7 +93,7 @@ impl Solver {
                 self.tear(index, TearCause::Cut);
             }
         }
-        self.tethers.drop_torn(&self.torn, &mut self.bodies);
+        self.tethers.drop_torn(&self.torn, &mut self.store);
     }
 }
 

@@ -7,15 +7,14 @@ use thiserror::Error;
 
 use glam::{Quat, Vec3};
 
-use crate::Solver;
-use crate::drive::Grab;
+use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::frame::{Frame, Pose};
 use crate::hash::state_hash;
 use crate::parameters::Parameters;
 use crate::particles::{Particle, flag};
-use crate::solver::Due;
+use crate::solver::{Due, Solver};
+use crate::step::drive::Grab;
 use crate::tear::TearCause;
-use crate::tethers::{Basis, Tethers};
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
 const KEYFRAME_VERSION: u32 = 2;
@@ -33,7 +32,7 @@ pub struct Keyframe {
     torn: Vec<u32>,
     tear_causes: Vec<TearCause>,
     /// What the tethers were last worked out from.
-    tethers: Basis,
+    tethers: TetherBasis,
     parameters: Parameters,
     /// Where clients have put anchors and colliders, ascending by index.
     moved_anchors: Vec<Moved>,
@@ -230,10 +229,12 @@ impl Solver {
         self.due = Due::default();
         if self.settings.tethers {
             let basis = keyframe.tethers.clone();
+            self.tethers.detach(&mut self.store);
             self.tethers = Tethers::new(&self.model, &self.parameters, basis);
         }
         self.configure();
-        self.tethers.drop_torn(&self.torn, &mut self.bodies);
+        self.tethers.attach(&mut self.store, &self.particles);
+        self.tethers.drop_torn(&self.torn, &mut self.store);
     }
 
     fn restore_frames(&mut self, keyframe: &Keyframe) {

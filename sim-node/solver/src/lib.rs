@@ -24,42 +24,31 @@
     reason = "a kernel that is not inlined is compiled for the oldest processor, and goes through memory"
 )]
 
-mod anchors;
-mod bodies;
 pub mod builtin;
-mod colliders;
 mod commands;
 mod constraints;
-mod contact;
-mod crew;
+mod contacts;
 mod cut;
-mod drive;
-mod families;
 mod frame;
 mod hash;
 mod kernels;
 mod keyframe;
-mod order;
-mod pages;
 mod parameters;
 mod particles;
-mod project;
 pub mod scene;
-mod solid;
 mod solver;
 mod step;
+mod store;
 mod tear;
-mod tethers;
-mod wind;
 
-pub use colliders::PlacedCollider;
 pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Push, Rejection};
 pub(crate) use commands::{check_finite, is_near};
 pub use constraints::{Constraint, ConstraintKind};
-pub use crew::THREADS_MAX;
+pub use contacts::colliders::PlacedCollider;
 pub use cut::{Ball, Sweep};
 pub use frame::Pose;
 pub use kernels::Kernels;
+pub use kernels::worker_pool::THREADS_MAX;
 pub use keyframe::{Keyframe, KeyframeError, RestoreError};
 pub use parameters::{PARAMETERS, Setting};
 pub use particles::{Particle, flag};

@@ -1,10 +1,11 @@
 //! Whether a snapshot and a keyframe are a state of a scene: both may come from anywhere.
 
 use super::{Keyframe, Moved, RestoreError};
+use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
 use crate::particles::{Particle, flag};
-use crate::tethers::Basis;
-use crate::{GRAB_OVER_S_MAX, Solver, is_near};
+use crate::solver::Solver;
+use crate::{GRAB_OVER_S_MAX, is_near};
 
 /// Latest step of a scene: up to it, f64 counts steps exactly.
 const SCENE_STEP_MAX: u64 = 1 << 53;
@@ -63,7 +64,7 @@ impl Solver {
         if keyframe.tear_causes.len() != keyframe.torn.len() {
             return Err("not every torn constraint has its cause");
         }
-        let Basis { roots, torn } = &keyframe.tethers;
+        let TetherBasis { roots, torn } = &keyframe.tethers;
         let is_torn = |index: &u32| all_torn.binary_search(index).is_ok();
         if !is_ascending_below(roots, particles)
             || !is_ascending_below(torn, constraints)
@@ -78,7 +79,7 @@ impl Solver {
         self.check_moved(&keyframe.moved_colliders, self.collider_count())?;
         let moved = keyframe.moved_colliders.iter();
         for (collider, moved) in moved.map(|one| (&self.colliders[one.index as usize], one)) {
-            if !collider.can_take(&moved.frame()) {
+            if !collider.accepts(&moved.frame()) {
                 return Err("bounds are turned");
             }
         }

@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::model::Model;
 use super::{Limits, Method, SceneParticle, Softness, Up, decimal};
+use crate::constraints::families::Sheet;
 use crate::constraints::{Constraint, ConstraintKind};
-use crate::families::Sheet;
 pub use bridge::Bridge;
 pub use cloth::{Cloth, Diagonals};
 pub use mesh_file::Obj;

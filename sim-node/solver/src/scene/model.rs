@@ -2,7 +2,7 @@
 
 use super::{Limits, Method, Scene, SceneParticle};
 use crate::constraints::Constraint;
-use crate::families::Sheet;
+use crate::constraints::families::Sheet;
 
 /// Every particle, constraint and triangle of a scene; immutable from load to load.
 #[derive(Debug, Clone, Default)]
@@ -63,6 +63,11 @@ impl Model {
     #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]
     pub(crate) fn particle_count(&self) -> u32 {
         self.particles.len() as u32
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 constraints")]
+    pub(crate) fn constraint_count(&self) -> u32 {
+        self.constraints.len() as u32
     }
 
     pub(crate) fn pair(&self, constraint: u32) -> [u32; 2] {

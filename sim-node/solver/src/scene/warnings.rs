@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{ConstraintOrder, Model, Scene};
 use crate::constraints::Constraint;
-use crate::contact::depth_at_load;
+use crate::contacts::obstacle::depth_at_load;
 
 /// Distance from the scene's origin, in m, beyond which f32 positions make a scene at rest tremble.
 const NEAR_ORIGIN: f32 = 100.0;

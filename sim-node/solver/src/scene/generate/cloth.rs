@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{Builder, Pinned, decimal, round};
 use crate::constraints::ConstraintKind;
-use crate::families::Family;
+use crate::constraints::families::Family;
 
 /// A sheet of columns x rows particles; particle (c, r) has index r columns + c.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{Builder, Pinned, between, decimal};
 use crate::constraints::ConstraintKind;
-use crate::families::Family;
+use crate::constraints::families::Family;
 
 /// A line of particles; constraint i joins particles i and i + 1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
