@@ -180,7 +180,7 @@ fn wrong(field: &str, what: &str, allowed: &str) -> Wrong {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{SettingKind, SettingValue, Text};
+    use sim_contract::{KindFilter, ParameterValue, Text};
 
     use super::*;
 
@@ -235,11 +235,11 @@ mod tests {
             Action::MoveAnchor { anchor: 1, translation: target, rotation },
             Action::MoveCollider { collider: 1, translation: target, rotation },
             Action::Set {
-                parameter: Text::new("compliance"),
-                value: SettingValue::Off,
-                constraint_kind: Some(SettingKind::Unknown),
+                parameter: Text::cut("compliance"),
+                value: ParameterValue::Off,
+                constraint_kind: Some(KindFilter::Unknown),
             },
-            Action::Load { scene: Text::new("rope") },
+            Action::Load { scene: Text::cut("rope") },
             Action::Unknown { number: 77 },
         ];
         assert_eq!(KINDS.len(), actions.len());

@@ -70,7 +70,7 @@ pub use collider_rows::{ColliderRow, CollidersRow, ShapeRow};
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema};
 pub use frames::{Frame, FrameReader};
 pub use index::{ChunkEntry, IndexedLog};
-pub use keyframe_tears::{KeyframeTears, cause_of};
+pub use keyframe_tears::KeyframeTears;
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
 pub use protobuf::{WORLD_FRAME, encode_transform};

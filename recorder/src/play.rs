@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::{
-    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow, cause_of,
+    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Endpoint, Stop, TearCause};
@@ -263,7 +263,7 @@ fn first_colliders(first: &Frame) -> Option<&CollidersRow> {
 fn causes_before(solver: &mut Solver, first: &Frame, torn: &[u32]) -> Option<Vec<TearCause>> {
     let keyframe = Keyframe::decode(first.own_keyframe()?).ok()?;
     solver.restore(bytemuck::cast_slice(&first.particles), &keyframe).ok()?;
-    let causes = solver.tear_causes().iter().map(|cause| cause_of(*cause));
+    let causes = solver.tear_causes().iter().map(|cause| *cause);
     solver.torn().starts_with(torn).then(|| causes.take(torn.len()).collect())
 }
 

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 use recorder::{Frame, Message, OutcomeRow, StepRow, state_hash};
 use sim_contract::{Action, Outcome, ParticleState};
-use sim_solver::{Keyframe, Scene, Solver};
+use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
-use crate::apply::{apply, is_control};
+use crate::apply::apply;
 use crate::difference::{Difference, first_difference};
 use side_rows::SideRows;
 
@@ -214,10 +214,13 @@ impl Resimulation {
     /// and why a node took them or not is not repeated.
     fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
         let is_refused_load = matches!(row.action, Action::Load { .. }) && !row.is_applied();
-        if is_control(row.action) || is_refused_load {
-            return None;
-        }
-        let result = apply(&mut self.solver, row.client_id, row.action);
+        let result = match apply(&mut self.solver, row.client_id, &row.action) {
+            Ok(Applied::Control(Control::Pause | Control::Resume | Control::Step { .. })) => {
+                return None;
+            }
+            Err(_) if is_refused_load => return None,
+            result => result.map(|_| ()),
+        };
         let again = Outcome::new(row.index, row.step, Outcome::from(row).command, result);
         let again = OutcomeRow::from(&again);
         if again.status == row.status && again.reason == row.reason {

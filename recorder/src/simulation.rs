@@ -6,8 +6,8 @@ use std::io::Write;
 use std::ops::ControlFlow;
 
 use recorder::{LogWriter, OutcomeRow, RunDescription, WriteError};
-use sim_contract::{Action, CONTRACT_VERSION, Command, Outcome};
-use sim_solver::{SOLVER_VERSION, Scene, Solver};
+use sim_contract::{CONTRACT_VERSION, Command, Outcome, Reason};
+use sim_solver::{Applied, SOLVER_VERSION, Scene, Solver};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::apply::apply;
@@ -94,10 +94,11 @@ pub(crate) fn simulate<W: Write>(
         let mut keyframe = KeyframeDue::OnTheSecond;
         let mut rows = Vec::new();
         while let Some((command, rest)) = waiting.split_first().filter(|(c, _)| c.step <= step) {
-            let outcome = outcomes.apply(&mut solver, command);
-            if outcome.is_applied() && !matches!(command.action, Action::Move { .. }) {
+            let result = apply(&mut solver, command.client_id, &command.action);
+            if result.is_ok_and(|applied| applied != Applied::Target) {
                 keyframe = KeyframeDue::Now;
             }
+            let outcome = outcomes.count(command, result.map(|_| ()));
             rows.push(OutcomeRow::from(&outcome));
             waiting = rest;
         }
@@ -126,9 +127,9 @@ impl Outcomes {
         }
     }
 
-    fn apply(&mut self, solver: &mut Solver, command: &TimedCommand) -> Outcome {
+    /// Counts a command and returns its outcome.
+    fn count(&mut self, command: &TimedCommand, result: Result<(), Reason>) -> Outcome {
         let TimedCommand { step, client_id, sequence, action, .. } = *command;
-        let result = apply(solver, client_id, action);
         let index = self.applied_count + self.rejected_count;
         let outcome = Outcome::new(index, step, Command::new(client_id, sequence, action), result);
         self.applied_count += u64::from(outcome.is_applied());

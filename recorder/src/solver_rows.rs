@@ -1,6 +1,6 @@
 //! From the state of a solver to the rows of `/colliders` and `/tears`.
 
-use recorder::{CollidersRow, TearsRow, cause_of};
+use recorder::{CollidersRow, TearsRow};
 use sim_contract::{ColliderShape, ColliderState};
 use sim_solver::{PlacedCollider, Solver};
 
@@ -24,7 +24,7 @@ pub(crate) fn newest_tears_row(solver: &Solver, step: u64, count: usize) -> Tear
     TearsRow {
         step,
         constraints: solver.torn()[first..].to_vec(),
-        causes: causes.map(|cause| cause_of(*cause).name().to_owned()).collect(),
+        causes: causes.map(|cause| cause.name().to_owned()).collect(),
     }
 }
 

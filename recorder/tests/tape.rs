@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use recorder::{
     Closing, CollidersRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message,
     OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow, TopologyRow,
-    cause_of, state_hash,
+    state_hash,
 };
 use sim_contract::{
     Action, Command, ConstraintState, LoadHeader, Outcome, ParticleState, TearCause,
@@ -61,7 +61,7 @@ fn expected(solver: &Solver, step: u64) -> Expected {
         step,
         particles: bytemuck::cast_slice(solver.particles()).to_vec(),
         torn: solver.torn().to_vec(),
-        causes: solver.tear_causes().iter().map(|cause| Some(cause_of(*cause))).collect(),
+        causes: solver.tear_causes().iter().map(|cause| Some(*cause)).collect(),
         hash: solver.state_hash(),
     }
 }
@@ -79,7 +79,7 @@ fn updates(solver: &Solver, step: u64, style: Style) -> Vec<Message> {
     }
     let new = solver.torn().len() - solver.new_torn_count();
     if solver.new_torn_count() > 0 {
-        let causes = solver.tear_causes()[new..].iter().map(|one| cause_of(*one).name().to_owned());
+        let causes = solver.tear_causes()[new..].iter().map(|one| one.name().to_owned());
         let constraints = solver.torn()[new..].to_vec();
         messages.push(Message::Tears(TearsRow { step, constraints, causes: causes.collect() }));
     }

@@ -12,7 +12,7 @@ use sim_contract::{Endpoint, NAME_DEFAULT};
 use sim_solver::THREADS_MAX;
 
 pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
-pub(crate) use lesson::{LessonArgs, LessonName};
+pub(crate) use lesson::LessonArgs;
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///

@@ -2,10 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use sim_contract::{
-    Action, COMMANDS_PER_STEP_MAX, Command, Reason, SettingKind, SettingValue, Text,
-};
-use sim_solver::{Ball, ConstraintKind, Grip, Pose, Push, Rejection, Setting, Solver, Sweep};
+use sim_contract::{COMMANDS_PER_STEP_MAX, Command, Reason};
+use sim_solver::{Applied, Control};
 
 /// Commands that have arrived and wait for their turn, by client.
 ///
@@ -70,6 +68,32 @@ impl Progress {
         !self.is_paused || self.steps_due > 0 || self.is_reset_due
     }
 
+    /// Follows an action that the solver has applied or passed on.
+    ///
+    /// # Errors
+    /// The action has no effect in this state of the loop. A `load` has none here: the node itself
+    /// replaces the scene.
+    pub(crate) fn apply(&mut self, applied: Applied) -> Result<(), Reason> {
+        let control = match applied {
+            Applied::State | Applied::Target => return Ok(()),
+            Applied::Reset => {
+                self.is_reset_due = true;
+                return Ok(());
+            }
+            Applied::Control(control) => control,
+        };
+        match control {
+            Control::Pause => (self.is_paused, self.steps_due) = (true, 0),
+            Control::Resume => (self.is_paused, self.steps_due) = (false, 0),
+            Control::Step { count: 0 } => return Err(Reason::OutOfRange),
+            Control::Step { count } if self.is_paused => self.steps_due += u64::from(count),
+            Control::TimeScale(scale) => self.time_scale = f64::from(scale),
+            // A running node needs no `step`.
+            Control::Step { .. } | Control::Load { .. } => return Err(Reason::NoEffectHere),
+        }
+        Ok(())
+    }
+
     /// A step was made. The one that shows a reset is not one of those asked for.
     pub(crate) fn count_step(&mut self) {
         if self.is_reset_due {
@@ -80,102 +104,11 @@ impl Progress {
     }
 }
 
-/// Applies one action at the boundary before a step. A rejected one changes nothing.
-pub(crate) fn apply(
-    client_id: u64,
-    action: Action,
-    solver: &mut Solver,
-    progress: &mut Progress,
-) -> Result<(), Reason> {
-    if let Some(result) = control(action, progress) {
-        return result;
-    }
-    match action {
-        Action::Pin { particle } => solver.pin(particle),
-        Action::Unpin { particle } => solver.unpin(particle),
-        Action::Grab { particle, target, over_s } => {
-            solver.grab(client_id, Grip { particle, target, over_s })
-        }
-        Action::Move { particle, target, over_s } => {
-            solver.move_grabbed(client_id, Grip { particle, target, over_s })
-        }
-        Action::Release { particle } => solver.release(client_id, particle),
-        Action::Push { center, radius, delta, limit } => {
-            solver.push(Push { ball: Ball { center, radius }, delta, limit })
-        }
-        Action::Cut { constraint } => solver.cut(constraint),
-        Action::CutRadius { center, radius } => solver.cut_radius(Ball { center, radius }),
-        Action::CutSegment { from, to, direction } => {
-            solver.cut_segment(Sweep { from, to, direction })
-        }
-        Action::MoveAnchor { anchor, translation, rotation } => {
-            solver.move_anchor(anchor, Pose { translation, rotation })
-        }
-        Action::MoveCollider { collider, translation, rotation } => {
-            solver.move_collider(collider, Pose { translation, rotation })
-        }
-        Action::Set { parameter, value, constraint_kind } => {
-            return set(solver, progress, &parameter, (value, constraint_kind));
-        }
-        Action::Reset => {
-            solver.reset();
-            progress.is_reset_due = true;
-            Ok(())
-        }
-        // Kinds of another version.
-        _ => return Err(Reason::NoEffectHere),
-    }
-    .map_err(reason)
-}
-
-/// What says only when steps are made; none for all else.
-fn control(action: Action, progress: &mut Progress) -> Option<Result<(), Reason>> {
-    match action {
-        Action::Pause => (progress.is_paused, progress.steps_due) = (true, 0),
-        Action::Resume => (progress.is_paused, progress.steps_due) = (false, 0),
-        Action::Step { count: 0 } => return Some(Err(Reason::OutOfRange)),
-        Action::Step { count } if progress.is_paused => progress.steps_due += u64::from(count),
-        // A running node needs none.
-        Action::Step { .. } => return Some(Err(Reason::NoEffectHere)),
-        _ => return None,
-    }
-    Some(Ok(()))
-}
-
-fn set(
-    solver: &mut Solver,
-    progress: &mut Progress,
-    parameter: &Text,
-    (value, kind): (SettingValue, Option<SettingKind>),
-) -> Result<(), Reason> {
-    let setting = match value {
-        SettingValue::Number(number) => Setting::Number(number),
-        SettingValue::Vector(vector) => Setting::Vector(vector),
-        SettingValue::Off => Setting::Off,
-    };
-    let kind = match kind {
-        None => None,
-        Some(SettingKind::Known(kind)) => {
-            Some(ConstraintKind::from_number(kind as u32).ok_or(Reason::OutOfRange)?)
-        }
-        Some(SettingKind::Unknown) => return Err(Reason::OutOfRange),
-    };
-    solver.set(parameter.as_str(), setting, kind).map_err(reason)?;
-    // The pace is not the solver's, which has only checked it.
-    if let ("time_scale", SettingValue::Number(scale)) = (parameter.as_str(), value) {
-        progress.time_scale = f64::from(scale);
-    }
-    Ok(())
-}
-
-fn reason(rejection: Rejection) -> Reason {
-    Reason::from_name(rejection.name()).unwrap_or(Reason::NoEffectHere)
-}
-
 #[cfg(test)]
 mod tests {
     //! The order of a turn, and the control of the loop; what the solver does has tests of its own.
-    use sim_solver::Scene;
+    use sim_contract::{Action, KindFilter, ParameterValue, Text};
+    use sim_solver::{Scene, Solver};
 
     use super::*;
 
@@ -216,68 +149,47 @@ mod tests {
         assert!(inbox.has_room());
     }
 
-    #[test]
-    fn every_rejection_of_the_solver_is_a_reason_of_the_contract() {
-        for rejection in [
-            Rejection::NonFinite,
-            Rejection::OutOfRange,
-            Rejection::UnknownParticle,
-            Rejection::UnknownConstraint,
-            Rejection::UnknownAnchor,
-            Rejection::UnknownCollider,
-            Rejection::UnknownParameter,
-            Rejection::AlreadyTorn,
-            Rejection::NotGrabbed,
-            Rejection::GrabbedByOther,
-            Rejection::NoEffectHere,
-        ] {
-            assert_eq!(reason(rejection).name(), rejection.name());
-        }
-    }
-
     fn progress(is_paused: bool, steps_due: u64, is_reset_due: bool) -> Progress {
         Progress { is_paused, steps_due, is_reset_due, time_scale: 1.0 }
     }
 
     #[test]
-    fn steps_are_for_a_paused_node_only() {
-        let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
+    fn only_a_paused_node_takes_steps() {
         let mut now = progress(false, 0, false);
-        let mut apply = |action| apply(1, action, &mut solver, &mut now).map(|()| now);
-        assert_eq!(apply(Action::Step { count: 3 }), Err(Reason::NoEffectHere));
-        assert_eq!(apply(Action::Pause), Ok(progress(true, 0, false)));
-        assert_eq!(apply(Action::Step { count: 0 }), Err(Reason::OutOfRange));
-        assert_eq!(apply(Action::Step { count: 3 }), Ok(progress(true, 3, false)));
-        assert_eq!(apply(Action::Resume), Ok(progress(false, 0, false)));
-        assert_eq!(apply(Action::Unknown { number: 99 }), Err(Reason::NoEffectHere));
+        let mut apply = |control| now.apply(Applied::Control(control)).map(|()| now);
+        assert_eq!(apply(Control::Step { count: 3 }), Err(Reason::NoEffectHere));
+        assert_eq!(apply(Control::Pause), Ok(progress(true, 0, false)));
+        assert_eq!(apply(Control::Step { count: 0 }), Err(Reason::OutOfRange));
+        assert_eq!(apply(Control::Step { count: 3 }), Ok(progress(true, 3, false)));
+        assert_eq!(apply(Control::Resume), Ok(progress(false, 0, false)));
     }
 
     #[test]
-    fn a_time_scale_is_the_pace_of_the_node_and_refused_where_it_is_wrong() {
+    fn a_time_scale_is_the_pace_of_the_node_and_a_wrong_one_is_rejected() {
         let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
         let mut now = progress(false, 0, false);
-        let mut set = |value, kind| {
-            let parameter = Text::new("time_scale");
-            let action = Action::Set { parameter, value, constraint_kind: kind };
-            apply(1, action, &mut solver, &mut now).map(|()| now.time_scale)
+        let mut set = |value, constraint_kind| {
+            let parameter = Text::new("time_scale").unwrap();
+            let action = Action::Set { parameter, value, constraint_kind };
+            let applied = solver.apply(1, &action)?;
+            now.apply(applied).map(|()| now.time_scale)
         };
-        assert_eq!(set(SettingValue::Number(0.5), None), Ok(0.5));
-        assert_eq!(set(SettingValue::Number(0.0), None), Err(Reason::OutOfRange));
-        assert_eq!(set(SettingValue::Off, None), Err(Reason::OutOfRange));
-        assert_eq!(set(SettingValue::Number(f32::NAN), None), Err(Reason::NonFinite));
+        assert_eq!(set(ParameterValue::Number(0.5), None), Ok(0.5));
+        assert_eq!(set(ParameterValue::Number(0.0), None), Err(Reason::OutOfRange));
+        assert_eq!(set(ParameterValue::Off, None), Err(Reason::OutOfRange));
+        assert_eq!(set(ParameterValue::Number(f32::NAN), None), Err(Reason::NonFinite));
         assert_eq!(
-            set(SettingValue::Number(2.0), Some(SettingKind::Unknown)),
+            set(ParameterValue::Number(2.0), Some(KindFilter::Unknown)),
             Err(Reason::OutOfRange)
         );
-        assert_eq!(set(SettingValue::Number(2.0), None), Ok(2.0));
+        assert_eq!(set(ParameterValue::Number(2.0), None), Ok(2.0));
     }
 
     #[test]
     fn resets_at_one_boundary_make_one_step_even_if_a_pause_follows() {
-        let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
         let mut now = progress(true, 2, false);
-        for action in [Action::Reset, Action::Reset, Action::Pause] {
-            apply(1, action, &mut solver, &mut now).unwrap();
+        for applied in [Applied::Reset, Applied::Reset, Applied::Control(Control::Pause)] {
+            now.apply(applied).unwrap();
         }
         assert!(now.is_stepping());
         now.count_step();

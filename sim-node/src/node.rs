@@ -2,10 +2,10 @@
 
 use anyhow::Context;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Action, Command, Endpoint, OwnerError, Reason, Stop};
-use sim_solver::{Scene, Solver};
+use sim_contract::{Command, Endpoint, OwnerError, Reason, Stop};
+use sim_solver::{Applied, Control, Scene, Solver};
 
-use crate::commands::{Inbox, Progress, apply};
+use crate::commands::{Inbox, Progress};
 use crate::pace::Pace;
 use crate::publish::{Position, Publisher, StepTimes};
 use crate::scene_source;
@@ -149,9 +149,12 @@ impl Node {
         for command in self.inbox.take_turn() {
             // Whoever commanded and then asks for the status finds the effect in it.
             self.next_status_ns = 0;
-            let result = match command.action() {
-                Action::Load { scene } => self.load(scene.as_str())?,
-                action => apply(command.client_id, action, &mut self.solver, &mut self.progress),
+            let result = match self.solver.apply(command.client_id, &command.action()) {
+                Ok(Applied::Control(Control::Load { scene })) => {
+                    self.load(scene.as_str())?.map(|()| Applied::Reset)
+                }
+                Ok(applied) => self.progress.apply(applied).map(|()| applied),
+                Err(reason) => Err(reason),
             };
             self.publisher.add_outcome(self.step + 1, command, result);
         }

@@ -6,11 +6,11 @@ use anyhow::Context;
 use bytemuck::cast;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    Action, CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus,
-    Outcome, Owner, OwnerError, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
+    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus, Outcome,
+    Owner, OwnerError, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
     TearsHeader, Wake,
 };
-use sim_solver::{PlacedCollider, SOLVER_VERSION, Scene, Solver};
+use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
 use crate::statistics::Statistics;
 use load::{LoadPlace, count, to_collider_state, with_load};
@@ -112,12 +112,16 @@ impl Publisher {
     }
 
     /// Logs what became of a command at the boundary before `step`.
-    pub(crate) fn add_outcome(&mut self, step: u64, command: Command, result: Result<(), Reason>) {
-        self.outcomes.push(Outcome::new(self.outcome_count, step, command, result));
+    pub(crate) fn add_outcome(
+        &mut self,
+        step: u64,
+        command: Command,
+        result: Result<Applied, Reason>,
+    ) {
+        self.outcomes.push(Outcome::new(self.outcome_count, step, command, result.map(|_| ())));
         self.outcome_count += 1;
         self.rejected_count += u64::from(result.is_err());
-        let is_move = matches!(command.action(), Action::Move { .. });
-        self.is_keyframe_due |= result.is_ok() && !is_move;
+        self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
     }
 
     /// Publishes what belongs to a step, the particles last, and wakes the readers.

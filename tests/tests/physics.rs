@@ -243,7 +243,7 @@ fn a_scene_of_another_rate_needs_another_node() {
     assert_eq!(refused.code, Some(1));
     assert!(refused.stderr.contains("wrong.toml:2: rate: unknown field"), "{}", refused.stderr);
     // A device is no scene, and nothing that a node would wait for.
-    let device = Action::Load { scene: Text::new("/dev/zero") };
+    let device = Action::Load { scene: Text::new("/dev/zero").unwrap() };
     let outcome = attach(&sandbox).request(device, DEADLINE).unwrap();
     assert_eq!(outcome.reason_name(), Reason::OutOfRange.name());
     let same = sandbox.write("same.toml", "version = 1\n[[particle]]\nposition = [1, 2, 3]\n");
@@ -270,7 +270,8 @@ fn another_process_commands_the_physics_through_the_client() {
     };
     assert_eq!(snapshot.particles()[5].position, [0.5, 0.1, 0.0]);
     assert_eq!(snapshot.particles()[5].flags, ParticleFlags::ANCHORED);
-    let load = client.request(Action::Load { scene: Text::new("no such") }, DEADLINE).unwrap();
+    let load =
+        client.request(Action::Load { scene: Text::new("no such").unwrap() }, DEADLINE).unwrap();
     assert_eq!(load.reason_name(), Reason::OutOfRange.name());
 }
 

@@ -7,10 +7,12 @@ use std::path::{Path, PathBuf};
 use cargo_metadata::MetadataCommand;
 
 /// The allowed arrows: crate -> workspace crates and restricted libraries that it may name.
-const ARROWS: [(&str, &[&str]); 6] = [
-    ("sim-solver", &[]),
-    ("sim-contract", &["iceoryx2"]),
-    ("sim-node", &["sim-contract", "sim-solver"]),
+const ARROWS: [(&str, &[&str]); 8] = [
+    ("sim-types", &[]),
+    ("sim-solver", &["sim-types"]),
+    ("sim-contract", &["iceoryx2", "sim-types"]),
+    ("sim-lessons", &["sim-solver"]),
+    ("sim-node", &["sim-contract", "sim-lessons", "sim-solver"]),
     ("recorder", &["mcap", "sim-contract", "sim-solver"]),
     ("viewer-bridge", &["foxglove", "recorder", "sim-contract"]),
     ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),

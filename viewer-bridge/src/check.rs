@@ -1,6 +1,6 @@
 //! The numbers of a command, at the door.
 
-use sim_contract::SettingValue;
+use sim_contract::ParameterValue;
 
 use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
 use crate::message::Command;
@@ -55,9 +55,9 @@ pub(crate) fn check(command: &Command) -> Result<(), Refused> {
         Command::Set { parameter, value, .. } => {
             allowed(parameter.len() <= NAME_SIZE_BYTES_MAX)?;
             match value {
-                SettingValue::Number(number) => within(*number, f32::MIN, f32::MAX),
-                SettingValue::Vector(vector) => numbers(vector),
-                SettingValue::Off => Ok(()),
+                ParameterValue::Number(number) => within(*number, f32::MIN, f32::MAX),
+                ParameterValue::Vector(vector) => numbers(vector),
+                ParameterValue::Off => Ok(()),
             }
         }
         Command::Rate { value } => within(*value, *RATES.start(), *RATES.end()),

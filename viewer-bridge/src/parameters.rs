@@ -1,7 +1,7 @@
 //! The parameters of a running scene: as the scene has them, and what commands have made of them.
 
 use serde::Serialize;
-use sim_contract::{ConstraintKind, PlainF32, SettingKind, SettingValue};
+use sim_contract::{ConstraintKind, KindFilter, ParameterValue, PlainF32};
 
 /// A limit, or a softness that is not set for all; `None` is off.
 pub type Limit = Option<PlainF32>;
@@ -76,18 +76,18 @@ impl Default for Parameters {
 
 impl Parameters {
     /// Follows a `set` that the node has applied; it has checked everything.
-    pub fn follow(&mut self, parameter: &str, value: SettingValue, kind: Option<SettingKind>) {
+    pub fn follow(&mut self, parameter: &str, value: ParameterValue, kind: Option<KindFilter>) {
         let number = match value {
-            SettingValue::Number(number) => Some(PlainF32(number)),
-            SettingValue::Vector(_) | SettingValue::Off => None,
+            ParameterValue::Number(number) => Some(PlainF32(number)),
+            ParameterValue::Vector(_) | ParameterValue::Off => None,
         };
         let vector = match value {
-            SettingValue::Vector(vector) => vector.map(PlainF32),
-            SettingValue::Number(_) | SettingValue::Off => [PlainF32(0.0); 3],
+            ParameterValue::Vector(vector) => vector.map(PlainF32),
+            ParameterValue::Number(_) | ParameterValue::Off => [PlainF32(0.0); 3],
         };
         let kind = match kind {
-            Some(SettingKind::Known(kind)) => Some(kind),
-            Some(SettingKind::Unknown) | None => None,
+            Some(KindFilter::Known(kind)) => Some(kind),
+            Some(KindFilter::Unknown) | None => None,
         };
         let or_zero = number.unwrap_or(PlainF32(0.0));
         match parameter {
@@ -121,8 +121,8 @@ mod tests {
     fn every_setting_is_followed() {
         for setting in SETTINGS {
             let value = match setting.value {
-                ValueKind::Vector => SettingValue::Vector([0.5; 3]),
-                ValueKind::Number | ValueKind::Whole => SettingValue::Number(0.5),
+                ValueKind::Vector => ParameterValue::Vector([0.5; 3]),
+                ValueKind::Number | ValueKind::Whole => ParameterValue::Number(0.5),
             };
             let mut parameters = Parameters::default();
             parameters.follow(setting.name, value, None);
@@ -133,12 +133,12 @@ mod tests {
     #[test]
     fn off_is_null_or_zero_and_a_kind_is_set_alone() {
         let mut parameters = Parameters::default();
-        parameters.follow("tear_force", SettingValue::Number(3.0), None);
-        parameters.follow("tear_force", SettingValue::Off, None);
-        parameters.follow("gravity", SettingValue::Off, None);
+        parameters.follow("tear_force", ParameterValue::Number(3.0), None);
+        parameters.follow("tear_force", ParameterValue::Off, None);
+        parameters.follow("gravity", ParameterValue::Off, None);
         assert_eq!((parameters.tear_force, parameters.gravity), (None, [PlainF32(0.0); 3]));
-        let shear = Some(SettingKind::Known(ConstraintKind::Shear));
-        parameters.follow("compliance", SettingValue::Number(1e-3), shear);
+        let shear = Some(KindFilter::Known(ConstraintKind::Shear));
+        parameters.follow("compliance", ParameterValue::Number(1e-3), shear);
         assert_eq!(parameters.compliance.shear, Some(PlainF32(1e-3)));
         assert_eq!(parameters.compliance.bend, None);
     }

@@ -147,7 +147,7 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     let rejected: Vec<_> = rejected.map(|row| (row.step, row.reason.as_str())).collect();
     // A load is of another file, and this scene has no stiffness.
     assert_eq!(rejected, [(22, "no_effect_here"), (53, "no_effect_here")]);
-    assert!(PARAMETERS.iter().all(|name| COMMANDS.contains(&format!("\"{name}\""))));
+    assert!(PARAMETERS.iter().all(|info| COMMANDS.contains(&format!("\"{}\"", info.name))));
 
     let lines: Vec<_> = rows.iter().map(|row| serde_json::to_string(row).unwrap()).collect();
     let (again, repeated) = record(&job(&lines.join("\n")));

@@ -125,8 +125,10 @@ impl TearLog {
                 && !self.has_reset(list.step, header.step)
         });
         let Some((_, numbers)) = found else { return Vec::new() };
-        let causes: Vec<_> =
-            numbers[..count].iter().map(|number| TearCause::from_number(*number)).collect();
+        let causes: Vec<_> = numbers[..count]
+            .iter()
+            .map(|number| TearCause::from_number((*number).into()))
+            .collect();
         if causes.iter().all(Option::is_none) {
             return Vec::new();
         }

@@ -10,7 +10,7 @@ use iceoryx2::prelude::ZeroCopySend;
 #[repr(C)]
 #[type_name("catenary.ColliderState")]
 pub struct ColliderState {
-    /// A [`ColliderShape`] as a number.
+    /// A [`ColliderShape`](crate::ColliderShape) as a number.
     pub shape: u32,
     /// Part of the approach speed that is given back, 0..=1.
     pub restitution: f32,
@@ -40,47 +40,6 @@ pub struct ColliderState {
 
 const _: () = assert!(size_of::<ColliderState>() == 120 && align_of::<ColliderState>() == 4);
 
-/// What a collider is; the values of [`ColliderState::shape`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub enum ColliderShape {
-    /// A half space.
-    Plane = 0,
-    /// A solid box.
-    Box = 1,
-    /// A solid sphere.
-    Sphere = 2,
-    /// All points within a radius of a segment.
-    Capsule = 3,
-    /// A box that particles stay inside.
-    Bounds = 4,
-}
-
-const COLLIDER_SHAPES: [(ColliderShape, &str); 5] = [
-    (ColliderShape::Plane, "plane"),
-    (ColliderShape::Box, "box"),
-    (ColliderShape::Sphere, "sphere"),
-    (ColliderShape::Capsule, "capsule"),
-    (ColliderShape::Bounds, "bounds"),
-];
-
-impl ColliderShape {
-    /// The shape of that number, if there is one.
-    pub fn from_number(number: u32) -> Option<Self> {
-        COLLIDER_SHAPES.get(number as usize).map(|(shape, _)| *shape)
-    }
-
-    /// The shape of that name, if there is one.
-    pub fn from_name(name: &str) -> Option<Self> {
-        COLLIDER_SHAPES.iter().find(|(_, known)| *known == name).map(|(shape, _)| *shape)
-    }
-
-    /// Its word in scenes and logs.
-    pub fn name(self) -> &'static str {
-        COLLIDER_SHAPES[self as usize].1
-    }
-}
-
 /// The header of `colliders`: 24 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -97,17 +56,3 @@ pub struct CollidersHeader {
 }
 
 const _: () = assert!(size_of::<CollidersHeader>() == 24 && align_of::<CollidersHeader>() == 8);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_shape_has_one_name_and_one_number() {
-        for (shape, name) in COLLIDER_SHAPES {
-            assert_eq!(ColliderShape::from_number(shape as u32), Some(shape));
-            assert_eq!((ColliderShape::from_name(name), shape.name()), (Some(shape), name));
-        }
-        assert_eq!(ColliderShape::from_number(5), None);
-    }
-}

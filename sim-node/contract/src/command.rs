@@ -3,7 +3,10 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::{Action, SettingKind, SettingValue, Text};
+use sim_types::{Action, KindFilter, ParameterValue, Text};
+
+/// Client that every `sim-node ctl` sends as: what one call grabs, a later call releases.
+pub const CONSOLE_CLIENT_ID: u64 = 0;
 
 /// A command on the wire: 256 bytes, alignment 8. Written by clients, read by the owner of the
 /// name; also the last part of an [`crate::Outcome`].
@@ -145,9 +148,9 @@ impl Command {
                 Self { rotation, ..Self::of(kind::MOVE_COLLIDER, collider).at(translation, 0.0) }
             }
             Action::Set { parameter, value, constraint_kind } => {
-                Self { text: parameter.bytes(), ..Self::setting(value, constraint_kind) }
+                Self { text: parameter.to_wire(), ..Self::setting(value, constraint_kind) }
             }
-            Action::Load { scene } => Self { text: scene.bytes(), ..Self::of(kind::LOAD, 0) },
+            Action::Load { scene } => Self { text: scene.to_wire(), ..Self::of(kind::LOAD, 0) },
             Action::Unknown { number } => Self::of(number, 0),
         }
     }
@@ -160,16 +163,16 @@ impl Command {
         Self { vectors: [point, ZERO, ZERO], number, ..self }
     }
 
-    fn setting(value: SettingValue, constraint_kind: Option<SettingKind>) -> Self {
+    fn setting(value: ParameterValue, constraint_kind: Option<KindFilter>) -> Self {
         let empty = Self::of(kind::SET, 0);
         let mut command = match value {
-            SettingValue::Number(number) => {
+            ParameterValue::Number(number) => {
                 Self { number, options: CommandOptions::VALUE_NUMBER, ..empty }
             }
-            SettingValue::Vector(vector) => {
+            ParameterValue::Vector(vector) => {
                 Self { options: CommandOptions::VALUE_VECTOR, ..empty.at(vector, 0.0) }
             }
-            SettingValue::Off => Self { options: CommandOptions::VALUE_OFF, ..empty },
+            ParameterValue::Off => Self { options: CommandOptions::VALUE_OFF, ..empty },
         };
         if let Some(constraint_kind) = constraint_kind {
             command.count = constraint_kind.number();
@@ -220,20 +223,20 @@ impl Command {
         self.options & option != 0
     }
 
-    fn set(&self, value: SettingValue) -> Action {
+    fn set(&self, value: ParameterValue) -> Action {
         let is_for_one_kind = self.has(CommandOptions::CONSTRAINT_KIND);
         Action::Set {
             parameter: Text::from_wire(&self.text),
             value,
-            constraint_kind: is_for_one_kind.then(|| SettingKind::from_number(self.count)),
+            constraint_kind: is_for_one_kind.then(|| KindFilter::from_number(self.count)),
         }
     }
 
-    fn value(&self) -> Option<SettingValue> {
+    fn value(&self) -> Option<ParameterValue> {
         match self.options & CommandOptions::VALUE_ANY {
-            CommandOptions::VALUE_NUMBER => Some(SettingValue::Number(self.number)),
-            CommandOptions::VALUE_VECTOR => Some(SettingValue::Vector(self.vectors[0])),
-            CommandOptions::VALUE_OFF => Some(SettingValue::Off),
+            CommandOptions::VALUE_NUMBER => Some(ParameterValue::Number(self.number)),
+            CommandOptions::VALUE_VECTOR => Some(ParameterValue::Vector(self.vectors[0])),
+            CommandOptions::VALUE_OFF => Some(ParameterValue::Off),
             _ => None,
         }
     }
@@ -242,11 +245,10 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::action::tests::all_actions;
 
     #[test]
     fn every_action_survives_the_wire_with_its_sender() {
-        for action in all_actions() {
+        for action in Action::samples() {
             let command = Command::new(11, 12, action);
             assert_eq!(command.action(), action);
             assert_eq!((command.client_id, command.sequence, command.spare), (11, 12, 0));
@@ -256,7 +258,7 @@ mod tests {
     #[test]
     fn kinds_have_their_numbers_in_the_order_of_the_actions() {
         let mut numbers: Vec<_> =
-            all_actions().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
+            Action::samples().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
         numbers.dedup();
         let expected: Vec<_> = (1..=17).chain([99]).collect();
         assert_eq!(numbers, expected);
@@ -264,8 +266,8 @@ mod tests {
 
     #[test]
     fn a_set_with_no_value_or_with_two_is_unknown() {
-        let value = SettingValue::Number(1.0);
-        let action = Action::Set { parameter: Text::new("damping"), value, constraint_kind: None };
+        let value = ParameterValue::Number(1.0);
+        let action = Action::Set { parameter: Text::cut("damping"), value, constraint_kind: None };
         let good = Command::new(0, 0, action);
         for options in [0, CommandOptions::VALUE_NUMBER | CommandOptions::VALUE_OFF] {
             let command = Command { options, ..good };
@@ -275,17 +277,17 @@ mod tests {
 
     #[test]
     fn a_kind_of_constraints_from_another_version_is_unknown() {
-        let value = SettingValue::Number(1.0);
-        let constraint_kind = Some(SettingKind::Unknown);
-        let action = Action::Set { parameter: Text::new("compliance"), value, constraint_kind };
+        let value = ParameterValue::Number(1.0);
+        let constraint_kind = Some(KindFilter::Unknown);
+        let action = Action::Set { parameter: Text::cut("compliance"), value, constraint_kind };
         let command = Command { count: 4, ..Command::new(0, 0, action) };
         assert_eq!(command.action(), action);
     }
 
     #[test]
     fn a_text_that_is_no_utf8_is_read_as_far_as_it_is() {
-        let mut command = Command::new(0, 0, Action::Load { scene: Text::new("curtain") });
+        let mut command = Command::new(0, 0, Action::Load { scene: Text::cut("curtain") });
         command.text[3] = 0x80;
-        assert_eq!(command.action(), Action::Load { scene: Text::new("cur") });
+        assert_eq!(command.action(), Action::Load { scene: Text::cut("cur") });
     }
 }

@@ -36,7 +36,6 @@
 //! There is no solver here, and no iceoryx2 outside of this crate.
 #![forbid(unsafe_code)]
 
-mod action;
 mod client;
 pub mod clock;
 mod collider;
@@ -48,49 +47,48 @@ mod limits;
 mod load;
 mod outcome;
 mod owner;
-mod plain_number;
 mod ports;
 mod reader;
 mod request;
 mod service;
 mod services;
 mod session;
-mod setting;
 mod snapshot;
 mod status;
 mod stop;
 mod tap;
 mod tears;
 pub mod testing;
-mod text;
 mod topology;
 mod views;
 mod wake;
 mod watch;
 mod writer;
 
-pub use action::{Action, CONSOLE_CLIENT_ID, GRAB_OVER_S_DEFAULT};
 pub use client::Client;
-pub use collider::{ColliderShape, ColliderState, CollidersHeader};
-pub use command::{Command, CommandOptions};
+pub use collider::{ColliderState, CollidersHeader};
+pub use command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
 pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
 pub use limits::*;
 pub use load::Load;
-pub use outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus, Reason};
+pub use outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus};
 pub use owner::{Owner, OwnerError};
-pub use plain_number::PlainF32;
 pub use reader::{Drained, ReadError};
 pub use request::{OwnerSeen, RequestError};
 pub use service::ServiceError;
 pub use services::AttachError;
-pub use setting::{SettingKind, SettingValue};
-pub use snapshot::{ParticleFlags, ParticleState, SnapshotFlags, SnapshotHeader};
+pub use sim_types::{
+    Action, COORDINATE_MAX, ColliderShape, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Method,
+    NumberRange, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
+    ParticleFlags, PerKind, PlainF32, Reason, SETTINGS_COUNT, Setting, TearCause, Text, TextError,
+    ValueForm,
+};
+pub use snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use status::{NodeStatus, StatusFlags};
 pub use stop::Stop;
 pub use tap::{Tap, Update};
-pub use tears::{TearCause, TearsHeader};
-pub use text::Text;
-pub use topology::{ConstraintKind, ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+pub use tears::TearsHeader;
+pub use topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 pub use views::{Colliders, Snapshot, Surface, Topology, Torn, TornConstraint};
 pub use wake::Wake;
 pub use writer::PublishError;

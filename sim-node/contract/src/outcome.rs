@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::Command;
+use crate::{Command, Reason};
 
 /// What became of a command: 288 bytes, alignment 8. Written by the owner of the name for every
 /// command that it takes, in the order of application, which a re-simulation follows.
@@ -43,66 +43,6 @@ pub enum OutcomeStatus {
     Rejected = 1,
 }
 
-/// Why a command was rejected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Reason {
-    /// A number is NaN or infinite.
-    NonFinite = 1,
-    /// A coordinate beyond 1e7, or a parameter outside of its range.
-    OutOfRange = 2,
-    /// The scene has no such particle.
-    UnknownParticle = 3,
-    /// The scene has no such constraint.
-    UnknownConstraint = 4,
-    /// The scene has no such anchor.
-    UnknownAnchor = 5,
-    /// The scene has no such collider.
-    UnknownCollider = 6,
-    /// There is no such parameter.
-    UnknownParameter = 7,
-    /// The constraint is torn already.
-    AlreadyTorn = 8,
-    /// The particle is not grabbed.
-    NotGrabbed = 9,
-    /// Another client holds the particle.
-    GrabbedByOther = 10,
-    /// The command means nothing here: a kind of another version, `step` while running, or a
-    /// change of a recording that is being played.
-    NoEffectHere = 11,
-}
-
-const REASONS: [(Reason, &str); 11] = [
-    (Reason::NonFinite, "non_finite"),
-    (Reason::OutOfRange, "out_of_range"),
-    (Reason::UnknownParticle, "unknown_particle"),
-    (Reason::UnknownConstraint, "unknown_constraint"),
-    (Reason::UnknownAnchor, "unknown_anchor"),
-    (Reason::UnknownCollider, "unknown_collider"),
-    (Reason::UnknownParameter, "unknown_parameter"),
-    (Reason::AlreadyTorn, "already_torn"),
-    (Reason::NotGrabbed, "not_grabbed"),
-    (Reason::GrabbedByOther, "grabbed_by_other"),
-    (Reason::NoEffectHere, "no_effect_here"),
-];
-
-impl Reason {
-    /// Its word in logs.
-    pub fn name(self) -> &'static str {
-        REASONS.iter().find(|(reason, _)| *reason == self).map_or("", |(_, name)| name)
-    }
-
-    /// The reason with that word.
-    pub fn from_name(name: &str) -> Option<Self> {
-        REASONS.iter().find(|(_, known)| *known == name).map(|(reason, _)| *reason)
-    }
-
-    /// The reason with that number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        REASONS.iter().find(|(reason, _)| *reason as u32 == number).map(|(reason, _)| *reason)
-    }
-}
-
 impl Outcome {
     /// The outcome of `command`: `Ok` is applied, `Err` rejected. `index` and `step` as in the
     /// fields of that name.
@@ -127,19 +67,5 @@ impl Outcome {
             None if self.reason == 0 => "",
             None => "unknown",
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_reason_has_one_name_and_one_number() {
-        for (reason, name) in REASONS {
-            assert_eq!(Reason::from_name(name), Some(reason));
-            assert_eq!(Reason::from_number(reason as u32), Some(reason));
-        }
-        assert_eq!(Reason::from_number(0), None);
     }
 }

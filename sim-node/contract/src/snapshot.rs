@@ -15,26 +15,11 @@ pub struct ParticleState {
     pub inverse_mass: f32,
     /// Velocity in m/s; 0 for pinned and frozen particles.
     pub velocity: [f32; 3],
-    /// [`ParticleFlags`] bits.
+    /// [`ParticleFlags`](crate::ParticleFlags) bits.
     pub flags: u32,
 }
 
 const _: () = assert!(size_of::<ParticleState>() == 32 && align_of::<ParticleState>() == 4);
-
-/// The bits of [`ParticleState::flags`]; all others are 0.
-#[derive(Debug)]
-pub struct ParticleFlags;
-
-impl ParticleFlags {
-    /// Held where it stands.
-    pub const PINNED: u32 = 1;
-    /// Driven to a client's target.
-    pub const GRABBED: u32 = 1 << 1;
-    /// Driven by an anchor's motion.
-    pub const ANCHORED: u32 = 1 << 2;
-    /// Taken out of the simulation because its state was no longer finite.
-    pub const FROZEN: u32 = 1 << 3;
-}
 
 /// The header of each `particles` sample: 104 bytes, alignment 8. The snapshot and the keyframe of
 /// one step are together the complete state of the solver after that step.

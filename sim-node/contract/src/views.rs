@@ -61,7 +61,9 @@ pub struct Torn {
 impl Torn {
     /// `causes` are those of the first constraints; behind them the causes are not known.
     pub(crate) fn new(header: &TearsHeader, torn: &[u32], causes: &[u8]) -> Self {
-        let cause = |place: usize| causes.get(place).copied().and_then(TearCause::from_number);
+        let cause = |place: usize| {
+            causes.get(place).copied().and_then(|cause| TearCause::from_number(cause.into()))
+        };
         let constraints = torn.iter().enumerate();
         let constraints = constraints.map(|(place, constraint)| TornConstraint {
             constraint: *constraint,

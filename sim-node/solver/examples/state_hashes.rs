@@ -9,7 +9,9 @@
 use std::error::Error;
 use std::thread;
 
-use sim_solver::{Ball, Grip, Pose, Push, SOLVER_VERSION, Scene, Setting, Solver, Sweep, builtin};
+use sim_solver::{
+    Ball, Grab, ParameterValue, Pose, Push, SOLVER_VERSION, Scene, Solver, Sweep, builtin,
+};
 
 /// The test scenes.
 const SCENES: [(&str, &str); 2] = [
@@ -56,12 +58,12 @@ fn run(scene: &Scene) -> u64 {
     solver.state_hash()
 }
 
-fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Rejection> {
+fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Reason> {
     let [x, y, _] = solver.particle(solver.particle_count() / 2).position;
     let ball = Ball { center: [x, y, 0.0], radius: 0.3 };
     let pose = Pose { translation: [0.1, 0.05, 0.0], rotation: [0.0, 0.0, 0.3, 1.0] };
     match step {
-        100 => solver.grab(1, Grip { particle: 20, target: [0.3, 0.7, 0.0], over_s: 0.2 }),
+        100 => solver.grab(1, Grab { particle: 20, target: [0.3, 0.7, 0.0], over_s: 0.2 }),
         300 => solver.pin(15),
         500 => solver.release(1, 20),
         700 => solver.push(Push { ball, delta: [0.01, 0.02, 0.0], limit: Some(0.015) }),
@@ -73,9 +75,9 @@ fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Rejection> 
         }),
         1500 => solver.move_anchor(0, pose),
         2000 => solver.move_collider(1, pose),
-        2500 => solver.set("gravity", Setting::Vector([0.5, -3.0, 0.0]), None),
-        3000 => solver.set("substeps", Setting::Number(4.0), None),
-        3500 => solver.set("wind_velocity", Setting::Vector([-4.0, 0.0, 0.0]), None),
+        2500 => solver.set("gravity", ParameterValue::Vector([0.5, -3.0, 0.0]), None),
+        3000 => solver.set("substeps", ParameterValue::Number(4.0), None),
+        3500 => solver.set("wind_velocity", ParameterValue::Vector([-4.0, 0.0, 0.0]), None),
         4000 => solver.unpin(15),
         5000 => solver.cut_radius(Ball { radius: 0.15, ..ball }),
         6000 => {

@@ -13,30 +13,7 @@ pub(crate) mod separation;
 pub(crate) mod tether_pull;
 pub(crate) mod tethers;
 
-use serde::{Deserialize, Serialize};
-
-/// What a constraint is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[repr(u32)]
-pub enum ConstraintKind {
-    /// Between direct neighbours.
-    #[default]
-    Structural = 0,
-    /// Across a diagonal.
-    Shear = 1,
-    /// Between next neighbours but one.
-    Bend = 2,
-    /// Acts only when longer than its rest length.
-    Tether = 3,
-}
-
-impl ConstraintKind {
-    /// The kind of that number, if there is one.
-    pub fn from_number(number: u32) -> Option<Self> {
-        [Self::Structural, Self::Shear, Self::Bend, Self::Tether].get(number as usize).copied()
-    }
-}
+use sim_types::ConstraintKind;
 
 /// A constraint as the scene defines it. Its index is its position in the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,8 +2,9 @@
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use crate::parameters::Context;
-use crate::{Rejection, check_finite, is_near};
+use sim_types::Reason;
+
+use crate::checks::{Context, check_finite, is_near};
 
 /// Where a frame is to be, against where it was at load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,14 +38,14 @@ impl Frame {
     }
 
     /// From what a client asks for; in 2-D a frame stays in the plane.
-    pub(crate) fn check(pose: &Pose, context: Context) -> Result<Self, Rejection> {
+    pub(crate) fn check(pose: &Pose, context: Context) -> Result<Self, Reason> {
         check_finite(&pose.translation)?;
         check_finite(&pose.rotation)?;
         let is_near = is_near(&pose.translation) && is_near(&pose.rotation);
         let [x, y, ..] = pose.rotation;
         let leaves_plane = pose.translation[2] != 0.0 || x != 0.0 || y != 0.0;
         if !is_near || pose.rotation == [0.0; 4] || (context.is_planar && leaves_plane) {
-            return Err(Rejection::OutOfRange);
+            return Err(Reason::OutOfRange);
         }
         Ok(Self::from_pose(pose))
     }

@@ -6,15 +6,15 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use glam::{Quat, Vec3};
+use sim_types::{ParticleFlags, TearCause};
 
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::frame::{Frame, Pose};
 use crate::hash::state_hash;
 use crate::parameters::Parameters;
-use crate::particles::{Particle, flag};
+use crate::particles::Particle;
 use crate::solver::{Due, Solver};
-use crate::step::drive::Grab;
-use crate::tear::TearCause;
+use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
 const KEYFRAME_VERSION: u32 = 2;
@@ -27,7 +27,7 @@ pub struct Keyframe {
     scene_step: u64,
     /// The masses that fixed particles have when nothing holds them, ascending by particle.
     fixed: Vec<FixedParticle>,
-    grabs: Vec<Grab>,
+    grabs: Vec<ActiveGrab>,
     /// Torn constraints in the order of tearing, and why each of them tore.
     torn: Vec<u32>,
     tear_causes: Vec<TearCause>,
@@ -251,6 +251,6 @@ impl Solver {
     }
 
     fn is_fixed(&self, particle: u32) -> bool {
-        self.particles.states[particle as usize].flags & flag::FIXED != 0
+        self.particles.states[particle as usize].flags & ParticleFlags::ALL != 0
     }
 }

@@ -5,11 +5,11 @@
 //! the result. The particles and the [`Keyframe`] of one step are together the complete state.
 //!
 //! ```
-//! use sim_solver::{Grip, Scene, Solver, builtin};
+//! use sim_solver::{Grab, Scene, Solver, builtin};
 //!
 //! let scene = Scene::from_toml(builtin::text("curtain").unwrap(), "curtain")?;
 //! let mut solver = Solver::new(&scene);
-//! solver.grab(7, Grip { particle: 90, target: [0.5, 0.2, 0.3], over_s: 0.1 })?;
+//! solver.grab(7, Grab { particle: 90, target: [0.5, 0.2, 0.3], over_s: 0.1 })?;
 //! for _ in 0..240 {
 //!     solver.step();
 //! }
@@ -25,10 +25,10 @@
 )]
 
 pub mod builtin;
+mod checks;
 mod commands;
 mod constraints;
 mod contacts;
-mod cut;
 mod frame;
 mod hash;
 mod kernels;
@@ -41,20 +41,23 @@ mod step;
 mod store;
 mod tear;
 
-pub use commands::{COORDINATE_MAX, GRAB_OVER_S_MAX, Grip, Push, Rejection};
-pub(crate) use commands::{check_finite, is_near};
-pub use constraints::{Constraint, ConstraintKind};
+pub use commands::apply::{Applied, Control};
+pub use commands::cut::{Ball, Sweep};
+pub use commands::{Grab, Push};
+pub use constraints::Constraint;
 pub use contacts::colliders::PlacedCollider;
-pub use cut::{Ball, Sweep};
 pub use frame::Pose;
 pub use kernels::Kernels;
 pub use kernels::worker_pool::THREADS_MAX;
 pub use keyframe::{Keyframe, KeyframeError, RestoreError};
-pub use parameters::{PARAMETERS, Setting};
-pub use particles::{Particle, flag};
-pub use scene::{ColliderShape, Method, Scene, SceneError, SolverSettings};
+pub use particles::Particle;
+pub use scene::{ColliderShape, Scene, SceneError, SolverSettings};
+pub use sim_types::{
+    Action, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter, ParameterValue,
+    ParameterValues, ParticleFlags, Reason, TearCause,
+};
 pub use solver::Solver;
-pub use tear::TearCause;
+pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes with any change of the bits that a step produces, and a
 /// recording is re-simulated only by the version that made it.

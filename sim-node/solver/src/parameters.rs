@@ -1,45 +1,15 @@
-//! What can be changed while a scene runs.
+//! The parameters that can change while a scene runs.
 
 use serde::{Deserialize, Serialize};
+use sim_types::{
+    ConstraintKind, Method, OffMeaning, Parameter, ParameterInfo, ParameterValue, ParameterValues,
+    PerKind, Reason, ValueForm,
+};
 
-use crate::constraints::ConstraintKind;
-use crate::scene::{Limits, Method, PASSES_MAX, Range32, Scene, Wind};
-use crate::{Rejection, is_near};
+use crate::checks::{Context, is_near};
+use crate::scene::{Limits, Scene, Wind};
 
-/// A new value for a parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Setting {
-    /// None: no limit, no damping, no wind.
-    Off,
-    /// A number.
-    Number(f32),
-    /// Three numbers.
-    Vector([f32; 3]),
-}
-
-/// The names of everything that [`crate::Solver::set`] knows.
-pub const PARAMETERS: [&str; 15] = [
-    "gravity",
-    "damping",
-    "wind_velocity",
-    "wind_drag",
-    "substeps",
-    "iterations",
-    "relaxation",
-    "max_stretch",
-    "tear_stretch",
-    "tear_distance",
-    "tear_force",
-    "max_speed",
-    "time_scale",
-    "compliance",
-    "stiffness",
-];
-
-/// The slowest and the fastest pace of a node, as multiples of real time.
-const TIME_SCALE: std::ops::RangeInclusive<f32> = 1e-3..=1e3;
-
-/// What can be changed while a scene runs. Part of the state: a keyframe holds it.
+/// Values that can change while a scene runs. Part of the state, and of a keyframe.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
     pub(crate) gravity: [f32; 3],
@@ -54,25 +24,20 @@ pub(crate) struct Parameters {
     tear_stretch: Option<f32>,
     tear_distance: Option<f32>,
     tear_force: Option<f32>,
-    /// By kind: the softness that all constraints of that kind have instead of their own.
+    /// By kind: softness that replaces that of every constraint of the kind.
     softness: [Option<f32>; 4],
 }
 
-/// What a value is checked against.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Context {
-    pub(crate) method: Method,
-    pub(crate) is_planar: bool,
-}
-
-/// What has to be worked out again after a parameter was set.
+/// Derived state that a parameter affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Affected {
-    /// Nothing: the step reads it as it is.
+    /// None: the step reads the parameter itself.
     Nothing,
-    /// What constraints derive from it.
+    /// The limits of constraints.
+    Limits,
+    /// All parameters of constraints.
     Constraints,
-    /// That, and which paths are rigid.
+    /// All parameters of constraints, and the tethers, whose paths consist of rigid constraints.
     RigidPaths,
 }
 
@@ -80,7 +45,7 @@ impl Parameters {
     pub(crate) fn new(scene: &Scene) -> Self {
         let solver = &scene.solver;
         let limits = solver.limits;
-        // Without a block of its own, air is not felt.
+        // A scene without a wind block has no air drag.
         let wind = scene.wind.unwrap_or(Wind { drag: 0.0, ..Wind::default() });
         Self {
             gravity: scene.gravity,
@@ -99,167 +64,172 @@ impl Parameters {
         }
     }
 
-    /// The scene's limits as they are now.
+    /// Current limits of constraints without limits of their own.
     pub(crate) fn limits(&self) -> Limits {
         let Self { max_stretch, tear_stretch, tear_distance, tear_force, .. } = *self;
         Limits { max_stretch, tear_stretch, tear_distance, tear_force }
     }
 
-    /// The softness of a constraint of that kind whose own is `own`.
+    /// Softness of a constraint of a kind, where `own` is its softness in the scene.
     pub(crate) fn softness(&self, kind: ConstraintKind, own: f32) -> f32 {
         self.softness[kind as usize].unwrap_or(own)
     }
 
-    /// Sets one parameter; a wrong value changes nothing.
+    /// Sets one parameter. A wrong value changes nothing.
     pub(crate) fn set(
         &mut self,
         name: &str,
-        setting: Setting,
+        value: ParameterValue,
         kind: Option<ConstraintKind>,
         context: Context,
-    ) -> Result<Affected, Rejection> {
-        if !PARAMETERS.contains(&name) {
-            return Err(Rejection::UnknownParameter);
+    ) -> Result<Affected, Reason> {
+        let parameter = Parameter::from_name(name).ok_or(Reason::UnknownParameter)?;
+        let info = parameter.info();
+        check_finite(value)?;
+        if kind.is_some() && !info.is_per_kind {
+            return Err(Reason::OutOfRange);
         }
-        check_finite(setting)?;
-        let is_softness = matches!(name, "compliance" | "stiffness");
-        if kind.is_some() && !is_softness {
-            return Err(Rejection::OutOfRange);
+        if info.is_per_kind && parameter != softness_parameter(context.method) {
+            return Err(Reason::NoEffectHere);
         }
-        match name {
-            "gravity" => self.gravity = vector(setting, context)?,
-            "wind_velocity" => self.wind_velocity = vector(setting, context)?,
-            "damping" => self.damping = number_or_zero(setting, Range32::AT_LEAST_ZERO)?,
-            "wind_drag" => self.wind_drag = number_or_zero(setting, Range32::AT_LEAST_ZERO)?,
-            "relaxation" => self.relaxation = number(setting, Range32::RELAXATION)?,
-            "max_speed" => self.max_speed = number(setting, Range32::POSITIVE)?,
-            "time_scale" => check_time_scale(setting)?,
-            "substeps" => self.substeps = whole(setting)?,
-            "iterations" => self.iterations = whole(setting)?,
-            "max_stretch" => self.max_stretch = limit(setting, Range32::RATIO)?,
-            "tear_stretch" => self.tear_stretch = limit(setting, Range32::RATIO)?,
-            "tear_distance" => self.tear_distance = limit(setting, Range32::DISTANCE_LIMIT)?,
-            "tear_force" => self.tear_force = limit(setting, Range32::FORCE_LIMIT)?,
-            _ => self.set_softness(name, setting, kind, context.method)?,
-        }
-        Ok(match name {
-            "compliance" | "stiffness" => Affected::RigidPaths,
-            "substeps" | "iterations" | "relaxation" | "wind_drag" => Affected::Constraints,
-            "max_stretch" | "tear_stretch" | "tear_distance" | "tear_force" => {
-                Affected::Constraints
-            }
-            _ => Affected::Nothing,
+        check_value(info, value, context)?;
+        self.store(parameter, value, kind);
+        Ok(match parameter {
+            Parameter::Compliance | Parameter::Stiffness => Affected::RigidPaths,
+            Parameter::Gravity
+            | Parameter::Damping
+            | Parameter::WindVelocity
+            | Parameter::MaxSpeed
+            | Parameter::TimeScale => Affected::Nothing,
+            Parameter::MaxStretch
+            | Parameter::TearStretch
+            | Parameter::TearDistance
+            | Parameter::TearForce => Affected::Limits,
+            Parameter::Substeps
+            | Parameter::Iterations
+            | Parameter::Relaxation
+            | Parameter::WindDrag => Affected::Constraints,
         })
     }
 
-    fn set_softness(
-        &mut self,
-        name: &str,
-        setting: Setting,
-        kind: Option<ConstraintKind>,
-        method: Method,
-    ) -> Result<(), Rejection> {
-        let (own, range) = match method {
-            Method::Xpbd => ("compliance", Range32::COMPLIANCE),
-            Method::Pbd => ("stiffness", Range32::SHARE),
+    /// Stores a checked value.
+    fn store(&mut self, parameter: Parameter, value: ParameterValue, kind: Option<ConstraintKind>) {
+        let number = match value {
+            ParameterValue::Number(number) => Some(number),
+            ParameterValue::Vector(_) | ParameterValue::Off => None,
         };
-        // The other one means nothing with this method.
-        if name != own {
-            return Err(Rejection::NoEffectHere);
+        let vector = match value {
+            ParameterValue::Vector(vector) => vector,
+            ParameterValue::Number(_) | ParameterValue::Off => [0.0; 3],
+        };
+        let or_zero = number.unwrap_or(0.0);
+        match parameter {
+            Parameter::Gravity => self.gravity = vector,
+            Parameter::WindVelocity => self.wind_velocity = vector,
+            Parameter::Damping => self.damping = or_zero,
+            Parameter::WindDrag => self.wind_drag = or_zero,
+            Parameter::Relaxation => self.relaxation = or_zero,
+            Parameter::MaxSpeed => self.max_speed = or_zero,
+            Parameter::Substeps => self.substeps = to_count(or_zero),
+            Parameter::Iterations => self.iterations = to_count(or_zero),
+            Parameter::MaxStretch => self.max_stretch = number,
+            Parameter::TearStretch => self.tear_stretch = number,
+            Parameter::TearDistance => self.tear_distance = number,
+            Parameter::TearForce => self.tear_force = number,
+            Parameter::Compliance | Parameter::Stiffness => match kind {
+                Some(kind) => self.softness[kind as usize] = number,
+                None => self.softness = [number; 4],
+            },
+            // The pace belongs to the node. It is checked here, so that every program refuses the
+            // same values.
+            Parameter::TimeScale => {}
         }
-        let value = Some(number(setting, range)?);
-        match kind {
-            Some(kind) => self.softness[kind as usize] = value,
-            None => self.softness = [value; 4],
-        }
-        Ok(())
     }
 
-    /// Whether a scene of that method and dimension can have these.
+    /// All values, with the time scale of a node at real time.
+    pub(crate) fn values(&self, method: Method) -> ParameterValues {
+        let [structural, shear, bend, tether] = self.softness;
+        let softness = PerKind { structural, shear, bend, tether };
+        let (compliance, stiffness) = match method {
+            Method::Xpbd => (softness, PerKind::default()),
+            Method::Pbd => (PerKind::default(), softness),
+        };
+        ParameterValues {
+            gravity: self.gravity,
+            damping: self.damping,
+            wind_velocity: self.wind_velocity,
+            wind_drag: self.wind_drag,
+            substeps: self.substeps,
+            iterations: self.iterations,
+            relaxation: self.relaxation,
+            max_stretch: self.max_stretch,
+            tear_stretch: self.tear_stretch,
+            tear_distance: self.tear_distance,
+            tear_force: self.tear_force,
+            max_speed: self.max_speed,
+            time_scale: 1.0,
+            compliance,
+            stiffness,
+        }
+    }
+
+    /// Returns `true` if a scene of this method and dimension can have these values.
     pub(crate) fn is_valid(&self, context: Context) -> bool {
-        let softness = match context.method {
-            Method::Xpbd => Range32::COMPLIANCE,
-            Method::Pbd => Range32::SHARE,
-        };
-        let passes = 1..=PASSES_MAX;
-        let is_limit = |limit: Option<f32>, range: Range32| limit.is_none_or(|one| range.has(one));
-        is_vector(self.gravity, context)
-            && is_vector(self.wind_velocity, context)
-            && is_number(self.damping, Range32::AT_LEAST_ZERO)
-            && is_number(self.wind_drag, Range32::AT_LEAST_ZERO)
-            && is_number(self.relaxation, Range32::RELAXATION)
-            && is_number(self.max_speed, Range32::POSITIVE)
-            && passes.contains(&self.substeps)
-            && passes.contains(&self.iterations)
-            && is_limit(self.max_stretch, Range32::RATIO)
-            && is_limit(self.tear_stretch, Range32::RATIO)
-            && is_limit(self.tear_distance, Range32::DISTANCE_LIMIT)
-            && is_limit(self.tear_force, Range32::FORCE_LIMIT)
-            && self.softness.iter().all(|one| is_limit(*one, softness))
+        let softness = softness_parameter(context.method);
+        self.values(context.method).settings().iter().all(|setting| {
+            let is_own_softness = setting.parameter == softness;
+            let is_other_softness = setting.parameter.info().is_per_kind && !is_own_softness;
+            let is_unset = setting.value == ParameterValue::Off;
+            is_other_softness
+                || (is_own_softness && is_unset)
+                || (check_finite(setting.value).is_ok()
+                    && check_value(setting.parameter.info(), setting.value, context).is_ok())
+        })
     }
 }
 
-fn check_finite(setting: Setting) -> Result<(), Rejection> {
-    let is_finite = match setting {
-        Setting::Off => true,
-        Setting::Number(number) => number.is_finite(),
-        Setting::Vector(vector) => vector.iter().all(|axis| axis.is_finite()),
+/// The parameter that sets the softness of constraints.
+fn softness_parameter(method: Method) -> Parameter {
+    match method {
+        Method::Xpbd => Parameter::Compliance,
+        Method::Pbd => Parameter::Stiffness,
+    }
+}
+
+fn check_finite(value: ParameterValue) -> Result<(), Reason> {
+    let is_finite = match value {
+        ParameterValue::Off => true,
+        ParameterValue::Number(number) => number.is_finite(),
+        ParameterValue::Vector(vector) => vector.iter().all(|axis| axis.is_finite()),
     };
-    if is_finite { Ok(()) } else { Err(Rejection::NonFinite) }
+    if is_finite { Ok(()) } else { Err(Reason::NonFinite) }
 }
 
-fn is_number(number: f32, range: Range32) -> bool {
-    number.is_finite() && range.has(number)
+/// Checks the form and the range of a finite value against the table of parameters.
+fn check_value(
+    info: &ParameterInfo,
+    value: ParameterValue,
+    context: Context,
+) -> Result<(), Reason> {
+    let is_allowed = match (info.form, value) {
+        (_, ParameterValue::Off) => matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit),
+        (ValueForm::Number, ParameterValue::Number(number)) => info.range.contains(number),
+        (ValueForm::Whole, ParameterValue::Number(number)) => {
+            number.fract() == 0.0 && info.range.contains(number)
+        }
+        (ValueForm::Vector, ParameterValue::Vector(vector)) => {
+            is_near(&vector) && (!context.is_planar || vector[2] == 0.0)
+        }
+        _ => false,
+    };
+    if is_allowed { Ok(()) } else { Err(Reason::OutOfRange) }
 }
 
-fn is_vector(vector: [f32; 3], context: Context) -> bool {
-    vector.iter().all(|axis| axis.is_finite())
-        && is_near(&vector)
-        && (!context.is_planar || vector[2] == 0.0)
-}
-
-fn number(setting: Setting, range: Range32) -> Result<f32, Rejection> {
-    match setting {
-        Setting::Number(number) if range.has(number) => Ok(number),
-        _ => Err(Rejection::OutOfRange),
-    }
-}
-
-fn number_or_zero(setting: Setting, range: Range32) -> Result<f32, Rejection> {
-    if setting == Setting::Off { Ok(0.0) } else { number(setting, range) }
-}
-
-fn limit(setting: Setting, range: Range32) -> Result<Option<f32>, Rejection> {
-    if setting == Setting::Off { Ok(None) } else { number(setting, range).map(Some) }
-}
-
-fn vector(setting: Setting, context: Context) -> Result<[f32; 3], Rejection> {
-    match setting {
-        Setting::Off => Ok([0.0; 3]),
-        Setting::Vector(vector) if is_vector(vector, context) => Ok(vector),
-        _ => Err(Rejection::OutOfRange),
-    }
-}
-
-fn whole(setting: Setting) -> Result<u32, Rejection> {
-    let Setting::Number(number) = setting else { return Err(Rejection::OutOfRange) };
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "compared with the number that it came from"
-    )]
-    let whole = number as u32;
-    if whole as f32 == number && (1..=PASSES_MAX).contains(&whole) {
-        Ok(whole)
-    } else {
-        Err(Rejection::OutOfRange)
-    }
-}
-
-/// The pace is the node's: here it is only checked, so that it is refused everywhere alike.
-fn check_time_scale(setting: Setting) -> Result<(), Rejection> {
-    match setting {
-        Setting::Number(number) if TIME_SCALE.contains(&number) => Ok(()),
-        _ => Err(Rejection::OutOfRange),
-    }
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a checked count is a whole number from 1 to 1000"
+)]
+fn to_count(number: f32) -> u32 {
+    number as u32
 }

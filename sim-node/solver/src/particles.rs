@@ -1,6 +1,7 @@
 //! The state of the particles, as it is published between two steps.
 
 use bytemuck::{Pod, Zeroable};
+use sim_types::ParticleFlags;
 
 use crate::scene::SceneParticle;
 
@@ -14,27 +15,11 @@ pub struct Particle {
     pub inverse_mass: f32,
     /// Velocity per second; 0 for pinned and frozen particles.
     pub velocity: [f32; 3],
-    /// Bits of [`flag`].
+    /// Bits of [`ParticleFlags`].
     pub flags: u32,
 }
 
 const _: () = assert!(size_of::<Particle>() == 32);
-
-/// The bits of [`Particle::flags`].
-pub mod flag {
-    /// Held where it stands.
-    pub const PINNED: u32 = 1;
-    /// Driven to a client's target.
-    pub const GRABBED: u32 = 1 << 1;
-    /// Driven by an anchor's motion.
-    pub const ANCHORED: u32 = 1 << 2;
-    /// Taken out because its state was no longer finite.
-    pub const FROZEN: u32 = 1 << 3;
-    /// All that this version can set.
-    pub(crate) const KNOWN: u32 = PINNED | GRABBED | ANCHORED | FROZEN;
-    /// With any of these, the step uses inverse mass 0.
-    pub(crate) const FIXED: u32 = PINNED | GRABBED | ANCHORED | FROZEN;
-}
 
 /// All particles between two steps, `particle_count` entries in each array.
 #[derive(Debug, Clone)]
@@ -52,11 +37,11 @@ impl Particles {
             position: one.position.map(|axis| axis + 0.0),
             inverse_mass: 0.0,
             velocity: one.velocity.map(|axis| axis + 0.0),
-            flags: if one.pinned { flag::PINNED } else { 0 },
+            flags: if one.pinned { ParticleFlags::PINNED } else { 0 },
         };
         let mut states: Vec<_> = scene.iter().map(state).collect();
         for particle in anchored {
-            states[particle as usize].flags = flag::ANCHORED;
+            states[particle as usize].flags = ParticleFlags::ANCHORED;
         }
         let base_inverse_masses: Vec<_> = scene.iter().map(|one| 1.0 / one.mass).collect();
         for (state, base) in states.iter_mut().zip(&base_inverse_masses) {
@@ -69,7 +54,7 @@ impl Particles {
     pub(crate) fn change_flags(&mut self, index: usize, set: u32, clear: u32) {
         let state = &mut self.states[index];
         state.flags = (state.flags | set) & !clear;
-        let is_fixed = state.flags & flag::FIXED != 0;
+        let is_fixed = state.flags & ParticleFlags::ALL != 0;
         state.inverse_mass = if is_fixed { 0.0 } else { self.base_inverse_masses[index] };
     }
 

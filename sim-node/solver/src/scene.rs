@@ -22,9 +22,9 @@ mod wind;
 
 use serde::{Deserialize, Serialize};
 
-use crate::constraints::ConstraintKind;
+use sim_types::{ConstraintKind, Method};
+
 pub use anchor::{SceneAnchor, Waypoint};
-pub(crate) use check::Range32;
 pub use collider::{ColliderShape, SceneCollider};
 pub use error::SceneError;
 pub use generate::{
@@ -166,18 +166,6 @@ impl SolverSettings {
 #[allow(clippy::cast_possible_truncation, reason = "the one rounding to the solver's f32")]
 pub(crate) fn substep_length(rate_hz: u32, substeps: u32) -> f32 {
     (1.0 / (f64::from(rate_hz) * f64::from(substeps))) as f32
-}
-
-/// What the softness of a constraint means; its number is the one in headers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[repr(u32)]
-pub enum Method {
-    /// Compliance in m/N: the same stretch at every rate.
-    #[default]
-    Xpbd = 0,
-    /// Stiffness 0..=1: the share of the error that the passes of a substep take away.
-    Pbd = 1,
 }
 
 /// The order in which constraints are projected.

@@ -1,5 +1,8 @@
 //! The running state of a scene.
 
+use sim_types::{ParameterValues, TearCause};
+
+use crate::checks::Context;
 use crate::constraints::Constraint;
 use crate::constraints::builder::{ConstraintBuilder, Setup};
 use crate::constraints::order::ProjectionOrder;
@@ -12,10 +15,10 @@ use crate::parameters::Parameters;
 use crate::particles::{Particle, Particles};
 use crate::scene::{Model, Scene, SceneAnchor, SolverSettings, substep_length};
 use crate::step::anchors::Anchors;
-use crate::step::drive::Grab;
+use crate::step::drive::ActiveGrab;
 use crate::step::wind::Air;
 use crate::store::{Configured, ParticleStore, SceneFields};
-use crate::tear::{TearCause, Torn};
+use crate::tear::Torn;
 
 /// A running scene.
 ///
@@ -46,7 +49,7 @@ pub struct Solver {
     scene_anchors: Vec<SceneAnchor>,
     pub(crate) air: Air,
     /// Ascending by particle.
-    pub(crate) grabs: Vec<Grab>,
+    pub(crate) grabs: Vec<ActiveGrab>,
     pub(crate) scene_step: u64,
     /// Derived state that commands of this boundary have made out of date.
     pub(crate) due: Due,
@@ -63,6 +66,8 @@ pub struct Solver {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
     pub(crate) constraints: bool,
+    /// Only the limits of constraints.
+    pub(crate) limits: bool,
     pub(crate) tethers: bool,
 }
 
@@ -99,7 +104,7 @@ impl Solver {
             // Room for every particle, so that a grab does not allocate.
             grabs: Vec::with_capacity(particle_count),
             scene_step: 0,
-            due: Due { constraints: true, tethers: true },
+            due: Due { constraints: true, tethers: true, ..Due::default() },
             is_restored: false,
             frozen_count: 0,
             model,
@@ -142,7 +147,7 @@ impl Solver {
             collider.moved = None;
             collider.place(0.0);
         }
-        self.due = Due { constraints: true, tethers: true };
+        self.due = Due { constraints: true, tethers: true, ..Due::default() };
         self.is_restored = true;
     }
 
@@ -150,9 +155,11 @@ impl Solver {
     /// steps in real time calls it after the commands; otherwise the next step does, and then may
     /// allocate.
     pub fn finish_boundary(&mut self) {
-        let Due { constraints, tethers } = std::mem::take(&mut self.due);
+        let Due { constraints, limits, tethers } = std::mem::take(&mut self.due);
         if constraints {
             self.configure();
+        } else if limits {
+            self.configure_limits();
         }
         if tethers {
             self.derive_tethers();
@@ -162,14 +169,30 @@ impl Solver {
     /// Derives the constraints from the parameters.
     pub(crate) fn configure(&mut self) {
         let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
-        let fields = SceneFields {
+        let configured = self.store.configure(&builder, self.scene_fields(), self.torn.all());
+        self.follow_particles(configured);
+    }
+
+    /// Derives the limits of the constraints from the parameters.
+    fn configure_limits(&mut self) {
+        let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
+        let configured =
+            self.store.configure_limits(&builder, self.scene_fields(), self.torn.all());
+        self.follow_particles(configured);
+    }
+
+    fn scene_fields(&self) -> SceneFields {
+        SceneFields {
             colliders: !self.colliders.is_empty(),
             wind: self.air.has_surface() && self.parameters.wind_drag > 0.0,
             tethers: self.settings.tethers,
-        };
-        let configured = self.store.configure(&builder, fields, self.torn.all());
+        }
+    }
+
+    /// Updates the locations of particles after a change of the layout.
+    fn follow_particles(&mut self, configured: Configured) {
         if configured == Configured::Moved {
-            if fields.wind || self.air.is_located() {
+            if self.scene_fields().wind || self.air.is_located() {
                 self.air.locate_corners(&self.store);
             }
             self.tethers.attach(&mut self.store, &self.particles);
@@ -200,6 +223,25 @@ impl Solver {
     /// Length of a substep in seconds.
     pub(crate) fn h(&self) -> f32 {
         substep_length(self.settings.rate_hz, self.parameters.substeps)
+    }
+
+    /// Properties against which parameters and poses are checked.
+    pub(crate) fn context(&self) -> Context {
+        Context { method: self.settings.method, is_planar: self.is_planar }
+    }
+
+    /// Number of steps that a grab of `over_s` seconds takes, rounded up, at least one. A time that
+    /// differs from whole steps only by its rounding to f32 counts as those: 1/60 s at 240 Hz is 4
+    /// steps, not 5.
+    pub(crate) fn grab_steps(&self, over_s: f32) -> u32 {
+        let steps = f64::from(over_s) * f64::from(self.settings.rate_hz) * (1.0 - 1e-7);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 <= over_s <= 0.25 and rate <= 1e5: at most 25,000"
+        )]
+        let steps = steps.ceil() as u32;
+        steps.max(1)
     }
 
     /// Length of a step in seconds.
@@ -275,6 +317,12 @@ impl Solver {
     /// Returns the number of entries at the end of [`Self::torn`] that the last step added.
     pub fn new_torn_count(&self) -> usize {
         self.torn.new_count()
+    }
+
+    /// Returns the current parameters. The pace belongs to the node, so the time scale is always that
+    /// of real time.
+    pub fn parameter_values(&self) -> ParameterValues {
+        self.parameters.values(self.settings.method)
     }
 
     /// Returns the number of colliders.

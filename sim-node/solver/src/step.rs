@@ -11,6 +11,8 @@ pub(crate) mod stage;
 pub(crate) mod substep;
 pub(crate) mod wind;
 
+use sim_types::ParticleFlags;
+
 use drive::{count_step, drive_grabbed};
 use prediction::Prediction;
 use stage::Stage;
@@ -21,7 +23,6 @@ use crate::constraints::builder::ConstraintBuilder;
 use crate::contacts::contact_substep::{ContactSubstep, Interval};
 use crate::contacts::obstacle::place_obstacles;
 use crate::hash::state_hash;
-use crate::particles::flag;
 use crate::solver::Solver;
 
 impl Solver {
@@ -167,7 +168,8 @@ impl Solver {
         if frozen_count > 0 {
             self.frozen_count += frozen_count;
             let states = &self.particles.states;
-            self.grabs.retain(|grab| states[grab.particle as usize].flags & flag::GRABBED != 0);
+            self.grabs
+                .retain(|grab| states[grab.particle as usize].flags & ParticleFlags::GRABBED != 0);
         }
     }
 

@@ -1,22 +1,8 @@
 //! What is torn, why, and what tears in the running step.
 
 use bytemuck::cast_slice;
-use serde::{Deserialize, Serialize};
+use sim_types::TearCause;
 use xxhash_rust::xxh3::xxh3_64;
-
-/// Why a constraint tore.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[repr(u8)]
-pub enum TearCause {
-    /// Its force exceeded `tear_force`.
-    Force = 0,
-    /// Its length exceeded `tear_stretch` times its rest length.
-    Stretch = 1,
-    /// Its length exceeded its rest length by more than `tear_distance`.
-    Distance = 2,
-    /// A command cut it.
-    Cut = 3,
-}
 
 /// What is torn since the load. Room for every constraint is made at the load, so that a step
 /// which tears allocates nothing.

@@ -169,7 +169,7 @@ fn the_tearable_cloth_hangs_whole_and_tears_where_it_is_pulled() {
     for pull in 1..=3_u8 {
         let [x, y, _] = solver.particle(lowest).position;
         let target = [x, y + 150.0 * f32::from(pull), 0.0];
-        let grip = sim_solver::Grip { particle: 32 * 121 + 60, target, over_s: 0.25 };
+        let grip = sim_solver::Grab { particle: 32 * 121 + 60, target, over_s: 0.25 };
         solver.grab(1, grip).unwrap();
         for _ in 0..15 {
             solver.step();
@@ -210,7 +210,7 @@ fn the_web_the_bridge_and_the_flag_hang_and_move() {
     assert!(sag > 0.1 && sag < 0.8, "the middle sags by {sag}");
     // In still air it comes to rest; in gusts, it does not.
     let (in_gusts, mut calm) = (after("rope-bridge", 240 * 60), Solver::new(&scene("rope-bridge")));
-    calm.set("wind_drag", sim_solver::Setting::Off, None).unwrap();
+    calm.set("wind_drag", sim_solver::ParameterValue::Off, None).unwrap();
     (0..240 * 60).for_each(|_| calm.step());
     let (moving, still) = (range_of_height(in_gusts), range_of_height(calm));
     assert!(moving > 0.02 && still < 0.005, "{moving} m in gusts, {still} m in still air");

@@ -1,7 +1,7 @@
 //! Commands on the state: what they do, and that a rejected one changes no bit.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{Grip, Particle, Rejection, Scene, Solver, builtin, flag};
+use sim_solver::{Grab, Particle, ParticleFlags, Reason, Scene, Solver, builtin};
 
 const CLIENT: u64 = 7;
 
@@ -16,8 +16,8 @@ fn one_particle(extra: &str) -> Solver {
     Solver::new(&Scene::from_toml(&text, "test").unwrap())
 }
 
-fn grip(particle: u32, target: [f32; 3]) -> Grip {
-    Grip { particle, target, over_s: 1.0 / 60.0 }
+fn grip(particle: u32, target: [f32; 3]) -> Grab {
+    Grab { particle, target, over_s: 1.0 / 60.0 }
 }
 
 fn step(solver: &mut Solver, steps: u32) {
@@ -41,7 +41,10 @@ fn a_pinned_particle_stands_bit_for_bit_and_falls_from_rest_when_unpinned() {
     step(&mut solver, 100);
     let pinned = solver.particle(90);
     assert_eq!(pinned.position, before.position);
-    assert_eq!((pinned.velocity, pinned.inverse_mass, pinned.flags), ([0.0; 3], 0.0, flag::PINNED));
+    assert_eq!(
+        (pinned.velocity, pinned.inverse_mass, pinned.flags),
+        ([0.0; 3], 0.0, ParticleFlags::PINNED)
+    );
     solver.unpin(90).unwrap();
     assert_eq!(solver.particle(90).velocity, [0.0; 3]);
     assert_eq!(solver.particle(90).inverse_mass, before.inverse_mass);
@@ -60,7 +63,7 @@ fn a_grab_reaches_its_target_in_whole_steps_in_a_straight_line() {
         }
     }
     assert_eq!(solver.particle(0).position, [0.4, -0.8, 1.2]);
-    assert_eq!(solver.particle(0).flags, flag::GRABBED);
+    assert_eq!(solver.particle(0).flags, ParticleFlags::GRABBED);
     step(&mut solver, 10);
     assert_eq!(solver.particle(0).position, [0.4, -0.8, 1.2]);
     assert_eq!(solver.particle(0).velocity, [0.0; 3]);
@@ -99,25 +102,25 @@ fn a_pinned_particle_can_be_carried_and_stays_where_it_is_let_go() {
     let mut solver = curtain();
     solver.grab(CLIENT, grip(0, [-0.6, 1.2, 0.1])).unwrap();
     step(&mut solver, 8);
-    assert_eq!(solver.particle(0).flags, flag::PINNED | flag::GRABBED);
+    assert_eq!(solver.particle(0).flags, ParticleFlags::PINNED | ParticleFlags::GRABBED);
     solver.release(CLIENT, 0).unwrap();
     step(&mut solver, 50);
     assert_eq!(solver.particle(0).position, [-0.6, 1.2, 0.1]);
-    assert_eq!(solver.particle(0).flags, flag::PINNED);
+    assert_eq!(solver.particle(0).flags, ParticleFlags::PINNED);
 }
 
 #[test]
 fn only_the_client_that_holds_a_particle_moves_and_releases_it() {
     let mut solver = curtain();
-    assert_eq!(solver.release(CLIENT, 5), Err(Rejection::NotGrabbed));
-    assert_eq!(solver.move_grabbed(CLIENT, grip(5, [0.0; 3])), Err(Rejection::NotGrabbed));
+    assert_eq!(solver.release(CLIENT, 5), Err(Reason::NotGrabbed));
+    assert_eq!(solver.move_grabbed(CLIENT, grip(5, [0.0; 3])), Err(Reason::NotGrabbed));
     solver.grab(CLIENT, grip(5, [0.0; 3])).unwrap();
     for other in [
         solver.grab(8, grip(5, [0.0; 3])),
         solver.move_grabbed(8, grip(5, [0.0; 3])),
         solver.release(8, 5),
     ] {
-        assert_eq!(other, Err(Rejection::GrabbedByOther));
+        assert_eq!(other, Err(Reason::GrabbedByOther));
     }
     solver.release(CLIENT, 5).unwrap();
 }
@@ -128,21 +131,21 @@ fn a_rejected_command_changes_no_bit_of_the_future() {
     solver.grab(CLIENT, grip(90, [0.1, 0.2, 0.3])).unwrap();
     step(&mut solver, 3);
     let mut untouched = solver.clone();
-    let long = Grip { over_s: 0.26, ..grip(9, [0.0; 3]) };
-    let backwards = Grip { over_s: -0.1, ..long };
-    let timeless = Grip { over_s: f32::NAN, ..long };
+    let long = Grab { over_s: 0.26, ..grip(9, [0.0; 3]) };
+    let backwards = Grab { over_s: -0.1, ..long };
+    let timeless = Grab { over_s: f32::NAN, ..long };
     let rejected = [
-        (solver.pin(168), Rejection::UnknownParticle),
-        (solver.unpin(u32::MAX), Rejection::UnknownParticle),
-        (solver.grab(CLIENT, grip(168, [0.0; 3])), Rejection::UnknownParticle),
-        (solver.grab(CLIENT, grip(9, [f32::NAN, 0.0, 0.0])), Rejection::NonFinite),
-        (solver.grab(CLIENT, grip(9, [0.0, f32::INFINITY, 0.0])), Rejection::NonFinite),
-        (solver.grab(CLIENT, grip(9, [0.0, 0.0, 1.1e7])), Rejection::OutOfRange),
-        (solver.grab(CLIENT, long), Rejection::OutOfRange),
-        (solver.grab(CLIENT, backwards), Rejection::OutOfRange),
-        (solver.grab(CLIENT, timeless), Rejection::NonFinite),
-        (solver.move_grabbed(CLIENT, grip(90, [f32::NAN; 3])), Rejection::NonFinite),
-        (solver.release(CLIENT, 91), Rejection::NotGrabbed),
+        (solver.pin(168), Reason::UnknownParticle),
+        (solver.unpin(u32::MAX), Reason::UnknownParticle),
+        (solver.grab(CLIENT, grip(168, [0.0; 3])), Reason::UnknownParticle),
+        (solver.grab(CLIENT, grip(9, [f32::NAN, 0.0, 0.0])), Reason::NonFinite),
+        (solver.grab(CLIENT, grip(9, [0.0, f32::INFINITY, 0.0])), Reason::NonFinite),
+        (solver.grab(CLIENT, grip(9, [0.0, 0.0, 1.1e7])), Reason::OutOfRange),
+        (solver.grab(CLIENT, long), Reason::OutOfRange),
+        (solver.grab(CLIENT, backwards), Reason::OutOfRange),
+        (solver.grab(CLIENT, timeless), Reason::NonFinite),
+        (solver.move_grabbed(CLIENT, grip(90, [f32::NAN; 3])), Reason::NonFinite),
+        (solver.release(CLIENT, 91), Reason::NotGrabbed),
     ];
     for (result, reason) in rejected {
         assert_eq!(result, Err(reason));
@@ -156,7 +159,7 @@ fn a_rejected_command_changes_no_bit_of_the_future() {
 #[test]
 fn in_two_dimensions_a_target_off_the_plane_is_out_of_range() {
     let mut solver = one_particle("dimensions = 2");
-    assert_eq!(solver.grab(CLIENT, grip(0, [0.0, 0.0, 0.1])), Err(Rejection::OutOfRange));
+    assert_eq!(solver.grab(CLIENT, grip(0, [0.0, 0.0, 0.1])), Err(Reason::OutOfRange));
 }
 
 #[test]
@@ -188,8 +191,8 @@ fn a_state_that_overflows_freezes_its_particle_where_it_last_stood() {
         let particle = solver.particle(index);
         assert!(particle.position.iter().chain(&particle.velocity).all(|one| one.is_finite()));
     }
-    assert_eq!(solver.particle(1).flags, flag::FROZEN);
-    assert_eq!(solver.pin(1), Err(Rejection::NoEffectHere));
+    assert_eq!(solver.particle(1).flags, ParticleFlags::FROZEN);
+    assert_eq!(solver.pin(1), Err(Reason::NoEffectHere));
     assert!(solver.frozen_count() > 0);
 }
 
@@ -203,8 +206,11 @@ fn what_is_held_survives_a_neighbour_that_blows_up_and_the_state_can_be_restored
     let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
     solver.grab(CLIENT, grip(2, [2.0, 1.0, 0.0])).unwrap();
     step(&mut solver, 20);
-    assert_eq!(solver.particle(1).flags, flag::FROZEN);
-    assert_eq!((solver.particle(0).flags, solver.particle(0).position), (flag::PINNED, [0.0; 3]));
+    assert_eq!(solver.particle(1).flags, ParticleFlags::FROZEN);
+    assert_eq!(
+        (solver.particle(0).flags, solver.particle(0).position),
+        (ParticleFlags::PINNED, [0.0; 3])
+    );
     assert_eq!(solver.particle(2).position, [2.0, 1.0, 0.0]);
     let particles: Vec<Particle> = (0..3).map(|index| solver.particle(index)).collect();
     let keyframe = solver.keyframe();

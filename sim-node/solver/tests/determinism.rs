@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 use sim_solver::{
-    Ball, Grip, Keyframe, Particle, Pose, Push, RestoreError, Scene, Setting, Solver, Sweep,
-    builtin, flag,
+    Ball, Grab, Keyframe, ParameterValue, Particle, ParticleFlags, Pose, Push, RestoreError, Scene,
+    Solver, Sweep, builtin,
 };
 
 #[derive(Debug, Clone)]
@@ -62,7 +62,7 @@ fn wish() -> impl Strategy<Value = Wish> {
 
 /// Applies a wish; a rejection is as good an outcome as any.
 fn apply(solver: &mut Solver, wish: &Wish) {
-    let grip = |particle, target| Grip { particle, target, over_s: 0.05 };
+    let grip = |particle, target| Grab { particle, target, over_s: 0.05 };
     let _outcome = match *wish {
         Wish::Pin(particle) => solver.pin(particle),
         Wish::Unpin(particle) => solver.unpin(particle),
@@ -87,7 +87,7 @@ fn apply(solver: &mut Solver, wish: &Wish) {
         }
         Wish::Set(which, share) => {
             let (name, low, high) = SETTINGS[which];
-            solver.set(name, Setting::Number(low + share * (high - low)), None)
+            solver.set(name, ParameterValue::Number(low + share * (high - low)), None)
         }
         Wish::Reset => {
             solver.reset();
@@ -159,7 +159,7 @@ fn cuts_beside_a_pin_at_one_boundary_leave_the_same_tethers_in_a_copy() {
 fn numbers_that_no_run_writes_are_refused_in_a_keyframe() {
     let scene = scene();
     let mut solver = Solver::new(&scene);
-    solver.grab(1, Grip { particle: 90, target: [0.5; 3], over_s: 0.25 }).unwrap();
+    solver.grab(1, Grab { particle: 90, target: [0.5; 3], over_s: 0.25 }).unwrap();
     solver.step();
     let bytes = solver.keyframe().encode();
     let restored = |bytes: &[u8]| {
@@ -209,7 +209,7 @@ proptest! {
                 let mut solver = if is_used { whole.clone() } else { Solver::new(&scene) };
                 if is_used {
                     solver.cut(3).ok();
-                    solver.set("substeps", Setting::Number(7.0), None).unwrap();
+                    solver.set("substeps", ParameterValue::Number(7.0), None).unwrap();
                     solver.step();
                 }
                 solver.restore(&particles(&whole), &keyframe).unwrap();
@@ -268,7 +268,7 @@ fn no_published_number_is_minus_zero() {
 #[test]
 fn a_state_that_is_none_is_refused_and_changes_nothing() {
     let mut solver = Solver::new(&scene());
-    solver.grab(1, Grip { particle: 90, target: [0.0; 3], over_s: 0.0 }).unwrap();
+    solver.grab(1, Grab { particle: 90, target: [0.0; 3], over_s: 0.0 }).unwrap();
     solver.step();
     let (keyframe, good) = (solver.keyframe(), particles(&solver));
     let hash = solver.state_hash();
@@ -282,7 +282,7 @@ fn a_state_that_is_none_is_refused_and_changes_nothing() {
         changed(|one| one.flags = 1 << 9),
         changed(|one| one.flags = 0),
         changed(|one| (one.flags, one.inverse_mass) = (0, 1.0)),
-        changed(|one| one.flags = flag::PINNED),
+        changed(|one| one.flags = ParticleFlags::PINNED),
         good[1..].to_vec(),
     ];
     for particles in cases {

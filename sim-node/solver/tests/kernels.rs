@@ -3,7 +3,7 @@
 //! constraint can have.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{Ball, Grip, Kernels, Push, Scene, Setting, Solver, TearCause, builtin};
+use sim_solver::{Ball, Grab, Kernels, ParameterValue, Push, Scene, Solver, TearCause, builtin};
 
 /// Steps all kernels side by side, with commands between, and compares every particle; gives the
 /// reference back.
@@ -37,7 +37,7 @@ fn command(solver: &mut Solver, step: u32) {
     let particle = step.wrapping_mul(7919) % count;
     let [x, y, z] = solver.particle(particle as usize).position;
     let _refused = match step % 23 {
-        3 => solver.grab(1, Grip { particle, target: [x + 0.1, y, z], over_s: 0.02 }),
+        3 => solver.grab(1, Grab { particle, target: [x + 0.1, y, z], over_s: 0.02 }),
         7 => solver.pin(particle),
         11 => solver.unpin(particle),
         13 => solver.push(Push {
@@ -235,14 +235,14 @@ fn after_parameters_have_changed() {
     let text = sheet(33, 17, "substeps = 2\ntethers = true", LINKS);
     let scene = Scene::from_toml(&text, "set").unwrap();
     let settings = [
-        ("tear_force", Setting::Number(30.0)),
-        ("iterations", Setting::Number(3.0)),
-        ("compliance", Setting::Number(1e-5)),
-        ("max_stretch", Setting::Number(1.1)),
-        ("wind_drag", Setting::Number(0.5)),
-        ("substeps", Setting::Number(4.0)),
-        ("tear_force", Setting::Off),
-        ("compliance", Setting::Number(0.0)),
+        ("tear_force", ParameterValue::Number(30.0)),
+        ("iterations", ParameterValue::Number(3.0)),
+        ("compliance", ParameterValue::Number(1e-5)),
+        ("max_stretch", ParameterValue::Number(1.1)),
+        ("wind_drag", ParameterValue::Number(0.5)),
+        ("substeps", ParameterValue::Number(4.0)),
+        ("tear_force", ParameterValue::Off),
+        ("compliance", ParameterValue::Number(0.0)),
     ];
     let mut hashes = Vec::new();
     for kernels in Kernels::available() {

@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use sim_solver::{Grip, Scene, Setting, Solver, builtin};
+use sim_solver::{Grab, ParameterValue, Scene, Solver, builtin};
 
 struct Counting;
 
@@ -44,7 +44,7 @@ fn neither_steps_nor_commands_allocate() {
     for round in 0..100_u8 {
         let particle = 20 + u32::from(round);
         let target = [0.0, f32::from(round) * 0.01, 0.1];
-        solver.grab(1, Grip { particle, target, over_s: 0.02 }).unwrap();
+        solver.grab(1, Grab { particle, target, over_s: 0.02 }).unwrap();
         solver.step();
         solver.release(1, particle).unwrap();
         solver.pin(particle).unwrap();
@@ -56,7 +56,7 @@ fn neither_steps_nor_commands_allocate() {
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
         solver.step();
         // A parameter is worked out at its boundary, which may allocate.
-        solver.set("tear_distance", Setting::Number(0.0), None).unwrap();
+        solver.set("tear_distance", ParameterValue::Number(0.0), None).unwrap();
         solver.step();
         let before = allocations();
         for _ in 0..200 {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
-use sim_contract::{ConstraintKind, Endpoint, GRAB_OVER_S_DEFAULT, NAME_DEFAULT, SettingValue};
+use sim_contract::{ConstraintKind, Endpoint, GRAB_OVER_S_DEFAULT, NAME_DEFAULT, ParameterValue};
 
 #[derive(Debug, ClapArgs)]
 #[command(
@@ -264,12 +264,12 @@ fn setting_word(text: &str) -> Result<SettingWord, String> {
 
 impl SetArgs {
     /// What the words say together.
-    pub(crate) fn value(&self) -> Result<SettingValue, &'static str> {
+    pub(crate) fn value(&self) -> Result<ParameterValue, &'static str> {
         use SettingWord::{Number, Off};
         match *self.values {
-            [Off] => Ok(SettingValue::Off),
-            [Number(number)] => Ok(SettingValue::Number(number)),
-            [Number(x), Number(y), Number(z)] => Ok(SettingValue::Vector([x, y, z])),
+            [Off] => Ok(ParameterValue::Off),
+            [Number(number)] => Ok(ParameterValue::Number(number)),
+            [Number(x), Number(y), Number(z)] => Ok(ParameterValue::Vector([x, y, z])),
             _ => Err("VALUE is one number, three numbers for a vector, or \"off\" alone"),
         }
     }

@@ -3,7 +3,7 @@
 use std::path;
 
 use anyhow::{Context, bail};
-use sim_contract::{Action, SettingKind, Text};
+use sim_contract::{Action, KindFilter, Text};
 
 use crate::args::{CtlVerb, PoseArgs, TargetArgs};
 use crate::scene_source;
@@ -46,7 +46,7 @@ pub(super) fn of(verb: &CtlVerb) -> anyhow::Result<Action> {
         CtlVerb::Set(args) => Action::Set {
             parameter: text(&args.parameter)?,
             value: args.value().map_err(anyhow::Error::msg)?,
-            constraint_kind: args.constraint_kind().map(SettingKind::Known),
+            constraint_kind: args.constraint_kind().map(KindFilter::Known),
         },
         CtlVerb::Load { scene } => Action::Load { scene: scene_of(scene)? },
         CtlVerb::Pause => Action::Pause,
@@ -81,19 +81,14 @@ fn scene_of(source: &str) -> anyhow::Result<Text> {
     text(path.to_str().with_context(|| format!("{}: not UTF-8", path.display()))?)
 }
 
-/// Cut short it would mean something else.
 fn text(text: &str) -> anyhow::Result<Text> {
-    if text.len() > Text::SIZE_BYTES_MAX {
-        let (size, max) = (text.len(), Text::SIZE_BYTES_MAX);
-        bail!("'{text}' has {size} bytes, a command can hold {max}");
-    }
-    Ok(Text::new(text))
+    Text::new(text).with_context(|| format!("'{text}' does not fit into a command"))
 }
 
 #[cfg(test)]
 mod tests {
     use clap::Parser;
-    use sim_contract::{ConstraintKind, SettingValue};
+    use sim_contract::{ConstraintKind, ParameterValue};
 
     use super::*;
     use crate::args::{Args, Verb};
@@ -105,9 +100,9 @@ mod tests {
         of(&ctl.verb).unwrap()
     }
 
-    fn set(name: &str, value: SettingValue, kind: Option<ConstraintKind>) -> Action {
-        let constraint_kind = kind.map(SettingKind::Known);
-        Action::Set { parameter: Text::new(name), value, constraint_kind }
+    fn set(name: &str, value: ParameterValue, kind: Option<ConstraintKind>) -> Action {
+        let constraint_kind = kind.map(KindFilter::Known);
+        Action::Set { parameter: Text::cut(name), value, constraint_kind }
     }
 
     #[test]
@@ -140,25 +135,25 @@ mod tests {
 
     #[test]
     fn a_value_is_a_number_a_vector_or_off() {
-        let gravity = SettingValue::Vector([0.0, -1.6, 0.0]);
+        let gravity = ParameterValue::Vector([0.0, -1.6, 0.0]);
         assert_eq!(action("set gravity 0 -1.6 0"), set("gravity", gravity, None));
-        let number = SettingValue::Number(-1.0);
+        let number = ParameterValue::Number(-1.0);
         assert_eq!(action("set damping -1 --timeout 1s"), set("damping", number, None));
-        assert_eq!(action("set tear_force off"), set("tear_force", SettingValue::Off, None));
-        let number = SettingValue::Number(1e-4);
+        assert_eq!(action("set tear_force off"), set("tear_force", ParameterValue::Off, None));
+        let number = ParameterValue::Number(1e-4);
         let expected = set("compliance", number, Some(ConstraintKind::Bend));
         assert_eq!(action("set compliance 1e-4 --kind bend"), expected);
     }
 
     #[test]
     fn a_scene_is_a_name_or_a_path_that_the_node_finds() {
-        assert_eq!(action("load rope"), Action::Load { scene: Text::new("rope") });
+        assert_eq!(action("load rope"), Action::Load { scene: Text::cut("rope") });
         let Action::Load { scene } = action("load ./scenes/rope.toml") else { panic!("no load") };
         assert!(scene.as_str().starts_with('/') && scene.as_str().ends_with("/scenes/rope.toml"));
         let verb = CtlVerb::Load { scene: "nix".to_owned() };
         let error = of(&verb).unwrap_err().to_string();
         assert!(error.starts_with("there is no built-in scene 'nix'"), "{error}");
-        let error = text(&"x".repeat(161)).unwrap_err().to_string();
-        assert!(error.ends_with("has 161 bytes, a command can hold 160"), "{error}");
+        let error = format!("{:#}", text(&"x".repeat(161)).unwrap_err());
+        assert!(error.ends_with("the text has 161 bytes (allowed: at most 160)"), "{error}");
     }
 }

@@ -1,17 +1,20 @@
 //! What to do about a rejected command, where its reason alone does not tell.
 
-use sim_contract::{Action, Outcome, Reason};
-use sim_solver::PARAMETERS;
+use sim_contract::{
+    Action, OffMeaning, Outcome, PARAMETERS, Parameter, ParameterInfo, Reason, ValueForm,
+};
 
 /// Words behind the reason, or none.
 pub(super) fn of(action: &Action, outcome: &Outcome) -> String {
     let Some(reason) = Reason::from_name(outcome.reason_name()) else { return String::new() };
     match (action, reason) {
         (Action::Set { .. }, Reason::UnknownParameter) => {
-            format!(" (there are {})", PARAMETERS.join(", "))
+            format!(" (allowed: {})", PARAMETERS.map(|info| info.name).join(", "))
         }
-        (Action::Set { parameter, .. }, Reason::OutOfRange) => allowed(parameter.as_str())
-            .map_or_else(String::new, |text| format!(" (allowed: {text})")),
+        (Action::Set { parameter, .. }, Reason::OutOfRange) => {
+            Parameter::from_name(parameter.as_str())
+                .map_or_else(String::new, |known| format!(" (allowed: {})", allowed(known.info())))
+        }
         (Action::Set { .. }, Reason::NoEffectHere) => {
             " (compliance belongs to method \"xpbd\", stiffness to \"pbd\")".to_owned()
         }
@@ -31,22 +34,19 @@ pub(super) fn of(action: &Action, outcome: &Outcome) -> String {
     }
 }
 
-/// The range of a parameter, in words.
-fn allowed(parameter: &str) -> Option<&'static str> {
-    Some(match parameter {
-        "gravity" | "wind_velocity" => "three numbers within 1e7, z 0 in 2-D, or off for 0 0 0",
-        "damping" | "wind_drag" => "a number >= 0, or off for 0",
-        "substeps" | "iterations" => "a whole number from 1 to 1000",
-        "relaxation" => "more than 0, less than 2",
-        "max_stretch" | "tear_stretch" => "more than 1, or off",
-        "tear_distance" => "a number >= 0, or off",
-        "tear_force" => "a number > 0, or off",
-        "max_speed" => "a number > 0",
-        "time_scale" => "0.001 to 1000",
-        "compliance" => "0 to 1e20, for one --kind or all",
-        "stiffness" => "0 to 1, for one --kind or all",
-        _ => return None,
-    })
+/// Allowed values of a parameter, in words.
+fn allowed(info: &ParameterInfo) -> String {
+    let values = match info.form {
+        ValueForm::Vector => format!("three numbers, each {}, z 0 in 2-D", info.range.text),
+        ValueForm::Number | ValueForm::Whole => info.range.text.to_owned(),
+    };
+    let off = match info.off {
+        OffMeaning::Zero => ", or off for 0",
+        OffMeaning::NoLimit => ", or off for no limit",
+        OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
+    };
+    let kind = if info.is_per_kind { ", for one --kind or all" } else { "" };
+    format!("{values}{off}{kind}")
 }
 
 #[cfg(test)]
@@ -54,10 +54,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_parameter_has_its_range_in_words() {
-        for name in PARAMETERS {
-            assert!(allowed(name).is_some(), "{name}");
-        }
-        assert_eq!(allowed("colour"), None);
+    fn the_allowed_values_name_range_off_and_kind() {
+        let text = |parameter: Parameter| allowed(parameter.info());
+        assert_eq!(text(Parameter::Substeps), "a whole number from 1 to 1000");
+        assert_eq!(text(Parameter::TearForce), "a number > 0, or off for no limit");
+        assert_eq!(text(Parameter::Stiffness), "0 to 1, for one --kind or all");
+        let gravity = "three numbers, each -1e7 to 1e7, z 0 in 2-D, or off for 0";
+        assert_eq!(text(Parameter::Gravity), gravity);
     }
 }

@@ -84,7 +84,9 @@ struct Torn {
 impl Torn {
     /// The message that tells of what stands at `first` and behind it.
     fn row(&self, first: usize) -> Message {
-        let cause = |place| self.causes.get(place).copied().and_then(TearCause::from_number);
+        let cause = |place: usize| {
+            self.causes.get(place).and_then(|cause| TearCause::from_number((*cause).into()))
+        };
         let name = |cause: Option<TearCause>| cause.map_or("unknown", TearCause::name);
         let places = first..self.constraints.len();
         let causes = places.map(|place| name(cause(place)).to_owned()).collect();

@@ -2,8 +2,8 @@
 //! "off": one without a value would not be told to anybody. A softness has a name for each kind of
 //! constraints, and one for all.
 
-use foxglove::websocket::{Parameter, ParameterType, ParameterValue};
-use sim_contract::{ConstraintKind, PlainF32, SettingKind, SettingValue};
+use foxglove::websocket::{Parameter, ParameterType, ParameterValue as FoxgloveValue};
+use sim_contract::{ConstraintKind, KindFilter, ParameterValue, PlainF32};
 
 use crate::message::Command;
 use crate::parameters::{Limit, Parameters, PerKind};
@@ -59,27 +59,27 @@ fn per_kind(name: &str, values: &PerKind) -> Vec<Parameter> {
     parameters
 }
 
-fn unnamed(r#type: Option<ParameterType>, value: ParameterValue) -> Parameter {
+fn unnamed(r#type: Option<ParameterType>, value: FoxgloveValue) -> Parameter {
     Parameter { name: String::new(), r#type, value: Some(value) }
 }
 
 fn number(value: PlainF32) -> Parameter {
-    unnamed(Some(ParameterType::Float64), ParameterValue::Float64(plain(value)))
+    unnamed(Some(ParameterType::Float64), FoxgloveValue::Float64(plain(value)))
 }
 
 fn whole(value: PlainF32) -> Parameter {
     #[allow(clippy::cast_possible_truncation, reason = "the node has only whole ones up to 1000")]
     let value = value.0 as i64;
-    unnamed(None, ParameterValue::Integer(value))
+    unnamed(None, FoxgloveValue::Integer(value))
 }
 
 fn vector(value: [PlainF32; 3]) -> Parameter {
-    let axes = value.map(|axis| ParameterValue::Float64(plain(axis)));
-    unnamed(Some(ParameterType::Float64Array), ParameterValue::Array(axes.into()))
+    let axes = value.map(|axis| FoxgloveValue::Float64(plain(axis)));
+    unnamed(Some(ParameterType::Float64Array), FoxgloveValue::Array(axes.into()))
 }
 
 fn limit(value: Limit, absent: &str) -> Parameter {
-    let absent = || unnamed(None, ParameterValue::String(absent.to_owned()));
+    let absent = || unnamed(None, FoxgloveValue::String(absent.to_owned()));
     value.map_or_else(absent, number)
 }
 
@@ -96,28 +96,30 @@ pub(super) fn command(parameter: &Parameter) -> Result<Command, &'static str> {
     };
     let setting = SETTINGS.iter().find(|setting| setting.name == name);
     let setting = setting.ok_or("unknown_parameter")?;
-    let constraint_kind = match kind.map(SettingKind::from_name) {
+    let constraint_kind = match kind.map(KindFilter::from_name) {
         None => None,
-        Some(known @ SettingKind::Known(_)) if setting.per_kind => Some(known),
+        Some(known @ KindFilter::Known(_)) if setting.per_kind => Some(known),
         Some(_) => return Err("unknown_parameter"),
     };
     let value = match (&parameter.value, setting.value) {
-        (Some(ParameterValue::String(word)), _) if word == OFF && setting.off => SettingValue::Off,
-        (Some(ParameterValue::Array(axes)), ValueKind::Vector) => {
+        (Some(FoxgloveValue::String(word)), _) if word == OFF && setting.off => ParameterValue::Off,
+        (Some(FoxgloveValue::Array(axes)), ValueKind::Vector) => {
             let [x, y, z] = axes.as_slice() else { return Err("out_of_range") };
-            SettingValue::Vector([single(x)?, single(y)?, single(z)?])
+            ParameterValue::Vector([single(x)?, single(y)?, single(z)?])
         }
-        (Some(value), ValueKind::Number | ValueKind::Whole) => SettingValue::Number(single(value)?),
+        (Some(value), ValueKind::Number | ValueKind::Whole) => {
+            ParameterValue::Number(single(value)?)
+        }
         _ => return Err("out_of_range"),
     };
     Ok(Command::Set { parameter: name.to_owned(), value, constraint_kind })
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "this is the one rounding to f32")]
-fn single(value: &ParameterValue) -> Result<f32, &'static str> {
+fn single(value: &FoxgloveValue) -> Result<f32, &'static str> {
     match value {
-        ParameterValue::Integer(number) => Ok(*number as f32),
-        ParameterValue::Float64(number) => Ok(*number as f32),
+        FoxgloveValue::Integer(number) => Ok(*number as f32),
+        FoxgloveValue::Float64(number) => Ok(*number as f32),
         _ => Err("out_of_range"),
     }
 }
@@ -126,12 +128,12 @@ fn single(value: &ParameterValue) -> Result<f32, &'static str> {
 mod tests {
     use super::*;
 
-    fn value_of(name: &str, parameters: &Parameters) -> ParameterValue {
+    fn value_of(name: &str, parameters: &Parameters) -> FoxgloveValue {
         let all = list(parameters);
         all.into_iter().find(|one| one.name == name).unwrap().value.unwrap()
     }
 
-    fn asked(name: &str, value: ParameterValue) -> Result<Command, &'static str> {
+    fn asked(name: &str, value: FoxgloveValue) -> Result<Command, &'static str> {
         command(&Parameter { name: name.to_owned(), r#type: None, value: Some(value) })
     }
 
@@ -141,7 +143,7 @@ mod tests {
         for setting in SETTINGS {
             let listed = all.iter().find(|one| one.name == setting.name);
             let listed = listed.unwrap_or_else(|| panic!("{} is not listed", setting.name));
-            let is_own = listed.value == Some(ParameterValue::String(OWN.to_owned()));
+            let is_own = listed.value == Some(FoxgloveValue::String(OWN.to_owned()));
             assert_eq!(command(listed).is_ok(), !is_own, "{}", setting.name);
         }
     }
@@ -149,15 +151,15 @@ mod tests {
     #[test]
     fn numbers_are_those_of_the_scene_in_plain_decimals() {
         let mut parameters = Parameters::default();
-        assert_eq!(value_of("tear_force", &parameters), ParameterValue::String(OFF.to_owned()));
+        assert_eq!(value_of("tear_force", &parameters), FoxgloveValue::String(OFF.to_owned()));
         parameters.tear_force = Some(PlainF32(0.1));
-        assert_eq!(value_of("tear_force", &parameters), ParameterValue::Float64(0.1));
-        let gravity = [0.0, -9.81, 0.0].map(ParameterValue::Float64);
-        assert_eq!(value_of("gravity", &parameters), ParameterValue::Array(gravity.into()));
-        assert_eq!(value_of("substeps", &parameters), ParameterValue::Integer(4));
+        assert_eq!(value_of("tear_force", &parameters), FoxgloveValue::Float64(0.1));
+        let gravity = [0.0, -9.81, 0.0].map(FoxgloveValue::Float64);
+        assert_eq!(value_of("gravity", &parameters), FoxgloveValue::Array(gravity.into()));
+        assert_eq!(value_of("substeps", &parameters), FoxgloveValue::Integer(4));
         parameters.compliance.bend = Some(PlainF32(0.5));
-        assert_eq!(value_of("compliance.bend", &parameters), ParameterValue::Float64(0.5));
-        assert_eq!(value_of("compliance", &parameters), ParameterValue::String(OWN.to_owned()));
+        assert_eq!(value_of("compliance.bend", &parameters), FoxgloveValue::Float64(0.5));
+        assert_eq!(value_of("compliance", &parameters), FoxgloveValue::String(OWN.to_owned()));
     }
 
     #[test]
@@ -168,34 +170,34 @@ mod tests {
             constraint_kind,
         };
         let axes = vec![
-            ParameterValue::Integer(0),
-            ParameterValue::Float64(-1.5),
-            ParameterValue::Integer(0),
+            FoxgloveValue::Integer(0),
+            FoxgloveValue::Float64(-1.5),
+            FoxgloveValue::Integer(0),
         ];
-        let value = SettingValue::Vector([0.0, -1.5, 0.0]);
-        assert_eq!(asked("gravity", ParameterValue::Array(axes)), Ok(set("gravity", value, None)));
-        let off = ParameterValue::String(OFF.to_owned());
-        assert_eq!(asked("tear_force", off), Ok(set("tear_force", SettingValue::Off, None)));
-        let kind = Some(SettingKind::Known(ConstraintKind::Shear));
-        let value = SettingValue::Number(0.5);
-        let command = asked("stiffness.shear", ParameterValue::Float64(0.5));
+        let value = ParameterValue::Vector([0.0, -1.5, 0.0]);
+        assert_eq!(asked("gravity", FoxgloveValue::Array(axes)), Ok(set("gravity", value, None)));
+        let off = FoxgloveValue::String(OFF.to_owned());
+        assert_eq!(asked("tear_force", off), Ok(set("tear_force", ParameterValue::Off, None)));
+        let kind = Some(KindFilter::Known(ConstraintKind::Shear));
+        let value = ParameterValue::Number(0.5);
+        let command = asked("stiffness.shear", FoxgloveValue::Float64(0.5));
         assert_eq!(command, Ok(set("stiffness", value, kind)));
     }
 
     #[test]
     fn a_wrong_name_or_value_is_refused() {
-        let number = || ParameterValue::Float64(1.0);
+        let number = || FoxgloveValue::Float64(1.0);
         for name in ["", "dance", "damping.shear", "stiffness.silk", "stiffness."] {
             assert_eq!(asked(name, number()), Err("unknown_parameter"), "{name}");
         }
-        let word = |word: &str| ParameterValue::String(word.to_owned());
+        let word = |word: &str| FoxgloveValue::String(word.to_owned());
         for (name, value) in [
             ("gravity", number()),
-            ("gravity", ParameterValue::Array(vec![number(), number()])),
+            ("gravity", FoxgloveValue::Array(vec![number(), number()])),
             ("damping", word("much")),
             ("substeps", word(OFF)),
             ("stiffness", word(OWN)),
-            ("damping", ParameterValue::Bool(true)),
+            ("damping", FoxgloveValue::Bool(true)),
         ] {
             assert_eq!(asked(name, value), Err("out_of_range"), "{name}");
         }

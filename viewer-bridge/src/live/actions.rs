@@ -1,6 +1,6 @@
 //! From a page's command to what a node is asked for.
 
-use sim_contract::{Action, ParticleState, SettingValue, Text};
+use sim_contract::{Action, Parameter, ParameterValue, ParticleState, Text};
 
 use super::brush::Stroke;
 use crate::message::Command;
@@ -53,13 +53,17 @@ pub(super) fn actions(command: Command, context: Context<'_>) -> Result<Vec<Acti
         Command::Reset {} => Action::Reset,
         // A path would let whoever opens the page read the files of the node's user.
         Command::Load { scene } if !scenes::is_known(&scene) => return Err("out_of_range"),
-        Command::Load { scene } => Action::Load { scene: Text::new(&scene) },
-        Command::Set { parameter, value, constraint_kind } => {
-            Action::Set { parameter: Text::new(&parameter), value, constraint_kind }
+        Command::Load { scene } => {
+            Action::Load { scene: Text::new(&scene).map_err(|_| "out_of_range")? }
         }
+        Command::Set { parameter, value, constraint_kind } => Action::Set {
+            parameter: Text::new(&parameter).map_err(|_| "unknown_parameter")?,
+            value,
+            constraint_kind,
+        },
         Command::Rate { value } => Action::Set {
-            parameter: Text::new("time_scale"),
-            value: SettingValue::Number(value),
+            parameter: Text::cut(Parameter::TimeScale.name()),
+            value: ParameterValue::Number(value),
             constraint_kind: None,
         },
         Command::Seek { .. } | Command::Loop { .. } => return Err(reason::ONLY_REPLAY),

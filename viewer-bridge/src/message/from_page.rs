@@ -3,7 +3,7 @@
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use sim_contract::{GRAB_OVER_S_DEFAULT, SettingKind, SettingValue};
+use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
 use thiserror::Error;
 
 /// A message of a page.
@@ -124,9 +124,9 @@ pub enum Command {
     },
     Set {
         parameter: String,
-        value: SettingValue,
+        value: ParameterValue,
         #[serde(default)]
-        constraint_kind: Option<SettingKind>,
+        constraint_kind: Option<KindFilter>,
     },
     Seek {
         step: u64,
@@ -271,7 +271,7 @@ mod tests {
         let text = r#"{"type":"set","parameter":"tear_force","value":null}"#;
         let command = Command::Set {
             parameter: "tear_force".to_owned(),
-            value: SettingValue::Off,
+            value: ParameterValue::Off,
             constraint_kind: None,
         };
         assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: None, command }));

@@ -1,7 +1,7 @@
 //! The parameters at each step of a recording: those of its scene, and what was set until then.
 
 use recorder::OutcomeRow;
-use sim_contract::{Action, SettingKind, SettingValue, Text};
+use sim_contract::{Action, KindFilter, ParameterValue, Text};
 
 use crate::parameters::Parameters;
 
@@ -17,7 +17,7 @@ pub(super) struct SettingsLog {
 
 #[derive(Debug, Clone, Copy)]
 enum Change {
-    Set(Text, SettingValue, Option<SettingKind>),
+    Set(Text, ParameterValue, Option<KindFilter>),
     /// Everything is as the scene has it.
     Reset,
     /// There may have been settings that the recording has lost.
@@ -94,8 +94,8 @@ mod tests {
     }
 
     fn damping(value: f32) -> Action {
-        let parameter = Text::new("damping");
-        Action::Set { parameter, value: SettingValue::Number(value), constraint_kind: None }
+        let parameter = Text::cut("damping");
+        Action::Set { parameter, value: ParameterValue::Number(value), constraint_kind: None }
     }
 
     /// Damping, and whether everything is known.

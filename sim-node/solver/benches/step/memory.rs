@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::Serialize;
 use sim_solver::scene::SceneParticle;
-use sim_solver::{Scene, Solver, flag};
+use sim_solver::{ParticleFlags, Scene, Solver};
 
 struct Counting;
 
@@ -70,7 +70,7 @@ fn without_constraints(scene: &Scene, solver: &Solver) -> Scene {
         SceneParticle {
             position: one.position,
             mass: 1.0,
-            pinned: one.flags & flag::PINNED != 0,
+            pinned: one.flags & ParticleFlags::PINNED != 0,
             velocity: one.velocity,
         }
     };

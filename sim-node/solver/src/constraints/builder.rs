@@ -2,13 +2,14 @@
 
 use std::cell::Cell;
 
+use sim_types::{ConstraintKind, Method, TearCause};
+
+use super::Constraint;
 use super::parameters::{ConstraintParameters, LimitLengths, PassSoftness};
 use super::projection::TearMark;
 use super::separation::RestLength;
-use super::{Constraint, ConstraintKind};
 use crate::parameters::Parameters;
-use crate::scene::{Limits, Method, Model};
-use crate::tear::TearCause;
+use crate::scene::{Limits, Model};
 
 /// Builds the parameters of each constraint.
 pub(crate) struct ConstraintBuilder<'a> {

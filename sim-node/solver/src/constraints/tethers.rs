@@ -4,9 +4,10 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::ConstraintKind;
+use sim_types::{ConstraintKind, ParticleFlags};
+
 use crate::parameters::Parameters;
-use crate::particles::{Particles, flag};
+use crate::particles::Particles;
 use crate::scene::{Model, Softness};
 use crate::store::{Location, ParticleStore};
 use crate::tear::Torn;
@@ -83,8 +84,10 @@ impl Tethers {
         particles: &Particles,
         torn: &[u32],
     ) -> Self {
-        let is_root =
-            |flags: u32| flags & (flag::PINNED | flag::ANCHORED) != 0 && flags & flag::GRABBED == 0;
+        let is_root = |flags: u32| {
+            flags & (ParticleFlags::PINNED | ParticleFlags::ANCHORED) != 0
+                && flags & ParticleFlags::GRABBED == 0
+        };
         let states = (0_u32..).zip(&particles.states);
         let roots = states.filter(|(_, one)| is_root(one.flags)).map(|(index, _)| index).collect();
         let mut torn = torn.to_vec();
@@ -153,7 +156,7 @@ impl Tethers {
             store.set_tether_length(particle, tether.length);
             let state = &particles.states[tether.root as usize];
             store.set_root(particle, state.position);
-            if state.flags & flag::ANCHORED != 0 {
+            if state.flags & ParticleFlags::ANCHORED != 0 {
                 self.moving_roots.push(MovingRoot { particle, root });
             }
         }

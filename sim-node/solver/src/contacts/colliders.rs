@@ -1,9 +1,9 @@
 //! Colliders and their motion.
 
 use glam::{DVec3, Quat, Vec3};
+use sim_types::Reason;
 
 use super::placed_shape::PlacedShape;
-use crate::Rejection;
 use crate::frame::{Frame, angular_velocity, rotation_about};
 use crate::scene::{ColliderShape, SceneCollider};
 
@@ -64,9 +64,9 @@ impl Collider {
     }
 
     /// Moves it to a frame by the end of the next step.
-    pub(crate) fn move_to(&mut self, frame: Frame) -> Result<(), Rejection> {
+    pub(crate) fn move_to(&mut self, frame: Frame) -> Result<(), Reason> {
         if !self.accepts(&frame) {
-            return Err(Rejection::OutOfRange);
+            return Err(Reason::OutOfRange);
         }
         self.moved = Some(frame);
         Ok(())

@@ -1,11 +1,14 @@
 //! Whether a snapshot and a keyframe are a state of a scene: both may come from anywhere.
 
+use sim_types::ParticleFlags;
+
 use super::{Keyframe, Moved, RestoreError};
+use crate::checks::is_near;
 use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
-use crate::particles::{Particle, flag};
+use crate::particles::Particle;
 use crate::solver::Solver;
-use crate::{GRAB_OVER_S_MAX, is_near};
+use crate::step::drive::GRAB_OVER_S_MAX;
 
 /// Latest step of a scene: up to it, f64 counts steps exactly.
 const SCENE_STEP_MAX: u64 = 1 << 53;
@@ -30,14 +33,14 @@ impl Solver {
     }
 
     fn check_particle(&self, index: usize, particle: &Particle) -> Result<(), &'static str> {
-        let is_fixed = particle.flags & flag::FIXED != 0;
+        let is_fixed = particle.flags & ParticleFlags::ALL != 0;
         if !particle.position.iter().chain(&particle.velocity).all(|number| number.is_finite()) {
             return Err("a number is not finite");
         }
-        if particle.flags & !flag::KNOWN != 0 {
+        if particle.flags & !ParticleFlags::ALL != 0 {
             return Err("it has flags that this version does not know");
         }
-        if (particle.flags ^ self.particles.states[index].flags) & flag::ANCHORED != 0 {
+        if (particle.flags ^ self.particles.states[index].flags) & ParticleFlags::ANCHORED != 0 {
             return Err("other particles follow an anchor in this scene");
         }
         if is_fixed != (particle.inverse_mass == 0.0) {
@@ -103,7 +106,7 @@ impl Solver {
     }
 
     fn check_counters(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
-        let steps_max = self.steps_of(GRAB_OVER_S_MAX);
+        let steps_max = self.grab_steps(GRAB_OVER_S_MAX);
         if keyframe.grabs.iter().any(|grab| grab.steps_left > steps_max) {
             return Err("a grab takes longer than any");
         }
@@ -130,10 +133,10 @@ fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'stat
         let indices = (0_u32..).zip(particles);
         indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
     };
-    if !with(flag::FIXED).eq(keyframe.fixed.iter().map(|one| one.particle)) {
+    if !with(ParticleFlags::ALL).eq(keyframe.fixed.iter().map(|one| one.particle)) {
         return Err("other particles are fixed");
     }
-    if !with(flag::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
+    if !with(ParticleFlags::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
         return Err("other particles are grabbed");
     }
     if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {

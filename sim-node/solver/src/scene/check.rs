@@ -3,12 +3,12 @@
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
+use sim_types::{COORDINATE_MAX, Method, NumberRange};
 use toml::Spanned;
 
+use super::SceneError;
 use super::error::Place;
 use super::file::{Number, Vector, Whole};
-use super::{Method, SceneError};
-use crate::COORDINATE_MAX;
 
 /// A range of finite numbers, and the words for it.
 #[derive(Debug, Clone, Copy)]
@@ -19,25 +19,30 @@ pub(crate) struct Range32 {
 
 impl Range32 {
     pub(crate) const AT_LEAST_ZERO: Self =
-        Self { contains: |value| value >= 0.0, allowed: "a number >= 0" };
+        Self { contains: |value| value >= 0.0, allowed: NumberRange::AT_LEAST_ZERO.text };
     pub(crate) const POSITIVE: Self =
-        Self { contains: |value| value > 0.0, allowed: "a number > 0" };
-    /// compliance / h^2 must be a number of f32 at the smallest h of 10 ns, too.
-    pub(crate) const COMPLIANCE: Self =
-        Self { contains: |value| (0.0..=1e20).contains(&value), allowed: "0 to 1e20 m/N" };
-    pub(crate) const SHARE: Self =
-        Self { contains: |value| (0.0..=1.0).contains(&value), allowed: "0 to 1" };
+        Self { contains: |value| value > 0.0, allowed: NumberRange::POSITIVE.text };
+    pub(crate) const COMPLIANCE: Self = Self {
+        contains: |value| NumberRange::COMPLIANCE.contains(value),
+        allowed: NumberRange::COMPLIANCE.text,
+    };
+    pub(crate) const SHARE: Self = Self {
+        contains: |value| NumberRange::SHARE.contains(value),
+        allowed: NumberRange::SHARE.text,
+    };
     /// 1/mass must be a number of f32, too.
     pub(crate) const MASS: Self = Self {
         contains: |value| value > 0.0 && (1.0 / value).is_finite() && 1.0 / value > 0.0,
         allowed: "a number > 0 in kg, and 1/mass a number, too: 1e-38 to 1e38",
     };
     pub(crate) const RELAXATION: Self = Self {
-        contains: |value| value > 0.0 && value < 2.0,
-        allowed: "more than 0, less than 2; 1 is no relaxation",
+        contains: |value| NumberRange::RELAXATION.contains(value),
+        allowed: NumberRange::RELAXATION.text,
     };
-    pub(crate) const RATIO: Self =
-        Self { contains: |value| value > 1.0, allowed: "more than 1, or inf for off" };
+    pub(crate) const RATIO: Self = Self {
+        contains: |value| NumberRange::RATIO.contains(value),
+        allowed: "more than 1, or inf for off",
+    };
     pub(crate) const DISTANCE_LIMIT: Self =
         Self { contains: |value| value >= 0.0, allowed: "a number >= 0, or inf for off" };
     pub(crate) const FORCE_LIMIT: Self =

@@ -7,8 +7,9 @@ use toml::Spanned;
 use super::anchor::FileAnchor;
 use super::collider::FileCollider;
 use super::wind::FileWind;
-use super::{ConstraintOrder, Method, Up};
-use crate::constraints::ConstraintKind;
+use sim_types::{ConstraintKind, Method};
+
+use super::{ConstraintOrder, Up};
 
 /// A whole or decimal number.
 pub(crate) type Number = Spanned<f64>;

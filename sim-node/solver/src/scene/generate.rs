@@ -11,9 +11,11 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::model::Model;
-use super::{Limits, Method, SceneParticle, Softness, Up, decimal};
+use sim_types::{ConstraintKind, Method};
+
+use super::{Limits, SceneParticle, Softness, Up, decimal};
+use crate::constraints::Constraint;
 use crate::constraints::families::Sheet;
-use crate::constraints::{Constraint, ConstraintKind};
 pub use bridge::Bridge;
 pub use cloth::{Cloth, Diagonals};
 pub use mesh_file::Obj;

@@ -1,6 +1,8 @@
 //! What a scene expands to: every particle, constraint and triangle.
 
-use super::{Limits, Method, Scene, SceneParticle};
+use sim_types::Method;
+
+use super::{Limits, Scene, SceneParticle};
 use crate::constraints::Constraint;
 use crate::constraints::families::Sheet;
 

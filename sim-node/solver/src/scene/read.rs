@@ -13,7 +13,7 @@ use super::{
     ELEMENTS_MAX, Method, Model, PASSES_MAX, RATE_HZ_MAX, SCENE_VERSION, Scene, SceneConstraint,
     SceneError, SceneParticle, Softness, SolverSettings,
 };
-use crate::COORDINATE_MAX;
+use sim_types::COORDINATE_MAX;
 
 /// Reads and checks a scene.
 pub(super) fn scene(

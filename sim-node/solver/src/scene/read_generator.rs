@@ -11,7 +11,7 @@ use super::generate::{
     cloth, ragdoll, rope, web,
 };
 use super::{ELEMENTS_MAX, SceneError, Softness};
-use crate::constraints::ConstraintKind;
+use sim_types::ConstraintKind;
 
 /// A shape: its keys, and the words for what of it is pinned, the default first.
 struct ShapeKeys {

@@ -2,9 +2,11 @@
 
 use glam::{DQuat, DVec3, Vec3};
 
+use sim_types::ParticleFlags;
+
 use super::drive::{DriveTarget, drive_towards};
 use crate::frame::{Frame, Pose};
-use crate::particles::{Particles, flag};
+use crate::particles::Particles;
 use crate::scene::{SceneAnchor, SceneParticle, Waypoint};
 use crate::store::ParticleStore;
 
@@ -91,7 +93,7 @@ impl Anchors {
         substeps_left: u32,
         reach: f32,
     ) {
-        const HELD: u32 = flag::PINNED | flag::FROZEN;
+        const HELD: u32 = ParticleFlags::PINNED | ParticleFlags::FROZEN;
         for (follower, target) in self.followers.iter().zip(&self.targets) {
             if particles.states[follower.particle as usize].flags & HELD == 0 {
                 let location = store.location(follower.particle);

@@ -5,9 +5,12 @@ use serde::{Deserialize, Serialize};
 use super::substep::Substep;
 use crate::store::{Location, ParticleStore};
 
+/// Longest time in seconds that a grabbed particle may take to its target.
+pub const GRAB_OVER_S_MAX: f32 = 0.25;
+
 /// A grabbed particle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Grab {
+pub(crate) struct ActiveGrab {
     pub(crate) particle: u32,
     pub(crate) client_id: u64,
     pub(crate) target: [f32; 3],
@@ -27,7 +30,7 @@ pub(crate) struct DriveTarget {
 /// than `reach` (`max_speed` h) in one substep.
 pub(crate) fn drive_grabbed(
     store: &mut ParticleStore,
-    grabs: &[Grab],
+    grabs: &[ActiveGrab],
     substep: Substep,
     reach: f32,
 ) {
@@ -39,7 +42,7 @@ pub(crate) fn drive_grabbed(
 }
 
 /// Counts a step of every grab.
-pub(crate) fn count_step(grabs: &mut [Grab]) {
+pub(crate) fn count_step(grabs: &mut [ActiveGrab]) {
     for grab in grabs {
         grab.steps_left = grab.steps_left.saturating_sub(1);
     }

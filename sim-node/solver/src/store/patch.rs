@@ -13,7 +13,7 @@ mod span;
 
 use std::ops::Range;
 
-use band::{Band, Sweep, SweepWork};
+use band::{Band, PassSweep, SweepWork};
 use row_layout::{LINE_LENGTH, RowLayout};
 use span::Span;
 
@@ -177,7 +177,7 @@ impl Patch {
         let mut round = |spans: &mut dyn Iterator<Item = (Range<usize>, Span)>| {
             let work = |part: &mut BandPart<'_>, scratch: &mut WorkerScratch| {
                 let band = Band { numbers: part.numbers, first: part.first, layout };
-                let sweep = Sweep { stages, pass, inputs, scratch };
+                let sweep = PassSweep { stages, pass, inputs, scratch };
                 part.is_marked = kernels.run(SweepWork { band, span: part.span.clone(), sweep });
             };
             let parts = BandPart::split(numbers, layout.row_length, spans);

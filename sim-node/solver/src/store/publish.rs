@@ -1,6 +1,8 @@
 //! The state of a particle at the end of a step.
 
-use crate::particles::{Particle, flag};
+use sim_types::ParticleFlags;
+
+use crate::particles::Particle;
 
 /// State of a particle after the last substep.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +27,7 @@ pub(crate) fn publish(state: &mut Particle, motion: PublishedMotion) -> bool {
     } else {
         state.velocity = [0.0; 3];
         state.inverse_mass = 0.0;
-        state.flags = (state.flags | flag::FROZEN) & !flag::GRABBED;
+        state.flags = (state.flags | ParticleFlags::FROZEN) & !ParticleFlags::GRABBED;
     }
     !is_finite
 }

@@ -1,6 +1,6 @@
 //! Anchors and hands: particles that follow a moving frame, and what they pull along.
 
-use sim_solver::{Grip, Pose, Rejection, flag};
+use sim_solver::{Grab, ParticleFlags, Pose, Reason};
 
 use super::{assert_close, assert_near, bits, position, solver, step, velocity};
 
@@ -18,7 +18,10 @@ const CARRIED: &str = "[solver]\nrate_hz = 100\nsubsteps = 2\n\
 #[test]
 fn a_frame_carries_its_particles_along_its_path() {
     let mut solver = solver(CARRIED);
-    assert_eq!((solver.particle(0).flags, solver.particle(0).inverse_mass), (flag::ANCHORED, 0.0));
+    assert_eq!(
+        (solver.particle(0).flags, solver.particle(0).inverse_mass),
+        (ParticleFlags::ANCHORED, 0.0)
+    );
     for _ in 0..5 {
         step(&mut solver, 10);
     }
@@ -63,11 +66,11 @@ fn a_client_moves_a_frame_that_then_stands_and_a_reset_gives_it_back_its_path() 
     solver.reset();
     step(&mut solver, 51);
     assert_near("on its path again", 0.5, position(&solver, 0)[0], 1e-6);
-    assert_eq!(solver.move_anchor(1, pose), Err(Rejection::UnknownAnchor));
+    assert_eq!(solver.move_anchor(1, pose), Err(Reason::UnknownAnchor));
     let wrong = Pose { rotation: [0.0; 4], ..pose };
-    assert_eq!(solver.move_anchor(0, wrong), Err(Rejection::OutOfRange));
+    assert_eq!(solver.move_anchor(0, wrong), Err(Reason::OutOfRange));
     let wrong = Pose { translation: [f32::NAN, 0.0, 0.0], ..pose };
-    assert_eq!(solver.move_anchor(0, wrong), Err(Rejection::NonFinite));
+    assert_eq!(solver.move_anchor(0, wrong), Err(Reason::NonFinite));
 }
 
 #[test]
@@ -83,7 +86,7 @@ fn an_anchor_holds_what_the_scene_pins_and_a_client_can_pin_and_grab_it() {
     assert_eq!(solver.particle(0).position, held);
     assert_eq!(solver.particle(0).velocity, [0.0; 3]);
     solver.unpin(0).unwrap();
-    solver.grab(5, Grip { particle: 0, target: [0.5, 1.2, 0.0], over_s: 0.1 }).unwrap();
+    solver.grab(5, Grab { particle: 0, target: [0.5, 1.2, 0.0], over_s: 0.1 }).unwrap();
     step(&mut solver, 10);
     assert_near("in the hand", 1.2, position(&solver, 0)[1], 1e-6);
     solver.release(5, 0).unwrap();

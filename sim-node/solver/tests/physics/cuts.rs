@@ -1,6 +1,6 @@
 //! Cuts and pushes: exactly what they are meant to reach.
 
-use sim_solver::{Ball, Push, Rejection, Solver, Sweep, TearCause};
+use sim_solver::{Ball, Push, Reason, Solver, Sweep, TearCause};
 
 use super::{assert_near, bits, position, solver, step, velocity};
 
@@ -24,8 +24,8 @@ fn a_cut_tears_one_constraint_before_the_step() {
     solver.cut(7).unwrap();
     step(&mut solver, 1);
     assert_eq!((solver.torn(), solver.tear_causes()), (&[7][..], &[TearCause::Cut][..]));
-    assert_eq!(solver.cut(7), Err(Rejection::AlreadyTorn));
-    assert_eq!(solver.cut(31), Err(Rejection::UnknownConstraint));
+    assert_eq!(solver.cut(7), Err(Reason::AlreadyTorn));
+    assert_eq!(solver.cut(31), Err(Reason::UnknownConstraint));
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn a_sweep_in_the_plane_cuts_as_seen_from_above_it() {
     step(&mut solver, 1);
     assert_eq!(torn_pairs(&solver), [[0, 1], [5, 6]]);
     let leaves = Sweep { from: [0.0, 0.0, 1.0], to, direction };
-    assert_eq!(solver.cut_segment(leaves), Err(Rejection::OutOfRange));
+    assert_eq!(solver.cut_segment(leaves), Err(Reason::OutOfRange));
 }
 
 #[test]
@@ -74,9 +74,9 @@ fn a_sweep_that_covers_nothing_cuts_nothing_and_one_without_direction_is_refused
     let sweep = |to: [f32; 3], direction: [f32; 3]| Sweep { from: at, to, direction };
     solver.cut_segment(sweep(at, [0.0, 0.0, 1.0])).unwrap();
     solver.cut_segment(sweep([0.5, 0.0, 5.0], [0.0, 0.0, 1.0])).unwrap();
-    assert_eq!(solver.cut_segment(sweep([0.0; 3], [0.0; 3])), Err(Rejection::OutOfRange));
+    assert_eq!(solver.cut_segment(sweep([0.0; 3], [0.0; 3])), Err(Reason::OutOfRange));
     let wrong = sweep([f32::INFINITY, 0.0, 0.0], [0.0, 0.0, 1.0]);
-    assert_eq!(solver.cut_segment(wrong), Err(Rejection::NonFinite));
+    assert_eq!(solver.cut_segment(wrong), Err(Reason::NonFinite));
     step(&mut solver, 1);
     assert_eq!(solver.torn(), []);
 }
@@ -124,18 +124,18 @@ fn a_wrong_push_or_cut_changes_no_bit() {
     let before = bits(&solver);
     let good = Push { ball: ball([0.0; 3], 1.0), delta: [1.0; 3], limit: None };
     for (wrong, reason) in [
-        (Push { ball: ball([0.0; 3], -1.0), ..good }, Rejection::OutOfRange),
-        (Push { ball: ball([2e7, 0.0, 0.0], 1.0), ..good }, Rejection::OutOfRange),
-        (Push { ball: ball([f32::NAN, 0.0, 0.0], 1.0), ..good }, Rejection::NonFinite),
-        (Push { ball: ball([0.0; 3], f32::INFINITY), ..good }, Rejection::NonFinite),
-        (Push { delta: [0.0, f32::NAN, 0.0], ..good }, Rejection::NonFinite),
-        (Push { delta: [0.0, 1e8, 0.0], ..good }, Rejection::OutOfRange),
-        (Push { limit: Some(-0.1), ..good }, Rejection::OutOfRange),
-        (Push { limit: Some(f32::NAN), ..good }, Rejection::NonFinite),
+        (Push { ball: ball([0.0; 3], -1.0), ..good }, Reason::OutOfRange),
+        (Push { ball: ball([2e7, 0.0, 0.0], 1.0), ..good }, Reason::OutOfRange),
+        (Push { ball: ball([f32::NAN, 0.0, 0.0], 1.0), ..good }, Reason::NonFinite),
+        (Push { ball: ball([0.0; 3], f32::INFINITY), ..good }, Reason::NonFinite),
+        (Push { delta: [0.0, f32::NAN, 0.0], ..good }, Reason::NonFinite),
+        (Push { delta: [0.0, 1e8, 0.0], ..good }, Reason::OutOfRange),
+        (Push { limit: Some(-0.1), ..good }, Reason::OutOfRange),
+        (Push { limit: Some(f32::NAN), ..good }, Reason::NonFinite),
     ] {
         assert_eq!(solver.push(wrong), Err(reason), "{wrong:?}");
     }
-    assert_eq!(solver.cut_radius(ball([0.0; 3], -0.5)), Err(Rejection::OutOfRange));
-    assert_eq!(solver.cut_radius(ball([0.0; 3], f32::NAN)), Err(Rejection::NonFinite));
+    assert_eq!(solver.cut_radius(ball([0.0; 3], -0.5)), Err(Reason::OutOfRange));
+    assert_eq!(solver.cut_radius(ball([0.0; 3], f32::NAN)), Err(Reason::NonFinite));
     assert_eq!(bits(&solver), before);
 }

@@ -1,6 +1,6 @@
 //! What users do wrong, and what blows up: the state stays finite, and the run goes on.
 
-use sim_solver::{Grip, Scene, Solver, flag};
+use sim_solver::{Grab, ParticleFlags, Scene, Solver};
 
 use super::{
     assert_at_most, assert_near, bits, distance, particles, position, solver, step, stepped,
@@ -27,7 +27,7 @@ fn a_state_that_blows_up_is_frozen_where_it_was_and_the_rest_goes_on() {
     for (index, start) in [(0, [0.0, 0.0, 0.0]), (1, [1.0, 0.0, 0.0])] {
         let one = solver.particle(index);
         assert_eq!((one.position, one.velocity), (start, [0.0; 3]));
-        assert_eq!((one.flags, one.inverse_mass), (flag::FROZEN, 0.0));
+        assert_eq!((one.flags, one.inverse_mass), (ParticleFlags::FROZEN, 0.0));
     }
     // The third one is held by its stick to a particle that stands.
     step(&mut solver, 300);
@@ -39,9 +39,9 @@ fn a_state_that_blows_up_is_frozen_where_it_was_and_the_rest_goes_on() {
 fn a_frozen_particle_refuses_commands_and_a_reset_brings_it_back() {
     let mut solver = stepped(BLOWS_UP, 1);
     let before = bits(&solver);
-    let grip = Grip { particle: 0, target: [0.0; 3], over_s: 0.0 };
+    let grip = Grab { particle: 0, target: [0.0; 3], over_s: 0.0 };
     for refused in [solver.pin(0), solver.unpin(0), solver.grab(1, grip), solver.release(1, 0)] {
-        assert_eq!(refused, Err(sim_solver::Rejection::NoEffectHere));
+        assert_eq!(refused, Err(sim_solver::Reason::NoEffectHere));
     }
     assert_eq!(bits(&solver), before);
     solver.reset();
@@ -156,7 +156,7 @@ fn a_target_a_million_metres_away_is_followed_at_max_speed_and_tears_nothing_apa
     let mut solver = solver(
         "[solver]\nmax_speed = 1000\n[[generate]]\nshape = \"cloth\"\ncolumns = 10\nrows = 10\nspacing = 0.1\n",
     );
-    solver.grab(1, Grip { particle: 55, target: [1e6, 0.0, 0.0], over_s: 0.01 }).unwrap();
+    solver.grab(1, Grab { particle: 55, target: [1e6, 0.0, 0.0], over_s: 0.01 }).unwrap();
     for _ in 0..240 {
         step(&mut solver, 1);
         assert_finite(&solver);
@@ -175,7 +175,7 @@ fn a_storm_of_tears_is_complete_and_in_order() {
     let mut solver = solver(text);
     // Everything hangs and is stretched; then nothing may be stretched any more.
     step(&mut solver, 60);
-    solver.set("tear_distance", sim_solver::Setting::Number(0.0), None).unwrap();
+    solver.set("tear_distance", sim_solver::ParameterValue::Number(0.0), None).unwrap();
     let mut seen = 0;
     for _ in 0..60 {
         let before = solver.torn().to_vec();

@@ -1,10 +1,10 @@
 //! Parameters that change while a scene runs: without a jump, and refused where they are wrong.
 
-use sim_solver::{ConstraintKind, PARAMETERS, Rejection, Setting, Solver};
+use sim_solver::{ConstraintKind, PARAMETERS, ParameterValue, Reason, Solver};
 
 use super::{assert_close, assert_near, bits, distance, position, solver, step, velocity};
 
-use Setting::{Number, Off, Vector};
+use ParameterValue::{Number, Off, Vector};
 
 const HANGING: &str = "[solver]\nrate_hz = 240\nsubsteps = 4\ndamping = 4\n\
      [[particle]]\nposition = [0, 0, 0]\npinned = true\n[[particle]]\nposition = [0, -1, 0]\nmass = 2\n\
@@ -97,9 +97,9 @@ fn stiffness_belongs_to_pbd_and_compliance_to_xpbd() {
             .replace("compliance = 1e-3\n", ""),
     );
     pbd.set("stiffness", Number(0.5), None).unwrap();
-    assert_eq!(pbd.set("compliance", Number(0.5), None), Err(Rejection::NoEffectHere));
-    assert_eq!(pbd.set("stiffness", Number(1.5), None), Err(Rejection::OutOfRange));
-    assert_eq!(settled().set("stiffness", Number(0.5), None), Err(Rejection::NoEffectHere));
+    assert_eq!(pbd.set("compliance", Number(0.5), None), Err(Reason::NoEffectHere));
+    assert_eq!(pbd.set("stiffness", Number(1.5), None), Err(Reason::OutOfRange));
+    assert_eq!(settled().set("stiffness", Number(0.5), None), Err(Reason::NoEffectHere));
 }
 
 #[test]
@@ -115,30 +115,31 @@ fn a_reset_brings_the_parameters_of_the_scene_back() {
 #[test]
 fn wrong_settings_change_no_bit_of_the_future() {
     let mut wrong = vec![
-        ("colour", Number(1.0), None, Rejection::UnknownParameter),
-        ("gravity", Number(1.0), None, Rejection::OutOfRange),
-        ("gravity", Vector([0.0, 2e7, 0.0]), None, Rejection::OutOfRange),
-        ("gravity", Vector([0.0, f32::NAN, 0.0]), None, Rejection::NonFinite),
-        ("damping", Vector([1.0; 3]), None, Rejection::OutOfRange),
-        ("damping", Number(-1.0), None, Rejection::OutOfRange),
-        ("substeps", Number(0.0), None, Rejection::OutOfRange),
-        ("substeps", Number(1001.0), None, Rejection::OutOfRange),
-        ("substeps", Number(2.5), None, Rejection::OutOfRange),
-        ("iterations", Off, None, Rejection::OutOfRange),
-        ("relaxation", Number(2.0), None, Rejection::OutOfRange),
-        ("relaxation", Number(0.0), None, Rejection::OutOfRange),
-        ("max_stretch", Number(1.0), None, Rejection::OutOfRange),
-        ("tear_stretch", Number(0.5), None, Rejection::OutOfRange),
-        ("tear_distance", Number(-0.1), None, Rejection::OutOfRange),
-        ("tear_force", Number(0.0), None, Rejection::OutOfRange),
-        ("max_speed", Number(0.0), None, Rejection::OutOfRange),
-        ("time_scale", Number(0.0), None, Rejection::OutOfRange),
-        ("time_scale", Number(1e4), None, Rejection::OutOfRange),
-        ("compliance", Number(-1e-3), None, Rejection::OutOfRange),
-        ("compliance", Off, None, Rejection::OutOfRange),
-        ("damping", Number(1.0), Some(ConstraintKind::Shear), Rejection::OutOfRange),
+        ("colour", Number(1.0), None, Reason::UnknownParameter),
+        ("gravity", Number(1.0), None, Reason::OutOfRange),
+        ("gravity", Vector([0.0, 2e7, 0.0]), None, Reason::OutOfRange),
+        ("gravity", Vector([0.0, f32::NAN, 0.0]), None, Reason::NonFinite),
+        ("damping", Vector([1.0; 3]), None, Reason::OutOfRange),
+        ("damping", Number(-1.0), None, Reason::OutOfRange),
+        ("substeps", Number(0.0), None, Reason::OutOfRange),
+        ("substeps", Number(1001.0), None, Reason::OutOfRange),
+        ("substeps", Number(2.5), None, Reason::OutOfRange),
+        ("iterations", Off, None, Reason::OutOfRange),
+        ("relaxation", Number(2.0), None, Reason::OutOfRange),
+        ("relaxation", Number(0.0), None, Reason::OutOfRange),
+        ("max_stretch", Number(1.0), None, Reason::OutOfRange),
+        ("tear_stretch", Number(0.5), None, Reason::OutOfRange),
+        ("tear_distance", Number(-0.1), None, Reason::OutOfRange),
+        ("tear_force", Number(0.0), None, Reason::OutOfRange),
+        ("max_speed", Number(0.0), None, Reason::OutOfRange),
+        ("time_scale", Number(0.0), None, Reason::OutOfRange),
+        ("time_scale", Number(1e4), None, Reason::OutOfRange),
+        ("compliance", Number(-1e-3), None, Reason::OutOfRange),
+        ("compliance", Off, None, Reason::OutOfRange),
+        ("damping", Number(1.0), Some(ConstraintKind::Shear), Reason::OutOfRange),
     ];
-    wrong.extend(PARAMETERS.map(|name| (name, Number(f32::INFINITY), None, Rejection::NonFinite)));
+    wrong
+        .extend(PARAMETERS.map(|info| (info.name, Number(f32::INFINITY), None, Reason::NonFinite)));
     let (mut with, mut without) = (settled(), settled());
     for (name, setting, kind, reason) in wrong {
         assert_eq!(with.set(name, setting, kind), Err(reason), "{name} {setting:?}");

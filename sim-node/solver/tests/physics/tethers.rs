@@ -93,7 +93,7 @@ fn a_cut_path_drops_its_tethers_and_a_pin_finds_new_ones() {
 #[test]
 fn what_is_in_a_hand_is_no_root_until_it_is_let_go() {
     let mut solver = solver(&rope(10, true));
-    solver.grab(1, sim_solver::Grip { particle: 0, target: [0.0; 3], over_s: 0.0 }).unwrap();
+    solver.grab(1, sim_solver::Grab { particle: 0, target: [0.0; 3], over_s: 0.0 }).unwrap();
     step(&mut solver, 60);
     let sag = distance(&solver, 0, 10) - 0.5;
     assert!(sag > 1e-3, "no tether holds the end, so the rope stretches: {sag}");
@@ -131,7 +131,7 @@ fn bends_compliant_and_torn_constraints_make_no_path() {
     assert!(falls("structural", true) > 4.0, "a torn link makes none: it falls");
     let mut stiff = solver(text);
     step(&mut stiff, 1200);
-    stiff.set("compliance", sim_solver::Setting::Number(0.0), None).unwrap();
+    stiff.set("compliance", sim_solver::ParameterValue::Number(0.0), None).unwrap();
     step(&mut stiff, 600);
     assert_near("rigid, so tethered", 1.0, distance(&stiff, 0, 1), 1e-3);
 }

@@ -94,8 +94,8 @@ fn a_scene_without_wind_feels_no_air() {
     let mut calm = solver(text);
     step(&mut calm, 10);
     assert_eq!(velocity(&calm, 0), [0.0; 3]);
-    calm.set("wind_velocity", sim_solver::Setting::Vector([0.0, 0.0, 2.0]), None).unwrap();
-    calm.set("wind_drag", sim_solver::Setting::Number(1.0), None).unwrap();
+    calm.set("wind_velocity", sim_solver::ParameterValue::Vector([0.0, 0.0, 2.0]), None).unwrap();
+    calm.set("wind_drag", sim_solver::ParameterValue::Number(1.0), None).unwrap();
     step(&mut calm, 10);
     assert!(velocity(&calm, 0)[2] > 0.0);
 }

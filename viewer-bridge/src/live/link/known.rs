@@ -3,7 +3,7 @@
 //! A node does not publish them in plain numbers: they are those of the scene, changed by every `set`
 //! that was applied. Whoever came later than one of these cannot know, and says so.
 
-use sim_contract::{Action, NodeStatus, Outcome, PlainF32, SettingKind, SettingValue, Text};
+use sim_contract::{Action, KindFilter, NodeStatus, Outcome, ParameterValue, PlainF32, Text};
 
 use crate::Hub;
 use crate::hub::Slot;
@@ -17,7 +17,7 @@ pub(super) struct Known {
     initial: Option<Parameters>,
     values: Option<Parameters>,
     /// Settings of a load that is not on show yet.
-    waiting: Vec<(Text, SettingValue, Option<SettingKind>)>,
+    waiting: Vec<(Text, ParameterValue, Option<KindFilter>)>,
     is_load_due: bool,
     /// The index of the next outcome.
     next_index: Option<u64>,
@@ -123,8 +123,8 @@ mod tests {
     }
 
     fn damping(value: f32) -> Action {
-        let parameter = Text::new("damping");
-        Action::Set { parameter, value: SettingValue::Number(value), constraint_kind: None }
+        let parameter = Text::cut("damping");
+        Action::Set { parameter, value: ParameterValue::Number(value), constraint_kind: None }
     }
 
     fn begun(outcome_count: u64) -> Known {
@@ -160,7 +160,7 @@ mod tests {
     fn what_is_set_after_a_load_waits_for_it() {
         let mut known = begun(0);
         known.follow(&outcome(0, damping(1.0)));
-        known.follow(&outcome(1, Action::Load { scene: Text::new("rope") }));
+        known.follow(&outcome(1, Action::Load { scene: Text::cut("rope") }));
         known.follow(&outcome(2, damping(2.0)));
         assert_eq!(damping_of(&known), 1.0);
         known.begin(Parameters::default(), 3);

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::rope::is_end_pinned;
 use super::{Builder, Pinned, between, decimal, round};
-use crate::constraints::ConstraintKind;
+use sim_types::ConstraintKind;
 
 /// Planks across a way, each from its left to its right end: particles 2 i and 2 i + 1. Constraints
 /// plank by plank: the plank, then to the next one left, right, and both diagonals.

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::{Builder, Pinned, decimal, round};
-use crate::constraints::ConstraintKind;
 use crate::constraints::families::Family;
+use sim_types::ConstraintKind;
 
 /// A sheet of columns x rows particles; particle (c, r) has index r columns + c.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::super::obj::{Mesh, area, edges, fan};
 use super::{Builder, Pinned, round};
-use crate::constraints::ConstraintKind;
+use sim_types::ConstraintKind;
 
 /// A mesh: vertices are particles; the edges are structural; the diagonals of quads, and those of
 /// bigger faces from their first corner, are shear; across

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::{Builder, Pinned, decimal, round};
-use crate::constraints::ConstraintKind;
+use sim_types::ConstraintKind;
 
 /// A standing figure.
 #[derive(Debug, Clone, PartialEq, Serialize)]

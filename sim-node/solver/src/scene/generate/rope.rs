@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::{Builder, Pinned, between, decimal};
-use crate::constraints::ConstraintKind;
 use crate::constraints::families::Family;
+use sim_types::ConstraintKind;
 
 /// A line of particles; constraint i joins particles i and i + 1.
 #[derive(Debug, Clone, PartialEq, Serialize)]

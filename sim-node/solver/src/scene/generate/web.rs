@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::{Builder, Pinned, decimal, round};
-use crate::constraints::ConstraintKind;
 use crate::frame::rotation_about;
+use sim_types::ConstraintKind;
 
 /// A web: the hub is particle 0, then come the rings from the inside, each spoke by spoke.
 /// Constraints ring by ring and spoke by spoke: along the spoke from the ring within, then along

@@ -35,7 +35,7 @@ pub(crate) struct Band<'a> {
 }
 
 /// A pass over some rows.
-pub(crate) struct Sweep<'a, 'b> {
+pub(crate) struct PassSweep<'a, 'b> {
     pub(crate) stages: &'a [ScheduledStage],
     pub(crate) pass: Pass,
     pub(crate) inputs: &'a SubstepInputs<'a>,
@@ -46,7 +46,7 @@ pub(crate) struct Sweep<'a, 'b> {
 pub(crate) struct SweepWork<'a, 'b, 'c> {
     pub(crate) band: Band<'a>,
     pub(crate) span: Span,
-    pub(crate) sweep: Sweep<'b, 'c>,
+    pub(crate) sweep: PassSweep<'b, 'c>,
 }
 
 impl LaneWork for SweepWork<'_, '_, '_> {
@@ -60,7 +60,7 @@ impl LaneWork for SweepWork<'_, '_, '_> {
 
 impl Band<'_> {
     #[inline(always)]
-    fn sweep<W: Wide>(&mut self, span: &Span, sweep: &mut Sweep<'_, '_>) -> bool {
+    fn sweep<W: Wide>(&mut self, span: &Span, sweep: &mut PassSweep<'_, '_>) -> bool {
         let stages = sweep.stages;
         let mut span = span.clone();
         let mut rows = [const { 0..0 }; STAGES_MAX];
@@ -89,7 +89,7 @@ impl Band<'_> {
         &mut self,
         scheduled: &ScheduledStage,
         row: usize,
-        sweep: &mut Sweep<'_, '_>,
+        sweep: &mut PassSweep<'_, '_>,
     ) -> bool {
         if scheduled.stage.is_grouped() {
             return self.project::<W>(scheduled, row, sweep);
@@ -107,7 +107,7 @@ impl Band<'_> {
         &mut self,
         scheduled: &ScheduledStage,
         row: usize,
-        sweep: &mut Sweep<'_, '_>,
+        sweep: &mut PassSweep<'_, '_>,
     ) -> bool {
         let (layout, row_length) = (self.layout, self.layout.row_length);
         let (block_index, half) = (scheduled.group / 2, scheduled.group % 2);

@@ -1,4 +1,4 @@
-//! A table of numbers: aligned text for people, rows as JSON for programs.
+//! Tables of numbers: aligned text for people, rows in JSON for programs.
 
 use std::fmt;
 
@@ -7,24 +7,24 @@ use serde::{Serialize, Serializer};
 /// Width of a note, in characters.
 const NOTE_WIDTH: usize = 96;
 
-/// Where the numbers of a column come from.
+/// Source of a column's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Origin {
-    /// Chosen: the row is about it.
+pub(crate) enum Origin {
+    /// A chosen value that identifies the row.
     Given,
-    /// A loop of plain arithmetic in this program.
+    /// A loop of plain arithmetic in this crate.
     Loop,
     /// A scene in the solver.
     Solver,
     /// A closed form.
     Law,
-    /// Printed in a tutorial; never computed here.
+    /// Numbers that a tutorial prints. They are never computed here.
     Document,
 }
 
 impl Origin {
-    /// The name in the legend, and in JSON.
+    /// Returns the name in the legend and in JSON.
     fn name(self) -> &'static str {
         match self {
             Self::Given => "given",
@@ -36,18 +36,18 @@ impl Origin {
     }
 }
 
-/// One entry.
+/// One entry of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(untagged)]
-pub(super) enum Cell {
-    /// A measure, printed with the decimals of its column.
+pub(crate) enum Cell {
+    /// A measurement, printed with the decimals of its column.
     Number(f64),
     /// A count.
     Whole(u32),
     /// A name.
     Word(&'static str),
-    /// The document prints nothing for this row; null in JSON.
-    Nothing,
+    /// No value in this row; null in JSON.
+    Empty,
 }
 
 impl From<f64> for Cell {
@@ -70,34 +70,34 @@ impl From<&'static str> for Cell {
 
 impl From<Option<f64>> for Cell {
     fn from(number: Option<f64>) -> Self {
-        number.map_or(Self::Nothing, Self::Number)
+        number.map_or(Self::Empty, Self::Number)
     }
 }
 
 impl Cell {
-    /// As it is printed.
+    /// Returns the printed form.
     fn text(self, decimals: usize) -> String {
         match self {
             Self::Number(number) => {
                 let text = format!("{number:.decimals$}");
-                // What rounds to nothing has no sign.
+                // A number that rounds to 0 is printed without a sign.
                 let is_zero = text.chars().all(|one| matches!(one, '-' | '0' | '.'));
                 if is_zero { text.trim_start_matches('-').to_owned() } else { text }
             }
             Self::Whole(count) => count.to_string(),
             Self::Word(word) => word.to_owned(),
-            Self::Nothing => "-".to_owned(),
+            Self::Empty => "-".to_owned(),
         }
     }
 }
 
 /// One column, from its heading to its last entry.
 #[derive(Debug, Serialize)]
-pub(super) struct Column {
-    /// The heading, and the key in JSON.
+pub(crate) struct Column {
+    /// Heading, and key in JSON.
     name: &'static str,
     origin: Origin,
-    /// What the numbers are, with formula and unit.
+    /// Meaning of the numbers, with formula and unit.
     text: &'static str,
     #[serde(skip)]
     decimals: usize,
@@ -106,18 +106,18 @@ pub(super) struct Column {
 }
 
 impl Column {
-    /// A column without entries and decimals.
-    pub(super) fn new(origin: Origin, name: &'static str, text: &'static str) -> Self {
+    /// Creates a column without entries and without decimals.
+    pub(crate) fn new(origin: Origin, name: &'static str, text: &'static str) -> Self {
         Self { name, origin, text, decimals: 0, cells: Vec::new() }
     }
 
-    /// How many decimals are printed; JSON has all of them.
-    pub(super) fn decimals(self, decimals: usize) -> Self {
+    /// Sets the number of printed decimals. JSON has all digits.
+    pub(crate) fn decimals(self, decimals: usize) -> Self {
         Self { decimals, ..self }
     }
 
-    /// The entries, one for each row.
-    pub(super) fn cells<T: Into<Cell>>(self, cells: impl IntoIterator<Item = T>) -> Self {
+    /// Sets the entries, one per row.
+    pub(crate) fn cells<T: Into<Cell>>(self, cells: impl IntoIterator<Item = T>) -> Self {
         Self { cells: cells.into_iter().map(Into::into).collect(), ..self }
     }
 
@@ -130,9 +130,12 @@ impl Column {
     }
 }
 
-/// A table with what there is to say about it.
+/// A table with a legend and notes.
+///
+/// [`Display`](fmt::Display) prints aligned text. JSON has the columns with their sources and each
+/// row as an object.
 #[derive(Debug)]
-pub(super) struct Table {
+pub struct Table {
     name: &'static str,
     title: &'static str,
     columns: Vec<Column>,
@@ -140,20 +143,20 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// A table without columns; the name is a word, the title says what the rows have in common.
-    pub(super) fn new(name: &'static str, title: &'static str) -> Self {
+    /// Creates a table without columns. The name is one word; the title says what all rows share.
+    pub(crate) fn new(name: &'static str, title: &'static str) -> Self {
         Self { name, title, columns: Vec::new(), notes: Vec::new() }
     }
 
-    /// Adds a column at the right; all of a table's columns have the same number of entries.
-    pub(super) fn column(mut self, column: Column) -> Self {
+    /// Adds a column at the right. All columns of a table have the same number of entries.
+    pub(crate) fn column(mut self, column: Column) -> Self {
         self.columns.push(column);
         assert_eq!(self.row_count(), self.columns[self.columns.len() - 1].cells.len());
         self
     }
 
-    /// Adds a paragraph below.
-    pub(super) fn note(mut self, note: impl Into<String>) -> Self {
+    /// Adds a paragraph below the table.
+    pub(crate) fn note(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
     }
@@ -162,14 +165,14 @@ impl Table {
         self.columns.first().map_or(0, |column| column.cells.len())
     }
 
-    /// The numbers of a column; a missing one is NaN.
+    /// Returns the numbers of a column. Words and empty entries are NaN.
     #[cfg(test)]
-    pub(super) fn numbers(&self, name: &str) -> Vec<f64> {
+    pub(crate) fn numbers(&self, name: &str) -> Vec<f64> {
         let column = self.columns.iter().find(|column| column.name == name).unwrap();
         let number = |cell: &Cell| match *cell {
             Cell::Number(number) => number,
             Cell::Whole(count) => f64::from(count),
-            Cell::Word(_) | Cell::Nothing => f64::NAN,
+            Cell::Word(_) | Cell::Empty => f64::NAN,
         };
         column.cells.iter().map(number).collect()
     }
@@ -195,27 +198,27 @@ impl fmt::Display for Table {
             writeln!(formatter, "  {name:<width$}  {:<8}  {text}", origin.name())?;
         }
         for note in &self.notes {
-            writeln!(formatter, "\n{}", wrapped(note))?;
+            writeln!(formatter, "\n{}", wrap(note))?;
         }
         Ok(())
     }
 }
 
-/// A text in lines of at most `NOTE_WIDTH`.
-fn wrapped(text: &str) -> String {
+/// Wraps a text into lines of at most `NOTE_WIDTH` characters.
+fn wrap(text: &str) -> String {
     let mut lines = String::new();
     let mut length = 0;
     for word in text.split_whitespace() {
-        let gap = if length == 0 { "" } else { " " };
-        let is_full = length + gap.len() + word.len() > NOTE_WIDTH;
-        lines += if is_full { "\n" } else { gap };
-        length = if is_full { 0 } else { length + gap.len() } + word.len();
+        let space = if length == 0 { "" } else { " " };
+        let is_full = length + space.len() + word.len() > NOTE_WIDTH;
+        lines += if is_full { "\n" } else { space };
+        length = if is_full { 0 } else { length + space.len() } + word.len();
         lines += word;
     }
     lines
 }
 
-/// One row as an object, its keys in the order of the columns.
+/// One row, serialized as an object with its keys in the order of the columns.
 struct Row<'a> {
     table: &'a Table,
     index: usize,
@@ -249,9 +252,11 @@ mod tests {
     use super::*;
 
     fn example() -> Table {
-        Table::new("way", "two rows")
+        Table::new("fall", "two rows")
             .column(Column::new(Origin::Given, "t", "time, s").cells([1_u32, 10]))
-            .column(Column::new(Origin::Law, "x", "way, m").decimals(2).cells([-0.001, 12.345]))
+            .column(
+                Column::new(Origin::Law, "x", "distance, m").decimals(2).cells([-0.001, 12.345]),
+            )
             .column(
                 Column::new(Origin::Document, "printed", "m").decimals(1).cells([Some(2.5), None]),
             )
@@ -259,12 +264,12 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_aligned_at_the_right_below_their_headings() {
+    fn columns_are_right_aligned_below_their_headings() {
         insta::assert_snapshot!(example());
     }
 
     #[test]
-    fn json_has_each_row_as_an_object_with_every_digit() {
+    fn json_has_each_row_as_an_object_with_all_digits() {
         let json = serde_json::to_value(example()).unwrap();
         let rows = r#"[{"t":1,"x":-0.001,"printed":2.5},{"t":10,"x":12.345,"printed":null}]"#;
         assert_eq!(json["rows"], serde_json::from_str::<serde_json::Value>(rows).unwrap());
@@ -274,7 +279,7 @@ mod tests {
 
     #[test]
     fn notes_are_wrapped_between_words() {
-        let text = wrapped(&"word ".repeat(50));
+        let text = wrap(&"word ".repeat(50));
         assert_eq!(text.lines().map(str::len).collect::<Vec<_>>(), [94, 94, 59]);
         assert_eq!(text.split_whitespace().count(), 50);
     }

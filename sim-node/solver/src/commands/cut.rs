@@ -1,26 +1,31 @@
-//! Cuts: one constraint, all around a point, all that cross the way of a cursor.
+//! Cuts: a single constraint, all around a point, or all that cross the path of a cursor.
 
 use glam::{DVec3, Vec3};
 
-use crate::{COORDINATE_MAX, Constraint, Rejection, Solver, TearCause, check_finite, is_near};
+use sim_types::{COORDINATE_MAX, Reason, TearCause};
 
-/// The way of a cursor, extended along the direction of view: a strip that cuts what crosses it.
+use crate::checks::{check_finite, is_near};
+use crate::constraints::Constraint;
+use crate::solver::Solver;
+
+/// The path of a cursor, extended along the direction of view to a strip that cuts the constraints
+/// that cross it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sweep {
-    /// Where the cursor was.
+    /// Previous position of the cursor.
     pub from: [f32; 3],
-    /// Where it is.
+    /// Current position of the cursor.
     pub to: [f32; 3],
-    /// The strip extends along this, both ways; of any length but 0.
+    /// Direction in which the strip extends, both ways; not 0.
     pub direction: [f32; 3],
 }
 
-/// All that is nearer to a point than a radius.
+/// All points nearer to the center than the radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ball {
-    /// Its middle.
+    /// Center.
     pub center: [f32; 3],
-    /// >= 0.
+    /// Radius, >= 0.
     pub radius: f32,
 }
 
@@ -28,35 +33,35 @@ impl Solver {
     /// Tears one constraint.
     ///
     /// # Errors
-    /// Unknown, or torn already.
-    pub fn cut(&mut self, constraint: u32) -> Result<(), Rejection> {
+    /// The constraint is unknown or already torn.
+    pub fn cut(&mut self, constraint: u32) -> Result<(), Reason> {
         if constraint as usize >= self.constraint_count() {
-            return Err(Rejection::UnknownConstraint);
+            return Err(Reason::UnknownConstraint);
         }
         if self.torn.is_torn(constraint) {
-            return Err(Rejection::AlreadyTorn);
+            return Err(Reason::AlreadyTorn);
         }
         self.tear(constraint, TearCause::Cut);
         self.tethers.drop_torn(&self.torn, &mut self.store);
         Ok(())
     }
 
-    /// Tears every constraint that has an end strictly within a ball.
+    /// Tears every constraint with an end strictly inside a ball.
     ///
     /// # Errors
-    /// A wrong number.
-    pub fn cut_radius(&mut self, ball: Ball) -> Result<(), Rejection> {
+    /// A number is not finite or out of range.
+    pub fn cut_radius(&mut self, ball: Ball) -> Result<(), Reason> {
         self.check_ball(&ball)?;
-        self.tear_all(|a, b| ball.has(a) || ball.has(b));
+        self.tear_all(|a, b| ball.contains(a) || ball.contains(b));
         Ok(())
     }
 
-    /// Tears every constraint that crosses a strip. One that lies in it, or a sweep that covers
-    /// nothing, does not cross.
+    /// Tears every constraint that crosses a strip. A constraint within the plane of the strip does
+    /// not cross it, and nothing crosses a strip without area.
     ///
     /// # Errors
-    /// A wrong number, or no direction.
-    pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Rejection> {
+    /// A number is not finite or out of range, or the direction is 0.
+    pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Reason> {
         let Sweep { from, to, direction } = sweep;
         for vector in [from, to, direction] {
             check_finite(&vector)?;
@@ -64,23 +69,23 @@ impl Solver {
         let is_near = is_near(&from) && is_near(&to) && is_near(&direction);
         let leaves_plane = self.is_planar && (from[2] != 0.0 || to[2] != 0.0);
         if !is_near || leaves_plane || direction == [0.0; 3] {
-            return Err(Rejection::OutOfRange);
+            return Err(Reason::OutOfRange);
         }
         let strip = Strip::new(&sweep);
         self.tear_all(|a, b| strip.is_crossed(a, b));
         Ok(())
     }
 
-    pub(crate) fn check_ball(&self, ball: &Ball) -> Result<(), Rejection> {
+    pub(crate) fn check_ball(&self, ball: &Ball) -> Result<(), Reason> {
         check_finite(&ball.center)?;
         check_finite(&[ball.radius])?;
         let is_near = is_near(&ball.center);
         let is_in_plane = !self.is_planar || ball.center[2] == 0.0;
         let is_size = (0.0..=COORDINATE_MAX).contains(&ball.radius);
-        if is_near && is_in_plane && is_size { Ok(()) } else { Err(Rejection::OutOfRange) }
+        if is_near && is_in_plane && is_size { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
-    /// Tears what is whole and meets a condition on its two ends.
+    /// Tears the constraints whose ends meet a condition, unless they are torn.
     fn tear_all(&mut self, is_cut: impl Fn(Vec3, Vec3) -> bool) {
         for index in 0..self.model.constraints.len() {
             let Constraint { a, b, .. } = self.model.constraints[index];
@@ -98,18 +103,18 @@ impl Solver {
 }
 
 impl Ball {
-    pub(crate) fn has(&self, point: Vec3) -> bool {
+    pub(crate) fn contains(&self, point: Vec3) -> bool {
         let arm = point - Vec3::from_array(self.center);
         arm.dot(arm) < self.radius * self.radius
     }
 }
 
-/// A strip: from a point along one side, and both ways along another direction.
+/// A strip: from a point along one side, and both ways along a direction.
 struct Strip {
     from: DVec3,
-    /// Of the plane of the strip; 0 where the strip covers nothing.
+    /// Normal of the plane of the strip; 0 if the strip has no area.
     normal: DVec3,
-    /// The part of the side that is across the direction.
+    /// Component of the side perpendicular to the direction.
     across: DVec3,
 }
 
@@ -122,7 +127,7 @@ impl Strip {
         Self { from, normal: side.cross(direction), across }
     }
 
-    /// Touching counts.
+    /// True if the segment from `a` to `b` crosses or touches the strip.
     fn is_crossed(&self, a: Vec3, b: Vec3) -> bool {
         let (a, b) = (a.as_dvec3() - self.from, b.as_dvec3() - self.from);
         let (above, below) = (a.dot(self.normal), b.dot(self.normal));

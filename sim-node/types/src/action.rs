@@ -1,22 +1,18 @@
-//! What a client asks of a node.
+//! The actions that clients ask a node to perform.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::plain_number::{number, optional_number, rotation, vector};
-use crate::{SettingKind, SettingValue, Text};
+use crate::json_number::{number, optional_number, rotation, vector};
+use crate::{ConstraintKind, ParameterValue, Text};
 
-/// Seconds that a grabbed particle takes to its target unless told: one frame of a 60 Hz display.
+/// Default time in which a grabbed particle reaches its target, in seconds: one frame at 60 Hz.
 pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;
 
-/// The client that every `sim-node ctl` speaks for: what one call grabs, a later call releases.
-pub const CONSOLE_CLIENT_ID: u64 = 0;
-
-/// Something to do at the boundary before a step. Its JSON form is a flat object with "kind".
+/// An action at the boundary before a step. Its JSON form is a flat object with "kind".
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-#[non_exhaustive]
 pub enum Action {
-    /// Holds a particle where it stands.
+    /// Holds a particle in place.
     Pin {
         /// Index of the particle.
         particle: u32,
@@ -26,45 +22,45 @@ pub enum Action {
         /// Index of the particle.
         particle: u32,
     },
-    /// Drives a particle to a target, linearly.
+    /// Drives a particle to a target, along a straight line.
     Grab {
         /// Index of the particle.
         particle: u32,
-        /// Where to, in m, relative to the scene's origin.
+        /// Target in m, relative to the scene's origin.
         #[serde(with = "vector")]
         target: [f32; 3],
-        /// Seconds to get there, 0..=0.25, rounded up to whole steps.
+        /// Time to the target in seconds, 0..=0.25, rounded up to whole steps.
         #[serde(with = "number", default = "grab_over_s_default")]
         over_s: f32,
     },
-    /// Gives a particle that this client grabbed a new target.
+    /// Sets a new target for a particle that this client has grabbed.
     Move {
         /// Index of the particle.
         particle: u32,
-        /// Where to, in m, relative to the scene's origin.
+        /// Target in m, relative to the scene's origin.
         #[serde(with = "vector")]
         target: [f32; 3],
-        /// Seconds to get there, 0..=0.25, rounded up to whole steps.
+        /// Time to the target in seconds, 0..=0.25, rounded up to whole steps.
         #[serde(with = "number", default = "grab_over_s_default")]
         over_s: f32,
     },
-    /// Lets a grabbed particle go, with the velocity of its last motion.
+    /// Releases a grabbed particle with the velocity of its last motion.
     Release {
         /// Index of the particle.
         particle: u32,
     },
-    /// Stops the node at this boundary.
+    /// Pauses the node at this boundary.
     Pause,
-    /// Lets a paused node go on.
+    /// Resumes a paused node.
     Resume,
-    /// Lets a paused node make that many steps.
+    /// Makes a paused node perform `count` steps.
     Step {
-        /// Steps to make, at least 1.
+        /// Number of steps, at least 1.
         count: u32,
     },
-    /// Makes the next step's state the initial one; the step number goes on.
+    /// Restores the initial state as the state of the next step. The step number goes on.
     Reset,
-    /// Gives every free particle within a ball a new velocity: `delta` times the rate.
+    /// Sets the velocity of every free particle inside a ball to `delta` times the rate.
     Push {
         /// Centre of the ball, in m, relative to the scene's origin.
         #[serde(with = "vector")]
@@ -72,10 +68,10 @@ pub enum Action {
         /// Radius of the ball in m; a particle at this distance is outside.
         #[serde(with = "number")]
         radius: f32,
-        /// How far the particles go in the next step, in m.
+        /// Displacement of the particles in the next step, in m.
         #[serde(with = "vector")]
         delta: [f32; 3],
-        /// Most of each component of `delta`, in m; without it none is too much.
+        /// Largest magnitude of each component of `delta`, in m; `None` is no limit.
         #[serde(default, with = "optional_number", skip_serializing_if = "Option::is_none")]
         limit: Option<f32>,
     },
@@ -84,7 +80,7 @@ pub enum Action {
         /// Index of the constraint.
         constraint: u32,
     },
-    /// Tears every constraint that has an end within a ball.
+    /// Tears every constraint with an end inside a ball.
     CutRadius {
         /// Centre of the ball, in m, relative to the scene's origin.
         #[serde(with = "vector")]
@@ -93,58 +89,58 @@ pub enum Action {
         #[serde(with = "number")]
         radius: f32,
     },
-    /// Tears every constraint that crosses a strip: the segment, extended both ways.
+    /// Tears every constraint that crosses a strip: a segment, extended in both directions.
     CutSegment {
-        /// Begin of the segment, in m, relative to the scene's origin.
+        /// Start of the segment, in m, relative to the scene's origin.
         #[serde(with = "vector")]
         from: [f32; 3],
         /// End of the segment, in m, relative to the scene's origin.
         #[serde(with = "vector")]
         to: [f32; 3],
-        /// Direction in which the segment is extended without end; [0, 0, 1] in the plane.
+        /// Direction along which the segment is extended without limit; [0, 0, 1] in a planar scene.
         #[serde(with = "vector")]
         direction: [f32; 3],
     },
-    /// Replaces an anchor's path: it stands in this pose from the end of the next step on.
+    /// Replaces an anchor's path: the anchor reaches this pose at the end of the next step and stays.
     MoveAnchor {
         /// Index of the anchor.
         anchor: u32,
-        /// In m, from its pose at load.
+        /// Translation in m, relative to the pose at load.
         #[serde(with = "vector")]
         translation: [f32; 3],
-        /// Quaternion x, y, z, w.
+        /// Rotation relative to the pose at load, as the quaternion x, y, z, w.
         #[serde(default = "identity", with = "rotation")]
         rotation: [f32; 4],
     },
-    /// Moves a collider within the next step, with the velocity that this implies.
+    /// Moves a collider during the next step, with the velocity that this implies.
     MoveCollider {
         /// Index of the collider.
         collider: u32,
-        /// In m, from its pose at load.
+        /// Translation in m, relative to the pose at load.
         #[serde(with = "vector")]
         translation: [f32; 3],
-        /// Quaternion x, y, z, w.
+        /// Rotation relative to the pose at load, as the quaternion x, y, z, w.
         #[serde(default = "identity", with = "rotation")]
         rotation: [f32; 4],
     },
-    /// Gives a parameter of the simulation a new value.
+    /// Sets a parameter of the simulation.
     Set {
-        /// Name of the parameter; one that the solver does not know is rejected.
+        /// Name of the parameter. An unknown name is rejected.
         parameter: Text,
-        /// Its value, which must be given: null in JSON is off.
-        value: SettingValue,
-        /// Which constraints it is for, where it is a parameter of constraints; without it all.
+        /// New value; null in JSON is off.
+        value: ParameterValue,
+        /// Kind of the affected constraints, for `compliance` and `stiffness`; `None` is all kinds.
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        constraint_kind: Option<SettingKind>,
+        constraint_kind: Option<KindFilter>,
     },
-    /// Replaces the scene by another one.
+    /// Replaces the scene.
     Load {
-        /// Name of a built-in scene, or a file of the node's host.
+        /// Name of a built-in scene, or path of a file on the node's host.
         scene: Text,
     },
-    /// What this version does not know, by its number on the wire. Always rejected.
+    /// A kind that this version does not know. Always rejected.
     Unknown {
-        /// [`crate::Command::kind`] as it came.
+        /// Number of the kind on the wire.
         number: u32,
     },
 }
@@ -158,49 +154,103 @@ fn identity() -> [f32; 4] {
     [0.0, 0.0, 0.0, 1.0]
 }
 
-#[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-    use crate::ConstraintKind;
+/// The kinds of constraints that a `set` addresses. Its JSON form is the name of a kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KindFilter {
+    /// The constraints of one kind.
+    Known(ConstraintKind),
+    /// A kind that this version does not know. The command is rejected like any wrong value. The
+    /// name is not kept; it is written as "unknown".
+    Unknown,
+}
 
-    /// One of each kind, and those with options more than once.
-    pub(crate) fn all_actions() -> Vec<Action> {
+impl KindFilter {
+    /// Returns the filter for a kind's name.
+    pub fn from_name(name: &str) -> Self {
+        ConstraintKind::from_name(name).map_or(Self::Unknown, Self::Known)
+    }
+
+    /// Returns the filter for a kind's number on the wire.
+    pub fn from_number(number: u32) -> Self {
+        ConstraintKind::from_number(number).map_or(Self::Unknown, Self::Known)
+    }
+
+    /// Number on the wire; `u32::MAX`, which no version will assign, for an unknown kind.
+    pub fn number(self) -> u32 {
+        match self {
+            Self::Known(kind) => kind as u32,
+            Self::Unknown => u32::MAX,
+        }
+    }
+
+    /// Name of the kind, or "unknown".
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Known(kind) => kind.name(),
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+impl Serialize for KindFilter {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for KindFilter {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer).map(|name| Self::from_name(&name))
+    }
+}
+
+impl Action {
+    /// One action of each kind, and those with options more than once: for tests of formats.
+    #[doc(hidden)]
+    pub fn samples() -> Vec<Self> {
         let target = [0.1, -2.0, 3.5];
         let other = [0.0, -0.0, 1e-9];
         let rotation = [0.0, 0.6, 0.0, 0.8];
+        let set = |name: &str, value, constraint_kind| Self::Set {
+            parameter: Text::cut(name),
+            value,
+            constraint_kind,
+        };
+        let structural = KindFilter::Known(ConstraintKind::Structural);
         vec![
-            Action::Pin { particle: 3 },
-            Action::Unpin { particle: 4 },
-            Action::Grab { particle: 5, target, over_s: 0.1 },
-            Action::Move { particle: 5, target, over_s: 0.0 },
-            Action::Release { particle: 5 },
-            Action::Pause,
-            Action::Resume,
-            Action::Step { count: 7 },
-            Action::Reset,
-            Action::Push { center: target, radius: 0.5, delta: other, limit: None },
-            Action::Push { center: target, radius: 0.5, delta: other, limit: Some(0.0) },
-            Action::Cut { constraint: 6 },
-            Action::CutRadius { center: target, radius: 0.25 },
-            Action::CutSegment { from: target, to: other, direction: [0.0, 0.0, 1.0] },
-            Action::MoveAnchor { anchor: 1, translation: target, rotation },
-            Action::MoveCollider { collider: 2, translation: target, rotation: identity() },
-            set("damping", SettingValue::Number(0.5), None),
-            set("gravity", SettingValue::Vector(target), None),
-            set("tear_force", SettingValue::Off, None),
-            set(
-                "compliance",
-                SettingValue::Number(0.0),
-                Some(SettingKind::Known(ConstraintKind::Structural)),
-            ),
-            set("stiffness", SettingValue::Number(1.0), Some(SettingKind::Unknown)),
-            Action::Load { scene: Text::new("./gemütlich.toml") },
-            Action::Unknown { number: 99 },
+            Self::Pin { particle: 3 },
+            Self::Unpin { particle: 4 },
+            Self::Grab { particle: 5, target, over_s: 0.1 },
+            Self::Move { particle: 5, target, over_s: 0.0 },
+            Self::Release { particle: 5 },
+            Self::Pause,
+            Self::Resume,
+            Self::Step { count: 7 },
+            Self::Reset,
+            Self::Push { center: target, radius: 0.5, delta: other, limit: None },
+            Self::Push { center: target, radius: 0.5, delta: other, limit: Some(0.0) },
+            Self::Cut { constraint: 6 },
+            Self::CutRadius { center: target, radius: 0.25 },
+            Self::CutSegment { from: target, to: other, direction: [0.0, 0.0, 1.0] },
+            Self::MoveAnchor { anchor: 1, translation: target, rotation },
+            Self::MoveCollider { collider: 2, translation: target, rotation: identity() },
+            set("damping", ParameterValue::Number(0.5), None),
+            set("gravity", ParameterValue::Vector(target), None),
+            set("tear_force", ParameterValue::Off, None),
+            set("compliance", ParameterValue::Number(0.0), Some(structural)),
+            set("stiffness", ParameterValue::Number(1.0), Some(KindFilter::Unknown)),
+            Self::Load { scene: Text::cut("./gemütlich.toml") },
+            Self::Unknown { number: 99 },
         ]
     }
+}
 
-    fn set(name: &str, value: SettingValue, constraint_kind: Option<SettingKind>) -> Action {
-        Action::Set { parameter: Text::new(name), value, constraint_kind }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(name: &str, value: ParameterValue, constraint_kind: Option<KindFilter>) -> Action {
+        Action::Set { parameter: Text::cut(name), value, constraint_kind }
     }
 
     fn read(text: &str) -> Action {
@@ -209,7 +259,7 @@ pub(crate) mod tests {
 
     #[test]
     fn every_action_survives_json() {
-        for action in all_actions() {
+        for action in Action::samples() {
             let text = serde_json::to_string(&action).unwrap();
             assert_eq!(read(&text), action, "{text}");
         }
@@ -218,7 +268,7 @@ pub(crate) mod tests {
     #[test]
     fn the_json_of_each_kind_is_frozen() {
         let lines: Vec<_> =
-            all_actions().iter().map(|action| serde_json::to_string(action).unwrap()).collect();
+            Action::samples().iter().map(|action| serde_json::to_string(action).unwrap()).collect();
         insta::assert_snapshot!(lines.join("\n"));
     }
 
@@ -241,10 +291,10 @@ pub(crate) mod tests {
     #[test]
     fn non_finite_settings_and_limits_are_strings_in_json() {
         let text = r#"{"kind":"set","parameter":"tear_force","value":"inf"}"#;
-        assert_eq!(read(text), set("tear_force", SettingValue::Number(f32::INFINITY), None));
+        assert_eq!(read(text), set("tear_force", ParameterValue::Number(f32::INFINITY), None));
         assert_eq!(serde_json::to_string(&read(text)).unwrap(), text);
         let text = r#"{"kind":"set","parameter":"gravity","value":[0,"-inf","nan"]}"#;
-        let Action::Set { value: SettingValue::Vector(value), .. } = read(text) else {
+        let Action::Set { value: ParameterValue::Vector(value), .. } = read(text) else {
             panic!("no vector: {text}");
         };
         assert!(value[1] == f32::NEG_INFINITY && value[2].is_nan());
@@ -253,7 +303,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_optional_has_a_default() {
+    fn optional_fields_have_defaults() {
         let grab = Action::Grab { particle: 1, target: [0., 1., 2.], over_s: GRAB_OVER_S_DEFAULT };
         assert_eq!(read(r#"{"kind":"grab","particle":1,"target":[0,1,2]}"#), grab);
         let push = r#"{"kind":"push","center":[0,0,0],"radius":1,"delta":[0,0,0]}"#;
@@ -265,21 +315,21 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn null_switches_a_parameter_off_but_no_value_is_an_error() {
+    fn null_is_off_but_a_missing_value_is_an_error() {
         let text = r#"{"kind":"set","parameter":"tear_force","value":null}"#;
-        assert_eq!(read(text), set("tear_force", SettingValue::Off, None));
+        assert_eq!(read(text), set("tear_force", ParameterValue::Off, None));
         let missing = r#"{"kind":"set","parameter":"tear_force"}"#;
         let error = serde_json::from_str::<Action>(missing).unwrap_err().to_string();
         assert!(error.contains("missing field `value`"), "{error}");
     }
 
     #[test]
-    fn an_unknown_kind_of_constraints_is_kept_as_unknown() {
+    fn an_unknown_kind_of_constraint_is_read_as_unknown() {
         let text = r#"{"kind":"set","parameter":"compliance","value":1,"constraint_kind":"knot"}"#;
         let action = read(text);
         assert_eq!(
             action,
-            set("compliance", SettingValue::Number(1.0), Some(SettingKind::Unknown))
+            set("compliance", ParameterValue::Number(1.0), Some(KindFilter::Unknown))
         );
         let text = serde_json::to_string(&action).unwrap();
         assert!(text.ends_with(r#""constraint_kind":"unknown"}"#), "{text}");

@@ -1,0 +1,77 @@
+//! The words that every program of this project shares, as plain data: actions and the reasons for
+//! rejecting them, kinds of constraints, causes of tears, shapes of colliders, particle flags, and
+//! the one table of parameters.
+//!
+//! ```
+//! use sim_types::{Action, PARAMETERS, Parameter};
+//!
+//! let action: Action = serde_json::from_str(r#"{"kind":"pin","particle":3}"#)?;
+//! assert_eq!(action, Action::Pin { particle: 3 });
+//! let damping = Parameter::from_name("damping").map(Parameter::info);
+//! assert_eq!(damping.map(|info| info.unit), Some("1/s"));
+//! assert_eq!(PARAMETERS.len(), 15);
+//! # Ok::<(), serde_json::Error>(())
+//! ```
+//!
+//! There is no behaviour here: no solver, no shared memory, no file format.
+#![forbid(unsafe_code)]
+
+mod action;
+mod collider_shape;
+mod constraint_kind;
+mod json_number;
+mod method;
+mod parameter;
+mod parameter_values;
+mod particle_flags;
+mod range;
+mod reason;
+mod tear_cause;
+mod text;
+
+pub use action::{Action, GRAB_OVER_S_DEFAULT, KindFilter};
+pub use collider_shape::ColliderShape;
+pub use constraint_kind::ConstraintKind;
+pub use json_number::PlainF32;
+pub use method::Method;
+pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
+pub use parameter_values::{ParameterValues, PerKind, SETTINGS_COUNT, Setting};
+pub use particle_flags::ParticleFlags;
+pub use range::{COORDINATE_MAX, NumberRange};
+pub use reason::Reason;
+pub use tear_cause::TearCause;
+pub use text::{Text, TextError};
+
+#[cfg(test)]
+mod tests {
+    /// Checks that names and numbers of an enum lead back to its variants.
+    macro_rules! assert_names_and_numbers {
+        ($type:ty, $number:ty) => {
+            for (number, one) in <$type>::ALL.into_iter().enumerate() {
+                assert_eq!(one as usize, number);
+                assert_eq!(<$type>::from_number(<$number>::try_from(number).unwrap()), Some(one));
+                assert_eq!(<$type>::from_name(one.name()), Some(one));
+            }
+            assert_eq!(<$type>::from_number(<$number>::MAX), None);
+            assert_eq!(<$type>::from_name("nonsense"), None);
+        };
+    }
+
+    #[test]
+    fn every_word_has_one_name_and_one_number() {
+        assert_names_and_numbers!(super::ConstraintKind, u32);
+        assert_names_and_numbers!(super::ColliderShape, u32);
+        assert_names_and_numbers!(super::Method, u32);
+        assert_names_and_numbers!(super::Parameter, u32);
+        assert_names_and_numbers!(super::TearCause, u32);
+    }
+
+    #[test]
+    fn every_reason_has_one_name_and_one_number() {
+        for reason in super::Reason::ALL {
+            assert_eq!(super::Reason::from_number(reason as u32), Some(reason));
+            assert_eq!(super::Reason::from_name(reason.name()), Some(reason));
+        }
+        assert_eq!(super::Reason::from_number(0), None);
+    }
+}

@@ -1,0 +1,279 @@
+//! The values of all parameters at one moment.
+
+use serde::{Deserialize, Serialize};
+
+use crate::json_number::{number, optional_number, vector};
+use crate::{ConstraintKind, Parameter, ParameterValue};
+
+/// One parameter with its value; `compliance` and `stiffness` have one for each kind of constraint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setting {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// The kind of constraint, for a parameter that has a value for each.
+    pub constraint_kind: Option<ConstraintKind>,
+    /// The value.
+    pub value: ParameterValue,
+}
+
+/// Number of [`Setting`]s in [`ParameterValues`]: 13 parameters, and two with one value for each of
+/// four kinds of constraints.
+pub const SETTINGS_COUNT: usize = 21;
+
+/// The values of all parameters, named as in commands. `None` is off.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "described in the table of parameters")]
+pub struct ParameterValues {
+    #[serde(with = "vector")]
+    pub gravity: [f32; 3],
+    #[serde(with = "number")]
+    pub damping: f32,
+    #[serde(with = "vector")]
+    pub wind_velocity: [f32; 3],
+    #[serde(with = "number")]
+    pub wind_drag: f32,
+    pub substeps: u32,
+    pub iterations: u32,
+    #[serde(with = "number")]
+    pub relaxation: f32,
+    #[serde(with = "optional_number")]
+    pub max_stretch: Option<f32>,
+    #[serde(with = "optional_number")]
+    pub tear_stretch: Option<f32>,
+    #[serde(with = "optional_number")]
+    pub tear_distance: Option<f32>,
+    #[serde(with = "optional_number")]
+    pub tear_force: Option<f32>,
+    #[serde(with = "number")]
+    pub max_speed: f32,
+    #[serde(with = "number")]
+    pub time_scale: f32,
+    pub compliance: PerKind,
+    pub stiffness: PerKind,
+}
+
+/// A softness for each kind of constraint; `None` where each constraint has its own.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "the kinds of constraints")]
+pub struct PerKind {
+    #[serde(with = "optional_number")]
+    pub structural: Option<f32>,
+    #[serde(with = "optional_number")]
+    pub shear: Option<f32>,
+    #[serde(with = "optional_number")]
+    pub bend: Option<f32>,
+    #[serde(with = "optional_number")]
+    pub tether: Option<f32>,
+}
+
+impl PerKind {
+    /// The value for a kind.
+    pub fn get(&self, kind: ConstraintKind) -> Option<f32> {
+        match kind {
+            ConstraintKind::Structural => self.structural,
+            ConstraintKind::Shear => self.shear,
+            ConstraintKind::Bend => self.bend,
+            ConstraintKind::Tether => self.tether,
+        }
+    }
+
+    /// Sets the value for a kind.
+    pub fn set(&mut self, kind: ConstraintKind, value: Option<f32>) {
+        *match kind {
+            ConstraintKind::Structural => &mut self.structural,
+            ConstraintKind::Shear => &mut self.shear,
+            ConstraintKind::Bend => &mut self.bend,
+            ConstraintKind::Tether => &mut self.tether,
+        } = value;
+    }
+}
+
+impl Default for ParameterValues {
+    /// The values of a scene that sets none.
+    fn default() -> Self {
+        Self {
+            gravity: [0.0, -9.81, 0.0],
+            damping: 0.0,
+            wind_velocity: [0.0; 3],
+            wind_drag: 0.0,
+            substeps: 4,
+            iterations: 1,
+            relaxation: 1.0,
+            max_stretch: None,
+            tear_stretch: None,
+            tear_distance: None,
+            tear_force: None,
+            max_speed: 10_000.0,
+            time_scale: 1.0,
+            compliance: PerKind::default(),
+            stiffness: PerKind::default(),
+        }
+    }
+}
+
+impl ParameterValues {
+    /// All values, by parameter and then by kind.
+    pub fn settings(&self) -> [Setting; SETTINGS_COUNT] {
+        let mut settings = [Setting {
+            parameter: Parameter::Gravity,
+            constraint_kind: None,
+            value: ParameterValue::Off,
+        }; SETTINGS_COUNT];
+        let keys = Parameter::ALL.into_iter().flat_map(|parameter| {
+            let kinds: &[Option<ConstraintKind>] =
+                if parameter.info().is_per_kind { &KINDS } else { &[None] };
+            kinds.iter().map(move |kind| (parameter, *kind))
+        });
+        for (setting, (parameter, constraint_kind)) in settings.iter_mut().zip(keys) {
+            let value = self.get(parameter, constraint_kind);
+            *setting = Setting { parameter, constraint_kind, value };
+        }
+        settings
+    }
+
+    /// The value of a parameter; of one kind of constraint where it has several. Without a kind,
+    /// such a parameter is off.
+    pub fn get(&self, parameter: Parameter, kind: Option<ConstraintKind>) -> ParameterValue {
+        use ParameterValue::{Number, Vector};
+        let optional = |value: Option<f32>| value.map_or(ParameterValue::Off, Number);
+        match parameter {
+            Parameter::Gravity => Vector(self.gravity),
+            Parameter::Damping => Number(self.damping),
+            Parameter::WindVelocity => Vector(self.wind_velocity),
+            Parameter::WindDrag => Number(self.wind_drag),
+            Parameter::Substeps => Number(self.substeps as f32),
+            Parameter::Iterations => Number(self.iterations as f32),
+            Parameter::Relaxation => Number(self.relaxation),
+            Parameter::MaxStretch => optional(self.max_stretch),
+            Parameter::TearStretch => optional(self.tear_stretch),
+            Parameter::TearDistance => optional(self.tear_distance),
+            Parameter::TearForce => optional(self.tear_force),
+            Parameter::MaxSpeed => Number(self.max_speed),
+            Parameter::TimeScale => Number(self.time_scale),
+            Parameter::Compliance => optional(kind.and_then(|kind| self.compliance.get(kind))),
+            Parameter::Stiffness => optional(kind.and_then(|kind| self.stiffness.get(kind))),
+        }
+    }
+
+    /// Stores a value. Off is 0 where the parameter has no off, and a value of the wrong form has
+    /// no effect: what the node publishes has passed its checks.
+    pub fn set(&mut self, setting: Setting) {
+        let Setting { parameter, constraint_kind, value } = setting;
+        let (number, vector) = match value {
+            ParameterValue::Number(number) => (Some(number), None),
+            ParameterValue::Vector(vector) => (None, Some(vector)),
+            ParameterValue::Off => (None, Some([0.0; 3])),
+        };
+        let or_zero = number.unwrap_or(0.0);
+        match parameter {
+            Parameter::Gravity => self.gravity = vector.unwrap_or(self.gravity),
+            Parameter::WindVelocity => self.wind_velocity = vector.unwrap_or(self.wind_velocity),
+            Parameter::Damping => self.damping = or_zero,
+            Parameter::WindDrag => self.wind_drag = or_zero,
+            Parameter::Substeps => self.substeps = to_count(or_zero),
+            Parameter::Iterations => self.iterations = to_count(or_zero),
+            Parameter::Relaxation => self.relaxation = or_zero,
+            Parameter::MaxStretch => self.max_stretch = number,
+            Parameter::TearStretch => self.tear_stretch = number,
+            Parameter::TearDistance => self.tear_distance = number,
+            Parameter::TearForce => self.tear_force = number,
+            Parameter::MaxSpeed => self.max_speed = or_zero,
+            Parameter::TimeScale => self.time_scale = or_zero,
+            Parameter::Compliance => set_kinds(&mut self.compliance, constraint_kind, number),
+            Parameter::Stiffness => set_kinds(&mut self.stiffness, constraint_kind, number),
+        }
+    }
+}
+
+const KINDS: [Option<ConstraintKind>; 4] = [
+    Some(ConstraintKind::Structural),
+    Some(ConstraintKind::Shear),
+    Some(ConstraintKind::Bend),
+    Some(ConstraintKind::Tether),
+];
+
+/// Sets the value for one kind, or for all.
+fn set_kinds(values: &mut PerKind, kind: Option<ConstraintKind>, value: Option<f32>) {
+    match kind {
+        Some(kind) => values.set(kind, value),
+        None => ConstraintKind::ALL.into_iter().for_each(|kind| values.set(kind, value)),
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a count of passes is at most 1000, and a negative one becomes 0"
+)]
+fn to_count(number: f32) -> u32 {
+    number as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{OffMeaning, PARAMETERS, ValueForm};
+
+    #[test]
+    fn the_defaults_are_those_of_the_table() {
+        for info in PARAMETERS {
+            assert_eq!(
+                ParameterValues::default().get(info.parameter, Some(ConstraintKind::Shear)),
+                info.default,
+                "{}",
+                info.name
+            );
+        }
+    }
+
+    #[test]
+    fn every_setting_survives_a_round_trip() {
+        let mut values = ParameterValues::default();
+        for info in PARAMETERS {
+            let value = match info.form {
+                ValueForm::Vector => ParameterValue::Vector([0.5, -1.0, 2.0]),
+                ValueForm::Number | ValueForm::Whole => ParameterValue::Number(7.0),
+            };
+            let constraint_kind = info.is_per_kind.then_some(ConstraintKind::Bend);
+            values.set(Setting { parameter: info.parameter, constraint_kind, value });
+            assert_eq!(values.get(info.parameter, constraint_kind), value, "{}", info.name);
+        }
+        let mut copy = ParameterValues::default();
+        for setting in values.settings() {
+            copy.set(setting);
+        }
+        assert_eq!(copy, values);
+        let text = serde_json::to_string(&values).unwrap();
+        assert_eq!(serde_json::from_str::<ParameterValues>(&text).unwrap(), values);
+    }
+
+    #[test]
+    fn off_is_zero_or_none() {
+        let mut values =
+            ParameterValues { damping: 1.0, tear_force: Some(3.0), ..Default::default() };
+        for info in PARAMETERS.iter().filter(|info| info.off != OffMeaning::NotAllowed) {
+            values.set(Setting {
+                parameter: info.parameter,
+                constraint_kind: None,
+                value: ParameterValue::Off,
+            });
+        }
+        assert_eq!((values.gravity, values.damping, values.tear_force), ([0.0; 3], 0.0, None));
+    }
+
+    #[test]
+    fn a_softness_without_a_kind_is_for_all_kinds() {
+        let mut values = ParameterValues::default();
+        let value = ParameterValue::Number(1e-3);
+        values.set(Setting { parameter: Parameter::Compliance, constraint_kind: None, value });
+        assert!(ConstraintKind::ALL.iter().all(|kind| values.compliance.get(*kind) == Some(1e-3)));
+    }
+
+    #[test]
+    fn the_json_names_every_parameter() {
+        let json = serde_json::to_value(ParameterValues::default()).unwrap();
+        let names: Vec<_> = PARAMETERS.iter().map(|info| info.name).collect();
+        assert!(names.iter().all(|name| json.get(name).is_some()));
+        assert_eq!(json.as_object().unwrap().len(), names.len());
+    }
+}

@@ -1,0 +1,26 @@
+//! The flags of particles.
+
+/// Bits of a particle's `flags`; all other bits are 0.
+#[derive(Debug)]
+pub struct ParticleFlags;
+
+impl ParticleFlags {
+    /// Held in place.
+    pub const PINNED: u32 = 1;
+    /// Driven to a client's target.
+    pub const GRABBED: u32 = 1 << 1;
+    /// Driven by an anchor's motion.
+    pub const ANCHORED: u32 = 1 << 2;
+    /// Taken out of the simulation because its state was not finite.
+    pub const FROZEN: u32 = 1 << 3;
+    /// Every flag of this version. With any of them, the step uses inverse mass 0.
+    pub const ALL: u32 = Self::PINNED | Self::GRABBED | Self::ANCHORED | Self::FROZEN;
+
+    /// Name of each flag, by ascending bit.
+    pub const NAMES: [(u32, &'static str); 4] = [
+        (Self::PINNED, "pinned"),
+        (Self::GRABBED, "grabbed"),
+        (Self::ANCHORED, "anchored"),
+        (Self::FROZEN, "frozen"),
+    ];
+}
