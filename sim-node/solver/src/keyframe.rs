@@ -1,4 +1,4 @@
-//! What the particles of a snapshot lack to be the complete state.
+//! Keyframes: the state beside the particles of a snapshot.
 
 mod check;
 
@@ -19,22 +19,22 @@ use crate::step::drive::ActiveGrab;
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
 const KEYFRAME_VERSION: u32 = 2;
 
-/// What the particles of a snapshot lack to be the complete state after the same step.
+/// The state beside the particles of a snapshot. Both together are the complete state after a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Keyframe {
-    /// Whether the node was paused. The solver knows no pause and only carries it along.
+    /// True if the node was paused. The solver only carries it: its own steps never pause.
     pub paused: bool,
     scene_step: u64,
-    /// The masses that fixed particles have when nothing holds them, ascending by particle.
+    /// Masses of fixed particles when they are free, ascending by particle.
     fixed: Vec<FixedParticle>,
     grabs: Vec<ActiveGrab>,
-    /// Torn constraints in the order of tearing, and why each of them tore.
+    /// Torn constraints in the order of tearing, and the cause of each tear.
     torn: Vec<u32>,
     tear_causes: Vec<TearCause>,
-    /// What the tethers were last worked out from.
+    /// State from which the tethers were last derived.
     tethers: TetherBasis,
     parameters: Parameters,
-    /// Where clients have put anchors and colliders, ascending by index.
+    /// Anchors and colliders that clients have moved, ascending by index.
     moved_anchors: Vec<Moved>,
     moved_colliders: Vec<Moved>,
 }
@@ -44,7 +44,7 @@ pub struct Keyframe {
 struct Moved {
     index: u32,
     translation: [f32; 3],
-    /// Of length 1.
+    /// A unit quaternion.
     rotation: [f32; 4],
 }
 
@@ -58,7 +58,7 @@ impl Moved {
         moved.collect()
     }
 
-    /// The frame as it was, bit for bit: it has length 1 already.
+    /// The frame, bit for bit: the rotation is normalised already.
     fn frame(&self) -> Frame {
         Frame {
             translation: Vec3::from_array(self.translation),
@@ -73,16 +73,16 @@ struct FixedParticle {
     base_inverse_mass: f32,
 }
 
-/// Why bytes are not a keyframe.
+/// Error of decoding a keyframe.
 #[derive(Debug, Error)]
 pub enum KeyframeError {
     /// Fewer than four bytes.
     #[error("a keyframe of {0} bytes is too short")]
     TooShort(usize),
-    /// More bytes than its fields take.
-    #[error("a keyframe has {0} bytes too many")]
+    /// Bytes are left after the last field.
+    #[error("{0} bytes follow the end of the keyframe")]
     TooLong(usize),
-    /// Written by another version.
+    /// Another version wrote it.
     #[error("keyframe version {found}, this program reads version {KEYFRAME_VERSION}")]
     Version {
         /// The version in the bytes.
@@ -93,58 +93,59 @@ pub enum KeyframeError {
     Damaged(#[from] postcard::Error),
 }
 
-/// Why a snapshot and a keyframe are not a state of this scene.
+/// Error of restoring a snapshot and a keyframe.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum RestoreError {
-    /// The snapshot is of another scene.
+    /// The snapshot belongs to another scene.
     #[error("the snapshot has {found} particles, the scene {expected}")]
     ParticleCount {
-        /// Particles of the scene.
+        /// Number of particles in the scene.
         expected: usize,
-        /// Particles of the snapshot.
+        /// Number of particles in the snapshot.
         found: usize,
     },
-    /// A particle that no step produces.
-    #[error("particle {particle} of the snapshot is not a state: {what}")]
+    /// A particle has a state that no step produces.
+    #[error("particle {particle} of the snapshot is invalid: {what}")]
     Particle {
-        /// Its index.
+        /// Index of the particle.
         particle: usize,
-        /// What is wrong with it.
+        /// The fault.
         what: &'static str,
     },
     /// The keyframe belongs to another snapshot.
     #[error("the keyframe does not belong to the snapshot: {what}")]
     Mismatch {
-        /// What differs.
+        /// The difference.
         what: &'static str,
     },
 }
 
 impl Keyframe {
-    /// The torn constraints, in the order of tearing.
+    /// Returns the torn constraints, in the order of tearing.
     pub fn torn(&self) -> &[u32] {
         &self.torn
     }
 
-    /// Why each of [`Self::torn`] tore.
+    /// Returns the cause of each tear in [`Self::torn`].
     pub fn tear_causes(&self) -> &[TearCause] {
         &self.tear_causes
     }
 
-    /// As bytes: the version as u32 little-endian, then the fields in postcard's encoding.
+    /// Encodes the keyframe: its version as a little-endian u32, then the fields in postcard's
+    /// encoding.
     ///
     /// # Panics
-    /// Never: the fields always encode into memory.
-    #[allow(clippy::expect_used, reason = "encoding numbers into a growing Vec has no error case")]
+    /// Never: the fields always have an encoding.
+    #[allow(clippy::expect_used, reason = "encoding numbers into a growing Vec cannot fail")]
     pub fn encode(&self) -> Vec<u8> {
         let bytes = KEYFRAME_VERSION.to_le_bytes().to_vec();
-        postcard::to_extend(self, bytes).expect("numbers encode into memory")
+        postcard::to_extend(self, bytes).expect("numbers have an encoding")
     }
 
-    /// From the bytes of [`Self::encode`].
+    /// Decodes the bytes of [`Self::encode`].
     ///
     /// # Errors
-    /// Another version, or damaged bytes.
+    /// Another version wrote the bytes, or they are damaged.
     pub fn decode(bytes: &[u8]) -> Result<Self, KeyframeError> {
         let Some((version, fields)) = bytes.split_first_chunk() else {
             return Err(KeyframeError::TooShort(bytes.len()));
@@ -161,7 +162,8 @@ impl Keyframe {
 }
 
 impl Solver {
-    /// What the particles lack, after the last step. Taken at a boundary before any command of it.
+    /// Returns the state beside the particles after the last step. Call it at a boundary, before any
+    /// command.
     pub fn keyframe(&self) -> Keyframe {
         let fixed = (0_u32..)
             .zip(&self.particles.base_inverse_masses)
@@ -182,9 +184,9 @@ impl Solver {
         }
     }
 
-    /// Most bytes that an encoded keyframe of this scene can have.
+    /// Returns the largest size of an encoded keyframe of this scene, in bytes.
     pub fn keyframe_size_bytes_max(&self) -> usize {
-        // Variable-length integers: u32 at most 5 bytes, u64 and lengths at most 10.
+        // Integers have variable length: a u32 at most 5 bytes, a u64 or a length at most 10.
         let (fixed, grab, root) = (5 + 4, 5 + 10 + 12 + 5, 5);
         let (torn, cause, basis, moved) = (5, 5, 5, 5 + 12 + 16);
         let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 8 * 5;
@@ -194,10 +196,10 @@ impl Solver {
             + (self.anchor_count() + self.collider_count()) * moved
     }
 
-    /// Takes over the state that a snapshot and the keyframe of the same step describe.
+    /// Restores the state of a snapshot and the keyframe of the same step.
     ///
     /// # Errors
-    /// They are not a state of this scene; then nothing is changed.
+    /// They are not a state of this scene. Then nothing changes.
     pub fn restore(
         &mut self,
         particles: &[Particle],

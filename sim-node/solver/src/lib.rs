@@ -1,8 +1,8 @@
 //! Particles and constraints, stepped at a fixed rate with the same bits on every machine.
 //!
-//! A [`Scene`] is checked text; a [`Solver`] made from it is the running state. Commands change it
-//! at the boundary before a step, [`Solver::step`] makes one step, and [`Solver::state_hash`] names
-//! the result. The particles and the [`Keyframe`] of one step are together the complete state.
+//! A [`Scene`] is checked text. A [`Solver`] made from it holds the running state. Commands change it
+//! at the boundary before a step, [`Solver::step`] makes a step, and [`Solver::state_hash`] identifies
+//! the result. The particles of a step and its [`Keyframe`] form the complete state.
 //!
 //! ```
 //! use sim_solver::{Grab, Scene, Solver, builtin};
@@ -17,11 +17,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! There is no process, clock, file or message in this crate.
+//! This crate has no processes, clocks, files or messages.
 #![deny(unsafe_code)]
 #![allow(
     clippy::inline_always,
-    reason = "a kernel that is not inlined is compiled for the oldest processor, and goes through memory"
+    reason = "a kernel that is not inlined is compiled for the baseline processor, and passes vectors in memory"
 )]
 
 pub mod builtin;
@@ -59,6 +59,6 @@ pub use sim_types::{
 pub use solver::Solver;
 pub use step::drive::GRAB_OVER_S_MAX;
 
-/// Version of the arithmetic. It changes with any change of the bits that a step produces, and a
-/// recording is re-simulated only by the version that made it.
+/// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that
+/// made a recording can re-simulate it.
 pub const SOLVER_VERSION: u32 = 3;

@@ -1,19 +1,19 @@
-//! The state of the particles, as it is published between two steps.
+//! The state of the particles between two steps, as it is published.
 
 use bytemuck::{Pod, Zeroable};
 use sim_types::ParticleFlags;
 
 use crate::scene::SceneParticle;
 
-/// One particle as it is published and hashed: 32 bytes, little-endian, no padding.
+/// A particle as it is published and hashed: 32 bytes, little-endian, without padding.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Particle {
     /// Position relative to the scene's origin, in the scene's unit.
     pub position: [f32; 3],
-    /// 1/mass as the step uses it: 0 for pinned, grabbed and frozen particles.
+    /// Inverse mass in 1/kg as the step uses it: 0 for pinned, grabbed, anchored and frozen particles.
     pub inverse_mass: f32,
-    /// Velocity per second; 0 for pinned and frozen particles.
+    /// Velocity in units per second; 0 for pinned and frozen particles.
     pub velocity: [f32; 3],
     /// Bits of [`ParticleFlags`].
     pub flags: u32,
@@ -24,14 +24,14 @@ const _: () = assert!(size_of::<Particle>() == 32);
 /// All particles between two steps, `particle_count` entries in each array.
 #[derive(Debug, Clone)]
 pub(crate) struct Particles {
-    /// As they are published.
+    /// The published state.
     pub(crate) states: Vec<Particle>,
-    /// The inverse mass of the particle when nothing holds it.
+    /// Inverse mass of each particle when it is free.
     pub(crate) base_inverse_masses: Vec<f32>,
 }
 
 impl Particles {
-    /// The particles of a scene at its step 0; what follows an anchor is held by that alone.
+    /// The particles of a scene at its step 0. An anchored particle is not pinned as well.
     pub(crate) fn new(scene: &[SceneParticle], anchored: impl Iterator<Item = u32>) -> Self {
         let state = |one: &SceneParticle| Particle {
             position: one.position.map(|axis| axis + 0.0),
@@ -50,7 +50,7 @@ impl Particles {
         Self { states, base_inverse_masses }
     }
 
-    /// Sets and clears flags, and gives the particle the inverse mass that follows from them.
+    /// Sets and clears flags, and updates the inverse mass accordingly.
     pub(crate) fn change_flags(&mut self, index: usize, set: u32, clear: u32) {
         let state = &mut self.states[index];
         state.flags = (state.flags | set) & !clear;
@@ -62,7 +62,7 @@ impl Particles {
         self.states[index].velocity = [0.0; 3];
     }
 
-    /// Commands may leave -0, which is published as +0.
+    /// Replaces -0, which commands may leave, by +0.
     pub(crate) fn make_zeros_canonical(&mut self) {
         for state in &mut self.states {
             for number in state.position.iter_mut().chain(&mut state.velocity) {

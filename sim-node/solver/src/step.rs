@@ -145,7 +145,7 @@ impl Solver {
             self.store.remove_marks(|constraint, mark| {
                 torn.tear(constraint, builder.cause(constraint, mark));
             });
-            for constraint in self.torn.new_ones() {
+            for constraint in self.torn.new_tears() {
                 self.store.tear(*constraint);
             }
         }

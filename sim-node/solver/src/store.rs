@@ -66,7 +66,7 @@ impl ParticleStore {
         let families = families_of(model, &sheets);
         let patches =
             sheets.iter().zip(&families).map(|(sheet, families)| Patch::new(*sheet, families));
-        Self {
+        let mut store = Self {
             workers: Workers::new(kernels, 1),
             graph,
             patches: patches.collect(),
@@ -76,7 +76,9 @@ impl ParticleStore {
             survey: Survey::default(),
             locations,
             contact_count: 0,
-        }
+        };
+        store.locate_constraints(model);
+        store
     }
 
     /// Sets the parameters of all constraints. Torn ones stay inactive. Allocates only fields that
@@ -161,7 +163,7 @@ impl ParticleStore {
         Configured::Moved
     }
 
-    /// Finds the constraints of the sheets, whose locations follow from the layout.
+    /// Updates the locations of the constraints of sheets, whose indices depend on the layout.
     fn locate_constraints(&mut self, model: &Model) {
         if self.patches.is_empty() {
             return;

@@ -1,26 +1,26 @@
-//! What is torn, why, and what tears in the running step.
+//! Torn constraints, the causes of their tears, and the tears of the running step.
 
 use bytemuck::cast_slice;
 use sim_types::TearCause;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// What is torn since the load. Room for every constraint is made at the load, so that a step
-/// which tears allocates nothing.
+/// The constraints torn since the load. It has room for every constraint, so that a tear does not
+/// allocate.
 #[derive(Debug, Clone)]
 pub(crate) struct Torn {
     /// By step, then by index.
     order: Vec<u32>,
-    /// Entry by entry of `order`.
+    /// Causes of the entries of `order`.
     causes: Vec<TearCause>,
-    /// For the hash.
+    /// Torn constraints in ascending order, for the hash.
     ascending: Vec<u32>,
-    /// How many at the end of `order` are new in the last step.
+    /// Number of entries at the end of `order` that the last step added.
     new_count: usize,
-    /// How many of `order` earlier steps have shown.
+    /// Number of entries of `order` that earlier steps published.
     shown_count: usize,
-    /// 0 while nothing is torn, else the XXH3-64 of the ascending indices.
+    /// 0 if nothing is torn, else the XXH3-64 of the ascending indices.
     hash_seed: u64,
-    /// Room to sort the new ones in.
+    /// Scratch memory to sort new entries.
     sorted: Vec<(u32, TearCause)>,
     by_constraint: Vec<bool>,
 }
@@ -55,12 +55,12 @@ impl Torn {
         self.hash_seed
     }
 
-    /// Nothing is torn any more.
+    /// Restores all constraints.
     pub(crate) fn clear(&mut self) {
         *self = Self::new(self.by_constraint.len());
     }
 
-    /// Takes over what a keyframe says.
+    /// Replaces the torn constraints by those of a keyframe.
     pub(crate) fn restore(&mut self, order: &[u32], causes: &[TearCause]) {
         self.clear();
         for (index, cause) in order.iter().zip(causes) {
@@ -70,7 +70,7 @@ impl Torn {
         self.sort_ascending();
     }
 
-    /// By constraint.
+    /// By constraint: true if it is torn.
     pub(crate) fn all(&self) -> &[bool] {
         &self.by_constraint
     }
@@ -79,7 +79,7 @@ impl Torn {
         self.by_constraint[index as usize]
     }
 
-    /// Tears a constraint, unless it is torn.
+    /// Tears a constraint, unless it is already torn.
     pub(crate) fn tear(&mut self, index: u32, cause: TearCause) {
         if !std::mem::replace(&mut self.by_constraint[index as usize], true) {
             self.order.push(index);
@@ -87,12 +87,12 @@ impl Torn {
         }
     }
 
-    /// Torn since the last step that was shown.
-    pub(crate) fn new_ones(&self) -> &[u32] {
+    /// Constraints torn since the last step.
+    pub(crate) fn new_tears(&self) -> &[u32] {
         &self.order[self.shown_count..]
     }
 
-    /// Ends a step. Whether anything is new in it.
+    /// Ends a step. Returns true if it has new tears.
     pub(crate) fn end_step(&mut self) -> bool {
         self.new_count = self.order.len() - self.shown_count;
         if self.new_count > 0 {
@@ -103,7 +103,7 @@ impl Torn {
         self.new_count > 0
     }
 
-    /// Those of one step stand by index, whatever tore them.
+    /// Sorts the tears of a step by index, whatever their causes.
     fn sort_new(&mut self) {
         let (order, causes) =
             (&mut self.order[self.shown_count..], &mut self.causes[self.shown_count..]);

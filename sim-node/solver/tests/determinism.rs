@@ -175,9 +175,9 @@ fn numbers_that_no_run_writes_are_refused_in_a_keyframe() {
     // 60 steps of a quarter of a second, less the one that was made.
     let place = bytes.iter().rposition(|byte| *byte == 59).unwrap();
     let slow = [&bytes[..place], &[0xff, 0xff, 0xff, 0xff, 0x0f], &bytes[place + 1..]].concat();
-    assert!(restored(&slow).unwrap_err().to_string().contains("longer than any"));
+    assert!(restored(&slow).unwrap_err().to_string().contains("exceeds the longest duration"));
     let long = [&bytes[..], &[0]].concat();
-    assert!(Keyframe::decode(&long).unwrap_err().to_string().contains("1 bytes too many"));
+    assert!(Keyframe::decode(&long).unwrap_err().to_string().contains("1 bytes follow"));
 }
 
 /// A built-in scene, and those that use every mechanism.

@@ -73,11 +73,7 @@ struct Scanner<'a> {
 }
 
 impl<'a> Scanner<'a> {
-    fn new(
-        text: &str,
-        file: &'a ModulePath,
-        modules: &'a BTreeMap<ModulePath, PathBuf>,
-    ) -> Self {
+    fn new(text: &str, file: &'a ModulePath, modules: &'a BTreeMap<ModulePath, PathBuf>) -> Self {
         let tokens = without_tests(tokens(text));
         Self { tokens, scope: file.clone(), modules, file, used: BTreeSet::new() }
     }
@@ -165,7 +161,8 @@ impl<'a> Scanner<'a> {
 
     /// Notes the innermost module of a path that has a file.
     fn uses(&mut self, path: &[String]) {
-        let longest = (0..=path.len()).rev().find(|length| self.modules.contains_key(&path[..*length]));
+        let longest =
+            (0..=path.len()).rev().find(|length| self.modules.contains_key(&path[..*length]));
         let module = path[..longest.unwrap_or(0)].to_vec();
         if module != *self.file {
             self.used.insert(module);
@@ -179,7 +176,8 @@ fn tokens(text: &str) -> Vec<String> {
     let starts = |at: usize, pattern: &str| {
         pattern.chars().enumerate().all(|(index, char)| chars.get(at + index) == Some(&char))
     };
-    let is_word = |at: usize| chars.get(at).is_some_and(|char| char.is_alphanumeric() || *char == '_');
+    let is_word =
+        |at: usize| chars.get(at).is_some_and(|char| char.is_alphanumeric() || *char == '_');
     let mut at = 0;
     while at < chars.len() {
         if starts(at, "//") {
@@ -262,8 +260,9 @@ fn components(graph: &BTreeMap<ModulePath, BTreeSet<ModulePath>>) -> Vec<Vec<Mod
     let mut assigned = BTreeSet::new();
     let mut components = Vec::new();
     for module in graph.keys() {
-        let is_mutual =
-            |other: &&ModulePath| reachable[module].contains(*other) && reachable[*other].contains(module);
+        let is_mutual = |other: &&ModulePath| {
+            reachable[module].contains(*other) && reachable[*other].contains(module)
+        };
         let component: Vec<_> = graph.keys().filter(is_mutual).cloned().collect();
         if component.len() > 1 && assigned.insert(component.clone()) {
             components.push(component);
@@ -330,7 +329,10 @@ mod tests {
         let files = [
             ("lib.rs", "mod a; pub use a::b::B;"),
             ("a.rs", "pub mod b; mod c; fn f() { c::g() }"),
-            ("a/b.rs", "/// [`crate::a::c::g`]\npub struct B; // crate::B\nconst S: &str = \"super::f\";"),
+            (
+                "a/b.rs",
+                "/// [`crate::a::c::g`]\npub struct B; // crate::B\nconst S: &str = \"super::f\";",
+            ),
             (
                 "a/c.rs",
                 "use super::b::B;\nmod inner { use super::B; }\nfn g(_: B) {}\n\

@@ -1,4 +1,4 @@
-//! Whether a snapshot and a keyframe are a state of a scene: both may come from anywhere.
+//! Checks that a snapshot and a keyframe are a state of a scene. Both come from outside.
 
 use sim_types::ParticleFlags;
 
@@ -10,7 +10,7 @@ use crate::particles::Particle;
 use crate::solver::Solver;
 use crate::step::drive::GRAB_OVER_S_MAX;
 
-/// Latest step of a scene: up to it, f64 counts steps exactly.
+/// Latest step of a scene. Up to it, f64 counts steps exactly.
 const SCENE_STEP_MAX: u64 = 1 << 53;
 
 impl Solver {
@@ -38,16 +38,16 @@ impl Solver {
             return Err("a number is not finite");
         }
         if particle.flags & !ParticleFlags::ALL != 0 {
-            return Err("it has flags that this version does not know");
+            return Err("its flags are unknown to this version");
         }
         if (particle.flags ^ self.particles.states[index].flags) & ParticleFlags::ANCHORED != 0 {
-            return Err("other particles follow an anchor in this scene");
+            return Err("the scene has other anchored particles");
         }
         if is_fixed != (particle.inverse_mass == 0.0) {
             return Err("its flags and its inverse mass contradict each other");
         }
         if self.is_planar && (particle.position[2] != 0.0 || particle.velocity[2] != 0.0) {
-            return Err("it is out of the plane of a scene of 2 dimensions");
+            return Err("it lies outside of the plane of a scene of 2 dimensions");
         }
         if is_fixed || is_inverse_mass(particle.inverse_mass) {
             Ok(())
@@ -56,16 +56,16 @@ impl Solver {
         }
     }
 
-    /// Everything that the scene alone can judge.
+    /// Checks the keyframe against the scene alone.
     fn check_keyframe(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
         let (particles, constraints) = (self.particle_count(), self.constraint_count());
         let mut all_torn = keyframe.torn.clone();
         all_torn.sort_unstable();
         if !is_ascending_below(&all_torn, constraints) {
-            return Err("it has torn constraints that the scene has not, or twice");
+            return Err("a torn constraint is unknown or listed twice");
         }
         if keyframe.tear_causes.len() != keyframe.torn.len() {
-            return Err("not every torn constraint has its cause");
+            return Err("torn constraints and causes differ in number");
         }
         let TetherBasis { roots, torn } = &keyframe.tethers;
         let is_torn = |index: &u32| all_torn.binary_search(index).is_ok();
@@ -73,7 +73,7 @@ impl Solver {
             || !is_ascending_below(torn, constraints)
             || !torn.iter().all(is_torn)
         {
-            return Err("its tethers are not those of the scene");
+            return Err("its tethers belong to another scene");
         }
         if !keyframe.parameters.is_valid(self.context()) {
             return Err("a parameter is out of its range");
@@ -83,7 +83,7 @@ impl Solver {
         let moved = keyframe.moved_colliders.iter();
         for (collider, moved) in moved.map(|one| (&self.colliders[one.index as usize], one)) {
             if !collider.accepts(&moved.frame()) {
-                return Err("bounds are turned");
+                return Err("bounds are rotated");
             }
         }
         self.check_counters(keyframe)
@@ -92,7 +92,7 @@ impl Solver {
     fn check_moved(&self, all: &[Moved], count: usize) -> Result<(), &'static str> {
         let indices: Vec<_> = all.iter().map(|one| one.index).collect();
         if !is_ascending_below(&indices, count) {
-            return Err("it has moved anchors or colliders that the scene has not");
+            return Err("a moved anchor or collider is unknown");
         }
         let is_frame = |moved: &Moved| {
             let pose = Pose { translation: moved.translation, rotation: moved.rotation };
@@ -108,16 +108,16 @@ impl Solver {
     fn check_counters(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
         let steps_max = self.grab_steps(GRAB_OVER_S_MAX);
         if keyframe.grabs.iter().any(|grab| grab.steps_left > steps_max) {
-            return Err("a grab takes longer than any");
+            return Err("a grab exceeds the longest duration");
         }
         if keyframe.scene_step > SCENE_STEP_MAX {
-            return Err("its scene step is beyond all");
+            return Err("its scene step is too large");
         }
         Ok(())
     }
 }
 
-/// Whether they ascend, none twice, and all are below a limit.
+/// True if the indices ascend strictly, all below a limit.
 fn is_ascending_below(indices: &[u32], limit: usize) -> bool {
     indices.windows(2).all(|pair| pair[0] < pair[1])
         && indices.last().is_none_or(|last| (*last as usize) < limit)
@@ -127,17 +127,17 @@ fn is_inverse_mass(number: f32) -> bool {
     number.is_finite() && number > 0.0
 }
 
-/// Snapshot and keyframe say the same of what is held.
+/// Checks that the snapshot and the keyframe agree on fixed and grabbed particles.
 fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'static str> {
     let with = |flags: u32| {
         let indices = (0_u32..).zip(particles);
         indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
     };
     if !with(ParticleFlags::ALL).eq(keyframe.fixed.iter().map(|one| one.particle)) {
-        return Err("other particles are fixed");
+        return Err("their fixed particles differ");
     }
     if !with(ParticleFlags::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
-        return Err("other particles are grabbed");
+        return Err("their grabbed particles differ");
     }
     if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {
         return Err("a mass is not a positive number");
