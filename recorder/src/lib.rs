@@ -1,8 +1,8 @@
-//! The format of a recording: standard MCAP, written append-only and read as far as it goes.
+//! The recording format: standard MCAP, written append-only and read as far as the file goes.
 //!
-//! A recording is one run of a simulation, or a part of it: the scene, every snapshot with its
-//! bytes unchanged, a hash of each, every command with its outcome, and keyframes. From these it
-//! can be simulated again and proved bit-identical.
+//! A recording holds one run of a simulation or a part of it: the scene, every snapshot with its
+//! bytes unchanged, a hash of each snapshot, every command with its outcome, and keyframes. From
+//! these the run can be re-simulated and proved bit-identical.
 //!
 //! ```
 //! use recorder::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message};
@@ -43,45 +43,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`LogReader`] and [`FrameReader`] read a file from its start, [`Tape`] at any step. mcap's own types
-//! stay inside.
+//! [`LogReader`] and [`FrameReader`] read a file from its start. [`Tape`] reads it at any step. No
+//! type of the mcap crate is part of this interface.
 #![forbid(unsafe_code)]
 
-mod collider_rows;
-mod descriptor;
-mod encoding;
-mod frames;
-mod index;
-mod keyframe_tears;
-mod message;
-mod part_file;
-mod protobuf;
-mod reader;
-mod records;
-mod rows;
-mod run;
-mod state_hash;
-mod tape;
-mod tears;
-mod topic;
-mod writer;
+mod log;
 
-pub use collider_rows::{ColliderRow, CollidersRow, ShapeRow};
-pub use encoding::{MessageEncoder, TopicFormat, TopicSchema};
-pub use frames::{Frame, FrameReader};
-pub use index::{ChunkEntry, IndexedLog};
-pub use keyframe_tears::KeyframeTears;
-pub use message::Message;
-pub use part_file::{Existing, PartFile, PartFileError};
-pub use protobuf::{WORLD_FRAME, encode_transform};
-pub use reader::{LogReader, Logged, ReadError};
-pub use records::LogEnd;
-pub use rows::{
-    EventRow, OutcomeRow, Softness, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow,
-};
-pub use run::{Closing, FORMAT_VERSION, RunDescription};
-pub use state_hash::state_hash;
-pub use tape::{Tape, TapeError, TapeState};
-pub use tears::{Torn, TornFollower};
-pub use topic::{AllCounts, Topic, TopicCounts};
-pub use writer::{Compression, LogOptions, LogWriter, WriteError};
+pub use log::*;

@@ -1,33 +1,21 @@
 //! `recorder`: records a simulation into MCAP, plays it back, simulates without a node, and proves
-//! that a recording can be simulated again bit by bit.
+//! that a recording can be re-simulated bit for bit.
 #![forbid(unsafe_code)]
 
-mod apply;
-mod command_file;
-mod difference;
-mod endpoint_args;
-mod exit;
+mod cli;
+mod commands;
 mod export;
-mod frozen;
-mod info;
-mod output;
-mod play;
+mod input;
 #[cfg(test)]
 mod proof_tests;
-mod record;
-mod resimulation;
-mod scene_source;
-mod simulate;
 mod simulation;
-mod solver_rows;
-mod thread_args;
-mod verify;
 
 use clap::{Parser, Subcommand};
 
-use exit::Exit;
+use cli::exit::{self, Exit};
+use commands::{export as export_command, info, play, record, simulate, verify};
 
-/// Record a simulation, play it back, and prove that it can be simulated again bit by bit.
+/// Record a simulation, play it back, and prove that it can be re-simulated bit for bit
 #[derive(Debug, Parser)]
 #[command(
     name = "recorder",
@@ -43,33 +31,33 @@ use exit::Exit;
 )]
 struct Args {
     #[command(subcommand)]
-    verb: Verb,
+    command: Command,
 }
 
 #[derive(Debug, Subcommand)]
-enum Verb {
-    /// Draw pictures of a recording, to look at it without a viewer.
-    Export(export::ExportArgs),
-    /// Tell what is in a recording.
+enum Command {
+    /// Draw pictures of a recording
+    Export(export_command::ExportArgs),
+    /// Show what a recording contains
     Info(info::InfoArgs),
-    /// Play a recording on the services that it was recorded from.
+    /// Play a recording on the services of a node
     Play(play::PlayArgs),
-    /// Record everything that a running simulation publishes.
+    /// Record everything that a running simulation publishes
     Record(record::RecordArgs),
-    /// Simulate a scene in this process, as fast as it can, into the same recording as a live run.
+    /// Simulate a scene in this process, as fast as possible, into the same recording as a live run
     Simulate(simulate::SimulateArgs),
-    /// Simulate a recording again and compare every bit.
+    /// Re-simulate a recording and compare every bit
     Verify(verify::VerifyArgs),
 }
 
 fn main() -> Exit {
     let args = Args::parse();
-    exit::of(match &args.verb {
-        Verb::Export(args) => export::run(args),
-        Verb::Info(args) => info::run(args),
-        Verb::Play(args) => play::run(args),
-        Verb::Record(args) => record::run(args),
-        Verb::Simulate(args) => simulate::run(args),
-        Verb::Verify(args) => verify::run(args),
+    exit::from_result(match &args.command {
+        Command::Export(args) => export_command::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Play(args) => play::run(args),
+        Command::Record(args) => record::run(args),
+        Command::Simulate(args) => simulate::run(args),
+        Command::Verify(args) => verify::run(args),
     })
 }

@@ -1,7 +1,7 @@
-//! From a scene to a recording and back: what is simulated twice is byte-equal, what is verified
-//! is bit-identical, and whatever is changed in a recording is found at its step.
+//! From a scene to a recording and back: equal simulations give equal bytes, an unchanged recording
+//! verifies as bit-identical, and every change in a recording is reported at its step.
 //!
-//! Recordings are made in memory; changed ones are rebuilt message by message.
+//! Recordings are built in memory. Changed ones are rebuilt message by message.
 
 mod commands;
 mod rows;
@@ -12,9 +12,9 @@ use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
-use crate::command_file::{self, TimedCommand};
-use crate::simulation::{Job, Outcomes, simulate};
-use crate::verify::{Report, Verdict, verify};
+use crate::commands::verify::{Report, Verdict, verify};
+use crate::input::command_file::{self, TimedCommand};
+use crate::simulation::{Job, SimulationResult, simulate};
 
 const COMMANDS: &str = r#"
     {"step":10,"kind":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.1}
@@ -33,10 +33,10 @@ fn job(scene: &str, commands: &str, steps: u64) -> Job {
     Job { scene, commands: command_file::parse(commands, "test").unwrap(), steps }
 }
 
-fn record(job: &Job) -> (Vec<u8>, Outcomes) {
+fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
     let solver = Solver::new(&job.scene);
     let (run, scene) = (job.description(&solver), job.scene.to_toml());
-    // Small chunks, so that a cut leaves something.
+    // Small chunks, so that a truncated file still has some.
     let options = LogOptions { chunk_size_bytes: 100_000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
     let outcomes = simulate(job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
@@ -47,7 +47,7 @@ fn check(file: &[u8]) -> (Report, Option<LogEnd>) {
     verify(LogReader::new(file).unwrap(), "test.mcap", 1, |_| false).unwrap()
 }
 
-/// The same recording with each message changed, or left out where `None` comes back.
+/// Rebuilds a recording. `change` returns the new message, or `None` to leave it out.
 fn rebuild(file: &[u8], mut change: impl FnMut(Message) -> Option<Message>) -> Vec<u8> {
     let mut old = LogReader::new(file).unwrap();
     let (run, scene) = (old.run().clone(), old.scene().to_vec());
@@ -61,7 +61,7 @@ fn rebuild(file: &[u8], mut change: impl FnMut(Message) -> Option<Message>) -> V
 }
 
 #[test]
-fn equal_inputs_give_equal_files_and_other_inputs_another_run() {
+fn equal_inputs_give_equal_files_and_different_inputs_different_runs() {
     let job_of = |commands| job("curtain", commands, 300);
     let (file, outcomes) = record(&job_of(COMMANDS));
     assert_eq!(record(&job_of(COMMANDS)), (file.clone(), outcomes.clone()));
@@ -72,7 +72,7 @@ fn equal_inputs_give_equal_files_and_other_inputs_another_run() {
 }
 
 #[test]
-fn a_simulated_recording_is_whole_and_bit_identical() {
+fn a_simulated_recording_is_complete_and_bit_identical() {
     for scene in ["curtain", "rope"] {
         let (file, outcomes) = record(&job(scene, COMMANDS, 300));
         let (report, end) = check(&file);
@@ -83,7 +83,7 @@ fn a_simulated_recording_is_whole_and_bit_identical() {
 }
 
 #[test]
-fn the_outcomes_of_a_recording_are_commands_that_reproduce_it() {
+fn the_outcomes_of_a_recording_are_a_command_file_that_reproduces_it() {
     let (file, _) = record(&job("curtain", COMMANDS, 200));
     let mut lines = String::new();
     rebuild(&file, |message| {
@@ -111,7 +111,7 @@ fn commands_are_applied_in_the_order_of_their_index() {
 }
 
 #[test]
-fn a_changed_command_is_found_at_its_step() {
+fn a_changed_command_is_reported_at_its_step() {
     let (file, _) = record(&job("curtain", COMMANDS, 200));
     let changed = rebuild(&file, |message| match message {
         Message::Outcome(mut row) if row.step == 50 => {
@@ -126,7 +126,7 @@ fn a_changed_command_is_found_at_its_step() {
 }
 
 #[test]
-fn another_outcome_than_the_recorded_one_is_found() {
+fn a_changed_outcome_is_reported() {
     let (file, _) = record(&job("curtain", COMMANDS, 200));
     let changed = rebuild(&file, |message| match message {
         Message::Outcome(mut row) if row.step == 110 => {
@@ -143,7 +143,7 @@ fn another_outcome_than_the_recorded_one_is_found() {
 }
 
 #[test]
-fn one_flipped_bit_of_a_payload_is_found_with_its_particle_and_field() {
+fn one_flipped_bit_of_a_payload_is_reported_with_its_particle_and_field() {
     let (file, _) = record(&job("curtain", COMMANDS, 100));
     for (at, earlier) in [(0, 0), (37, 36), (100, 99)] {
         let changed = rebuild(&file, |mut message| {
@@ -164,7 +164,7 @@ fn one_flipped_bit_of_a_payload_is_found_with_its_particle_and_field() {
 }
 
 #[test]
-fn a_changed_hash_of_a_step_is_found() {
+fn a_changed_state_hash_is_reported() {
     let (file, _) = record(&job("curtain", "", 20));
     let changed = rebuild(&file, |mut message| {
         if let Message::Step(row) = &mut message
@@ -180,7 +180,7 @@ fn a_changed_hash_of_a_step_is_found() {
 }
 
 #[test]
-fn a_later_keyframe_of_another_state_is_found() {
+fn a_keyframe_of_another_state_is_reported() {
     let (file, _) = record(&job("curtain", COMMANDS, 300));
     let mut first = None;
     let changed = rebuild(&file, |message| match message {
@@ -213,7 +213,7 @@ fn a_missing_outcome_is_reported_and_the_solver_is_not_blamed() {
 }
 
 #[test]
-fn outcomes_that_stand_elsewhere_in_the_file_are_still_applied_in_order() {
+fn outcomes_out_of_order_in_the_file_are_applied_in_order() {
     let (file, _) = record(&job("curtain", COMMANDS, 60));
     let mut first = None;
     let swapped = rebuild(&file, |message| match message {
@@ -224,7 +224,7 @@ fn outcomes_that_stand_elsewhere_in_the_file_are_still_applied_in_order() {
         Message::Outcome(row) if row.index == 1 => Some(Message::Outcome(row)),
         other => Some(other),
     });
-    // The one that was left out goes behind the other: same step, smaller index.
+    // The first outcome goes after the second one: same step, lower index.
     let mut log = LogReader::new(swapped.as_slice()).unwrap();
     let (run, scene) = (log.run().clone(), log.scene().to_vec());
     let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
@@ -240,7 +240,7 @@ fn outcomes_that_stand_elsewhere_in_the_file_are_still_applied_in_order() {
 }
 
 #[test]
-fn a_recording_that_starts_later_and_lacks_snapshots_is_bit_identical_where_it_is() {
+fn a_recording_that_starts_late_and_lacks_snapshots_is_bit_identical() {
     let (file, _) = record(&job("curtain", COMMANDS, 400));
     let partial = rebuild(&file, |message| {
         let is_snapshot = matches!(message, Message::Step(_) | Message::Particles { .. });
@@ -248,12 +248,12 @@ fn a_recording_that_starts_later_and_lacks_snapshots_is_bit_identical_where_it_i
         (message.step() >= 37 && !is_left_out).then_some(message)
     });
     let (report, _) = check(&partial);
-    // The pin at step 50 has the first keyframe; every fifth step follows.
+    // The first keyframe is that of the pin at step 50. Every fifth step follows.
     assert_eq!(report.to_string(), "70 steps bit-identical (50..=400)");
 }
 
 #[test]
-fn a_recording_without_a_keyframe_says_so() {
+fn a_recording_without_a_keyframe_is_an_error() {
     let (file, _) = record(&job("curtain", "", 10));
     let without =
         rebuild(&file, |message| (!matches!(message, Message::Keyframe { .. })).then_some(message));
@@ -273,7 +273,7 @@ fn a_recording_of_another_solver_version_is_refused() {
     let file = log.unwrap().finish(&Closing::default()).unwrap();
     let error = verify(LogReader::new(file.as_slice()).unwrap(), "x.mcap", 1, |_| false);
     let error = error.unwrap_err().to_string();
-    let found = format!("recorded with solver version {}, this program", SOLVER_VERSION + 1);
+    let found = format!("recorded with solver version {}, but this program", SOLVER_VERSION + 1);
     assert!(error.contains(&found), "{error}");
 }
 

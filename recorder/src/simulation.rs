@@ -1,109 +1,68 @@
-//! A scene and commands, stepped in this process and written as a live run would be.
+//! Steps a scene with commands in this process and writes the recording of a live run.
 
-mod writer;
+pub(crate) mod apply;
+pub(crate) mod frozen;
+mod job;
+pub(crate) mod solver_rows;
+mod state_writer;
 
 use std::io::Write;
 use std::ops::ControlFlow;
 
-use recorder::{LogWriter, OutcomeRow, RunDescription, WriteError};
-use sim_contract::{CONTRACT_VERSION, Command, Outcome, Reason};
-use sim_solver::{Applied, SOLVER_VERSION, Scene, Solver};
-use xxhash_rust::xxh3::Xxh3;
+use recorder::{LogWriter, OutcomeRow, WriteError};
+use sim_contract::{Command, Outcome, Reason};
+use sim_solver::{Applied, Solver};
 
-use crate::apply::apply;
-use crate::command_file::TimedCommand;
-use writer::{KeyframeDue, StateWriter};
+use crate::input::command_file::TimedCommand;
+use apply::apply;
+pub(crate) use job::Job;
+use state_writer::{KeyframeDue, StateWriter};
 
-/// What is simulated.
-#[derive(Debug)]
-pub(crate) struct Job {
-    pub(crate) scene: Scene,
-    /// In the order of application.
-    pub(crate) commands: Vec<TimedCommand>,
-    /// Steps to make after step 0.
-    pub(crate) steps: u64,
-}
-
-/// What came of it.
+/// The result of a simulation.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Outcomes {
-    /// Steps made.
+pub(crate) struct SimulationResult {
+    /// Number of computed steps.
     pub(crate) steps: u64,
     /// Hash of the last state.
     pub(crate) state_hash: u64,
     pub(crate) applied_count: u64,
     pub(crate) rejected_count: u64,
-    /// The first of the rejected ones, at most [`REJECTIONS_SHOWN_MAX`].
+    /// The first rejected commands, at most [`REJECTIONS_SHOWN_MAX`].
     pub(crate) rejections: Vec<Outcome>,
 }
 
-/// Rejected commands that are named one by one.
+/// Most rejected commands to report one by one.
 const REJECTIONS_SHOWN_MAX: usize = 5;
 
-impl Job {
-    /// Commands that no step is left for.
-    pub(crate) fn commands_beyond_the_end(&self) -> usize {
-        self.commands.iter().filter(|command| command.step > self.steps).count()
-    }
-
-    /// The run as a recording of it says.
-    pub(crate) fn description(&self, solver: &Solver) -> RunDescription {
-        RunDescription {
-            run_id: self.run_id(),
-            epoch_ns: 0,
-            scene_name: self.scene.name.clone(),
-            origin: self.scene.origin,
-            rate_hz: self.scene.solver.rate_hz,
-            method: self.scene.solver.method as u32,
-            particle_count: count(solver.particle_count()),
-            constraint_count: count(solver.constraint_count()),
-            solver_version: SOLVER_VERSION,
-            contract_version: CONTRACT_VERSION,
-            recorder_version: env!("CARGO_PKG_VERSION").to_owned(),
-        }
-    }
-
-    /// Equal inputs, equal number: the hash of the scene and of what each command is.
-    fn run_id(&self) -> u64 {
-        let mut hash = Xxh3::new();
-        hash.update(self.scene.to_toml().as_bytes());
-        for command in &self.commands {
-            let wire = Command::new(command.client_id, command.sequence, command.action);
-            hash.update(&command.step.to_le_bytes());
-            hash.update(bytemuck::bytes_of(&wire));
-        }
-        hash.digest()
-    }
-}
-
-/// Makes the steps of `job` and writes them to `log`. `on_step` is called after each and may end
-/// it early.
+/// Computes the steps of `job` and writes them to `log`. Calls `on_step` after each step, which may
+/// end the simulation early.
 pub(crate) fn simulate<W: Write>(
     job: &Job,
     mut solver: Solver,
     log: Option<&mut LogWriter<W>>,
     mut on_step: impl FnMut(u64) -> ControlFlow<()>,
-) -> Result<Outcomes, WriteError> {
-    let mut writer = log.map(|log| StateWriter::new(log, job, &solver)).transpose()?;
-    let mut outcomes = Outcomes::at_start(&solver);
+) -> Result<SimulationResult, WriteError> {
+    let run = job.description(&solver);
+    let mut writer = log.map(|log| StateWriter::new(log, run, &solver)).transpose()?;
+    let mut result = SimulationResult::at_start(&solver);
     if let Some(writer) = &mut writer {
         writer.write_state(&solver, 0, KeyframeDue::Now)?;
     }
-    let mut waiting = job.commands.as_slice();
+    let mut pending = job.commands.as_slice();
     for step in 1..=job.steps {
         let mut keyframe = KeyframeDue::OnTheSecond;
         let mut rows = Vec::new();
-        while let Some((command, rest)) = waiting.split_first().filter(|(c, _)| c.step <= step) {
-            let result = apply(&mut solver, command.client_id, &command.action);
-            if result.is_ok_and(|applied| applied != Applied::Target) {
+        while let Some((command, rest)) = pending.split_first().filter(|(c, _)| c.step <= step) {
+            let answer = apply(&mut solver, command.client_id, &command.action);
+            if answer.is_ok_and(|applied| applied != Applied::Target) {
                 keyframe = KeyframeDue::Now;
             }
-            let outcome = outcomes.count(command, result.map(|_| ()));
+            let outcome = result.count(command, answer.map(|_| ()));
             rows.push(OutcomeRow::from(&outcome));
-            waiting = rest;
+            pending = rest;
         }
         solver.step();
-        outcomes.steps = step;
+        result.steps = step;
         if let Some(writer) = &mut writer {
             writer.outcomes = rows;
             writer.write_state(&solver, step, keyframe)?;
@@ -112,11 +71,11 @@ pub(crate) fn simulate<W: Write>(
             break;
         }
     }
-    outcomes.state_hash = solver.state_hash();
-    Ok(outcomes)
+    result.state_hash = solver.state_hash();
+    Ok(result)
 }
 
-impl Outcomes {
+impl SimulationResult {
     fn at_start(solver: &Solver) -> Self {
         Self {
             steps: 0,
@@ -135,14 +94,9 @@ impl Outcomes {
         self.applied_count += u64::from(outcome.is_applied());
         if !outcome.is_applied() {
             self.rejected_count += 1;
-            let shown = self.rejections.len() < REJECTIONS_SHOWN_MAX;
-            self.rejections.extend(shown.then_some(outcome));
+            let is_shown = self.rejections.len() < REJECTIONS_SHOWN_MAX;
+            self.rejections.extend(is_shown.then_some(outcome));
         }
         outcome
     }
-}
-
-#[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 of anything")]
-fn count(length: usize) -> u32 {
-    length as u32
 }

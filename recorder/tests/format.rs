@@ -6,9 +6,9 @@
 use std::io::{Cursor, Read};
 
 use recorder::{
-    Closing, CollidersRow, EventRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Logged,
-    Message, OutcomeRow, ReadError, RunDescription, StatusRow, StepRow, SurfaceRow, TearsRow,
-    Topic, TopologyRow, WriteError,
+    Closing, CollidersRow, EventRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
+    LoggedMessage, Message, OutcomeRow, ReadError, RunDescription, StatusRow, StepRow, SurfaceRow,
+    TearsRow, Topic, TopologyRow, WriteError,
 };
 use sim_contract::{
     Action, ColliderState, Command, ConstraintState, LoadHeader, NodeStatus, Outcome,
@@ -112,11 +112,11 @@ fn write(options: LogOptions) -> Vec<u8> {
         }
     }
     let mut closing = Closing { stop_reason: "SIGINT".to_owned(), ..Closing::default() };
-    closing.counts.of_mut(Topic::Particles).received = 38;
+    closing.counts[Topic::Particles].received = 38;
     log.finish(&closing).unwrap()
 }
 
-fn read_all<R: Read>(log: &mut LogReader<R>) -> Result<Vec<Logged>, ReadError> {
+fn read_all<R: Read>(log: &mut LogReader<R>) -> Result<Vec<LoggedMessage>, ReadError> {
     std::iter::from_fn(|| log.next_message().transpose()).collect()
 }
 
@@ -146,10 +146,10 @@ fn a_recording_reads_back_as_it_was_written() {
             assert_eq!(logged.log_time_ns, 100 + count as u64);
             assert_eq!(logged.publish_time_ns, run().time_of_step_ns(message.step()));
         }
-        assert_eq!(log.end(), Some(&LogEnd::Whole));
+        assert_eq!(log.end(), Some(&LogEnd::Complete));
         let closing = log.closing().unwrap();
         assert_eq!(closing.stop_reason, "SIGINT");
-        assert_eq!(closing.counts.of(Topic::Particles).received, 38);
+        assert_eq!(closing.counts[Topic::Particles].received, 38);
     }
 }
 
@@ -238,7 +238,7 @@ fn frames_hold_what_leads_up_to_a_snapshot() {
         step += 1;
         assert_eq!(frame.row, step_row(step));
     }
-    assert_eq!((step, frames.end()), (39, Some(&LogEnd::Whole)));
+    assert_eq!((step, frames.end()), (39, Some(&LogEnd::Complete)));
 }
 
 #[test]
@@ -271,7 +271,9 @@ fn a_truncated_file_is_read_up_to_the_cut() {
                 readable_counts.push(read.len());
             }
             Err(ReadError::NotMcap) => assert!(length < 100, "{length}"),
-            Err(ReadError::NoHead(LogEnd::Truncated { .. })) => assert!(length < 1000, "{length}"),
+            Err(ReadError::NoHeader(LogEnd::Truncated { .. })) => {
+                assert!(length < 1000, "{length}");
+            }
             Err(other) => panic!("cut at {length}: {other}"),
         }
     }
@@ -311,7 +313,7 @@ fn one_flipped_bit_anywhere_is_noticed() {
         damaged[place] ^= 1 << (place % 8);
         let Ok(mut log) = LogReader::new(damaged.as_slice()) else { continue };
         let Ok(read) = read_all(&mut log) else { continue };
-        assert_ne!(log.end(), Some(&LogEnd::Whole), "bit of byte {place}");
+        assert_ne!(log.end(), Some(&LogEnd::Complete), "bit of byte {place}");
         // A damaged record type hides a whole chunk; what is left is as it was written.
         let mut written = whole.iter();
         for logged in &read {

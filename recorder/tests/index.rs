@@ -8,8 +8,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use recorder::{
-    Closing, IndexedLog, LogEnd, LogOptions, LogReader, LogWriter, Logged, Message, ReadError,
-    RunDescription, StepRow, TearsRow, Topic,
+    Closing, IndexedLog, LogEnd, LogOptions, LogReader, LogWriter, LoggedMessage, Message,
+    ReadError, RunDescription, StepRow, TearsRow, Topic,
 };
 use sim_contract::ParticleState;
 
@@ -64,11 +64,11 @@ impl Drop for TestFile {
     }
 }
 
-fn read_all(log: &mut IndexedLog) -> Vec<Logged> {
+fn read_all(log: &mut IndexedLog) -> Vec<LoggedMessage> {
     (0..log.chunks().len()).flat_map(|chunk| log.read_chunk(chunk).unwrap()).collect()
 }
 
-fn in_order(bytes: &[u8]) -> Vec<Logged> {
+fn in_order(bytes: &[u8]) -> Vec<LoggedMessage> {
     let mut log = LogReader::new(bytes).unwrap();
     std::iter::from_fn(|| log.next_message().unwrap()).collect()
 }
@@ -79,7 +79,7 @@ fn chunks_hold_what_the_file_holds_in_order() {
     let file = TestFile::new("whole", &bytes);
     let mut log = file.open().unwrap();
     assert!(log.has_index() && log.chunks().len() > 10, "{} chunks", log.chunks().len());
-    assert_eq!((log.end(), log.scene()), (&LogEnd::Whole, &b"version = 1"[..]));
+    assert_eq!((log.end(), log.scene()), (&LogEnd::Complete, &b"version = 1"[..]));
     assert_eq!(read_all(&mut log), in_order(&bytes));
     // From the back as well.
     let last = log.chunks().len() - 1;
@@ -100,7 +100,7 @@ fn topics_of_a_chunk_are_known_without_reading_it() {
         assert_eq!(has_tears.iter().filter(|has| **has).count(), 1);
         for (chunk, has_tears) in has_tears.into_iter().enumerate() {
             let messages = log.read_chunk(chunk).unwrap();
-            let is_tears = |logged: &Logged| logged.message.topic() == Topic::Tears;
+            let is_tears = |logged: &LoggedMessage| logged.message.topic() == Topic::Tears;
             assert_eq!(messages.iter().any(is_tears), has_tears, "chunk {chunk}");
             assert_eq!(log.chunks()[chunk].has_any(&Topic::ALL), !messages.is_empty());
         }
@@ -122,7 +122,7 @@ fn a_file_without_its_end_is_walked_up_to_the_cut() {
                 assert_eq!(read, whole[..read.len()]);
                 counts.push(read.len());
             }
-            Err(ReadError::NotMcap | ReadError::NoHead(_)) => assert!(length < 1000, "{length}"),
+            Err(ReadError::NotMcap | ReadError::NoHeader(_)) => assert!(length < 1000, "{length}"),
             Err(other) => panic!("cut at {length}: {other}"),
         }
     }

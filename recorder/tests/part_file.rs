@@ -52,7 +52,10 @@ fn an_existing_file_is_refused_and_stays() {
     let path = directory.file("a.mcap");
     fs::write(&path, "old").unwrap();
     let error = write(&path, Existing::Refuse, "new").unwrap_err();
-    assert_eq!(error.to_string(), format!("{} exists (--overwrite replaces it)", path.display()));
+    assert_eq!(
+        error.to_string(),
+        format!("{} exists (use --overwrite to replace it)", path.display())
+    );
     assert_eq!(fs::read_to_string(&path).unwrap(), "old");
     assert!(!directory.file("a.mcap.part").exists());
 }

@@ -224,7 +224,7 @@ fn a_tape_shows_at_any_step_what_the_solver_had() {
         let mut tape = file.open().unwrap();
         assert_eq!((tape.first_step(), tape.last_step(), tape.stride()), (0, STEPS, style.every));
         tour().for_each(|step| assert_shows(&mut tape, step, &all));
-        assert_eq!(tape.take_faults(), Vec::<String>::new());
+        assert_eq!(tape.drain_faults(), Vec::<String>::new());
     }
 }
 
@@ -283,7 +283,7 @@ fn around_a_damaged_chunk_everything_else_is_shown() {
     let steps: Vec<_> = (0..=STEPS).map(|step| tape.step_at(step).unwrap()).collect();
     let missing: Vec<_> = (0..=STEPS).filter(|step| !steps.contains(step)).collect();
     assert!(!missing.is_empty() && missing.len() < 60, "{missing:?}");
-    let faults = tape.take_faults();
+    let faults = tape.drain_faults();
     assert!(faults.len() == 1 && faults[0].contains("is damaged"), "{faults:?}");
     let behind = missing.last().unwrap().next_multiple_of(KEYFRAME_PERIOD);
     for step in (0..missing[0]).chain(behind..=STEPS) {

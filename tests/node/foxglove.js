@@ -1,5 +1,5 @@
-// Talks to the Foxglove server of a viewer-bridge with the protocol's own client, decodes what comes
-// by the schemas that it was sent, and prints what it saw as one JSON object.
+// Connects to the Foxglove server of viewer-bridge with the official client, decodes messages by their
+// advertised schemas, and prints a report as one JSON object.
 //
 // usage: foxglove.js URL read | command
 
@@ -10,19 +10,19 @@ import WebSocket from "ws";
 
 const { FoxgloveClient } = protocol;
 
-/** Numeric types of a point cloud's field, as far as ours have them. */
+/** Numeric types of the fields of our point clouds. */
 const UINT32 = 5;
 const FLOAT32 = 7;
 
-/** Keeps the events of a client, so that none is missed that comes before it is waited for. */
+/** Queues the events of a client, so that none is lost before a caller waits for it. */
 class Events {
   constructor(client, names) {
-    this.kept = new Map(names.map((name) => [name, []]));
-    this.waiting = [];
+    this.queues = new Map(names.map((name) => [name, []]));
+    this.waiters = [];
     for (const name of names) {
       client.on(name, (event) => {
-        this.kept.get(name).push(event);
-        this.waiting = this.waiting.filter((look) => !look());
+        this.queues.get(name).push(event);
+        this.waiters = this.waiters.filter((check) => !check());
       });
     }
     client.on("error", (error) => {
@@ -33,25 +33,25 @@ class Events {
     });
   }
 
-  /** The first event of that name for which `isMeant` holds; it is taken out. */
-  next(name, isMeant = () => true) {
+  /** Waits for the first event with a name that matches, and removes it. */
+  next(name, matches = () => true) {
     return new Promise((resolve) => {
-      const look = () => {
-        const kept = this.kept.get(name);
-        const place = kept.findIndex(isMeant);
-        if (place >= 0) {
-          resolve(kept.splice(place, 1)[0]);
+      const check = () => {
+        const queue = this.queues.get(name);
+        const index = queue.findIndex(matches);
+        if (index >= 0) {
+          resolve(queue.splice(index, 1)[0]);
         }
-        return place >= 0;
+        return index >= 0;
       };
-      if (!look()) {
-        this.waiting.push(look);
+      if (!check()) {
+        this.waiters.push(check);
       }
     });
   }
 }
 
-/** The reader of a channel's messages, made from the schema that the channel was advertised with. */
+/** Creates the decoder of a channel from its advertised schema. */
 function decoder(channel) {
   if (channel.encoding === "json") {
     JSON.parse(channel.schema);
@@ -63,18 +63,18 @@ function decoder(channel) {
   return (data) => type.toObject(type.decode(new Uint8Array(data.buffer, data.byteOffset, data.byteLength)), options);
 }
 
-/** One number of each point of a cloud. */
+/** One field of each point of a cloud. */
 function column(cloud, name) {
   const { offset, type } = cloud.fields.find((field) => field.name === name);
   const view = new DataView(cloud.data.buffer, cloud.data.byteOffset, cloud.data.byteLength);
-  const places = Array.from({ length: view.byteLength / cloud.point_stride }, (_, point) => point * cloud.point_stride + offset);
+  const offsets = Array.from({ length: view.byteLength / cloud.point_stride }, (_, point) => point * cloud.point_stride + offset);
   if (type === FLOAT32) {
-    return places.map((place) => view.getFloat32(place, true));
+    return offsets.map((at) => view.getFloat32(at, true));
   }
   if (type !== UINT32) {
     throw new Error(`${name} has the type ${type}`);
   }
-  return places.map((place) => view.getUint32(place, true));
+  return offsets.map((at) => view.getUint32(at, true));
 }
 
 async function connect(url) {
@@ -92,89 +92,89 @@ async function connect(url) {
   return { client, events, server, channels };
 }
 
-/** Subscribes to a topic; gives the way to its next message, and to the end of it. */
-function listen({ client, events, channels }, topic) {
+/** Subscribes to a topic. Returns functions to wait for its next message and to unsubscribe. */
+function subscribe({ client, events, channels }, topic) {
   const { id, decode } = channels.get(topic);
   const subscription = client.subscribe(id);
   return {
     next: async () => decode((await events.next("message", (one) => one.subscriptionId === subscription)).data),
-    end: () => client.unsubscribe(subscription),
+    unsubscribe: () => client.unsubscribe(subscription),
   };
 }
 
-/** What is shown of a node that stands still. */
+/** Reports the topics and parameters of a paused node. */
 async function read(connection) {
   const { client, events, server, channels } = connection;
-  const seen = { capabilities: server.capabilities, topics: [...channels.keys()].sort() };
-  const first = listen(connection, "/particles");
+  const report = { capabilities: server.capabilities, topics: [...channels.keys()].sort() };
+  const first = subscribe(connection, "/particles");
   const cloud = await first.next();
-  first.end();
-  const again = await listen(connection, "/particles").next();
-  seen.is_same_again = Buffer.compare(cloud.data, again.data) === 0;
-  seen.frame = cloud.frame_id;
+  first.unsubscribe();
+  const again = await subscribe(connection, "/particles").next();
+  report.is_same_again = Buffer.compare(cloud.data, again.data) === 0;
+  report.frame = cloud.frame_id;
   for (const { name } of cloud.fields) {
-    seen[name] = column(cloud, name);
+    report[name] = column(cloud, name);
   }
-  seen.step = (await listen(connection, "/steps").next()).step;
-  seen.transform = await listen(connection, "/tf").next();
-  const { entities } = await listen(connection, "/scene").next();
+  report.step = (await subscribe(connection, "/steps").next()).step;
+  report.transform = await subscribe(connection, "/tf").next();
+  const { entities } = await subscribe(connection, "/scene").next();
   const lines = entities.flatMap((entity) => entity.lines);
   const triangles = entities.flatMap((entity) => entity.triangles);
-  seen.sticks = lines.map((line) => line.indices.length / 2);
-  seen.triangles = triangles.map((list) => list.indices.length / 3);
-  seen.ends = lines.map((line) => line.points.map(({ x, y, z }) => [x, y, z]));
+  report.sticks = lines.map((line) => line.indices.length / 2);
+  report.triangles = triangles.map((list) => list.indices.length / 3);
+  report.ends = lines.map((line) => line.points.map(({ x, y, z }) => [x, y, z]));
   client.getParameters([], "all");
   const { parameters } = await events.next("parameterValues", (one) => one.id === "all");
-  seen.parameters = Object.fromEntries(parameters.map(({ name, value }) => [name, value]));
-  return seen;
+  report.parameters = Object.fromEntries(parameters.map(({ name, value }) => [name, value]));
+  return report;
 }
 
-/** What becomes of everything that would change the node. */
+/** Reports the results of service calls, a parameter change and a command. */
 async function command(connection) {
   const { client, events, server } = connection;
-  // The bridge may still be looking for the node.
-  await listen(connection, "/particles").next();
+  // The bridge may not have found the node yet.
+  await subscribe(connection, "/particles").next();
   const isOffered = server.capabilities.includes("services");
   const services = isOffered ? await events.next("advertiseServices") : [];
   let callCount = 0;
   const call = async (name, request) => {
     const callId = ++callCount;
     const serviceId = services.find((service) => service.name === name)?.id ?? 1;
-    const isMine = (one) => one.callId === callId;
+    const isForCall = (one) => one.callId === callId;
     const answer = Promise.race([
-      events.next("serviceCallResponse", isMine).then(({ data }) => JSON.parse(new TextDecoder().decode(data))),
-      events.next("serviceCallFailure", isMine).then(({ message }) => ({ failure: message })),
+      events.next("serviceCallResponse", isForCall).then(({ data }) => JSON.parse(new TextDecoder().decode(data))),
+      events.next("serviceCallFailure", isForCall).then(({ message }) => ({ failure: message })),
     ]);
     const data = new DataView(new TextEncoder().encode(JSON.stringify(request)).buffer);
     client.sendServiceCallRequest({ serviceId, callId, encoding: "json", data });
     return answer;
   };
-  const seen = { services: services.map(({ name }) => name).sort() };
-  seen.step = await call("step", { count: 3 });
-  seen.nonsense = await call("step", { count: 0 });
-  seen.resume = await call("resume", {});
-  seen.pause = await call("pause", {});
-  seen.reset = await call("reset", {});
+  const report = { services: services.map(({ name }) => name).sort() };
+  report.step = await call("step", { count: 3 });
+  report.nonsense = await call("step", { count: 0 });
+  report.resume = await call("resume", {});
+  report.pause = await call("pause", {});
+  report.reset = await call("reset", {});
   client.setParameters([{ name: "gravity", value: [0, -1.5, 0] }], "set");
   const { parameters } = await events.next("parameterValues", (one) => one.id === "set");
-  seen.gravity = parameters[0].value;
+  report.gravity = parameters[0].value;
   if (server.capabilities.includes("clientPublish")) {
-    const outcomes = listen(connection, "/outcomes");
+    const outcomes = subscribe(connection, "/outcomes");
     const channel = client.advertise({ topic: "/commands", encoding: "json", schemaName: "catenary.Command" });
     client.sendMessage(channel, new TextEncoder().encode('{"kind":"pin","particle":100}'));
     let outcome = await outcomes.next();
     while (outcome.kind !== "pin") {
       outcome = await outcomes.next();
     }
-    seen.pin = outcome;
-    // A node that stands still shows it with its next step.
+    report.pin = outcome;
+    // A paused node shows the pin with its next step.
     await call("step", {});
   }
-  return seen;
+  return report;
 }
 
-const [url, what] = process.argv.slice(2);
+const [url, mode] = process.argv.slice(2);
 const connection = await connect(url);
-const seen = await { read, command }[what](connection);
-// A stream that is read may take its time: the end of the process must not cut it off.
-process.stdout.write(JSON.stringify(seen), () => process.exit(0));
+const report = await { read, command }[mode](connection);
+// Exits only once the output is written: a pipe may be slow.
+process.stdout.write(JSON.stringify(report), () => process.exit(0));

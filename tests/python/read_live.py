@@ -35,7 +35,9 @@ class SnapshotHeader(ctypes.Structure):
         ]
         + [
             (name, ctypes.c_uint32)
-            for name in "topology_revision torn_count particle_count flags".split()
+            for name in (
+                "topology_revision torn_count particle_count flags stride spare"
+            ).split()
         ]
     )
 
@@ -65,7 +67,7 @@ def main(prefix, root):
     count = header.particle_count
     first = [list(floats[index].position) for index in range(min(count, 3))]
     print(json.dumps({"step": header.step, "particle_count": count, "first": first}))
-    # The interpreter's own order at exit leaves a dead node behind.
+    # Destroyed in any other order at exit, the ports leave a dead node behind.
     del sample, subscriber, service, node
 
 

@@ -1,6 +1,6 @@
-"""Reads a recording with the stock MCAP reader and compares its particles with published bytes.
+"""Reads a recording with the stock MCAP reader, and compares its particles with published bytes.
 
-usage: read_recording.py RECORDING PUBLISHED, where PUBLISHED has lines "STEP HEX".
+usage: read_recording.py RECORDING PUBLISHED, where PUBLISHED has lines "STEP HEX"
 """
 
 import json

@@ -1,5 +1,5 @@
-//! The harness: it builds the programs once, starts them as processes in a domain of their own,
-//! waits for conditions with a deadline, and leaves nothing behind.
+//! A test harness that builds the programs once, starts them as processes in a separate domain,
+//! polls for conditions with a deadline, and leaves nothing behind.
 #![forbid(unsafe_code)]
 #![allow(clippy::expect_used, clippy::panic, reason = "a panic is how a test fails")]
 
@@ -9,7 +9,7 @@ mod sandbox;
 mod wait;
 
 pub use process::{Finished, Process, ctl};
-pub use programs::Program;
+pub use programs::{Program, build_products};
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;
 pub use wait::{DEADLINE, Deadline, wait_for};

@@ -1,4 +1,4 @@
-//! A child process that ends with its guard.
+//! Child processes that end with their guard.
 
 use std::fmt;
 use std::io::{BufRead, BufReader, Read};
@@ -12,7 +12,7 @@ use sim_contract::DOMAIN_VARIABLE;
 
 use crate::{Program, Sandbox, wait_for};
 
-/// A running program. Dropping it kills it, and prints what it wrote if the test is failing.
+/// A running program. Dropping it kills the process, and prints its output if the test is failing.
 pub struct Process {
     title: String,
     child: Child,
@@ -20,10 +20,10 @@ pub struct Process {
     stderr: Captured,
 }
 
-/// What a program wrote until it ended.
+/// The exit code and output of a program that has ended.
 #[derive(Debug, Clone)]
 pub struct Finished {
-    /// Exit code; `None` after a signal.
+    /// Exit code, or `None` if a signal ended the program.
     pub code: Option<i32>,
     /// Everything on stdout.
     pub stdout: String,
@@ -37,28 +37,28 @@ impl fmt::Debug for Process {
     }
 }
 
-/// What `sim-node ctl --json` answers to a verb with its arguments.
+/// Runs `sim-node ctl --json` with a verb and its arguments, and returns the answer.
 ///
 /// # Panics
-/// If it fails.
+/// If `ctl` fails.
 pub fn ctl(sandbox: &Sandbox, args: &[&str]) -> serde_json::Value {
     let args: Vec<_> = ["ctl", "--json"].iter().chain(args).copied().collect();
     Process::run(Program::SimNode, sandbox, &args).json()
 }
 
 impl Process {
-    /// Starts a program in a domain.
+    /// Starts a program in the domain of a sandbox.
     ///
     /// # Panics
-    /// If it does not start.
+    /// If the program does not start.
     pub fn start(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
         Self::spawn(program, sandbox.domain(), args)
     }
 
-    /// Starts a program in the domain of that name; "" is the default one.
+    /// Starts a program in a domain given by name; "" is the default domain.
     ///
     /// # Panics
-    /// If it does not start.
+    /// If the program does not start.
     pub fn start_in(program: Program, domain: &str, args: &[&str]) -> Self {
         Self::spawn(program, domain, args)
     }
@@ -66,8 +66,8 @@ impl Process {
     #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
     fn spawn(program: Program, domain: &str, args: &[&str]) -> Self {
         let mut command = Command::new(program.path());
-        // Away from the terminal: Ctrl-C reaches only the program that started it, which ends it
-        // in good order.
+        // A process group of its own, so that Ctrl-C in the terminal reaches only the parent, which
+        // ends its children in order.
         command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let title = format!("{program:?} {}", args.join(" "));
@@ -80,7 +80,7 @@ impl Process {
     /// Starts a program and waits for its line `ready ...`.
     ///
     /// # Panics
-    /// If it ends before, or the deadline passes.
+    /// If the program ends without that line, or the deadline passes.
     pub fn start_ready(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
         let mut process = Self::start(program, sandbox, args);
         process.wait_until_ready();
@@ -90,23 +90,23 @@ impl Process {
     /// Runs a program to its end.
     ///
     /// # Panics
-    /// If it does not end before the deadline.
+    /// If the program does not end before the deadline.
     pub fn run(program: Program, sandbox: &Sandbox, args: &[&str]) -> Finished {
         Self::start(program, sandbox, args).wait()
     }
 
-    /// Waits until its stderr has a line that starts with "ready".
+    /// Waits for a line on stderr that starts with "ready".
     ///
     /// # Panics
-    /// If it ends before, or the deadline passes.
+    /// If the program ends without that line, or the deadline passes.
     pub fn wait_until_ready(&mut self) {
         self.wait_for_line("ready");
     }
 
-    /// Waits until its stderr has a line that starts like that, and returns the line.
+    /// Waits for a line on stderr that starts with `start`, and returns the line.
     ///
     /// # Panics
-    /// If it ends before, or the deadline passes.
+    /// If the program ends without that line, or the deadline passes.
     pub fn wait_for_line(&mut self, start: &str) -> String {
         let line =
             |text: &str| text.lines().find(|line| line.starts_with(start)).map(ToOwned::to_owned);
@@ -116,7 +116,7 @@ impl Process {
             }
             let ended = self.child.try_wait().expect("a child");
             if ended.is_some() {
-                // It may have written the line just before it ended.
+                // The line may have been written just before the end.
                 self.stderr.join();
                 let text = self.stderr.text();
                 assert!(
@@ -132,16 +132,16 @@ impl Process {
     /// Sends a signal.
     ///
     /// # Panics
-    /// If the process is gone.
+    /// If the process has ended.
     pub fn signal(&self, signal: Signal) {
         let pid = Pid::from_child(&self.child);
         kill_process(pid, signal).unwrap_or_else(|error| panic!("{}: {error}", self.title));
     }
 
-    /// Asks it to end as Ctrl-C does, if it has not ended already, and waits.
+    /// Sends SIGINT, as Ctrl-C does, unless the program has ended, and waits for its end.
     ///
     /// # Panics
-    /// If it does not end before the deadline.
+    /// If the program does not end before the deadline.
     pub fn interrupt(mut self) -> Finished {
         if self.is_running() {
             self.signal(Signal::INT);
@@ -149,10 +149,10 @@ impl Process {
         self.wait()
     }
 
-    /// Waits for its end.
+    /// Waits for the end of the program.
     ///
     /// # Panics
-    /// If it does not end before the deadline.
+    /// If the program does not end before the deadline.
     pub fn wait(mut self) -> Finished {
         let status: ExitStatus = wait_for(&format!("the end of {}", self.title), || {
             self.child.try_wait().expect("a child")
@@ -162,10 +162,10 @@ impl Process {
         Finished { code: status.code(), stdout: self.stdout.text(), stderr: self.stderr.text() }
     }
 
-    /// Whether it still runs.
+    /// Returns true if the program is still running.
     ///
     /// # Panics
-    /// Never in practice: a child can always be asked.
+    /// If the state of the child cannot be read, which does not happen for a child of this process.
     pub fn is_running(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
     }
@@ -173,7 +173,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // An error means that it has ended already.
+        // Errors mean that the process has already ended.
         let _ended = self.child.kill();
         let _ended = self.child.wait();
         if std::thread::panicking() {
@@ -184,32 +184,32 @@ impl Drop for Process {
     }
 }
 
-#[allow(clippy::print_stderr, reason = "what a failing test shows")]
+#[allow(clippy::print_stderr, reason = "the output of a failing test")]
 fn show_failure(title: &str, stdout: &str, stderr: &str) {
     eprintln!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---");
 }
 
 impl Finished {
-    /// The stdout of a program that must have ended well.
+    /// Returns the stdout of a program that must have succeeded.
     ///
     /// # Panics
-    /// If it did not.
+    /// If its exit code is not 0.
     pub fn success(self) -> String {
         assert_eq!(self.code, Some(0), "stdout: {}\nstderr: {}", self.stdout, self.stderr);
         self.stdout
     }
 
-    /// The JSON object on the stdout of a program that must have ended well.
+    /// Parses the stdout of a program that must have succeeded as JSON.
     ///
     /// # Panics
-    /// If it did not, or that is not JSON.
+    /// If its exit code is not 0, or its stdout is not JSON.
     pub fn json(self) -> serde_json::Value {
         let text = self.success();
         serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error} in {text}"))
     }
 }
 
-/// One output of a child, read by a thread so that the child never waits for us.
+/// An output stream of a child. A thread reads it, so that the child never blocks on a full pipe.
 struct Captured {
     text: Arc<Mutex<String>>,
     reader: Option<JoinHandle<()>>,
@@ -235,7 +235,7 @@ impl Captured {
         self.text.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Waits for the end of the output.
+    /// Waits for the end of the stream.
     fn join(&mut self) {
         if let Some(reader) = self.reader.take() {
             let _panicked = reader.join();

@@ -1,4 +1,4 @@
-//! The programs under test, built with the profile of the test itself.
+//! The programs under test, built with the profile of the test.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,45 +13,62 @@ pub enum Program {
     Recorder,
     /// The server of the page.
     ViewerBridge,
-    /// A reader that takes samples and never gives them back.
+    /// A reader that borrows samples and never returns them.
     StubbornReader,
+    /// The demo that `cargo demo` runs.
+    Demo,
     /// The contract's example that prints snapshots.
     Watch,
-    /// The contract's example that drags a particle.
+    /// The contract's example that grabs and moves a particle.
     Drag,
-    /// The Python of `.venv`, which `.ci/run` makes.
+    /// The Python interpreter of `.venv`, which `.ci/run` creates.
     Python,
-    /// The Node of this machine, for scripts whose packages `.ci/run` installs in `tests/node`.
+    /// Node.js from the search path, for scripts whose packages `.ci/run` installs in `tests/node`.
     Node,
 }
 
 impl Program {
-    /// Its path; builds all programs if this process has not done so yet.
+    /// Returns the path of the program. The first call in a process builds all programs, unless
+    /// [`build_products`] was called.
     pub fn path(self) -> PathBuf {
         match self {
             Self::SimNode => built().join("sim-node"),
             Self::Recorder => built().join("recorder"),
             Self::ViewerBridge => built().join("viewer-bridge"),
             Self::StubbornReader => built().join("stubborn-reader"),
+            Self::Demo => built().join("demo"),
             Self::Watch => built().join("examples/watch"),
             Self::Drag => built().join("examples/drag"),
-            // Out of the search path.
+            // Found through the search path.
             Self::Node => PathBuf::from("node"),
             Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),
         }
     }
 }
 
-/// The folder with the programs of this test's profile.
+/// The folder of the built programs.
+static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+
+/// Returns the folder of the programs, built with the profile of this test.
 fn built() -> &'static Path {
-    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(build)
+    FOLDER.get_or_init(|| build(&["--quiet", "--workspace", "--bins", "--examples"]))
+}
+
+/// Builds the simulation, the recorder and the viewer, and shows the progress of cargo on stderr.
+///
+/// One call of cargo builds all three, so that it compiles each dependency once. Afterwards
+/// [`Program::path`] builds nothing, and the other programs may be missing.
+///
+/// # Panics
+/// If a program does not build.
+pub fn build_products() {
+    FOLDER.get_or_init(|| build(&["-p", "sim-node", "-p", "recorder", "-p", "viewer-bridge"]));
 }
 
 #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
-fn build() -> PathBuf {
-    // target/PROFILE/deps/test-hash, or target/PROFILE/program.
-    let this = std::env::current_exe().expect("a path of this program");
+fn build(selection: &[&str]) -> PathBuf {
+    // The executable is target/PROFILE/deps/TEST-HASH or target/PROFILE/PROGRAM.
+    let this = std::env::current_exe().expect("the path of this program");
     let folder = this.ancestors().skip(1).find(|folder| !folder.ends_with("deps"));
     let folder = folder.expect("a target folder").to_owned();
     let profile = match folder.file_name().and_then(|name| name.to_str()) {
@@ -61,10 +78,11 @@ fn build() -> PathBuf {
     let target = folder.parent().expect("a target folder");
     let status = Command::new(option_env!("CARGO").unwrap_or("cargo"))
         .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-        .args(["build", "--quiet", "--workspace", "--bins", "--examples", "--profile", profile])
-        .arg("--target-dir")
+        .arg("build")
+        .args(selection)
+        .args(["--profile", profile, "--target-dir"])
         .arg(target)
         .status();
-    assert!(status.is_ok_and(|status| status.success()), "the programs do not build");
+    assert!(status.is_ok_and(|status| status.success()), "the programs did not build");
     folder
 }

@@ -1,4 +1,4 @@
-//! A domain for one test, with a scratch folder, which leaves no file behind.
+//! A domain and a scratch folder for one test, removed after it.
 
 use std::fs;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use sim_contract::Endpoint;
 use sim_contract::testing::TestDomain;
 
-/// A domain that no other test uses, and a folder for its files. Both go when it is dropped.
+/// A domain that no other test uses, and a folder for files. Dropping it removes both.
 #[derive(Debug)]
 pub struct Sandbox {
     domain: TestDomain,
@@ -20,10 +20,10 @@ impl Default for Sandbox {
 }
 
 impl Sandbox {
-    /// A fresh domain and an empty folder.
+    /// Creates a domain and an empty folder.
     ///
     /// # Panics
-    /// If there is no room for the folder.
+    /// If the folder cannot be created.
     pub fn new() -> Self {
         let domain = TestDomain::new();
         let folder = std::env::temp_dir().join(format!("catenary-{}", domain.name()));
@@ -31,20 +31,20 @@ impl Sandbox {
         Self { domain, folder }
     }
 
-    /// The name of the domain, for `--domain`.
+    /// Returns the name of the domain, for `--domain`.
     pub fn domain(&self) -> &str {
         self.domain.name()
     }
 
-    /// The endpoint of a node with the default name.
+    /// Returns the endpoint of a node with the default name.
     pub fn endpoint(&self) -> Endpoint {
         self.domain.endpoint()
     }
 
-    /// A path in the folder, as text for command lines.
+    /// Returns a path in the folder, as text for command lines.
     ///
     /// # Panics
-    /// If the temporary folder's path is not UTF-8.
+    /// If the path of the temporary folder is not UTF-8.
     pub fn path(&self, file: &str) -> String {
         self.folder.join(file).to_str().expect("a path in UTF-8").to_owned()
     }
@@ -52,7 +52,7 @@ impl Sandbox {
     /// Writes a file into the folder and returns its path.
     ///
     /// # Panics
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn write(&self, file: &str, content: &str) -> String {
         let path = self.path(file);
         fs::write(&path, content).expect("a scratch file");
@@ -62,7 +62,7 @@ impl Sandbox {
 
 impl Drop for Sandbox {
     fn drop(&mut self) {
-        // A folder that cannot be removed fails no test.
+        // A failure to clean up does not fail the test.
         let _left = fs::remove_dir_all(&self.folder);
     }
 }

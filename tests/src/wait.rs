@@ -1,38 +1,40 @@
-//! Waiting for a condition, with a deadline.
+//! Polling for a condition, with a deadline.
 
 use std::time::{Duration, Instant};
 
-/// Longest wait for anything that should happen at once: generous, because the machine may be busy.
+/// Limit on every wait. It is generous, because the machine may be busy.
 pub const DEADLINE: Duration = Duration::from_mins(1);
 
-/// The end of a wait in which other things than the awaited one may come for ever.
+/// A deadline for loops that may receive unrelated messages forever.
 #[derive(Debug, Clone, Copy)]
 pub struct Deadline {
     end: Instant,
 }
 
 impl Deadline {
-    /// [`DEADLINE`] from now.
+    /// Starts a wait that ends [`DEADLINE`] from now.
     #[allow(clippy::disallowed_methods, reason = "the one clock of the tests")]
     pub fn start() -> Self {
         Self { end: Instant::now() + DEADLINE }
     }
 
+    /// Checks the deadline.
+    ///
     /// # Panics
-    /// At the end, naming what was waited for.
+    /// After the deadline, with a message that names `what`.
     #[allow(clippy::disallowed_methods, reason = "the one clock of the tests")]
     pub fn check(self, what: &str) {
-        assert!(Instant::now() < self.end, "waited {DEADLINE:?} in vain for {what}");
+        assert!(Instant::now() < self.end, "waited {DEADLINE:?} for {what}");
     }
 }
 
-/// Polls until the condition gives a value.
+/// Polls until the condition returns a value.
 ///
 /// # Panics
-/// At the deadline, naming what was waited for.
+/// After the deadline, with a message that names `what`.
 #[allow(
     clippy::disallowed_methods,
-    reason = "the one polling loop of the tests; what it waits for is a condition, not a time"
+    reason = "the one polling loop of the tests; it waits for a condition, not for a time"
 )]
 pub fn wait_for<T>(what: &str, mut condition: impl FnMut() -> Option<T>) -> T {
     let deadline = Deadline::start();

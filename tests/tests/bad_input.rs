@@ -1,4 +1,4 @@
-//! Bad input of the node: each is refused with an exit code, the place and the cure.
+//! The node refuses bad input with an exit code, the place of the error and the remedy.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Finished, Process, Program, Sandbox};
@@ -7,7 +7,7 @@ fn run(sandbox: &Sandbox, args: &[&str]) -> Finished {
     Process::run(Program::SimNode, sandbox, args)
 }
 
-/// Exit code, and words that stderr must have.
+/// Asserts the exit code, an empty stdout, and words in the error message.
 fn assert_refused(finished: &Finished, code: i32, words: &[&str]) {
     assert_eq!(finished.code, Some(code), "{}", finished.stderr);
     assert_eq!(finished.stdout, "");
@@ -17,7 +17,7 @@ fn assert_refused(finished: &Finished, code: i32, words: &[&str]) {
 }
 
 #[test]
-fn unknown_scenes_and_files_are_named_with_what_there_is() {
+fn an_unknown_scene_or_file_is_named_with_the_alternatives() {
     let sandbox = Sandbox::new();
     assert_refused(&run(&sandbox, &["run", "courtain"]), 1, &["'courtain'", "curtain, rope"]);
     assert_refused(&run(&sandbox, &["check", "./none.toml"]), 1, &["./none.toml", "No such file"]);
@@ -26,7 +26,7 @@ fn unknown_scenes_and_files_are_named_with_what_there_is() {
 }
 
 #[test]
-fn a_wrong_scene_file_is_named_with_line_field_and_cure_before_anything_runs() {
+fn an_invalid_scene_file_is_refused_with_line_field_and_remedy() {
     let sandbox = Sandbox::new();
     let file = sandbox.write("wrong.toml", "version = 1\n[solver]\nrate_hz = 0\n");
     for verb in ["run", "check", "show"] {
@@ -39,7 +39,7 @@ fn a_wrong_scene_file_is_named_with_line_field_and_cure_before_anything_runs() {
 }
 
 #[test]
-fn wrong_options_exit_with_2_and_wrong_rates_name_the_range() {
+fn invalid_options_exit_with_2_and_invalid_rates_name_the_range() {
     let sandbox = Sandbox::new();
     for args in
         [&["run", "--speed", "3"][..], &["run", "--every", "0"], &["ctl", "grab", "90"], &["ctl"]]
@@ -71,7 +71,7 @@ fn wrong_options_exit_with_2_and_wrong_rates_name_the_range() {
 }
 
 #[test]
-fn a_missing_node_is_named_with_its_domain_and_how_to_start_it() {
+fn a_missing_node_is_reported_with_its_domain_and_how_to_start_one() {
     let sandbox = Sandbox::new();
     for args in [&["ctl", "status"][..], &["ctl", "pin", "3"], &["ctl", "hash"]] {
         let finished = run(&sandbox, args);
@@ -80,7 +80,7 @@ fn a_missing_node_is_named_with_its_domain_and_how_to_start_it() {
 }
 
 #[test]
-fn scenes_lists_and_show_prints_what_check_accepts() {
+fn check_accepts_every_scene_that_scenes_lists_and_show_prints() {
     let sandbox = Sandbox::new();
     let listed = run(&sandbox, &["scenes", "--json"]).json();
     let curtain = listed.as_array().unwrap().iter().find(|one| one["name"] == "curtain").unwrap();

@@ -1,4 +1,4 @@
-//! Bad input of the recorder: files that are none, nodes that are not there, wrong options.
+//! The recorder refuses bad input: files that are not recordings, missing nodes, invalid options.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Finished, Process, Program, Sandbox};
@@ -15,9 +15,9 @@ fn assert_refused(finished: &Finished, words: &[&str]) {
 }
 
 #[test]
-fn files_that_are_no_recordings_are_named() {
+fn a_file_that_is_not_a_recording_is_named() {
     let sandbox = Sandbox::new();
-    let text = sandbox.write("text.mcap", "this is no recording, but long enough to be looked at");
+    let text = sandbox.write("text.mcap", "this is not a recording, but long enough to be read");
     let empty = sandbox.write("empty.mcap", "");
     let missing = sandbox.path("missing.mcap");
     for verb in ["info", "play", "verify"] {
@@ -28,7 +28,7 @@ fn files_that_are_no_recordings_are_named() {
 }
 
 #[test]
-fn a_truncated_recording_is_read_as_far_as_it_goes_and_said_to_be_truncated() {
+fn a_truncated_recording_is_read_to_its_end_and_reported_as_truncated() {
     let sandbox = Sandbox::new();
     let whole = sandbox.path("whole.mcap");
     recorder(&sandbox, &["simulate", "curtain", "--steps", "2400", "-o", &whole]).success();
@@ -38,8 +38,8 @@ fn a_truncated_recording_is_read_as_far_as_it_goes_and_said_to_be_truncated() {
     for verb in ["info", "verify"] {
         let finished = recorder(&sandbox, &[verb, &cut]);
         assert_eq!(finished.code, Some(3), "{verb}: {}{}", finished.stdout, finished.stderr);
-        let said = finished.stdout + &finished.stderr;
-        assert!(said.contains("truncated"), "{verb}: {said}");
+        let output = finished.stdout + &finished.stderr;
+        assert!(output.contains("truncated"), "{verb}: {output}");
     }
     let played = recorder(&sandbox, &["play", &cut, "--rate", "50"]);
     assert_eq!(played.code, Some(3), "{}", played.stderr);
@@ -47,10 +47,10 @@ fn a_truncated_recording_is_read_as_far_as_it_goes_and_said_to_be_truncated() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_named_and_what_can_be_is_drawn() {
+fn export_names_a_file_that_it_cannot_draw_and_draws_a_truncated_one() {
     let sandbox = Sandbox::new();
     let pictures = sandbox.path("pictures");
-    let text = sandbox.write("text.mcap", "this is no recording, but long enough to be looked at");
+    let text = sandbox.write("text.mcap", "this is not a recording, but long enough to be read");
     assert_refused(&recorder(&sandbox, &["export", &text, "--png", &pictures]), &[&text]);
     assert!(!std::path::Path::new(&pictures).exists());
 
@@ -79,7 +79,7 @@ fn what_cannot_be_drawn_is_named_and_what_can_be_is_drawn() {
 }
 
 #[test]
-fn a_missing_node_is_named_with_its_domain_and_how_to_start_it() {
+fn a_missing_node_is_reported_with_its_domain_and_how_to_start_one() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let finished = recorder(&sandbox, &["record", "-o", &file]);
@@ -89,7 +89,7 @@ fn a_missing_node_is_named_with_its_domain_and_how_to_start_it() {
 }
 
 #[test]
-fn nothing_is_overwritten_unless_told() {
+fn an_existing_file_is_overwritten_only_on_request() {
     let sandbox = Sandbox::new();
     let file = sandbox.write("run.mcap", "precious");
     let args = ["simulate", "curtain", "--steps", "3", "-o", &file];
@@ -101,7 +101,7 @@ fn nothing_is_overwritten_unless_told() {
 }
 
 #[test]
-fn a_wrong_command_file_is_named_with_line_and_field_and_nothing_is_written() {
+fn an_invalid_command_file_is_refused_with_line_and_field_and_nothing_is_written() {
     let sandbox = Sandbox::new();
     let lines = "{\"step\":1,\"kind\":\"reset\"}\n{\"step\":2,\"kind\":\"pin\"}\n";
     let commands = sandbox.write("bad.jsonl", lines);
@@ -115,7 +115,7 @@ fn a_wrong_command_file_is_named_with_line_and_field_and_nothing_is_written() {
 }
 
 #[test]
-fn wrong_options_exit_with_2() {
+fn invalid_options_exit_with_2() {
     let sandbox = Sandbox::new();
     for args in
         [&["simulate", "curtain"][..], &["play"], &["play", "x.mcap", "--rate", "-1"], &["dance"]]

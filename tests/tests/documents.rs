@@ -1,5 +1,5 @@
-//! The reference documents say what the programs accept: their examples run, and they leave out no
-//! key, no kind of command and no built-in scene.
+//! The reference documents agree with the programs: their examples run, and they list every scene key,
+//! every kind of command and every built-in scene.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Process, Program, Sandbox};
@@ -9,9 +9,9 @@ const SCENES: &str = include_str!("../../sim-node/scenes/README.md");
 const SOLVER: &str = include_str!("../../sim-node/solver/README.md");
 const CONTRACT: &str = include_str!("../../sim-node/contract/README.md");
 
-/// The fenced blocks of a language: the number of their first line, and their text.
+/// Returns the fenced blocks of a language, each with the number of its first line.
 fn blocks(document: &str, language: &str) -> Vec<(usize, String)> {
-    let mut found: Vec<(usize, String)> = Vec::new();
+    let mut blocks: Vec<(usize, String)> = Vec::new();
     let mut fence = None;
     for (number, line) in (1..).zip(document.lines()) {
         match (line.strip_prefix("```"), fence) {
@@ -19,25 +19,25 @@ fn blocks(document: &str, language: &str) -> Vec<(usize, String)> {
             (Some(opened), None) => {
                 fence = Some(opened);
                 if opened == language {
-                    found.push((number + 1, String::new()));
+                    blocks.push((number + 1, String::new()));
                 }
             }
             (None, Some(opened)) if opened == language => {
-                let (_, text) = found.last_mut().unwrap();
+                let (_, text) = blocks.last_mut().unwrap();
                 text.push_str(line);
                 text.push('\n');
             }
             (None, _) => {}
         }
     }
-    assert!(fence.is_none(), "a fence is left open");
-    found
+    assert!(fence.is_none(), "a fence is not closed");
+    blocks
 }
 
-/// What an error says is allowed, as a list.
+/// Returns the values that an error message lists as allowed.
 fn allowed(error: &str) -> Vec<&str> {
-    let (_, behind) = error.split_once("(allowed: ").unwrap();
-    behind.split_once(')').unwrap().0.split(", ").collect()
+    let (_, list) = error.split_once("(allowed: ").unwrap();
+    list.split_once(')').unwrap().0.split(", ").collect()
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn every_scene_in_a_document_is_accepted_without_a_warning_and_runs() {
             count += 1;
         }
     }
-    assert!(count >= 8, "only {count} scenes found");
+    assert!(count >= 8, "found only {count} scenes");
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn the_scene_reference_names_every_key() {
         let checked = Process::run(Program::SimNode, &sandbox, &["check", &scene]);
         assert_eq!(checked.code, Some(1), "{table}");
         for key in allowed(&checked.stderr) {
-            assert!(SCENES.contains(&format!("`{key}`")), "{table}: {key} is not described");
+            assert!(SCENES.contains(&format!("`{key}`")), "{table}: {key} is not documented");
         }
     }
 }
@@ -88,12 +88,12 @@ fn the_scene_reference_names_every_built_in_scene() {
     let listed = Process::run(Program::SimNode, &sandbox, &["scenes", "--json"]).json();
     for scene in listed.as_array().unwrap() {
         let name = scene["name"].as_str().unwrap();
-        assert!(SCENES.contains(&format!("| `{name}` |")), "{name} is not described");
+        assert!(SCENES.contains(&format!("| `{name}` |")), "{name} is not documented");
     }
 }
 
 #[test]
-fn every_command_in_the_reference_is_read_and_every_kind_is_there() {
+fn every_command_in_the_reference_is_accepted_and_every_kind_has_an_example() {
     let sandbox = Sandbox::new();
     let simulate = |commands: &str| {
         let file = sandbox.write("commands.jsonl", commands);
@@ -105,7 +105,7 @@ fn every_command_in_the_reference_is_read_and_every_kind_is_there() {
     for (line, text) in &commands {
         let done = simulate(text);
         assert_eq!(done.code, Some(0), "block of line {line}: {}", done.stderr);
-        // The curtain has no anchor, so some are rejected; none is beyond the end.
+        // The curtain has no anchor, so some commands are rejected, but all of them are reached.
         assert!(!done.stderr.contains("for steps after"), "block of line {line}: {}", done.stderr);
     }
     let wrong = simulate(r#"{"step":1,"kind":"nonsense"}"#);

@@ -1,10 +1,10 @@
-//! The contract's examples do what their first lines say, against a running node.
+//! The examples of the contract work against a running node, and report errors as text.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Process, Program, Sandbox};
 
 #[test]
-fn watch_prints_as_many_snapshots_as_asked() {
+fn watch_prints_the_requested_number_of_snapshots() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let printed = Process::run(Program::Watch, &sandbox, &["25"]).success();
@@ -18,13 +18,13 @@ fn watch_prints_as_many_snapshots_as_asked() {
 }
 
 #[test]
-fn drag_moves_a_particle_and_lets_it_go() {
+fn drag_moves_and_releases_a_particle() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let printed = Process::run(Program::Drag, &sandbox, &["90"]).success();
     assert!(printed.starts_with("released at step "), "{printed}");
     let status = Process::run(Program::SimNode, &sandbox, &["ctl", "status", "--json"]).json();
-    // A grab, 120 moves and a release, all applied.
+    // One grab, 120 moves and one release, all applied.
     assert_eq!(
         (status["outcomes"].as_u64(), status["rejected_commands"].as_u64()),
         (Some(122), Some(0))

@@ -1,6 +1,6 @@
-//! The Foxglove server between a node and its clients, all of them processes or sockets: what they
-//! are given is what the node publishes, and what they may do is seen in the node's own snapshots.
-//! The tests with the protocol's own client need the packages that `.ci/run` installs.
+//! The Foxglove server, end to end: clients receive the bits that the node publishes, and their commands
+//! show in the snapshots of the node. The tests with the official client need the packages that
+//! `.ci/run` installs.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 #[path = "../../viewer-bridge/tests/sockets/foxglove_client.rs"]
@@ -18,8 +18,8 @@ use sim_contract::{Client as Reader, ParticleFlags, ParticleState};
 
 use foxglove_client::Client;
 
-/// A node with the curtain that stands still, and a bridge that serves it.
-struct Stand {
+/// A paused node with the curtain scene, and a bridge that serves it.
+struct Setup {
     sandbox: Sandbox,
     _node: Process,
     _bridge: Process,
@@ -27,7 +27,7 @@ struct Stand {
     node: Reader,
 }
 
-impl Stand {
+impl Setup {
     fn start(options: &[&str]) -> Self {
         let sandbox = Sandbox::new();
         let args = ["run", "curtain", "--paused"];
@@ -39,14 +39,14 @@ impl Stand {
         Self { sandbox, _node: process, _bridge: bridge, url, node }
     }
 
-    /// The newest state.
+    /// Returns the newest state.
     fn particles(&self) -> Vec<ParticleState> {
-        // A reader is given each state once, and this one may not have moved.
+        // A new reader, because a reader receives each state only once.
         let mut node = Reader::attach(&self.sandbox.endpoint()).unwrap();
         node.latest_snapshot(DEADLINE).unwrap().unwrap().particles().to_vec()
     }
 
-    /// Waits for a state in which that holds for a particle.
+    /// Waits for a state in which a condition holds for a particle.
     fn wait_for_particle(&mut self, particle: usize, is_so: impl Fn(&ParticleState) -> bool) {
         wait_for("a state of a particle", || {
             let snapshot = self.node.latest_snapshot(Duration::from_millis(100)).unwrap()?;
@@ -54,55 +54,55 @@ impl Stand {
         });
     }
 
-    /// What the protocol's own client saw, in a script of `tests/node`.
-    fn script(&self, what: &str) -> Value {
+    /// Runs the official client in `tests/node`, and returns its report.
+    fn run_client(&self, what: &str) -> Value {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("node/foxglove.js");
         let args = [script.to_str().unwrap(), &self.url, what];
         Process::run(Program::Node, &self.sandbox, &args).json()
     }
 }
 
-/// Numbers, which JavaScript writes without a point where they are whole.
-fn numbers(seen: &Value) -> Vec<f64> {
-    serde_json::from_value(seen.clone()).unwrap_or_else(|error| panic!("{error} in {seen}"))
+/// Parses an array of numbers. JavaScript writes whole numbers without a decimal point.
+fn numbers(array: &Value) -> Vec<f64> {
+    serde_json::from_value(array.clone()).unwrap_or_else(|error| panic!("{error} in {array}"))
 }
 
-/// One number of every particle.
-fn column(particles: &[ParticleState], of: impl Fn(&ParticleState) -> f32) -> Vec<f64> {
-    particles.iter().map(|particle| f64::from(of(particle))).collect()
+/// Returns one value of every particle.
+fn column(particles: &[ParticleState], value: impl Fn(&ParticleState) -> f32) -> Vec<f64> {
+    particles.iter().map(|particle| f64::from(value(particle))).collect()
 }
 
 #[test]
-fn a_client_is_given_the_bits_of_the_snapshot() {
-    let stand = Stand::start(&[]);
-    let (mut client, _) = Client::start(&stand.url);
+fn a_client_receives_the_bits_of_the_snapshot() {
+    let setup = Setup::start(&[]);
+    let (mut client, _) = Client::start(&setup.url);
     client.subscribe(1, "/particles");
     let (_, message) = client.message(1);
     client.subscribe(2, "/steps");
-    let particles = stand.particles();
+    let particles = setup.particles();
     assert_eq!(particles.len(), 168);
     assert!(message.ends_with(bytemuck::cast_slice::<_, u8>(&particles)));
     assert_eq!(client.json(2)["step"], 0);
 }
 
 #[test]
-fn what_a_client_grabs_follows_it_and_is_let_go_when_it_goes() {
-    let mut stand = Stand::start(&["--allow-commands"]);
-    let (mut client, _) = Client::start(&stand.url);
+fn a_particle_follows_the_grab_of_a_client_and_is_released_when_the_client_disconnects() {
+    let mut setup = Setup::start(&["--allow-commands"]);
+    let (mut client, _) = Client::start(&setup.url);
     client.advertise(1, "/commands");
     let grab = json!({ "kind": "grab", "particle": 90, "target": [0.2, 0.5, 0.5], "over_s": 0.01 });
     client.publish(1, &json!({ "kind": "resume" }));
     client.publish(1, &grab);
     let is_grabbed = |particle: &ParticleState| particle.flags & ParticleFlags::GRABBED != 0;
-    stand.wait_for_particle(90, |particle| {
+    setup.wait_for_particle(90, |particle| {
         is_grabbed(particle) && particle.position == [0.2, 0.5, 0.5]
     });
     drop(client);
-    stand.wait_for_particle(90, |particle| !is_grabbed(particle));
+    setup.wait_for_particle(90, |particle| !is_grabbed(particle));
 }
 
 #[test]
-fn a_recording_is_wound_to_where_a_client_wants_it() {
+fn a_client_can_seek_in_a_recording() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let args = ["simulate", "curtain", "--steps", "480", "-o", &file];
@@ -123,7 +123,7 @@ fn a_recording_is_wound_to_where_a_client_wants_it() {
     for step in [300, 1, 480, 299] {
         let time_ns = run.time_of_step_ns(step);
         client.play(1, 1.0, Some(time_ns), &format!("to step {step}"));
-        // Its header comes first.
+        // The header of the step comes first.
         while client.json(2)["step"] != step {}
         let (at_ns, payload) = client.message(1);
         assert_eq!(at_ns, time_ns);
@@ -132,7 +132,7 @@ fn a_recording_is_wound_to_where_a_client_wants_it() {
 }
 
 #[test]
-fn wrong_options_are_refused_with_the_reason() {
+fn invalid_options_are_refused_with_the_reason() {
     let sandbox = Sandbox::new();
     for (options, reason) in [
         (&["--foxglove", "0.0.0.0:8765"][..], "ssh -L"),
@@ -148,70 +148,73 @@ fn wrong_options_are_refused_with_the_reason() {
 
 #[test]
 #[ignore = "needs Node"]
-fn the_protocols_own_client_decodes_what_the_node_publishes() {
-    let stand = Stand::start(&[]);
-    let seen = stand.script("read");
-    let particles = stand.particles();
+fn the_official_client_decodes_the_published_state() {
+    let setup = Setup::start(&[]);
+    let report = setup.run_client("read");
+    let particles = setup.particles();
     for (axis, name) in ["x", "y", "z"].iter().enumerate() {
-        assert_eq!(numbers(&seen[name]), column(&particles, |one| one.position[axis]), "{name}");
+        assert_eq!(numbers(&report[name]), column(&particles, |one| one.position[axis]), "{name}");
         let name = format!("v{name}");
-        assert_eq!(numbers(&seen[&name]), column(&particles, |one| one.velocity[axis]), "{name}");
+        assert_eq!(numbers(&report[&name]), column(&particles, |one| one.velocity[axis]), "{name}");
     }
-    assert_eq!(numbers(&seen["inverse_mass"]), column(&particles, |one| one.inverse_mass));
+    assert_eq!(numbers(&report["inverse_mass"]), column(&particles, |one| one.inverse_mass));
     let flags: Value = particles.iter().map(|particle| particle.flags).collect();
-    assert_eq!(seen["flags"], flags);
-    assert_eq!((&seen["frame"], &seen["step"]), (&json!("world"), &json!(0)));
-    assert_eq!(seen["is_same_again"], true);
-    assert_eq!(seen["sticks"], json!([596]));
-    let ends: Vec<[f64; 3]> = serde_json::from_value(seen["ends"][0].clone()).unwrap();
+    assert_eq!(report["flags"], flags);
+    assert_eq!((&report["frame"], &report["step"]), (&json!("world"), &json!(0)));
+    assert_eq!(report["is_same_again"], true);
+    assert_eq!(report["sticks"], json!([596]));
+    let ends: Vec<[f64; 3]> = serde_json::from_value(report["ends"][0].clone()).unwrap();
     assert_eq!(ends, particles.iter().map(|one| one.position.map(f64::from)).collect::<Vec<_>>());
-    assert_eq!(seen["triangles"], json!([286]));
-    let transform = &seen["transform"];
+    assert_eq!(report["triangles"], json!([286]));
+    let transform = &report["transform"];
     assert_eq!(
         (&transform["parent_frame_id"], &transform["child_frame_id"]),
         (&json!("map"), &json!("world"))
     );
-    assert_eq!(numbers(&seen["parameters"]["gravity"]), [0.0, -9.81, 0.0]);
-    assert_eq!(seen["capabilities"], json!(["parameters", "parametersSubscribe"]));
+    assert_eq!(numbers(&report["parameters"]["gravity"]), [0.0, -9.81, 0.0]);
+    assert_eq!(report["capabilities"], json!(["parameters", "parametersSubscribe"]));
     let topics = ["/outcomes", "/particles", "/scene", "/status", "/steps", "/tears", "/tf"]
         .map(Value::from);
-    assert_eq!(seen["topics"], json!(topics));
+    assert_eq!(report["topics"], json!(topics));
 }
 
 #[test]
 #[ignore = "needs Node"]
-fn the_protocols_own_client_commands_the_node_where_that_is_allowed() {
-    let mut stand = Stand::start(&["--allow-commands"]);
-    let seen = stand.script("command");
-    assert_eq!(seen["services"], json!(["pause", "reset", "resume", "step"]));
-    assert_eq!((&seen["step"]["status"], &seen["step"]["step"]), (&json!("applied"), &json!(1)));
-    assert!(seen["nonsense"]["failure"].as_str().unwrap().contains("range"), "{seen}");
-    for service in ["resume", "pause", "reset"] {
-        assert_eq!(seen[service]["status"], "applied", "{seen}");
-    }
-    assert_eq!(numbers(&seen["gravity"]), [0.0, -1.5, 0.0]);
+fn the_official_client_commands_the_node_if_allowed() {
+    let mut setup = Setup::start(&["--allow-commands"]);
+    let report = setup.run_client("command");
+    assert_eq!(report["services"], json!(["pause", "reset", "resume", "step"]));
     assert_eq!(
-        (&seen["pin"]["status"], &seen["pin"]["particle"]),
+        (&report["step"]["status"], &report["step"]["step"]),
+        (&json!("applied"), &json!(1))
+    );
+    assert!(report["nonsense"]["failure"].as_str().unwrap().contains("range"), "{report}");
+    for service in ["resume", "pause", "reset"] {
+        assert_eq!(report[service]["status"], "applied", "{report}");
+    }
+    assert_eq!(numbers(&report["gravity"]), [0.0, -1.5, 0.0]);
+    assert_eq!(
+        (&report["pin"]["status"], &report["pin"]["particle"]),
         (&json!("applied"), &json!(100))
     );
-    stand.wait_for_particle(100, |particle| particle.flags & ParticleFlags::PINNED != 0);
-    let reset = seen["reset"]["step"].as_u64().unwrap();
-    assert!(reset > 3, "{seen}");
+    setup.wait_for_particle(100, |particle| particle.flags & ParticleFlags::PINNED != 0);
+    let reset = report["reset"]["step"].as_u64().unwrap();
+    assert!(reset > 3, "{report}");
 }
 
 #[test]
 #[ignore = "needs Node"]
-fn the_protocols_own_client_changes_nothing_where_that_is_not_allowed() {
-    let stand = Stand::start(&[]);
-    let before = stand.particles();
-    let seen = stand.script("command");
-    assert_eq!(seen["services"], json!([]));
+fn the_official_client_changes_nothing_if_not_allowed() {
+    let setup = Setup::start(&[]);
+    let before = setup.particles();
+    let report = setup.run_client("command");
+    assert_eq!(report["services"], json!([]));
     for service in ["step", "resume", "pause", "reset"] {
-        assert!(seen[service]["failure"].is_string(), "{seen}");
+        assert!(report[service]["failure"].is_string(), "{report}");
     }
-    assert_eq!(numbers(&seen["gravity"]), [0.0, -9.81, 0.0]);
-    assert_eq!(seen["pin"], Value::Null);
-    let status = integration_tests::ctl(&stand.sandbox, &["status"]);
+    assert_eq!(numbers(&report["gravity"]), [0.0, -9.81, 0.0]);
+    assert_eq!(report["pin"], Value::Null);
+    let status = integration_tests::ctl(&setup.sandbox, &["status"]);
     assert_eq!((&status["step"], &status["paused"]), (&json!(0), &json!(true)), "{status}");
-    assert!(stand.particles() == before);
+    assert!(setup.particles() == before);
 }

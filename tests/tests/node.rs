@@ -1,4 +1,4 @@
-//! The node as other processes see it: late joiners, commands, pauses, a second node, stubborn
+//! The node as other processes see it: late subscribers, commands, pauses, a second node, stubborn
 //! readers, many short-lived clients.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -15,8 +15,8 @@ fn attach(sandbox: &Sandbox) -> Client {
     Client::attach(&sandbox.endpoint()).unwrap()
 }
 
-/// The first snapshot of that step or a later one.
-fn snapshot_of(client: &mut Client, step: u64) -> Snapshot {
+/// Waits for a snapshot of a step, or of a later one.
+fn snapshot_from(client: &mut Client, step: u64) -> Snapshot {
     loop {
         let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
         if snapshot.header().step >= step {
@@ -26,11 +26,11 @@ fn snapshot_of(client: &mut Client, step: u64) -> Snapshot {
 }
 
 #[test]
-fn a_late_joiner_gets_the_scene_and_the_last_snapshot_at_once() {
+fn a_late_subscriber_receives_the_scene_and_the_last_snapshot_at_once() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain", "--paused"]);
     ctl(&sandbox, &["step", "7"]);
-    // The node stands still: all of this was published before this reader came.
+    // The node is paused: it published all of this before the reader attached.
     let mut client = attach(&sandbox);
     let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
     assert_eq!((snapshot.header().step, snapshot.particles().len()), (7, 168));
@@ -40,25 +40,25 @@ fn a_late_joiner_gets_the_scene_and_the_last_snapshot_at_once() {
 }
 
 #[test]
-fn a_drag_by_one_process_moves_the_particle_that_another_one_reads() {
+fn a_grab_by_one_process_moves_the_particle_that_another_process_reads() {
     let sandbox = Sandbox::new();
-    let _node = node(&sandbox, &["run", "curtain"]);
-    let mut reader = attach(&sandbox);
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
     let outcome = ctl(&sandbox, &["grab", "90", "0.5", "-0.2", "0.3", "--over", "0.1"]);
-    assert_eq!(outcome["status"], "applied");
-    let step = outcome["step"].as_u64().unwrap();
-    // 0.1 s are 24 steps of 240 Hz, the first of them the one that the outcome names.
-    let before = snapshot_of(&mut reader, step + 22).particles()[90];
+    assert_eq!((&outcome["status"], &outcome["step"]), (&"applied".into(), &1.into()));
+    // 0.1 s is 24 steps at 240 Hz. The step of the outcome is the first.
+    ctl(&sandbox, &["step", "23"]);
+    let before = snapshot_from(&mut attach(&sandbox), 23).particles()[90];
     assert_ne!(before.position, [0.5, -0.2, 0.3]);
-    let there = snapshot_of(&mut reader, step + 23);
-    assert_eq!(there.particles()[90].position, [0.5, -0.2, 0.3]);
-    assert_eq!(there.particles()[90].flags, ParticleFlags::GRABBED);
-    // A third process of the same console lets go.
+    ctl(&sandbox, &["step"]);
+    let after = snapshot_from(&mut attach(&sandbox), 24).particles()[90];
+    assert_eq!(after.position, [0.5, -0.2, 0.3]);
+    assert_eq!(after.flags, ParticleFlags::GRABBED);
+    // Each call of `ctl` is a process, but all of them share one client id.
     assert_eq!(ctl(&sandbox, &["release", "90"])["status"], "applied");
 }
 
 #[test]
-fn a_paused_node_makes_exactly_the_steps_it_is_told() {
+fn a_paused_node_makes_exactly_the_requested_steps() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain", "--paused"]);
     assert_eq!(ctl(&sandbox, &["hash"])["step"], 0);
@@ -66,18 +66,18 @@ fn a_paused_node_makes_exactly_the_steps_it_is_told() {
     assert_eq!(ctl(&sandbox, &["hash"])["step"], 13);
     assert_eq!(ctl(&sandbox, &["step"])["step"], 14);
     assert_eq!(ctl(&sandbox, &["status"])["step"], 14);
-    // A reset makes the one step that shows it.
+    // A reset makes one step, which shows it.
     assert_eq!(ctl(&sandbox, &["reset"])["step"], 15);
     let mut client = attach(&sandbox);
-    let header = *snapshot_of(&mut client, 15).header();
+    let header = *snapshot_from(&mut client, 15).header();
     assert_eq!((header.step, header.scene_step), (15, 0));
     assert!(client.next_snapshot(Duration::from_millis(200)).unwrap().is_none());
     assert_eq!(ctl(&sandbox, &["resume"])["status"], "applied");
-    snapshot_of(&mut client, 20);
+    snapshot_from(&mut client, 20);
 }
 
 #[test]
-fn commands_of_a_paused_node_are_answered_with_the_step_that_will_show_them() {
+fn a_paused_node_answers_commands_with_the_step_that_will_show_them() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain", "--paused"]);
     for index in 0..3 {
@@ -85,7 +85,7 @@ fn commands_of_a_paused_node_are_answered_with_the_step_that_will_show_them() {
         assert_eq!((outcome["step"].as_u64(), outcome["index"].as_u64()), (Some(1), Some(index)));
     }
     ctl(&sandbox, &["step"]);
-    let snapshot = snapshot_of(&mut attach(&sandbox), 1);
+    let snapshot = snapshot_from(&mut attach(&sandbox), 1);
     assert_eq!(snapshot.particles()[100].flags, ParticleFlags::PINNED);
     assert_eq!(snapshot.header().outcome_count, 4);
 }
@@ -122,7 +122,7 @@ fn rejected_commands_name_their_reason_and_change_no_bit() {
 }
 
 #[test]
-fn a_second_node_of_a_name_is_refused_with_the_process_of_the_first() {
+fn a_second_node_with_the_same_name_is_refused_and_told_the_process_id_of_the_first() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain"]);
     let process_id = ctl(&sandbox, &["status"])["process_id"].to_string();
@@ -130,18 +130,18 @@ fn a_second_node_of_a_name_is_refused_with_the_process_of_the_first() {
     assert_eq!(second.code, Some(1));
     assert!(second.stderr.contains("running already"), "{}", second.stderr);
     assert!(second.stderr.contains(&process_id), "{}", second.stderr);
-    // Beside it, under another name, it runs.
+    // It runs beside the first under another name.
     let _other = node(&sandbox, &["run", "rope", "--name", "other"]);
     assert_eq!(ctl(&sandbox, &["status", "--name", "other"])["scene"], "rope");
     assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain");
 }
 
 #[test]
-fn a_killed_node_is_replaced_and_its_readers_go_on() {
+fn readers_of_a_killed_node_continue_with_its_replacement() {
     let sandbox = Sandbox::new();
     let first = node(&sandbox, &["run", "curtain"]);
     let mut client = attach(&sandbox);
-    let run_id = snapshot_of(&mut client, 1).header().run_id;
+    let run_id = snapshot_from(&mut client, 1).header().run_id;
     first.signal(Signal::KILL);
     assert_eq!(first.wait().code, None);
     let _second = node(&sandbox, &["run", "curtain"]);
@@ -152,19 +152,19 @@ fn a_killed_node_is_replaced_and_its_readers_go_on() {
 }
 
 #[test]
-fn readers_that_hold_their_samples_and_stand_still_do_not_change_or_stop_the_node() {
-    let run = |with_reader: bool| {
+fn stopped_readers_with_borrowed_samples_neither_change_nor_stop_the_node() {
+    let run = |reader_count: usize| {
         let sandbox = Sandbox::new();
         let args =
             ["run", "curtain", "--paused", "--steps", "5000", "--as-fast-as-possible", "--json"];
         let node = node(&sandbox, &args);
-        let mut readers: Vec<_> = (0..if with_reader { 2 } else { 0 })
+        let mut readers: Vec<_> = (0..reader_count)
             .map(|_| Process::start(Program::StubbornReader, &sandbox, &[]))
             .collect();
         for reader in &mut readers {
             reader.wait_for_line("attached");
         }
-        // They fill their hands, and stand still with a buffer that fills up behind them.
+        // They borrow all they may, and stop while their buffers fill up.
         ctl(&sandbox, &["step", "4"]);
         for reader in &mut readers {
             reader.wait_until_ready();
@@ -173,12 +173,12 @@ fn readers_that_hold_their_samples_and_stand_still_do_not_change_or_stop_the_nod
         ctl(&sandbox, &["resume"]);
         node.wait().json()
     };
-    let (alone, watched) = (run(false), run(true));
+    let (alone, watched) = (run(0), run(2));
     assert_eq!(alone["steps"], 5000);
     assert_eq!(watched["state_hash"], alone["state_hash"]);
 }
 
-/// 200 processes that each pin another particle and end; each must have its outcome and its pin.
+/// Starts 200 processes that each pin a different particle and end, and checks each outcome and pin.
 fn pin_by_200_processes(rate: &str) {
     let sandbox = Sandbox::new();
     let cloth = "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 20\nrows = 20\nspacing = 0.1\npinned = \"none\"\n";
@@ -201,7 +201,7 @@ fn pin_by_200_processes(rate: &str) {
     }
     indices.sort_unstable();
     assert_eq!(indices, (0..200).collect::<Vec<_>>());
-    let snapshot = snapshot_of(&mut attach(&sandbox), last_step);
+    let snapshot = snapshot_from(&mut attach(&sandbox), last_step);
     let pinned = |range: std::ops::Range<usize>| {
         let flags = snapshot.particles()[range].iter().map(|one| one.flags);
         flags.filter(|flags| *flags == ParticleFlags::PINNED).count()
@@ -220,7 +220,7 @@ fn two_hundred_short_lived_processes_pin_at_10_hz() {
 }
 
 #[test]
-fn another_client_cannot_move_what_the_console_holds() {
+fn a_client_cannot_release_a_particle_that_ctl_grabbed() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain"]);
     ctl(&sandbox, &["grab", "90", "0", "0", "0"]);
@@ -230,7 +230,7 @@ fn another_client_cannot_move_what_the_console_holds() {
 }
 
 #[test]
-fn a_run_ends_by_itself_and_reports_in_json() {
+fn a_run_with_a_duration_ends_and_reports_in_json() {
     let sandbox = Sandbox::new();
     let args =
         ["run", "rope", "--rate", "500", "--duration", "0.2s", "--as-fast-as-possible", "--json"];

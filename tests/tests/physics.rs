@@ -1,11 +1,11 @@
-//! Every command on the physics, from the command line and from other processes: answered, shown
-//! by the next snapshots, known to late joiners, recorded, and simulated again bit for bit.
+//! Every command on the physics, from the command line and from other processes: the node answers it,
+//! snapshots show its effect, late subscribers see it, and a recording of it re-simulates bit for bit.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
 use sim_contract::{Action, Client, ColliderShape, ParticleFlags, Reason, TearCause, Text};
 
-/// A small cloth on an anchor over a floor and beside a ball, in the wind.
+/// A small cloth in the wind on an anchor, over a floor and beside a ball.
 const SCENE: &str = r#"
 version = 1
 name = "all"
@@ -54,10 +54,10 @@ fn attach(sandbox: &Sandbox) -> Client {
     Client::attach(&sandbox.endpoint()).unwrap()
 }
 
-/// A verb with its arguments, and the reason for which it is refused.
-type Order = (&'static [&'static str], &'static str);
+/// A verb with its arguments, and the reason for its refusal.
+type RefusedCommand = (&'static [&'static str], &'static str);
 
-/// One of each, all of which take effect.
+/// At least one command of each kind, all of which are applied.
 const APPLIED: &[&[&str]] = &[
     &[
         "push", "0.3", "-0.3", "0", "--radius", "0.2", "--delta", "0.01", "0", "0.02", "--limit",
@@ -86,7 +86,8 @@ const APPLIED: &[&[&str]] = &[
     &["set", "compliance", "0"],
 ];
 
-const REFUSED: &[Order] = &[
+/// Commands that the node refuses.
+const REFUSED: &[RefusedCommand] = &[
     (&["push", "0", "0", "0", "--radius", "-1", "--delta", "0", "0", "0"], "out_of_range"),
     (&["push", "nan", "0", "0", "--radius", "1", "--delta", "0", "0", "0"], "non_finite"),
     (&["cut", "4000"], "unknown_constraint"),
@@ -146,11 +147,11 @@ fn every_command_is_answered_and_a_refused_one_names_its_reason() {
 
 #[test]
 fn refused_commands_change_no_bit() {
-    let run = |orders: &[Order]| {
+    let run = |refused: &[RefusedCommand]| {
         let sandbox = Sandbox::new();
         let _node = node(&sandbox, &["--paused"]);
         ctl(&sandbox, &["cut", "40"]);
-        for (args, _) in orders {
+        for (args, _) in refused {
             ctl(&sandbox, args);
         }
         ctl(&sandbox, &["step", "50"]);
@@ -160,7 +161,7 @@ fn refused_commands_change_no_bit() {
 }
 
 #[test]
-fn a_late_joiner_knows_what_is_torn_and_why_and_where_the_colliders_are() {
+fn a_late_subscriber_receives_tears_with_causes_and_colliders() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["--paused"]);
     ctl(&sandbox, &["cut", "40"]);
@@ -168,10 +169,10 @@ fn a_late_joiner_knows_what_is_torn_and_why_and_where_the_colliders_are() {
     ctl(&sandbox, &["cut", "7"]);
     ctl(&sandbox, &["move-collider", "1", "-0.5", "0", "0"]);
     ctl(&sandbox, &["step", "3"]);
-    // All of this was published before this reader came.
+    // The node published all of this before the reader attached.
     let mut client = attach(&sandbox);
     let torn = client.torn(DEADLINE).unwrap();
-    let torn: Vec<_> = torn.constraints.iter().map(|one| (one.constraint, one.cause)).collect();
+    let torn: Vec<_> = torn.constraints.iter().map(|one| (one.constraint, one.cause())).collect();
     assert_eq!(torn, [(40, Some(TearCause::Cut)), (7, Some(TearCause::Cut))]);
     let colliders = client.colliders(DEADLINE).unwrap().colliders;
     assert_eq!(colliders.len(), 2);
@@ -194,7 +195,7 @@ fn a_late_joiner_knows_what_is_torn_and_why_and_where_the_colliders_are() {
 }
 
 #[test]
-fn a_load_changes_the_scene_for_readers_that_stay_and_the_step_goes_on() {
+fn a_load_changes_the_scene_for_attached_readers_and_steps_continue() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["--paused"]);
     let mut client = attach(&sandbox);
@@ -219,7 +220,7 @@ fn a_load_changes_the_scene_for_readers_that_stay_and_the_step_goes_on() {
     assert!(late.torn(DEADLINE).unwrap().constraints.is_empty());
     assert!(late.colliders(DEADLINE).unwrap().colliders.is_empty());
     assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain");
-    // Down to a smaller one.
+    // Loads a smaller scene.
     assert_eq!(ctl(&sandbox, &["load", "rope"])["step"], 9);
     let snapshot = loop {
         let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
@@ -237,12 +238,12 @@ fn a_scene_of_another_rate_needs_another_node() {
     let _node = node(&sandbox, &["--paused"]);
     let other = sandbox.write("other.toml", "version = 1\n[solver]\nrate_hz = 60\n");
     assert_eq!(ctl(&sandbox, &["load", &other])["reason"], "no_effect_here");
-    // What is wrong with a scene is said before it is sent.
+    // An invalid scene is refused before it is sent.
     let wrong = sandbox.write("wrong.toml", "version = 1\nrate = 3\n");
     let refused = Process::run(Program::SimNode, &sandbox, &["ctl", "load", &wrong]);
     assert_eq!(refused.code, Some(1));
     assert!(refused.stderr.contains("wrong.toml:2: rate: unknown field"), "{}", refused.stderr);
-    // A device is no scene, and nothing that a node would wait for.
+    // A device is not a scene, and the node does not block on reading it.
     let device = Action::Load { scene: Text::new("/dev/zero").unwrap() };
     let outcome = attach(&sandbox).request(device, DEADLINE).unwrap();
     assert_eq!(outcome.reason_name(), Reason::OutOfRange.name());
@@ -276,7 +277,7 @@ fn another_process_commands_the_physics_through_the_client() {
 }
 
 #[test]
-fn a_recording_of_every_command_is_simulated_again_bit_for_bit() {
+fn a_recording_of_every_command_re_simulates_bit_for_bit() {
     let sandbox = Sandbox::new();
     let node = node(&sandbox, &[]);
     let file = sandbox.path("all.mcap");

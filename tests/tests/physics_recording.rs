@@ -1,5 +1,5 @@
-//! Tears, colliders and a load in recordings of a live node: a recorder that comes late knows what
-//! came before it, the file ends with the load, and it plays back and records again row for row.
+//! Tears, colliders and a load in recordings of a live node: a late recorder records the state before
+//! it attached, the file ends with the load, and a recording of its playback has the same rows.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::path::Path;
 use integration_tests::{Process, Program, Sandbox};
 use recorder::{Frame, FrameReader, LogReader, Message};
 
-/// A cloth over a ball, and no moment without a motion.
+/// A cloth over a ball, always in motion.
 const SCENE: &str = r#"
 version = 1
 name = "net"
@@ -29,21 +29,21 @@ spacing = 0.1
 mass = 0.02
 "#;
 
-fn ctl(sandbox: &Sandbox, orders: &[&str]) {
-    for order in orders {
-        let args: Vec<_> = ["ctl"].into_iter().chain(order.split(' ')).collect();
+fn ctl(sandbox: &Sandbox, commands: &[&str]) {
+    for command in commands {
+        let args: Vec<_> = ["ctl"].into_iter().chain(command.split(' ')).collect();
         Process::run(Program::SimNode, sandbox, &args).success();
     }
 }
 
-/// All snapshots of a recording.
+/// Reads all snapshots of a recording.
 fn frames(file: &str) -> Vec<Frame> {
     let mut reader = FrameReader::new(LogReader::open(Path::new(file)).unwrap());
     std::iter::from_fn(|| reader.next_frame().unwrap()).collect()
 }
 
-/// The rows of tears, colliders and outcomes, and what was torn before; sorted, because a paused
-/// node answers a command long before the step that shows it.
+/// Returns the rows of tears, colliders and outcomes, and the initially torn constraints. Sorted,
+/// because a paused node answers a command long before the step that shows it.
 fn side_rows(frames: &[Frame]) -> Vec<String> {
     let text = |update: &Message| match update {
         Message::Topology(row) => Some(format!("torn before {:?}", row.torn)),
@@ -58,7 +58,7 @@ fn side_rows(frames: &[Frame]) -> Vec<String> {
     rows
 }
 
-/// What tore, by step.
+/// Returns the torn constraints of each step with tears.
 fn tears(frames: &[Frame]) -> Vec<(u64, Vec<u32>)> {
     let rows = frames.iter().flat_map(|frame| &frame.updates).filter_map(|update| match update {
         Message::Tears(row) => Some((row.step, row.constraints.clone())),
@@ -78,12 +78,12 @@ fn a_late_recording_with_tears_a_reset_and_a_load_verifies_and_plays_back_row_fo
     let (first, second) = (sandbox.path("first.mcap"), sandbox.path("second.mcap"));
     let scene = sandbox.write("net.toml", SCENE);
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", &scene, "--paused"]);
-    // All of this is over when the recorder comes.
+    // All of this happens before the recorder attaches.
     ctl(&sandbox, &["cut 9", "move-collider 0 0 0 -0.1", "step", "cut 4", "step 3"]);
     let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &first]);
     ctl(&sandbox, &["step 5", "cut 20", "cut 11", "step 2", "move-collider 0 0 0 -0.2", "step 4"]);
     ctl(&sandbox, &["reset", "cut 9", "step", "cut 4", "step 3", "load curtain"]);
-    // Another scene is another file.
+    // Another scene needs another file, so the recording ends with the load.
     recording.wait().success();
     node.interrupt().success();
     assert_verifies(&sandbox, &first);

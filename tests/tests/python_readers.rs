@@ -1,5 +1,5 @@
-//! Independent readers: the stock Python MCAP reader finds the published bits in a recording, and
-//! the iceoryx2 package reads a running node. They need the virtual environment of `.ci/run`.
+//! Independent readers in Python: the stock MCAP reader finds the published bits in a recording, and
+//! the iceoryx2 package reads a running node. These tests need the virtual environment of `.ci/run`.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use integration_tests::{DEADLINE, Process, Program, Sandbox};
 use serde_json::Value;
 use sim_contract::Client;
 
-/// Runs a script of `tests/python`.
+/// Runs a script of `tests/python`, and returns its report.
 fn python(sandbox: &Sandbox, script: &str, args: &[&str]) -> Value {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let script: PathBuf = folder.join("python").join(script);

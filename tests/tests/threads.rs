@@ -1,5 +1,5 @@
-//! The number of threads is no input of a simulation: whole recordings are equal byte for byte, and
-//! what some threads have simulated others verify.
+//! The number of threads does not affect a simulation: recordings are equal byte for byte, and a
+//! recording made with one thread verifies with two.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::path::Path;
 use integration_tests::{Finished, Process, Program, Sandbox};
 use recorder::{LogReader, Message};
 
-/// A sheet that is big enough to be divided, falls onto a ball, and tears there.
+/// A sheet that is big enough for several threads, falls onto a ball, and tears there.
 const SCENE: &str = r#"
 version = 1
 
@@ -36,7 +36,7 @@ fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
     Process::run(Program::Recorder, sandbox, args)
 }
 
-/// Constraints that have torn in a recording.
+/// Counts the torn constraints of a recording.
 fn torn_count(file: &str) -> usize {
     let mut log = LogReader::open(Path::new(file)).unwrap();
     let rows = std::iter::from_fn(|| log.next_message().unwrap());
@@ -57,17 +57,17 @@ fn simulate_writes_the_same_file_with_any_number_of_threads() {
         recorder(&sandbox, &args).success();
         file
     });
-    assert!(torn_count(&files[0]) > 0, "a sheet that does not tear proves less");
+    assert!(torn_count(&files[0]) > 0, "the sheet must tear");
     let [one, two, three] = files.each_ref().map(|file| std::fs::read(file).unwrap());
-    // Not `assert_eq`: nobody reads megabytes.
-    assert!(one == two, "two threads write another file");
-    assert!(one == three, "three threads write another file");
+    // Not `assert_eq`, which would print megabytes.
+    assert!(one == two, "two threads wrote a different file");
+    assert!(one == three, "three threads wrote a different file");
     let verified = recorder(&sandbox, &["verify", &files[0], "--threads", "2"]).success();
     assert!(verified.starts_with("60 steps bit-identical"), "{verified}");
 }
 
 #[test]
-fn wrong_numbers_of_threads_exit_with_2_and_the_range() {
+fn an_invalid_number_of_threads_exits_with_2_and_names_the_range() {
     let sandbox = Sandbox::new();
     for (program, command) in [
         (Program::SimNode, &["run", "curtain"][..]),

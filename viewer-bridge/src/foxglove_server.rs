@@ -26,9 +26,9 @@ use thiserror::Error;
 use tokio::net::TcpListener;
 use tokio::time::timeout;
 
-use crate::Hub;
-use crate::guard::Guard;
 use crate::limits::{FAREWELL_TIMEOUT, FOXGLOVE_QUEUED_MAX};
+use crate::pages::hub::Hub;
+use crate::socket::guard::Guard;
 use desk::{Desk, ParameterDesk};
 use gate::Gate;
 use listener::Listener;

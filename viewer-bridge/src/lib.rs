@@ -13,30 +13,17 @@
 //! ```
 #![forbid(unsafe_code)]
 
-pub mod assets;
-mod check;
-mod client;
 mod foxglove_server;
-pub mod guard;
-pub mod hub;
 pub mod limits;
-pub mod live;
-mod load;
-pub mod measure;
 pub mod message;
-pub mod parameters;
-mod rate_limit;
-pub mod reason;
-pub mod replay;
-pub mod scene_text;
-pub mod scenes;
-pub mod server;
-pub mod settings;
+pub mod pages;
+pub mod scene;
+pub mod shown_state;
+mod socket;
 pub mod source;
-pub mod stage;
 pub mod wire;
 
 pub use foxglove_server::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Recording};
-pub use hub::Hub;
-pub use server::{Server, ServerOptions};
+pub use pages::hub::Hub;
+pub use pages::server::{Server, ServerOptions};
 pub use source::Source;

@@ -13,10 +13,11 @@ use clap::Parser;
 use sim_contract::Stop;
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
-use viewer_bridge::assets::Assets;
-use viewer_bridge::live::Live;
-use viewer_bridge::replay::Replay;
+
+use viewer_bridge::pages::assets::Assets;
 use viewer_bridge::source::Requests;
+use viewer_bridge::source::live::Live;
+use viewer_bridge::source::replay::Replay;
 use viewer_bridge::{FoxgloveOptions, FoxgloveServer, Hub, Server, ServerOptions, Source};
 
 use args::Args;

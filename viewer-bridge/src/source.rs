@@ -1,15 +1,18 @@
 //! The seam between what is shown and how it is served: a live node and a recording feed the same
 //! hub, and answer the same commands.
 
+pub mod live;
+pub mod replay;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-use crate::Hub;
 use crate::foxglove_server::Recording;
 use crate::limits::REQUESTS_QUEUED_MAX;
 use crate::message::{Command, Mode};
+use crate::pages::hub::Hub;
 
 /// What feeds a hub. It has a thread of its own.
 pub trait Source: Send {

@@ -1,7 +1,7 @@
-//! Every message of the protocol as bytes, and what the bytes say: `golden/messages.json` and
-//! `golden/texts.json` are what the page's decoder is tested on as well.
+//! Golden files with every message of the protocol: `golden/messages.json` has the bytes and fields of
+//! the binary messages, `golden/texts.json` the texts. The decoder of the page is tested on them too.
 //!
-//! With `UPDATE_GOLDEN=1` the files are written anew; then look at what changed.
+//! `UPDATE_GOLDEN=1` rewrites the files; review the difference.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 use std::fmt::Write;
@@ -12,20 +12,21 @@ use serde_json::{Value, json};
 use sim_contract::{
     ColliderShape, ColliderState, ConstraintState, ParticleFlags, ParticleState, PlainF32, Triangle,
 };
+use viewer_bridge::message::parameters::Parameters;
+use viewer_bridge::message::settings;
 use viewer_bridge::message::{
     Choice, FromPage, Hashes, Level, Limits, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
     ParametersText, Playback, Status, Timeline, ToPage, Welcome,
 };
-use viewer_bridge::parameters::Parameters;
+use viewer_bridge::scene::catalog;
 use viewer_bridge::wire::{
     Colliders, Format, FrameHead, FrameLimits, Grid, Message, Pins, Scene, SceneText, Stamp,
     Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
 };
-use viewer_bridge::{scenes, settings};
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
 
-/// Three particles, the last one out of reach of u16, and one that is not finite.
+/// Three particles, the last beyond the range of u16, and one that is not finite.
 fn particles() -> Vec<ParticleState> {
     let at = |position, flags| ParticleState { position, flags, ..ParticleState::default() };
     vec![
@@ -117,7 +118,7 @@ fn colliders() -> Colliders {
     Colliders { stamp: STAMP, colliders: vec![ball, floor] }
 }
 
-/// All binary messages by name.
+/// All binary messages, by name.
 fn messages() -> Vec<(&'static str, Vec<u8>)> {
     let finite = &particles()[..3];
     let limits = FrameLimits::around([0.0; 3], [0.1; 3]);
@@ -145,7 +146,7 @@ fn messages() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// What a decoder has to find.
+/// The fields that a decoder must find.
 fn fields(message: &Message) -> Value {
     match message {
         Message::Scene(scene) => json!({
@@ -208,7 +209,7 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// Compares with a file of `golden/`, or writes it.
+/// Compares content with a file of `golden/`, or writes the file.
 fn check(file: &str, content: &Value) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(file);
     let text = serde_json::to_string_pretty(content).unwrap() + "\n";
@@ -217,7 +218,7 @@ fn check(file: &str, content: &Value) {
         return;
     }
     let known = fs::read_to_string(&path).unwrap_or_default();
-    assert!(known == text, "{file} is another one now; UPDATE_GOLDEN=1 shows how");
+    assert!(known == text, "{file} differs; UPDATE_GOLDEN=1 rewrites it");
 }
 
 #[test]
@@ -230,7 +231,7 @@ fn the_bytes_of_every_message_are_frozen() {
 }
 
 #[test]
-fn every_message_survives_the_wire() {
+fn every_message_decodes_to_what_was_encoded() {
     assert_eq!(decode(&scene().encode()), Ok(Message::Scene(scene())));
     assert_eq!(decode(&colliders().encode()), Ok(Message::Colliders(colliders())));
     let decoded = decode(&statistics().encode());
@@ -238,14 +239,14 @@ fn every_message_survives_the_wire() {
     for (name, bytes) in messages() {
         assert!(bytes.len().is_multiple_of(4), "{name}");
         for end in 0..bytes.len() {
-            assert!(decode(&bytes[..end]).is_err(), "{name} cut at {end}");
+            assert!(decode(&bytes[..end]).is_err(), "{name} truncated to {end} bytes");
         }
-        assert!(decode(&[&bytes[..], &[0]].concat()).is_err(), "{name} with a byte too many");
+        assert!(decode(&[&bytes[..], &[0]].concat()).is_err(), "{name} with an extra byte");
     }
 }
 
 #[test]
-fn u16_positions_are_within_half_a_step_and_f32_positions_are_the_bits() {
+fn u16_positions_are_within_half_a_quantum_and_f32_positions_are_exact() {
     let limits = FrameLimits::around([0.0; 3], [1.0; 3]);
     let particles: Vec<_> = (0..1000_u16)
         .map(|index| {
@@ -256,7 +257,7 @@ fn u16_positions_are_within_half_a_step_and_f32_positions_are_the_bits() {
         .collect();
     for format in [Format::F32, Format::U16] {
         let bytes = encode_frame(&head(), &particles, format, &limits);
-        let Ok(Message::Frame(frame)) = decode(&bytes) else { panic!("no frame") };
+        let Ok(Message::Frame(frame)) = decode(&bytes) else { panic!("not a frame") };
         assert_eq!(frame.head, head());
         for (position, particle) in frame.positions.iter().zip(&particles) {
             for ((axis, exact), scale) in position.iter().zip(particle.position).zip(frame.scale) {
@@ -269,13 +270,13 @@ fn u16_positions_are_within_half_a_step_and_f32_positions_are_the_bits() {
 }
 
 #[test]
-fn one_particle_that_flies_off_takes_no_resolution_from_the_others() {
+fn a_particle_far_away_does_not_reduce_the_resolution_of_the_others() {
     let limits = FrameLimits::around([0.0; 3], [1.0; 3]);
     let mut all = particles();
     all[1].position = [1e30, 0.0, 0.0];
     let Ok(Message::Frame(frame)) = decode(&encode_frame(&head(), &all, Format::U16, &limits))
     else {
-        panic!("no frame")
+        panic!("not a frame")
     };
     assert_eq!(frame.head.flags & frame_flag::SATURATED, frame_flag::SATURATED);
     assert_eq!(frame.not_finite, [3]);
@@ -302,7 +303,7 @@ fn to_page() -> Vec<ToPage> {
             client: 3,
             mode: Mode::Live,
             format: Choice::Auto,
-            scenes: scenes::all(),
+            scenes: catalog::all(),
             settings: &settings::SETTINGS,
             limits: Limits::default(),
         })),
@@ -367,7 +368,7 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
     ]
 }
 
-/// One of each kind, as a page may send them.
+/// One message of each kind that a page may send.
 const FROM_PAGE: [&str; 25] = [
     r#"{"type":"hello","protocol":1,"token":"00","format":"u16"}"#,
     r#"{"type":"hello","protocol":1}"#,

@@ -1,4 +1,4 @@
-//! Where the picture is looked at from: parallel rays, so that lengths stay comparable.
+//! The camera: an orthographic projection, so that lengths stay comparable.
 
 use clap::ValueEnum;
 use glam::{DVec2, DVec3};
@@ -7,42 +7,42 @@ use sim_solver::scene::Up;
 use super::extent::Extent;
 use super::shape::Size;
 
-/// Share of the picture that stays free on each side.
+/// Margin on each side, relative to the picture.
 const MARGIN: f64 = 0.08;
-/// A scene is flat along an axis that has less than this share of its longest one.
+/// A scene is flat along an axis if its extent there is less than this fraction of the longest one.
 const FLAT: f64 = 0.01;
-/// Sine and cosine of the 30 degrees that the slanted view is turned by.
+/// Sine and cosine of the 30 degrees by which the view `Iso` turns.
 const TURN: (f64, f64) = (0.5, 0.866_025_403_784_438_6);
-/// Sine and cosine of the 20 degrees that it looks down.
+/// Sine and cosine of the 20 degrees by which it looks down.
 const TILT: (f64, f64) = (0.342_020_143_325_668_7, 0.939_692_620_785_908_4);
 
-/// The side from which a scene is seen.
+/// The direction of view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum View {
-    /// Along the depth axis: x to the right, the scene's up is up
+    /// Along the depth axis, with x to the right and the scene's up axis up
     Front,
     /// From the right-hand side of the front view
     Side,
     /// From above
     Top,
-    /// Slanted: turned by 30 degrees, from 20 degrees above
+    /// Oblique: turned by 30 degrees, from 20 degrees above
     Iso,
 }
 
-/// Three axes at right angles, of length 1, right-handed.
+/// A right-handed orthonormal basis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Basis {
     pub(crate) right: DVec3,
     pub(crate) up: DVec3,
-    /// From the scene to who looks at it.
+    /// From the scene to the viewer.
     pub(crate) toward: DVec3,
 }
 
-/// What brings points of the scene into the picture.
+/// Maps points of the scene to pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Camera {
     basis: Basis,
-    /// The point of the scene, along right and up, that is in the middle of the picture.
+    /// The center of the picture, in coordinates along right and up.
     center: DVec2,
     /// Pixels per unit of the scene.
     scale: f64,
@@ -78,32 +78,35 @@ impl Basis {
 }
 
 impl View {
-    /// The view that shows most: along the axis in which the scene is flat, else slanted.
-    pub(crate) fn of(extent: &Extent, up: Up) -> Self {
+    /// Returns the view along the axis in which the scene is flat, or else [`Self::Iso`].
+    pub(crate) fn best_for(extent: &Extent, up: Up) -> Self {
         let size = extent.size();
-        let is_along_flat = |view: &Self| {
+        let is_along_flat_axis = |view: &Self| {
             let depth = Basis::new(*view, up).toward.abs().dot(size);
             depth < FLAT * size.max_element()
         };
-        [Self::Front, Self::Side, Self::Top].into_iter().find(is_along_flat).unwrap_or(Self::Iso)
+        [Self::Front, Self::Side, Self::Top]
+            .into_iter()
+            .find(is_along_flat_axis)
+            .unwrap_or(Self::Iso)
     }
 }
 
 impl Camera {
-    /// Looks at all of `extent`, as near as its margin allows.
+    /// Fits `extent` into the picture.
     pub(crate) fn fit(basis: Basis, extent: &Extent, size: Size) -> Self {
         let flat = |point: DVec3| DVec2::new(point.dot(basis.right), point.dot(basis.up));
         let corners = extent.corners().map(flat);
         let min = corners.into_iter().fold(corners[0], DVec2::min);
         let max = corners.into_iter().fold(corners[0], DVec2::max);
         let room = DVec2::new(size.width.into(), size.height.into()) * (1.0 - 2.0 * MARGIN);
-        // Nothing is too small to be seen but a point, which has one unit around it.
+        // The extent of a single point is 0. It gets one unit of space around it.
         let scale = (room / (max - min)).min_element();
         let scale = if scale.is_finite() { scale } else { room.min_element() };
         Self { basis, center: (min + max) * 0.5, scale, size }
     }
 
-    /// Where a point is in the picture.
+    /// Returns the pixel coordinates of a point.
     pub(crate) fn project(&self, point: DVec3) -> DVec2 {
         let Basis { right, up, .. } = self.basis;
         let away = (DVec2::new(point.dot(right), point.dot(up)) - self.center) * self.scale;
@@ -111,31 +114,31 @@ impl Camera {
         middle + DVec2::new(away.x, -away.y)
     }
 
-    /// How near to the eye a point is; larger is nearer.
+    /// Returns the depth coordinate of a point, which is larger for nearer points.
     pub(crate) fn nearness(&self, point: DVec3) -> f64 {
         point.dot(self.basis.toward)
     }
 
-    /// A length of the scene in pixels.
+    /// Converts a length of the scene to pixels.
     pub(crate) fn pixels(&self, length: f64) -> f64 {
         length * self.scale
     }
 
-    /// How much light a face with that normal, of length 1, gives back, 0..=1, from either side.
-    /// The light comes from the upper left behind the eye.
+    /// Returns the brightness of a two-sided face with this unit normal, 0..=1. The light comes from
+    /// the upper left behind the viewer.
     pub(crate) fn brightness(&self, normal: DVec3) -> f64 {
         let Basis { right, up, toward } = self.basis;
         let light = (toward * 0.8 + up * 0.5 - right * 0.3).normalize();
         0.55 + 0.45 * normal.dot(light).abs()
     }
 
-    /// Whether a face with that normal is turned to the eye.
-    pub(crate) fn sees(&self, normal: DVec3) -> bool {
+    /// Returns `true` if a face with this normal faces the viewer.
+    pub(crate) fn is_facing(&self, normal: DVec3) -> bool {
         normal.dot(self.basis.toward) > 1e-9
     }
 
-    /// What widths of lines are multiplied by: 1 in a picture of 720 pixels. In small ones lines
-    /// stay wide enough to be seen.
+    /// Returns the factor for line widths: 1 in a picture of 720 pixels. It has a minimum, so that
+    /// lines stay visible in small pictures.
     pub(crate) fn line_scale(&self) -> f64 {
         (f64::from(self.size.width.min(self.size.height)) / 720.0).max(0.6)
     }
@@ -158,16 +161,16 @@ mod tests {
 
     /// The unit cube is 84 pixels high in a picture of 200 x 100: from x 58 to 142, y 8 to 92.
     #[test]
-    fn corners_of_the_unit_cube_are_where_geometry_puts_them() {
+    fn the_corners_of_the_unit_cube_project_to_the_expected_pixels() {
         for (view, up, corner, expected) in [
             (View::Front, Up::Y, [0.0, 0.0, 0.0], [58.0, 92.0]),
             (View::Front, Up::Y, [1.0, 1.0, 1.0], [142.0, 8.0]),
             (View::Front, Up::MinusY, [0.0, 0.0, 0.0], [58.0, 8.0]),
             (View::Front, Up::Z, [1.0, 0.0, 1.0], [142.0, 8.0]),
-            // From the right, what is near is on the left.
+            // From the right, near points are on the left.
             (View::Side, Up::Y, [0.0, 1.0, 1.0], [58.0, 8.0]),
             (View::Side, Up::Z, [0.0, 0.0, 1.0], [58.0, 8.0]),
-            // From above, what is near is below.
+            // From above, near points are at the bottom.
             (View::Top, Up::Y, [0.0, 0.0, 1.0], [58.0, 92.0]),
             (View::Top, Up::Z, [1.0, 1.0, 0.0], [142.0, 8.0]),
         ] {
@@ -177,7 +180,7 @@ mod tests {
 
     /// Turned by 30 and tilted by 20 degrees, the cube is cos 20 + (sin 30 + cos 30) sin 20 high.
     #[test]
-    fn the_slanted_view_shows_the_cube_turned_and_tilted() {
+    fn the_oblique_view_shows_the_cube_turned_and_tilted() {
         let (turn, tilt) = (30_f64.to_radians(), 20_f64.to_radians());
         let scale = 84.0 / (tilt.cos() + (turn.sin() + turn.cos()) * tilt.sin());
         let camera = Camera::fit(Basis::new(View::Iso, Up::Y), &cube(), SIZE);
@@ -188,8 +191,8 @@ mod tests {
             (DVec3::Z, -turn.sin(), -turn.cos() * tilt.sin()),
         ] {
             let expected = origin + DVec2::new(x, -y) * scale;
-            let found = camera.project(axis);
-            assert!((found - expected).length() < 1e-9, "{axis}: {found}, not {expected}");
+            let pixel = camera.project(axis);
+            assert!((pixel - expected).length() < 1e-9, "{axis}: {pixel}, not {expected}");
         }
         assert!((camera.project(DVec3::ONE * 0.5) - DVec2::new(100.0, 50.0)).length() < 1e-9);
     }
@@ -206,9 +209,10 @@ mod tests {
     }
 
     #[test]
-    fn flat_scenes_are_seen_along_their_flat_axis_and_others_slanted() {
-        let view =
-            |x, y, z, up| View::of(&Extent { min: DVec3::ZERO, max: DVec3::new(x, y, z) }, up);
+    fn flat_scenes_are_viewed_along_their_flat_axis_and_others_obliquely() {
+        let view = |x, y, z, up| {
+            View::best_for(&Extent { min: DVec3::ZERO, max: DVec3::new(x, y, z) }, up)
+        };
         assert_eq!(view(2.0, 3.0, 0.01, Up::Y), View::Front);
         assert_eq!(view(0.01, 3.0, 2.0, Up::Y), View::Side);
         assert_eq!(view(2.0, 0.01, 3.0, Up::Y), View::Top);
@@ -219,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_points_fit_as_well() {
+    fn lines_and_points_fit_too() {
         let fit = |max: DVec3| {
             let extent = Extent { min: DVec3::ZERO, max };
             Camera::fit(Basis::new(View::Front, Up::Y), &extent, SIZE)

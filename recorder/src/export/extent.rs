@@ -1,22 +1,23 @@
-//! What a picture must show: the box around particles and colliders of all frames, without those
-//! that have flown far away.
+//! The box that the pictures show: around the particles and colliders of all frames, without
+//! outliers.
 
 use glam::{DQuat, DVec3};
 use recorder::ShapeRow;
 use sim_contract::{ParticleState, PlainF32};
 
-use super::moment::Moment;
+use super::scene_state::SceneState;
 
-/// Of so many particles the outermost one on each side of each axis is not relied on.
-const PARTICLES_PER_FLYER: usize = 200;
-/// With fewer particles than this, each of them is meant.
-const FLYERS_FROM: usize = 10;
-/// Farthest that a particle may be outside of the box of most, in longest sides of that box.
-const FLYER_DISTANCE: f64 = 1.0;
-/// Farthest that a collider is followed away from the particles, in longest sides of their box.
+/// One in this many particles may be an outlier, on each side of each axis.
+const PARTICLES_PER_OUTLIER: usize = 200;
+/// Scenes with fewer particles have no outliers.
+const OUTLIERS_FROM: usize = 10;
+/// A particle farther than this from the core box is an outlier, relative to the longest side of
+/// that box.
+const OUTLIER_DISTANCE: f64 = 1.0;
+/// Colliders count up to this distance from the particles, relative to the longest side of their box.
 const COLLIDER_DISTANCE: f64 = 2.0;
 
-/// A box along the axes.
+/// An axis-aligned box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
     pub(crate) min: DVec3,
@@ -24,7 +25,7 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// Around all points; `None` without any.
+    /// Returns the box around all points, or `None` if there are none.
     pub(crate) fn around(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
         let points = points.into_iter().map(|point| Self { min: point, max: point });
         points.reduce(Self::union)
@@ -38,7 +39,7 @@ impl Extent {
         self.max - self.min
     }
 
-    /// Larger by that many of its longest sides on each side.
+    /// Returns the box extended on each side by `sides` times its longest side.
     pub(crate) fn grown(&self, sides: f64) -> Self {
         let by = DVec3::splat(self.size().max_element() * sides);
         Self { min: self.min - by, max: self.max + by }
@@ -55,40 +56,40 @@ impl Extent {
         point.cmpge(self.min).all() && point.cmple(self.max).all()
     }
 
-    /// What both have in common, if anything.
-    fn common(self, other: Self) -> Option<Self> {
-        let common = Self { min: self.min.max(other.min), max: self.max.min(other.max) };
-        common.min.cmple(common.max).all().then_some(common)
+    /// Returns the intersection, if it is not empty.
+    fn intersection(self, other: Self) -> Option<Self> {
+        let both = Self { min: self.min.max(other.min), max: self.max.min(other.max) };
+        both.min.cmple(both.max).all().then_some(both)
     }
 }
 
-/// Grows frame by frame.
+/// Accumulates the extents of all frames.
 #[derive(Debug, Default)]
-pub(crate) struct Fit {
+pub(crate) struct ExtentTracker {
     particles: Option<Extent>,
     /// By index of the collider, over all frames.
     colliders: Vec<Option<Extent>>,
 }
 
-impl Fit {
-    /// Takes one frame more.
-    pub(crate) fn add(&mut self, moment: &Moment) {
-        self.particles = union(self.particles, extent_of_particles(&moment.particles));
-        if self.colliders.len() < moment.colliders.len() {
-            self.colliders.resize(moment.colliders.len(), None);
+impl ExtentTracker {
+    /// Adds a frame.
+    pub(crate) fn add(&mut self, state: &SceneState) {
+        self.particles = union(self.particles, extent_of_particles(&state.particles));
+        if self.colliders.len() < state.colliders.len() {
+            self.colliders.resize(state.colliders.len(), None);
         }
-        for (known, collider) in self.colliders.iter_mut().zip(&moment.colliders) {
+        for (known, collider) in self.colliders.iter_mut().zip(&state.colliders) {
             *known = union(*known, extent_of_collider(&collider.shape));
         }
     }
 
-    /// The box to show; around the origin where there is nothing.
+    /// Returns the box to show. An empty scene has an empty box at the origin.
     pub(crate) fn extent(&self) -> Extent {
         let colliders = self.colliders.iter().flatten().copied();
         let reach = self.particles.filter(|particles| particles.size() != DVec3::ZERO);
         let reach = reach.map(|particles| particles.grown(COLLIDER_DISTANCE));
         let near = colliders.filter_map(|collider| match reach {
-            Some(reach) => collider.common(reach),
+            Some(reach) => collider.intersection(reach),
             None => Some(collider),
         });
         let all = self.particles.into_iter().chain(near).reduce(Extent::union);
@@ -100,15 +101,16 @@ fn union(one: Option<Extent>, other: Option<Extent>) -> Option<Extent> {
     one.into_iter().chain(other).reduce(Extent::union)
 }
 
-/// Around all but those that are far outside of the box of 99 % of them.
+/// Returns the box around the particles without outliers, which are far from the box around 99 % of
+/// the particles.
 fn extent_of_particles(particles: &[ParticleState]) -> Option<Extent> {
     let points = particles.iter().map(|one| position(one.position));
     let mut points: Vec<_> = points.filter(|point| point.is_finite()).collect();
     if points.is_empty() {
         return None;
     }
-    let is_few = points.len() < FLYERS_FROM;
-    let rank = if is_few { 0 } else { points.len().div_ceil(PARTICLES_PER_FLYER) };
+    let has_no_outliers = points.len() < OUTLIERS_FROM;
+    let rank = if has_no_outliers { 0 } else { points.len().div_ceil(PARTICLES_PER_OUTLIER) };
     let (mut min, mut max) = (DVec3::ZERO, DVec3::ZERO);
     let last = points.len() - 1;
     for axis in 0..3 {
@@ -116,13 +118,13 @@ fn extent_of_particles(particles: &[ParticleState]) -> Option<Extent> {
         min[axis] = points.select_nth_unstable_by(rank, by_axis).1[axis];
         max[axis] = points.select_nth_unstable_by(last - rank, by_axis).1[axis];
     }
-    let reach = Extent { min, max }.grown(FLYER_DISTANCE);
+    let reach = Extent { min, max }.grown(OUTLIER_DISTANCE);
     Extent::around(points.into_iter().filter(|point| reach.contains(*point)))
 }
 
-/// `None` for a plane, which has no end.
+/// Returns `None` for a plane, which is infinite.
 fn extent_of_collider(shape: &ShapeRow) -> Option<Extent> {
-    let ball = |center: DVec3, radius: PlainF32| {
+    let sphere_extent = |center: DVec3, radius: PlainF32| {
         let radius = DVec3::splat(radius.0.into());
         Extent { min: center - radius, max: center + radius }
     };
@@ -131,16 +133,16 @@ fn extent_of_collider(shape: &ShapeRow) -> Option<Extent> {
         ShapeRow::Box { center, half_extents, rotation } => {
             Extent::around(box_corners(*center, *half_extents, *rotation))?
         }
-        ShapeRow::Sphere { center, radius } => ball(plain(*center), *radius),
+        ShapeRow::Sphere { center, radius } => sphere_extent(plain(*center), *radius),
         ShapeRow::Capsule { a, b, radius } => {
-            ball(plain(*a), *radius).union(ball(plain(*b), *radius))
+            sphere_extent(plain(*a), *radius).union(sphere_extent(plain(*b), *radius))
         }
         ShapeRow::Bounds { min, max } => Extent { min: plain(*min), max: plain(*max) },
     };
     (extent.min.is_finite() && extent.max.is_finite()).then_some(extent)
 }
 
-/// The corners of a box in its pose, numbered as those of an [`Extent`].
+/// Returns the corners of a box in its pose, in the order of [`Extent::corners`].
 pub(crate) fn box_corners(
     center: [PlainF32; 3],
     half_extents: [PlainF32; 3],
@@ -178,24 +180,24 @@ mod tests {
     }
 
     #[test]
-    fn a_flyer_and_what_is_not_finite_do_not_count() {
+    fn outliers_and_non_finite_particles_do_not_count() {
         let mut points = row(11);
         points.extend([[0.0, 500.0, 0.0], [f32::NAN, 0.0, 0.0], [f32::INFINITY, 0.0, 0.0]]);
-        let found = extent_of_particles(&particles(points));
-        assert_eq!(found, Some(extent([0.0; 3], [10.0, 0.0, 0.0])));
+        let box_around = extent_of_particles(&particles(points));
+        assert_eq!(box_around, Some(extent([0.0; 3], [10.0, 0.0, 0.0])));
     }
 
     #[test]
-    fn ends_of_a_rope_count_and_so_does_each_of_a_few() {
-        let found = extent_of_particles(&particles(row(41)));
-        assert_eq!(found, Some(extent([0.0; 3], [40.0, 0.0, 0.0])));
-        let found = extent_of_particles(&particles([[0.0; 3], [1.0; 3], [0.0, 500.0, 0.0]]));
-        assert_eq!(found, Some(extent([0.0; 3], [1.0, 500.0, 1.0])));
+    fn the_ends_of_a_rope_and_each_particle_of_a_small_scene_count() {
+        let box_around = extent_of_particles(&particles(row(41)));
+        assert_eq!(box_around, Some(extent([0.0; 3], [40.0, 0.0, 0.0])));
+        let box_around = extent_of_particles(&particles([[0.0; 3], [1.0; 3], [0.0, 500.0, 0.0]]));
+        assert_eq!(box_around, Some(extent([0.0; 3], [1.0, 500.0, 1.0])));
         assert_eq!(extent_of_particles(&[]), None);
     }
 
     #[test]
-    fn colliders_count_as_far_as_they_are_near() {
+    fn only_the_near_part_of_a_collider_counts() {
         let number = PlainF32;
         let ball = ShapeRow::Sphere { center: [number(0.0); 3], radius: number(0.5) };
         let floor = ShapeRow::Box {
@@ -205,12 +207,12 @@ mod tests {
         };
         let plane = ShapeRow::Plane { normal: [number(1.0); 3], offset: number(0.0) };
         let colliders = [ball, floor, plane].iter().map(extent_of_collider).collect();
-        let fit = Fit { particles: Some(extent([0.0; 3], [2.0, 1.0, 0.0])), colliders };
+        let fit = ExtentTracker { particles: Some(extent([0.0; 3], [2.0, 1.0, 0.0])), colliders };
         assert_eq!(fit.extent(), extent([-4.0, -0.5, -4.0], [6.0, 1.0, 4.0]));
     }
 
     #[test]
-    fn a_turned_box_is_as_wide_as_its_corners() {
+    fn the_extent_of_a_rotated_box_contains_its_corners() {
         let half_angle = 22.5_f32.to_radians();
         let rotation = [0.0, 0.0, half_angle.sin(), half_angle.cos()].map(PlainF32);
         let corners = box_corners([PlainF32(0.0); 3], [PlainF32(1.0); 3], rotation);

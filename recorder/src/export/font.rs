@@ -1,11 +1,11 @@
-//! Letters of 5 x 7 cells and one row below them, as on a dot-matrix display: no font of the system
-//! is asked for.
+//! A font of 5 x 7 cells with one row for descenders, as on a dot-matrix display, so that pictures do
+//! not depend on system fonts.
 
 /// Cells from one letter to the next.
 pub(crate) const ADVANCE: u32 = 6;
 
-/// The cells of a letter that are filled, as column and row from its upper left corner. What is
-/// not printable ASCII looks like a question mark.
+/// Returns the filled cells of a letter, as column and row from its upper left corner. Characters
+/// outside printable ASCII become a question mark.
 pub(crate) fn cells(letter: char) -> impl Iterator<Item = (u32, u32)> {
     let place = (letter as usize).checked_sub(usize::from(b' '));
     let columns = place.and_then(|place| GLYPHS.get(place)).unwrap_or(&GLYPHS[QUESTION_MARK]);
@@ -16,7 +16,7 @@ pub(crate) fn cells(letter: char) -> impl Iterator<Item = (u32, u32)> {
 
 const QUESTION_MARK: usize = (b'?' - b' ') as usize;
 
-/// From the space to `~`: the five columns of each letter, the top row in the lowest bit.
+/// The five columns of each letter from the space to `~`, with the top row in the lowest bit.
 const GLYPHS: [[u8; 5]; 95] = [
     [0x00, 0x00, 0x00, 0x00, 0x00],
     [0x00, 0x00, 0x5f, 0x00, 0x00],
@@ -85,7 +85,7 @@ const GLYPHS: [[u8; 5]; 95] = [
     [0x04, 0x02, 0x01, 0x02, 0x04],
     [0x40, 0x40, 0x40, 0x40, 0x40],
     [0x00, 0x01, 0x02, 0x04, 0x00],
-    // Small letters.
+    // Lowercase letters.
     [0x20, 0x54, 0x54, 0x54, 0x78],
     [0x7f, 0x48, 0x44, 0x44, 0x38],
     [0x38, 0x44, 0x44, 0x44, 0x20],
@@ -122,7 +122,7 @@ const GLYPHS: [[u8; 5]; 95] = [
 mod tests {
     use super::*;
 
-    /// The letter as rows of `#` and `.`.
+    /// Returns the letter as rows of `#` and `.`.
     fn rows(letter: char) -> String {
         let mut rows = vec![vec!['.'; 5]; 8];
         for (column, row) in cells(letter) {
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn letters_stand_at_their_codes() {
+    fn each_letter_is_at_its_ascii_code() {
         insta::assert_snapshot!(['2', 'R', 'p'].map(rows).join("\n"), @r"
         .###.
         #...#
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_letter_is_a_question_mark() {
+    fn characters_outside_printable_ascii_become_a_question_mark() {
         for letter in ['\n', '\u{7f}', 'ä', '🦀'] {
             assert_eq!(rows(letter), rows('?'), "{letter:?}");
         }

@@ -1,7 +1,7 @@
 //! Particles, constraints and triangles as shapes, from back to front.
 //!
-//! Triangles are sorted by the distance of their middles. A stick or dot comes right after the last
-//! triangle that touches it: what is nearer hides it, its own surface does not.
+//! Triangles are sorted by the distance of their centers. A line or dot comes right after the last
+//! triangle that touches it, so that nearer triangles hide it and its own surface does not.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use sim_contract::{ConstraintKind, ParticleFlags};
 
 use super::camera::Camera;
 use super::extent::position;
-use super::moment::Moment;
+use super::scene_state::SceneState;
 use super::shape::{Color, Dash, Shape, Stroke};
 
 const SURFACE: Color = Color([0x8f, 0xb8, 0xde]);
@@ -24,73 +24,90 @@ const ANCHORED: Color = Color([0x1e, 0x8a, 0x5a]);
 const GRABBED: Color = Color([0xe0, 0x8a, 0x00]);
 const FROZEN: Color = Color([0xc0, 0x26, 0xc0]);
 
-/// From so many particles on, free ones that something is tied to are not drawn.
+/// Scenes with at least this many particles show free particles only if they are unconnected.
 const DOTS_BELOW: usize = 2000;
-/// Length of a stick, in pixels, below which its line gets thinner and dots get smaller.
-const STICK_LENGTH: f64 = 16.0;
-/// Share of its width that a stick has at most, and share of that which it has at least.
-const ON_SURFACE: (f64, f64) = (0.6, 0.35);
-const IN_THE_AIR: (f64, f64) = (1.0, 0.7);
-/// Radius of a dot, and the share of it that it has at least.
+/// Lines shorter than this get thinner, and their dots smaller. In pixels.
+const LINE_LENGTH: f64 = 16.0;
+/// Widths of lines on a surface and elsewhere.
+const ON_SURFACE: LineWidth = LineWidth { max: 0.6, min_ratio: 0.35 };
+const OFF_SURFACE: LineWidth = LineWidth { max: 1.0, min_ratio: 0.7 };
+/// Radius of a dot, in pixels, and the minimum relative to it.
 const RADIUS: f64 = 2.6;
 const DOT_MIN: f64 = 0.4;
-/// Of a particle with a flag, before it is drawn larger than others.
+/// Minimum radius of a flagged particle, before its enlargement.
 const MARKED_RADIUS_MIN: f64 = 1.6;
 
-/// How a moment is drawn.
+/// The range of a line's width.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sheet<'a> {
-    pub(crate) moment: &'a Moment,
+struct LineWidth {
+    /// Relative to the width of the kind of constraint.
+    max: f64,
+    /// Width of short lines, relative to `max`.
+    min_ratio: f64,
+}
+
+/// Draws the particles, constraints and triangles of a state.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MeshDrawing<'a> {
+    pub(crate) state: &'a SceneState,
     pub(crate) camera: &'a Camera,
     pub(crate) bend: Bend,
 }
 
-/// What is done with bending constraints.
+/// The handling of bend constraints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Bend {
     Draw,
-    LeaveOut,
+    Hide,
 }
 
-/// Where a shape stands in the order: after so many triangles, and among those after the same one
-/// by rank, the higher later.
-type Place = (usize, u8);
+/// The position of a shape from back to front.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct DrawOrder {
+    /// Position of the last triangle behind the shape.
+    after: usize,
+    /// Order of the shapes after the same triangle. Higher ranks are in front.
+    rank: u8,
+}
 
-impl Sheet<'_> {
-    /// All shapes of the mesh.
+/// A shape and its position from back to front.
+type OrderedShape = (DrawOrder, Shape);
+
+impl MeshDrawing<'_> {
+    /// Returns all shapes, from back to front.
     pub(crate) fn shapes(&self) -> Vec<Shape> {
         let triangles = self.triangles();
-        let mut last_at = vec![None; self.moment.particles.len()];
+        let mut last_at = vec![None; self.state.particles.len()];
         for (place, triangle) in triangles.iter().enumerate() {
-            for corner in self.moment.triangles[*triangle].corners {
+            for corner in self.state.triangles[*triangle].corners {
                 last_at[corner as usize] = Some(place);
             }
         }
-        let mut shapes: Vec<(Place, Shape)> = Vec::new();
-        for (place, triangle) in triangles.iter().enumerate() {
-            shapes.push(((place, 0), self.triangle(*triangle)));
+        let mut shapes: Vec<OrderedShape> = Vec::new();
+        for (after, triangle) in triangles.iter().enumerate() {
+            shapes.push((DrawOrder { after, rank: 0 }, self.triangle(*triangle)));
         }
-        self.add_sticks(&mut shapes, &last_at);
+        self.add_lines(&mut shapes, &last_at);
         self.add_dots(&mut shapes, &last_at);
-        // Stable: ties stay in the order of their index.
-        shapes.sort_by_key(|(place, _)| *place);
+        // The sort is stable, so ties keep the order of their index.
+        shapes.sort_by_key(|(order, _)| *order);
         shapes.into_iter().map(|(_, shape)| shape).collect()
     }
 
-    /// Triangles that are whole, from back to front, ties by index. A hole is where a structural
-    /// edge is torn.
+    /// Returns the triangles without a torn structural edge, from back to front. Ties are sorted by
+    /// index.
     fn triangles(&self) -> Vec<usize> {
-        let moment = self.moment;
-        let torn_edges: BTreeSet<_> = (moment.constraints.iter().zip(&moment.is_torn))
+        let scene = self.state;
+        let torn_edges: BTreeSet<_> = (scene.constraints.iter().zip(&scene.is_torn))
             .filter(|(constraint, is_torn)| **is_torn && constraint.kind == STRUCTURAL_KIND)
             .map(|(constraint, _)| edge(constraint.a, constraint.b))
             .collect();
-        let is_whole = |[a, b, c]: [u32; 3]| {
+        let is_intact = |[a, b, c]: [u32; 3]| {
             let edges = [edge(a, b), edge(b, c), edge(c, a)];
             torn_edges.is_empty() || !edges.iter().any(|edge| torn_edges.contains(edge))
         };
-        let mut order: Vec<_> = (moment.triangles.iter().enumerate())
-            .filter(|(_, triangle)| is_whole(triangle.corners))
+        let mut order: Vec<_> = (scene.triangles.iter().enumerate())
+            .filter(|(_, triangle)| is_intact(triangle.corners))
             .map(|(index, triangle)| {
                 let [a, b, c] = triangle.corners.map(|corner| self.point(corner));
                 (self.camera.nearness(a + b + c), index)
@@ -101,79 +118,80 @@ impl Sheet<'_> {
     }
 
     fn triangle(&self, index: usize) -> Shape {
-        let [a, b, c] = self.moment.triangles[index].corners.map(|corner| self.point(corner));
+        let [a, b, c] = self.state.triangles[index].corners.map(|corner| self.point(corner));
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let fill = SURFACE.times(self.camera.brightness(normal));
-        // The outline closes the seams between neighbours.
+        // The outline closes the seams between neighbors.
         let outline = Some(Stroke::solid(fill, 0.7));
         let corners = [a, b, c].map(|corner| self.camera.project(corner)).into();
         Shape::Polygon { corners, fill, outline }
     }
 
-    fn add_sticks(&self, shapes: &mut Vec<(Place, Shape)>, last_at: &[Option<usize>]) {
-        let moment = self.moment;
+    fn add_lines(&self, shapes: &mut Vec<OrderedShape>, last_at: &[Option<usize>]) {
+        let scene = self.state;
         for (constraint, _) in
-            moment.constraints.iter().zip(&moment.is_torn).filter(|(_, is_torn)| !**is_torn)
+            scene.constraints.iter().zip(&scene.is_torn).filter(|(_, is_torn)| !**is_torn)
         {
-            if constraint.kind == BEND_KIND && self.bend == Bend::LeaveOut {
+            if constraint.kind == BEND_KIND && self.bend == Bend::Hide {
                 continue;
             }
             let [a, b] = [constraint.a, constraint.b];
             let lasts = [a, b].map(|end| last_at[end as usize]);
-            // A bend lies on structural sticks, and must not hide them.
+            // A bend constraint lies on structural lines and must not hide them.
             let is_bend = constraint.kind == BEND_KIND;
             let after = if is_bend { lasts[0].min(lasts[1]) } else { lasts[0].max(lasts[1]) };
-            let (share, thinnest) = if after.is_some() { ON_SURFACE } else { IN_THE_AIR };
-            let (rank, mut stroke) = look_of(constraint.kind);
-            let thinness = self.thinness(constraint.rest_length.into()).clamp(thinnest, 1.0);
-            stroke.width *= self.camera.line_scale() * share * thinness;
+            let width = if after.is_some() { ON_SURFACE } else { OFF_SURFACE };
+            let (rank, mut stroke) = line_style(constraint.kind);
+            let ratio = self.width_ratio(constraint.rest_length.into()).clamp(width.min_ratio, 1.0);
+            stroke.width *= self.camera.line_scale() * width.max * ratio;
             let after = after.unwrap_or(usize::MAX);
             let ends = [a, b].map(|end| self.pixel(end));
-            shapes.push(((after, rank), Shape::Segment { ends, stroke }));
+            shapes.push((DrawOrder { after, rank }, Shape::Segment { ends, stroke }));
         }
     }
 
-    fn add_dots(&self, shapes: &mut Vec<(Place, Shape)>, last_at: &[Option<usize>]) {
-        let particles = &self.moment.particles;
-        let is_tied = self.tied();
-        let thinness = self.mean_length().map_or(1.0, |length| self.thinness(length));
+    fn add_dots(&self, shapes: &mut Vec<OrderedShape>, last_at: &[Option<usize>]) {
+        let particles = &self.state.particles;
+        let is_connected = self.connected();
+        let ratio = self.mean_length().map_or(1.0, |length| self.width_ratio(length));
         let scale = self.camera.line_scale();
-        let radius = RADIUS * scale * thinness.clamp(DOT_MIN, 1.0);
+        let radius = RADIUS * scale * ratio.clamp(DOT_MIN, 1.0);
         let marked_radius = radius.max(MARKED_RADIUS_MIN * scale) * 1.4;
         for (index, state) in (0_u32..).zip(particles) {
             let place = index as usize;
-            let is_seen = particles.len() < DOTS_BELOW || !is_tied[place];
-            if state.flags & DRAWN_FLAGS == 0 && !is_seen {
+            let is_shown = particles.len() < DOTS_BELOW || !is_connected[place];
+            if state.flags & MARKED_FLAGS == 0 && !is_shown {
                 continue;
             }
             let after = last_at[place].unwrap_or(usize::MAX);
-            let radius = if state.flags & DRAWN_FLAGS == 0 { radius } else { marked_radius };
-            shapes.push(((after, DOT_RANK), dot(state.flags, self.pixel(index), radius)));
+            let radius = if state.flags & MARKED_FLAGS == 0 { radius } else { marked_radius };
+            let order = DrawOrder { after, rank: DOT_RANK };
+            shapes.push((order, dot(state.flags, self.pixel(index), radius)));
         }
     }
 
-    /// By particle: whether a stick that is not torn, or a triangle, is tied to it.
-    fn tied(&self) -> Vec<bool> {
-        let moment = self.moment;
-        let mut is_tied = vec![false; moment.particles.len()];
-        let whole =
-            moment.constraints.iter().zip(&moment.is_torn).filter(|(_, is_torn)| !**is_torn);
-        let ends = whole.flat_map(|(constraint, _)| [constraint.a, constraint.b]);
-        let corners = moment.triangles.iter().flat_map(|triangle| triangle.corners);
+    /// Returns for each particle whether an untorn constraint or a triangle uses it.
+    fn connected(&self) -> Vec<bool> {
+        let scene = self.state;
+        let mut is_connected = vec![false; scene.particles.len()];
+        let untorn = scene.constraints.iter().zip(&scene.is_torn).filter(|(_, is_torn)| !**is_torn);
+        let ends = untorn.flat_map(|(constraint, _)| [constraint.a, constraint.b]);
+        let corners = scene.triangles.iter().flat_map(|triangle| triangle.corners);
         for index in ends.chain(corners) {
-            is_tied[index as usize] = true;
+            is_connected[index as usize] = true;
         }
-        is_tied
+        is_connected
     }
 
-    /// What the width of a line is multiplied by: less where it is short in the picture.
-    fn thinness(&self, length: f64) -> f64 {
-        self.camera.pixels(length) / (STICK_LENGTH * self.camera.line_scale())
+    /// Returns the factor for the width of a line, which is below 1 for lines that are short in the
+    /// picture.
+    fn width_ratio(&self, length: f64) -> f64 {
+        self.camera.pixels(length) / (LINE_LENGTH * self.camera.line_scale())
     }
 
-    /// Mean rest length of what is not torn and not a bend.
+    /// Returns the mean rest length of the untorn constraints except bend constraints.
     fn mean_length(&self) -> Option<f64> {
-        let lengths = (self.moment.constraints.iter().zip(&self.moment.is_torn))
+        let lengths = (self.state.constraints.iter().zip(&self.state.is_torn))
             .filter(|(constraint, is_torn)| !**is_torn && constraint.kind != BEND_KIND)
             .map(|(constraint, _)| f64::from(constraint.rest_length));
         let (count, sum) = lengths.fold((0_u32, 0.0), |(count, sum), one| (count + 1, sum + one));
@@ -181,7 +199,7 @@ impl Sheet<'_> {
     }
 
     fn point(&self, particle: u32) -> DVec3 {
-        position(self.moment.particles[particle as usize].position)
+        position(self.state.particles[particle as usize].position)
     }
 
     fn pixel(&self, particle: u32) -> DVec2 {
@@ -193,16 +211,16 @@ const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 const BEND_KIND: u32 = ConstraintKind::Bend as u32;
 const SHEAR_KIND: u32 = ConstraintKind::Shear as u32;
 const TETHER_KIND: u32 = ConstraintKind::Tether as u32;
-/// Above all sticks.
+/// In front of all lines.
 const DOT_RANK: u8 = 5;
-/// Particles with any of these are drawn in any number.
-const DRAWN_FLAGS: u32 = ParticleFlags::PINNED
+/// Particles with any of these flags are always drawn.
+const MARKED_FLAGS: u32 = ParticleFlags::PINNED
     | ParticleFlags::GRABBED
     | ParticleFlags::ANCHORED
     | ParticleFlags::FROZEN;
 
-/// Rank and line of a constraint, in a picture of 720 pixels without a surface.
-fn look_of(kind: u32) -> (u8, Stroke) {
+/// Returns the rank and the line of a kind of constraint, in a picture of 720 pixels without a surface.
+fn line_style(kind: u32) -> (u8, Stroke) {
     match kind {
         BEND_KIND => (1, Stroke { color: BEND, width: 0.8, dash: Dash::Dashed }),
         SHEAR_KIND => (2, Stroke::solid(SHEAR, 1.0)),
@@ -212,15 +230,15 @@ fn look_of(kind: u32) -> (u8, Stroke) {
 }
 
 fn dot(flags: u32, center: DVec2, radius: f64) -> Shape {
-    let is = |flag: u32| flags & flag != 0;
+    let has = |flag: u32| flags & flag != 0;
     let circle = |fill, radius| Shape::Circle { center, radius, fill, outline: None };
-    if is(ParticleFlags::FROZEN) {
+    if has(ParticleFlags::FROZEN) {
         circle(FROZEN, radius)
-    } else if is(ParticleFlags::GRABBED) {
+    } else if has(ParticleFlags::GRABBED) {
         circle(GRABBED, radius * 1.2)
-    } else if is(ParticleFlags::ANCHORED) {
+    } else if has(ParticleFlags::ANCHORED) {
         circle(ANCHORED, radius)
-    } else if is(ParticleFlags::PINNED) {
+    } else if has(ParticleFlags::PINNED) {
         let corner = |x: f64, y: f64| center + DVec2::new(x, y) * radius;
         let corners =
             vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
@@ -230,7 +248,7 @@ fn dot(flags: u32, center: DVec2, radius: f64) -> Shape {
     }
 }
 
-/// An edge is the same from either end.
+/// Returns the edge with its ends in ascending order.
 fn edge(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }

@@ -1,4 +1,4 @@
-//! A picture as PNG.
+//! Encodes a picture as PNG.
 
 use anyhow::Context;
 use glam::DVec2;
@@ -9,10 +9,10 @@ use tiny_skia::{
 use super::font;
 use super::shape::{BACKGROUND, Color, Picture, Shape, Stroke, Text};
 
-/// The bytes of the file. Equal pictures give equal bytes.
-pub(crate) fn bytes(picture: &Picture) -> anyhow::Result<Vec<u8>> {
+/// Returns the bytes of the file. Equal pictures give equal bytes.
+pub(crate) fn encode(picture: &Picture) -> anyhow::Result<Vec<u8>> {
     let size = picture.size;
-    let mut pixmap = Pixmap::new(size.width, size.height).context("a picture of no size")?;
+    let mut pixmap = Pixmap::new(size.width, size.height).context("the picture has no pixels")?;
     let [red, green, blue] = BACKGROUND.0;
     pixmap.fill(tiny_skia::Color::from_rgba8(red, green, blue, u8::MAX));
     for shape in &picture.shapes {
@@ -55,12 +55,12 @@ fn builder(points: &[DVec2]) -> Option<PathBuilder> {
     Some(path)
 }
 
-/// There is no path where nothing is to be seen, such as of a circle of radius 0.
+/// Paints a path. It is `None` for an invisible shape, such as a circle of radius 0.
 fn paint_path(pixmap: &mut Pixmap, path: Option<Path>, fill: Option<Color>, line: Option<Stroke>) {
     let Some(path) = path else { return };
-    let place = Transform::identity();
+    let identity = Transform::identity();
     if let Some(fill) = fill {
-        pixmap.fill_path(&path, &paint_of(fill), FillRule::Winding, place, None);
+        pixmap.fill_path(&path, &color_paint(fill), FillRule::Winding, identity, None);
     }
     if let Some(line) = line {
         let stroke = tiny_skia::Stroke {
@@ -70,12 +70,12 @@ fn paint_path(pixmap: &mut Pixmap, path: Option<Path>, fill: Option<Color>, line
             dash: line.dashes().and_then(|lengths| StrokeDash::new(lengths.map(f32).into(), 0.0)),
             ..tiny_skia::Stroke::default()
         };
-        pixmap.stroke_path(&path, &paint_of(line.color), &stroke, place, None);
+        pixmap.stroke_path(&path, &color_paint(line.color), &stroke, identity, None);
     }
 }
 
 fn paint_text(pixmap: &mut Pixmap, text: &Text) {
-    let (paint, cell) = (paint_of(text.color), f64::from(text.cell));
+    let (paint, cell) = (color_paint(text.color), f64::from(text.cell));
     for (place, letter) in (0_u32..).zip(text.line.chars()) {
         let corner = text.corner + DVec2::new(f64::from(place * font::ADVANCE) * cell, 0.0);
         for (column, row) in font::cells(letter) {
@@ -88,7 +88,7 @@ fn paint_text(pixmap: &mut Pixmap, text: &Text) {
     }
 }
 
-fn paint_of(color: Color) -> Paint<'static> {
+fn color_paint(color: Color) -> Paint<'static> {
     let [red, green, blue] = color.0;
     let mut paint = Paint::default();
     paint.set_color_rgba8(red, green, blue, u8::MAX);
@@ -96,7 +96,7 @@ fn paint_of(color: Color) -> Paint<'static> {
     paint
 }
 
-/// The digits that the rasteriser takes.
+/// Converts to the precision of the rasterizer.
 #[allow(clippy::cast_possible_truncation, reason = "pixels are rounded to f32 here and only here")]
 fn f32(value: f64) -> f32 {
     value as f32

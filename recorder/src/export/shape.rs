@@ -1,15 +1,15 @@
-//! What a picture is made of, in pixels: the list that both formats are written from.
+//! The shapes of a picture, in pixels. Both file formats are written from this list.
 
 use glam::DVec2;
 
-/// A picture's width and height in pixels.
+/// Width and height of a picture, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Size {
     pub(crate) width: u32,
     pub(crate) height: u32,
 }
 
-/// A picture: its shapes from back to front.
+/// A picture as shapes from back to front.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Picture {
     pub(crate) size: Size,
@@ -20,10 +20,10 @@ pub(crate) struct Picture {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Color(pub(crate) [u8; 3]);
 
-/// What is behind everything.
+/// The background color.
 pub(crate) const BACKGROUND: Color = Color([0xf8, 0xf8, 0xf5]);
 
-/// A line's look.
+/// The style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stroke {
     pub(crate) color: Color,
@@ -32,7 +32,7 @@ pub(crate) struct Stroke {
     pub(crate) dash: Dash,
 }
 
-/// How a line is interrupted.
+/// The dash pattern of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dash {
     Solid,
@@ -40,7 +40,7 @@ pub(crate) enum Dash {
     Dotted,
 }
 
-/// One element of a picture; x to the right, y down, ends and corners of lines are round.
+/// One element of a picture. x points to the right and y down. Line ends and corners are round.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Shape {
     Polygon { corners: Vec<DVec2>, fill: Color, outline: Option<Stroke> },
@@ -60,29 +60,29 @@ pub(crate) struct Text {
     pub(crate) line: String,
 }
 
-/// Farthest that anything drawn may be from the picture's corner, in pixels: what is cut off is
-/// cut off exactly, and writers keep their digits.
+/// Largest drawable coordinate, in pixels. The encoders keep enough digits up to this limit.
 const COORDINATE_MAX: f64 = 1e6;
 
 impl Stroke {
-    /// A line without interruptions.
+    /// Returns a solid line.
     pub(crate) fn solid(color: Color, width: f64) -> Self {
         Self { color, width, dash: Dash::Solid }
     }
 
-    /// Lengths of a dash and of the gap behind it, in pixels; `None` without interruptions.
+    /// Returns the lengths of a dash and of the gap after it, in pixels. Returns `None` for a solid
+    /// line.
     pub(crate) fn dashes(&self) -> Option<[f64; 2]> {
         match self.dash {
             Dash::Solid => None,
             Dash::Dashed => Some([4.0 * self.width, 4.0 * self.width]),
-            // Round ends make a dot of a dash of nearly no length.
+            // The round ends turn a very short dash into a dot.
             Dash::Dotted => Some([0.01, 2.5 * self.width]),
         }
     }
 }
 
 impl Shape {
-    /// Whether all of it is where numbers of pixels are meant to be.
+    /// Returns `true` if all coordinates are finite and within [`COORDINATE_MAX`].
     pub(crate) fn is_drawable(&self) -> bool {
         let is_near =
             |point: &DVec2| point.is_finite() && point.abs().max_element() < COORDINATE_MAX;
@@ -98,11 +98,11 @@ impl Shape {
 }
 
 impl Color {
-    /// Darkened: each part times `share`, 0..=1.
+    /// Returns the color darkened by the factor `share`, 0..=1.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "a share of a byte, rounded, is a byte"
+        reason = "a fraction of a byte, rounded, is a byte"
     )]
     pub(crate) fn times(self, share: f64) -> Self {
         Self(self.0.map(|part| (f64::from(part) * share).round() as u8))

@@ -1,4 +1,4 @@
-//! Where pictures go: files of a folder, named after the scene and the step.
+//! The files of the pictures, named after the scene and the step.
 
 use std::fs;
 use std::io::Write;
@@ -10,13 +10,13 @@ use recorder::{Existing, PartFile};
 use super::shape::Picture;
 use super::{png, svg};
 
-/// Where pictures go.
+/// The folder and the format of the pictures.
 #[derive(Debug)]
 pub(crate) struct Target<'a> {
     folder: &'a Path,
     format: Format,
     existing: Existing,
-    /// The name of the scene, as a part of file names.
+    /// The name of the scene, reduced to characters that are safe in a file name.
     stem: String,
 }
 
@@ -44,12 +44,12 @@ impl<'a> Target<'a> {
         self.folder.join(format!("{}_{step:08}.{extension}", self.stem))
     }
 
-    /// Makes the folder, unless a file is there already that must not be.
+    /// Creates the folder. Fails if a file exists that may not be replaced.
     pub(crate) fn prepare(&self, steps: &[u64]) -> anyhow::Result<()> {
         if self.existing == Existing::Refuse {
-            let taken = steps.iter().map(|step| self.path(*step)).find(|path| path.exists());
-            if let Some(path) = taken {
-                bail!("{} exists (--overwrite replaces it)", path.display());
+            let existing = steps.iter().map(|step| self.path(*step)).find(|path| path.exists());
+            if let Some(path) = existing {
+                bail!("{} exists (use --overwrite to replace it)", path.display());
             }
         }
         let folder = self.folder;
@@ -57,11 +57,11 @@ impl<'a> Target<'a> {
             .with_context(|| format!("cannot create the folder {}", folder.display()))
     }
 
-    /// Draws the picture into its file, which bears its name only once it is whole.
+    /// Writes the picture of a step. The file gets its name only when it is complete.
     pub(crate) fn write(&self, step: u64, picture: &Picture) -> anyhow::Result<PathBuf> {
         let bytes = match self.format {
-            Format::Png => png::bytes(picture)?,
-            Format::Svg => svg::text(picture).into_bytes(),
+            Format::Png => png::encode(picture)?,
+            Format::Svg => svg::encode(picture).into_bytes(),
         };
         let path = self.path(step);
         let mut file = PartFile::create(&path, self.existing)?;
@@ -70,10 +70,10 @@ impl<'a> Target<'a> {
     }
 }
 
-/// A scene's name as a part of a file name.
+/// Returns the name of a scene with every character that is not safe in a file name replaced.
 fn stem(name: &str) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
+    let is_safe = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
     let stem: String =
-        name.chars().map(|letter| if is_plain(letter) { letter } else { '_' }).collect();
+        name.chars().map(|letter| if is_safe(letter) { letter } else { '_' }).collect();
     if stem.trim_matches('.').is_empty() { "scene".to_owned() } else { stem }
 }

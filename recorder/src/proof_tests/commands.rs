@@ -1,15 +1,15 @@
-//! Every kind of command, on a scene with all that there is: recorded, simulated again, repeated
-//! from its own log; a command that is missing or wrong is found.
+//! Every kind of command, on a scene with every feature: recorded, re-simulated and repeated from
+//! the log. Missing and wrong commands are reported.
 
 use recorder::{Message, OutcomeRow};
 use sim_solver::{PARAMETERS, Scene};
 
 use super::{check, rebuild, record};
-use crate::command_file;
+use crate::commands::verify::Verdict;
+use crate::input::command_file;
 use crate::simulation::Job;
-use crate::verify::Verdict;
 
-/// A cloth between two anchors, in the wind, above a floor, beside a box that turns.
+/// A cloth between two anchors, in the wind, above a floor and beside a rotating box.
 pub(super) const SCENE: &str = r#"
 version = 1
 [solver]
@@ -60,8 +60,7 @@ center = [0.35, 0.5, -0.3]
 radius = 0.1
 "#;
 
-/// Every kind; the line of a step is found by it below. The last one repeats a client's number, as
-/// two lines may.
+/// Every kind of command. The tests below refer to the lines by step.
 pub(super) const COMMANDS: &str = r#"
     {"step":3,"kind":"push","center":[0.3,0.5,0],"radius":0.3,"delta":[0,0,0.02],"limit":0.01}
     {"step":5,"kind":"cut","constraint":40}
@@ -118,14 +117,14 @@ pub(super) fn job_of(scene: &str, commands: &str) -> Job {
     Job { scene, commands: command_file::parse(commands, "test").unwrap(), steps: STEPS }
 }
 
-/// Every message of a recording that `pick` wants.
+/// Collects the values that `pick` returns for the messages of a recording.
 pub(super) fn collect<T>(file: &[u8], mut pick: impl FnMut(&Message) -> Option<T>) -> Vec<T> {
-    let mut found = Vec::new();
+    let mut values = Vec::new();
     rebuild(file, |message| {
-        found.extend(pick(&message));
+        values.extend(pick(&message));
         Some(message)
     });
-    found
+    values
 }
 
 fn outcomes(file: &[u8]) -> Vec<OutcomeRow> {
@@ -145,18 +144,18 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     let rows = outcomes(&file);
     let rejected = rows.iter().filter(|row| !row.is_applied());
     let rejected: Vec<_> = rejected.map(|row| (row.step, row.reason.as_str())).collect();
-    // A load is of another file, and this scene has no stiffness.
+    // A load belongs to another file, and this scene has no stiffness.
     assert_eq!(rejected, [(22, "no_effect_here"), (53, "no_effect_here")]);
     assert!(PARAMETERS.iter().all(|info| COMMANDS.contains(&format!("\"{}\"", info.name))));
 
     let lines: Vec<_> = rows.iter().map(|row| serde_json::to_string(row).unwrap()).collect();
     let (again, repeated) = record(&job(&lines.join("\n")));
     assert_eq!(repeated, summary);
-    assert!(again == file, "the log repeats its recording");
+    assert!(again == file, "the log reproduces its recording");
 }
 
 #[test]
-fn a_command_that_is_missing_is_found_whichever_it_is() {
+fn every_missing_command_is_reported() {
     let (file, _) = record(&job(COMMANDS));
     let rows = outcomes(&file);
     for missing in rows.iter().filter(|row| row.is_applied()) {
@@ -171,9 +170,9 @@ fn a_command_that_is_missing_is_found_whichever_it_is() {
 }
 
 #[test]
-fn a_command_that_never_was_is_found_where_it_shows() {
+fn a_removed_command_with_a_renumbered_log_is_reported_where_it_shows() {
     let (file, _) = record(&job(COMMANDS));
-    // The log is closed again around the one that is left out, as a forger would.
+    // The remaining outcomes are renumbered, as a forger would do.
     for left_out in [3, 5, 7, 9, 11, 13, 15, 30, 34, 38, 51, 70, 95] {
         let mut removed = None;
         let forged = rebuild(&file, |message| match message {
@@ -197,7 +196,7 @@ fn a_command_that_never_was_is_found_where_it_shows() {
 }
 
 #[test]
-fn a_load_that_a_node_refused_or_that_ended_the_file_is_no_divergence() {
+fn a_load_that_was_rejected_or_ended_the_file_is_not_a_divergence() {
     let (file, _) = record(&job(COMMANDS));
     let refused = rebuild(&file, |message| match message {
         Message::Outcome(mut row) if row.step == 22 => {
@@ -207,7 +206,7 @@ fn a_load_that_a_node_refused_or_that_ended_the_file_is_no_divergence() {
         other => Some(other),
     });
     assert_eq!(check(&refused).0.verdict, Verdict::Identical);
-    // The snapshot that shows a load is of another file.
+    // The snapshot that shows a load belongs to another file.
     let ended = rebuild(&file, |message| match message {
         Message::Outcome(mut row) if row.step == 22 => {
             (row.status, row.reason) = ("applied".to_owned(), String::new());

@@ -1,12 +1,12 @@
-//! What a recording says beside its snapshots: tears with their causes, colliders and events are
-//! those of the simulation, and a changed row is found.
+//! The rows besides the snapshots: tears with their causes, colliders and events match the
+//! simulation, and a changed row is reported.
 
 use recorder::{Message, TearsRow, TopologyRow};
 use sim_contract::ParticleFlags;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
 use super::{check, rebuild, record};
-use crate::verify::Verdict;
+use crate::commands::verify::Verdict;
 
 fn tears(file: &[u8]) -> Vec<TearsRow> {
     collect(file, |message| match message {
@@ -16,7 +16,7 @@ fn tears(file: &[u8]) -> Vec<TearsRow> {
 }
 
 #[test]
-fn what_tore_is_recorded_with_its_cause_and_begins_anew_with_a_reset() {
+fn tears_are_recorded_with_their_causes_and_start_again_after_a_reset() {
     let (file, _) = record(&job(COMMANDS));
     let rows = tears(&file);
     assert!(rows.iter().all(|row| row.constraints.len() == row.causes.len()));
@@ -26,7 +26,7 @@ fn what_tore_is_recorded_with_its_cause_and_begins_anew_with_a_reset() {
         (&[40][..], &["cut".to_owned()][..])
     );
     assert!(find(7).constraints.len() > 1 && find(9).constraints.len() > 1);
-    assert_eq!(find(90).constraints, [9], "a cut before the reset is gone with it");
+    assert_eq!(find(90).constraints, [9], "the reset discards a cut before it");
     let causes: Vec<_> = rows.iter().flat_map(|row| &row.causes).collect();
     for cause in ["cut", "stretch"] {
         assert!(causes.iter().any(|one| *one == cause), "{causes:?}");
@@ -53,18 +53,18 @@ fn colliders_are_recorded_when_they_change() {
         })
     };
     let all: Vec<_> = (0..=STEPS).collect();
-    assert_eq!(steps_of(SCENE, ""), all, "one turns");
+    assert_eq!(steps_of(SCENE, ""), all, "one rotates");
     let still = SCENE.replace("angular_velocity = [0, 2, 0]", "");
     assert_eq!(steps_of(&still, ""), [0]);
     let moved = r#"{"step":20,"kind":"move_collider","collider":2,"translation":[0,0,0.4]}
         {"step":50,"kind":"reset"}"#;
-    assert_eq!(steps_of(&still, moved), [0, 20, 21, 50], "moves, stands, is back");
+    assert_eq!(steps_of(&still, moved), [0, 20, 21, 50], "it moves, stops, and returns");
     let none = &still[..still.find("[[collider]]").unwrap()];
     assert_eq!(steps_of(none, ""), [] as [u64; 0]);
 }
 
 #[test]
-fn a_changed_row_of_tears_or_colliders_is_found_with_its_step() {
+fn a_changed_row_of_tears_or_colliders_is_reported_with_its_step() {
     let (file, _) = record(&job(COMMANDS));
     let with = |change: fn(Message) -> Message| check(&rebuild(&file, |one| Some(change(one)))).0;
     let report = with(|message| match message {
@@ -114,7 +114,7 @@ fn a_changed_row_of_tears_or_colliders_is_found_with_its_step() {
 }
 
 #[test]
-fn tears_of_several_steps_in_one_row_are_those_of_a_recorder_that_missed_a_list() {
+fn one_row_may_hold_the_tears_of_several_steps() {
     let (file, _) = record(&job(COMMANDS));
     let mut missed = None;
     let late = rebuild(&file, |message| match message {
@@ -136,8 +136,8 @@ fn tears_of_several_steps_in_one_row_are_those_of_a_recorder_that_missed_a_list(
 }
 
 #[test]
-fn a_particle_that_is_frozen_is_an_event_each_time() {
-    // A stick that is much too long pushes its ends out of what f32 can hold.
+fn each_time_a_particle_freezes_there_is_an_event() {
+    // A constraint that is far too long pushes its ends out of the range of f32.
     let text = "version = 1\n[solver]\nmax_speed = 3e38\n\
         [[particle]]\nposition = [0, 0, 0]\n[[particle]]\nposition = [1, 0, 0]\n\
         [[constraint]]\nparticles = [0, 1]\nrest_length = 1e30\n";
@@ -166,14 +166,14 @@ fn a_particle_that_is_frozen_is_an_event_each_time() {
 }
 
 #[test]
-fn a_recording_that_begins_in_a_torn_scene_is_bit_identical_from_there() {
+fn a_recording_that_starts_in_a_torn_scene_is_bit_identical() {
     let (file, _) = record(&job(COMMANDS));
-    // The first snapshot with a keyframe behind the cuts, and what tore until then.
+    // The constraints that tore before a step.
     let torn = |until: u64| {
         let rows = tears(&file).into_iter().filter(|row| row.step < until);
         rows.flat_map(|row| row.constraints).collect::<Vec<_>>()
     };
-    let begin_at = |first_step: u64, torn: Vec<u32>| {
+    let verify_from = |first_step: u64, torn: Vec<u32>| {
         let part = rebuild(&file, |message| match message {
             Message::Topology(row) => {
                 Some(Message::Topology(TopologyRow { torn: torn.clone(), ..row }))
@@ -184,12 +184,15 @@ fn a_recording_that_begins_in_a_torn_scene_is_bit_identical_from_there() {
         check(&part).0
     };
     for first_step in [9, 13] {
-        let report = begin_at(first_step, torn(first_step));
+        let report = verify_from(first_step, torn(first_step));
         let steps = STEPS - first_step;
         let expected = format!("{steps} steps bit-identical ({first_step}..={STEPS})");
         assert_eq!(report.to_string(), expected);
-        let report = begin_at(first_step, Vec::new());
+        let report = verify_from(first_step, Vec::new());
         assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(first_step)));
-        assert!(report.to_string().contains("other torn constraints"), "{report}");
+        assert!(
+            report.to_string().contains("torn constraints in /topology and /tears differ"),
+            "{report}"
+        );
     }
 }

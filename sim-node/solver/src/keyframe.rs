@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use glam::{Quat, Vec3};
-use sim_types::{ParticleFlags, TearCause};
+use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
 
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::frame::{Frame, Pose};
@@ -124,6 +124,12 @@ impl Keyframe {
     /// Returns the torn constraints, in the order of tearing.
     pub fn torn(&self) -> &[u32] {
         &self.torn
+    }
+
+    /// Returns the parameters of a scene that uses `method`, with a time scale of 1: the pace belongs to
+    /// the node and is not part of the state.
+    pub fn parameter_values(&self, method: Method) -> ParameterValues {
+        self.parameters.values(method)
     }
 
     /// Returns the cause of each tear in [`Self::torn`].

@@ -1,32 +1,33 @@
-//! `cargo demo`: a node, a recorder and a viewer as processes, until Ctrl-C; then what was recorded.
+//! `cargo demo`: runs a node, a recorder and a viewer as processes until Ctrl-C, then describes the
+//! recording.
 //!
-//! Open the printed address in a browser meanwhile, and drag the curtain.
+//! Open the printed address in a browser and drag the curtain.
 #![forbid(unsafe_code)]
-#![allow(clippy::print_stderr, clippy::print_stdout, reason = "it talks to the user")]
+#![allow(clippy::print_stderr, clippy::print_stdout, reason = "messages to the user")]
 
 use std::net::TcpListener;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use integration_tests::{Finished, Process, Program};
+use integration_tests::{Finished, Process, Program, build_products};
 use sim_contract::clock::{SECOND_NS, realtime_ns};
 use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint, Stop};
 
-/// How long the demo waits for news before it looks for Ctrl-C again.
+/// Limit on each wait for a status of the node, so that the demo notices Ctrl-C.
 const POLL: Duration = Duration::from_millis(200);
 
-/// What `--help` says.
+/// The text of `--help`.
 const HELP: &str =
-    "Run a node with the curtain, a recorder and a viewer, until Ctrl-C; then say what was recorded.
+    "Run a node with the curtain scene, a recorder and a viewer until Ctrl-C, then describe the recording.
 
 Usage: cargo demo
 
-Open the printed address in a browser and drag the curtain. CATENARY_DOMAIN keeps it apart from
-other nodes on this host. The recording goes to the temporary folder.";
+Open the printed address in a browser and drag the curtain. Set CATENARY_DOMAIN to separate the demo
+from other nodes on this host. The recording goes to the temporary folder.";
 
-/// Where the viewer listens unless that is taken.
+/// Address of the viewer, unless the port is in use.
 const LISTEN: &str = "127.0.0.1:8080";
-/// Any free port.
+/// Fallback: any free port.
 const LISTEN_ANYWHERE: &str = "127.0.0.1:0";
 
 fn main() -> anyhow::Result<()> {
@@ -44,24 +45,26 @@ fn main() -> anyhow::Result<()> {
         std::env::temp_dir().join(format!("catenary-demo-{}.mcap", realtime_ns() / SECOND_NS));
     let file = file.to_str().context("the temporary folder's path is not UTF-8")?;
 
-    eprintln!("building the programs ...");
+    eprintln!("building the programs");
+    build_products();
+    eprintln!("starting the node");
     let mut node = Process::start_in(Program::SimNode, &domain, &["run", "curtain"]);
     node.wait_until_ready();
     let mut recorder = Process::start_in(Program::Recorder, &domain, &["record", "-o", file]);
     recorder.wait_until_ready();
     let mut viewer = start_viewer(&domain);
     let url = viewer.wait_for_line("ready ");
-    eprintln!("the curtain hangs, and everything is recorded; Ctrl-C ends the demo");
-    eprintln!("see it, drag it, cut it:  {}", url.trim_start_matches("ready "));
+    eprintln!("the node is running and being recorded; press Ctrl-C to end the demo");
+    eprintln!("open in a browser:  {}", url.trim_start_matches("ready "));
 
-    watch(&stop, &mut node, &domain)?;
+    show_progress(&stop, &mut node, &domain)?;
     let recorded = recorder.interrupt();
     let shown = viewer.interrupt();
     let ended = node.interrupt();
     eprint!("{}{}{}", recorded.stderr, shown.stderr, ended.stderr);
-    // Exit code 3: finished, and it says itself what was lost.
-    let is_well = |ended: &Finished| ended.code == Some(0);
-    if !matches!(recorded.code, Some(0 | 3)) || !is_well(&shown) || !is_well(&ended) {
+    // Exit code 3 means that the recording has gaps; the recorder has reported them.
+    let is_ok = |ended: &Finished| ended.code == Some(0);
+    if !matches!(recorded.code, Some(0 | 3)) || !is_ok(&shown) || !is_ok(&ended) {
         let [recorder, viewer, node] = [recorded.code, shown.code, ended.code];
         bail!(
             "the recorder ended with {recorder:?}, the viewer with {viewer:?}, the node with {node:?}"
@@ -73,15 +76,15 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Starts the viewer, on another port where the usual one is taken.
+/// Starts the viewer, on a free port if the usual one is in use.
 fn start_viewer(domain: &str) -> Process {
     let is_free = TcpListener::bind(LISTEN).is_ok();
     let listen = if is_free { LISTEN } else { LISTEN_ANYWHERE };
     Process::start_in(Program::ViewerBridge, domain, &["--listen", listen])
 }
 
-/// Shows how the node does until Ctrl-C, or until it ends by itself.
-fn watch(stop: &Stop, node: &mut Process, domain: &str) -> anyhow::Result<()> {
+/// Shows the progress of the node until Ctrl-C, or until the node ends.
+fn show_progress(stop: &Stop, node: &mut Process, domain: &str) -> anyhow::Result<()> {
     let domain = Some(domain).filter(|domain| !domain.is_empty());
     let endpoint = Endpoint::new(domain, sim_contract::NAME_DEFAULT)?;
     let mut client = Client::attach(&endpoint)?;

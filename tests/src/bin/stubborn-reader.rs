@@ -1,5 +1,5 @@
-//! A reader that takes as many snapshots as it may hold, never gives one back, and waits to be
-//! killed: what a debugger's breakpoint makes of any reader.
+//! A reader that borrows as many snapshots as it may, never returns one, and waits to be killed, like
+//! a reader stopped in a debugger.
 #![forbid(unsafe_code)]
 
 use std::error::Error;
@@ -10,15 +10,15 @@ use sim_contract::{BORROWED_SAMPLES_MAX, Client, Endpoint};
 #[allow(clippy::print_stderr, reason = "messages to the test")]
 fn main() -> Result<(), Box<dyn Error>> {
     let mut client = Client::attach(&Endpoint::from_env_and_args()?.0)?;
-    let mut held = Vec::new();
-    while held.len() < BORROWED_SAMPLES_MAX {
-        held.extend(client.next_snapshot(Duration::from_millis(100))?);
-        if held.len() == 1 {
+    let mut borrowed = Vec::new();
+    while borrowed.len() < BORROWED_SAMPLES_MAX {
+        borrowed.extend(client.next_snapshot(Duration::from_millis(100))?);
+        if borrowed.len() == 1 {
             eprintln!("attached");
         }
     }
-    eprintln!("ready: holding {}", held.len());
-    // Never comes back: no status of step u64::MAX is ever published.
+    eprintln!("ready: borrowed {}", borrowed.len());
+    // Loops forever: no status has step u64::MAX.
     while client.status(Duration::from_secs(1))?.is_none_or(|status| status.step < u64::MAX) {}
     Ok(())
 }

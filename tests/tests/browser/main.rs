@@ -1,6 +1,6 @@
-//! The page in a real browser, on the built node and bridge. A user's hands are events of mouse and
-//! keys; what they did is read from the node's own snapshots, and what is seen from pixels. No
-//! figure of speed is asserted. The pages' errors fail each test.
+//! The page in a real browser, with the built node and bridge. The tests send mouse, touch and key
+//! events, and check the snapshots of the node and the pixels of the page. An error of a page fails
+//! its test. No speed is asserted.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -8,9 +8,9 @@
     reason = "a panic is how a test fails"
 )]
 
-mod hands;
 mod pages;
 mod picture;
+mod pointer;
 mod replay;
 mod support;
 mod time;

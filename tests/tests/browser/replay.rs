@@ -1,4 +1,4 @@
-//! A recording in the page: where its bar is scrubbed to, the recorded positions are seen.
+//! Replay in the page: scrubbing the timeline shows the recorded positions.
 
 use std::path::Path;
 
@@ -6,14 +6,14 @@ use integration_tests::{Process, Program, Sandbox};
 use recorder::{FrameReader, LogReader};
 
 use crate::picture::{ERROR_MAX, NAMED, SWINGING, errors};
-use crate::support::{Button, Replay};
+use crate::support::{Button, ReplayRig};
 
-/// Far enough away that the sheet swings within the picture.
-const LOOK: &str = "show.particles=1&camera=0.5,-0.35,0,3,0.42,0.16";
-/// Parts of the bar's length.
-const PLACES: [f64; 3] = [0.8, 0.25, 0.55];
+/// A view in which the swinging sheet stays within the picture.
+const VIEW: &str = "show.particles=1&camera=0.5,-0.35,0,3,0.42,0.16";
+/// Positions on the timeline, as fractions of its length.
+const FRACTIONS: [f64; 3] = [0.8, 0.25, 0.55];
 
-/// The positions of each step of a recording, read from its start.
+/// Reads the positions of each step of a recording.
 fn recorded(file: &str) -> Vec<Vec<[f32; 3]>> {
     let mut frames = FrameReader::new(LogReader::open(Path::new(file)).unwrap());
     let mut positions = Vec::new();
@@ -34,41 +34,47 @@ fn scrubbing_a_recording_shows_the_recorded_positions() {
     Process::run(Program::Recorder, &sandbox, &args).success();
     let recorded = recorded(&file);
 
-    let replay = Replay::open(sandbox, &file, LOOK);
+    let replay = ReplayRig::open(sandbox, &file, VIEW);
     let tab = &replay.tab;
-    let mut from = tab.place("#seek", 0.1);
-    for part in PLACES {
-        let to = tab.place("#seek", part);
+    let mut from = tab.pixel("#seek", 0.1);
+    for fraction in FRACTIONS {
+        let to = tab.pixel("#seek", fraction);
         tab.press(from, Button::Left);
         tab.stroke(from, to, 8);
         tab.release(to);
         from = to;
-        let step = tab.ask("document.querySelector('#seek').valueAsNumber");
+        let step = tab.evaluate("document.querySelector('#seek').valueAsNumber");
         let step: usize = serde_json::from_value(step).unwrap();
-        assert!((step as f64 / 240.0 - part).abs() < 0.03, "step {step} at {part} of the bar");
+        assert!(
+            (step as f64 / 240.0 - fraction).abs() < 0.03,
+            "step {step} at {fraction} of the timeline"
+        );
         tab.wait(&format!("viewer.paused && viewer.step === {step}"));
         let (camera, picture) = (tab.camera(), tab.screenshot());
         let positions = &recorded[step];
         for (at, error) in NAMED.iter().zip(errors(&picture, &camera, positions)) {
-            assert!(error <= ERROR_MAX, "{at:?} is {error} px from where it was recorded");
+            assert!(error <= ERROR_MAX, "{at:?} is {error} px from its recorded position");
         }
         let earlier = errors(&picture, &camera, &recorded[step - 20]);
-        assert!(earlier.iter().any(|error| *error > ERROR_MAX), "nothing would be seen of it");
+        assert!(
+            earlier.iter().any(|error| *error > ERROR_MAX),
+            "an error of 20 steps would go unnoticed"
+        );
     }
 }
 
 #[test]
 #[ignore = "needs Chromium"]
-fn a_live_bridge_at_the_address_of_a_replay_has_no_bar_of_the_recording() {
+fn a_live_bridge_at_the_address_of_a_replay_hides_the_timeline() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let args = ["simulate", "rope", "--steps", "24", "-o", &file];
     Process::run(Program::Recorder, &sandbox, &args).success();
-    let mut replay = Replay::open(sandbox, &file, "");
-    let bar = "document.querySelector('#timeline').checkVisibility()";
-    replay.tab.wait(bar);
+    let mut replay = ReplayRig::open(sandbox, &file, "");
+    let timeline = "document.querySelector('#timeline').checkVisibility()";
+    replay.tab.wait(timeline);
     replay.end();
     replay.go_live("curtain");
     replay.tab.wait("viewer.connection === 'open' && viewer.scene === 'curtain'");
-    replay.tab.wait(&format!("!{bar} && viewer.step > 0 && viewer.mode === 'live'"));
+    replay.tab.wait(&format!("!{timeline} && viewer.step > 0 && viewer.mode === 'live'"));
 }

@@ -1,14 +1,14 @@
-//! The browser and what tests do with it.
+//! The browser, and the programs that each test runs.
 
 mod camera;
 mod chromium;
 mod picture;
 mod replay;
-mod stage;
+mod rig;
 mod tab;
 
 pub(crate) use camera::{Camera, distance};
-pub(crate) use picture::{Area, Picture, is_cloth, is_held, is_particle, is_pin};
-pub(crate) use replay::Replay;
-pub(crate) use stage::{Stage, State};
+pub(crate) use picture::{Area, Picture, is_cloth, is_grab_mark, is_particle, is_pin};
+pub(crate) use replay::ReplayRig;
+pub(crate) use rig::{Rig, State};
 pub(crate) use tab::Button;

@@ -1,114 +1,114 @@
-//! Time and connection: pause, step, reset, another scene, a node that is killed and comes back, a
-//! page that is slow.
+//! Time and connection: pause, step, reset, another scene, a killed and restarted node or bridge, and
+//! a slow page.
 
 use integration_tests::{Signal, wait_for};
 
-use crate::support::{Stage, is_cloth};
+use crate::support::{Rig, is_cloth};
 
 #[test]
 #[ignore = "needs Chromium"]
-fn pause_freezes_the_picture_step_makes_one_and_reset_restores() {
-    let mut stage = Stage::new(&["flag", "--paused"], "");
-    stage.settled();
-    let start = stage.state().clone();
-    let first_picture = stage.tab.hash();
-    stage.tab.key(' ');
-    stage.tab.wait("!viewer.paused && viewer.step > 60");
-    let paused = stage.pause();
-    let frozen = stage.tab.hash();
+fn pause_freezes_the_picture_step_advances_it_and_reset_restores_it() {
+    let mut rig = Rig::new(&["flag", "--paused"], "");
+    rig.settled();
+    let start = rig.state().clone();
+    let first_picture = rig.tab.hash();
+    rig.tab.key(' ');
+    rig.tab.wait("!viewer.paused && viewer.step > 60");
+    let paused = rig.pause();
+    let frozen = rig.tab.hash();
     assert_ne!(frozen, first_picture);
-    // Measurements still come, and pictures may be drawn: of the same step, the same to the bit.
-    stage.tab.pass_animation_frames(40);
-    assert_eq!(stage.tab.hash(), frozen);
-    assert_eq!(stage.state().step, paused.step);
+    // Statistics still arrive and the page may redraw: the picture of a step is always the same.
+    rig.tab.pass_animation_frames(40);
+    assert_eq!(rig.tab.hash(), frozen);
+    assert_eq!(rig.state().step, paused.step);
 
-    stage.tab.key('.');
-    stage.wait_for_state("one step", |state| state.step == paused.step + 1);
-    stage.tab.wait(&format!("viewer.step === {}", paused.step + 1));
-    assert_ne!(stage.tab.hash(), frozen);
+    rig.tab.key('.');
+    rig.wait_for_state("one step", |state| state.step == paused.step + 1);
+    rig.tab.wait(&format!("viewer.step === {}", paused.step + 1));
+    assert_ne!(rig.tab.hash(), frozen);
 
-    stage.tab.key('r');
+    rig.tab.key('r');
     let positions = |state: &crate::support::State| {
         state.particles.iter().map(|one| one.position).collect::<Vec<_>>()
     };
     let wanted = positions(&start);
-    stage.wait_for_state("the first positions", |state| positions(state) == wanted);
-    stage.settled();
-    assert_eq!(stage.tab.hash(), first_picture);
+    rig.wait_for_state("the initial positions", |state| positions(state) == wanted);
+    rig.settled();
+    assert_eq!(rig.tab.hash(), first_picture);
 }
 
 #[test]
 #[ignore = "needs Chromium"]
-fn another_scene_is_loaded_and_shown() {
-    let mut stage = Stage::new(&["curtain"], "");
-    let area = stage.tab.camera().area();
-    assert!(stage.tab.screenshot().count(&area, is_cloth) > 1000);
-    // The keys of digits take the scenes in the order of the picker.
-    stage.tab.key('2');
-    stage.wait_for_state("the rope in the node", |state| state.particles.len() == 41);
-    stage.tab.wait("viewer.scene === 'rope' && viewer.particleCount === 41 && viewer.frame >= 0");
-    stage.tab.wait("document.title.startsWith('rope')");
-    stage.tab.wait("document.querySelector('#scene').value === 'rope'");
+fn a_digit_key_loads_and_shows_another_scene() {
+    let mut rig = Rig::new(&["curtain"], "");
+    let area = rig.tab.camera().area();
+    assert!(rig.tab.screenshot().count(&area, is_cloth) > 1000);
+    // Digit keys load scenes in the order of the picker.
+    rig.tab.key('2');
+    rig.wait_for_state("the rope in the node", |state| state.particles.len() == 41);
+    rig.tab.wait("viewer.scene === 'rope' && viewer.particleCount === 41 && viewer.frame >= 0");
+    rig.tab.wait("document.title.startsWith('rope')");
+    rig.tab.wait("document.querySelector('#scene').value === 'rope'");
     wait_for("a picture without cloth", || {
-        (stage.tab.screenshot().count(&area, is_cloth) < 100).then_some(())
+        (rig.tab.screenshot().count(&area, is_cloth) < 100).then_some(())
     });
-    stage.tab.key('1');
-    stage.wait_for_state("the curtain in the node", |state| state.particles.len() == 168);
+    rig.tab.key('1');
+    rig.wait_for_state("the curtain in the node", |state| state.particles.len() == 168);
     wait_for("a picture of cloth", || {
-        (stage.tab.screenshot().count(&area, is_cloth) > 1000).then_some(())
+        (rig.tab.screenshot().count(&area, is_cloth) > 1000).then_some(())
     });
 }
 
 #[test]
 #[ignore = "needs Chromium"]
-fn the_page_says_that_the_node_is_gone_and_goes_on_when_it_is_back() {
-    let mut stage = Stage::new(&["curtain"], "");
-    assert_eq!(stage.tab.ask("viewer.banner"), "");
-    let epoch = stage.tab.ask("viewer.epoch");
-    stage.node.signal(Signal::KILL);
-    stage.tab.wait("viewer.node === 'lost' && viewer.banner !== ''");
-    assert_eq!(stage.tab.ask("document.querySelector('#banner').checkVisibility()"), true);
-    // The last picture stays.
-    let area = stage.tab.camera().area();
-    assert!(stage.tab.screenshot().count(&area, is_cloth) > 1000);
+fn the_page_reports_a_lost_node_and_continues_when_it_is_back() {
+    let mut rig = Rig::new(&["curtain"], "");
+    assert_eq!(rig.tab.evaluate("viewer.banner"), "");
+    let epoch = rig.tab.evaluate("viewer.epoch");
+    rig.node.signal(Signal::KILL);
+    rig.tab.wait("viewer.node === 'lost' && viewer.banner !== ''");
+    assert_eq!(rig.tab.evaluate("document.querySelector('#banner').checkVisibility()"), true);
+    // The last picture stays visible.
+    let area = rig.tab.camera().area();
+    assert!(rig.tab.screenshot().count(&area, is_cloth) > 1000);
 
-    stage.restart_node(&["curtain"]);
-    stage.tab.wait("viewer.node === 'alive' && viewer.banner === ''");
-    assert_eq!(stage.tab.ask("document.querySelector('#banner').checkVisibility()"), false);
-    stage.tab.wait(&format!("viewer.epoch !== {epoch} && viewer.step > 10"));
-    // And commands reach the new one.
-    stage.pause();
-    assert!(stage.bridge.is_running());
+    rig.restart_node(&["curtain"]);
+    rig.tab.wait("viewer.node === 'alive' && viewer.banner === ''");
+    assert_eq!(rig.tab.evaluate("document.querySelector('#banner').checkVisibility()"), false);
+    rig.tab.wait(&format!("viewer.epoch !== {epoch} && viewer.step > 10"));
+    // Commands reach the new node.
+    rig.pause();
+    assert!(rig.bridge.is_running());
 }
 
 #[test]
 #[ignore = "needs Chromium"]
-fn the_page_comes_back_to_a_bridge_that_was_killed() {
-    let mut stage = Stage::new(&["curtain"], "");
-    stage.bridge.signal(Signal::KILL);
-    stage.tab.wait("viewer.connection !== 'open' && viewer.banner !== ''");
-    // The browser itself says so in the console, each time that the page tries in vain.
-    stage.tab.expect_error("ERR_CONNECTION_REFUSED");
-    let step = stage.state().step;
-    stage.restart_bridge();
-    stage.tab.wait(&format!(
+fn the_page_reconnects_to_a_restarted_bridge() {
+    let mut rig = Rig::new(&["curtain"], "");
+    rig.bridge.signal(Signal::KILL);
+    rig.tab.wait("viewer.connection !== 'open' && viewer.banner !== ''");
+    // The browser logs an error for each failed attempt to connect.
+    rig.tab.expect_error("ERR_CONNECTION_REFUSED");
+    let step = rig.state().step;
+    rig.restart_bridge();
+    rig.tab.wait(&format!(
         "viewer.connection === 'open' && viewer.banner === '' && viewer.step > {step}"
     ));
-    stage.pause();
+    rig.pause();
 }
 
-/// Steps that the node makes while a page draws nothing: some two seconds.
+/// Steps that the node makes while a page draws nothing.
 const STEPS_MISSED: u64 = 480;
-/// Pictures that may be old when it draws again: two that it had not acknowledged, and one that the
-/// server made before it knew that these were on their way.
+/// Limit on old pictures when the page draws again: two that it had not acknowledged, and one that the
+/// server encoded before it had sent these.
 const PICTURES_OLD_MAX: usize = 3;
-/// Frames that the server may make meanwhile: a busy machine tells it later of those on their way.
-/// Without acknowledgements it would make 60 a second.
+/// Limit on frames that the server encodes meanwhile. On a busy machine it learns later that its credit
+/// is used up. Without acknowledgements it would encode 60 per second.
 const FRAMES_MADE_MAX: u64 = 10;
 
-/// What a page draws that drew nothing between the picture of that number and that step of the node.
-fn assert_only_owed_pictures_are_old(stage: &Stage, last_number: u64, newest: u64) {
-    let pictures = stage.tab.pictures_until(last_number, newest);
+/// Checks the pictures of a page that drew nothing between picture `last_number` and step `newest`.
+fn assert_only_owed_pictures_are_old(rig: &Rig, last_number: u64, newest: u64) {
+    let pictures = rig.tab.pictures_until(last_number, newest);
     let old_count = pictures.iter().take_while(|[_, step]| *step < newest).count();
     assert!(old_count <= PICTURES_OLD_MAX, "before step {newest}: {pictures:?}");
     let made_count = pictures[old_count][0] - last_number - 1;
@@ -117,29 +117,27 @@ fn assert_only_owed_pictures_are_old(stage: &Stage, last_number: u64, newest: u6
 
 #[test]
 #[ignore = "needs Chromium"]
-fn a_page_that_stood_still_is_at_most_three_frames_behind() {
-    let mut stage = Stage::new(&["curtain"], "");
-    stage.tab.note_pictures();
-    let last_number = stage.tab.stand_still();
-    let begin = stage.state().step;
-    let newest =
-        stage.wait_for_state("later steps", |state| state.step > begin + STEPS_MISSED).step;
-    stage.tab.go_on();
-    assert_only_owed_pictures_are_old(&stage, last_number, newest);
+fn a_blocked_page_is_at_most_three_frames_behind() {
+    let mut rig = Rig::new(&["curtain"], "");
+    rig.tab.log_pictures();
+    let last_number = rig.tab.block_script();
+    let begin = rig.state().step;
+    let newest = rig.wait_for_state("later steps", |state| state.step > begin + STEPS_MISSED).step;
+    rig.tab.unblock_script();
+    assert_only_owed_pictures_are_old(&rig, last_number, newest);
 }
 
 #[test]
 #[ignore = "needs Chromium"]
-fn a_hidden_tab_gets_no_frames_and_shows_the_newest_when_it_is_seen_again() {
-    let mut stage = Stage::new(&["curtain"], "");
-    stage.tab.note_pictures();
-    let last_number = stage.tab.hide();
-    let begin = stage.state().step;
-    let newest =
-        stage.wait_for_state("later steps", |state| state.step > begin + STEPS_MISSED).step;
-    assert_eq!(stage.tab.ask("viewer.frame"), last_number, "it drew while it was hidden");
-    stage.tab.show();
-    assert_only_owed_pictures_are_old(&stage, last_number, newest);
-    let area = stage.tab.camera().area();
-    assert!(stage.tab.screenshot().count(&area, is_cloth) > 1000);
+fn a_hidden_tab_receives_no_frames_and_shows_the_newest_when_visible_again() {
+    let mut rig = Rig::new(&["curtain"], "");
+    rig.tab.log_pictures();
+    let last_number = rig.tab.hide();
+    let begin = rig.state().step;
+    let newest = rig.wait_for_state("later steps", |state| state.step > begin + STEPS_MISSED).step;
+    assert_eq!(rig.tab.evaluate("viewer.frame"), last_number, "the page drew while hidden");
+    rig.tab.show();
+    assert_only_owed_pictures_are_old(&rig, last_number, newest);
+    let area = rig.tab.camera().area();
+    assert!(rig.tab.screenshot().count(&area, is_cloth) > 1000);
 }

@@ -1,5 +1,5 @@
-//! The viewer's server between a node and pages, all of them processes or sockets: what pages see
-//! is what the node publishes, and what they do is seen in the node's own snapshots.
+//! The server of the viewer, end to end: pages receive the state that the node publishes, and their
+//! commands show in the snapshots of the node.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod page;
@@ -14,7 +14,7 @@ use viewer_bridge::wire::{scene_flag, statistics_flag};
 
 use page::{Bridge, Page};
 
-/// Waits for a state of the node in which that holds for a particle.
+/// Waits for a state of the node in which a condition holds for a particle.
 fn wait_for_particle(
     node: &mut Client,
     particle: usize,
@@ -31,12 +31,13 @@ fn is_grabbed(particle: &ParticleState) -> bool {
     particle.flags & ParticleFlags::GRABBED != 0
 }
 
-fn drag(phase: &str, target: [f32; 3]) -> Value {
+/// A message of a grab: phase "begin" or "move".
+fn grab(phase: &str, target: [f32; 3]) -> Value {
     json!({ "type": format!("drag_{phase}"), "particle": 90, "target": target })
 }
 
 #[test]
-fn a_page_sees_what_the_node_publishes() {
+fn a_page_receives_the_state_that_the_node_publishes() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let bridge = Bridge::start(&sandbox);
@@ -49,7 +50,7 @@ fn a_page_sees_what_the_node_publishes() {
     assert_eq!(pins.held, (0..14).map(|particle| [particle, 1]).collect::<Vec<_>>());
     page.frame(|frame| frame.head.stamp.step > 60);
     page.applied(json!({ "type": "pause" }));
-    page.told("node", "is_paused", &json!(true));
+    page.text_with("node", "is_paused", &json!(true));
     let mut node = Client::attach(&sandbox.endpoint()).unwrap();
     let snapshot = node.latest_snapshot(DEADLINE).unwrap().unwrap();
     let step = snapshot.header().step;
@@ -63,48 +64,48 @@ fn a_page_sees_what_the_node_publishes() {
 }
 
 #[test]
-fn what_a_page_grabs_follows_it_and_is_let_go_when_the_page_goes() {
+fn a_particle_follows_the_grab_of_a_page_and_is_released_when_the_page_disconnects() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let bridge = Bridge::start(&sandbox);
     let mut node = Client::attach(&sandbox.endpoint()).unwrap();
     let (mut page, mut other) = (bridge.page(), bridge.page());
-    page.applied(drag("begin", [0.2, 0.5, 0.5]));
-    assert_eq!(other.rejected(drag("begin", [0.0; 3])), "grabbed_by_other");
-    assert_eq!(other.rejected(drag("move", [0.0; 3])), "grabbed_by_other");
+    page.applied(grab("begin", [0.2, 0.5, 0.5]));
+    assert_eq!(other.rejected(grab("begin", [0.0; 3])), "grabbed_by_other");
+    assert_eq!(other.rejected(grab("move", [0.0; 3])), "grabbed_by_other");
     assert_eq!(other.rejected(json!({ "type": "drag_end", "particle": 3 })), "not_grabbed");
-    page.send(&drag("move", [0.3, 0.5, 0.4]));
+    page.send(&grab("move", [0.3, 0.5, 0.4]));
     wait_for_particle(&mut node, 90, "the particle at its target", |particle| {
         is_grabbed(particle) && particle.position == [0.3, 0.5, 0.4]
     });
     drop(page);
-    wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
-    other.applied(drag("begin", [0.2, 0.5, 0.5]));
+    wait_for_particle(&mut node, 90, "the release", |one| !is_grabbed(one));
+    other.applied(grab("begin", [0.2, 0.5, 0.5]));
     other.applied(json!({ "type": "drag_end", "particle": 90 }));
-    wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
+    wait_for_particle(&mut node, 90, "the release", |one| !is_grabbed(one));
 }
 
 #[test]
-fn what_a_page_grabs_is_let_go_when_the_bridge_ends() {
+fn grabs_of_pages_are_released_when_the_bridge_ends() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let bridge = Bridge::start(&sandbox);
     let mut node = Client::attach(&sandbox.endpoint()).unwrap();
     let mut page = bridge.page();
-    page.applied(drag("begin", [0.2, 0.5, 0.5]));
-    wait_for_particle(&mut node, 90, "the particle to be held", is_grabbed);
-    // A bridge that waits for a state of the node hears of no page that leaves.
+    page.applied(grab("begin", [0.2, 0.5, 0.5]));
+    wait_for_particle(&mut node, 90, "the grab", is_grabbed);
+    // While the node is paused, the bridge is blocked on the next state.
     page.applied(json!({ "type": "pause" }));
     page.statistics(|statistics| statistics.flags & statistics_flag::PAUSED != 0);
     page.statistics(|_| true);
     let ended = bridge.process.interrupt();
     assert_eq!(ended.code, Some(0), "{}", ended.stderr);
     ctl(&sandbox, &["resume"]);
-    wait_for_particle(&mut node, 90, "the particle to be let go", |one| !is_grabbed(one));
+    wait_for_particle(&mut node, 90, "the release", |one| !is_grabbed(one));
 }
 
 #[test]
-fn pages_pin_cut_brush_set_step_reset_and_load() {
+fn pages_can_pin_cut_brush_set_step_reset_and_load() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let bridge = Bridge::start(&sandbox);
@@ -143,7 +144,7 @@ fn pages_pin_cut_brush_set_step_reset_and_load() {
     let reset = page.applied(json!({ "type": "reset" }));
     let tear = page.tear();
     assert!(tear.constraints.is_empty() && tear.first == 0 && tear.stamp.step >= reset);
-    refusals(&mut page);
+    check_refusals(&mut page);
     page.send(&json!({ "type": "load", "scene": "rope" }));
     let rope = page.scene();
     assert_eq!((rope.text.name.as_str(), rope.positions.len()), ("rope", 41));
@@ -151,8 +152,8 @@ fn pages_pin_cut_brush_set_step_reset_and_load() {
     page.frame(|frame| frame.head.stamp.epoch == rope.stamp.epoch);
 }
 
-/// What a live node, or the bridge, does not do.
-fn refusals(page: &mut Page) {
+/// Checks commands that a live node or the bridge refuses.
+fn check_refusals(page: &mut Page) {
     for (message, reason) in [
         (json!({ "type": "load", "scene": "/etc/passwd.toml" }), "out_of_range"),
         (json!({ "type": "load", "scene": "ragdoll" }), "no_effect_here"),
@@ -165,7 +166,7 @@ fn refusals(page: &mut Page) {
 }
 
 #[test]
-fn what_others_set_is_shown() {
+fn pages_show_parameters_that_other_clients_set() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let bridge = Bridge::start(&sandbox);
@@ -174,29 +175,29 @@ fn what_others_set_is_shown() {
     ctl(&sandbox, &["set", "damping", "2.5"]);
     page.text(|text| text["values"]["damping"] == 2.5);
     ctl(&sandbox, &["pause"]);
-    page.told("node", "is_paused", &json!(true));
+    page.text_with("node", "is_paused", &json!(true));
     // Who comes after a command cannot know what it did, and says so.
     let late = Bridge::start(&sandbox);
-    let told = late.page().text(|text| text["type"] == "parameters" && !text["values"].is_null());
-    assert_eq!(told["is_complete"], false);
+    let text = late.page().text(|text| text["type"] == "parameters" && !text["values"].is_null());
+    assert_eq!(text["is_complete"], false);
 }
 
 #[test]
-fn pages_wait_for_a_node_and_see_it_go_and_come_back() {
+fn pages_wait_for_a_node_and_report_when_it_is_lost_and_back() {
     let sandbox = Sandbox::new();
     let bridge = Bridge::start(&sandbox);
     let mut page = bridge.page();
-    let told = page.text(|text| text["type"] == "node" && text["text"] != "");
-    assert_eq!(told["state"], "none");
-    assert!(told["text"].as_str().unwrap().contains("sim-node run"), "{told}");
+    let text = page.text(|text| text["type"] == "node" && text["text"] != "");
+    assert_eq!(text["state"], "none");
+    assert!(text["text"].as_str().unwrap().contains("sim-node run"), "{text}");
     assert_eq!(page.rejected(json!({ "type": "pause" })), "no_node");
 
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let first = page.scene();
-    page.told("node", "state", &json!("alive"));
-    // Killed: it cannot say that it goes.
+    page.text_with("node", "state", &json!("alive"));
+    // A killed node cannot announce its end.
     node.signal(Signal::KILL);
-    page.told("node", "state", &json!("lost"));
+    page.text_with("node", "state", &json!("lost"));
     assert_eq!(page.rejected(json!({ "type": "pause" })), "no_node");
     drop(node);
 
@@ -208,21 +209,22 @@ fn pages_wait_for_a_node_and_see_it_go_and_come_back() {
     page.frame(|frame| frame.head.stamp.epoch == second.stamp.epoch);
     // A clean end.
     node.interrupt();
-    page.told("node", "state", &json!("lost"));
+    page.text_with("node", "state", &json!("lost"));
 }
 
 #[test]
-fn the_picker_has_the_scenes_of_the_node() {
+fn the_scene_picker_lists_the_scenes_of_the_node() {
     let sandbox = Sandbox::new();
     let listed = Process::run(Program::SimNode, &sandbox, &["scenes", "--json"]).json();
     let listed: Vec<_> = listed.as_array().unwrap().iter().map(|one| &one["name"]).collect();
-    let known: Vec<_> = viewer_bridge::scenes::all().iter().map(|one| json!(one.name)).collect();
+    let known: Vec<_> =
+        viewer_bridge::scene::catalog::all().iter().map(|one| json!(one.name)).collect();
     assert_eq!(listed, known.iter().collect::<Vec<_>>());
-    assert!(viewer_bridge::scenes::all().iter().all(|one| !one.text.is_empty()));
+    assert!(viewer_bridge::scene::catalog::all().iter().all(|one| !one.text.is_empty()));
 }
 
 #[test]
-fn the_server_ends_as_programs_should() {
+fn the_server_reports_errors_and_signals_by_its_exit_code() {
     let sandbox = Sandbox::new();
     let bridge = Bridge::start(&sandbox);
     let _page = bridge.page();

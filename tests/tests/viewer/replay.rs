@@ -1,10 +1,10 @@
-//! A recording in the viewer: pages see in every step what the file has there, and share one place.
+//! Replay in the viewer: pages see the recorded state of every step, and share one playback position.
 //!
-//! What is expected is read from the file from its start, by the recorder's library.
+//! The recorder's library reads the expected states from the start of the file.
 
 use std::path::Path;
 
-use integration_tests::{Process, Program, Sandbox, wait_for};
+use integration_tests::{Process, Program, Sandbox};
 use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
 use serde_json::{Value, json};
 use sim_contract::ParticleFlags;
@@ -13,7 +13,7 @@ use viewer_bridge::wire::Message;
 use super::page::{Bridge, Page};
 
 const STEPS: u64 = 960;
-/// Cuts, pins and settings on both sides of a reset; the last cut in the step of another reset.
+/// Cuts, pins and parameters before and after a reset. Two later commands share the step of a reset.
 const COMMANDS: &str = r#"{"step":20,"kind":"pin","particle":100}
 {"step":50,"kind":"cut","constraint":300}
 {"step":51,"kind":"cut","constraint":20}
@@ -34,7 +34,7 @@ struct State {
     positions: Vec<[f32; 3]>,
     torn: Vec<u32>,
     /// Particle and flags.
-    held: Vec<[u32; 2]>,
+    pins: Vec<[u32; 2]>,
 }
 
 fn recording(sandbox: &Sandbox) -> String {
@@ -46,25 +46,25 @@ fn recording(sandbox: &Sandbox) -> String {
     file
 }
 
-/// All states of a recording, and what it is of.
+/// Reads all states of a recording, and the description of its run.
 fn states(file: &str) -> (Vec<State>, RunDescription) {
     let mut frames = FrameReader::new(LogReader::open(Path::new(file)).unwrap());
     let mut torn = Vec::new();
     let mut states = Vec::new();
     while let Some(frame) = frames.next_frame().unwrap() {
-        follow_tears(&mut torn, &frame);
-        let held = (0_u32..).zip(&frame.particles).filter(|(_, one)| one.flags != 0);
+        apply_tears(&mut torn, &frame);
+        let pins = (0_u32..).zip(&frame.particles).filter(|(_, one)| one.flags != 0);
         states.push(State {
             step: frame.row.step,
             positions: frame.particles.iter().map(|one| one.position).collect(),
             torn: torn.clone(),
-            held: held.map(|(particle, one)| [particle, one.flags]).collect(),
+            pins: pins.map(|(particle, one)| [particle, one.flags]).collect(),
         });
     }
     (states, frames.log().run().clone())
 }
 
-fn follow_tears(torn: &mut Vec<u32>, frame: &Frame) {
+fn apply_tears(torn: &mut Vec<u32>, frame: &Frame) {
     for update in &frame.updates {
         if let Logged::Topology(row) = update {
             torn.clone_from(&row.torn);
@@ -80,45 +80,45 @@ fn follow_tears(torn: &mut Vec<u32>, frame: &Frame) {
     }
 }
 
-/// A page that keeps what it was told of tears and pins.
+/// A page that tracks tears and pins.
 struct View {
     page: Page,
     torn: Vec<u32>,
-    held: Vec<[u32; 2]>,
+    pins: Vec<[u32; 2]>,
 }
 
 impl View {
     fn new(bridge: &Bridge) -> Self {
-        Self { page: bridge.page(), torn: Vec::new(), held: Vec::new() }
+        Self { page: bridge.page(), torn: Vec::new(), pins: Vec::new() }
     }
 
-    /// What the page shows with the next frame like that.
-    fn shown(&mut self, is_meant: impl Fn(u64) -> bool) -> State {
-        let Self { page, torn, held } = self;
-        page.find("a step", |message| match message {
+    /// Waits for the next frame whose step matches, and returns the state that the page then shows.
+    fn shown(&mut self, matches: impl Fn(u64) -> bool) -> State {
+        let Self { page, torn, pins } = self;
+        page.receive("a step", |message| match message {
             Message::Tear(tear) => {
                 torn.truncate(tear.first as usize);
                 torn.extend(tear.constraints);
                 None
             }
-            Message::Pins(pins) => {
-                *held = pins.held;
+            Message::Pins(message) => {
+                *pins = message.held;
                 None
             }
-            Message::Frame(frame) if is_meant(frame.head.stamp.step) => {
+            Message::Frame(frame) if matches(frame.head.stamp.step) => {
                 assert_eq!(frame.head.torn_count as usize, torn.len());
                 Some(State {
                     step: frame.head.stamp.step,
                     positions: frame.positions,
                     torn: torn.clone(),
-                    held: held.clone(),
+                    pins: pins.clone(),
                 })
             }
             _ => None,
         })
     }
 
-    /// Goes to another step.
+    /// Seeks to a step, and returns the state shown there.
     fn seek(&mut self, step: u64) -> State {
         self.page.send(&json!({ "type": "seek", "step": step }));
         self.shown(|shown| shown == step)
@@ -130,14 +130,14 @@ fn seek(step: u64) -> Value {
 }
 
 #[test]
-fn scrubbing_shows_what_the_recording_has_in_each_step() {
+fn scrubbing_shows_the_recorded_state_of_each_step() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
     let (states, _) = states(&file);
     let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
     let mut view = View::new(&bridge);
     assert_eq!(view.shown(|_| true), states[0]);
-    // Forwards and backwards, to the steps around each event, from near and from far.
+    // Seeks forwards and backwards to the steps around each event, from near and from far.
     let steps = [
         19, 20, 21, 960, 51, 50, 49, 52, 640, 333, 332, 499, 500, 501, 334, 639, 641, 699, 700,
         701, 0, 702, 700, 199, 200, 959, 1, 700,
@@ -146,18 +146,18 @@ fn scrubbing_shows_what_the_recording_has_in_each_step() {
         assert_eq!(view.seek(step), states[usize::try_from(step).unwrap()], "at step {step}");
     }
     assert_eq!(states[700].torn, [9]);
-    assert!(states[100].held.contains(&[100, ParticleFlags::PINNED]));
-    // One that comes now sees the same.
+    assert!(states[100].pins.contains(&[100, ParticleFlags::PINNED]));
+    // A page that connects now sees the same.
     assert_eq!(View::new(&bridge).shown(|_| true), states[700]);
 }
 
 #[test]
-fn the_timeline_has_marks_and_whether_the_hashes_are_right() {
+fn the_timeline_has_marks_and_the_result_of_the_hash_check() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
     let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
     let mut page = bridge.page();
-    let timeline = page.told("timeline", "hashes", &json!("verified"));
+    let timeline = page.text_with("timeline", "hashes", &json!("verified"));
     assert_eq!(timeline["hash_text"], "961 hashes verified");
     assert_eq!((&timeline["file"], &timeline["scene"]), (&json!("run.mcap"), &json!("curtain")));
     assert_eq!((&timeline["first_step"], &timeline["last_step"]), (&json!(0), &json!(STEPS)));
@@ -183,7 +183,7 @@ fn the_timeline_has_marks_and_whether_the_hashes_are_right() {
         mark("command", 701, 1),
     ];
     assert_eq!(timeline["marks"], json!(marks));
-    // The parameters are those of the step.
+    // The parameters are those of the shown step.
     page.send(&seek(119));
     page.text(|text| text["type"] == "parameters" && text["is_complete"] == true);
     page.send(&seek(120));
@@ -193,17 +193,17 @@ fn the_timeline_has_marks_and_whether_the_hashes_are_right() {
 }
 
 #[test]
-fn a_state_that_was_changed_is_found() {
+fn a_changed_state_is_detected() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
     let changed = sandbox.path("changed.mcap");
     change_one_particle(&file, &changed, 321);
     let bridge = Bridge::start_with(&sandbox, &["--replay", &changed]);
-    let timeline = bridge.page().told("timeline", "hashes", &json!("diverged"));
+    let timeline = bridge.page().text_with("timeline", "hashes", &json!("diverged"));
     assert_eq!(timeline["hash_text"], "1 of 961 hashes differ, first at step 321");
 }
 
-/// Writes a recording anew with another bit in one state.
+/// Copies a recording with a change in one state.
 fn change_one_particle(from: &str, to: &str, changed_step: u64) {
     let mut log = LogReader::open(Path::new(from)).unwrap();
     let (run, scene) = (log.run().clone(), log.scene().to_vec());
@@ -227,7 +227,7 @@ fn pages_play_pause_step_and_loop_one_recording_together() {
     let file = recording(&sandbox);
     let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
     let (mut page, mut other) = (bridge.page(), bridge.page());
-    assert_eq!(page.told("node", "state", &json!("alive"))["is_replay"], true);
+    assert_eq!(page.text_with("node", "state", &json!("alive"))["is_replay"], true);
     let playback = page.text(|text| text["type"] == "playback");
     assert_eq!((&playback["is_playing"], &playback["step"]), (&json!(false), &json!(0)));
 
@@ -241,12 +241,12 @@ fn pages_play_pause_step_and_loop_one_recording_together() {
     assert_eq!(page.applied(json!({ "type": "step", "count": -10_000 })), 0);
 
     page.applied(json!({ "type": "rate", "value": 10 }));
-    other.told("playback", "rate", &json!(10.0));
+    other.text_with("playback", "rate", &json!(10.0));
     page.applied(json!({ "type": "resume" }));
-    other.told("playback", "is_playing", &json!(true));
-    // It stands at its end, and plays from there from the beginning.
+    other.text_with("playback", "is_playing", &json!(true));
+    // It pauses at the end, and resuming there starts again at the beginning.
     other.frame(|frame| frame.head.stamp.step == STEPS);
-    assert_eq!(other.told("playback", "is_playing", &json!(false))["step"], STEPS);
+    assert_eq!(other.text_with("playback", "is_playing", &json!(false))["step"], STEPS);
     page.applied(json!({ "type": "loop", "is_on": true }));
     page.applied(json!({ "type": "rate", "value": 0.1 }));
     page.applied(seek(STEPS - 2));
@@ -282,7 +282,7 @@ fn a_recording_cannot_be_changed() {
 }
 
 #[test]
-fn a_live_recording_is_shown_as_it_was() {
+fn a_recording_of_a_live_node_is_shown_as_recorded() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("live.mcap");
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
@@ -301,10 +301,10 @@ fn a_live_recording_is_shown_as_it_was() {
     let bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
     let mut view = View::new(&bridge);
     let hex = json!(format!("{:016x}", run.run_id));
-    assert_eq!(view.page.told("node", "run_id", &hex)["scene"], "curtain");
-    let timeline = view.page.told("timeline", "hashes", &json!("verified"));
+    assert_eq!(view.page.text_with("node", "run_id", &hex)["scene"], "curtain");
+    let timeline = view.page.text_with("timeline", "hashes", &json!("verified"));
     assert_eq!(timeline["first_step"], states[0].step);
-    // The texts above were waited for in place of its first frame.
+    // A new page, because waiting for the texts above dropped the first frame.
     let mut view = View::new(&bridge);
     assert_eq!(view.shown(|_| true), states[0]);
     let count = states.len();
@@ -314,7 +314,7 @@ fn a_live_recording_is_shown_as_it_was() {
 }
 
 #[test]
-fn a_recording_that_was_cut_off_is_shown_as_far_as_it_goes() {
+fn a_truncated_recording_is_shown_as_far_as_it_goes() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
     let bytes = std::fs::read(&file).unwrap();
@@ -328,14 +328,14 @@ fn a_recording_that_was_cut_off_is_shown_as_far_as_it_goes() {
     for place in [states.len() - 1, states.len() / 2, 1] {
         assert_eq!(view.seek(states[place].step), states[place]);
     }
-    let timeline = bridge.page().told("timeline", "hashes", &json!("verified"));
+    let timeline = bridge.page().text_with("timeline", "hashes", &json!("verified"));
     assert_eq!(timeline["last_step"], states.last().unwrap().step);
     let text = timeline["hash_text"].as_str().unwrap();
     assert!(text.contains("truncated"), "{text}");
 }
 
 #[test]
-fn a_damaged_part_is_left_out_and_said() {
+fn a_damaged_part_is_skipped_and_reported() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
     let mut bytes = std::fs::read(&file).unwrap();
@@ -343,7 +343,7 @@ fn a_damaged_part_is_left_out_and_said() {
     bytes[middle] ^= 1;
     let damaged = sandbox.path("damaged.mcap");
     std::fs::write(&damaged, &bytes).unwrap();
-    // Read from its start, it ends before the damage.
+    // Reading from the start ends before the damage.
     let (before, all) = (states(&damaged).0, states(&file).0);
     let bridge = Bridge::start_with(&sandbox, &["--replay", &damaged]);
     let mut view = View::new(&bridge);
@@ -361,7 +361,7 @@ fn a_damaged_part_is_left_out_and_said() {
 }
 
 #[test]
-fn files_that_are_no_recordings_are_named_before_anything_is_served() {
+fn a_file_that_is_not_a_recording_is_named_before_anything_is_served() {
     let sandbox = Sandbox::new();
     let whole = std::fs::read(recording(&sandbox)).unwrap();
     let head = sandbox.path("head.mcap");
@@ -372,24 +372,28 @@ fn files_that_are_no_recordings_are_named_before_anything_is_served() {
     let cases = [
         (sandbox.path("missing.mcap"), "there is no such file", give),
         (sandbox.write("empty.mcap", ""), "is empty", again),
-        (sandbox.write("text.mcap", "this is no recording, but long"), "is not an MCAP file", give),
+        (
+            sandbox.write("text.mcap", "this is not a recording, but long"),
+            "is not an MCAP file",
+            give,
+        ),
         (folder, "is not a file", give),
-        (head, "has no readable head", again),
+        (head, "has no readable header", again),
     ];
-    for (file, what, cure) in cases {
+    for (file, cause, remedy) in cases {
         let args = ["--listen", "127.0.0.1:0", "--replay", &file];
         let ended = Process::run(Program::ViewerBridge, &sandbox, &args);
         assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""), "{}", ended.stderr);
         let start = format!("error: {file}: ");
         assert!(ended.stderr.starts_with(&start), "{}", ended.stderr);
-        assert!(ended.stderr.contains(what) && ended.stderr.contains(cure), "{}", ended.stderr);
+        assert!(ended.stderr.contains(cause) && ended.stderr.contains(remedy), "{}", ended.stderr);
     }
     let both = Process::run(Program::ViewerBridge, &sandbox, &["--replay", "a", "--name", "b"]);
     assert_eq!(both.code, Some(2), "{}", both.stderr);
 }
 
 #[test]
-fn a_replay_ends_as_programs_should_while_it_plays() {
+fn ctrl_c_ends_a_playing_replay_cleanly() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
     let mut bridge = Bridge::start_with(&sandbox, &["--replay", &file]);
@@ -397,7 +401,7 @@ fn a_replay_ends_as_programs_should_while_it_plays() {
     page.applied(json!({ "type": "loop", "is_on": true }));
     page.applied(json!({ "type": "resume" }));
     page.frame(|frame| frame.head.stamp.step > 10);
-    wait_for("a program that runs", || bridge.process.is_running().then_some(()));
+    assert!(bridge.process.is_running());
     let ended = bridge.process.interrupt();
     assert_eq!((ended.code, ended.stdout.as_str()), (Some(0), ""), "{}", ended.stderr);
 }

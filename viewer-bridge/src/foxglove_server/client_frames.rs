@@ -1,7 +1,7 @@
 //! The frames of a client's WebSocket, as far as to count them: the sizes in their heads.
 
 use crate::limits::MESSAGE_SIZE_BYTES_MAX;
-use crate::rate_limit::RateLimit;
+use crate::socket::rate_limit::RateLimit;
 
 /// Longest head of a frame: two bytes, eight of a length, four of a mask.
 const HEAD_SIZE_BYTES_MAX: usize = 14;

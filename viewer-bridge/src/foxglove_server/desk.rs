@@ -16,11 +16,11 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
 use super::playback::Recording;
 use super::{FoxgloveOptions, published, settable};
-use crate::Hub;
-use crate::check::check;
+use crate::message::check::check;
+use crate::message::parameters::Parameters;
+use crate::message::reason;
 use crate::message::{Command, OutcomeText, Playback, Status as Fate};
-use crate::parameters::Parameters;
-use crate::reason;
+use crate::pages::hub::Hub;
 use crate::source::Ask;
 
 /// Numbers of pages are below it; those of our clients are not.

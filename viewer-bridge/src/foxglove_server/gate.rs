@@ -18,8 +18,8 @@ use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
 use super::client_frames::ClientFrames;
-use crate::guard::{Admission, Guard};
 use crate::limits::{ACCEPT_PAUSE, CLIENTS_MAX, HELLO_TIMEOUT, SILENCE_MAX};
+use crate::socket::guard::{Admission, Guard};
 
 /// Longest head of a request; those of browsers have about 1 KiB.
 const HEAD_SIZE_BYTES_MAX: usize = 8 << 10;

@@ -12,8 +12,8 @@ use serde::Deserialize;
 use super::desk::{CLIENT_FIRST, Desk};
 use super::published;
 use super::publisher::Publisher;
-use crate::Hub;
 use crate::message::Command;
+use crate::pages::hub::Hub;
 use crate::source::Ask;
 
 /// Hears what clients do. Its calls come from their tasks and must not block.

@@ -4,7 +4,7 @@
 use foxglove::websocket::{PlaybackCommand, PlaybackControlRequest, PlaybackState, PlaybackStatus};
 use sim_contract::clock::SECOND_NS;
 
-use crate::check::check;
+use crate::message::check::check;
 use crate::message::{Command, Playback};
 
 /// The times of a recording that is shown.

@@ -110,7 +110,7 @@ impl Publisher {
     ) -> Result<Self, FoxgloveError> {
         let mut channels = Vec::new();
         for topic in TOPICS {
-            let TopicFormat { encoding, schema } = TopicFormat::of(topic);
+            let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
             let schema = schema.map(|one| Schema::new(one.name, one.encoding, one.data));
             let builder = context.channel_builder(topic.name()).message_encoding(encoding);
             channels.push(builder.schema(schema).build_raw()?);

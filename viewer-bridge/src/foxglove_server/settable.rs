@@ -6,8 +6,8 @@ use foxglove::websocket::{Parameter, ParameterType, ParameterValue as FoxgloveVa
 use sim_contract::{ConstraintKind, KindFilter, ParameterValue, PlainF32};
 
 use crate::message::Command;
-use crate::parameters::{Limit, Parameters, PerKind};
-use crate::settings::{SETTINGS, ValueKind};
+use crate::message::parameters::{Limit, Parameters, PerKind};
+use crate::message::settings::{SETTINGS, ValueKind};
 
 /// The value of what is switched off.
 const OFF: &str = "off";

@@ -8,10 +8,10 @@ pub use timeline::{Hashes, Mark, MarkKind, Playback, Timeline};
 
 use super::Choice;
 use crate::limits;
-use crate::parameters::Parameters;
-use crate::reason;
-use crate::scenes::SceneEntry;
-use crate::settings::SettingEntry;
+use crate::message::parameters::Parameters;
+use crate::message::reason;
+use crate::message::settings::SettingEntry;
+use crate::scene::catalog::SceneEntry;
 
 /// A message to a page.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,25 +1,25 @@
-//! What pages are told, in which order, and how far a slow one is behind.
+//! Delivery: the order of messages, credits, and how far a slow page can fall behind.
 
 use std::time::Duration;
 
-use viewer_bridge::hub::{Demand, Slot};
 use viewer_bridge::limits::FRAMES_UNACKNOWLEDGED_MAX;
 use viewer_bridge::message::{Node, ToPage};
+use viewer_bridge::pages::hub::{Demand, Slot};
 use viewer_bridge::source::{Ask, Request};
 use viewer_bridge::wire::Format::{F32, U16};
 use viewer_bridge::wire::Message;
 
 use crate::support::{Site, wait_for};
 
-/// How long a request of a page is waited for.
-const PATIENCE: Duration = Duration::from_mins(1);
+/// Limit on the wait for a request of a page.
+const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
 
 fn ack(frame: u32) -> String {
     format!(r#"{{"type":"ack","frame":{frame}}}"#)
 }
 
 #[test]
-fn who_comes_late_is_told_everything_in_order() {
+fn a_late_page_receives_the_state_in_order() {
     let mut site = Site::start();
     site.hub.latch(Slot::Node, &ToPage::Node(Node::default()));
     site.begin(2);
@@ -59,7 +59,7 @@ fn tears_come_as_changes_and_a_reset_empties_the_list() {
 }
 
 #[test]
-fn a_page_gets_two_frames_and_then_the_newest_when_it_has_drawn_one() {
+fn a_page_receives_two_frames_and_then_the_newest_after_an_acknowledgement() {
     let mut site = Site::start();
     let mut page = site.page();
     site.begin(1);
@@ -67,38 +67,38 @@ fn a_page_gets_two_frames_and_then_the_newest_when_it_has_drawn_one() {
     let first = page.frame();
     site.show(2, 1);
     assert_eq!((first.0, page.frame().0), (1, 2));
-    // Credit is used up; whatever is shown now waits, and only the last of it.
+    // The credit is used up: of the following frames, only the last one waits.
     assert_eq!(site.hub.demand(1), Demand::default());
     for step in 3..50 {
         site.show(step, 1);
     }
     page.say(&ack(first.1));
-    // Its page has credit again: the source is told, and shows what it has.
+    // The page has credit again: the source learns of the demand, and shows its newest frame.
     wait_for("demand", || site.hub.demand(1).is_any().then_some(()));
     site.show(50, 1);
     assert_eq!(page.frame().0, 50);
 }
 
 #[test]
-fn a_page_that_has_drawn_the_newest_frame_asks_for_no_other() {
+fn a_page_with_the_newest_frame_does_not_request_another() {
     let mut site = Site::start();
     let mut page = site.page();
-    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Frame }));
+    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Frame }));
     site.begin(1);
     for step in 1..=FRAMES_UNACKNOWLEDGED_MAX {
         site.show(step.into(), 1);
         assert_eq!(page.frame().1, step);
     }
     page.say(&ack(FRAMES_UNACKNOWLEDGED_MAX));
-    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Credit }));
-    // Nor does it get the same once more, if somebody else needs it.
+    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Credit }));
+    // It does not receive the same frame again when another page needs it.
     site.hub.show_again();
     site.show(9, 1);
     assert_eq!(page.frame().0, 9);
 }
 
 #[test]
-fn a_page_that_missed_the_newest_frame_asks_for_it() {
+fn a_page_that_missed_the_newest_frame_requests_it() {
     let mut site = Site::start();
     let mut slow = site.silent_page();
     slow.say(r#"{"type":"hello","protocol":1,"format":"u16"}"#);
@@ -110,12 +110,12 @@ fn a_page_that_missed_the_newest_frame_asks_for_it() {
     }
     let _quick = site.page();
     site.wait_for_clients(2);
-    // Nobody waits for u16.
+    // No page waits for u16 frames.
     site.show(3, 1);
     while site.requests.next(Duration::ZERO).is_some() {}
     slow.say(&ack(2));
-    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Credit }));
-    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Frame }));
+    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Credit }));
+    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Frame }));
     site.show(3, 1);
     assert_eq!(slow.frame().0, 3);
 }
@@ -140,7 +140,7 @@ fn a_slow_page_is_never_more_than_three_frames_behind() {
 }
 
 #[test]
-fn no_frame_comes_before_its_scene() {
+fn a_frame_never_precedes_its_scene() {
     let mut site = Site::start();
     let mut page = site.page();
     let mut epoch = 0;
@@ -167,7 +167,7 @@ fn no_frame_comes_before_its_scene() {
 }
 
 #[test]
-fn each_page_gets_the_format_that_it_asked_for() {
+fn each_page_receives_its_requested_format() {
     let mut site = Site::start();
     let mut kinds = Vec::new();
     let mut pages = Vec::new();
@@ -194,7 +194,7 @@ fn each_page_gets_the_format_that_it_asked_for() {
 }
 
 #[test]
-fn nobody_to_show_to_is_no_demand() {
+fn there_is_no_demand_without_pages() {
     let mut site = Site::start();
     assert_eq!(site.hub.demand(10), Demand::default());
     let page = site.page();
@@ -207,17 +207,17 @@ fn nobody_to_show_to_is_no_demand() {
 }
 
 #[test]
-fn the_source_is_told_who_comes_and_goes() {
+fn the_source_learns_of_pages_that_connect_and_disconnect() {
     let site = Site::start();
     let page = site.page();
-    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Frame }));
-    // Torn off, without a farewell.
+    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Frame }));
+    // The connection breaks without a close message.
     drop(page);
-    assert_eq!(site.requests.next(PATIENCE), Some(Request { client: 1, ask: Ask::Left }));
+    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Left }));
 }
 
 #[test]
-fn the_end_of_the_server_is_told() {
+fn a_page_receives_the_end_of_the_server_as_a_close_code() {
     let site = Site::start();
     let mut page = site.page();
     site.hub.close();

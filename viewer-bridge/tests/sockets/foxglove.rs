@@ -1,5 +1,5 @@
-//! The Foxglove server over real sockets: what clients get, what they may do, and what becomes of
-//! those that break the rules. There is no node: the tests feed the hub, and answer for it.
+//! The Foxglove server over real sockets: delivery, permissions, and clients that violate the protocol.
+//! There is no node: the tests feed the hub, and answer commands.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -9,23 +9,23 @@ use bytemuck::cast_slice;
 use serde_json::{Value, json};
 use sim_contract::ParticleState;
 use tokio::runtime::Runtime;
-use viewer_bridge::hub::{Demand, Slot};
+use viewer_bridge::message::parameters::Parameters;
 use viewer_bridge::message::{
     Command, Mode, OutcomeText, ParametersText, Playback, Status, ToPage,
 };
-use viewer_bridge::parameters::Parameters;
+use viewer_bridge::pages::hub::{Demand, Slot};
+use viewer_bridge::shown_state::Stage;
 use viewer_bridge::source::{Ask, Requests};
-use viewer_bridge::stage::Stage;
 use viewer_bridge::wire::{FrameHead, Scene, Stamp};
 use viewer_bridge::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Hub, Recording};
 
 use crate::foxglove_client::{Binary, Client, connect};
 use crate::support::wait_for;
 
-/// Connections at the same time.
+/// Limit on simultaneous connections.
 const CLIENTS_MAX: usize = viewer_bridge::limits::CLIENTS_MAX;
 
-/// A Foxglove server; it ends with this.
+/// A running Foxglove server. Dropping it ends the server.
 struct Site {
     hub: Arc<Hub>,
     requests: Requests,
@@ -55,7 +55,7 @@ impl Site {
         Self { hub, requests, url, stage: Stage::default(), _runtime: runtime }
     }
 
-    /// Shows a scene of that many particles, joined in a row.
+    /// Shows a scene with `count` particles, connected in a row.
     fn begin(&mut self, count: u32) {
         let positions = (0..count).map(|_| [0.0; 3]).collect();
         let ends = (1..count).map(|particle| [particle - 1, particle]).collect();
@@ -75,7 +75,7 @@ impl Site {
         });
     }
 
-    /// The next command and who sent it; subscriptions before it are passed over.
+    /// Waits for the next command, and returns it with its client and id. Skips subscriptions.
     fn command(&self) -> (u32, Option<u32>, Command) {
         wait_for("a command", || match self.requests.next(Duration::ZERO)? {
             request if request.ask == Ask::Frame => None,
@@ -86,7 +86,7 @@ impl Site {
         })
     }
 
-    /// Answers a command as a node would that applied it, or one that rejected it.
+    /// Answers a command: applied if `reason` is empty, otherwise rejected.
     fn answer(&self, client: u32, id: Option<u32>, kind: &'static str, reason: &'static str) {
         let mut outcome = OutcomeText::refused(id, kind, reason);
         if reason.is_empty() {
@@ -108,14 +108,14 @@ impl Drop for Site {
     }
 }
 
-/// Particles of which the first one is at `x`.
+/// Particles, the first of them at `x`.
 fn particles(count: usize, x: f32) -> Vec<ParticleState> {
     let mut particles = vec![ParticleState::default(); count];
     particles[0].position[0] = x;
     particles
 }
 
-/// Whether a message on `/particles` has these bits; they are its last field.
+/// Returns true if a message on `/particles` ends with the bits of these particles, its last field.
 fn has_bits(message: &[u8], particles: &[ParticleState]) -> bool {
     message.ends_with(cast_slice::<_, u8>(particles))
 }
@@ -126,7 +126,7 @@ fn parameter(values: &Value, name: &str) -> Value {
 }
 
 #[test]
-fn a_client_gets_the_topics_it_subscribed_to_and_no_others() {
+fn a_client_receives_only_the_topics_that_it_subscribed_to() {
     let mut site = Site::start(options());
     let (mut client, server) = Client::start(&site.url);
     assert_eq!(server["name"], "catenary");
@@ -153,7 +153,7 @@ fn a_client_gets_the_topics_it_subscribed_to_and_no_others() {
     site.show(8, &state);
     let tears = json!({ "step": 8, "constraints": [2, 0], "causes": ["force", "cut"] });
     assert_eq!(client.json(2), tears);
-    // In whatever order the server has for them.
+    // The order of these two is not specified.
     let mut others = BTreeSet::new();
     while others.len() < 2 {
         others.insert(client.binary(|binary| match binary {
@@ -164,7 +164,7 @@ fn a_client_gets_the_topics_it_subscribed_to_and_no_others() {
 }
 
 #[test]
-fn nobody_waits_for_a_state_after_the_last_one_unsubscribed() {
+fn there_is_no_demand_after_the_last_client_unsubscribed() {
     let mut site = Site::start(options());
     assert_eq!(site.hub.demand(1), Demand::default());
     let (mut client, _) = Client::start(&site.url);
@@ -175,14 +175,14 @@ fn nobody_waits_for_a_state_after_the_last_one_unsubscribed() {
     (0..2).for_each(|_| site.wait_for_subscription());
     client.unsubscribe(1);
     drop(other);
-    // What was to be given to them at their coming has to be given up as well.
+    // The initial messages that were due to the clients are dropped as well.
     site.begin(1);
     site.show(0, &particles(1, 0.0));
     wait_for("no demand", || (!site.hub.demand(1).foxglove).then_some(()));
 }
 
 #[test]
-fn services_become_commands_and_are_answered_with_the_outcome() {
+fn a_service_call_becomes_a_command_and_returns_the_outcome() {
     let site = Site::start(options());
     let (mut client, server) = Client::start(&site.url);
     let capabilities: Vec<String> = serde_json::from_value(server["capabilities"].clone()).unwrap();
@@ -222,7 +222,7 @@ fn services_become_commands_and_are_answered_with_the_outcome() {
 }
 
 #[test]
-fn without_permission_nothing_can_be_changed() {
+fn a_client_cannot_change_anything_without_permission() {
     let site = Site::start(FoxgloveOptions { takes_commands: false, ..options() });
     site.set_parameters(Parameters::default());
     let (mut client, server) = Client::start(&site.url);
@@ -246,7 +246,7 @@ fn without_permission_nothing_can_be_changed() {
 }
 
 #[test]
-fn parameters_are_read_set_and_followed() {
+fn a_client_can_read_set_and_subscribe_to_parameters() {
     let site = Site::start(options());
     site.set_parameters(Parameters::default());
     let (mut client, _) = Client::start(&site.url);
@@ -268,7 +268,7 @@ fn parameters_are_read_set_and_followed() {
 }
 
 #[test]
-fn published_commands_reach_the_source_and_drags_end_with_the_client() {
+fn published_commands_reach_the_source_and_grabs_end_with_the_client() {
     let site = Site::start(options());
     let grab = json!({ "kind": "grab", "particle": 3, "target": [0, 1, 2], "over_s": 0.1 });
     let (mut client, _) = Client::start(&site.url);
@@ -292,13 +292,13 @@ fn published_commands_reach_the_source_and_drags_end_with_the_client() {
     other.publish(1, &grab);
     let (other_holder, _, _) = site.command();
     assert_ne!(other_holder, holder);
-    // Torn off, without a farewell.
+    // The connection breaks without a close message.
     drop(other);
     leaves(other_holder);
 }
 
 #[test]
-fn what_is_no_command_is_refused_and_reaches_nobody() {
+fn an_invalid_command_is_refused_and_does_not_reach_the_source() {
     let site = Site::start(options());
     for wrong in [
         json!("pause"),
@@ -338,7 +338,7 @@ fn other_pages_and_other_protocols_are_refused() {
 }
 
 #[test]
-fn another_address_than_loopback_is_refused() {
+fn an_address_other_than_loopback_is_refused() {
     let runtime = Runtime::new().unwrap();
     let hub = Arc::new(Hub::new(Mode::Live).0);
     for address in ["0.0.0.0:0", "[::]:0", "10.1.2.3:8765"] {
@@ -350,20 +350,20 @@ fn another_address_than_loopback_is_refused() {
 }
 
 #[test]
-fn so_many_clients_are_let_in_and_the_next_when_one_has_gone() {
+fn a_client_over_the_limit_is_refused_until_another_disconnects() {
     let site = Site::start(options());
     let mut clients: Vec<_> = (0..CLIENTS_MAX).map(|_| Client::start(&site.url)).collect();
     assert_eq!(connect(&site.url, None).err(), Some(0));
     clients.pop();
-    wait_for("a place", || connect(&site.url, None).ok());
+    wait_for("a free slot", || connect(&site.url, None).ok());
 }
 
 #[test]
-fn who_sends_too_much_is_let_go_and_others_stay() {
+fn a_client_that_sends_too_much_is_disconnected_and_others_stay() {
     let mut site = Site::start(options());
     let (mut other, _) = Client::start(&site.url);
     let (mut long, _) = Client::start(&site.url);
-    // The door may have closed before all of it was sent.
+    // The server may close the connection before all of it is sent.
     let names = vec!["x".repeat(1 << 10); 65];
     long.flood(&json!({ "op": "getParameters", "parameterNames": names }), 1);
     long.read_to_end();
@@ -378,8 +378,8 @@ fn who_sends_too_much_is_let_go_and_others_stay() {
 }
 
 #[test]
-fn a_client_that_takes_nothing_delays_nobody_and_finds_the_newest_state() {
-    // A megabyte a state, far more than sockets hold.
+fn a_client_that_does_not_read_delays_no_other_and_then_receives_the_newest_state() {
+    // One megabyte per state, far more than socket buffers hold.
     const PARTICLES: u32 = 1 << 15;
     const STATES: u32 = 80;
     let mut site = Site::start(options());
@@ -399,11 +399,11 @@ fn a_client_that_takes_nothing_delays_nobody_and_finds_the_newest_state() {
     while !has_bits(&slow.message(1).1, &state) {
         count += 1;
     }
-    assert!(count < STATES, "{count} states were kept for it");
+    assert!(count < STATES, "{count} states were queued");
 }
 
 #[test]
-fn the_playback_of_a_recording_is_told_and_controlled() {
+fn a_client_can_observe_and_control_playback() {
     let second_ns = 1_000_000_000;
     let recording =
         Recording { epoch_ns: 5 * second_ns, rate_hz: 240, first_step: 0, last_step: 480 };

@@ -1,5 +1,5 @@
-//! A client of the Foxglove protocol on a bare WebSocket: it knows the messages from the protocol's
-//! description, and nothing of the library that serves them.
+//! A client of the Foxglove protocol on a plain WebSocket. It is written from the protocol
+//! specification and does not use the library of the server.
 
 use std::collections::VecDeque;
 use std::net::TcpStream;
@@ -10,30 +10,31 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::{HeaderValue, header};
 use tungstenite::{Message, WebSocket};
 
-/// Longest wait for a message.
+/// Limit on the wait for a message.
 const DEADLINE: Duration = Duration::from_mins(1);
 
-/// What comes as bytes.
+/// A binary message from the server.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Binary {
     /// A message on a topic.
     Message { subscription: u32, log_time_ns: u64, payload: Vec<u8> },
-    /// The answer of a service.
+    /// The response of a service.
     Response { call: u32, payload: Value },
-    /// How a recording is played: 0 playing, 1 paused, 3 at its end.
+    /// The state of playback: 0 playing, 1 paused, 3 ended.
     Playback { status: u8, time_ns: u64, speed: f32, did_seek: bool, request: String },
 }
 
-/// A client that is connected.
+/// A connected client.
 pub(crate) struct Client {
     socket: WebSocket<TcpStream>,
-    /// What came while something else was waited for.
+    /// Messages received while waiting for others.
     texts: VecDeque<Value>,
     binaries: VecDeque<Binary>,
     channels: Vec<Value>,
 }
 
-/// Opens a connection as a page of `origin` would, or as a program; the status of a refusal.
+/// Connects as a page of `origin`, or as a program without an origin. Returns the HTTP status if the
+/// server refuses, or 0 if it closes the connection.
 pub(crate) fn connect(url: &str, origin: Option<&str>) -> Result<Client, u16> {
     let host = url.trim_start_matches("ws://");
     let stream = TcpStream::connect(host).unwrap();
@@ -53,13 +54,13 @@ pub(crate) fn connect(url: &str, origin: Option<&str>) -> Result<Client, u16> {
         Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(response))) => {
             Err(response.status().as_u16())
         }
-        // Nobody was there any more to refuse it.
+        // The server closed the connection without an answer.
         Err(_) => Err(0),
     }
 }
 
 impl Client {
-    /// A program that connects, and the server's description of itself.
+    /// Connects as a program, and returns the server info.
     pub(crate) fn start(url: &str) -> (Self, Value) {
         let mut client = connect(url, None).unwrap();
         let server = client.text("serverInfo");
@@ -68,7 +69,7 @@ impl Client {
         (client, server)
     }
 
-    /// What is said of a topic.
+    /// Returns the advertisement of a topic.
     pub(crate) fn channel(&self, topic: &str) -> &Value {
         self.channels.iter().find(|channel| channel["topic"] == topic).unwrap()
     }
@@ -85,7 +86,7 @@ impl Client {
         self.socket.send(Message::binary(bytes)).unwrap();
     }
 
-    /// Subscribes to a topic under that number.
+    /// Subscribes to a topic with a subscription id.
     pub(crate) fn subscribe(&mut self, subscription: u32, topic: &str) {
         let channel = self.channel(topic)["id"].clone();
         let subscriptions = json!([{ "id": subscription, "channelId": channel }]);
@@ -96,7 +97,7 @@ impl Client {
         self.say(&json!({ "op": "unsubscribe", "subscriptionIds": [subscription] }));
     }
 
-    /// Announces that it publishes on a topic, under that number.
+    /// Advertises a topic with a channel id.
     pub(crate) fn advertise(&mut self, channel: u32, topic: &str) {
         let channels = json!([
             { "id": channel, "topic": topic, "encoding": "json", "schemaName": "catenary.Command" }
@@ -115,7 +116,7 @@ impl Client {
         self.say_bytes(bytes);
     }
 
-    /// Calls a service; it is not waited for.
+    /// Calls a service without waiting for the response.
     pub(crate) fn call(&mut self, service: u32, call: u32, request: &Value) {
         let mut bytes = vec![2];
         bytes.extend(service.to_le_bytes());
@@ -126,7 +127,7 @@ impl Client {
         self.say_bytes(bytes);
     }
 
-    /// Asks for another manner of playing. `command`: 0 to play, 1 to pause.
+    /// Controls playback. `command` is 0 to play, 1 to pause.
     pub(crate) fn play(&mut self, command: u8, speed: f32, seek_ns: Option<u64>, request: &str) {
         let mut bytes = vec![3, command];
         bytes.extend(speed.to_le_bytes());
@@ -137,7 +138,7 @@ impl Client {
         self.say_bytes(bytes);
     }
 
-    /// Reads one message into the queues; false at the end of the connection.
+    /// Reads one message into the queues. Returns false at the end of the connection.
     fn read(&mut self) -> bool {
         match self.socket.read() {
             Ok(Message::Text(text)) => self.texts.push_back(serde_json::from_str(&text).unwrap()),
@@ -148,11 +149,11 @@ impl Client {
         true
     }
 
-    /// Says the same so many times, or until the other end has had enough.
+    /// Sends a message `count` times, or until the server closes the connection.
     pub(crate) fn flood(&mut self, message: &Value, count: usize) {
         let text = message.to_string();
-        // An error is what this is about.
-        let _enough = (0..count).try_for_each(|_| self.socket.send(Message::text(text.clone())));
+        // An error means that the server has closed the connection.
+        let _closed = (0..count).try_for_each(|_| self.socket.send(Message::text(text.clone())));
     }
 
     /// Reads to the end of the connection.
@@ -160,7 +161,7 @@ impl Client {
         while self.read() {}
     }
 
-    /// The next text of that kind; those before it are dropped.
+    /// Waits for the next text with an operation, and drops the texts before it.
     pub(crate) fn text(&mut self, op: &str) -> Value {
         loop {
             while let Some(text) = self.texts.pop_front() {
@@ -168,48 +169,48 @@ impl Client {
                     return text;
                 }
             }
-            assert!(self.read(), "the connection ended before {op} came");
+            assert!(self.read(), "the connection ended before {op}");
         }
     }
 
-    /// The next binary message out of which that can be taken; those before it are dropped.
-    pub(crate) fn binary<T>(&mut self, take: impl Fn(Binary) -> Option<T>) -> T {
+    /// Waits for the next binary message that `accept` maps to a value, and drops the messages before it.
+    pub(crate) fn binary<T>(&mut self, accept: impl Fn(Binary) -> Option<T>) -> T {
         loop {
             while let Some(binary) = self.binaries.pop_front() {
-                if let Some(taken) = take(binary) {
-                    return taken;
+                if let Some(value) = accept(binary) {
+                    return value;
                 }
             }
-            assert!(self.read(), "the connection ended before a message came");
+            assert!(self.read(), "the connection ended before a message");
         }
     }
 
-    /// The next message of a subscription: when it was made, and its bytes.
-    pub(crate) fn message(&mut self, of: u32) -> (u64, Vec<u8>) {
+    /// Waits for the next message of a subscription, and returns its log time and payload.
+    pub(crate) fn message(&mut self, id: u32) -> (u64, Vec<u8>) {
         self.binary(|binary| match binary {
-            Binary::Message { subscription, log_time_ns, payload } if subscription == of => {
+            Binary::Message { subscription, log_time_ns, payload } if subscription == id => {
                 Some((log_time_ns, payload))
             }
             _ => None,
         })
     }
 
-    /// The next message of a subscription to a topic with JSON.
-    pub(crate) fn json(&mut self, of: u32) -> Value {
-        serde_json::from_slice(&self.message(of).1).unwrap()
+    /// Waits for the next message of a subscription, and parses it as JSON.
+    pub(crate) fn json(&mut self, id: u32) -> Value {
+        serde_json::from_slice(&self.message(id).1).unwrap()
     }
 
-    /// The answer to a call.
-    pub(crate) fn response(&mut self, of: u32) -> Value {
+    /// Waits for the response to a call.
+    pub(crate) fn response(&mut self, id: u32) -> Value {
         self.binary(|binary| match binary {
-            Binary::Response { call, payload } if call == of => Some(payload),
+            Binary::Response { call, payload } if call == id => Some(payload),
             _ => None,
         })
     }
 }
 
-/// Numbers out of the front of some bytes.
-fn take<const N: usize>(bytes: &mut &[u8]) -> [u8; N] {
+/// Splits `N` bytes off the front of a slice.
+fn split_front<const N: usize>(bytes: &mut &[u8]) -> [u8; N] {
     let (front, rest) = bytes.split_first_chunk().unwrap();
     *bytes = rest;
     *front
@@ -217,26 +218,26 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> [u8; N] {
 
 fn parse(bytes: &[u8]) -> Binary {
     let mut rest = bytes;
-    let [opcode] = take(&mut rest);
+    let [opcode] = split_front(&mut rest);
     match opcode {
         1 => Binary::Message {
-            subscription: u32::from_le_bytes(take(&mut rest)),
-            log_time_ns: u64::from_le_bytes(take(&mut rest)),
+            subscription: u32::from_le_bytes(split_front(&mut rest)),
+            log_time_ns: u64::from_le_bytes(split_front(&mut rest)),
             payload: rest.to_vec(),
         },
         3 => {
-            let _service = u32::from_le_bytes(take(&mut rest));
-            let call = u32::from_le_bytes(take(&mut rest));
-            let encoding = u32::from_le_bytes(take(&mut rest)) as usize;
+            let _service = u32::from_le_bytes(split_front(&mut rest));
+            let call = u32::from_le_bytes(split_front(&mut rest));
+            let encoding = u32::from_le_bytes(split_front(&mut rest)) as usize;
             assert_eq!(&rest[..encoding], b"json");
             Binary::Response { call, payload: serde_json::from_slice(&rest[encoding..]).unwrap() }
         }
         5 => {
-            let [status] = take(&mut rest);
-            let time_ns = u64::from_le_bytes(take(&mut rest));
-            let speed = f32::from_le_bytes(take(&mut rest));
-            let [did_seek] = take(&mut rest);
-            let _size = u32::from_le_bytes(take(&mut rest));
+            let [status] = split_front(&mut rest);
+            let time_ns = u64::from_le_bytes(split_front(&mut rest));
+            let speed = f32::from_le_bytes(split_front(&mut rest));
+            let [did_seek] = split_front(&mut rest);
+            let _size = u32::from_le_bytes(split_front(&mut rest));
             let request = String::from_utf8(rest.to_vec()).unwrap();
             Binary::Playback { status, time_ns, speed, did_seek: did_seek != 0, request }
         }

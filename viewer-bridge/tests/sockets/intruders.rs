@@ -1,4 +1,4 @@
-//! Who is let in: Host and Origin of every request, the token, and the number of pages.
+//! Access control: Host and Origin of every request, the token, and the limit on pages.
 
 use tungstenite::http::{HeaderValue, header};
 
@@ -36,7 +36,7 @@ fn a_foreign_host_is_refused_on_every_path() {
 }
 
 #[test]
-fn every_answer_has_the_headers_that_keep_other_pages_out() {
+fn every_answer_has_the_security_headers() {
     let site = Site::start();
     for (path, status) in [("/", "200"), ("/nothing", "404"), ("/%2e%2e/Cargo.toml", "404")] {
         let host = site.address;
@@ -58,7 +58,7 @@ fn every_answer_has_the_headers_that_keep_other_pages_out() {
 }
 
 #[test]
-fn elsewhere_than_on_loopback_the_token_is_demanded() {
+fn the_token_is_required_on_other_addresses_than_loopback() {
     let site = Site::listen("0.0.0.0:0");
     let token = site.url.split_once("#token=").unwrap().1.to_owned();
     for hello in [
@@ -76,22 +76,22 @@ fn elsewhere_than_on_loopback_the_token_is_demanded() {
 }
 
 #[test]
-fn on_loopback_there_is_no_token() {
+fn there_is_no_token_on_loopback() {
     assert!(!Site::start().url.contains('#'));
 }
 
 #[test]
-fn the_seventeenth_page_is_refused_until_another_one_goes() {
+fn the_seventeenth_page_is_refused_until_another_page_disconnects() {
     let site = Site::start();
     let mut pages: Vec<_> = (0..16).map(|_| site.page()).collect();
     assert_eq!(site.open(site.request(None)).err(), Some(503));
     drop(pages.pop());
     site.wait_for_clients(15);
-    wait_for("a place", || site.open(site.request(None)).ok());
+    wait_for("a free slot", || site.open(site.request(None)).ok());
 }
 
 #[test]
-fn sockets_that_say_nothing_take_no_place() {
+fn silent_sockets_do_not_count_against_the_limit_on_pages() {
     let site = Site::start();
     let silent: Vec<_> = (0..40).map(|_| site.silent_page()).collect();
     let pages: Vec<_> = (0..16).map(|_| site.page()).collect();

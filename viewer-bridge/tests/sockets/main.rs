@@ -1,5 +1,5 @@
-//! The server over real sockets: who is let in, what pages are told, and what becomes of those that
-//! are slow, silent, or talk too much. There is no node: the tests feed the hub themselves.
+//! The server over real sockets: access control, delivery, and clients that are slow, silent or too
+//! talkative. There is no node: the tests feed the hub.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
 mod delivery;

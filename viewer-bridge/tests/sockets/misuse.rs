@@ -1,4 +1,5 @@
-//! Pages that break the rules are told why, and disconnected; nobody else notices.
+//! Misuse: a page that violates the protocol is disconnected with a reason, and other pages are not
+//! affected.
 
 use std::io::Read;
 use std::net::TcpStream;
@@ -12,7 +13,7 @@ use viewer_bridge::source::Ask;
 use crate::support::{Site, filler, wait_for};
 
 #[test]
-fn a_first_message_that_is_no_hello_ends_the_connection() {
+fn a_first_message_other_than_hello_ends_the_connection() {
     let site = Site::start();
     for (text, code) in [
         ("", 4400),
@@ -55,7 +56,7 @@ fn a_message_that_is_too_long_ends_the_connection() {
     let mut other = site.page();
     let mut page = site.page();
     let text = format!(r#"{{"type":"load","scene":"{}"}}"#, "x".repeat(64 << 10));
-    // The server may have closed before all of it was sent.
+    // The server may close the connection before all of it is sent.
     let _sent = page.socket.send(Message::text(text));
     let code = page.close_code();
     assert!(code.is_none_or(|code| code == 1009), "{code:?}");
@@ -69,7 +70,7 @@ fn a_flood_ends_the_connection() {
     let site = Site::start();
     let mut page = site.page();
     for _ in 0..1000 {
-        // The server may have closed already.
+        // The server may have closed the connection already.
         if page.socket.send(Message::text(r#"{"type":"pause"}"#)).is_err() {
             break;
         }
@@ -79,7 +80,7 @@ fn a_flood_ends_the_connection() {
 }
 
 #[test]
-fn a_wrong_number_is_refused_and_the_page_stays() {
+fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
     let site = Site::start();
     let mut page = site.page();
     page.say(r#"{"type":"drag_begin","particle":1,"target":[0,1e8,0],"id":5}"#);
@@ -100,10 +101,9 @@ fn a_wrong_number_is_refused_and_the_page_stays() {
 }
 
 #[test]
-fn who_says_nothing_is_let_go() {
+fn silent_connections_are_closed() {
     let site = Site::start();
-    // One that connects and is silent, one that opens a socket and is silent, and one that came in
-    // and then answers no ping.
+    // A connection without a request, a socket without a message, and a page that answers no pings.
     let mut head = TcpStream::connect(site.address).unwrap();
     let mut silent = site.silent_page();
     let half_open = site.page();
@@ -116,11 +116,11 @@ fn who_says_nothing_is_let_go() {
 }
 
 #[test]
-fn who_leaves_the_reliable_messages_unread_is_let_go_and_others_get_them_all() {
+fn a_page_that_leaves_reliable_messages_unread_is_disconnected_and_others_receive_all() {
     let site = Site::start();
     let mut reader = site.page();
     let _stalled = site.page();
-    // More than the system keeps for a socket that nobody reads, and the queue on top of it.
+    // More than the socket buffers and the queue can hold.
     for _ in 0..1000 {
         site.hub.broadcast_binary(filler(64 << 10));
         while !matches!(reader.next().unwrap(), Message::Binary(_)) {}

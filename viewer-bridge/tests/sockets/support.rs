@@ -1,4 +1,4 @@
-//! A server in this process without a source, and pages that talk to it over real sockets.
+//! A server in this process without a source, and pages that connect to it over real sockets.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -14,17 +14,17 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::{HeaderValue, Request, header};
 use tungstenite::protocol::CloseFrame;
 use tungstenite::{Message, WebSocket};
-use viewer_bridge::assets::Assets;
 use viewer_bridge::message::Mode;
+use viewer_bridge::pages::assets::Assets;
+use viewer_bridge::shown_state::Stage;
 use viewer_bridge::source::Requests;
-use viewer_bridge::stage::Stage;
 use viewer_bridge::wire::{self, FrameHead, Scene, Stamp, decode};
 use viewer_bridge::{Hub, Server, ServerOptions};
 
-/// Longest wait for anything that should happen: generous, because the machine may be busy.
+/// Limit on every wait. It is generous, because the machine may be busy.
 const DEADLINE: Duration = Duration::from_mins(1);
 
-/// A server; it ends with this.
+/// A running server. Dropping it ends the server.
 pub(crate) struct Site {
     pub(crate) hub: Arc<Hub>,
     pub(crate) requests: Requests,
@@ -55,7 +55,7 @@ impl Site {
         Self { hub, requests, address, url, stage: Stage::default(), _runtime: runtime }
     }
 
-    /// What a browser asks for when a page of `origin` opens a socket.
+    /// Returns the request of a browser when a page of `origin` opens a socket.
     pub(crate) fn request(&self, origin: Option<&str>) -> Request<()> {
         let url = format!("ws://{}/socket", self.address);
         let mut request = url.into_client_request().unwrap();
@@ -65,7 +65,7 @@ impl Site {
         request
     }
 
-    /// Opens a socket; the status of the answer if it is refused.
+    /// Opens a socket. Returns the HTTP status if it is refused.
     pub(crate) fn open(&self, request: Request<()>) -> Result<Page, u16> {
         let stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(DEADLINE)).unwrap();
@@ -78,12 +78,12 @@ impl Site {
         }
     }
 
-    /// A socket before its first message.
+    /// Opens a socket that has sent no message yet.
     pub(crate) fn silent_page(&self) -> Page {
         self.open(self.request(None)).unwrap()
     }
 
-    /// A page that was let in, its greeting read.
+    /// Opens a page, and reads the server's `hello`.
     pub(crate) fn page(&self) -> Page {
         let mut page = self.silent_page();
         page.say(r#"{"type":"hello","protocol":1}"#);
@@ -91,24 +91,24 @@ impl Site {
         page
     }
 
-    /// The head of the answer to a request that is sent as it stands.
+    /// Sends a raw request, and returns the head of the answer in lower case.
     pub(crate) fn answer(&self, request: &str) -> String {
         let mut stream = TcpStream::connect(self.address).unwrap();
         stream.set_read_timeout(Some(DEADLINE)).unwrap();
         stream.write_all(request.as_bytes()).unwrap();
         let mut answer = String::new();
-        // A reset after the answer is an end as well.
+        // A connection reset after the answer is fine.
         let _ended = stream.read_to_string(&mut answer);
         answer.split("\r\n\r\n").next().unwrap_or_default().to_lowercase()
     }
 
-    /// Shows a scene of that many particles.
+    /// Shows a scene with `particle_count` particles.
     pub(crate) fn begin(&mut self, particle_count: usize) {
         let scene = Scene { positions: vec![[0.0; 3]; particle_count], ..Scene::default() };
         self.stage.begin(&self.hub, scene);
     }
 
-    /// Shows a frame of that step.
+    /// Shows a frame of a step.
     pub(crate) fn show(&mut self, step: u64, particle_count: usize) {
         let head = FrameHead { stamp: Stamp { epoch: 0, step }, ..FrameHead::default() };
         let particles = vec![ParticleState::default(); particle_count];
@@ -126,7 +126,7 @@ impl Drop for Site {
     }
 }
 
-/// A page.
+/// A connected page.
 pub(crate) struct Page {
     pub(crate) socket: WebSocket<TcpStream>,
 }
@@ -136,12 +136,12 @@ impl Page {
         self.socket.send(Message::text(text)).unwrap();
     }
 
-    /// The next message that is no ping.
+    /// Waits for the next message, except pings and pongs.
     pub(crate) fn next(&mut self) -> Result<Message, tungstenite::Error> {
-        // Pings come for ever.
+        // Pings keep the socket from timing out.
         let end_ns = deadline_ns();
         loop {
-            assert!(monotonic_ns() < end_ns, "waited {DEADLINE:?} in vain for a message");
+            assert!(monotonic_ns() < end_ns, "waited {DEADLINE:?} for a message");
             match self.socket.read()? {
                 Message::Ping(_) | Message::Pong(_) => {}
                 message => return Ok(message),
@@ -149,15 +149,15 @@ impl Page {
         }
     }
 
-    /// The next text; nothing else may come before it.
+    /// Waits for the next message, which must be a text.
     pub(crate) fn text(&mut self) -> Value {
         match self.next().unwrap() {
             Message::Text(text) => serde_json::from_str(&text).unwrap(),
-            other => panic!("no text: {other:?}"),
+            other => panic!("not a text: {other:?}"),
         }
     }
 
-    /// The next binary message, texts before it are passed over.
+    /// Waits for the next binary message, and skips texts.
     pub(crate) fn binary(&mut self) -> wire::Message {
         loop {
             if let Message::Binary(bytes) = self.next().unwrap() {
@@ -166,7 +166,7 @@ impl Page {
         }
     }
 
-    /// The next frame: its step and its number.
+    /// Waits for the next frame, and returns its step and number.
     pub(crate) fn frame(&mut self) -> (u64, u32) {
         loop {
             if let wire::Message::Frame(frame) = self.binary() {
@@ -175,7 +175,7 @@ impl Page {
         }
     }
 
-    /// The next text of a type.
+    /// Waits for the next text of a type.
     pub(crate) fn text_of(&mut self, kind: &str) -> Value {
         loop {
             let text = match self.next().unwrap() {
@@ -188,7 +188,7 @@ impl Page {
         }
     }
 
-    /// Reads to the end; the code that the server closed with, if it said one.
+    /// Reads to the end of the connection. Returns the close code of the server, if there is one.
     pub(crate) fn close_code(&mut self) -> Option<u16> {
         loop {
             match self.next() {
@@ -204,19 +204,19 @@ fn deadline_ns() -> u64 {
     monotonic_ns() + u64::try_from(DEADLINE.as_nanos()).unwrap()
 }
 
-/// Polls until the condition gives a value.
+/// Polls until the condition returns a value.
 pub(crate) fn wait_for<T>(what: &str, mut condition: impl FnMut() -> Option<T>) -> T {
     let end_ns = deadline_ns();
     loop {
         if let Some(value) = condition() {
             return value;
         }
-        assert!(monotonic_ns() < end_ns, "waited {DEADLINE:?} in vain for {what}");
+        assert!(monotonic_ns() < end_ns, "waited {DEADLINE:?} for {what}");
         sleep_until(monotonic_ns() + SECOND_NS / 500);
     }
 }
 
-/// A message of that size that nobody looks into.
+/// A message of a given size with meaningless content.
 pub(crate) fn filler(size_bytes: usize) -> Bytes {
     Bytes::from(vec![0; size_bytes])
 }

@@ -1,29 +1,29 @@
-// The page: makes its parts, joins them, and runs one loop of animation frames.
+// The page: creates its parts, connects them, and runs the animation loop.
 
-import { Banner, sentence } from "./banner.js";
-import { Camera } from "./camera.js";
-import { Charts } from "./charts.js";
-import { Commands } from "./commands.js";
-import { Controls } from "./controls.js";
-import { find } from "./dom.js";
+import { Banner, sentence } from "./ui/banner.js";
+import { Camera } from "./geometry/camera.js";
+import { Charts } from "./panel/charts.js";
+import { Commands } from "./net/commands.js";
+import { Controls } from "./ui/controls.js";
+import { find } from "./ui/dom.js";
 import { Renderer } from "./gl/renderer.js";
-import { Hud } from "./hud.js";
-import { Input } from "./input.js";
-import { parseLink } from "./link.js";
-import { Overlay } from "./overlay.js";
-import { Panel } from "./panel.js";
-import { Connector } from "./socket.js";
-import { Simulation } from "./state.js";
-import { TimelineBar } from "./timeline-bar.js";
-import { viewerOf } from "./viewer.js";
-import { Views } from "./views.js";
+import { Hud } from "./ui/hud.js";
+import { Input } from "./tools/input.js";
+import { parseLink } from "./ui/link.js";
+import { Overlay } from "./ui/overlay.js";
+import { Panel } from "./panel/panel.js";
+import { Connector } from "./net/socket.js";
+import { Simulation } from "./state/simulation.js";
+import { TimelineBar } from "./ui/timeline-bar.js";
+import { createViewer } from "./viewer.js";
+import { Views } from "./ui/views.js";
 
-/** Where the token is kept, so that a reload still has it. */
+/** Key of the token in sessionStorage, so that it survives a reload. */
 const TOKEN_KEY = "catenary-token";
-/** Refusals that say nothing new to the one who caused them. */
+/** Reasons of refusals that are not worth a notice. */
 const QUIET_REASONS = new Set(["already_torn", "not_grabbed", "stale_epoch"]);
 
-/** Everything that went wrong, for tests. @type {string[]} */
+/** Uncaught errors, for tests. @type {string[]} */
 const faults = [];
 addEventListener("error", (event) => faults.push(String(event.message)));
 addEventListener("unhandledrejection", (event) => faults.push(String(event.reason)));
@@ -42,13 +42,13 @@ function openRenderer() {
     return new Renderer(find("picture-canvas", HTMLCanvasElement), simulation, camera, antialias);
   } catch (error) {
     faults.push(String(error));
-    banner.set("fatal", "This browser has no WebGL2, which the picture needs. Another browser, or its hardware acceleration turned on, will show it.");
+    banner.set("fatal", "This page needs WebGL2, which this browser does not provide. Try another browser, or turn on hardware acceleration.");
     return null;
   }
 }
 
-/** The token leaves the address at once: it must not be in a copied link or a picture of the screen. */
-function takeToken() {
+/** Moves the token from the address to sessionStorage, so that it is not in copied links or screenshots. */
+function loadToken() {
   if (link.token !== null) {
     sessionStorage.setItem(TOKEN_KEY, link.token);
     history.replaceState(null, "", location.pathname + location.search);
@@ -59,16 +59,16 @@ function takeToken() {
 /** @param {Renderer} renderer */
 function start(renderer) {
   const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`;
-  const connector = new Connector(url, takeToken(), {
+  const connector = new Connector(url, loadToken(), {
     onBinary: (message) => simulation.receive(message),
     onText: (message) => simulation.receiveText(message),
     onChange: (connection) => {
       banner.set("connection", connection.state === "open" ? "" : connection.text);
       if (connection.state === "waiting" || connection.state === "refused") {
-        commands.forget();
+        commands.clear();
         input.abandon();
         timeline.gate.reset();
-        // The next connection counts its frames anew.
+        // The next connection numbers its frames from the start.
         simulation.frameNumber = null;
       }
     },
@@ -80,12 +80,12 @@ function start(renderer) {
   const commands = new Commands((message) => connector.send(message), (outcome) => {
     if (!QUIET_REASONS.has(outcome.reason)) banner.notify(`${outcome.kind}: ${outcome.text || outcome.reason}`, "warning");
   });
-  const bench = { simulation, camera, renderer, commands };
-  const input = new Input(renderer.canvas, bench, () => controls.canChange());
-  const overlay = new Overlay(find("overlay", HTMLCanvasElement), bench, input);
-  const views = new Views(bench, banner);
+  const app = { simulation, camera, renderer, commands };
+  const input = new Input(renderer.canvas, app, () => controls.canChange());
+  const overlay = new Overlay(find("overlay", HTMLCanvasElement), app, input);
+  const views = new Views(app, banner);
   const timeline = new TimelineBar(simulation, commands);
-  const controls = new Controls(bench, input, views, timeline, banner);
+  const controls = new Controls(app, input, views, timeline, banner);
   const panel = new Panel(find("parameters", HTMLFormElement), find("parameters-note", HTMLElement), simulation, commands);
   new Charts(find("plots", HTMLElement), find("figures", HTMLElement), simulation);
   const hud = new Hud(find("hud", HTMLOutputElement), simulation, renderer);
@@ -113,12 +113,12 @@ function start(renderer) {
   requestAnimationFrame(loop);
   connector.connect();
 
-  Object.defineProperty(window, "viewer", { value: viewerOf({ bench, connector, banner, input, faults, scriptMs: () => scriptMs }) });
+  Object.defineProperty(window, "viewer", { value: createViewer({ app, connector, banner, input, faults, scriptMs: () => scriptMs }) });
 }
 
 /** @param {Input} input */
 function listenToSimulation(input) {
-  simulation.on("outcome", (outcome) => input.bench.commands.receive(outcome));
+  simulation.on("outcome", (outcome) => input.app.commands.receive(outcome));
   simulation.on("notice", ({ text, level }) => banner.notify(text, level));
   simulation.on("node", (node) => banner.set("node", node.state === "alive" || simulation.isReplay ? "" : sentence(node.text || "no node is running")));
   simulation.on("scene", (scene) => {
@@ -127,28 +127,27 @@ function listenToSimulation(input) {
   });
   simulation.on("reset", () => input.abandon());
   simulation.on("frame", (frame) => {
-    const lost = frame.nonFinite.length;
-    const frozen = simulation.stats?.frozenCount ?? 0;
-    banner.set("nonFinite", lost + frozen === 0 ? "" : `${Math.max(lost, frozen)} particles have no finite state and stand still: reset brings them back.`);
-    banner.set("saturated", frame.isSaturated ? "Something has flown far away: it is shown at the border of its box." : "");
+    const count = Math.max(frame.nonFinite.length, simulation.stats?.frozenCount ?? 0);
+    banner.set("nonFinite", count === 0 ? "" : `Frozen particles: ${count}. Their state is no longer finite. Reset restores them.`);
+    banner.set("saturated", frame.isSaturated ? "Some particles are far outside the scene. They are shown at its border." : "");
   });
 }
 
 /** @param {Renderer} renderer @param {Connector} connector */
 function listenToSurroundings(renderer, connector) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  const recolor = () => {
+  const applyScheme = () => {
     renderer.isDark = dark.matches;
     renderer.isDirty = true;
   };
-  dark.addEventListener("change", recolor);
-  recolor();
+  dark.addEventListener("change", applyScheme);
+  applyScheme();
   new ResizeObserver(() => renderer.measure()).observe(renderer.canvas);
-  addEventListener("online", () => connector.hurry());
-  document.addEventListener("visibilitychange", () => { if (!document.hidden) connector.hurry(); });
+  addEventListener("online", () => connector.retryNow());
+  document.addEventListener("visibilitychange", () => { if (!document.hidden) connector.retryNow(); });
   renderer.canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
-    banner.set("context", "The graphics card was taken away: waiting for it to come back.");
+    banner.set("context", "The graphics context was lost. Waiting for the browser to restore it.");
   });
   renderer.canvas.addEventListener("webglcontextrestored", () => {
     renderer.create();
@@ -156,22 +155,22 @@ function listenToSurroundings(renderer, connector) {
   });
 }
 
-/** Does what the address asks for, once it is known what there is. @param {Views} views @param {Controls} controls */
+/** Applies the scene, camera and toggles of the address, once the scene is known. @param {Views} views @param {Controls} controls */
 function followLink(views, controls) {
-  for (const [name, isOn] of Object.entries(link.toggles)) if (name in views.bench.renderer.toggles) views.chosen.set(name, isOn);
-  let wanted = link.scene;
+  for (const [name, isOn] of Object.entries(link.toggles)) if (name in views.app.renderer.toggles) views.chosen.set(name, isOn);
+  let requested = link.scene;
   const isReady = () => simulation.scene !== null && simulation.hello !== null && simulation.node !== null;
   let pose = link.camera;
   const follow = () => {
     if (!isReady()) return;
-    const isOther = wanted !== null && wanted !== simulation.scene?.name && controls.canChange();
-    if (isOther && wanted !== null) controls.load(wanted);
+    const isOther = requested !== null && requested !== simulation.scene?.name && controls.canChange();
+    if (isOther && requested !== null) controls.load(requested);
     else {
       views.linkedPose = pose;
       pose = null;
     }
-    wanted = null;
+    requested = null;
   };
-  // Before the views look at the scene, so that they look from where the link says.
+  // Runs before the first frame of the scene, when the view applies the linked pose.
   simulation.on("scene", follow);
 }

@@ -1,20 +1,20 @@
-// What tests may ask of the page: `window.viewer`. Read-only, but for a picture on demand.
+// `window.viewer`, the interface of the page for tests. It is read-only, but can draw on demand.
 
 /**
  * @typedef {{
- *   bench: import("./tools.js").Bench, connector: import("./socket.js").Connector,
- *   banner: import("./banner.js").Banner, input: import("./input.js").Input, faults: string[],
+ *   app: import("./tools/tool.js").App, connector: import("./net/socket.js").Connector,
+ *   banner: import("./ui/banner.js").Banner, input: import("./tools/input.js").Input, faults: string[],
  *   scriptMs: () => number,
  * }} Parts
  */
 
 /** @param {Parts} parts */
-export function viewerOf({ bench, connector, banner, input, faults, scriptMs }) {
-  const { simulation, camera, renderer, commands } = bench;
+export function createViewer({ app, connector, banner, input, faults, scriptMs }) {
+  const { simulation, camera, renderer, commands } = app;
   const viewer = {
-    /** Step of the newest picture, -1 before the first. */
+    /** Step of the drawn picture, or -1 before the first. */
     get step() { return renderer.stepDrawn; },
-    /** Number of the newest frame that was drawn, -1 before the first. */
+    /** Number of the drawn frame, or -1 before the first. */
     get frame() { return renderer.frameDrawn?.number ?? -1; },
     get framesDrawn() { return renderer.framesDrawn; },
     get epoch() { return simulation.scene?.epoch ?? null; },
@@ -28,16 +28,16 @@ export function viewerOf({ bench, connector, banner, input, faults, scriptMs }) 
     get torn() { return simulation.torn.length; },
     /** Particles that are pinned, grabbed, anchored or frozen, with their flags. */
     get pins() { return [...simulation.pins]; },
-    get held() { return input.tool !== null && "particle" in input.tool ? input.tool.particle : null; },
-    get tool() { return input.mode; },
+    get grabbed() { return input.tool !== null && "particle" in input.tool ? input.tool.particle : null; },
+    get pointerMode() { return input.mode; },
     get toggles() { return { ...renderer.toggles }; },
     get heatMax() { return renderer.heatMax; },
     get renderer() { return renderer.rendererName; },
     get banner() { return banner.text; },
-    get notices() { return [...banner.said]; },
+    get notices() { return [...banner.history]; },
     get faults() { return [...faults]; },
     get unanswered() { return commands.waiting.size; },
-    /** Mean time of the page's own script in an animation frame, without drawing, ms. */
+    /** Mean time of the page's script per animation frame, without drawing, in ms. */
     get scriptMs() { return scriptMs(); },
     get camera() {
       const { viewport } = renderer;
@@ -47,9 +47,9 @@ export function viewerOf({ bench, connector, banner, input, faults, scriptMs }) 
         yaw: camera.yaw, pitch: camera.pitch, isFlat: camera.isFlat,
       };
     },
-    /** Position of a particle in the picture that is drawn. @param {number} particle */
+    /** Position of a particle in the drawn frame. @param {number} particle */
     position: (particle) => simulation.position(particle),
-    /** The CSS pixel of the window that shows a particle, or null. @param {number} particle */
+    /** The CSS pixel of the window at which a particle is drawn, or null. @param {number} particle */
     project(particle) {
       const at = simulation.position(particle);
       const pixel = at === null ? null : camera.project(at, renderer.viewport);
@@ -57,9 +57,9 @@ export function viewerOf({ bench, connector, banner, input, faults, scriptMs }) 
       const box = renderer.canvas.getBoundingClientRect();
       return { x: box.left + pixel.x, y: box.top + pixel.y };
     },
-    /** Draws now; pixels can be read in the same task only. */
+    /** Draws now. Pixels can be read only in the same task. */
     draw() { renderer.draw(); },
-    /** The colours of a rectangle, in CSS pixels of the window, just drawn: rows from the top, RGBA.
+    /** Draws, and returns the colours of a rectangle given in CSS pixels of the window: rows from the top, RGBA.
      * @param {number} x @param {number} y @param {number} width @param {number} height */
     pixels(x, y, width, height) {
       renderer.draw();

@@ -1,16 +1,16 @@
-// The camera: its matrices, rays and drags agree with one another and with pinhole geometry.
+// Camera matrices, rays and plane intersections agree with each other and with pinhole geometry.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera, axesOf } from "../js/camera.js";
-import { addScaled, cross, dot, length, subtract } from "../js/math.js";
+import { Camera, sceneAxes } from "../js/geometry/camera.js";
+import { addScaled, cross, dot, length, subtract } from "../js/geometry/math.js";
 
 const VIEWPORT = { width: 800, height: 500 };
 
 function cameras() {
   const turned = Object.assign(new Camera(), { target: [0.2, 1, -0.3], distance: 4, yaw: 0.7, pitch: -0.3 });
-  const screen = Object.assign(new Camera(), { axes: axesOf("-y", 2), isFlat: true, target: [250, 200, 0], distance: 600, sceneRadius: 300 });
-  const tall = Object.assign(new Camera(), { axes: axesOf("z", 3), yaw: -1.2, pitch: 0.5 });
+  const screen = Object.assign(new Camera(), { axes: sceneAxes("-y", 2), isFlat: true, target: [250, 200, 0], distance: 600, sceneRadius: 300 });
+  const tall = Object.assign(new Camera(), { axes: sceneAxes("z", 3), yaw: -1.2, pitch: 0.5 });
   return { turned, screen, tall };
 }
 
@@ -24,37 +24,37 @@ test("the ray through a projected point passes through the point", () => {
   }
 });
 
-test("a target is in the middle of the picture", () => {
+test("the target is at the centre of the picture", () => {
   for (const camera of Object.values(cameras())) {
     const { x, y } = camera.project(camera.target, VIEWPORT);
     assert.ok(Math.abs(x - 400) < 1e-9 && Math.abs(y - 250) < 1e-9);
   }
 });
 
-test("a drag stays on the plane through the particle that faces the camera, under the pointer", () => {
+test("a grab stays on the camera-facing plane through the particle, under the pointer", () => {
   for (const camera of Object.values(cameras())) {
     const particle = addScaled(camera.target, camera.basis().back, camera.isFlat ? 0 : 0.4);
-    const hit = camera.onPlaneThrough(610, 120, VIEWPORT, particle);
+    const hit = camera.intersectFacingPlane(610, 120, VIEWPORT, particle);
     assert.ok(Math.abs(dot(subtract(hit, particle), camera.basis().back)) < 1e-9 * camera.distance);
     const pixel = camera.project(hit, VIEWPORT);
     assert.ok(Math.abs(pixel.x - 610) < 1e-6 && Math.abs(pixel.y - 120) < 1e-6);
   }
 });
 
-test("in two dimensions a drag keeps z at 0 to the last bit", () => {
+test("in 2-D a grab keeps z at exactly 0", () => {
   const { screen } = cameras();
-  assert.equal(screen.onPlaneThrough(13, 477, VIEWPORT, [0, 0, 0])[2], 0);
+  assert.equal(screen.intersectFacingPlane(13, 477, VIEWPORT, [0, 0, 0])[2], 0);
 });
 
-test("a unit of a pixel is as long as two neighbouring pixels are apart", () => {
+test("unitsPerPixel is the distance between neighbouring pixels", () => {
   for (const camera of Object.values(cameras())) {
-    const a = camera.onPlaneThrough(300, 200, VIEWPORT, camera.target);
-    const b = camera.onPlaneThrough(301, 200, VIEWPORT, camera.target);
+    const a = camera.intersectFacingPlane(300, 200, VIEWPORT, camera.target);
+    const b = camera.intersectFacingPlane(301, 200, VIEWPORT, camera.target);
     assert.ok(Math.abs(length(subtract(a, b)) / camera.unitsPerPixel(camera.target, VIEWPORT) - 1) < 1e-9);
   }
 });
 
-test("what is twice as far is half as big, and in two dimensions as big", () => {
+test("an object at twice the distance appears half as big, and in 2-D equally big", () => {
   const { turned, screen } = cameras();
   const size = (camera, back) => {
     const at = addScaled(camera.target, camera.basis().back, -back);
@@ -66,16 +66,16 @@ test("what is twice as far is half as big, and in two dimensions as big", () => 
   assert.ok(Math.abs(size(screen, 0) / size(screen, 50) - 1) < 1e-9);
 });
 
-test("zooming keeps what is under the pointer there", () => {
+test("zooming keeps the point under the pointer in place", () => {
   for (const camera of Object.values(cameras())) {
-    const at = camera.onPlaneThrough(200, 400, VIEWPORT, camera.target);
+    const at = camera.intersectFacingPlane(200, 400, VIEWPORT, camera.target);
     camera.zoom(1.7, 200, 400, VIEWPORT);
     const pixel = camera.project(at, VIEWPORT);
     assert.ok(Math.abs(pixel.x - 200) < 1e-6 && Math.abs(pixel.y - 400) < 1e-6);
   }
 });
 
-test("panning moves the picture with the pointer", () => {
+test("panning moves the picture along with the pointer", () => {
   for (const camera of Object.values(cameras())) {
     const at = camera.target;
     camera.pan(30, -20, VIEWPORT);
@@ -84,7 +84,7 @@ test("panning moves the picture with the pointer", () => {
   }
 });
 
-test("a framed box is wholly in the picture, wide or tall, and fills most of it", () => {
+test("a framed box fits a wide or tall picture and fills most of it", () => {
   for (const viewport of [VIEWPORT, { width: 390, height: 800 }]) {
     for (const camera of Object.values(cameras())) {
       const box = { min: [-1, 0, -0.5], max: [3, 2, 0.5] };
@@ -101,10 +101,10 @@ test("a framed box is wholly in the picture, wide or tall, and fills most of it"
   }
 });
 
-test("in two dimensions y goes up, or down where the scene says so", () => {
+test("in 2-D y points up, or down if the scene says so", () => {
   const camera = Object.assign(new Camera(), { isFlat: true });
   for (const [up, sign] of [["y", -1], ["-y", 1]]) {
-    camera.axes = axesOf(up, 2);
+    camera.axes = sceneAxes(up, 2);
     const from = camera.project([0, 0, 0], VIEWPORT);
     const to = camera.project([0.1, 0.1, 0], VIEWPORT);
     assert.equal(Math.sign(to.y - from.y), sign);
@@ -112,7 +112,7 @@ test("in two dimensions y goes up, or down where the scene says so", () => {
   }
 });
 
-test("what is behind the eye has no pixel", () => {
+test("a point behind the eye has no pixel", () => {
   const { turned } = cameras();
   assert.equal(turned.project(addScaled(turned.eye(), turned.basis().back, 1), VIEWPORT), null);
 });

@@ -1,20 +1,20 @@
-// What the picture keeps on the graphics card: of one scene, however many were shown before. The
-// context is a stand-in that counts what is created and deleted.
+// The renderer keeps GPU resources for one scene only, however many were shown before. The context is
+// a fake that counts created and deleted objects.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Camera } from "../js/camera.js";
+import { Camera } from "../js/geometry/camera.js";
 import { Renderer } from "../js/gl/renderer.js";
-import { Simulation } from "../js/state.js";
+import { Simulation } from "../js/state/simulation.js";
 
-/** A context that draws nothing: constants are their names, and `live` has how many of each kind there are. */
+/** A context that draws nothing. Constants are their names, and `live` counts the objects of each kind. */
 function countingContext() {
   const live = { Texture: 0, Buffer: 0, VertexArray: 0, Program: 0 };
-  /** Bytes that each buffer holds. */
+  /** Size of each buffer in bytes. */
   const sizes = new Map();
   let bound = null;
   const own = {
-    live, heldBytes: () => [...sizes.values()].reduce((sum, size) => sum + size, 0),
+    live, bufferBytes: () => [...sizes.values()].reduce((sum, size) => sum + size, 0),
     getProgramParameter: (_, name) => (name === "ACTIVE_UNIFORMS" ? 0 : true),
     bindBuffer: (_, buffer) => { bound = buffer; },
     bufferData: (_, data) => sizes.set(bound, data.byteLength),
@@ -36,7 +36,7 @@ function rendererOf(simulation) {
   return { renderer: new Renderer(canvas, simulation, new Camera(), false), gl };
 }
 
-/** A triangle. */
+/** A single triangle. */
 const scene = (epoch) => ({
   kind: "scene", epoch, step: 0, particleCount: 3, constraintCount: 3, triangleCount: 1, isPlanar: false, up: "y",
   positions: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0), ends: Uint32Array.of(0, 1, 1, 2, 2, 0), restLengths: Float32Array.of(1, 1, 1),
@@ -48,7 +48,7 @@ const frame = (epoch, number, isQuantised) => ({
   positions: isQuantised ? new Uint16Array(9) : new Float32Array(9), nonFinite: new Uint32Array(0),
 });
 
-test("scenes of both formats in turn take no more than the first two", () => {
+test("scenes of alternating formats use no more memory than the first two", () => {
   const simulation = new Simulation();
   const { renderer, gl } = rendererOf(simulation);
   const kept = [];
@@ -56,15 +56,15 @@ test("scenes of both formats in turn take no more than the first two", () => {
     simulation.receive(scene(epoch));
     simulation.receive(frame(epoch, epoch, epoch % 2 === 0));
     renderer.upload();
-    kept.push({ ...gl.live, bytes: gl.heldBytes() });
+    kept.push({ ...gl.live, bytes: gl.bufferBytes() });
   }
   assert.equal(kept[0].Texture, 3);
   assert.equal(kept[1].Texture, 3);
-  assert.equal(kept[1].bytes, kept[0].bytes, "lists of a scene that is gone are gone");
+  assert.equal(kept[1].bytes, kept[0].bytes, "the lists of the old scene are freed");
   assert.deepEqual(kept.slice(2), [kept[1], kept[1], kept[1], kept[1]]);
 });
 
-test("a scene of another bridge that has the same number is uploaded", () => {
+test("a scene of another bridge with the same epoch is uploaded", () => {
   const simulation = new Simulation();
   const { renderer } = rendererOf(simulation);
   for (const number of [1, 2]) {

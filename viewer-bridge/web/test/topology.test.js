@@ -1,11 +1,11 @@
-// Which triangles and sticks are left after tears, and that a fan's normal is the triangles' sum.
+// Triangles and sticks after tears, the fans of normals, and how low a scene can hang.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { FAN_WORDS, STICK, Topology, drawnSticks } from "../js/topology.js";
-import { lowestReach, lowestWithin } from "../js/hanging.js";
+import { FAN_WORDS, STICK, Topology, drawnSticks } from "../js/state/topology.js";
+import { lowestReach, lowestWithin } from "../js/state/hanging.js";
 
-/** A sheet of columns x rows, a unit apart, hanging along -y: links right, down, and the diagonal down-right. */
+/** A sheet of columns x rows, one unit apart, hanging along -y. Constraints run right, down, and diagonally down-right. */
 function sheet(columns, rows) {
   const at = (c, r) => r * columns + c;
   const positions = [], ends = [], kinds = [], triangles = [];
@@ -50,7 +50,7 @@ test("every triangle is in the fans of its three corners", () => {
   }
 });
 
-test("a fan knows the rest length to its first corner, and 0 where nothing joins them", () => {
+test("a fan has the rest length to its first corner, or 0 without a constraint", () => {
   const scene = sheet(2, 2);
   scene.constraintKinds.fill(0);
   const topology = new Topology(scene);
@@ -61,20 +61,20 @@ test("a fan knows the rest length to its first corner, and 0 where nothing joins
   assert.equal(bare.fans[2], 0);
 });
 
-test("a torn constraint takes the triangles along it, and no others", () => {
+test("a torn constraint removes the triangles along it and no others", () => {
   const scene = sheet(3, 3);
   const topology = new Topology(scene);
   topology.remove([find(scene, 0, 4)]);
-  assert.equal(live(topology), 6, "both halves of the cell go with its diagonal");
+  assert.equal(live(topology), 6, "both triangles of the cell go with its diagonal");
   topology.remove([find(scene, 7, 8)]);
-  assert.equal(live(topology), 5, "an edge of the border has one triangle");
+  assert.equal(live(topology), 5, "an edge at the border has one triangle");
   for (let t = 0; t < scene.triangleCount; t++) {
     const corners = [...topology.indices.subarray(3 * t, 3 * t + 3)];
     assert.deepEqual(corners, topology.isDead[t] ? [0, 0, 0] : [...scene.triangles.subarray(3 * t, 3 * t + 3)]);
   }
 });
 
-test("a thread whose triangles are gone is a stick again, and a torn one is none", () => {
+test("a constraint whose triangles are gone becomes a stick, and a torn one does not", () => {
   const scene = sheet(2, 2);
   const topology = new Topology(scene);
   const [right, diagonal] = [find(scene, 0, 1), find(scene, 0, 3)];
@@ -88,19 +88,19 @@ test("a thread whose triangles are gone is a stick again, and a torn one is none
   assert.equal(topology.styles[diagonal] & STICK.isGone, 0);
 });
 
-test("what joins a particle without a position is not drawn", () => {
+test("constraints and triangles of a particle without a position are not drawn", () => {
   const topology = new Topology(sheet(3, 3));
   topology.removeAround(Uint32Array.of(4));
-  assert.equal(live(topology), 2, "of eight triangles, six have the middle as a corner");
+  assert.equal(live(topology), 2, "six of the eight triangles have the middle as a corner");
 });
 
-test("sticks are drawn up to a limit, structural ones first and bends never", () => {
+test("sticks are drawn up to a limit, structural first and bend never", () => {
   const scene = sceneOf([0, 0, 0, 1, 0, 0, 2, 0, 0], [0, 2, 0, 1, 1, 2, 0, 1], [2, 1, 0, 3]);
   assert.deepEqual([...drawnSticks(scene, 10)], [2, 1, 3]);
   assert.deepEqual([...drawnSticks(scene, 1)], [2]);
 });
 
-test("a rope held at one end can hang its whole length down", () => {
+test("a rope pinned at one end can hang down by its whole length", () => {
   const count = 11;
   const positions = Array.from({ length: count }, (_, i) => [i * 0.1, 2, 0]).flat();
   const scene = sceneOf(positions, Array.from({ length: count - 1 }, (_, i) => [i, i + 1]).flat(), new Array(count - 1).fill(0));
@@ -108,7 +108,7 @@ test("a rope held at one end can hang its whole length down", () => {
   assert.equal(lowestReach(scene, [], [0, 1, 0]), null);
 });
 
-test("a tight rope held at both ends cannot hang, and one of double length hangs like a V", () => {
+test("a taut rope pinned at both ends cannot sag, and one of double length hangs like a V", () => {
   const count = 11;
   const positions = Array.from({ length: count }, (_, i) => [i * 0.1, 2, 0]).flat();
   const scene = sceneOf(positions, Array.from({ length: count - 1 }, (_, i) => [i, i + 1]).flat(), new Array(count - 1).fill(0));
@@ -118,7 +118,7 @@ test("a tight rope held at both ends cannot hang, and one of double length hangs
   assert.ok(Math.abs(lowestReach(scene, [0, count - 1], [0, 1, 0]) - deepest) < 0.02);
 });
 
-test("two balls meet lowest between their middles, or nowhere", () => {
-  assert.ok(Math.abs(lowestWithin(5, 5, 6, 0) + 4) < 1e-12, "the triangle of sides 3, 4, 5");
+test("two balls intersect lowest between their centres, or nowhere", () => {
+  assert.ok(Math.abs(lowestWithin(5, 5, 6, 0) + 4) < 1e-12, "the triangle with sides 3, 4, 5");
   assert.equal(lowestWithin(1, 1, 3, 0), null);
 });

@@ -1,20 +1,20 @@
-// The bridge's own golden messages, byte for byte, decoded by the page: what Rust encodes and what
-// JavaScript reads cannot drift apart.
+// The page decodes the golden messages of the bridge, so that the Rust encoder and the JavaScript
+// decoder cannot drift apart.
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { decode } from "../js/wire.js";
+import { decode } from "../js/net/wire.js";
 
 const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
 const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders"];
 
-/** An array buffer of its own: a slice of a shared one would begin anywhere. */
+/** Decodes hex into an array buffer that starts at offset 0. */
 const bufferOf = (hex) => Uint8Array.from(hex.match(/../g), (byte) => parseInt(byte, 16)).buffer;
 
 const triples = (flat) => Array.from({ length: flat.length / 3 }, (_, i) => [...flat.subarray(3 * i, 3 * i + 3)]);
 
-/** What each kind of message has to say, in the golden file's words. */
+/** Fields of each kind of message, under the names of the golden file. */
 const readers = {
   scene: (m) => ({
     positions: triples(m.positions), rest_lengths: [...m.restLengths], triangles: triples(m.triangles), kinds: [...m.constraintKinds],
@@ -43,7 +43,7 @@ const readers = {
 };
 
 for (const { name, hex, fields } of golden) {
-  test(`the golden message "${name}" is read as it was written`, () => {
+  test(`the golden message "${name}" decodes to its fields`, () => {
     const message = decode(bufferOf(hex));
     assert.equal(message.kind, KINDS[fields.kind]);
     assert.deepEqual([message.epoch, message.step], [fields.epoch, fields.step]);
@@ -53,7 +53,7 @@ for (const { name, hex, fields } of golden) {
       else if (field === "positions" && message.kind === "frame") compareNumbers(value.flat(), fields.positions.flat());
       else assert.deepEqual(value, fields[field], field);
     }
-    // Nothing that the bridge names is left unread.
+    // The page reads every field that the golden file lists.
     const known = new Set([...Object.keys(read), "epoch", "kind", "step", "lo", "scale"]);
     assert.deepEqual(Object.keys(fields).filter((field) => !known.has(field)), []);
   });
@@ -73,7 +73,7 @@ function compareColliders(read, written) {
   });
 }
 
-test("a kind and a version of a later bridge are passed over", () => {
+test("unknown kinds and versions are ignored", () => {
   const buffer = new ArrayBuffer(16);
   const view = new DataView(buffer);
   view.setUint16(0, 99, true);
@@ -84,14 +84,14 @@ test("a kind and a version of a later bridge are passed over", () => {
   assert.equal(decode(buffer), null);
 });
 
-test("a message that ends too early is refused at every length", () => {
+test("a truncated message is refused at every length", () => {
   for (const { name, hex, fields } of golden) {
     const whole = bufferOf(hex);
     for (const length of [4, 15, 20, Math.floor(whole.byteLength / 2 / 4) * 4, whole.byteLength - 4]) {
       if (length >= whole.byteLength) continue;
-      // The padding behind the last array may be missing.
+      // The padding after the last array may be missing.
       if (length === whole.byteLength - 4 && endsInPadding(fields)) continue;
-      assert.throws(() => decode(whole.slice(0, length)), RangeError, `${name} cut to ${length}`);
+      assert.throws(() => decode(whole.slice(0, length)), RangeError, `${name} truncated to ${length}`);
     }
   }
 });

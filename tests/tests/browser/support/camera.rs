@@ -1,13 +1,13 @@
-//! Where the page shows a point of the scene.
+//! The camera of the page: projects points of the scene to pixels.
 
 use serde_json::Value;
 
-/// How a page looks at the scene.
+/// The projection of a page.
 #[derive(Debug)]
 pub(crate) struct Camera {
-    /// To clip space, column-major.
+    /// From the scene to clip space, column-major.
     matrix: [f64; 16],
-    /// Upper left corner of the picture in the window, and its size, in CSS pixels.
+    /// Upper left corner and size of the picture in the window, in CSS pixels.
     corner: [f64; 2],
     size: [f64; 2],
 }
@@ -22,7 +22,7 @@ impl Camera {
         }
     }
 
-    /// The pixel of the window that shows a point; y goes down.
+    /// Returns the pixel of the window at which a point is drawn; y points down.
     pub(crate) fn project(&self, point: [f32; 3]) -> [f64; 2] {
         let [x, y, z] = point.map(f64::from);
         let row = |r: usize| {
@@ -30,11 +30,11 @@ impl Camera {
             m[r] * x + m[4 + r] * y + m[8 + r] * z + m[12 + r]
         };
         let [right, up] = [row(0) / row(3), row(1) / row(3)];
-        let share = [f64::midpoint(right, 1.0), 1.0 - f64::midpoint(up, 1.0)];
-        [0, 1].map(|axis| self.corner[axis] + share[axis] * self.size[axis])
+        let fraction = [f64::midpoint(right, 1.0), 1.0 - f64::midpoint(up, 1.0)];
+        [0, 1].map(|axis| self.corner[axis] + fraction[axis] * self.size[axis])
     }
 
-    /// The whole picture.
+    /// Returns the area of the whole picture.
     pub(crate) fn area(&self) -> super::Area {
         super::Area {
             x: self.corner[0],
@@ -45,7 +45,7 @@ impl Camera {
     }
 }
 
-/// Distance of two pixels.
+/// Distance between two pixels.
 pub(crate) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }

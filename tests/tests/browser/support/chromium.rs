@@ -1,4 +1,4 @@
-//! The browser: Debian's Chromium, driven by the `DevTools` protocol over a WebSocket on loopback.
+//! Chromium, driven through the `DevTools` protocol over a WebSocket on loopback.
 
 use std::cell::RefCell;
 use std::env;
@@ -16,15 +16,19 @@ use integration_tests::DEADLINE;
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-/// A shell stands between, so that the browser ends with the process of the tests, in whatever way
-/// that ends: its end closes the shell's input. Then the profile, which is `$0`, goes too.
+/// A shell that ends the browser when the test process ends for any reason, because that closes the
+/// shell's input. Then it removes the profile, `$0`.
 const LAUNCH: &str = r#""$@" & read -r _; kill "$!"; wait "$!"; rm -rf -- "$0""#;
 
-/// What Chromium writes before its address.
+/// Prefix of the line in which Chromium prints its address.
 const LISTENING: &str = "DevTools listening on ";
 
-/// No sandbox: tests run as root in containers, and open only a page of our own. Software drawing
-/// of WebGL has to be asked for. Containers have little shared memory, and the node needs it. The last three keep a page at work that nobody looks at.
+/// Command-line flags.
+///
+/// - No sandbox: the tests run as root in containers, and open only our own page.
+/// - Software WebGL is off by default.
+/// - No /dev/shm: containers have little shared memory, and the node needs it.
+/// - The last three keep pages in the background running.
 const FLAGS: [&str; 19] = [
     "--headless",
     "--remote-debugging-port=0",
@@ -47,25 +51,25 @@ const FLAGS: [&str; 19] = [
     "--disable-renderer-backgrounding",
 ];
 
-/// The one browser of this process, for one test at a time: drawing in software takes all cores.
+/// The browser of this process. One test uses it at a time, because software drawing needs all cores.
 static BROWSER: Mutex<Option<Chromium>> = Mutex::new(None);
 
 /// A running browser.
 struct Chromium {
-    /// Its input stays open for as long as the browser is wanted.
+    /// Its open stdin keeps the browser running.
     _shell: Child,
     socket: WebSocket<TcpStream>,
     last_id: u64,
-    /// What sessions were told, until they end.
+    /// Events of all open sessions.
     events: Vec<Value>,
 }
 
-/// The browser while it is this test's.
-pub(crate) struct Turn(RefCell<MutexGuard<'static, Option<Chromium>>>);
+/// Exclusive access to the browser.
+pub(crate) struct BrowserLock(RefCell<MutexGuard<'static, Option<Chromium>>>);
 
-impl Turn {
-    /// Waits until no other test has the browser; starts it if need be.
-    pub(crate) fn take() -> Self {
+impl BrowserLock {
+    /// Waits until no other test uses the browser. Starts it if it is not running.
+    pub(crate) fn acquire() -> Self {
         let mut browser = BROWSER.lock().unwrap_or_else(PoisonError::into_inner);
         if !browser.as_mut().is_some_and(Chromium::is_running) {
             *browser = Some(Chromium::start());
@@ -85,13 +89,13 @@ impl Turn {
         browser.call(session, method, params).map_err(|error| format!("{method}: {error}"))
     }
 
-    /// The same without waiting for the answer.
+    /// Calls a method of a session without waiting for the answer.
     pub(crate) fn post(&self, session: &str, method: &str, params: Value) {
         let mut browser = self.0.borrow_mut();
         browser.as_mut().unwrap().send(Some(session), method, params).unwrap();
     }
 
-    /// What a session was told so far, oldest first.
+    /// Returns the events of a session so far, oldest first.
     pub(crate) fn events(&self, session: &str) -> Vec<Value> {
         let browser = self.0.borrow();
         let events = browser.iter().flat_map(|browser| &browser.events);
@@ -129,7 +133,7 @@ impl Chromium {
         self.call(None, "Browser.getVersion", json!({})).is_ok()
     }
 
-    /// Sends a message, and returns the number of its answer.
+    /// Sends a message, and returns its id, which the answer repeats.
     fn send(&mut self, session: Option<&str>, method: &str, params: Value) -> Result<u64, String> {
         self.last_id += 1;
         let mut message = json!({ "id": self.last_id, "method": method });
@@ -169,37 +173,38 @@ fn text(error: impl Display) -> String {
     error.to_string()
 }
 
-/// Reads lines in a thread of its own, to the end, so that the browser never waits for us.
+/// Reads lines in a separate thread, so that the browser never blocks on a full pipe.
 fn lines(output: ChildStderr) -> Receiver<String> {
     let (sender, lines) = channel();
     thread::spawn(move || {
         for line in BufReader::new(output).lines().map_while(Result::ok) {
-            // Nobody listens once the address is known.
-            let _heard = sender.send(line);
+            // The receiver is dropped once the address is known.
+            let _dropped = sender.send(line);
         }
     });
     lines
 }
 
-/// Where the browser listens: it says so once it does.
+/// Waits for the line with the address of the browser.
 fn address(lines: &Receiver<String>) -> String {
-    let mut said = String::new();
+    let mut output = String::new();
     loop {
-        let Ok(line) = lines.recv_timeout(DEADLINE) else { panic!("no Chromium: {said}") };
+        let Ok(line) = lines.recv_timeout(DEADLINE) else {
+            panic!("Chromium did not start: {output}")
+        };
         if let Some(address) = line.strip_prefix(LISTENING) {
             return address.to_owned();
         }
-        said += &line;
-        said.push('\n');
+        output += &line;
+        output.push('\n');
     }
 }
 
-/// The path of the browser. Without one the tests fail: a check that is passed over is none.
+/// Returns the path of the browser. The tests fail without one: a skipped test would prove nothing.
 fn program() -> PathBuf {
     let folders = env::var_os("PATH").unwrap_or_default();
-    let found = env::split_paths(&folders).map(|folder| folder.join("chromium"));
-    found
-        .into_iter()
+    env::split_paths(&folders)
+        .map(|folder| folder.join("chromium"))
         .find(|path| path.is_file())
-        .expect("these tests drive Chromium, which is not there; Debian: apt-get install chromium")
+        .expect("these tests need Chromium; on Debian: apt-get install chromium")
 }

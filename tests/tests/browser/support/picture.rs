@@ -1,11 +1,11 @@
-//! Pictures as colours of pixels: what is looked for in them are classes of colours, never bytes of
-//! a file, so that another version of the browser gives the same answers.
+//! Pictures as pixel colours. Tests look for classes of colours, never for bytes of a file, so that they
+//! pass with other versions of the browser.
 
 use serde_json::Value;
 
 use super::distance;
 
-/// A part of the window, in CSS pixels, which are those of the screen here.
+/// A rectangle of the window in CSS pixels, which equal device pixels in these tests.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Area {
     pub(crate) x: f64,
@@ -15,7 +15,7 @@ pub(crate) struct Area {
 }
 
 impl Area {
-    /// The square with that middle.
+    /// Returns a square around a point.
     pub(crate) fn around([x, y]: [f64; 2], radius: f64) -> Self {
         Self { x: x - radius, y: y - radius, width: 2.0 * radius, height: 2.0 * radius }
     }
@@ -31,16 +31,16 @@ pub(crate) type Color = [u8; 3];
 /// A rectangle of pixels of the window.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    /// Where its first pixel is in the window.
+    /// Position of the first pixel in the window.
     corner: [f64; 2],
     columns: usize,
     colors: Vec<Color>,
 }
 
 impl Picture {
-    /// `answer`: of `Page.captureScreenshot`.
-    pub(crate) fn of_screenshot(answer: &Value) -> Self {
-        let bytes = bytes_of(answer);
+    /// Decodes the answer of `Page.captureScreenshot`.
+    pub(crate) fn from_screenshot(answer: &Value) -> Self {
+        let bytes = data_bytes(answer);
         let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let frame = reader.next_frame(&mut pixels).unwrap();
@@ -48,8 +48,8 @@ impl Picture {
         Self::new([0.0; 2], frame.width as usize, &pixels[..frame.buffer_size()], channels)
     }
 
-    /// `pixels`: as the page's `viewer.pixels` gives them.
-    pub(crate) fn of_pixels(pixels: &Value, [x, y]: [f64; 2]) -> Self {
+    /// Converts the result of the page's `viewer.pixels`.
+    pub(crate) fn from_pixels(pixels: &Value, [x, y]: [f64; 2]) -> Self {
         let columns: usize = serde_json::from_value(pixels["width"].clone()).unwrap();
         let bytes: Vec<u8> = serde_json::from_value(pixels["data"].clone()).unwrap();
         Self::new([x.round(), y.round()], columns, &bytes, 4)
@@ -60,51 +60,51 @@ impl Picture {
         Self { corner, columns, colors }
     }
 
-    /// The middles of the pixels of a class of colours.
-    fn places(&self, is_meant: impl Fn(Color) -> bool) -> impl Iterator<Item = [f64; 2]> {
+    /// Returns the centres of the pixels of a class of colours.
+    fn centers(&self, matches: impl Fn(Color) -> bool) -> impl Iterator<Item = [f64; 2]> {
         let [left, top] = self.corner;
-        let found = self.colors.iter().enumerate().filter(move |(_, color)| is_meant(**color));
-        found.map(move |(index, _)| {
+        let pixels = self.colors.iter().enumerate().filter(move |(_, color)| matches(**color));
+        pixels.map(move |(index, _)| {
             let (row, column) = (index / self.columns, index % self.columns);
             [left + column as f64 + 0.5, top + row as f64 + 0.5]
         })
     }
 
-    /// How many pixels of an area are of a class of colours.
-    pub(crate) fn count(&self, area: &Area, is_meant: impl Fn(Color) -> bool) -> usize {
-        self.places(is_meant).filter(|place| area.contains(*place)).count()
+    /// Counts the pixels of a class of colours in an area.
+    pub(crate) fn count(&self, area: &Area, matches: impl Fn(Color) -> bool) -> usize {
+        self.centers(matches).filter(|center| area.contains(*center)).count()
     }
 
-    /// The middle of the pixels of a class of colours, of those within `radius` of a place.
+    /// Returns the centroid of the pixels of a class of colours within `radius` of a point.
     pub(crate) fn middle_of(
         &self,
         near: [f64; 2],
         radius: f64,
-        is_meant: impl Fn(Color) -> bool,
+        matches: impl Fn(Color) -> bool,
     ) -> Option<[f64; 2]> {
         let mut sum = [0.0; 2];
         let mut count = 0.0;
-        for place in self.places(is_meant).filter(|place| distance(*place, near) <= radius) {
-            sum = [sum[0] + place[0], sum[1] + place[1]];
+        for center in self.centers(matches).filter(|center| distance(*center, near) <= radius) {
+            sum = [sum[0] + center[0], sum[1] + center[1]];
             count += 1.0;
         }
         (count > 0.0).then(|| sum.map(|one| one / count))
     }
 }
 
-/// The surface's front, in any light: red.
+/// The front of the cloth in any light: red.
 pub(crate) fn is_cloth([red, green, blue]: Color) -> bool {
     let [red, green, blue] = [red, green, blue].map(u32::from);
     red > 70 && red > 2 * green && red > 2 * blue
 }
 
-/// A free particle: dark, and rather blue.
+/// A free particle: dark and bluish.
 pub(crate) fn is_particle([red, green, blue]: Color) -> bool {
     blue > red && green < 120 && blue < 140
 }
 
-/// A particle that a hand holds: orange.
-pub(crate) fn is_held([red, green, blue]: Color) -> bool {
+/// The mark of a grabbed particle: orange.
+pub(crate) fn is_grab_mark([red, green, blue]: Color) -> bool {
     red > 200 && (90..190).contains(&green) && blue < 100
 }
 
@@ -113,11 +113,11 @@ pub(crate) fn is_pin([red, green, blue]: Color) -> bool {
     blue > 170 && red < 120 && green < 160
 }
 
-/// The bytes in the field `data` of an answer, which are in base 64.
-pub(crate) fn bytes_of(answer: &Value) -> Vec<u8> {
+/// Decodes the field `data` of an answer from base64.
+pub(crate) fn data_bytes(answer: &Value) -> Vec<u8> {
     let text = answer["data"].as_str().unwrap_or_default().trim_end_matches('=');
     let mut bytes = Vec::with_capacity(text.len() * 3 / 4);
-    let (mut bits, mut held) = (0_u32, 0);
+    let (mut bits, mut bit_count) = (0_u32, 0);
     for character in text.bytes() {
         let value = match character {
             b'A'..=b'Z' => character - b'A',
@@ -127,10 +127,10 @@ pub(crate) fn bytes_of(answer: &Value) -> Vec<u8> {
             _ => 63,
         };
         bits = bits << 6 | u32::from(value);
-        held += 6;
-        if held >= 8 {
-            held -= 8;
-            bytes.push((bits >> held & 0xff) as u8);
+        bit_count += 6;
+        if bit_count >= 8 {
+            bit_count -= 8;
+            bytes.push((bits >> bit_count & 0xff) as u8);
         }
     }
     bytes

@@ -1,41 +1,41 @@
-//! A bridge that shows a recording, and a page of it: at first no node runs.
+//! The programs of a replay test: a bridge with a recording, and a page. No node runs at first.
 
 use std::rc::Rc;
 
 use integration_tests::{Process, Sandbox, Signal};
 
-use super::chromium::Turn;
-use super::stage::{ANY_PORT, address, start_bridge, start_bridge_at, start_node};
+use super::chromium::BrowserLock;
+use super::rig::{ANY_PORT, address, start_bridge, start_bridge_at, start_node};
 use super::tab::Tab;
 
-/// What a test of a recording drives. It ends in the order of the fields.
-pub(crate) struct Replay {
+/// The programs of a replay test. They end in the order of the fields.
+pub(crate) struct ReplayRig {
     pub(crate) tab: Tab,
     bridge: Process,
-    /// The one that a live bridge shows, once it has come.
+    /// The node of the live bridge, once started.
     node: Option<Process>,
     sandbox: Sandbox,
     url: String,
 }
 
-impl Replay {
-    /// `file`: the recording. `look`: what stands behind the "#" of the address.
-    pub(crate) fn open(sandbox: Sandbox, file: &str, look: &str) -> Self {
-        let turn = Rc::new(Turn::take());
+impl ReplayRig {
+    /// Opens a recording in a page. `fragment` is the part of the address after "#".
+    pub(crate) fn open(sandbox: Sandbox, file: &str, fragment: &str) -> Self {
+        let browser = Rc::new(BrowserLock::acquire());
         let args = ["--listen", ANY_PORT, "--replay", file];
         let (bridge, url) = start_bridge(&sandbox, &args);
-        let tab = Tab::open(&turn, &address(&url, look));
+        let tab = Tab::open(&browser, &address(&url, fragment));
         Self { tab, bridge, node: None, sandbox, url }
     }
 
-    /// Ends the bridge, and waits until the page has knocked in vain.
+    /// Kills the bridge, and waits until the page has failed to reconnect.
     pub(crate) fn end(&self) {
         self.bridge.signal(Signal::KILL);
-        // The browser itself says so in the console.
+        // The browser logs the failed attempt.
         self.tab.expect_error("ERR_CONNECTION_REFUSED");
     }
 
-    /// Starts a node, and a live bridge of it at the address of the bridge that has ended.
+    /// Starts a node, and a live bridge at the address of the killed one.
     pub(crate) fn go_live(&mut self, scene: &str) {
         self.node = Some(start_node(&self.sandbox, &[scene]));
         self.bridge = start_bridge_at(&self.sandbox, &self.url);

@@ -1,4 +1,4 @@
-//! A tab: what a user does with the page and sees of it, and what the page says of itself.
+//! A browser tab: user input, the picture, and the state and errors of the page.
 
 use std::cell::{Cell, RefCell};
 use std::fs;
@@ -10,17 +10,17 @@ use integration_tests::wait_for;
 use serde_json::{Value, json};
 
 use super::camera::Camera;
-use super::chromium::Turn;
+use super::chromium::BrowserLock;
 use super::picture::{Area, Picture};
 
-/// Width and height of the window in CSS pixels: big enough for the panel to be beside the picture.
+/// Width and height of the window in CSS pixels: wide enough for the panel beside the picture.
 const SIZE: [u32; 2] = [800, 600];
-/// The page's state as a failure shows it.
+/// An expression for the state of the page that a failing test prints.
 const STATE: &str = "(({ step, frame, framesDrawn, scene, connection, node, paused, torn, banner, notices, faults, \
     unanswered, renderer }) => ({ step, frame, framesDrawn, scene, connection, node, paused, torn, banner, notices, \
     faults, unanswered, renderer }))(window.viewer ?? {})";
 
-/// A button of the mouse, and its bit among those that are held.
+/// A mouse button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Button {
     None,
@@ -37,6 +37,7 @@ impl Button {
         }
     }
 
+    /// Bit in the mask of pressed buttons.
     fn bit(self) -> u32 {
         match self {
             Self::None => 0,
@@ -46,41 +47,41 @@ impl Button {
     }
 }
 
-/// A tab in a window and with a storage of its own. Dropping it closes it, and fails the test if
-/// the page had errors; if the test is failing, keeps what the page looked like and said.
+/// A tab with its own window and storage. Dropping it closes the tab, and fails the test if the page had
+/// errors. If the test is failing, the picture and the console of the page are saved.
 pub(crate) struct Tab {
-    turn: Rc<Turn>,
+    browser: Rc<BrowserLock>,
     context: String,
     session: String,
-    held: Cell<Button>,
-    /// Beginnings of errors that the test itself causes.
+    pressed: Cell<Button>,
+    /// Parts of errors that the test causes on purpose.
     expected_errors: RefCell<Vec<&'static str>>,
 }
 
 impl Tab {
     /// Opens a page and waits until it has drawn.
-    pub(crate) fn open(turn: &Rc<Turn>, url: &str) -> Self {
-        let tab = Self::blank(turn);
+    pub(crate) fn open(browser: &Rc<BrowserLock>, url: &str) -> Self {
+        let tab = Self::blank(browser);
         tab.call("Page.navigate", json!({ "url": url }));
         tab.wait("window.viewer !== undefined && viewer.frame >= 0");
         tab
     }
 
-    fn blank(turn: &Rc<Turn>) -> Self {
+    fn blank(browser: &Rc<BrowserLock>) -> Self {
         let text = |answer: Value, field: &str| answer[field].as_str().unwrap().to_owned();
-        let browser = |method: &str, params: Value| turn.call(None, method, params).unwrap();
-        let context = text(browser("Target.createBrowserContext", json!({})), "browserContextId");
+        let call = |method: &str, params: Value| browser.call(None, method, params).unwrap();
+        let context = text(call("Target.createBrowserContext", json!({})), "browserContextId");
         let [width, height] = SIZE;
         let target = json!({ "url": "about:blank", "browserContextId": context, "newWindow": true,
             "width": width, "height": height });
-        let target = text(browser("Target.createTarget", target), "targetId");
+        let target = text(call("Target.createTarget", target), "targetId");
         let attach = json!({ "targetId": target, "flatten": true });
-        let session = text(browser("Target.attachToTarget", attach), "sessionId");
+        let session = text(call("Target.attachToTarget", attach), "sessionId");
         let tab = Self {
-            turn: Rc::clone(turn),
+            browser: Rc::clone(browser),
             context,
             session,
-            held: Cell::new(Button::None),
+            pressed: Cell::new(Button::None),
             expected_errors: RefCell::default(),
         };
         for domain in ["Page", "Runtime", "Log", "Audits"] {
@@ -95,20 +96,20 @@ impl Tab {
         tab
     }
 
-    /// Calls a method that has to succeed.
+    /// Calls a method that must succeed.
     pub(crate) fn call(&self, method: &str, params: Value) -> Value {
-        self.turn.call(Some(&self.session), method, params).unwrap()
+        self.browser.call(Some(&self.session), method, params).unwrap()
     }
 
-    /// The value of an expression, or what the promise that it is resolves to.
-    pub(crate) fn ask(&self, expression: &str) -> Value {
-        self.evaluate(expression).unwrap()
+    /// Evaluates an expression, and awaits it if it is a promise.
+    pub(crate) fn evaluate(&self, expression: &str) -> Value {
+        self.try_evaluate(expression).unwrap()
     }
 
-    fn evaluate(&self, expression: &str) -> Result<Value, String> {
+    fn try_evaluate(&self, expression: &str) -> Result<Value, String> {
         let params = json!({ "expression": expression, "returnByValue": true,
             "awaitPromise": true });
-        let mut answer = self.turn.call(Some(&self.session), "Runtime.evaluate", params)?;
+        let mut answer = self.browser.call(Some(&self.session), "Runtime.evaluate", params)?;
         if answer["exceptionDetails"].is_null() {
             Ok(answer["result"]["value"].take())
         } else {
@@ -116,20 +117,20 @@ impl Tab {
         }
     }
 
-    /// The value of an expression that is a number.
+    /// Evaluates an expression that is a number.
     pub(crate) fn number(&self, expression: &str) -> f64 {
-        self.ask(expression).as_f64().unwrap()
+        self.evaluate(expression).as_f64().unwrap()
     }
 
     /// Waits until an expression is true.
     pub(crate) fn wait(&self, condition: &str) {
-        // While a page loads, the answer may be that it is gone.
-        wait_for(condition, || (self.evaluate(condition).ok()? == true).then_some(()));
+        // Evaluation fails while a page loads.
+        wait_for(condition, || (self.try_evaluate(condition).ok()? == true).then_some(()));
     }
 
-    /// Lets the page have so many turns to draw, whether it does or not.
+    /// Waits for `count` animation frames of the page.
     pub(crate) fn pass_animation_frames(&self, count: u32) {
-        self.ask(&format!(
+        self.evaluate(&format!(
             "new Promise(done => {{ \
                 let left = {count}; \
                 const pass = () => left-- > 0 ? requestAnimationFrame(pass) : done(); \
@@ -137,9 +138,9 @@ impl Tab {
         ));
     }
 
-    /// Notes the number and the step of each picture that the page draws from now on.
-    pub(crate) fn note_pictures(&self) {
-        self.ask(
+    /// Starts to log the number and step of each picture that the page draws.
+    pub(crate) fn log_pictures(&self) {
+        self.evaluate(
             "void (() => { \
                 window.pictures = []; \
                 const look = () => { \
@@ -149,46 +150,47 @@ impl Tab {
         );
     }
 
-    /// The noted number and step of each picture after the one of that number, once there is one of
-    /// such a step.
+    /// Waits for a picture of `step` or later. Returns the number and step of each logged picture after
+    /// number `last_number`.
     pub(crate) fn pictures_until(&self, last_number: u64, step: u64) -> Vec<[u64; 2]> {
         self.wait(&format!("pictures.some(([, step]) => step >= {step})"));
-        let mut pictures: Vec<[u64; 2]> = serde_json::from_value(self.ask("pictures")).unwrap();
+        let mut pictures: Vec<[u64; 2]> =
+            serde_json::from_value(self.evaluate("pictures")).unwrap();
         pictures.retain(|[number, _]| *number > last_number);
         pictures
     }
 
-    /// Holds the page's script up, as a long computation does, until it may go on. Returns the
-    /// number of the picture that it then shows.
-    pub(crate) fn stand_still(&self) -> u64 {
-        self.ask(
+    /// Blocks the script of the page, as a long computation does. Returns the number of the picture that
+    /// it shows meanwhile.
+    pub(crate) fn block_script(&self) -> u64 {
+        self.evaluate(
             "void setTimeout(() => { window.stillNumber = viewer.frame; alert(stillNumber); })",
         );
-        wait_for("the page to stand still", || {
-            // Events come with answers; this call asks nothing of the page.
-            self.turn.call(None, "Browser.getVersion", json!({})).unwrap();
-            let events = self.turn.events(&self.session);
+        wait_for("the page to block", || {
+            // Events arrive along with answers; this call does not involve the page.
+            self.browser.call(None, "Browser.getVersion", json!({})).unwrap();
+            let events = self.browser.events(&self.session);
             let opening = events.iter().find(|one| one["method"] == "Page.javascriptDialogOpening");
             opening?["params"]["message"].as_str()?.parse().ok()
         })
     }
 
-    pub(crate) fn go_on(&self) {
+    pub(crate) fn unblock_script(&self) {
         self.call("Page.handleJavaScriptDialog", json!({ "accept": true }));
     }
 
-    /// Hides the page behind another tab of its window. Returns the number of the picture that it
-    /// then has.
+    /// Hides the page behind another tab of its window. Returns the number of the picture that it shows
+    /// then.
     pub(crate) fn hide(&self) -> u64 {
-        // What has the focus is never hidden.
+        // A page with focus is never hidden.
         self.set_focused(false);
         let front = json!({ "url": "about:blank", "browserContextId": self.context });
-        self.turn.call(None, "Target.createTarget", front).unwrap();
+        self.browser.call(None, "Target.createTarget", front).unwrap();
         self.wait("document.hidden");
-        serde_json::from_value(self.ask("viewer.frame")).unwrap()
+        serde_json::from_value(self.evaluate("viewer.frame")).unwrap()
     }
 
-    /// Brings the page to the front again.
+    /// Brings the page back to the front.
     pub(crate) fn show(&self) {
         self.call("Page.bringToFront", json!({}));
         self.set_focused(true);
@@ -201,7 +203,7 @@ impl Tab {
 
     pub(crate) fn press(&self, at: [f64; 2], button: Button) {
         self.mouse("mouseMoved", at, 0);
-        self.held.set(button);
+        self.pressed.set(button);
         self.mouse("mousePressed", at, 1);
     }
 
@@ -209,76 +211,77 @@ impl Tab {
         self.mouse("mouseMoved", at, 0);
     }
 
-    /// Moves in so many equal parts.
+    /// Moves the pointer in `parts` equal parts.
     pub(crate) fn stroke(&self, from: [f64; 2], to: [f64; 2], parts: u32) {
         for part in 1..=parts {
-            let share = f64::from(part) / f64::from(parts);
-            self.move_to([0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * share));
+            let fraction = f64::from(part) / f64::from(parts);
+            self.move_to([0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * fraction));
         }
     }
 
     pub(crate) fn release(&self, at: [f64; 2]) {
         self.mouse("mouseReleased", at, 1);
-        self.held.set(Button::None);
+        self.pressed.set(Button::None);
     }
 
-    /// Moves there and lets go in the motion: the page hears of both at once, however busy it is.
+    /// Moves the pointer and releases the button in motion: the page receives both events together,
+    /// however busy it is.
     pub(crate) fn fling(&self, at: [f64; 2]) {
         for kind in ["mouseMoved", "mouseReleased"] {
             let event = self.mouse_event(kind, at, u32::from(kind == "mouseReleased"));
-            self.turn.post(&self.session, "Input.dispatchMouseEvent", event);
+            self.browser.post(&self.session, "Input.dispatchMouseEvent", event);
         }
-        self.held.set(Button::None);
+        self.pressed.set(Button::None);
     }
 
     pub(crate) fn double_click(&self, at: [f64; 2]) {
-        self.held.set(Button::Left);
+        self.pressed.set(Button::Left);
         for count in [1, 2] {
             self.mouse("mousePressed", at, count);
             self.mouse("mouseReleased", at, count);
         }
-        self.held.set(Button::None);
+        self.pressed.set(Button::None);
     }
 
     fn mouse(&self, kind: &str, at: [f64; 2], clicks: u32) {
         self.call("Input.dispatchMouseEvent", self.mouse_event(kind, at, clicks));
     }
 
-    /// `clicks`: which click of a series it is, 0 for a motion.
+    /// Describes a mouse event. `clicks` is the number of the click in a series, or 0 for a motion.
     fn mouse_event(&self, kind: &str, [x, y]: [f64; 2], clicks: u32) -> Value {
-        let button = self.held.get();
+        let button = self.pressed.get();
         let is_down = kind != "mouseReleased";
         json!({ "type": kind, "x": x, "y": y, "button": button.name(),
             "buttons": if is_down { button.bit() } else { 0 }, "clickCount": clicks })
     }
 
-    /// Clicks the middle of the element of that selector.
+    /// Clicks the centre of the element with a selector.
     pub(crate) fn click(&self, selector: &str) {
-        self.click_within(selector, 0.5);
+        self.click_at(selector, 0.5);
     }
 
-    /// Clicks an element at that part of its width.
-    pub(crate) fn click_within(&self, selector: &str, part: f64) {
-        let place = self.place(selector, part);
-        self.press(place, Button::Left);
-        self.release(place);
+    /// Clicks an element at a fraction of its width.
+    pub(crate) fn click_at(&self, selector: &str, fraction: f64) {
+        let at = self.pixel(selector, fraction);
+        self.press(at, Button::Left);
+        self.release(at);
     }
 
-    /// The pixel at that part of an element's width, in the middle of its height.
-    pub(crate) fn place(&self, selector: &str, part: f64) -> [f64; 2] {
-        let place = format!(
-            "(({{ x, y, width, height }}) => [x + width * {part}, y + height / 2])(document.querySelector({selector:?}).getBoundingClientRect())"
+    /// Returns the pixel at a fraction of the width of an element, at half its height.
+    pub(crate) fn pixel(&self, selector: &str, fraction: f64) -> [f64; 2] {
+        let pixel = format!(
+            "(({{ x, y, width, height }}) => [x + width * {fraction}, y + height / 2])(document.querySelector({selector:?}).getBoundingClientRect())"
         );
-        serde_json::from_value(self.ask(&place)).unwrap()
+        serde_json::from_value(self.evaluate(&pixel)).unwrap()
     }
 
-    /// Puts a finger down, moves it, or with `None` lifts it.
+    /// Presses or moves a finger, or lifts it with `None`.
     pub(crate) fn finger(&self, kind: &str, at: Option<[f64; 2]>) {
         let points: Vec<_> = at.iter().map(|[x, y]| json!({ "x": x, "y": y })).collect();
         self.call("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
     }
 
-    /// Strikes a key that types one character.
+    /// Presses and releases the key of a character.
     pub(crate) fn key(&self, key: char) {
         let key = key.to_string();
         for kind in ["keyDown", "keyUp"] {
@@ -286,35 +289,35 @@ impl Tab {
         }
     }
 
-    /// Strikes the key that pauses, and waits until the page knows that the node has.
+    /// Presses the pause key, and waits until the page knows that the node is paused.
     pub(crate) fn pause(&self) {
         self.key(' ');
         self.wait("viewer.paused && viewer.unanswered === 0");
     }
 
-    /// How the page looks at the scene now.
+    /// Returns the current projection of the page.
     pub(crate) fn camera(&self) -> Camera {
-        let camera = self.ask(
+        let camera = self.evaluate(
             "(({ x, y, width, height }) => ({ matrix: viewer.camera.viewProjection, corner: [x, y], size: [width, height] }))\
              (document.querySelector('#picture-canvas').getBoundingClientRect())",
         );
         Camera::new(&camera)
     }
 
-    /// What the window shows.
+    /// Returns a screenshot of the window.
     pub(crate) fn screenshot(&self) -> Picture {
-        Picture::of_screenshot(&self.call("Page.captureScreenshot", json!({ "format": "png" })))
+        Picture::from_screenshot(&self.call("Page.captureScreenshot", json!({ "format": "png" })))
     }
 
-    /// The drawn picture alone, without what lies over it: a part of the window.
+    /// Returns an area of the drawn picture, without the elements above it.
     pub(crate) fn drawn(&self, Area { x, y, width, height }: Area) -> Picture {
-        let pixels = self.ask(&format!("viewer.pixels({x}, {y}, {width}, {height})"));
-        Picture::of_pixels(&pixels, [x, y])
+        let pixels = self.evaluate(&format!("viewer.pixels({x}, {y}, {width}, {height})"));
+        Picture::from_pixels(&pixels, [x, y])
     }
 
-    /// A number that is the same for the same picture: of all its bytes.
+    /// Returns a hash of all pixels of the picture.
     pub(crate) fn hash(&self) -> Value {
-        self.ask(
+        self.evaluate(
             "(() => { const { x, y, width, height } = document.querySelector('#picture-canvas').getBoundingClientRect(); \
              let hash = 2166136261; \
              for (const byte of viewer.pixels(x, y, width, height).data) hash = Math.imul(hash ^ byte, 16777619); \
@@ -322,49 +325,50 @@ impl Tab {
         )
     }
 
-    /// Waits for an error that has this in its text, and allows such errors in this test.
+    /// Waits for an error that contains a text, and allows such errors in this test.
     pub(crate) fn expect_error(&self, part: &'static str) {
         wait_for(part, || self.errors().iter().any(|error| error.contains(part)).then_some(()));
         self.expected_errors.borrow_mut().push(part);
     }
 
-    /// Everything that went wrong in the page: exceptions, console errors and warnings, what could
-    /// not be loaded, what the policy refused.
+    /// Returns all errors of the page: exceptions, console errors and warnings, failed requests, and
+    /// violations of the content security policy.
     pub(crate) fn errors(&self) -> Vec<String> {
-        let events = self.turn.events(&self.session);
+        let events = self.browser.events(&self.session);
         let mut errors: Vec<_> = events.iter().filter_map(error_in).collect();
-        let faults = self.evaluate("window.viewer?.faults ?? []").unwrap_or_default();
+        let faults = self.try_evaluate("window.viewer?.faults ?? []").unwrap_or_default();
         errors.extend(faults.as_array().into_iter().flatten().map(Value::to_string));
         errors
     }
 
-    /// Keeps what may tell why the test fails.
-    #[allow(clippy::print_stderr, reason = "what a failing test shows")]
-    fn keep(&self) {
+    /// Saves the state, console and picture of the page of a failing test.
+    #[allow(clippy::print_stderr, reason = "the output of a failing test")]
+    fn save(&self) {
         let folder = failures();
-        let state = self.evaluate(STATE).unwrap_or_else(Value::from);
+        let state = self.try_evaluate(STATE).unwrap_or_else(Value::from);
         let console: Vec<_> =
-            self.turn.events(&self.session).iter().map(Value::to_string).collect();
+            self.browser.events(&self.session).iter().map(Value::to_string).collect();
         let text = format!("{state:#}\n\n{}\n", console.join("\n"));
-        let shot = self.turn.call(Some(&self.session), "Page.captureScreenshot", json!({}));
+        let shot = self.browser.call(Some(&self.session), "Page.captureScreenshot", json!({}));
         let name = &self.session[..6.min(self.session.len())];
-        let kept = fs::create_dir_all(&folder)
+        let saved = fs::create_dir_all(&folder)
             .and_then(|()| fs::write(folder.join(format!("{name}.txt")), text));
         if let Ok(shot) = shot {
-            let _ = fs::write(folder.join(format!("{name}.png")), super::picture::bytes_of(&shot));
+            let _ =
+                fs::write(folder.join(format!("{name}.png")), super::picture::data_bytes(&shot));
         }
         eprintln!("--- page: {state}");
-        eprintln!("--- picture and console of the page: {} {kept:?}", folder.display());
+        eprintln!("--- picture and console of the page: {} {saved:?}", folder.display());
     }
 }
 
-/// The folder for what this test leaves when it fails.
+/// Returns the folder for the output of this test if it fails.
 fn failures() -> PathBuf {
     let test = thread::current().name().unwrap_or("test").replace("::", "-");
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("browser").join(test)
 }
 
-/// What an event says of an error, if it is one.
+/// Returns the text of an event if it is an error.
 fn error_in(event: &Value) -> Option<String> {
     let params = &event["params"];
     let is_error = match event["method"].as_str()? {
@@ -385,12 +389,12 @@ impl Drop for Tab {
         let expected = self.expected_errors.borrow();
         errors.retain(|error| !expected.iter().any(|part| error.contains(part)));
         if thread::panicking() {
-            self.keep();
+            self.save();
         }
-        // A browser that has ended needs no closing.
+        // Fails if the browser has ended, which closes the tab too.
         let context = json!({ "browserContextId": self.context });
-        let _ended = self.turn.call(None, "Target.disposeBrowserContext", context);
-        self.turn.forget(&self.session);
+        let _ended = self.browser.call(None, "Target.disposeBrowserContext", context);
+        self.browser.forget(&self.session);
         assert!(errors.is_empty() || thread::panicking(), "the page had errors: {errors:#?}");
     }
 }

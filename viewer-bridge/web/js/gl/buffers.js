@@ -1,25 +1,25 @@
-// What a scene holds on the graphics card: positions, the fans of triangles, the lists of what is
-// drawn. Written when something has changed, and only what has.
+// GPU resources of a scene: positions, triangle fans, and the lists of triangles, sticks and points.
+// Each is uploaded only when it has changed.
 
-import { drawnSticks } from "../topology.js";
+import { drawnSticks } from "../state/topology.js";
 import { ArrayTexture, layouts } from "./context.js";
 import { Cloth } from "./cloth.js";
 import { POINT, Points } from "./points.js";
 import { Sticks } from "./sticks.js";
-import { PIN } from "../wire.js";
+import { PIN } from "../net/wire.js";
 
-/** @typedef {import("../wire.js").Frame} Frame */
-/** @typedef {import("../state.js").Simulation} Simulation */
+/** @typedef {import("../net/wire.js").Frame} Frame */
+/** @typedef {import("../state/simulation.js").Simulation} Simulation */
 
-/** Sticks that are drawn at most: more are a grey carpet, and slow on weak machines. */
+/** Limit on drawn sticks: more merge into grey, and are slow on weak machines. */
 export const STICKS_MAX = 30_000;
-/** Particles that are drawn as balls at most. */
+/** Limit on particles drawn as balls. */
 export const PARTICLES_MAX = 60_000;
 
-const NOTHING = new Uint32Array(0);
+const EMPTY = new Uint32Array(0);
 
-/** Programs by the kind of positions that they read. */
-export class Drawers {
+/** Everything that is drawn from particle positions, for one format of positions. */
+export class Drawables {
   /** @param {WebGL2RenderingContext} gl @param {boolean} isQuantised */
   constructor(gl, isQuantised) {
     this.isQuantised = isQuantised;
@@ -28,34 +28,34 @@ export class Drawers {
     this.points = new Points(gl, isQuantised);
   }
 
-  /** Draws nothing any more, and gives back what the lists of a scene take. */
+  /** Empties all lists, and frees their memory. */
   clear() {
-    this.cloth.setTriangles(NOTHING);
+    this.cloth.setTriangles(EMPTY);
     this.sticks.clear();
-    for (const list of [this.points.particles, this.points.marks, this.points.held]) list.set(NOTHING);
+    for (const list of [this.points.particles, this.points.marks, this.points.grabbed]) list.set(EMPTY);
   }
 }
 
 export class SceneBuffers {
-  /** @param {WebGL2RenderingContext} gl @param {Simulation} simulation @param {Drawers} drawers */
-  constructor(gl, simulation, drawers) {
+  /** @param {WebGL2RenderingContext} gl @param {Simulation} simulation @param {Drawables} drawables */
+  constructor(gl, simulation, drawables) {
     this.gl = gl;
     this.simulation = simulation;
-    this.drawers = drawers;
+    this.drawables = drawables;
     const scene = simulation.scene;
     const topology = simulation.topology;
     if (scene === null || topology === null) throw new Error("no scene to draw");
     this.topology = topology;
-    /** Another bridge may number its scenes alike: the same scene is the same object. */
+    /** Compared by identity: the epochs of two bridges may be equal. */
     this.scene = scene;
-    /** What lies between neighbours: the middle of the rest lengths. */
+    /** Typical distance between neighbours: the median of the rest lengths. */
     this.spacing = medianLength(scene.restLengths, simulation.radius() * 0.5);
     const formats = layouts(gl);
-    this.positions = new ArrayTexture(gl, 0, drawers.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
+    this.positions = new ArrayTexture(gl, 0, drawables.isQuantised ? formats.u16x3 : formats.f32x3, scene.particleCount);
     this.fanRanges = new ArrayTexture(gl, 1, formats.u32x2, scene.particleCount);
     this.fans = new ArrayTexture(gl, 2, formats.u32x4, scene.triangles.length);
     if (scene.particleCount > 0) this.fanRanges.write(topology.fanRanges);
-    drawers.sticks.setSticks(scene, drawnSticks(scene, STICKS_MAX), topology.styles);
+    drawables.sticks.setSticks(scene, drawnSticks(scene, STICKS_MAX), topology.styles);
     this.writeTopology(true);
     this.writeParticles();
     this.writeMarks();
@@ -66,53 +66,53 @@ export class SceneBuffers {
     if (frame.particleCount > 0) this.positions.write(frame.positions);
   }
 
-  /** After a tear: which triangles and sticks are left, and the fans of those that died. @param {boolean} [isAll] */
+  /** Uploads the intact triangles and sticks, and the changed fan entries. @param {boolean} [isAll] */
   writeTopology(isAll = false) {
-    const { topology, drawers, fans } = this;
+    const { topology, drawables, fans } = this;
     const { first, end } = isAll ? { first: 0, end: fans.count } : topology.dirtyFans.range();
     if (end > first) fans.write(topology.fans, first, end);
     topology.dirtyFans.clear();
-    drawers.cloth.setTriangles(topology.indices);
-    if (!isAll) drawers.sticks.setStyles(topology.styles);
+    drawables.cloth.setTriangles(topology.indices);
+    if (!isAll) drawables.sticks.setStyles(topology.styles);
   }
 
-  /** All particles that have a position, those of a big scene up to a limit. */
+  /** Lists the particles that have a position, up to a limit. */
   writeParticles() {
-    const scene = /** @type {import("../wire.js").Scene} */ (this.simulation.scene);
+    const scene = /** @type {import("../net/wire.js").Scene} */ (this.simulation.scene);
     const lost = new Set(Array.from(this.simulation.nonFinite));
     const words = [];
     for (let particle = 0; particle < Math.min(scene.particleCount, PARTICLES_MAX); particle++) {
       if (!lost.has(particle)) words.push(particle, POINT.particle);
     }
-    this.drawers.points.particles.set(new Uint32Array(words));
+    this.drawables.points.particles.set(new Uint32Array(words));
   }
 
-  /** What does not move freely, and why; what hands hold apart from the rest. */
+  /** Lists the marks of particles that are not free. Grabbed particles have their own list. */
   writeMarks() {
-    const { points } = this.drawers;
-    const looks = [...this.simulation.pins].map(([particle, flags]) => [particle, lookOf(flags)]);
-    const isHeld = (/** @type {number[]} */ [, look]) => look === POINT.held;
-    points.marks.set(new Uint32Array(looks.filter((one) => !isHeld(one)).flat()));
-    points.held.set(new Uint32Array(looks.filter(isHeld).flat()));
+    const { points } = this.drawables;
+    const marks = [...this.simulation.pins].map(([particle, flags]) => [particle, markStyle(flags)]);
+    const isGrabbed = (/** @type {number[]} */ [, style]) => style === POINT.grabbed;
+    points.marks.set(new Uint32Array(marks.filter((mark) => !isGrabbed(mark)).flat()));
+    points.grabbed.set(new Uint32Array(marks.filter(isGrabbed).flat()));
   }
 
   delete() {
     for (const texture of [this.positions, this.fanRanges, this.fans]) texture.delete();
-    this.drawers.clear();
+    this.drawables.clear();
   }
 }
 
-/** What holds first, as the node has it: a hand before a pin, a pin before an anchor. @param {number} flags */
-function lookOf(flags) {
+/** The mark of a particle, by the precedence of the node: a grab before a pin, a pin before an anchor. @param {number} flags */
+function markStyle(flags) {
   if (flags & PIN.frozen) return POINT.frozen;
-  if (flags & PIN.grabbed) return POINT.held;
+  if (flags & PIN.grabbed) return POINT.grabbed;
   return flags & PIN.pinned ? POINT.pin : POINT.anchor;
 }
 
 /** @param {Float32Array} lengths @param {number} fallback */
 function medianLength(lengths, fallback) {
   if (lengths.length === 0) return fallback;
-  // A sample is enough for the width of a line.
+  // A sample is accurate enough for the width of a line.
   const sample = lengths.filter((_, index) => index % Math.ceil(lengths.length / 500) === 0).sort();
   return sample[sample.length >> 1];
 }

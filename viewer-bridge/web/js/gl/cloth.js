@@ -1,5 +1,5 @@
-// The surface: two-sided cloth. Its normals are made in the vertex shader from the whole triangles
-// round each particle, so that a tear needs no work on the CPU but to name the triangles that died.
+// The surface: two-sided cloth. The vertex shader computes the normal of a particle from the intact
+// triangles around it, so after a tear the CPU only lists the triangles that are gone.
 
 import { Program } from "./context.js";
 import { HEADER, HEAT, LIGHT, SCREEN, SHADOW, positionReader } from "./shaders.js";
@@ -10,12 +10,12 @@ uniform usampler2D u_fans;
 void main() {
   uint particle = uint(gl_VertexID);
   vec3 at = position(particle);
-  uvec2 range = texelFetch(u_fan_ranges, place(particle), 0).xy;
+  uvec2 range = texelFetch(u_fan_ranges, texel(particle), 0).xy;
   vec3 normal = vec3(0.0);
   float strain = 0.0;
   float edges = 0.0;
   for (uint entry = range.x; entry < range.x + range.y; entry++) {
-    uvec4 fan = texelFetch(u_fans, place(entry), 0);
+    uvec4 fan = texelFetch(u_fans, texel(entry), 0);
     vec3 to_first = position(fan.x) - at;
     normal += cross(to_first, position(fan.y) - at);
     float rest_length = uintBitsToFloat(fan.z);
@@ -57,7 +57,7 @@ void main() {
   bool is_heat = u_heat_max > 0.0;
   if (is_heat) base = heat(v_strain);
   vec3 color = lit(base, v_position, normal, to_eye, is_heat ? 0.2 : 1.0);
-  // A heat map has to be read by its colour: half of it is not shaded.
+  // Shading would distort the colours of the heat map, so about half of it is unshaded.
   o_color = screen(is_heat ? mix(base, color, 0.45) : color, 1.0);
 }
 `;
@@ -88,7 +88,7 @@ export class Cloth {
     this.gl = gl;
     this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
     this.shadow = new Program(gl, shadowVertex(isQuantised), SHADOW_FRAGMENT);
-    for (const program of [this.program, this.shadow]) program.samplers({ u_positions: 0, u_fan_ranges: 1, u_fans: 2 });
+    for (const program of [this.program, this.shadow]) program.setSamplers({ u_positions: 0, u_fan_ranges: 1, u_fans: 2 });
     this.vao = gl.createVertexArray();
     this.indices = gl.createBuffer();
     this.count = 0;

@@ -1,17 +1,17 @@
-// What particles collide with: solids in three dimensions, filled shapes in two.
+// Colliders: solids in 3-D, filled shapes in 2-D.
 
-import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../math.js";
+import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../geometry/math.js";
 import { Program } from "./context.js";
 import { HEADER, LIGHT, SCREEN, SHADOW } from "./shaders.js";
 import { VERTEX_FLOATS, ball, cube, cubeEdges } from "./solids.js";
 
-/** @typedef {import("../math.js").Vec3} Vec3 */
-/** @typedef {import("../wire.js").Collider} Collider */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../net/wire.js").Collider} Collider */
 /** @typedef {Record<string, number | number[]>} Uniforms */
-/** Axes of a solid scaled by its size, where both ends of its axis are, and its axes for normals.
+/** A solid in the scene: `shape` has its axes scaled by its size, `turn` its unit axes for normals, `a` and `b` are the ends of its axis.
  * @typedef {{ solid: "ball" | "cube" | "edges", shape: number[], turn: number[], a: Vec3, b: Vec3 }} Placed */
 
-/** How far half planes go in two dimensions, in radii of the scene. */
+/** Extent of half planes in 2-D, in radii of the scene. */
 const HALF_PLANE_RADII = 200;
 
 const VERTEX = `${HEADER}${SHADOW}
@@ -54,10 +54,10 @@ void main() {
 }
 `;
 
-const STILL = [0, 0, 0, 1];
+const NO_ROTATION = [0, 0, 0, 1];
 const ORIGIN = /** @type {Vec3} */ ([0, 0, 0]);
 
-/** A box with these half edges, turned by a quaternion. @param {Vec3} center @param {Vec3} half @param {number[]} rotation @returns {Placed} */
+/** A box with the given half extents, rotated by a quaternion. @param {Vec3} center @param {Vec3} half @param {number[]} rotation @returns {Placed} */
 function placeBox(center, half, rotation) {
   const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => rotate(rotation, /** @type {Vec3} */ (axis)));
   return {
@@ -74,7 +74,7 @@ function placeCapsule(a, b, radius) {
   return { solid: "ball", a, b, shape: frameOf(scale(u, radius), scale(axis, radius), scale(v, radius), ORIGIN), turn: frameOf(u, axis, v, ORIGIN) };
 }
 
-/** Everything behind a line, as a leaf far bigger than the picture. @param {Vec3} normal @param {number} offset @param {Vec3} near @param {number} size */
+/** The half plane behind a line, as a flat box far bigger than the picture. @param {Vec3} normal @param {number} offset @param {Vec3} near @param {number} size */
 function placeHalfPlane(normal, offset, near, size) {
   const along = /** @type {Vec3} */ ([-normal[1], normal[0], 0]);
   const foot = addScaled(scale(normal, offset), along, near[0] * along[0] + near[1] * along[1]);
@@ -82,15 +82,15 @@ function placeHalfPlane(normal, offset, near, size) {
   return placeBox(addScaled(foot, normal, -size), [size, size, 0], [0, 0, Math.sin(angle / 2), Math.cos(angle / 2)]);
 }
 
-/** The solids that a collider is drawn as; a plane in space is drawn with the ground's shader.
+/** The solids that draw a collider. A plane in 3-D has none: the shader of the ground draws it.
  * @param {Collider} one @param {boolean} isPlanar @param {Vec3} near @param {number} radius of the scene @returns {Placed[]} */
-export function place(one, isPlanar, near, radius) {
+export function placeCollider(one, isPlanar, near, radius) {
   const size = radius * HALF_PLANE_RADII;
   if (one.shape === "box") return [placeBox(one.center, one.halfExtents, one.rotation)];
   if (one.shape === "sphere") return [placeCapsule(one.center, one.center, one.radius)];
   if (one.shape === "capsule") return [placeCapsule(one.a, one.b, one.radius)];
   if (one.shape === "plane") return isPlanar ? [placeHalfPlane(one.normal, one.offset, near, size)] : [];
-  if (!isPlanar) return [{ ...placeBox(scale(add(one.a, one.b), 0.5), scale(subtract(one.b, one.a), 0.5), STILL), solid: "edges" }];
+  if (!isPlanar) return [{ ...placeBox(scale(add(one.a, one.b), 0.5), scale(subtract(one.b, one.a), 0.5), NO_ROTATION), solid: "edges" }];
   return [
     placeHalfPlane([1, 0, 0], one.a[0], near, size), placeHalfPlane([-1, 0, 0], -one.b[0], near, size),
     placeHalfPlane([0, 1, 0], one.a[1], near, size), placeHalfPlane([0, -1, 0], -one.b[1], near, size),

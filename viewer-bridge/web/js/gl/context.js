@@ -1,37 +1,37 @@
-// Opening WebGL2, compiling programs, and textures that hold arrays.
+// WebGL2 basics: opening a context, compiling programs, and textures that hold arrays.
 
 /** @typedef {WebGL2RenderingContext} GL */
 
-/** Texels of a row of an array texture; every WebGL2 device takes this width. */
+/** Texels per row of an array texture; every WebGL2 device supports this width. */
 export const ROW = 1024;
 
 /**
- * The context of a canvas, or null where the browser has none. Opaque: a ground that fades out must
- * show the backdrop, not the page.
+ * Opens the WebGL2 context of a canvas; null if the browser has no WebGL2. The canvas is opaque, because
+ * the ground must fade into the backdrop, not into the page.
  * @param {HTMLCanvasElement} canvas @param {boolean} antialias
  */
 export const openContext = (canvas, antialias) =>
   canvas.getContext("webgl2", { alpha: false, antialias, depth: true, stencil: true, powerPreference: "high-performance" });
 
-/** What draws: for tests, that must know whether it is a software renderer. @param {GL} gl @returns {string} */
+/** Name of the renderer. Tests use it to detect a software renderer. @param {GL} gl @returns {string} */
 export function rendererName(gl) {
   const extension = gl.getExtension("WEBGL_debug_renderer_info");
   return String(gl.getParameter(extension ? extension.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
 }
 
-/** A linked program, with the places of its uniforms looked up once. */
+/** A linked program, with the locations of its uniforms. */
 export class Program {
   /** @param {GL} gl @param {string} vertex @param {string} fragment */
   constructor(gl, vertex, fragment) {
     this.gl = gl;
     this.handle = link(gl, vertex, fragment);
     /** @type {Map<string, WebGLUniformLocation>} */
-    this.places = new Map();
+    this.locations = new Map();
     const count = gl.getProgramParameter(this.handle, gl.ACTIVE_UNIFORMS);
     for (let index = 0; index < count; index++) {
       const uniform = gl.getActiveUniform(this.handle, index);
-      const place = uniform && gl.getUniformLocation(this.handle, uniform.name);
-      if (uniform && place) this.places.set(uniform.name.replace("[0]", ""), place);
+      const location = uniform && gl.getUniformLocation(this.handle, uniform.name);
+      if (uniform && location) this.locations.set(uniform.name.replace("[0]", ""), location);
     }
   }
 
@@ -39,28 +39,28 @@ export class Program {
     this.gl.useProgram(this.handle);
   }
 
-  /** Sets uniforms by the length of their values; a name that the compiler removed is passed over.
+  /** Sets uniforms, choosing the type by the length of the value. Ignores uniforms that the compiler removed.
    * @param {Record<string, number | number[]>} values */
   set(values) {
     const { gl } = this;
     for (const [name, value] of Object.entries(values)) {
-      const place = this.places.get(name);
-      if (place === undefined) continue;
-      if (typeof value === "number") gl.uniform1f(place, value);
-      else if (value.length === 2) gl.uniform2fv(place, value);
-      else if (value.length === 3) gl.uniform3fv(place, value);
-      else if (value.length === 4) gl.uniform4fv(place, value);
-      else if (value.length === 16) gl.uniformMatrix4fv(place, false, value);
-      else gl.uniform3fv(place, value);
+      const location = this.locations.get(name);
+      if (location === undefined) continue;
+      if (typeof value === "number") gl.uniform1f(location, value);
+      else if (value.length === 2) gl.uniform2fv(location, value);
+      else if (value.length === 3) gl.uniform3fv(location, value);
+      else if (value.length === 4) gl.uniform4fv(location, value);
+      else if (value.length === 16) gl.uniformMatrix4fv(location, false, value);
+      else gl.uniform3fv(location, value);
     }
   }
 
-  /** Says which texture unit each sampler reads. @param {Record<string, number>} units */
-  samplers(units) {
+  /** Assigns a texture unit to each sampler. @param {Record<string, number>} units */
+  setSamplers(units) {
     this.use();
     for (const [name, unit] of Object.entries(units)) {
-      const place = this.places.get(name);
-      if (place !== undefined) this.gl.uniform1i(place, unit);
+      const location = this.locations.get(name);
+      if (location !== undefined) this.gl.uniform1i(location, unit);
     }
   }
 }
@@ -83,7 +83,7 @@ function link(gl, vertex, fragment) {
   return program;
 }
 
-/** How a texture stores its texels: internal format, format, type, and numbers in a texel.
+/** Storage of the texels of a texture: internal format, format, type, and components per texel.
  * @typedef {{ internal: number, format: number, type: number, width: number }} Layout */
 
 /** @param {GL} gl @returns {Record<"u16x3" | "f32x3" | "u32x2" | "u32x4", Layout>} */
@@ -94,9 +94,9 @@ export const layouts = (gl) => ({
   u32x4: { internal: gl.RGBA32UI, format: gl.RGBA_INTEGER, type: gl.UNSIGNED_INT, width: 4 },
 });
 
-/** An array in a texture, `ROW` elements a row: what vertex shaders read by index. */
+/** An array in a texture, `ROW` elements per row. Vertex shaders read it by index. */
 export class ArrayTexture {
-  /** @param {GL} gl @param {number} unit that it stays bound to @param {Layout} layout @param {number} count elements */
+  /** @param {GL} gl @param {number} unit texture unit that it stays bound to @param {Layout} layout @param {number} count elements */
   constructor(gl, unit, layout, count) {
     this.gl = gl;
     this.unit = unit;
@@ -116,7 +116,7 @@ export class ArrayTexture {
     this.gl.bindTexture(this.gl.TEXTURE_2D, this.handle);
   }
 
-  /** Writes the elements from `first` to before `end`, whole rows at a time.
+  /** Uploads the elements in first..end, as whole rows.
    * @param {ArrayBufferView} array @param {number} [first] @param {number} [end] */
   write(array, first = 0, end = this.count) {
     this.bind();
@@ -126,7 +126,7 @@ export class ArrayTexture {
     if (fullRows > 0) this.writeRows(array, firstRow, fullRows, ROW);
     const lastRow = firstRow + Math.max(fullRows, 0);
     const rest = this.count - lastRow * ROW;
-    // The last row is not full, and its rest is not in the array.
+    // The array ends within the last row.
     if (end > lastRow * ROW && rest > 0) this.writeRows(array, lastRow, 1, Math.min(rest, ROW));
   }
 

@@ -1,5 +1,5 @@
-// What is behind everything: a soft backdrop, and a ground whose lines are computed for each pixel,
-// so that they neither flicker at the horizon nor end at an edge.
+// The background: a soft backdrop, and a ground. The lines of the ground are computed per pixel, so
+// they neither flicker at the horizon nor end at an edge.
 
 import { Program } from "./context.js";
 import { CORNER, HEADER, SCREEN } from "./shaders.js";
@@ -15,7 +15,7 @@ uniform vec3 u_top;
 uniform vec3 u_bottom;
 void main() {
   vec3 color = mix(u_bottom, u_top, smoothstep(-0.9, 1.0, v_at.y));
-  // A grain of less than one step of 8 bits: wide gradients show no bands.
+  // Noise below one 8-bit step, so that wide gradients show no bands.
   float grain = fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) - 0.5;
   o_color = screen(color, 1.0) + vec4(vec3(grain / 255.0), 0.0);
 }
@@ -35,7 +35,7 @@ void main() {
 }
 `;
 
-/** Two spacings, ten times apart; the finer one fades out before its lines would touch. */
+/** Grid lines at two spacings, a factor of ten apart. The finer ones fade out before they merge. */
 const GROUND_FRAGMENT = `${HEADER}${SCREEN}
 in vec2 v_at;
 uniform vec2 u_shift;

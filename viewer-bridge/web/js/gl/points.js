@@ -1,24 +1,24 @@
-// Particles as small balls, and what holds some of them as discs with a white ring.
+// Particles as small balls; marks of pinned, anchored, grabbed and frozen particles as discs with a white ring.
 
 import { Program } from "./context.js";
 import { HEADER, SCREEN, SHADOW, positionReader } from "./shaders.js";
 
-/** Looks of a point, as the shader numbers them. */
-export const POINT = Object.freeze({ particle: 0, pin: 1, anchor: 2, held: 3, frozen: 4 });
+/** Styles of a point, as the shader numbers them. */
+export const POINT = Object.freeze({ particle: 0, pin: 1, anchor: 2, grabbed: 3, frozen: 4 });
 
-/** Words of a point: particle, look. */
+/** Words of a point: particle, style. */
 const WORDS = 2;
 
 /** @param {boolean} isQuantised */
 const vertex = (isQuantised) => `${HEADER}${SHADOW}
 layout(location = 0) in uint a_particle;
-layout(location = 1) in uint a_look;
+layout(location = 1) in uint a_style;
 uniform mat4 u_view_projection;
 uniform float u_pixels_per_unit;
 uniform float u_radius;
 uniform float u_radius_min;
 uniform float u_forward;
-flat out uint v_look;
+flat out uint v_style;
 flat out float v_diameter;
 out float v_height;
 ${positionReader(isQuantised)}
@@ -26,8 +26,8 @@ void main() {
   vec3 at = position(a_particle);
   vec4 clip = u_view_projection * vec4(at, 1.0);
   float radius = max(u_radius_min, u_radius * u_pixels_per_unit / clip.w);
-  if (a_look != ${POINT.particle}u) radius *= a_look == ${POINT.held}u ? 1.35 : 1.0;
-  v_look = a_look;
+  if (a_style != ${POINT.particle}u) radius *= a_style == ${POINT.grabbed}u ? 1.35 : 1.0;
+  v_style = a_style;
   v_diameter = radius * 2.0 + 1.0;
   v_height = dot(u_ground.xyz, at) - u_ground.w;
   gl_PointSize = v_diameter;
@@ -36,7 +36,7 @@ void main() {
 `;
 
 const FRAGMENT = `${HEADER}${SHADOW}${SCREEN}
-flat in uint v_look;
+flat in uint v_style;
 flat in float v_diameter;
 in float v_height;
 uniform vec3 u_particle;
@@ -54,14 +54,14 @@ void main() {
     return;
   }
   if (alpha < 0.03) discard;
-  if (v_look == ${POINT.particle}u) {
+  if (v_style == ${POINT.particle}u) {
     float up = sqrt(max(0.0, 1.0 - away * away));
     float light = 0.5 + 0.6 * max(0.0, dot(vec3(at.x, -at.y, up), normalize(vec3(-0.4, 0.6, 0.8))));
     o_color = screen(u_particle * mix(1.0, light, u_round * smoothstep(5.0, 9.0, v_diameter)), alpha);
     return;
   }
   float ring = smoothstep(0.62 - soft, 0.62, away);
-  o_color = screen(mix(u_marks[int(v_look) - 1], u_ring, ring), alpha);
+  o_color = screen(mix(u_marks[int(v_style) - 1], u_ring, ring), alpha);
 }
 `;
 
@@ -70,10 +70,10 @@ export class Points {
   constructor(gl, isQuantised) {
     this.gl = gl;
     this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
-    this.program.samplers({ u_positions: 0 });
+    this.program.setSamplers({ u_positions: 0 });
     this.particles = new PointList(gl);
     this.marks = new PointList(gl);
-    this.held = new PointList(gl);
+    this.grabbed = new PointList(gl);
   }
 
   /** @param {PointList} list @param {Record<string, number | number[]>} uniforms */
@@ -104,7 +104,7 @@ export class PointList {
     gl.bindVertexArray(null);
   }
 
-  /** @param {Uint32Array} words particle and look of each point */
+  /** @param {Uint32Array} words particle and style of each point */
   set(words) {
     this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffer);
     this.gl.bufferData(this.gl.ARRAY_BUFFER, words, this.gl.DYNAMIC_DRAW);

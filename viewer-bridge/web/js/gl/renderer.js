@@ -1,27 +1,27 @@
-// The picture: everything in the order that it is drawn in. It asks the simulation what has changed
-// since the last picture, and draws only when something has.
+// Draws the picture, layer by layer. Uploads only what has changed since the last picture, and draws
+// only if something has.
 
-import { add, addScaled, dot, multiply, normalize, scale, shadowOnto, tangents } from "../math.js";
-import { HEAT_STOPS, linear, paletteOf } from "../theme.js";
+import { add, addScaled, dot, multiply, normalize, scale, shadowOnto, tangents } from "../geometry/math.js";
+import { HEAT_STOPS, linear, paletteOf } from "./theme.js";
 import { openContext, rendererName } from "./context.js";
-import { Drawers, SceneBuffers } from "./buffers.js";
-import { Colliders, place } from "./colliders.js";
+import { Drawables, SceneBuffers } from "./buffers.js";
+import { Colliders, placeCollider } from "./colliders.js";
 import { Ground } from "./ground.js";
 
-/** @typedef {import("../math.js").Vec3} Vec3 */
-/** @typedef {import("../state.js").Simulation} Simulation */
-/** @typedef {import("../camera.js").Camera} Camera */
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../state/simulation.js").Simulation} Simulation */
+/** @typedef {import("../geometry/camera.js").Camera} Camera */
 /** @typedef {Record<string, number | number[]>} Uniforms */
 /** @typedef {{ surface: boolean, sticks: boolean, particles: boolean, pins: boolean, heat: boolean, shadow: boolean }} Toggles */
 
-/** Pixels of the screen that a CSS pixel is made of, at most: finer is not seen, and costs the square. */
+/** Limit on device pixels per CSS pixel: the cost grows with the square, and a finer picture looks the same. */
 const PIXEL_RATIO_MAX = 2;
 const HEAT_COLORS = HEAT_STOPS.flatMap((hex) => linear(hex));
-/** Distance of the lamp in radii of the scene. */
+/** Distance of the lamp, in radii of the scene. */
 const LAMP_RADII = 2.6;
-/** Radii of the ground that fades out. */
+/** Size of the ground, in radii of the scene; it fades out towards its edge. */
 const GROUND_RADII = 6;
-/** Scenes of more particles than a body has joints are drawn with thinner sticks. */
+/** Scenes with more particles than a ragdoll are drawn with thinner sticks. */
 const FEW_PARTICLES = 60;
 
 export class Renderer {
@@ -41,10 +41,10 @@ export class Renderer {
     this.toggles = { surface: true, sticks: false, particles: false, pins: true, heat: false, shadow: true };
     this.framesDrawn = 0;
     this.stepDrawn = -1;
-    /** @type {import("../wire.js").Frame | null} */
+    /** @type {import("../net/wire.js").Frame | null} */
     this.frameDrawn = null;
     this.isDirty = true;
-    /** What has changed since it was uploaded. */
+    /** Parts that have changed since they were uploaded. */
     this.stale = { topology: false, particles: false, marks: false, colliders: true };
     this.measure();
     this.create();
@@ -55,14 +55,14 @@ export class Renderer {
     return rendererName(this.gl);
   }
 
-  /** All that lives in the context: again after it was lost. */
+  /** Creates every object of the context: at first, and again after the context was lost. */
   create() {
     this.ground = new Ground(this.gl);
     this.colliders = new Colliders(this.gl);
-    /** By whether they read quantised positions: kept, because compiling takes long. @type {Map<boolean, Drawers>} */
-    this.drawersByFormat = new Map();
-    /** Those of the frame's format. @type {Drawers | null} */
-    this.drawers = null;
+    /** By whether they read quantised positions. Kept for both formats, because compiling is slow. @type {Map<boolean, Drawables>} */
+    this.drawablesByFormat = new Map();
+    /** Those for the format of the frame. @type {Drawables | null} */
+    this.drawables = null;
     /** @type {SceneBuffers | null} */
     this.buffers = null;
     this.frameDrawn = null;
@@ -86,14 +86,14 @@ export class Renderer {
     this.isDirty = true;
   }
 
-  /** Asks for the size of the canvas: when it has changed, because asking can cost a layout. */
+  /** Reads the size of the canvas. Call it only when the size has changed, because reading can force a layout. */
   measure() {
     const { clientWidth, clientHeight } = this.canvas;
     this.viewport = { width: Math.max(1, clientWidth), height: Math.max(1, clientHeight) };
     this.isDirty = true;
   }
 
-  /** Fits the picture to the element; true if it changed. */
+  /** Resizes the drawing buffer to the canvas element. */
   resize() {
     const ratio = Math.min(globalThis.devicePixelRatio || 1, PIXEL_RATIO_MAX);
     const width = Math.round(this.viewport.width * ratio);
@@ -104,7 +104,7 @@ export class Renderer {
     this.isDirty = true;
   }
 
-  /** Draws the newest frame. A readPixels in the same task sees it. */
+  /** Draws the newest frame. readPixels sees it only in the same task. */
   draw() {
     const { gl } = this;
     if (gl.isContextLost()) return;
@@ -122,7 +122,7 @@ export class Renderer {
     this.isDirty = false;
   }
 
-  /** Brings what has changed to the graphics card. */
+  /** Uploads whatever has changed. */
   upload() {
     const { simulation, stale } = this;
     const { frame, scene } = simulation;
@@ -131,11 +131,11 @@ export class Renderer {
       this.buffers = null;
       return;
     }
-    const drawers = this.drawersOf(frame.isQuantised);
-    this.drawers = drawers;
-    if (this.buffers === null || this.buffers.scene !== scene || this.buffers.drawers !== drawers) {
+    const drawables = this.drawablesFor(frame.isQuantised);
+    this.drawables = drawables;
+    if (this.buffers === null || this.buffers.scene !== scene || this.buffers.drawables !== drawables) {
       this.buffers?.delete();
-      this.buffers = new SceneBuffers(this.gl, simulation, drawers);
+      this.buffers = new SceneBuffers(this.gl, simulation, drawables);
       this.frameDrawn = null;
       stale.topology = stale.particles = stale.marks = false;
       stale.colliders = true;
@@ -151,19 +151,19 @@ export class Renderer {
   }
 
   /** @param {boolean} isQuantised */
-  drawersOf(isQuantised) {
-    const drawers = this.drawersByFormat.get(isQuantised) ?? new Drawers(this.gl, isQuantised);
-    this.drawersByFormat.set(isQuantised, drawers);
-    return drawers;
+  drawablesFor(isQuantised) {
+    const drawables = this.drawablesByFormat.get(isQuantised) ?? new Drawables(this.gl, isQuantised);
+    this.drawablesByFormat.set(isQuantised, drawables);
+    return drawables;
   }
 
   /** @param {boolean} isPlanar */
   placeColliders(isPlanar) {
     const { simulation, colliders } = this;
-    if (colliders) colliders.placed = simulation.colliders.flatMap((one) => place(one, isPlanar, this.camera.target, simulation.radius()));
+    if (colliders) colliders.placed = simulation.colliders.flatMap((one) => placeCollider(one, isPlanar, this.camera.target, simulation.radius()));
   }
 
-  /** What all programs may ask for. @returns {Uniforms} */
+  /** The uniforms of all programs. @returns {Uniforms} */
   uniforms() {
     const { camera, simulation, canvas, viewport } = this;
     const palette = paletteOf(this.isDark);
@@ -178,23 +178,23 @@ export class Renderer {
       u_view_projection: multiply(projection, camera.view()),
       u_lo: simulation.frame?.lo ?? [0, 0, 0], u_scale: simulation.frame?.scale ?? [1, 1, 1],
       u_viewport: [canvas.width, canvas.height], u_eye: camera.eye(), u_up: up, u_light: light,
-      // Near enough that a flat cloth is not of one colour; the shadow takes it as far away.
+      // Close enough that a flat cloth is not uniformly lit. The shadow treats the light as distant.
       u_lamp: addScaled(simulation.middle(), light, simulation.radius() * LAMP_RADII),
       u_pixels_per_unit: (projection[5] * canvas.height) / 2, u_near: isFlat ? 0 : camera.distance * 0.02,
       u_sky: palette.sky, u_bounce: palette.bounce, u_key: palette.key,
       u_heat_max: this.toggles.heat ? this.heatMax : 0, u_heat_stops: HEAT_COLORS,
       u_front: palette.front, u_back: palette.back, u_flat: isFlat ? [...palette.flatSurface, 0.85] : [0, 0, 0, 0],
       u_stick: isFlat && hasSurface ? palette.flatStick : palette.stick, u_stick_faint: palette.stickFaint,
-      // A dark ball is not seen on the dark end of the heat map.
+      // A dark ball is invisible on the dark end of the heat map.
       u_particle: this.toggles.heat && this.toggles.surface && hasSurface ? palette.ring : palette.particle, u_ring: palette.ring, u_collider: palette.collider,
-      u_marks: [...palette.pin, ...palette.anchor, ...palette.held, ...palette.frozen],
+      u_marks: [...palette.pin, ...palette.anchor, ...palette.grabbed, ...palette.frozen],
       u_round: 1, u_opacity: 1, u_forward: 0, u_shadow: 0, u_is_all: 1,
       u_ground: ground ? [...ground.normal, ground.offset] : [...up, -1e9],
       ...this.sizes(ratio, hasSurface, isFlat),
     };
   }
 
-  /** Radii of sticks: part of what is between particles, but never thinner than can be seen.
+  /** Radii of sticks and points: a fraction of the spacing between particles, but always visible.
    * @param {number} ratio @param {boolean} hasSurface @param {boolean} isFlat @returns {Uniforms} */
   sizes(ratio, hasSurface, isFlat) {
     const { simulation } = this;
@@ -212,11 +212,11 @@ export class Renderer {
 
   /** @param {Uniforms} uniforms */
   drawSurroundings(uniforms) {
-    const { gl, ground: drawer, simulation } = this;
+    const { gl, ground, simulation } = this;
     const palette = paletteOf(this.isDark);
     gl.disable(gl.DEPTH_TEST);
     gl.depthMask(false);
-    drawer?.drawBackdrop({ u_top: palette.backdropTop, u_bottom: palette.backdropBottom });
+    ground?.drawBackdrop({ u_top: palette.backdropTop, u_bottom: palette.backdropBottom });
     if (simulation.ground !== null && !simulation.scene?.isPlanar) {
       this.drawPlane(simulation.ground, uniforms, this.camera.target);
       if (this.toggles.shadow) this.drawShadows(simulation.ground, uniforms);
@@ -224,8 +224,8 @@ export class Renderer {
     gl.depthMask(true);
   }
 
-  /** A plane as a fading piece of ground, its lines at round numbers of the scene.
-   * @param {import("../state.js").Plane} plane @param {Uniforms} uniforms @param {Vec3} near */
+  /** Draws a plane as a patch of ground that fades out, with grid lines at round coordinates.
+   * @param {import("../state/simulation.js").Plane} plane @param {Uniforms} uniforms @param {Vec3} near */
   drawPlane(plane, uniforms, near) {
     const palette = paletteOf(this.isDark);
     const size = Math.max(this.simulation.radius(), this.camera.distance * 0.4) * GROUND_RADII;
@@ -240,8 +240,8 @@ export class Renderer {
     });
   }
 
-  /** Each pixel of the ground is darkened once, however many things are over it: the stencil counts.
-   * @param {import("../state.js").Plane} plane @param {Uniforms} uniforms */
+  /** Draws shadows onto the ground. The stencil buffer makes sure that each pixel is darkened only once.
+   * @param {import("../state/simulation.js").Plane} plane @param {Uniforms} uniforms */
   drawShadows(plane, uniforms) {
     const { gl } = this;
     const eye = /** @type {Vec3} */ (uniforms.u_eye);
@@ -255,15 +255,15 @@ export class Renderer {
     gl.stencilFunc(gl.EQUAL, 0, 0xff);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
     this.colliders?.draw(shadow);
-    if (this.toggles.surface) this.drawers?.cloth.drawShadow(shadow);
-    // The flattening matrix multiplies w by its last number: sizes in pixels are divided by w.
+    if (this.toggles.surface) this.drawables?.cloth.drawShadow(shadow);
+    // The flattening matrix scales w by its last element, and sizes in pixels are divided by w.
     this.drawSticks({ ...shadow, u_pixels_per_unit: /** @type {number} */ (uniforms.u_pixels_per_unit) * flattened[15] });
     gl.disable(gl.STENCIL_TEST);
   }
 
   /** @param {Uniforms} uniforms */
   drawSolid(uniforms) {
-    const { gl, simulation, drawers } = this;
+    const { gl, simulation, drawables } = this;
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     this.colliders?.draw(uniforms);
@@ -274,20 +274,20 @@ export class Renderer {
       this.drawPlane(one, uniforms, this.camera.target);
       gl.depthMask(true);
     }
-    if (this.buffers === null || drawers === null) return;
-    if (this.toggles.surface) drawers.cloth.draw(uniforms);
+    if (this.buffers === null || drawables === null) return;
+    if (this.toggles.surface) drawables.cloth.draw(uniforms);
     this.drawSticks({ ...uniforms, u_forward: 4e-4, u_opacity: this.hasSurface() ? 0.75 : 1 });
     this.drawPoints({ ...uniforms, u_forward: 1.2e-3 });
   }
 
-  /** In two dimensions the later is in front: nothing has a depth. @param {Uniforms} uniforms */
+  /** Draws a 2-D scene without a depth test: later layers cover earlier ones. @param {Uniforms} uniforms */
   drawFlat(uniforms) {
-    const { gl, drawers } = this;
+    const { gl, drawables } = this;
     const palette = paletteOf(this.isDark);
     gl.disable(gl.DEPTH_TEST);
     this.colliders?.draw({ ...uniforms, u_flat: [...palette.collider, 0.55] });
-    if (this.buffers === null || drawers === null) return;
-    if (this.toggles.surface) drawers.cloth.draw(uniforms);
+    if (this.buffers === null || drawables === null) return;
+    if (this.toggles.surface) drawables.cloth.draw(uniforms);
     this.drawSticks({ ...uniforms, u_round: 0.35 });
     this.drawPoints({ ...uniforms, u_round: 0.6 });
   }
@@ -295,21 +295,21 @@ export class Renderer {
   /** @param {Uniforms} uniforms */
   drawSticks(uniforms) {
     const isAll = this.toggles.sticks || !this.hasSurface() || !this.toggles.surface;
-    this.drawers?.sticks.draw({ ...uniforms, u_is_all: isAll ? 1 : 0 });
+    this.drawables?.sticks.draw({ ...uniforms, u_is_all: isAll ? 1 : 0 });
   }
 
   /** @param {Uniforms} uniforms */
   drawPoints(uniforms) {
-    const { drawers, toggles } = this;
-    if (drawers === null) return;
+    const { drawables, toggles } = this;
+    if (drawables === null) return;
     const particles = { ...uniforms, u_radius: uniforms.u_point_radius, u_radius_min: uniforms.u_point_min };
-    if (toggles.particles) drawers.points.draw(drawers.points.particles, particles);
+    if (toggles.particles) drawables.points.draw(drawables.points.particles, particles);
     const marks = { ...particles, u_radius_min: uniforms.u_mark_min, u_forward: /** @type {number} */ (uniforms.u_forward) * 2 };
     if (!toggles.pins) return;
-    drawers.points.draw(drawers.points.marks, marks);
-    // What a hand holds is seen through the fold that it has gone behind.
+    drawables.points.draw(drawables.points.marks, marks);
+    // A grabbed particle stays visible behind a fold.
     this.gl.disable(this.gl.DEPTH_TEST);
-    drawers.points.draw(drawers.points.held, marks);
+    drawables.points.draw(drawables.points.grabbed, marks);
   }
 
   hasSurface() {

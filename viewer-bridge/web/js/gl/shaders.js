@@ -1,24 +1,24 @@
-// What all programs share: reading a particle's position by its index, the heat ramp, the light.
+// GLSL shared by all programs: particle positions by index, the heat ramp, lighting.
 
-import { HEAT_STOPS } from "../theme.js";
+import { HEAT_STOPS } from "./theme.js";
 
-/** Both stages of a program need the same precisions, or it does not link. */
+/** Both stages of a program need equal precisions, or the program does not link. */
 export const HEADER = `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
 `;
 
-/** position(particle), for frames of 16-bit integers or of floats. @param {boolean} isQuantised */
+/** Defines position(particle), for positions as 16-bit integers or as floats. @param {boolean} isQuantised */
 export const positionReader = (isQuantised) => `
 uniform highp ${isQuantised ? "usampler2D" : "sampler2D"} u_positions;
 uniform vec3 u_lo;
 uniform vec3 u_scale;
-ivec2 place(uint index) { return ivec2(int(index & 1023u), int(index >> 10u)); }
-vec3 position(uint particle) { return u_lo + u_scale * vec3(texelFetch(u_positions, place(particle), 0).xyz); }
+ivec2 texel(uint index) { return ivec2(int(index & 1023u), int(index >> 10u)); }
+vec3 position(uint particle) { return u_lo + u_scale * vec3(texelFetch(u_positions, texel(particle), 0).xyz); }
 `;
 
-/** heat(strain): the colour of a strain; u_heat_max is the strain at the end of the ramp, 0 for no heat map. */
+/** Defines heat(strain), the colour of a strain. u_heat_max is the strain at the end of the ramp; 0 turns the heat map off. */
 export const HEAT = `
 uniform float u_heat_max;
 uniform vec3 u_heat_stops[${HEAT_STOPS.length}];
@@ -29,7 +29,7 @@ vec3 heat(float strain) {
 }
 `;
 
-/** lit(base, at, normal, to_eye, sheen): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim. */
+/** Defines lit(base, at, normal, to_eye, sheen): a soft sky, one key light with a wrapped edge, light through thin cloth, a rim. */
 export const LIGHT = `
 uniform vec3 u_up;
 uniform vec3 u_lamp;
@@ -49,17 +49,17 @@ vec3 lit(vec3 base, vec3 at, vec3 normal, vec3 to_eye, float sheen) {
 }
 `;
 
-/** To the screen: linear light becomes sRGB. */
+/** Defines screen(color, alpha): converts linear light to sRGB. */
 export const SCREEN = `
 out vec4 o_color;
 vec4 screen(vec3 color, float alpha) { return vec4(pow(clamp(color, 0.0, 1.0), vec3(1.0 / 2.2)), alpha); }
 `;
 
-/** What casts a shadow gives its height over the ground; what is under it casts none. */
+/** Uniforms of the shadow pass. Anything below the ground casts no shadow. */
 export const SHADOW = `
 uniform vec4 u_ground;
 uniform float u_shadow;
 `;
 
-/** A quad over the whole picture, or any other, from gl_VertexID 0..=3 as a strip. */
+/** Defines corner(): a corner of a quad, from gl_VertexID 0..=3 of a triangle strip. */
 export const CORNER = "vec2 corner() { return vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0; }\n";

@@ -1,14 +1,13 @@
-// The two solids that colliders are drawn with: a ball in two halves that can be pulled apart into a
-// capsule, and a cube.
+// The meshes of colliders: a ball in two halves, which the shader separates into a capsule, and a cube.
 
-/** Numbers of a vertex: position 3, normal 3, and which end of the axis it belongs to, 0 or 1. */
+/** Floats per vertex: position 3, normal 3, and the end of the axis that the vertex belongs to, 0 or 1. */
 export const VERTEX_FLOATS = 7;
 const SECTORS = 40;
 const RINGS_OF_HALF = 10;
 
 /** @typedef {{ vertices: Float32Array, indices: Uint16Array }} Solid */
 
-/** The unit ball about y; the equator stands twice, once for each half. @returns {Solid} */
+/** The unit ball with its axis along y. The equator occurs twice, once per half. @returns {Solid} */
 export function ball() {
   /** @type {number[]} */
   const vertices = [];
@@ -34,7 +33,7 @@ export function ball() {
   return { vertices: new Float32Array(vertices), indices: new Uint16Array(indices) };
 }
 
-/** The cube from -1 to 1, four corners a face. @returns {Solid} */
+/** The cube from -1 to 1, with four corners per face. @returns {Solid} */
 export function cube() {
   /** @type {number[]} */
   const vertices = [];
@@ -58,7 +57,7 @@ export function cube() {
   return { vertices: new Float32Array(vertices), indices: new Uint16Array(indices) };
 }
 
-/** Pairs of corners of the cube from -1 to 1: its edges. */
+/** The edges of the cube from -1 to 1, as pairs of corners. */
 export function cubeEdges() {
   /** @type {number[]} */
   const ends = [];

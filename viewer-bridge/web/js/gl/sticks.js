@@ -1,15 +1,15 @@
-// Constraints as sticks: one instanced quad each, wide enough for a capsule in the picture, because
-// lines of WebGL are one pixel wide everywhere.
+// Constraints as sticks. Each is one instanced quad around a capsule on the screen, because WebGL lines
+// are only one pixel wide.
 
-import { STICK } from "../topology.js";
+import { STICK } from "../state/topology.js";
 import { Program } from "./context.js";
 import { CORNER, HEADER, HEAT, SCREEN, SHADOW, positionReader } from "./shaders.js";
 
-/** Words of an instance: two ends, rest length as f32 bits, style. */
+/** Words per instance: two ends, rest length as f32 bits, style. */
 const WORDS = 4;
 
-/** Ends in pixels, and the quad round them. Positions are divided by w here, so that everything is
- * interpolated straight across the picture. An end behind the eye is moved to just before it. @param {boolean} isQuantised */
+/** Computes the ends in pixels, and the quad around them. Divides by w here, so that interpolation is
+ * linear on the screen. Clips an end behind the eye to the near plane. @param {boolean} isQuantised */
 const vertex = (isQuantised) => `${HEADER}${SHADOW}${CORNER}
 layout(location = 0) in uvec2 a_ends;
 layout(location = 1) in float a_rest_length;
@@ -86,7 +86,7 @@ void main() {
   }
   if (alpha < 0.03) discard;
   vec3 base = u_heat_max > 0.0 ? heat(v_strain) : v_kind == 0u ? u_stick : u_stick_faint;
-  // A thick one looks like a rod: darker towards its edges.
+  // A thick stick is shaded like a rod: darker towards its edges.
   float edge = clamp(away / max(radius, 1e-3), 0.0, 1.0);
   float rod = mix(1.0, 0.45 + 0.65 * sqrt(1.0 - edge * edge), u_round * smoothstep(1.5, 4.0, radius));
   o_color = screen(base * rod, alpha * u_opacity);
@@ -98,15 +98,15 @@ export class Sticks {
   constructor(gl, isQuantised) {
     this.gl = gl;
     this.program = new Program(gl, vertex(isQuantised), FRAGMENT);
-    this.program.samplers({ u_positions: 0 });
+    this.program.setSamplers({ u_positions: 0 });
     this.vao = gl.createVertexArray();
     this.buffer = gl.createBuffer();
-    /** Constraints in the order of the instances. */
+    /** Constraints, in the order of the instances. */
     this.drawn = /** @type {Uint32Array} */ (new Uint32Array(0));
     this.words = new Uint32Array(0);
   }
 
-  /** @param {import("../wire.js").Scene} scene @param {Uint32Array} drawn @param {Uint8Array} styles */
+  /** @param {import("../net/wire.js").Scene} scene @param {Uint32Array} drawn @param {Uint8Array} styles */
   setSticks(scene, drawn, styles) {
     const { gl } = this;
     this.drawn = drawn;

@@ -1,0 +1,8 @@
+//! The subcommands, one file each.
+
+pub(crate) mod export;
+pub(crate) mod info;
+pub(crate) mod play;
+pub(crate) mod record;
+pub(crate) mod simulate;
+pub(crate) mod verify;

@@ -1,0 +1,346 @@
+//! From a recording to pictures: the drawn shapes, equal output for equal input, and incomplete
+//! recordings.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Cursor;
+use std::ops::ControlFlow;
+
+use clap::Parser;
+use recorder::{Closing, LogOptions, LogWriter, Message, RunDescription, StepRow};
+use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
+use sim_solver::Solver;
+
+use super::*;
+use crate::export::scene_state::SceneState;
+use crate::export::shape::{Picture, Shape};
+use crate::export::{png, svg};
+use crate::simulation::{Job, simulate};
+
+/// A square of cloth in front of a sphere and above a floor, with a pinned particle at its side.
+const TINY: &str = r#"
+    version = 1
+    name = "tiny"
+    [[collider]]
+    shape = "sphere"
+    center = [0.5, -0.5, 0.0]
+    radius = 0.5
+    [[collider]]
+    shape = "plane"
+    normal = [0, 1, 0]
+    offset = -1.05
+    [[particle]]
+    position = [2.0, 0.0, 0.0]
+    pinned = true
+    [[constraint]]
+    particles = [0, 2]
+    [[constraint]]
+    particles = [0, 4]
+    kind = "tether"
+    [[generate]]
+    shape = "cloth"
+    columns = 2
+    rows = 2
+    spacing = 1.0
+    origin = [0.0, 0.0, 0.0]
+    links = ["structural", "shear", "bend"]
+"#;
+
+fn run_at(rate_hz: u32) -> RunDescription {
+    RunDescription {
+        run_id: 1,
+        epoch_ns: 0,
+        scene_name: "tiny".to_owned(),
+        origin: [0.0; 3],
+        rate_hz,
+        method: 0,
+        particle_count: 0,
+        constraint_count: 0,
+        solver_version: 1,
+        contract_version: 1,
+        recorder_version: "0.1.0".to_owned(),
+    }
+}
+
+fn record(scene: &str, steps: u64) -> Vec<u8> {
+    let job = Job { scene: Scene::from_toml(scene, "test").unwrap(), commands: Vec::new(), steps };
+    let (solver, toml) = (Solver::new(&job.scene), job.scene.to_toml());
+    let run = job.description(&solver);
+    let options = LogOptions { chunk_size_bytes: 2000, ..LogOptions::default() };
+    let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
+    simulate(&job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    log.finish(&Closing::default()).unwrap()
+}
+
+const STYLE: Style =
+    Style { size: Size { width: 160, height: 120 }, view: Some(View::Front), bend: Bend::Draw };
+
+fn pictures(file: &[u8], steps: &[u64], style: Style) -> Vec<Picture> {
+    let open = || LogReader::new(file);
+    let survey = Survey::read(open().unwrap(), "test.mcap").unwrap();
+    let renderer = renderer(open, &survey, steps, style).unwrap();
+    let mut pictures = Vec::new();
+    visit_states(open().unwrap(), steps, |state| {
+        pictures.push(renderer.draw(state, survey.time_s(state.row.step)));
+        Ok(ControlFlow::Continue(()))
+    })
+    .unwrap();
+    pictures
+}
+
+#[test]
+fn a_tiny_scene_is_drawn_from_back_to_front() {
+    let picture = &pictures(&record(TINY, 0), &[0], STYLE)[0];
+    insta::assert_snapshot!(svg::encode(picture));
+}
+
+#[test]
+fn the_same_recording_gives_the_same_bytes() {
+    let file = record(TINY, 40);
+    let draw = |view| {
+        let style = Style { view, ..STYLE };
+        let pictures = pictures(&file, &[0, 20, 40], style);
+        let pngs: Vec<_> = pictures.iter().map(|picture| png::encode(picture).unwrap()).collect();
+        (pictures.iter().map(svg::encode).collect::<Vec<_>>(), pngs)
+    };
+    let (svgs, pngs) = draw(None);
+    assert_eq!(draw(None), (svgs.clone(), pngs.clone()));
+    assert!(svgs[0] != svgs[2] && pngs[0] != pngs[2], "nothing moves");
+}
+
+#[test]
+fn a_png_has_the_size_that_was_asked_for_and_several_colors() {
+    let bytes = png::encode(&pictures(&record(TINY, 0), &[0], STYLE)[0]).unwrap();
+    let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let frame = reader.next_frame(&mut pixels).unwrap();
+    assert_eq!((frame.width, frame.height), (160, 120));
+    let mut counts = BTreeMap::new();
+    for pixel in pixels[..frame.buffer_size()].chunks_exact(4) {
+        *counts.entry(pixel).or_insert(0) += 1;
+    }
+    assert!(counts.len() > 10, "{} colors", counts.len());
+    assert!(counts.values().all(|count| *count < 160 * 120 * 9 / 10));
+}
+
+/// Four particles in a square, two triangles with the edges 0-1, 1-2, 2-0 and 1-3, 3-2, and a
+/// diagonal of another kind across.
+fn square() -> SceneState {
+    let places = [[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+    let constraint =
+        |(a, b, kind)| ConstraintState { a, b, rest_length: 1.0, compliance: 0.0, kind };
+    let edges = [(0, 1, 0), (0, 2, 0), (1, 3, 0), (2, 3, 0), (1, 2, 1)];
+    SceneState {
+        particles: places
+            .map(|position| ParticleState { position, ..ParticleState::default() })
+            .to_vec(),
+        constraints: edges.map(constraint).to_vec(),
+        is_torn: vec![false; edges.len()],
+        triangles: [[0, 1, 2], [1, 3, 2]].map(|corners| Triangle { corners }).to_vec(),
+        ..SceneState::default()
+    }
+}
+
+fn draw(state: &SceneState) -> Picture {
+    let mut tracker = ExtentTracker::default();
+    tracker.add(state);
+    let (extent, size) = (tracker.extent(), STYLE.size);
+    let camera = Camera::fit(Basis::new(View::Front, Up::Y), &extent, size);
+    let scene_name = "square".to_owned();
+    Renderer { camera, extent, size, bend: Bend::Draw, scene_name }.draw(state, 0.0)
+}
+
+/// Returns the numbers of polygons, lines and dots.
+fn counts(picture: &Picture) -> [usize; 3] {
+    let count = |is: fn(&Shape) -> bool| picture.shapes.iter().filter(|shape| is(shape)).count();
+    [
+        count(|shape| matches!(shape, Shape::Polygon { .. })),
+        count(|shape| matches!(shape, Shape::Segment { .. })),
+        count(|shape| matches!(shape, Shape::Circle { .. })),
+    ]
+}
+
+#[test]
+fn torn_constraints_and_triangles_with_a_torn_structural_edge_are_left_out() {
+    let mut state = square();
+    assert_eq!(counts(&draw(&state)), [2, 5, 4]);
+    state.is_torn[4] = true;
+    assert_eq!(counts(&draw(&state)), [2, 4, 4], "shear makes no hole");
+    state.is_torn[2] = true;
+    assert_eq!(counts(&draw(&state)), [1, 3, 4]);
+    state.is_torn[0] = true;
+    assert_eq!(counts(&draw(&state)), [0, 2, 4]);
+}
+
+#[test]
+fn pinned_particles_are_squares_and_non_finite_ones_are_left_out() {
+    let mut state = square();
+    state.particles[0].flags = ParticleFlags::PINNED;
+    assert_eq!(counts(&draw(&state)), [3, 5, 3]);
+    state.particles[3].position = [f32::NAN, f32::INFINITY, 1e30];
+    assert_eq!(counts(&draw(&state)), [2, 3, 2]);
+    assert!(png::encode(&draw(&state)).is_ok());
+}
+
+#[test]
+fn lines_behind_a_triangle_are_hidden_and_lines_on_it_are_not() {
+    let mut state = square();
+    // A second square behind the first one.
+    let mut behind = square();
+    for (index, particle) in behind.particles.iter_mut().enumerate() {
+        particle.position[2] = if index == 0 { -1.0 } else { -2.0 };
+    }
+    state.particles.extend(behind.particles);
+    state.constraints.push(ConstraintState { a: 5, b: 6, ..state.constraints[0] });
+    state.is_torn.push(false);
+    state.triangles.push(Triangle { corners: [4, 5, 6] });
+    let picture = draw(&state);
+    let places = |is: fn(&Shape) -> bool| -> Vec<usize> {
+        let shapes = picture.shapes.iter().enumerate();
+        shapes.filter(|(_, shape)| is(shape)).map(|(place, _)| place).collect()
+    };
+    let triangles = places(|shape| matches!(shape, Shape::Polygon { .. }));
+    let lines = places(|shape| matches!(shape, Shape::Segment { .. }));
+    assert_eq!(triangles[0], 0);
+    assert!(lines[0] < triangles[1], "the line behind comes before the nearer triangles");
+    // Line 0-1 touches both triangles and comes after the second one.
+    assert!(lines[1] > triangles[1]);
+}
+
+#[test]
+fn a_reset_restores_torn_constraints() {
+    let reset = r#"{"step":10,"kind":"cut","constraint":0}
+        {"step":20,"kind":"reset"}"#;
+    let scene = Scene::from_toml(TINY, "test").unwrap();
+    let commands = crate::input::command_file::parse(reset, "test").unwrap();
+    let job = Job { scene, commands, steps: 30 };
+    let solver = Solver::new(&job.scene);
+    let (run, toml) = (job.description(&solver), job.scene.to_toml());
+    let options = LogOptions::default();
+    let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
+    simulate(&job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    let file = log.finish(&Closing::default()).unwrap();
+    let lines: Vec<_> =
+        pictures(&file, &[9, 10, 19, 20], STYLE).iter().map(|one| counts(one)[1]).collect();
+    assert_eq!(lines, [8, 7, 7, 8]);
+}
+
+/// Without a scene, y is up.
+#[test]
+fn a_recording_without_a_scene_is_drawn() {
+    let mut log =
+        LogWriter::create(Vec::new(), LogOptions::default(), &run_at(100), b"", 0).unwrap();
+    let row = StepRow { step: 3, ..StepRow::default() };
+    let particles = square().particles;
+    log.write(&Message::Step(row), 0).unwrap();
+    log.write(&Message::Particles { step: 3, particles }, 0).unwrap();
+    let file = log.finish(&Closing::default()).unwrap();
+    let survey = Survey::read(LogReader::new(file.as_slice()).unwrap(), "a.mcap").unwrap();
+    assert_eq!(survey.scene.unwrap_err(), "a.mcap: has no scene (attachment scene.toml)");
+    assert_eq!(survey.steps, [3]);
+    assert_eq!(counts(&pictures(&file, &[3], STYLE)[0]), [0, 0, 4]);
+}
+
+#[test]
+fn a_truncated_recording_is_drawn_as_far_as_it_goes() {
+    let file = record(TINY, 200);
+    let cut = &file[..file.len() / 2];
+    let survey = Survey::read(LogReader::new(cut).unwrap(), "test").unwrap();
+    assert!(matches!(survey.end, LogEnd::Truncated { .. }), "{}", survey.end);
+    let last = *survey.steps.last().unwrap();
+    assert!(last > 10 && last < 190, "{last}");
+    assert_eq!(pictures(cut, &[last], STYLE), pictures(&file, &[last], STYLE));
+}
+
+#[test]
+fn indices_of_missing_particles_are_an_error() {
+    let refused = |change: fn(&mut SceneState)| {
+        let mut state = square();
+        change(&mut state);
+        state.check_indices().unwrap_err().to_string()
+    };
+    let expected =
+        "the snapshot of step 0 has 4 particles, but /topology or /surface refers to particle 9";
+    assert_eq!(refused(|state| state.constraints[0].b = 9), expected);
+    assert_eq!(refused(|state| state.triangles[1].corners[2] = 9), expected);
+}
+
+#[derive(Debug, Parser)]
+struct Line {
+    #[command(flatten)]
+    args: ExportArgs,
+}
+
+fn parse(line: &str) -> Result<ExportArgs, String> {
+    let words = ["export"].into_iter().chain(line.split(' '));
+    Line::try_parse_from(words).map(|line| line.args).map_err(|error| error.to_string())
+}
+
+#[test]
+fn the_error_names_a_wrong_option() {
+    for (line, word) in [
+        ("a.mcap", "--png"),
+        ("a.mcap --png d --svg d", "cannot be used with"),
+        ("a.mcap --png d --every 1s --frames 3", "cannot be used with"),
+        ("a.mcap --png d --every 0s", "expected a time longer than 0s"),
+        ("a.mcap --png d --frames 0", "--frames"),
+        ("a.mcap --png d --size 960", "expected WIDTHxHEIGHT with sides from 16 to 8192"),
+        ("a.mcap --png d --size 960x9000", "expected WIDTHxHEIGHT"),
+        ("a.mcap --png d --view below", "front, side, top, iso"),
+    ] {
+        let error = parse(line).unwrap_err();
+        assert!(error.contains(word), "{line}: {error}");
+    }
+}
+
+#[test]
+fn options_select_the_snapshots_and_the_style() {
+    let selection = |line| parse(line).unwrap().selection();
+    assert_eq!(selection("a.mcap --svg d"), Selection::Spread(8));
+    assert_eq!(selection("a.mcap --svg d --frames 3"), Selection::Spread(3));
+    let times = [1000, 500].map(Duration::from_millis).to_vec();
+    assert_eq!(selection("a.mcap --svg d --at 1s --at 500ms"), Selection::At(times));
+    let args = parse("a.mcap --svg d --size 20x30 --no-bend --view top").unwrap();
+    let style = args.style();
+    assert_eq!((style.size, style.view), (Size { width: 20, height: 30 }, Some(View::Top)));
+    assert_eq!(style.bend, Bend::Hide);
+}
+
+#[test]
+fn files_are_named_after_the_scene() {
+    let target = |name: &str| {
+        let run = RunDescription { scene_name: name.to_owned(), ..run_at(100) };
+        let args = parse("a.mcap --png d").unwrap();
+        args.target(&run).path(37).display().to_string()
+    };
+    assert_eq!(target("curtain"), "d/curtain_00000037.png");
+    assert_eq!(target("../a b"), "d/.._a_b_00000037.png");
+    assert_eq!(target(".."), "d/scene_00000037.png");
+}
+
+#[test]
+fn files_without_a_snapshot_are_an_error() {
+    let folder = std::env::temp_dir().join(format!("recorder-export-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let (path, pictures) = (folder.join("a.mcap"), folder.join("pictures"));
+    let error_for = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        let line = format!("{} --png {}", path.display(), pictures.display());
+        let error = run(&parse(&line).unwrap()).unwrap_err();
+        assert!(!pictures.exists());
+        format!("{error:#}").replace(&path.display().to_string(), "a.mcap")
+    };
+    let empty = LogWriter::create(Vec::new(), LogOptions::default(), &run_at(100), b"", 0);
+    let empty = empty.unwrap().finish(&Closing::default()).unwrap();
+    assert_eq!(error_for(&empty), "a.mcap: has no snapshot to draw (the file is complete)");
+    assert_eq!(
+        error_for(b"a text of some length, and no recording"),
+        "a.mcap: is not an MCAP file"
+    );
+    let whole = record(TINY, 0);
+    assert!(
+        error_for(&whole[..whole.len() / 4]).starts_with("a.mcap: has no"),
+        "no head, or no step"
+    );
+    fs::remove_dir_all(&folder).unwrap();
+}

@@ -1,0 +1,158 @@
+//! `recorder info`: the content of a recording.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::io::Read;
+use std::path::PathBuf;
+
+use anyhow::Context;
+use recorder::{Closing, LogEnd, LogReader, Message, RunDescription, Topic};
+use serde::Serialize;
+
+use crate::cli::exit::Exit;
+use crate::cli::output::{self, AsJson};
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Exit codes: 0 complete; 1 not a recording; 3 messages lost, or file truncated \
+    or damaged.\n\nExamples:\n  \
+    recorder info run.mcap\n  \
+    recorder info run.mcap --json"
+)]
+pub(crate) struct InfoArgs {
+    /// Recording to read. Every checksum is verified
+    file: PathBuf,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+/// The content of a recording, as printed.
+#[derive(Debug, Serialize)]
+pub(crate) struct Info {
+    file: String,
+    size_bytes: u64,
+    /// "complete", "truncated ..." or "damaged ...".
+    file_end: String,
+    scene: String,
+    particle_count: u32,
+    constraint_count: u32,
+    rate_hz: u32,
+    method: &'static str,
+    /// 16 hex digits.
+    run_id: String,
+    solver_version: u32,
+    contract_version: u32,
+    recorder_version: String,
+    first_step: Option<u64>,
+    last_step: Option<u64>,
+    /// From the first to the last snapshot, in simulated seconds.
+    duration_s: f64,
+    /// Number of messages in the file, by topic.
+    messages: BTreeMap<&'static str, u64>,
+    /// Messages that the recorder lost or that never reached it, for topics with such messages.
+    lost: BTreeMap<&'static str, u64>,
+    /// Reason why the recorder stopped. Absent if it was killed.
+    stop_reason: Option<String>,
+}
+
+pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<Exit> {
+    let path = output::path_text(&args.file);
+    let mut log = LogReader::open(&args.file).with_context(|| path.clone())?;
+    let size_bytes = fs::metadata(&args.file).with_context(|| path.clone())?.len();
+    let (info, end) = inspect(&mut log, path.clone(), size_bytes).with_context(|| path.clone())?;
+    output::result(args.as_json, &info, &info.to_string())?;
+    if end != LogEnd::Complete {
+        output::note(&format!("warning: {path} is {end}"));
+    }
+    Ok(if end == LogEnd::Complete && info.lost.is_empty() { Exit::Done } else { Exit::Loss })
+}
+
+/// Reads the whole recording.
+pub(crate) fn inspect<R: Read>(
+    log: &mut LogReader<R>,
+    file: String,
+    size_bytes: u64,
+) -> Result<(Info, LogEnd), recorder::ReadError> {
+    let mut info = Info::new(log.run(), file, size_bytes);
+    while let Some(logged) = log.next_message()? {
+        *info.messages.entry(logged.message.topic().name()).or_default() += 1;
+        if let Message::Particles { step, .. } = logged.message {
+            info.first_step.get_or_insert(step);
+            info.last_step = Some(step);
+        }
+    }
+    let end = log.end().cloned().unwrap_or(LogEnd::Complete);
+    info.file_end = end.to_string();
+    if let (Some(first), Some(last)) = (info.first_step, info.last_step) {
+        info.duration_s = last.saturating_sub(first) as f64 / f64::from(info.rate_hz);
+    }
+    if let Some(closing) = log.closing() {
+        info.close(closing);
+    }
+    Ok((info, end))
+}
+
+impl Info {
+    fn new(run: &RunDescription, file: String, size_bytes: u64) -> Self {
+        let decoded = Topic::ALL.into_iter().filter(|topic| *topic != Topic::Tf);
+        Self {
+            file,
+            size_bytes,
+            file_end: String::new(),
+            scene: run.scene_name.clone(),
+            particle_count: run.particle_count,
+            constraint_count: run.constraint_count,
+            rate_hz: run.rate_hz,
+            method: run.method_name(),
+            run_id: format!("{:016x}", run.run_id),
+            solver_version: run.solver_version,
+            contract_version: run.contract_version,
+            recorder_version: run.recorder_version.clone(),
+            first_step: None,
+            last_step: None,
+            duration_s: 0.0,
+            messages: decoded.map(|topic| (topic.name(), 0)).collect(),
+            lost: BTreeMap::new(),
+            stop_reason: None,
+        }
+    }
+
+    fn close(&mut self, closing: &Closing) {
+        self.stop_reason = Some(closing.stop_reason.clone());
+        let missing = closing.counts.iter().map(|(topic, c)| (topic.name(), c.lost + c.gaps));
+        self.lost = missing.filter(|(_, count)| *count > 0).collect();
+    }
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let join = |counts: &BTreeMap<&str, u64>| {
+            let parts = counts.iter().filter(|(_, count)| **count > 0);
+            parts.map(|(topic, count)| format!("{topic} {count}")).collect::<Vec<_>>().join(", ")
+        };
+        let none_if_empty = |text: String| if text.is_empty() { "none".to_owned() } else { text };
+        writeln!(f, "file        {}, {} bytes, {}", self.file, self.size_bytes, self.file_end)?;
+        writeln!(
+            f,
+            "scene       {}: {} particles, {} constraints, {} Hz, {}",
+            self.scene, self.particle_count, self.constraint_count, self.rate_hz, self.method
+        )?;
+        writeln!(
+            f,
+            "run         {} (solver version {}, contract version {}, recorder {})",
+            self.run_id, self.solver_version, self.contract_version, self.recorder_version
+        )?;
+        match (self.first_step, self.last_step) {
+            (Some(first), Some(last)) => {
+                let count = self.messages[Topic::Particles.name()];
+                let duration_s = self.duration_s;
+                writeln!(f, "steps       {first}..={last}, {count} recorded, {duration_s:.3} s")?;
+            }
+            _ => writeln!(f, "steps       none")?,
+        }
+        writeln!(f, "messages    {}", none_if_empty(join(&self.messages)))?;
+        writeln!(f, "lost        {}", none_if_empty(join(&self.lost)))?;
+        write!(f, "stopped     {}", self.stop_reason.as_deref().unwrap_or("unknown"))
+    }
+}

@@ -1,0 +1,277 @@
+//! `recorder play`: a recording on the services that it was recorded from.
+
+mod control;
+mod pace;
+mod position;
+mod replay;
+#[cfg(test)]
+mod tests;
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use recorder::{
+    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
+};
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_contract::{Endpoint, Method, Stop, TearCause};
+use sim_solver::{Keyframe, Solver};
+
+use crate::cli::endpoint_args::EndpointArgs;
+use crate::cli::exit::Exit;
+use crate::cli::output;
+use crate::input::scene_source::scene_in_recording;
+use control::Control;
+use pace::Pace;
+use position::Position;
+pub(crate) use position::{Happening, happenings};
+use replay::{Recorded, Replay};
+
+/// Longest wait before commands, readers and signals are looked at.
+const WAIT_MAX_NS: u64 = SECOND_NS / 100;
+/// Longest time between two status messages: 10 Hz.
+const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
+/// How long the last snapshot stays, for readers that have just been woken by it.
+const LINGER_NS: u64 = SECOND_NS / 10;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Obeys pause, resume and step like a node: sim-node ctl pause.\n\n\
+    Exit codes: 0 played; 1 failed; 3 the file is cut off or damaged, played as far as it \
+    goes.\n\nExamples:\n  \
+    recorder play run.mcap\n  \
+    recorder play run.mcap --rate 0.25 --loop\n  \
+    recorder play run.mcap --start 2s --end 3500ms --wait-for-readers 1")]
+pub(crate) struct PlayArgs {
+    /// Recording to play
+    file: PathBuf,
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+    /// Simulated time per wall-clock time, above 0 to 1000; pauses of the recorded run are left out
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = rate)]
+    rate: f64,
+    /// Start again at the end, as a new run [default: end]
+    #[arg(long = "loop")]
+    loops: bool,
+    /// Start this much simulated time after the first snapshot, such as 2s or 500ms [default: 0s]
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    start: Option<Duration>,
+    /// End this much simulated time after the first snapshot [default: the end of the recording]
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    end: Option<Duration>,
+    /// Wait with the first snapshot for `ctl resume` or `ctl step` [default: go on]
+    #[arg(long)]
+    paused: bool,
+    /// Wait for this many readers before the first snapshot
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    wait_for_readers: usize,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate > 0.0 && rate <= 1000.0 => Ok(rate),
+        _ => Err("not a number above 0 and up to 1000".to_owned()),
+    }
+}
+
+pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
+    let stop = Stop::install()?;
+    let endpoint = args.endpoint.endpoint()?;
+    let path = output::path_text(&args.file);
+    if args.end.is_some_and(|end| end < args.start.unwrap_or_default()) {
+        let problem = "--end is before --start: nothing would be played\n";
+        clap::Error::raw(clap::error::ErrorKind::ValueValidation, problem).exit();
+    }
+    let mut is_first = true;
+    let mut is_paused = args.paused;
+    loop {
+        let mut pass = Pass::open(args, &endpoint).with_context(|| path.clone())?;
+        // Whoever pauses the end of a pass finds the next one paused.
+        pass.replay.control = Control::new(is_paused);
+        let readers = if is_first { args.wait_for_readers } else { 0 };
+        if is_first {
+            output::note(&format!("ready playing {path} as {endpoint}"));
+        }
+        let end = pass.play(readers, &stop).with_context(|| path.clone())?;
+        is_paused = pass.replay.control.is_paused;
+        is_first = false;
+        if let Some(end) = &end
+            && *end != LogEnd::Complete
+        {
+            output::note(&format!("warning: {path} is {end}; played as far as it goes"));
+        }
+        if !args.loops || stop.is_asked() {
+            let is_whole = end.is_none_or(|end| end == LogEnd::Complete);
+            return Ok(if is_whole { Exit::Done } else { Exit::Loss });
+        }
+    }
+}
+
+/// One pass over the file.
+#[derive(Debug)]
+struct Pass {
+    frames: FrameReader<BufReader<File>>,
+    first: Frame,
+    /// Wall clock of the recording after which nothing is played, in nanoseconds since 1970.
+    end_ns: u64,
+    replay: Replay,
+    pace: Pace,
+    next_status_ns: u64,
+}
+
+impl Pass {
+    /// Goes to the first snapshot that is played, and takes the name.
+    fn open(args: &PlayArgs, endpoint: &Endpoint) -> anyhow::Result<Self> {
+        let log = LogReader::open(&args.file)?;
+        let (run, scene) = (log.run().clone(), log.scene().to_vec());
+        let mut solver = Solver::new(&scene_in_recording(&log, &output::path_text(&args.file))?);
+        let mut frames = FrameReader::new(log);
+        let mut first = next_frame(&mut frames)?;
+        let (topology, surface) = load_of(&first)?;
+        let colliders = first_colliders(&first).map(|row| row.colliders.len());
+        let collider_count = colliders.unwrap_or_else(|| solver.collider_count());
+        let origin_ns = run.time_of_step_ns(first.row.step);
+        let start_ns = origin_ns.saturating_add(nanoseconds(args.start.unwrap_or_default()));
+        let causes = causes_before(&mut solver, &first, &topology.torn);
+        let mut position = Position::new(&topology.torn, causes);
+        position.method = Method::from_number(run.method).unwrap_or_default();
+        position.since_step = first.row.step.saturating_sub(first.row.scene_step);
+        if let Some(Ok(keyframe)) = first.own_keyframe().map(Keyframe::decode) {
+            position.parameters = keyframe.parameter_values(position.method);
+        }
+        while run.time_of_step_ns(first.row.step) < start_ns {
+            position.skip(&first.updates);
+            first = next_frame(&mut frames).context("--start is behind its last snapshot")?;
+        }
+        let recorded = Recorded {
+            run: &run,
+            scene: &scene,
+            topology: &topology,
+            surface: &surface,
+            collider_count,
+            keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
+        };
+        let replay = Replay::new(endpoint, &recorded, position, args.rate)?;
+        let end_ns = args.end.map_or(u64::MAX, |end| origin_ns.saturating_add(nanoseconds(end)));
+        let pace = Pace::new(args.rate);
+        Ok(Self { frames, first, end_ns, replay, pace, next_status_ns: 0 })
+    }
+
+    /// Plays to the end, or until asked to stop. How the file ends, if its end was reached.
+    fn play(&mut self, readers: usize, stop: &Stop) -> anyhow::Result<Option<LogEnd>> {
+        let first_step = self.first.row.step;
+        self.wait_for_readers(readers, first_step, stop)?;
+        self.replay.publish_latched(first_step)?;
+        let mut next = Some(self.first.clone());
+        let mut last_step = first_step;
+        while let Some(frame) = next {
+            let time_ns = self.frames.log().run().time_of_step_ns(frame.row.step);
+            if time_ns > self.end_ns || !self.wait_until_due(time_ns, frame.row.step, stop)? {
+                break;
+            }
+            self.replay.publish(&frame)?;
+            last_step = frame.row.step;
+            // Read ahead: unpacking it falls into the wait.
+            next = self.frames.next_frame()?;
+        }
+        self.linger(last_step + 1, stop)?;
+        Ok(self.frames.end().cloned())
+    }
+
+    fn wait_for_readers(&mut self, count: usize, step: u64, stop: &Stop) -> anyhow::Result<()> {
+        while self.replay.reader_count() < count && !stop.is_asked() {
+            self.attend(step)?;
+            sleep_until(monotonic_ns() + WAIT_MAX_NS);
+        }
+        Ok(())
+    }
+
+    /// Waits until a snapshot is due; `false` if asked to stop.
+    fn wait_until_due(&mut self, time_ns: u64, step: u64, stop: &Stop) -> anyhow::Result<bool> {
+        loop {
+            self.attend(step)?;
+            if stop.is_asked() {
+                return Ok(false);
+            }
+            let now_ns = monotonic_ns();
+            if self.replay.control.is_moving() {
+                let deadline_ns = self.pace.deadline_ns(time_ns, now_ns);
+                if now_ns >= deadline_ns {
+                    return Ok(true);
+                }
+                sleep_until(deadline_ns.min(now_ns + WAIT_MAX_NS));
+            } else {
+                self.pace.restart();
+                sleep_until(now_ns + WAIT_MAX_NS);
+            }
+        }
+    }
+
+    /// Answers commands, serves late readers, and tells how the replay does.
+    fn attend(&mut self, next_step: u64) -> anyhow::Result<()> {
+        // Whoever commanded and then asks for the status finds the effect in it.
+        let has_commands = self.replay.answer_commands(next_step)?;
+        let now_ns = monotonic_ns();
+        if has_commands || now_ns >= self.next_status_ns {
+            self.next_status_ns = now_ns + STATUS_PERIOD_NS;
+            self.replay.publish_status()?;
+        }
+        Ok(())
+    }
+
+    fn linger(&mut self, next_step: u64, stop: &Stop) -> anyhow::Result<()> {
+        let end_ns = monotonic_ns() + LINGER_NS;
+        while monotonic_ns() < end_ns && !stop.is_asked() {
+            self.attend(next_step)?;
+            sleep_until(monotonic_ns() + WAIT_MAX_NS);
+        }
+        Ok(())
+    }
+}
+
+fn next_frame(frames: &mut FrameReader<BufReader<File>>) -> anyhow::Result<Frame> {
+    match frames.next_frame()? {
+        Some(frame) => Ok(frame),
+        None => match frames.end() {
+            Some(LogEnd::Complete) | None => bail!("has no snapshot to play"),
+            Some(end) => bail!("has no snapshot to play: {end}"),
+        },
+    }
+}
+
+/// The topology and surface stand before the first snapshot.
+fn load_of(first: &Frame) -> anyhow::Result<(TopologyRow, SurfaceRow)> {
+    let topology = first.updates.iter().find_map(|update| match update {
+        Message::Topology(row) => Some(row.clone()),
+        _ => None,
+    });
+    let surface = first.updates.iter().find_map(|update| match update {
+        Message::Surface(row) => Some(row.clone()),
+        _ => None,
+    });
+    let topology = topology.context("has no /topology before its first snapshot")?;
+    Ok((topology, surface.context("has no /surface before its first snapshot")?))
+}
+
+/// The number of colliders never changes in a recording.
+fn first_colliders(first: &Frame) -> Option<&CollidersRow> {
+    first.updates.iter().find_map(|update| match update {
+        Message::Colliders(row) => Some(row),
+        _ => None,
+    })
+}
+
+/// Why each of `torn` tore before the recording: that stands in the first keyframe only. `None` if
+/// nothing did, or if the keyframe is of another version.
+fn causes_before(solver: &mut Solver, first: &Frame, torn: &[u32]) -> Option<Vec<TearCause>> {
+    let keyframe = Keyframe::decode(first.own_keyframe()?).ok()?;
+    solver.restore(bytemuck::cast_slice(&first.particles), &keyframe).ok()?;
+    let causes = solver.tear_causes().iter().map(|cause| *cause);
+    solver.torn().starts_with(torn).then(|| causes.take(torn.len()).collect())
+}
+
+fn nanoseconds(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,85 @@
+//! The deadlines of snapshots.
+
+/// Longest delay to catch up, in nanoseconds. After a longer one the replay continues from the
+/// current time.
+const CATCH_UP_MAX_NS: u64 = 200_000_000;
+
+/// Maps recorded time to CLOCK_MONOTONIC. All times are in nanoseconds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pace {
+    /// Recorded time per wall-clock time.
+    rate: f64,
+    /// `None` before the first snapshot and after a pause.
+    base: Option<Base>,
+}
+
+/// A recorded time and its deadline.
+#[derive(Debug, Clone, Copy)]
+struct Base {
+    recorded_ns: u64,
+    deadline_ns: u64,
+}
+
+impl Pace {
+    pub(crate) fn new(rate: f64) -> Self {
+        Self { rate, base: None }
+    }
+
+    /// Makes the next snapshot due at once.
+    pub(crate) fn restart(&mut self) {
+        self.base = None;
+    }
+
+    /// Returns the deadline of the snapshot at `recorded_ns`. The previous snapshot is published
+    /// already.
+    pub(crate) fn deadline_ns(&mut self, recorded_ns: u64, now_ns: u64) -> u64 {
+        let base = *self.base.get_or_insert(Base { recorded_ns, deadline_ns: now_ns });
+        let passed_ns = recorded_ns.saturating_sub(base.recorded_ns) as f64 / self.rate;
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "positive, and saturating at the maximum"
+        )]
+        let deadline_ns = base.deadline_ns.saturating_add(passed_ns as u64);
+        if deadline_ns.saturating_add(CATCH_UP_MAX_NS) < now_ns {
+            self.base = Some(Base { recorded_ns, deadline_ns: now_ns });
+            return now_ns;
+        }
+        deadline_ns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_NS: u64 = 4_000_000;
+
+    #[test]
+    fn snapshots_are_due_at_the_recorded_intervals_divided_by_the_rate() {
+        for (rate, expected_ns) in [(1.0, STEP_NS), (2.0, STEP_NS / 2), (0.5, STEP_NS * 2)] {
+            let mut pace = Pace::new(rate);
+            for step in 0..100 {
+                let deadline_ns = pace.deadline_ns(77 + step * STEP_NS, 1000 + step * expected_ns);
+                assert_eq!(deadline_ns, 1000 + step * expected_ns);
+            }
+        }
+    }
+
+    #[test]
+    fn a_late_snapshot_does_not_delay_the_following_ones() {
+        let mut pace = Pace::new(1.0);
+        pace.deadline_ns(0, 0);
+        assert_eq!(pace.deadline_ns(STEP_NS, STEP_NS * 3), STEP_NS);
+        assert_eq!(pace.deadline_ns(STEP_NS * 4, STEP_NS * 3), STEP_NS * 4);
+    }
+
+    #[test]
+    fn after_a_long_delay_the_replay_continues_from_the_current_time() {
+        let mut pace = Pace::new(1.0);
+        pace.deadline_ns(0, 0);
+        let late_ns = CATCH_UP_MAX_NS * 2;
+        assert_eq!(pace.deadline_ns(STEP_NS, late_ns), late_ns);
+        assert_eq!(pace.deadline_ns(STEP_NS * 2, late_ns), late_ns + STEP_NS);
+    }
+}

@@ -1,0 +1,287 @@
+//! A replay publishes what was recorded: headers and payloads are compared in shared memory.
+
+use std::time::Duration;
+
+use recorder::{
+    CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TearsRow,
+    TopologyRow,
+};
+use sim_contract::testing::TestDomain;
+use sim_contract::{
+    Action, CONTRACT_VERSION, Client, ColliderState, Command, ConstraintState, LoadHeader, Outcome,
+    OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, TearCause,
+    Triangle,
+};
+use sim_solver::{Scene, Solver, builtin};
+
+use super::causes_before;
+use super::position::{Happening, Position, happenings};
+use super::replay::{Recorded, Replay};
+
+/// Long enough on any machine.
+const TIMEOUT: Duration = Duration::from_secs(10);
+
+fn run() -> RunDescription {
+    RunDescription {
+        run_id: 5,
+        epoch_ns: 1_000,
+        scene_name: "dot".to_owned(),
+        origin: [0.5, 0.0, 0.0],
+        rate_hz: 240,
+        method: 0,
+        particle_count: 2,
+        constraint_count: 1,
+        solver_version: 3,
+        contract_version: CONTRACT_VERSION,
+        recorder_version: "0".to_owned(),
+    }
+}
+
+fn outcome(index: u64, step: u64, action: Action) -> Message {
+    let outcome = Outcome::new(index, step, Command::new(9, index, action), Ok(()));
+    Message::Outcome(OutcomeRow::from(&outcome))
+}
+
+fn frame(step: u64, updates: Vec<Message>) -> Frame {
+    let row = StepRow {
+        step,
+        scene_step: step + 1,
+        state_hash: 99,
+        topology_revision: 0,
+        torn_count: 0,
+        outcome_count: 4,
+        wake_late_ns: 6,
+        solve_ns: 7,
+    };
+    let particle = ParticleState { position: [-0.0, step as f32, 0.0], ..Default::default() };
+    Frame { updates, row, particles: vec![particle; 2] }
+}
+
+fn replay(domain: &TestDomain) -> Replay {
+    replay_from(domain, Position::default())
+}
+
+fn replay_from(domain: &TestDomain, position: Position) -> Replay {
+    let load = LoadHeader::default();
+    let recorded = Recorded {
+        run: &run(),
+        scene: b"version = 1",
+        topology: &TopologyRow::new(&load, &[ConstraintState { b: 1, ..Default::default() }; 4]),
+        surface: &SurfaceRow::new(&load, &[Triangle { corners: [0, 1, 0] }]),
+        collider_count: 1,
+        keyframe_size_bytes_max: 64,
+    };
+    Replay::new(&domain.endpoint(), &recorded, position, 1.0).unwrap()
+}
+
+/// A client that reads snapshots from now on: the first look takes the place of a reader.
+fn reader(domain: &TestDomain) -> Client {
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert!(client.next_snapshot(Duration::ZERO).unwrap().is_none());
+    client
+}
+
+fn next_header(client: &mut Client) -> (SnapshotHeader, Vec<ParticleState>) {
+    let snapshot = client.next_snapshot(TIMEOUT).unwrap().unwrap();
+    (*snapshot.header(), snapshot.particles().to_vec())
+}
+
+#[test]
+fn snapshots_are_those_of_the_node_but_for_run_time_and_flag() {
+    let domain = TestDomain::new();
+    let mut replay = replay(&domain);
+    let mut client = reader(&domain);
+    let keyframe = Message::Keyframe { step: 12, bytes: vec![1, 2, 3] };
+    replay.publish(&frame(12, vec![keyframe])).unwrap();
+    let (header, particles) = next_header(&mut client);
+    let expected = SnapshotHeader {
+        contract_version: CONTRACT_VERSION,
+        solver_version: 3,
+        run_id: header.run_id,
+        step: 12,
+        scene_step: 13,
+        keyframe_step: 12,
+        sim_time_ns: 50_000_000,
+        publish_monotonic_ns: header.publish_monotonic_ns,
+        state_hash: 99,
+        outcome_count: 4,
+        wake_late_ns: 6,
+        solve_ns: 7,
+        topology_revision: 0,
+        torn_count: 0,
+        particle_count: 2,
+        flags: SnapshotFlags::REPLAY,
+        stride: 1,
+        spare: 0,
+    };
+    assert_eq!(header, expected);
+    assert_ne!(header.run_id, run().run_id);
+    assert_eq!(particles, frame(12, Vec::new()).particles);
+    assert!(client.topology(Duration::ZERO).unwrap().is_none());
+    replay.answer_commands(13).unwrap();
+    assert_eq!(client.topology(TIMEOUT).unwrap().unwrap().constraints.len(), 4);
+}
+
+#[test]
+fn the_paused_flag_follows_the_recorded_outcomes() {
+    let domain = TestDomain::new();
+    let mut replay = replay(&domain);
+    let mut client = reader(&domain);
+    let pause = outcome(2, 6, Action::Pause);
+    let resume = outcome(3, 8, Action::Resume);
+    let frames = [
+        (frame(5, Vec::new()), false),
+        (frame(6, vec![pause]), true),
+        (frame(7, Vec::new()), true),
+        (frame(8, vec![resume]), false),
+    ];
+    for (frame, is_paused) in frames {
+        replay.publish(&frame).unwrap();
+        let (header, _) = next_header(&mut client);
+        assert_eq!(header.flags & SnapshotFlags::PAUSED != 0, is_paused, "step {}", header.step);
+    }
+}
+
+#[test]
+fn commands_are_answered_beside_the_recorded_run() {
+    let domain = TestDomain::new();
+    let mut replay = replay(&domain);
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    let mut ask = |action| {
+        client.send(action).unwrap();
+        replay.answer_commands(42).unwrap();
+        client.next_outcome(TIMEOUT).unwrap().unwrap()
+    };
+    let paused = ask(Action::Pause);
+    assert_eq!((paused.step, paused.status), (42, OutcomeStatus::Applied as u32));
+    assert_eq!(paused.flags, sim_contract::OUTCOME_FLAG_CONTROL);
+    let refused = ask(Action::Pin { particle: 0 });
+    assert_eq!(refused.reason, Reason::NoEffectHere as u32);
+    assert!(!replay.control.is_moving());
+}
+
+#[test]
+fn a_name_that_is_taken_is_refused() {
+    let domain = TestDomain::new();
+    let _replay = replay(&domain);
+    let load = sim_contract::Load {
+        header: LoadHeader::default(),
+        scene: b"",
+        constraints: &[],
+        triangles: &[],
+        collider_count: 0,
+        keyframe_size_bytes_max: 1,
+        parameters: sim_contract::ParameterValues::default(),
+    };
+    let error = Owner::create(&domain.endpoint(), &load).unwrap_err();
+    assert!(error.to_string().contains("is running already"), "{error}");
+}
+
+#[test]
+fn a_snapshot_of_another_size_is_refused() {
+    let domain = TestDomain::new();
+    let mut replay = replay(&domain);
+    let short = Frame { particles: vec![ParticleState::default()], ..frame(1, Vec::new()) };
+    let error = replay.publish(&short).unwrap_err();
+    assert_eq!(error.to_string(), "step 1 has 1 particles, the scene 2");
+}
+
+fn tears(step: u64, constraints: &[u32], cause: &str) -> Message {
+    let causes = vec![cause.to_owned(); constraints.len()];
+    Message::Tears(TearsRow { step, constraints: constraints.to_vec(), causes })
+}
+
+fn floor(step: u64, offset: f32) -> Message {
+    let state = ColliderState { normal: [0.0, 1.0, 0.0], offset, ..ColliderState::default() };
+    Message::Colliders(CollidersRow::new(step, &[state]).unwrap())
+}
+
+/// Step, number of new ones, and all that is torn with why, as a client finds it.
+fn torn(client: &mut Client) -> (u64, u32, Vec<(u32, Option<TearCause>)>) {
+    let torn = client.torn(TIMEOUT).unwrap();
+    let all = torn.constraints.iter().map(|one| (one.constraint, one.cause())).collect();
+    (torn.header.step, torn.header.new_count, all)
+}
+
+#[test]
+fn tears_are_published_with_all_before_them_and_a_reset_clears_them() {
+    let domain = TestDomain::new();
+    let position = Position::new(&[2], Some(vec![TearCause::Force]));
+    let mut replay = replay_from(&domain, position);
+    replay.publish_latched(5).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
+    replay.answer_commands(5).unwrap();
+    let (force, cut) = (Some(TearCause::Force), Some(TearCause::Cut));
+    assert_eq!(torn(&mut client), (5, 0, vec![(2, force)]));
+    replay.publish(&frame(5, vec![tears(5, &[3, 1], "cut")])).unwrap();
+    assert_eq!(torn(&mut client), (5, 2, vec![(2, force), (3, cut), (1, cut)]));
+    replay.publish(&frame(7, vec![outcome(4, 7, Action::Reset)])).unwrap();
+    assert_eq!(torn(&mut client), (7, 0, vec![]));
+    // What is cut at the boundary of a reset stands in the file before the reset.
+    replay.publish(&frame(8, vec![tears(8, &[0], "x")])).unwrap();
+    let updates = vec![tears(9, &[3], "cut"), outcome(5, 9, Action::Reset)];
+    replay.publish(&frame(9, updates)).unwrap();
+    assert_eq!(torn(&mut client), (9, 1, vec![(3, cut)]));
+}
+
+#[test]
+fn a_replay_that_starts_later_has_what_was_torn_and_where_colliders_stood() {
+    let domain = TestDomain::new();
+    let mut position = Position::new(&[2], None);
+    position.skip(&[floor(0, 0.0), tears(1, &[0], "stretch")]);
+    position.skip(&[floor(2, 1.0), tears(2, &[1], "cut"), outcome(0, 2, Action::Reset)]);
+    position.skip(&[floor(3, 2.0), tears(4, &[0], "distance")]);
+    let mut replay = replay_from(&domain, position);
+    replay.publish_latched(6).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    let mut offset = |replay: &mut Replay, timeout| {
+        let colliders = client.colliders(timeout).unwrap();
+        replay.answer_commands(6).unwrap();
+        colliders.colliders.first().map(|one| (colliders.header.step, one.offset))
+    };
+    assert_eq!(offset(&mut replay, Duration::ZERO), None);
+    assert_eq!(offset(&mut replay, TIMEOUT), Some((3, 2.0)));
+    replay.publish(&frame(6, vec![floor(6, 3.0)])).unwrap();
+    assert_eq!(offset(&mut replay, TIMEOUT), Some((6, 3.0)));
+    let expected = vec![(1, Some(TearCause::Cut)), (0, Some(TearCause::Distance))];
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
+    replay.answer_commands(6).unwrap();
+    assert_eq!(torn(&mut client), (6, 0, expected));
+}
+
+#[test]
+fn a_reset_happens_before_everything_of_its_step_and_a_refused_one_never() {
+    let refused = Outcome::new(3, 3, Command::new(9, 3, Action::Reset), Err(Reason::OutOfRange));
+    let refused = Message::Outcome(OutcomeRow::from(&refused));
+    let updates =
+        [tears(1, &[0], "cut"), refused, tears(4, &[1], "cut"), outcome(4, 4, Action::Reset)];
+    let expected = [
+        Happening::Update(&updates[0]),
+        Happening::Update(&updates[1]),
+        Happening::Reset(4),
+        Happening::Update(&updates[2]),
+        Happening::Update(&updates[3]),
+    ];
+    assert_eq!(happenings(&updates), expected);
+}
+
+#[test]
+fn why_something_tore_before_the_recording_stands_in_its_first_keyframe() {
+    let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
+    let mut solver = Solver::new(&scene);
+    solver.cut(3).unwrap();
+    solver.step();
+    let particles =
+        (0..solver.particle_count()).map(|index| bytemuck::cast(solver.particle(index)));
+    let keyframe = Message::Keyframe { step: 1, bytes: solver.keyframe().encode() };
+    let first = Frame { particles: particles.collect(), ..frame(1, vec![keyframe]) };
+    let causes = |torn: &[u32]| causes_before(&mut Solver::new(&scene), &first, torn);
+    assert_eq!(causes(&[3]), Some(vec![TearCause::Cut]));
+    assert_eq!(causes(&[]), Some(vec![]));
+    assert_eq!(causes(&[4]), None, "of another state");
+    let damaged = Message::Keyframe { step: 1, bytes: vec![0; 9] };
+    let first = frame(1, vec![damaged]);
+    assert_eq!(causes_before(&mut Solver::new(&scene), &first, &[3]), None);
+}

@@ -1,0 +1,305 @@
+//! `recorder record`: records everything that a node publishes into one file.
+
+mod accepted;
+mod batch;
+mod collider_log;
+mod intake;
+mod queue;
+mod report;
+mod tear_log;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use anyhow::{Context, anyhow, bail};
+use recorder::{Closing, Message, PartFile, WriteError};
+use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
+use sim_contract::{Endpoint, ReadError, Stop, Tap};
+
+use crate::cli::endpoint_args::EndpointArgs;
+use crate::cli::exit::Exit;
+use crate::cli::file_args::{FileArgs, LogFile, default_path};
+use crate::cli::output::{self, AsJson};
+use accepted::{Accepted, RunEnd, RunHeader};
+use batch::Batch;
+use intake::{Intake, Now};
+use queue::{Content, Item, Popped, Queue};
+use report::Report;
+
+/// Longest wait for messages before the next check for signals.
+const WAIT_MAX: Duration = Duration::from_millis(50);
+/// Period of the check whether the owner is alive.
+const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
+/// Flush period: the most that a killed recorder loses.
+const FLUSH_NS: u64 = SECOND_NS;
+/// Most reads per batch. Each read empties at most one buffer of each service.
+const READS_PER_BATCH_MAX: usize = 8;
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Ends cleanly on Ctrl-C, on SIGTERM, at a limit, when the node ends, or when another run \
+    starts (as with play --loop).\n\n\
+    Exit codes: 0 all recorded; 1 failed; 3 messages lost.\n\nExamples:\n  \
+    recorder record -o run.mcap\n  \
+    recorder record --name left --duration 10s --compression none\n  \
+    recorder record -o run.mcap --steps 2400 --json"
+)]
+pub(crate) struct RecordArgs {
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+    /// File to write. Its name ends in `.part` until it is finished
+    /// [default: NAME_<UTC time>.mcap]
+    #[arg(short, long, value_name = "OUT.mcap")]
+    output: Option<PathBuf>,
+    /// End after this time, such as 10s or 500ms [default: no limit]
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    duration: Option<Duration>,
+    /// End N steps after the first recorded step [default: no limit]
+    #[arg(long, value_name = "N")]
+    steps: Option<u64>,
+    /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
+    /// not fit are lost and counted
+    #[arg(long, value_name = "BYTES", default_value_t = 256 << 20, value_parser = clap::value_parser!(u64).range(1 << 20..=1 << 40))]
+    queue_bytes: u64,
+    #[command(flatten)]
+    file: FileArgs,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
+    let stop = Stop::install()?;
+    let endpoint = args.endpoint.endpoint()?;
+    let tap = Tap::attach(&endpoint)?;
+    let path = args.output.clone().unwrap_or_else(|| default_path(endpoint.name(), realtime_ns()));
+    let file = args.file.create(&path)?;
+    output::note(&format!("ready recording {endpoint} into {}", output::path_text(&path)));
+
+    let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
+    let mut recording = Recording {
+        tap,
+        intake: Intake::new(args.steps),
+        queue: Arc::new(Queue::new(queue_bytes)),
+        file: Some(file),
+        writing: None,
+        last_step: 0,
+        begin_ns: monotonic_ns(),
+        next_owner_check_ns: 0,
+        is_owner_alive: true,
+        unreadable: 0,
+    };
+    let result = recording.run(args, &stop);
+    let report = recording.finish(result, &endpoint)?;
+    output::result(args.as_json, &report, &report.to_string())?;
+    Ok(if report.is_complete() { Exit::Done } else { Exit::Loss })
+}
+
+/// The reason why a recording ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StopReason {
+    Signal,
+    Duration,
+    OwnerGone,
+    Run(RunEnd),
+    WriteError,
+}
+
+impl StopReason {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Signal => "signal",
+            Self::Duration => "duration reached",
+            Self::OwnerGone => "owner gone",
+            Self::Run(RunEnd::NewRun) => "new run",
+            Self::Run(RunEnd::NewLoad) => "new scene loaded",
+            Self::Run(RunEnd::EndStep) => "steps reached",
+            Self::WriteError => "write error",
+        }
+    }
+}
+
+/// A recording in progress.
+#[derive(Debug)]
+struct Recording {
+    tap: Tap,
+    intake: Intake,
+    queue: Arc<Queue>,
+    /// The file, until its header is written.
+    file: Option<PartFile>,
+    /// The writing thread, once the recording has started.
+    writing: Option<JoinHandle<anyhow::Result<LogFile>>>,
+    /// The last step in the queue.
+    last_step: u64,
+    begin_ns: u64,
+    next_owner_check_ns: u64,
+    is_owner_alive: bool,
+    /// Number of messages that arrived but could not be read.
+    unreadable: u64,
+}
+
+impl Recording {
+    /// Reads until the recording ends.
+    fn run(&mut self, args: &RecordArgs, stop: &Stop) -> anyhow::Result<StopReason> {
+        loop {
+            // Checked before reading, so that messages from before the end are read.
+            let reason = self.reason_to_stop(args, stop);
+            let (batch, log_time_ns) = self.read();
+            let now = Now { realtime_ns: log_time_ns, monotonic_ns: monotonic_ns() };
+            let accepted = self.intake.accept(batch, now)?;
+            let end = accepted.end.map(StopReason::Run);
+            self.enqueue(accepted, args, log_time_ns)?;
+            if let Some(reason) = end.or(reason) {
+                return Ok(reason);
+            }
+            self.tap.wait(WAIT_MAX);
+        }
+    }
+
+    fn reason_to_stop(&mut self, args: &RecordArgs, stop: &Stop) -> Option<StopReason> {
+        let now_ns = monotonic_ns();
+        if now_ns >= self.next_owner_check_ns {
+            self.next_owner_check_ns = now_ns + OWNER_CHECK_NS;
+            self.is_owner_alive = self.tap.is_owner_alive();
+        }
+        let passed = Duration::from_nanos(now_ns - self.begin_ns);
+        if stop.is_asked() {
+            Some(StopReason::Signal)
+        } else if self.queue.is_closed() {
+            Some(StopReason::WriteError)
+        } else if args.duration.is_some_and(|duration| passed >= duration) {
+            Some(StopReason::Duration)
+        } else {
+            (!self.is_owner_alive).then_some(StopReason::OwnerGone)
+        }
+    }
+
+    /// Copies messages out of shared memory. Particles come first, so that the messages that belong
+    /// to them have arrived.
+    fn read(&mut self) -> (Batch, u64) {
+        let mut batch = Batch::default();
+        let drained =
+            self.tap.drain_particles(|header, particles| batch.add_snapshot(header, particles));
+        self.note_unreadable(&drained.errors);
+        for _ in 0..READS_PER_BATCH_MAX {
+            let drained = self.tap.drain_updates(|update| batch.add_update(update));
+            self.note_unreadable(&drained.errors);
+            if drained.count == 0 {
+                break;
+            }
+        }
+        (batch, realtime_ns())
+    }
+
+    /// Counts messages that could not be read, and reports the first one.
+    fn note_unreadable(&mut self, errors: &[ReadError]) {
+        if let (Some(error), 0) = (errors.first(), self.unreadable) {
+            output::note(&format!("warning: a message was not recorded: {error}"));
+        }
+        self.unreadable += errors.len() as u64;
+    }
+
+    /// Passes a batch to the writing thread.
+    fn enqueue(
+        &mut self,
+        accepted: Accepted,
+        args: &RecordArgs,
+        log_time_ns: u64,
+    ) -> anyhow::Result<()> {
+        if let Some(header) = accepted.header {
+            self.begin(args, header, log_time_ns)?;
+        }
+        for content in accepted.contents {
+            if let Content::Snapshot(row, _) = &content {
+                self.last_step = row.step;
+            }
+            self.queue.push(Item { content, log_time_ns });
+        }
+        Ok(())
+    }
+
+    /// Starts the writing thread, which writes the header. The reading thread never waits for the disk.
+    fn begin(
+        &mut self,
+        args: &RecordArgs,
+        header: RunHeader,
+        log_time_ns: u64,
+    ) -> anyhow::Result<()> {
+        let Some(file) = self.file.take() else { return Ok(()) };
+        let (queue, options) = (CloseOnDrop(Arc::clone(&self.queue)), args.file.clone());
+        let writing = thread::Builder::new().name("writer".to_owned()).spawn(move || {
+            let log = options.begin(file, &header.run, &header.scene, log_time_ns)?;
+            Ok(write(&queue.0, log)?)
+        });
+        self.writing = Some(writing.context("cannot start the writing thread")?);
+        Ok(())
+    }
+
+    /// Writes the rest of the queue and the closing metadata, and gives the file its name.
+    fn finish(
+        self,
+        result: anyhow::Result<StopReason>,
+        endpoint: &Endpoint,
+    ) -> anyhow::Result<Report> {
+        self.queue.close();
+        let Some(writing) = self.writing else {
+            if let Some(file) = self.file {
+                file.discard()?;
+            }
+            let reason = result?.text();
+            bail!(
+                "nothing was recorded ({reason}): {endpoint} published no snapshot with a keyframe"
+            );
+        };
+        let written = writing.join().map_err(|_| anyhow!("the writing thread panicked"))?;
+        let log = written.context(
+            "the recording is incomplete; its readable part is the file with the suffix .part",
+        )?;
+        let stop_reason = match &result {
+            Ok(reason) => reason.text().to_owned(),
+            Err(error) => format!("{error:#}"),
+        };
+        let mut closing = Closing { stop_reason, counts: self.intake.counts() };
+        closing.counts.set_written(log.counts());
+        closing.counts.set_lost(&self.queue.lost());
+        let kept =
+            "the recording is complete except for its end, in the file with the suffix .part";
+        let path = log.finish(&closing).context(kept)?.finish().context(kept)?;
+        result?;
+        let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
+        Ok(Report::new(path, closing, steps).with_unreadable(self.unreadable))
+    }
+}
+
+/// Closes the queue when the writing thread ends for any reason, so that the reading thread sees it.
+struct CloseOnDrop(Arc<Queue>);
+
+impl Drop for CloseOnDrop {
+    fn drop(&mut self) {
+        self.0.close();
+    }
+}
+
+/// The writing thread: writes every item and flushes every second.
+fn write(queue: &Queue, mut log: LogFile) -> Result<LogFile, WriteError> {
+    let mut next_flush_ns = monotonic_ns() + FLUSH_NS;
+    loop {
+        match queue.pop(WAIT_MAX) {
+            Popped::Item(Item { content: Content::Update(message), log_time_ns }) => {
+                log.write(&message, log_time_ns)?;
+            }
+            Popped::Item(Item { content: Content::Snapshot(row, particles), log_time_ns }) => {
+                log.write(&Message::Step(row), log_time_ns)?;
+                log.write(&Message::Particles { step: row.step, particles }, log_time_ns)?;
+            }
+            Popped::Timeout => {}
+            Popped::Closed => return Ok(log),
+        }
+        let now_ns = monotonic_ns();
+        if now_ns >= next_flush_ns {
+            next_flush_ns = now_ns + FLUSH_NS;
+            log.flush()?;
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! The bounded queue from the thread that reads shared memory to the thread that writes the file.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use recorder::{AllCounts, Message, StepRow, Topic};
+use sim_contract::ParticleState;
+
+/// One or two messages to write.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Content {
+    /// Any message except those of a snapshot.
+    Update(Message),
+    /// The two messages of a snapshot, which stay together.
+    Snapshot(StepRow, Vec<ParticleState>),
+}
+
+/// A content with the time of its reception: wall clock, in nanoseconds since 1970.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Item {
+    pub(crate) content: Content,
+    pub(crate) log_time_ns: u64,
+}
+
+/// A queue that never blocks the reading thread: it drops and counts items that do not fit.
+///
+/// The limit applies to snapshots. Other messages are small, and later steps build on them, so their
+/// limit is twice as high. The load, without which a file is useless, and an item that finds the
+/// queue empty are always accepted.
+#[derive(Debug)]
+pub(crate) struct Queue {
+    state: Mutex<State>,
+    changed: Condvar,
+    limit_bytes: usize,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    items: VecDeque<Item>,
+    size_bytes: usize,
+    lost: AllCounts,
+    is_closed: bool,
+}
+
+/// The result of [`Queue::pop`].
+#[derive(Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "moved once; a box for each item would cost more")]
+pub(crate) enum Popped {
+    Item(Item),
+    /// No item arrived before the timeout.
+    Timeout,
+    /// The queue is closed and empty.
+    Closed,
+}
+
+impl Queue {
+    pub(crate) fn new(limit_bytes: usize) -> Self {
+        Self { state: Mutex::default(), changed: Condvar::new(), limit_bytes }
+    }
+
+    /// Adds an item, or counts it as lost.
+    pub(crate) fn push(&self, item: Item) {
+        let size_bytes = item.content.size_bytes();
+        let mut state = self.lock();
+        let (limit_bytes, topics) = match &item.content {
+            Content::Update(message) => (2 * self.limit_bytes, &[message.topic()][..]),
+            Content::Snapshot(..) => (self.limit_bytes, &[Topic::Steps, Topic::Particles][..]),
+        };
+        let is_load = [Topic::Topology, Topic::Surface].contains(&topics[0]);
+        let fits = state.size_bytes + size_bytes <= limit_bytes;
+        if state.is_closed || !(fits || is_load || state.items.is_empty()) {
+            for topic in topics {
+                state.lost[*topic].lost += 1;
+            }
+            return;
+        }
+        state.size_bytes += size_bytes;
+        state.items.push_back(item);
+        drop(state);
+        self.changed.notify_one();
+    }
+
+    /// Closes the queue. Items in the queue can still be popped.
+    pub(crate) fn close(&self) {
+        self.lock().is_closed = true;
+        self.changed.notify_one();
+    }
+
+    /// Returns `true` if either side has called [`Queue::close`].
+    pub(crate) fn is_closed(&self) -> bool {
+        self.lock().is_closed
+    }
+
+    /// Returns the next item. Waits for one at most `timeout`.
+    pub(crate) fn pop(&self, timeout: Duration) -> Popped {
+        let is_idle = |state: &mut State| state.items.is_empty() && !state.is_closed;
+        let waited = self.changed.wait_timeout_while(self.lock(), timeout, is_idle);
+        let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        match state.items.pop_front() {
+            Some(item) => {
+                state.size_bytes -= item.content.size_bytes();
+                Popped::Item(item)
+            }
+            None if state.is_closed => Popped::Closed,
+            None => Popped::Timeout,
+        }
+    }
+
+    /// Returns the number of dropped messages by topic. The other counts are 0.
+    pub(crate) fn lost(&self) -> AllCounts {
+        self.lock().lost
+    }
+
+    /// Locks the state. A panic of the other thread cannot leave it inconsistent.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Content {
+    fn size_bytes(&self) -> usize {
+        match self {
+            Self::Update(message) => message.size_bytes(),
+            Self::Snapshot(_, particles) => size_of::<Item>() + size_of_val(particles.as_slice()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(step: u64) -> StepRow {
+        StepRow { step, scene_step: step, ..StepRow::default() }
+    }
+
+    fn snapshot(step: u64) -> Item {
+        let particles = vec![ParticleState::default(); 1000];
+        Item { content: Content::Snapshot(row(step), particles), log_time_ns: step }
+    }
+
+    fn keyframe(step: u64, size_bytes: usize) -> Item {
+        let message = Message::Keyframe { step, bytes: vec![0; size_bytes] };
+        Item { content: Content::Update(message), log_time_ns: step }
+    }
+
+    fn pop_steps(queue: &Queue) -> Vec<u64> {
+        let next = || match queue.pop(Duration::ZERO) {
+            Popped::Item(item) => Some(item.log_time_ns),
+            Popped::Timeout | Popped::Closed => None,
+        };
+        std::iter::from_fn(next).collect()
+    }
+
+    #[test]
+    fn a_full_queue_drops_and_counts_snapshots_only() {
+        let queue = Queue::new(100_000);
+        for step in 0..10 {
+            queue.push(keyframe(100 + step, 100));
+            queue.push(snapshot(step));
+        }
+        let lost = queue.lost();
+        assert_eq!(lost[Topic::Particles].lost, 7);
+        assert_eq!(lost[Topic::Steps].lost, 7);
+        assert_eq!(lost[Topic::Keyframe].lost, 0);
+        let steps = pop_steps(&queue);
+        assert_eq!(steps, [100, 0, 101, 1, 102, 2, 103, 104, 105, 106, 107, 108, 109]);
+        queue.push(snapshot(10));
+        assert_eq!(pop_steps(&queue), [10], "an empty queue accepts snapshots again");
+    }
+
+    #[test]
+    fn an_empty_queue_accepts_a_snapshot_above_the_limit() {
+        let queue = Queue::new(1000);
+        queue.push(snapshot(1));
+        queue.push(snapshot(2));
+        assert_eq!(queue.lost()[Topic::Particles].lost, 1);
+        assert_eq!(pop_steps(&queue), [1]);
+        queue.push(snapshot(3));
+        assert_eq!(pop_steps(&queue), [3]);
+    }
+
+    #[test]
+    fn small_messages_have_a_limit_too() {
+        let queue = Queue::new(1000);
+        for step in 0..10 {
+            queue.push(keyframe(step, 500));
+        }
+        assert!(queue.lost()[Topic::Keyframe].lost > 0);
+        assert!(pop_steps(&queue).len() < 4);
+    }
+
+    #[test]
+    fn a_closed_queue_returns_its_items_and_accepts_no_more() {
+        let queue = Queue::new(100_000);
+        queue.push(snapshot(1));
+        queue.close();
+        queue.push(snapshot(2));
+        assert!(matches!(queue.pop(Duration::ZERO), Popped::Item(_)));
+        assert_eq!(queue.pop(Duration::ZERO), Popped::Closed);
+        assert_eq!(queue.lost()[Topic::Particles].lost, 1);
+    }
+}

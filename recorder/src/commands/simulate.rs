@@ -1,0 +1,161 @@
+//! `recorder simulate`: simulates a scene in this process, without a node.
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use recorder::{Closing, OutcomeRow};
+use serde::Serialize;
+use sim_contract::Stop;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_solver::Solver;
+
+use crate::cli::exit::Exit;
+use crate::cli::file_args::{FileArgs, LogFile};
+use crate::cli::output::{self, AsJson};
+use crate::cli::progress::progress_bar;
+use crate::cli::thread_args::ThreadArgs;
+use crate::input::scene_source::{load_commands, load_scene};
+use crate::simulation::{Job, SimulationResult, simulate};
+
+/// Steps between two checks for signals and updates of the progress bar.
+const STEPS_PER_CHECK: u64 = 256;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    recorder simulate curtain --steps 24000\n  \
+    recorder simulate curtain --steps 2400 -o drag.mcap --commands drag.jsonl\n  \
+    recorder simulate live.mcap --steps 2400 --commands live.mcap -o again.mcap")]
+pub(crate) struct SimulateArgs {
+    /// A built-in scene, a TOML file (a path with / or ending in .toml), or a recording with a
+    /// scene (ending in .mcap)
+    scene: String,
+    /// Number of steps to compute after step 0
+    #[arg(long, value_name = "N")]
+    steps: u64,
+    /// Recording to write [default: none, only the summary is printed]
+    #[arg(short, long, value_name = "OUT.mcap")]
+    output: Option<PathBuf>,
+    /// Commands: a file of JSON lines, or a recording (ending in .mcap), whose outcomes are
+    /// repeated [default: none]
+    #[arg(long, value_name = "FILE")]
+    commands: Option<String>,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    file: FileArgs,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+/// The summary.
+#[derive(Debug, Serialize)]
+struct Summary {
+    scene: String,
+    steps: u64,
+    state_hash: String,
+    applied: u64,
+    rejected: u64,
+    /// Simulated time per wall-clock time.
+    real_time_factor: f64,
+    wall_s: f64,
+    output: Option<String>,
+}
+
+pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
+    let stop = Stop::install()?;
+    let scene = load_scene(&args.scene)?;
+    let commands = args.commands.as_deref().map_or(Ok(Vec::new()), load_commands)?;
+    let job = Job { scene, commands, steps: args.steps };
+    let beyond = job.commands_beyond_the_end();
+    if beyond > 0 {
+        output::note(&format!(
+            "warning: commands for steps after {}, the last one: {beyond}",
+            args.steps
+        ));
+    }
+    let mut solver = Solver::new(&job.scene);
+    solver.set_threads(args.threads.count());
+    let mut log =
+        args.output.as_deref().map(|path| begin(args, path, &job, &solver)).transpose()?;
+
+    let bar = progress_bar(args.steps);
+    let before_ns = monotonic_ns();
+    let result = simulate(&job, solver, log.as_mut(), |step| {
+        if !step.is_multiple_of(STEPS_PER_CHECK) {
+            return ControlFlow::Continue(());
+        }
+        bar.set_position(step);
+        if stop.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+    .with_context(|| truncation(args))?;
+    bar.finish_and_clear();
+    let path = log.map(|log| finish(log, &result, args.steps)).transpose()?;
+    let wall_ns = monotonic_ns() - before_ns;
+
+    note_rejections(&result);
+    let summary = summary(&job, &result, wall_ns, path.as_deref());
+    output::result(args.as_json, &summary, &summary.to_string())?;
+    Ok(if result.steps < args.steps { Exit::Loss } else { Exit::Done })
+}
+
+/// Describes the file after a write error.
+fn truncation(args: &SimulateArgs) -> String {
+    let path = args.output.as_deref().map(output::path_text).unwrap_or_default();
+    format!("{path} is incomplete; its readable part is {path}.part")
+}
+
+fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow::Result<LogFile> {
+    let file = args.file.create(path)?;
+    args.file.begin(file, &job.description(solver), job.scene.to_toml().as_bytes(), 0)
+}
+
+fn finish(log: LogFile, result: &SimulationResult, steps: u64) -> anyhow::Result<PathBuf> {
+    let stop_reason = if result.steps < steps { "interrupted" } else { "steps reached" };
+    let mut closing = Closing { stop_reason: stop_reason.to_owned(), counts: *log.counts() };
+    closing.counts.set_received_to_written();
+    Ok(log.finish(&closing)?.finish()?)
+}
+
+/// Reports the first rejected commands. The recording has all of them.
+fn note_rejections(result: &SimulationResult) {
+    for outcome in &result.rejections {
+        let row = OutcomeRow::from(outcome);
+        let kind = serde_json::to_value(row.action).unwrap_or_default();
+        output::note(&format!(
+            "warning: step {}: {} (client {}, sequence {}) was rejected: {}",
+            row.step,
+            kind["kind"].as_str().unwrap_or("a command"),
+            row.client_id,
+            row.sequence,
+            row.reason
+        ));
+    }
+}
+
+fn summary(job: &Job, result: &SimulationResult, wall_ns: u64, path: Option<&Path>) -> Summary {
+    let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
+    let simulated_s = result.steps as f64 / f64::from(job.scene.solver.rate_hz);
+    Summary {
+        scene: job.scene.name.clone(),
+        steps: result.steps,
+        state_hash: format!("{:016x}", result.state_hash),
+        applied: result.applied_count,
+        rejected: result.rejected_count,
+        real_time_factor: simulated_s / wall_s,
+        wall_s,
+        output: path.map(output::path_text),
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "scene       {}", self.scene)?;
+        writeln!(f, "steps       {}", self.steps)?;
+        writeln!(f, "state_hash  {}", self.state_hash)?;
+        writeln!(f, "commands    {} applied, {} rejected", self.applied, self.rejected)?;
+        write!(f, "speed       {:.1} x real time ({:.2} s)", self.real_time_factor, self.wall_s)?;
+        self.output.iter().try_for_each(|path| write!(f, "\nwritten     {path}"))
+    }
+}

@@ -1,0 +1,195 @@
+//! `recorder verify`: proves that a recording is complete and re-simulates bit for bit.
+
+mod difference;
+mod resimulation;
+mod side_rows;
+
+use std::fmt;
+use std::io::Read;
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use recorder::{FrameReader, LogEnd, LogReader};
+use serde::Serialize;
+use sim_contract::Stop;
+use sim_solver::SOLVER_VERSION;
+
+use crate::cli::exit::Exit;
+use crate::cli::output::{self, AsJson};
+use crate::cli::progress::progress_spinner;
+use crate::cli::thread_args::ThreadArgs;
+use crate::input::scene_source::scene_in_recording;
+use difference::Difference;
+use resimulation::{Finding, Resimulation};
+
+/// Snapshots between two checks for signals and updates of the progress bar.
+const SNAPSHOTS_PER_CHECK: u64 = 64;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes \
+    missing, or file truncated or damaged.\n\nExamples:\n  \
+    recorder verify run.mcap\n  \
+    recorder verify run.mcap --json")]
+pub(crate) struct VerifyArgs {
+    /// Recording to re-simulate, from its first snapshot with a keyframe
+    file: PathBuf,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+/// The result of the verification, as printed.
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    pub(crate) verdict: Verdict,
+    /// The step from which the simulation started.
+    pub(crate) first_step: u64,
+    /// The last bit-identical step, if there is one.
+    pub(crate) last_identical_step: Option<u64>,
+    /// Number of simulated and compared steps.
+    pub(crate) steps_identical: u64,
+    /// The step that the verdict concerns.
+    pub(crate) step: Option<u64>,
+    pub(crate) what: Option<String>,
+    #[serde(flatten)]
+    pub(crate) difference: Option<Difference>,
+    /// The end of the file.
+    pub(crate) file_end: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Verdict {
+    Identical,
+    Diverged,
+    OutcomeLogIncomplete,
+    Interrupted,
+}
+
+pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
+    let stop = Stop::install()?;
+    let path = output::path_text(&args.file);
+    let log = LogReader::open(&args.file).with_context(|| path.clone())?;
+    let bar = progress_spinner();
+    let (report, end) = verify(log, &path, args.threads.count(), |step| {
+        bar.set_message(format!("step {step}"));
+        stop.is_asked()
+    })?;
+    bar.finish_and_clear();
+    output::result(args.as_json, &report, &report.to_string())?;
+    if let Some(end) = &end {
+        output::note(&format!("warning: {path} is {end}; verified as far as it goes"));
+    }
+    Ok(match report.verdict {
+        Verdict::Interrupted => Exit::Failed,
+        Verdict::Identical if end.is_none() => Exit::Done,
+        _ => Exit::Loss,
+    })
+}
+
+/// Re-simulates a recording with `threads` threads. Calls `is_stopped` periodically, with the step.
+pub(crate) fn verify<R: Read>(
+    log: LogReader<R>,
+    path: &str,
+    threads: usize,
+    mut is_stopped: impl FnMut(u64) -> bool,
+) -> anyhow::Result<(Report, Option<LogEnd>)> {
+    let recorded_version = log.run().solver_version;
+    if recorded_version != SOLVER_VERSION {
+        bail!(
+            "{path}: recorded with solver version {recorded_version}, but this program has version \
+             {SOLVER_VERSION}, whose bits differ. Verify it with the program that recorded it"
+        );
+    }
+    let scene = scene_in_recording(&log, path)?;
+    let mut frames = FrameReader::new(log);
+    let mut simulation = None;
+    let mut report = Report::new();
+    let mut count = 0;
+    while let Some(frame) = frames.next_frame().with_context(|| path.to_owned())? {
+        let step = frame.row.step;
+        let finding = match &mut simulation {
+            None => {
+                let start = Resimulation::start(&scene, &frame).with_context(|| path.to_owned())?;
+                let Some(mut start) = start else { continue };
+                start.set_threads(threads);
+                report.first_step = step;
+                simulation.insert(start).compare_start(&frame)
+            }
+            Some(simulation) => simulation.advance(&frame),
+        };
+        if !report.add(finding, step) {
+            break;
+        }
+        count += 1;
+        if count % SNAPSHOTS_PER_CHECK == 0 && is_stopped(step) {
+            report.verdict = Verdict::Interrupted;
+            break;
+        }
+    }
+    let end = frames.end().cloned().filter(|end| *end != LogEnd::Complete);
+    if simulation.is_none() {
+        let end = end.map_or_else(String::new, |end| format!(" (the file is {end})"));
+        bail!("{path}: has no snapshot with a keyframe to start from{end}");
+    }
+    report.file_end = frames.end().map_or_else(|| "not reached".to_owned(), ToString::to_string);
+    Ok((report, end))
+}
+
+impl Report {
+    fn new() -> Self {
+        Self {
+            verdict: Verdict::Identical,
+            first_step: 0,
+            last_identical_step: None,
+            steps_identical: 0,
+            step: None,
+            what: None,
+            difference: None,
+            file_end: String::new(),
+        }
+    }
+
+    /// Adds the finding at `step`. Returns `true` to continue.
+    fn add(&mut self, finding: Finding, step: u64) -> bool {
+        match finding {
+            Finding::Identical => {
+                self.last_identical_step = Some(step);
+                self.steps_identical += u64::from(step != self.first_step);
+                return true;
+            }
+            Finding::Diverged { step, what, difference } => {
+                self.verdict = Verdict::Diverged;
+                (self.step, self.what, self.difference) = (Some(step), Some(what), difference);
+            }
+            Finding::Incomplete { step, what } => {
+                self.verdict = Verdict::OutcomeLogIncomplete;
+                (self.step, self.what) = (Some(step), Some(what));
+            }
+        }
+        false
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.steps_identical;
+        let (step, what) = (self.step.unwrap_or(0), self.what.as_deref().unwrap_or(""));
+        match self.verdict {
+            Verdict::Identical => {
+                let last = self.last_identical_step.unwrap_or(self.first_step);
+                write!(f, "{count} steps bit-identical ({}..={last})", self.first_step)
+            }
+            Verdict::Diverged => {
+                write!(f, "step {step} differs: {what} ({count} steps before it bit-identical)")
+            }
+            Verdict::OutcomeLogIncomplete => write!(
+                f,
+                "outcome log incomplete from step {step}: {what} ({count} steps before it \
+                 bit-identical)"
+            ),
+            Verdict::Interrupted => write!(f, "interrupted; {count} steps so far bit-identical"),
+        }
+    }
+}

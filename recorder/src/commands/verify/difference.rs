@@ -1,0 +1,86 @@
+//! The first field in which two states differ, compared bit by bit.
+
+use std::fmt;
+
+use serde::Serialize;
+use sim_contract::ParticleState;
+
+/// One field of one particle in two states.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Difference {
+    pub(crate) particle: usize,
+    pub(crate) field: &'static str,
+    /// The value in the recording, with its bits.
+    pub(crate) recorded: String,
+    /// The re-simulated value, with its bits.
+    pub(crate) simulated: String,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { particle, field, recorded, simulated } = self;
+        write!(
+            formatter,
+            "particle {particle}, {field}: recorded {recorded}, simulated {simulated}"
+        )
+    }
+}
+
+/// The 32-bit words of a particle, in order.
+const FIELDS: [&str; 8] = [
+    "position x",
+    "position y",
+    "position z",
+    "inverse_mass",
+    "velocity x",
+    "velocity y",
+    "velocity z",
+    "flags",
+];
+
+/// Returns the first field that differs, or `None` if all bits are equal. Both slices have the same
+/// length.
+pub(crate) fn first_difference(
+    recorded: &[ParticleState],
+    simulated: &[ParticleState],
+) -> Option<Difference> {
+    recorded.iter().zip(simulated).enumerate().find_map(|(particle, (old, new))| {
+        let old: [u32; 8] = bytemuck::cast(*old);
+        let new: [u32; 8] = bytemuck::cast(*new);
+        let place = (0..FIELDS.len()).find(|place| old[*place] != new[*place])?;
+        let field = FIELDS[place];
+        let [recorded, simulated] = [old[place], new[place]].map(|bits| value(field, bits));
+        Some(Difference { particle, field, recorded, simulated })
+    })
+}
+
+fn value(field: &str, bits: u32) -> String {
+    if field == "flags" {
+        format!("{bits:#x}")
+    } else {
+        format!("{} ({bits:#010x})", f32::from_bits(bits))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_difference_names_the_first_field_with_a_different_bit() {
+        let zero = ParticleState::default();
+        let other = ParticleState { velocity: [0.0, -0.0, 0.0], flags: 1, ..zero };
+        assert_eq!(first_difference(&[zero, zero], &[zero, zero]), None);
+        let difference = first_difference(&[zero, zero], &[zero, other]).unwrap();
+        assert_eq!(
+            difference.to_string(),
+            "particle 1, velocity y: recorded 0 (0x00000000), simulated -0 (0x80000000)"
+        );
+    }
+
+    #[test]
+    fn nans_with_equal_bits_are_equal() {
+        let nan = ParticleState { inverse_mass: f32::NAN, ..ParticleState::default() };
+        assert_eq!(first_difference(&[nan], &[nan]), None);
+    }
+}

@@ -1,0 +1,294 @@
+//! Re-simulates a recording and compares every recorded step, from the file alone.
+
+use std::collections::BTreeMap;
+
+use recorder::{Frame, Message, OutcomeRow, StepRow, state_hash};
+use sim_contract::{Action, Outcome, ParticleState};
+use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
+
+use super::difference::{Difference, first_difference};
+use super::side_rows::SideRows;
+use crate::simulation::apply::apply;
+
+/// The result of the comparison of one snapshot. The texts are for people.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Finding {
+    /// Every bit is equal.
+    Identical,
+    /// The simulation differs from the recording.
+    Diverged {
+        /// The first step that differs.
+        step: u64,
+        what: String,
+        difference: Option<Difference>,
+    },
+    /// Outcomes are missing, so the states cannot be compared.
+    Incomplete {
+        /// The first step that may lack an outcome.
+        step: u64,
+        what: String,
+    },
+}
+
+/// The reason why a recording cannot be re-simulated.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum StartError {
+    #[error("the keyframe of step {step}: {cause}")]
+    Keyframe { step: u64, cause: sim_solver::KeyframeError },
+    #[error("the state of step {step}: {cause}")]
+    State { step: u64, cause: sim_solver::RestoreError },
+}
+
+/// The re-simulation of a recording.
+#[derive(Debug)]
+pub(crate) struct Resimulation {
+    scene: Scene,
+    solver: Solver,
+    /// The step of the solver's state.
+    step: u64,
+    /// Index of the next outcome to apply.
+    next_index: u64,
+    /// Outcomes that were read but not applied yet, by index.
+    pending: BTreeMap<u64, OutcomeRow>,
+    side_rows: SideRows,
+}
+
+impl Resimulation {
+    /// Starts at a snapshot. Returns `None` if it has no keyframe.
+    pub(crate) fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, StartError> {
+        let step = frame.row.step;
+        let Some(bytes) = frame.own_keyframe() else { return Ok(None) };
+        let keyframe =
+            Keyframe::decode(bytes).map_err(|cause| StartError::Keyframe { step, cause })?;
+        let mut solver = Solver::new(scene);
+        solver
+            .restore(bytemuck::cast_slice(&frame.particles), &keyframe)
+            .map_err(|cause| StartError::State { step, cause })?;
+        let next_index = frame.row.outcome_count;
+        let mut start = Self {
+            scene: scene.clone(),
+            solver,
+            step,
+            next_index,
+            pending: BTreeMap::new(),
+            side_rows: SideRows::default(),
+        };
+        start.add_updates(frame);
+        Ok(Some(start))
+    }
+
+    /// Sets the number of threads.
+    pub(crate) fn set_threads(&mut self, threads: usize) {
+        self.solver.set_threads(threads);
+    }
+
+    /// Compares the first snapshot with its own header and with the torn constraints in the file.
+    /// Compares step 0 with the scene.
+    pub(crate) fn compare_start(&self, frame: &Frame) -> Finding {
+        let finding = match self.step {
+            0 => compare(&Solver::new(&self.scene), frame),
+            _ => compare(&self.solver, frame),
+        };
+        let has_other_tears =
+            torn_in_first_frame(frame).is_some_and(|torn| torn != self.solver.torn());
+        if finding != Finding::Identical || !has_other_tears {
+            return finding;
+        }
+        let what =
+            "its torn constraints in /topology and /tears differ from its keyframe".to_owned();
+        Finding::Diverged { step: self.step, what, difference: None }
+    }
+
+    /// Simulates up to the next snapshot and compares it.
+    pub(crate) fn advance(&mut self, frame: &Frame) -> Finding {
+        self.add_updates(frame);
+        let row = &frame.row;
+        if row.step <= self.step {
+            let what = format!("it follows step {} in the file", self.step);
+            return Finding::Diverged { step: row.step, what, difference: None };
+        }
+        if let Some(finding) = self.find_gap(row) {
+            return finding;
+        }
+        while self.step < row.step {
+            if let Some(finding) = self.simulate_step() {
+                return finding;
+            }
+            // In the step of the snapshot, the particles are compared first.
+            if self.step < row.step
+                && let Some(finding) = self.compare_side_rows()
+            {
+                return finding;
+            }
+        }
+        // All outcomes that the header counts are applied now, unless one has another step.
+        if self.next_index != row.outcome_count {
+            return self.misplaced(row.step, "its step is after the snapshot that counts it");
+        }
+        match compare(&self.solver, frame) {
+            Finding::Identical => {
+                self.compare_side_rows().unwrap_or_else(|| self.compare_keyframe(frame))
+            }
+            // The torn constraints may differ. The rows name the first one.
+            different @ Finding::Diverged { difference: None, .. } => {
+                self.compare_side_rows().unwrap_or(different)
+            }
+            different => different,
+        }
+    }
+
+    /// Compares the keyframe, if the snapshot has one.
+    fn compare_keyframe(&self, frame: &Frame) -> Finding {
+        let step = frame.row.step;
+        let recorded = frame.own_keyframe().map(Keyframe::decode);
+        let mut simulated = self.solver.keyframe();
+        let what = match recorded {
+            None => return Finding::Identical,
+            Some(Err(error)) => format!("its keyframe is damaged: {error}"),
+            Some(Ok(recorded)) => {
+                // The solver does not know whether the node was paused.
+                simulated.paused = recorded.paused;
+                if recorded == simulated {
+                    return Finding::Identical;
+                }
+                "its keyframe has another state: the masses, grabs, parameters, torn constraints, \
+                 or moved anchors or colliders differ"
+                    .to_owned()
+            }
+        };
+        Finding::Diverged { step, what, difference: None }
+    }
+
+    fn compare_side_rows(&mut self) -> Option<Finding> {
+        let step = self.step;
+        let what = self.side_rows.compare(&self.solver, step)?;
+        Some(Finding::Diverged { step, what, difference: None })
+    }
+
+    fn add_updates(&mut self, frame: &Frame) {
+        // The rows of the first state are restored, not simulated.
+        self.side_rows.add(&frame.updates, self.step + 1);
+        let outcomes = frame.updates.iter().filter_map(|update| match update {
+            // Outcomes with a lower index are part of the first state.
+            Message::Outcome(row) if row.index >= self.next_index => Some(row),
+            _ => None,
+        });
+        self.pending.extend(outcomes.map(|row| (row.index, row.clone())));
+    }
+
+    /// Finds the first outcome that the snapshot counts and the log lacks.
+    fn find_gap(&self, row: &StepRow) -> Option<Finding> {
+        let present = self.pending.range(self.next_index..).map(|(index, _)| *index);
+        let expected = self.next_index..row.outcome_count;
+        let missing = expected.zip(present.map(Some).chain(std::iter::repeat(None)));
+        let (index, _) = missing.into_iter().find(|(index, present)| *present != Some(*index))?;
+        let before = index.checked_sub(1).and_then(|before| self.pending.get(&before));
+        let step = before.map_or(self.step + 1, |before| before.step.max(self.step + 1));
+        let what = format!(
+            "outcome {index} is missing; the snapshot of step {} counts {} outcomes",
+            row.step, row.outcome_count
+        );
+        Some(Finding::Incomplete { step, what })
+    }
+
+    /// Applies the outcomes of the next step in the order of their index, and computes the step.
+    fn simulate_step(&mut self) -> Option<Finding> {
+        let step = self.step + 1;
+        while let Some(entry) = self.pending.first_entry().filter(|entry| entry.get().step <= step)
+        {
+            let row = entry.remove();
+            if row.index != self.next_index || row.step != step {
+                return Some(self.misplaced(row.step, "the log has another order"));
+            }
+            self.next_index += 1;
+            if let Some(finding) = self.apply(&row) {
+                return Some(finding);
+            }
+        }
+        self.solver.step();
+        self.step = step;
+        None
+    }
+
+    /// Applies an outcome and compares its status. Skips pause, resume and step, which control only the
+    /// pace of the node, and rejected loads, which change nothing.
+    fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
+        let is_rejected_load = matches!(row.action, Action::Load { .. }) && !row.is_applied();
+        let result = match apply(&mut self.solver, row.client_id, &row.action) {
+            Ok(Applied::Control(Control::Pause | Control::Resume | Control::Step { .. })) => {
+                return None;
+            }
+            Err(_) if is_rejected_load => return None,
+            result => result.map(|_| ()),
+        };
+        let again = Outcome::new(row.index, row.step, Outcome::from(row).command, result);
+        let again = OutcomeRow::from(&again);
+        if again.status == row.status && again.reason == row.reason {
+            return None;
+        }
+        let what = format!(
+            "outcome {}: recorded {} {}, simulated {} {}",
+            row.index, row.status, row.reason, again.status, again.reason
+        );
+        Some(Finding::Diverged { step: row.step, what, difference: None })
+    }
+
+    fn misplaced(&self, step: u64, why: &str) -> Finding {
+        let what = format!("outcome {} is misplaced: {why}", self.next_index);
+        Finding::Diverged { step, what, difference: None }
+    }
+}
+
+/// Returns the torn constraints of the first snapshot, from its rows. Returns `None` for later
+/// snapshots.
+fn torn_in_first_frame(frame: &Frame) -> Option<Vec<u32>> {
+    let mut updates = frame.updates.iter();
+    let mut torn = updates.find_map(|update| match update {
+        Message::Topology(row) => Some(row.torn.clone()),
+        _ => None,
+    })?;
+    for update in updates {
+        if let Message::Tears(row) = update {
+            torn.extend(&row.constraints);
+        }
+    }
+    Some(torn)
+}
+
+/// Compares the recorded header, the recorded payload and the simulated state.
+fn compare(solver: &Solver, frame: &Frame) -> Finding {
+    let Frame { row, particles, .. } = frame;
+    let diverged =
+        |what: String, difference| Finding::Diverged { step: row.step, what, difference };
+    let expected_count = solver.particle_count();
+    if particles.len() != expected_count {
+        let what = format!("recorded {} particles, simulated {expected_count}", particles.len());
+        return diverged(what, None);
+    }
+    let simulated_hash = solver.state_hash();
+    if state_hash(particles, solver.torn()) != simulated_hash {
+        let simulated: Vec<ParticleState> =
+            (0..expected_count).map(|index| bytemuck::cast(solver.particle(index))).collect();
+        let difference = first_difference(particles, &simulated);
+        let what = difference
+            .as_ref()
+            .map_or_else(|| "the torn constraints differ".to_owned(), ToString::to_string);
+        return diverged(what, difference);
+    }
+    let counts = [
+        ("scene_step", row.scene_step, solver.scene_step()),
+        ("torn_count", u64::from(row.torn_count), solver.torn().len() as u64),
+    ];
+    let differs = |(_, recorded, simulated): &(_, u64, u64)| recorded != simulated;
+    if let Some((name, recorded, simulated)) = counts.into_iter().find(differs) {
+        return diverged(format!("{name}: recorded {recorded}, simulated {simulated}"), None);
+    }
+    if row.state_hash != simulated_hash {
+        let what = format!(
+            "its row in /steps has the hash {:016x}, its particles have {simulated_hash:016x}",
+            row.state_hash
+        );
+        return diverged(what, None);
+    }
+    Finding::Identical
+}

@@ -1,0 +1,39 @@
+//! The recording format, from the bytes of a message to the state at any step.
+
+mod decode;
+mod encoding;
+mod frames;
+mod index;
+mod keyframe_tears;
+mod message;
+mod part_file;
+mod read_error;
+mod reader;
+mod records;
+mod rows;
+mod run;
+mod state_hash;
+mod tape;
+mod tears;
+mod topic;
+mod writer;
+
+pub use decode::LoggedMessage;
+pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
+pub use frames::{Frame, FrameReader};
+pub use index::{ChunkEntry, IndexedLog};
+pub use keyframe_tears::KeyframeTears;
+pub use message::Message;
+pub use part_file::{Existing, PartFile, PartFileError};
+pub use read_error::{LogEnd, ReadError};
+pub use reader::LogReader;
+pub use rows::{
+    ColliderRow, CollidersRow, EventRow, OutcomeRow, ShapeRow, Softness, StatusRow, StepRow,
+    SurfaceRow, TearsRow, TopologyRow,
+};
+pub use run::{Closing, FORMAT_VERSION, RunDescription};
+pub use state_hash::state_hash;
+pub use tape::{Tape, TapeError, TapeState};
+pub use tears::{Torn, TornFollower};
+pub use topic::{AllCounts, Topic, TopicCounts};
+pub use writer::{Compression, LogOptions, LogWriter, WriteError};

@@ -1,0 +1,59 @@
+//! From the bytes of a record to a message of a recording.
+
+use mcap::records::MessageHeader;
+use serde::de::DeserializeOwned;
+
+use super::encoding::decode_particles;
+use super::message::Message;
+use super::run::RunDescription;
+use super::topic::Topic;
+
+/// A message with its times in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoggedMessage {
+    /// The content.
+    pub message: Message,
+    /// Low 32 bits of the step.
+    pub sequence: u32,
+    /// Wall clock of the reception, in nanoseconds since 1970.
+    pub log_time_ns: u64,
+    /// Wall clock of the step, in nanoseconds since 1970.
+    pub publish_time_ns: u64,
+}
+
+/// Decodes a message. Returns `None` for `/tf`, which no reader of ours needs. `Err` describes the
+/// error in the content.
+pub(super) fn decode_message(
+    topic: Topic,
+    header: &MessageHeader,
+    data: &[u8],
+    run: &RunDescription,
+) -> Result<Option<LoggedMessage>, String> {
+    let step =
+        || run.step_at(header.publish_time).ok_or("its time is not the time of a step".to_owned());
+    let message = match topic {
+        Topic::Tf => return Ok(None),
+        Topic::Topology => Message::Topology(row(data)?),
+        Topic::Surface => Message::Surface(row(data)?),
+        Topic::Colliders => Message::Colliders(row(data)?),
+        Topic::Tears => Message::Tears(row(data)?),
+        Topic::Outcomes => Message::Outcome(row(data)?),
+        Topic::Status => Message::Status(row(data)?),
+        Topic::Events => Message::Event(row(data)?),
+        Topic::Steps => Message::Step(row(data)?),
+        Topic::Keyframe => Message::Keyframe { step: step()?, bytes: data.to_vec() },
+        Topic::Particles => {
+            Message::Particles { step: step()?, particles: decode_particles(data)? }
+        }
+    };
+    Ok(Some(LoggedMessage {
+        message,
+        sequence: header.sequence,
+        log_time_ns: header.log_time,
+        publish_time_ns: header.publish_time,
+    }))
+}
+
+fn row<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
+    serde_json::from_slice(data).map_err(|error| error.to_string())
+}

@@ -1,0 +1,227 @@
+//! Random access to the chunks of a recording.
+//!
+//! The index at the end of the file gives the position and the topics of each chunk. A file
+//! without an end (its recorder was killed or is still writing) is scanned from record to record
+//! instead. The scan reads only the headers of the records.
+
+mod chunk;
+mod scan;
+mod summary;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::ErrorKind;
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+
+use mcap::records::{Record, op};
+
+use super::decode::{LoggedMessage, decode_message};
+use super::read_error::{LogEnd, ReadError};
+use super::reader::LogReader;
+use super::records::{RECORD_SIZE_BYTES_MAX, RecordReader};
+use super::run::RunDescription;
+use super::topic::Topic;
+use chunk::{LocatedChunk, record_size_bytes};
+
+/// A recording with random access to its chunks.
+#[derive(Debug)]
+pub struct IndexedLog {
+    file: File,
+    run: RunDescription,
+    scene: Vec<u8>,
+    channels: BTreeMap<u16, Option<Topic>>,
+    chunks: Vec<ChunkEntry>,
+    end: LogEnd,
+    has_index: bool,
+}
+
+/// The position and the topics of a chunk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChunkEntry {
+    /// First byte in the file.
+    offset: u64,
+    size_bytes: u64,
+    topics: TopicSet,
+}
+
+/// A set of topics: bit [`Topic::index`] of each.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct TopicSet(u16);
+
+impl TopicSet {
+    /// The set for a chunk with unknown content.
+    const ALL: Self = Self(u16::MAX);
+
+    fn add(&mut self, topic: Topic) {
+        self.0 |= 1 << topic.index();
+    }
+}
+
+impl ChunkEntry {
+    /// Returns `true` if the chunk has messages on any of these topics, or if its topics are
+    /// unknown.
+    pub fn has_any(&self, topics: &[Topic]) -> bool {
+        topics.iter().any(|topic| self.topics.0 & 1 << topic.index() != 0)
+    }
+}
+
+impl IndexedLog {
+    /// Opens a file and reads its header and its index.
+    ///
+    /// # Errors
+    /// If the file is not a recording or has no readable header.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        Self::open_with_progress(path, &mut |_, _| {})
+    }
+
+    /// Opens a file. A scan of a file without an index calls `on_progress` with the bytes scanned
+    /// and the size of the file.
+    ///
+    /// # Errors
+    /// Like [`Self::open`].
+    pub fn open_with_progress(
+        path: &Path,
+        on_progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<Self, ReadError> {
+        let log = LogReader::open(path)?;
+        let (run, scene) = (log.run().clone(), log.scene().to_vec());
+        let mut file = File::open(path)?;
+        let size_bytes = file.metadata()?.len();
+        let summary = summary::read(&mut file, size_bytes)?;
+        let has_index = summary.is_some();
+        let (located, end) = match summary {
+            Some(located) => (located, LogEnd::Complete),
+            None => scan::read(&file, size_bytes, on_progress)?,
+        };
+        let channels = BTreeMap::new();
+        let mut log = Self { file, run, scene, channels, chunks: Vec::new(), end, has_index };
+        log.resolve_topics(&located)?;
+        Ok(log)
+    }
+
+    /// Resolves channel ids to topics. The first chunk declares the channels, so it is read first.
+    fn resolve_topics(&mut self, located: &[LocatedChunk]) -> Result<(), ReadError> {
+        let entry = |chunk: &LocatedChunk| ChunkEntry {
+            offset: chunk.offset,
+            size_bytes: chunk.size_bytes,
+            topics: TopicSet::ALL,
+        };
+        self.chunks = located.iter().map(entry).collect();
+        if !self.chunks.is_empty() {
+            match self.read_chunk(0) {
+                // The chunk may have no messages. Then it has no message index to take ids from.
+                Ok(messages) => {
+                    let mut topics = TopicSet::default();
+                    for logged in &messages {
+                        topics.add(logged.message.topic());
+                    }
+                    self.chunks[0].topics = topics;
+                }
+                Err(ReadError::DamagedChunk { .. } | ReadError::Malformed { .. }) => {}
+                Err(other) => return Err(other),
+            }
+        }
+        for (chunk, located) in self.chunks.iter_mut().zip(located) {
+            let known: Option<Vec<_>> =
+                located.channels.iter().map(|id| self.channels.get(id)).collect();
+            if let Some(known) = known.filter(|known| !known.is_empty()) {
+                chunk.topics = TopicSet::default();
+                known.into_iter().flatten().for_each(|topic| chunk.topics.add(*topic));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns another reader of the same file, for another thread.
+    ///
+    /// # Errors
+    /// If the operating system reports an error.
+    pub fn try_clone(&self) -> Result<Self, ReadError> {
+        Ok(Self {
+            file: self.file.try_clone()?,
+            run: self.run.clone(),
+            scene: self.scene.clone(),
+            channels: self.channels.clone(),
+            chunks: self.chunks.clone(),
+            end: self.end.clone(),
+            has_index: self.has_index,
+        })
+    }
+
+    /// Returns the run that was recorded.
+    pub fn run(&self) -> &RunDescription {
+        &self.run
+    }
+
+    /// Returns the text of the complete effective scene. It is empty if the file has none.
+    pub fn scene(&self) -> &[u8] {
+        &self.scene
+    }
+
+    /// Returns all chunks in the order of the file.
+    pub fn chunks(&self) -> &[ChunkEntry] {
+        &self.chunks
+    }
+
+    /// Returns the end of the file. The content of a chunk is verified when the chunk is read.
+    pub fn end(&self) -> &LogEnd {
+        &self.end
+    }
+
+    /// Returns `true` if the file has an index, and `false` if it was scanned.
+    pub fn has_index(&self) -> bool {
+        self.has_index
+    }
+
+    /// Reads all messages of a chunk except `/tf` and foreign topics, and verifies its checksum.
+    ///
+    /// # Errors
+    /// If the operating system reports an error, the chunk is damaged, or the content of a message
+    /// is invalid.
+    ///
+    /// # Panics
+    /// If there is no such chunk.
+    pub fn read_chunk(&mut self, index: usize) -> Result<Vec<LoggedMessage>, ReadError> {
+        let ChunkEntry { offset, size_bytes, .. } = self.chunks[index];
+        let damaged = |cause: String| ReadError::DamagedChunk { byte: offset, cause };
+        if size_bytes > RECORD_SIZE_BYTES_MAX as u64 {
+            return Err(damaged("its length exceeds the limit".to_owned()));
+        }
+        let mut bytes = vec![0; usize::try_from(size_bytes).unwrap_or(usize::MAX)];
+        // Independent of the file position, which a clone shares.
+        match self.file.read_exact_at(&mut bytes, offset) {
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
+                return Err(damaged("the file is shorter than its index says".to_owned()));
+            }
+            read => read?,
+        }
+        if bytes.first() != Some(&op::CHUNK) || record_size_bytes(&bytes) != Some(size_bytes) {
+            return Err(damaged("no chunk starts here".to_owned()));
+        }
+        let mut records = RecordReader::without_magic(bytes.as_slice());
+        let (channels, run) = (&mut self.channels, &self.run);
+        let mut messages = Vec::new();
+        while let Some(message) = records.next(|record, _| match record {
+            Record::Channel(channel) => {
+                channels.insert(channel.id, Topic::from_name(&channel.topic));
+                Ok(None)
+            }
+            Record::Message { header, data } => {
+                let topic = channels.get(&header.channel_id).copied().flatten();
+                let Some(topic) = topic else { return Ok(None) };
+                let byte = offset + size_bytes;
+                let malformed = |what| ReadError::Malformed { topic: topic.name(), byte, what };
+                decode_message(topic, &header, &data, run).map_err(malformed)
+            }
+            _ => Ok(None),
+        })? {
+            messages.extend(message);
+        }
+        match records.end {
+            Some(LogEnd::Complete) | None => Ok(messages),
+            Some(LogEnd::Truncated { .. }) => Err(damaged("it ends too early".to_owned())),
+            Some(LogEnd::Damaged { cause, .. }) => Err(damaged(cause)),
+        }
+    }
+}

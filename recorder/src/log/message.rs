@@ -1,0 +1,100 @@
+//! One message of a recording, on any topic.
+
+use sim_contract::{Action, ParticleState};
+
+use super::rows::{
+    ColliderRow, CollidersRow, EventRow, OutcomeRow, StatusRow, StepRow, SurfaceRow, TearsRow,
+    TopologyRow,
+};
+use super::topic::Topic;
+
+/// One message of a recording. `/tf` is not included, because it belongs to the header of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Message {
+    /// The constraints.
+    Topology(TopologyRow),
+    /// The triangles.
+    Surface(SurfaceRow),
+    /// The colliders after a step.
+    Colliders(CollidersRow),
+    /// The constraints that tore in a step.
+    Tears(TearsRow),
+    /// The part of the solver's state after a step that the particles lack.
+    Keyframe {
+        /// The step of the snapshot that this completes.
+        step: u64,
+        /// The solver's encoding.
+        bytes: Vec<u8>,
+    },
+    /// The outcome of a command.
+    Outcome(OutcomeRow),
+    /// The status of the node.
+    Status(StatusRow),
+    /// A notable event in a step.
+    Event(EventRow),
+    /// The header of a snapshot.
+    Step(StepRow),
+    /// The payload of a snapshot.
+    Particles {
+        /// The state after this step.
+        step: u64,
+        /// Shape: particle count.
+        particles: Vec<ParticleState>,
+    },
+}
+
+/// Approximate heap size of the name of a cause.
+const TEAR_CAUSE_SIZE_BYTES: usize = 32;
+
+impl Message {
+    /// Returns the topic of the message.
+    pub fn topic(&self) -> Topic {
+        match self {
+            Self::Topology(_) => Topic::Topology,
+            Self::Surface(_) => Topic::Surface,
+            Self::Colliders(_) => Topic::Colliders,
+            Self::Tears(_) => Topic::Tears,
+            Self::Keyframe { .. } => Topic::Keyframe,
+            Self::Outcome(_) => Topic::Outcomes,
+            Self::Status(_) => Topic::Status,
+            Self::Event(_) => Topic::Events,
+            Self::Step(_) => Topic::Steps,
+            Self::Particles { .. } => Topic::Particles,
+        }
+    }
+
+    /// Returns the step that the message belongs to.
+    pub fn step(&self) -> u64 {
+        match self {
+            Self::Topology(row) => row.step,
+            Self::Surface(row) => row.step,
+            Self::Colliders(row) => row.step,
+            Self::Tears(row) => row.step,
+            Self::Outcome(row) => row.step,
+            Self::Status(row) => row.step,
+            Self::Event(row) => row.step,
+            Self::Step(row) => row.step,
+            Self::Keyframe { step, .. } | Self::Particles { step, .. } => *step,
+        }
+    }
+
+    /// Returns the step whose state is the initial one, if this is the outcome of a reset.
+    pub fn reset_step(&self) -> Option<u64> {
+        let Self::Outcome(row) = self else { return None };
+        (row.action == Action::Reset && row.is_applied()).then_some(row.step)
+    }
+
+    /// Returns the approximate memory use, in bytes.
+    pub fn size_bytes(&self) -> usize {
+        let heap_size_bytes = match self {
+            Self::Topology(row) => row.a.len() * (4 * size_of::<u32>() + size_of::<f32>()),
+            Self::Surface(row) => size_of_val(row.triangles.as_slice()),
+            Self::Colliders(row) => row.colliders.len() * size_of::<ColliderRow>(),
+            Self::Tears(row) => row.constraints.len() * (size_of::<u32>() + TEAR_CAUSE_SIZE_BYTES),
+            Self::Keyframe { bytes, .. } => bytes.len(),
+            Self::Particles { particles, .. } => size_of_val(particles.as_slice()),
+            Self::Outcome(_) | Self::Status(_) | Self::Event(_) | Self::Step(_) => 0,
+        };
+        size_of::<Self>() + heap_size_bytes
+    }
+}

@@ -1,0 +1,96 @@
+//! The end of a file, and the reasons why a file cannot be read as a recording.
+
+use std::fmt;
+
+use super::run::{FORMAT_VERSION, FORMAT_VERSION_MIN};
+
+/// The end of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LogEnd {
+    /// The file is finished.
+    Complete,
+    /// The file stops in the middle: its writer was killed or is still writing.
+    Truncated {
+        /// The file is readable up to this byte.
+        byte: u64,
+    },
+    /// A part of the file differs from what was written.
+    Damaged {
+        /// The file is readable up to this byte.
+        byte: u64,
+        /// The error that follows.
+        cause: String,
+    },
+}
+
+impl fmt::Display for LogEnd {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Complete => formatter.write_str("complete"),
+            Self::Truncated { byte } => write!(formatter, "truncated after byte {byte}"),
+            Self::Damaged { byte, cause } => {
+                write!(formatter, "damaged after byte {byte}: {cause}")
+            }
+        }
+    }
+}
+
+/// The reason why a file cannot be read as a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The operating system reports an error.
+    #[error("cannot read the file")]
+    Io(#[from] std::io::Error),
+    /// The file is not an MCAP file.
+    #[error("is not an MCAP file")]
+    NotMcap,
+    /// An MCAP file that no recorder wrote.
+    #[error(
+        "is an MCAP file of '{library}', not a recording of a simulation (no metadata 'run' before its first message)"
+    )]
+    Foreign {
+        /// The library that wrote the file, as the file states it.
+        library: String,
+    },
+    /// The file ends or is damaged before the first message.
+    #[error("has no readable header: {0}")]
+    NoHeader(LogEnd),
+    /// The file has a format version that this recorder does not read.
+    #[error(
+        "has format version {found}; this recorder reads versions {FORMAT_VERSION_MIN} to {FORMAT_VERSION}"
+    )]
+    Version {
+        /// The version in the file.
+        found: String,
+    },
+    /// The metadata of the run lacks an entry.
+    #[error("its metadata 'run' has no valid '{key}'")]
+    BadRun {
+        /// The missing or invalid entry.
+        key: String,
+    },
+    /// A message with a correct checksum and invalid content.
+    #[error("the message on {topic} that ends before byte {byte} is invalid: {what}")]
+    Malformed {
+        /// Name of the topic.
+        topic: &'static str,
+        /// Position in the file.
+        byte: u64,
+        /// The error in the content.
+        what: String,
+    },
+    /// A chunk that differs from what was written.
+    #[error("the chunk at byte {byte} is damaged: {cause}")]
+    DamagedChunk {
+        /// First byte of the chunk.
+        byte: u64,
+        /// The error in the chunk.
+        cause: String,
+    },
+    /// A snapshot without a header.
+    #[error("the snapshot of step {step} is not preceded by its row in /steps")]
+    NoRow {
+        /// The step of the snapshot.
+        step: u64,
+    },
+}

@@ -1,0 +1,18 @@
+//! The JSON rows of a recording. The schemas in the file are derived from these types.
+
+mod colliders;
+mod event;
+mod json;
+mod outcome;
+mod status;
+mod step;
+mod tears;
+mod topology;
+
+pub use colliders::{ColliderRow, CollidersRow, ShapeRow};
+pub use event::EventRow;
+pub use outcome::OutcomeRow;
+pub use status::StatusRow;
+pub use step::StepRow;
+pub use tears::TearsRow;
+pub use topology::{Softness, SurfaceRow, TopologyRow};

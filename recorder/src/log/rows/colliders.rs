@@ -1,0 +1,255 @@
+//! The row of `/colliders`, with the key names of a scene file.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sim_contract::{ColliderShape, ColliderState, PlainF32};
+
+use super::json::JsonNumber;
+
+/// Three numbers, which JSON stores bit for bit.
+type Vector = [PlainF32; 3];
+
+/// All colliders in their poses after a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CollidersRow {
+    /// The colliders have these poses from the end of this step to the next row.
+    pub step: u64,
+    /// By collider index.
+    pub colliders: Vec<ColliderRow>,
+}
+
+/// One collider. Its keys are those of its shape.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ColliderRow {
+    /// The shape and its pose.
+    #[serde(flatten)]
+    pub shape: ShapeRow,
+    /// Ratio of the separation speed to the approach speed, 0..=1.
+    #[schemars(with = "JsonNumber")]
+    pub restitution: PlainF32,
+    /// Coefficient of friction.
+    #[schemars(with = "JsonNumber")]
+    pub friction: PlainF32,
+    /// In m/s.
+    #[schemars(with = "[JsonNumber; 3]")]
+    pub velocity: Vector,
+    /// Boxes only: about the center, in rad/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<[JsonNumber; 3]>")]
+    pub angular_velocity: Option<Vector>,
+}
+
+/// The shape and pose of a collider, in m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "shape", rename_all = "lowercase")]
+pub enum ShapeRow {
+    /// A half-space. The free side is normal·x >= offset.
+    Plane {
+        /// Unit vector.
+        #[schemars(with = "[JsonNumber; 3]")]
+        normal: Vector,
+        /// Distance of the surface from the origin, along the normal.
+        #[schemars(with = "JsonNumber")]
+        offset: PlainF32,
+    },
+    /// A solid box.
+    Box {
+        /// Center.
+        #[schemars(with = "[JsonNumber; 3]")]
+        center: Vector,
+        /// Half the side lengths, along the box's own axes.
+        #[schemars(with = "[JsonNumber; 3]")]
+        half_extents: Vector,
+        /// Quaternion x, y, z, w.
+        #[schemars(with = "[JsonNumber; 4]")]
+        rotation: [PlainF32; 4],
+    },
+    /// A solid sphere.
+    Sphere {
+        /// Center.
+        #[schemars(with = "[JsonNumber; 3]")]
+        center: Vector,
+        /// > 0.
+        #[schemars(with = "JsonNumber")]
+        radius: PlainF32,
+    },
+    /// All points within a radius of a segment.
+    Capsule {
+        /// One end of the segment.
+        #[schemars(with = "[JsonNumber; 3]")]
+        a: Vector,
+        /// The other end.
+        #[schemars(with = "[JsonNumber; 3]")]
+        b: Vector,
+        /// > 0.
+        #[schemars(with = "JsonNumber")]
+        radius: PlainF32,
+    },
+    /// A box that particles stay inside.
+    Bounds {
+        /// Lowest coordinates.
+        #[schemars(with = "[JsonNumber; 3]")]
+        min: Vector,
+        /// Highest coordinates.
+        #[schemars(with = "[JsonNumber; 3]")]
+        max: Vector,
+    },
+}
+
+impl CollidersRow {
+    /// Returns the row of a published list, or `None` if it has an unknown shape.
+    pub fn new(step: u64, colliders: &[ColliderState]) -> Option<Self> {
+        let colliders = colliders.iter().map(ColliderRow::new).collect::<Option<_>>()?;
+        Some(Self { step, colliders })
+    }
+
+    /// Returns the list as it was published.
+    pub fn states(&self) -> Vec<ColliderState> {
+        self.colliders.iter().map(ColliderRow::state).collect()
+    }
+}
+
+impl ColliderRow {
+    fn new(state: &ColliderState) -> Option<Self> {
+        let shape = ColliderShape::from_number(state.shape)?;
+        let angular_velocity = plain(state.angular_velocity);
+        Some(Self {
+            shape: ShapeRow::new(shape, state),
+            restitution: PlainF32(state.restitution),
+            friction: PlainF32(state.friction),
+            velocity: plain(state.velocity),
+            angular_velocity: matches!(shape, ColliderShape::Box).then_some(angular_velocity),
+        })
+    }
+
+    fn state(&self) -> ColliderState {
+        ColliderState {
+            restitution: self.restitution.0,
+            friction: self.friction.0,
+            velocity: raw(self.velocity),
+            angular_velocity: self.angular_velocity.map(raw).unwrap_or_default(),
+            ..self.shape.state()
+        }
+    }
+}
+
+impl ShapeRow {
+    fn new(shape: ColliderShape, state: &ColliderState) -> Self {
+        let (center, radius) = (plain(state.center), PlainF32(state.radius));
+        let (a, b) = (plain(state.a), plain(state.b));
+        match shape {
+            ColliderShape::Plane => {
+                Self::Plane { normal: plain(state.normal), offset: PlainF32(state.offset) }
+            }
+            ColliderShape::Box => Self::Box {
+                center,
+                half_extents: plain(state.half_extents),
+                rotation: state.rotation.map(PlainF32),
+            },
+            ColliderShape::Sphere => Self::Sphere { center, radius },
+            ColliderShape::Capsule => Self::Capsule { a, b, radius },
+            ColliderShape::Bounds => Self::Bounds { min: a, max: b },
+        }
+    }
+
+    fn state(&self) -> ColliderState {
+        let with =
+            |shape: ColliderShape| ColliderState { shape: shape as u32, ..Default::default() };
+        match *self {
+            Self::Plane { normal, offset } => ColliderState {
+                normal: raw(normal),
+                offset: offset.0,
+                ..with(ColliderShape::Plane)
+            },
+            Self::Box { center, half_extents, rotation } => ColliderState {
+                center: raw(center),
+                half_extents: raw(half_extents),
+                rotation: rotation.map(|number| number.0),
+                ..with(ColliderShape::Box)
+            },
+            Self::Sphere { center, radius } => ColliderState {
+                center: raw(center),
+                radius: radius.0,
+                ..with(ColliderShape::Sphere)
+            },
+            Self::Capsule { a, b, radius } => ColliderState {
+                a: raw(a),
+                b: raw(b),
+                radius: radius.0,
+                ..with(ColliderShape::Capsule)
+            },
+            Self::Bounds { min, max } => {
+                ColliderState { a: raw(min), b: raw(max), ..with(ColliderShape::Bounds) }
+            }
+        }
+    }
+}
+
+fn plain(vector: [f32; 3]) -> Vector {
+    vector.map(PlainF32)
+}
+
+fn raw(vector: Vector) -> [f32; 3] {
+    vector.map(|number| number.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One collider of each shape, with every field that the shape uses set.
+    fn states() -> Vec<ColliderState> {
+        let any = ColliderState {
+            restitution: 0.5,
+            friction: f32::INFINITY,
+            velocity: [0.1, -0.0, 1e-40],
+            ..ColliderState::default()
+        };
+        let with = |shape: ColliderShape| ColliderState { shape: shape as u32, ..any };
+        vec![
+            ColliderState { normal: [0.0, 1.0, 0.0], offset: -0.25, ..with(ColliderShape::Plane) },
+            ColliderState {
+                center: [1.0, 2.0, 3.0],
+                half_extents: [0.5; 3],
+                rotation: [0.0, 0.6, 0.0, 0.8],
+                angular_velocity: [0.0, 0.0, 2.0],
+                ..with(ColliderShape::Box)
+            },
+            ColliderState { center: [0.1; 3], radius: 0.3, ..with(ColliderShape::Sphere) },
+            ColliderState { a: [0.1; 3], b: [0.2; 3], radius: 0.3, ..with(ColliderShape::Capsule) },
+            ColliderState { a: [-1.0; 3], b: [1.0; 3], ..with(ColliderShape::Bounds) },
+        ]
+    }
+
+    #[test]
+    fn each_shape_has_only_its_own_keys() {
+        let row = CollidersRow::new(7, &states()).unwrap();
+        let lines: Vec<_> =
+            row.colliders.iter().map(|one| serde_json::to_string(one).unwrap()).collect();
+        insta::assert_snapshot!(lines.join("\n"), @r#"
+        {"shape":"plane","normal":[0.0,1.0,0.0],"offset":-0.25,"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40]}
+        {"shape":"box","center":[1.0,2.0,3.0],"half_extents":[0.5,0.5,0.5],"rotation":[0.0,0.6,0.0,0.8],"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40],"angular_velocity":[0.0,0.0,2.0]}
+        {"shape":"sphere","center":[0.1,0.1,0.1],"radius":0.3,"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40]}
+        {"shape":"capsule","a":[0.1,0.1,0.1],"b":[0.2,0.2,0.2],"radius":0.3,"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40]}
+        {"shape":"bounds","min":[-1.0,-1.0,-1.0],"max":[1.0,1.0,1.0],"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40]}
+        "#);
+    }
+
+    #[test]
+    fn colliders_survive_a_round_trip_through_json_bit_for_bit() {
+        let text = serde_json::to_string(&CollidersRow::new(7, &states()).unwrap()).unwrap();
+        assert!(text.starts_with(r#"{"step":7,"colliders":[{"shape":"plane","#), "{text}");
+        let read: CollidersRow = serde_json::from_str(&text).unwrap();
+        let (read, written) = (read.states(), states());
+        assert_eq!(
+            bytemuck::cast_slice::<_, u8>(&read),
+            bytemuck::cast_slice::<ColliderState, u8>(&written)
+        );
+    }
+
+    #[test]
+    fn an_unknown_shape_makes_no_row() {
+        let state = ColliderState { shape: 5, ..ColliderState::default() };
+        assert_eq!(CollidersRow::new(7, &[state]), None);
+    }
+}

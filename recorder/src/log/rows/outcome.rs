@@ -1,0 +1,122 @@
+//! The row of `/outcomes`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sim_contract::{Action, Command, Outcome, OutcomeStatus, Reason};
+
+use super::json::JsonNumber;
+
+/// The outcome of a command: the flat command object with its status. The rows of a recording are a
+/// command file that reproduces it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OutcomeRow {
+    /// The first step that shows the effect.
+    pub step: u64,
+    /// Id of the client that sent the command.
+    pub client_id: u64,
+    /// Number of the command among those of its client.
+    pub sequence: u64,
+    /// Number of the outcome in its run, without gaps.
+    pub index: u64,
+    /// The command: "kind" and its fields.
+    #[serde(flatten)]
+    #[schemars(with = "ActionSchema")]
+    pub action: Action,
+    /// "applied" or "rejected".
+    pub status: String,
+    /// Reason of a rejection. "" if the command was applied.
+    pub reason: String,
+}
+
+const APPLIED: &str = "applied";
+const REJECTED: &str = "rejected";
+
+impl From<&Outcome> for OutcomeRow {
+    fn from(outcome: &Outcome) -> Self {
+        let status = if outcome.is_applied() { APPLIED } else { REJECTED };
+        Self {
+            step: outcome.step,
+            client_id: outcome.command.client_id,
+            sequence: outcome.command.sequence,
+            index: outcome.index,
+            action: outcome.command.action(),
+            status: status.to_owned(),
+            reason: outcome.reason_name().to_owned(),
+        }
+    }
+}
+
+impl OutcomeRow {
+    /// Returns `true` if the command took effect.
+    pub fn is_applied(&self) -> bool {
+        self.status == APPLIED
+    }
+}
+
+impl From<&OutcomeRow> for Outcome {
+    fn from(row: &OutcomeRow) -> Self {
+        let command = Command::new(row.client_id, row.sequence, row.action);
+        let mut outcome = Self::new(row.index, row.step, command, Ok(()));
+        if !row.is_applied() {
+            outcome.status = OutcomeStatus::Rejected as u32;
+            outcome.reason = Reason::from_name(&row.reason).map_or(0, |reason| reason as u32);
+        }
+        outcome
+    }
+}
+
+/// The schema of a command, because [`Action`] does not depend on schemars.
+#[derive(JsonSchema)]
+#[allow(dead_code, reason = "only its schema is used")]
+struct ActionSchema {
+    kind: String,
+    #[schemars(default)]
+    particle: Option<u32>,
+    #[schemars(default)]
+    target: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    over_s: Option<JsonNumber>,
+    #[schemars(default)]
+    count: Option<u32>,
+    #[schemars(default)]
+    center: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    radius: Option<JsonNumber>,
+    #[schemars(default)]
+    delta: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    limit: Option<JsonNumber>,
+    #[schemars(default)]
+    constraint: Option<u32>,
+    #[schemars(default)]
+    from: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    to: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    direction: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    anchor: Option<u32>,
+    #[schemars(default)]
+    collider: Option<u32>,
+    #[schemars(default)]
+    translation: Option<[JsonNumber; 3]>,
+    #[schemars(default)]
+    rotation: Option<[JsonNumber; 4]>,
+    #[schemars(default)]
+    parameter: Option<String>,
+    #[schemars(default)]
+    value: Option<ParameterValueSchema>,
+    #[schemars(default)]
+    constraint_kind: Option<String>,
+    #[schemars(default)]
+    scene: Option<String>,
+}
+
+/// The schema of a parameter's value. No value means off.
+#[derive(JsonSchema)]
+#[schemars(untagged, rename = "ParameterValue")]
+#[allow(dead_code, reason = "only its schema is used")]
+enum ParameterValueSchema {
+    Number(JsonNumber),
+    Vector([JsonNumber; 3]),
+}

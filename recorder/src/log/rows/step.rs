@@ -1,0 +1,58 @@
+//! The row of `/steps`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sim_contract::SnapshotHeader;
+
+/// The header of a recorded snapshot.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct StepRow {
+    /// The snapshot is the state after this step.
+    pub step: u64,
+    /// Steps since the scene was last loaded, reset or restored.
+    pub scene_step: u64,
+    /// XXH3-64 of the particles, as 16 hex digits.
+    #[serde(with = "hex")]
+    #[schemars(with = "String")]
+    pub state_hash: u64,
+    /// Number of scene loads in this run, minus one.
+    pub topology_revision: u32,
+    /// Constraints torn since the load.
+    pub torn_count: u32,
+    /// Outcomes that this state includes: those with a lower index.
+    pub outcome_count: u64,
+    /// Delay of the step after its deadline, in nanoseconds.
+    pub wake_late_ns: u64,
+    /// Computing time of the solver, in nanoseconds.
+    pub solve_ns: u64,
+}
+
+impl From<&SnapshotHeader> for StepRow {
+    fn from(header: &SnapshotHeader) -> Self {
+        Self {
+            step: header.step,
+            scene_step: header.scene_step,
+            state_hash: header.state_hash,
+            topology_revision: header.topology_revision,
+            torn_count: header.torn_count,
+            outcome_count: header.outcome_count,
+            wake_late_ns: header.wake_late_ns,
+            solve_ns: header.solve_ns,
+        }
+    }
+}
+
+/// `#[serde(with = "hex")]` for a u64 as 16 lowercase hex digits in a string.
+mod hex {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
+    pub(super) fn serialize<S: Serializer>(value: &u64, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{value:016x}"))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        u64::from_str_radix(&text, 16).map_err(|_| D::Error::custom("expected 16 hex digits"))
+    }
+}

@@ -1,0 +1,113 @@
+//! The rows of `/topology` and `/surface`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sim_contract::{ConstraintState, LoadHeader, PlainF32, Triangle};
+
+use super::json::JsonNumber;
+
+/// The constraints of a scene in columns. The position in a column is the constraint's index.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TopologyRow {
+    /// The first step that shows this load.
+    pub step: u64,
+    /// Number of scene loads in this run, minus one.
+    pub revision: u32,
+    /// First particles.
+    pub a: Vec<u32>,
+    /// Second particles.
+    pub b: Vec<u32>,
+    /// Rest lengths in m.
+    #[schemars(with = "Vec<JsonNumber>")]
+    pub rest_length: Vec<PlainF32>,
+    /// Compliances in m/N (method xpbd) or stiffnesses (method pbd).
+    #[serde(flatten)]
+    #[schemars(with = "SoftnessSchema")]
+    pub softness: Softness,
+    /// 0 structural, 1 shear, 2 bend, 3 tether.
+    pub kind: Vec<u32>,
+    /// Indices of the constraints that were torn before the first snapshot of the file, in the order
+    /// of tearing.
+    pub torn: Vec<u32>,
+}
+
+/// The column of [`TopologyRow`] whose name depends on the method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Softness {
+    /// Method xpbd, in m/N.
+    Compliance(Vec<PlainF32>),
+    /// Method pbd, 0..=1.
+    Stiffness(Vec<PlainF32>),
+}
+
+#[derive(JsonSchema)]
+#[allow(dead_code, reason = "only its schema is used")]
+struct SoftnessSchema {
+    #[schemars(default)]
+    compliance: Option<Vec<JsonNumber>>,
+    #[schemars(default)]
+    stiffness: Option<Vec<JsonNumber>>,
+}
+
+impl TopologyRow {
+    /// Returns the row of a load, with no torn constraints.
+    pub fn new(header: &LoadHeader, constraints: &[ConstraintState]) -> Self {
+        let softness = constraints.iter().map(|c| PlainF32(c.compliance)).collect();
+        Self {
+            step: header.step,
+            revision: header.topology_revision,
+            a: constraints.iter().map(|c| c.a).collect(),
+            b: constraints.iter().map(|c| c.b).collect(),
+            rest_length: constraints.iter().map(|c| PlainF32(c.rest_length)).collect(),
+            softness: match header.method {
+                0 => Softness::Compliance(softness),
+                _ => Softness::Stiffness(softness),
+            },
+            kind: constraints.iter().map(|c| c.kind).collect(),
+            torn: Vec::new(),
+        }
+    }
+
+    /// Returns the constraints, or `None` if the columns differ in length.
+    pub fn constraints(&self) -> Option<Vec<ConstraintState>> {
+        let (Softness::Compliance(softness) | Softness::Stiffness(softness)) = &self.softness;
+        let count = self.a.len();
+        let lengths = [self.b.len(), self.rest_length.len(), softness.len(), self.kind.len()];
+        if lengths.iter().any(|length| *length != count) {
+            return None;
+        }
+        let constraint = |index: usize| ConstraintState {
+            a: self.a[index],
+            b: self.b[index],
+            rest_length: self.rest_length[index].0,
+            compliance: softness[index].0,
+            kind: self.kind[index],
+        };
+        Some((0..count).map(constraint).collect())
+    }
+}
+
+/// The triangles of a scene.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct SurfaceRow {
+    /// The first step that shows this load.
+    pub step: u64,
+    /// Three particle indices per triangle.
+    pub triangles: Vec<u32>,
+}
+
+impl SurfaceRow {
+    /// Returns the row of a load.
+    pub fn new(header: &LoadHeader, triangles: &[Triangle]) -> Self {
+        let corners = triangles.iter().flat_map(|triangle| triangle.corners).collect();
+        Self { step: header.step, triangles: corners }
+    }
+
+    /// Returns the triangles, or `None` if the number of indices is not a multiple of three.
+    pub fn triangles(&self) -> Option<Vec<Triangle>> {
+        let (corners, rest) = self.triangles.as_chunks::<3>();
+        rest.is_empty()
+            .then(|| corners.iter().map(|corners| Triangle { corners: *corners }).collect())
+    }
+}

@@ -1,0 +1,224 @@
+//! A recording as a tape that winds to any step. It reads only the chunks around the step.
+
+mod chunk_reader;
+mod chunks;
+mod digest;
+mod load;
+mod search;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sim_contract::ParticleState;
+
+use super::index::IndexedLog;
+use super::read_error::{LogEnd, ReadError};
+use super::rows::{CollidersRow, StatusRow, StepRow, SurfaceRow, TopologyRow};
+use super::run::RunDescription;
+use super::tears::{Torn, TornFollower};
+use super::topic::Topic;
+use chunk_reader::ChunkReader;
+use load::read_load;
+use search::{SnapshotPosition, StepRange, find, first_and_last};
+
+/// The reason why a recording cannot be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum TapeError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file has no readable snapshot.
+    #[error("has no snapshot to show (the file is {0})")]
+    NoSnapshot(LogEnd),
+    /// The file has no scene.
+    #[error("has no readable {0} before its first snapshot")]
+    NoLoad(&'static str),
+}
+
+/// A recording that winds to any step.
+#[derive(Debug)]
+pub struct Tape {
+    reader: ChunkReader,
+    topology: TopologyRow,
+    surface: SurfaceRow,
+    range: StepRange,
+    stride: u64,
+}
+
+/// The state of a recorded step.
+#[derive(Debug, Clone)]
+pub struct TapeState {
+    /// The header of the snapshot. If it is unreadable, every field except the step is 0.
+    pub row: StepRow,
+    /// Shape: particle count.
+    pub particles: Arc<Vec<ParticleState>>,
+    /// The torn constraints.
+    pub torn: Torn,
+    /// The poses of the colliders, if there are any.
+    pub colliders: Option<CollidersRow>,
+    /// The latest status of the node, if there is one.
+    pub status: Option<StatusRow>,
+}
+
+impl Tape {
+    /// Opens a recording. A scan of a file without an index calls `on_progress` with the bytes
+    /// scanned and the size of the file.
+    ///
+    /// # Errors
+    /// If the file is not a recording or has no snapshot.
+    pub fn open(path: &Path, on_progress: &mut dyn FnMut(u64, u64)) -> Result<Self, TapeError> {
+        let mut log = IndexedLog::open_with_progress(path, on_progress)?;
+        let load = read_load(&mut log)?;
+        let topology = load.topology.ok_or(TapeError::NoLoad("/topology"))?;
+        let surface = load.surface.ok_or(TapeError::NoLoad("/surface"))?;
+        let mut reader = ChunkReader::new(log);
+        let ends = first_and_last(&mut reader)?;
+        let (first_steps, last) =
+            ends.ok_or_else(|| TapeError::NoSnapshot(reader.log().end().clone()))?;
+        let range = StepRange { first: first_steps[0], last: last.max(first_steps[0]) };
+        let mut tape = Self { reader, topology, surface, range, stride: 1 };
+        // The second snapshot may be in the next chunk.
+        let second = tape.step_after(range.first)?;
+        let pairs = first_steps.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
+        let strides = pairs.chain([second.saturating_sub(range.first)]);
+        tape.stride = strides.filter(|stride| *stride > 0).min().unwrap_or(1);
+        Ok(tape)
+    }
+
+    /// Returns the run that was recorded.
+    pub fn run(&self) -> &RunDescription {
+        self.log().run()
+    }
+
+    /// Returns the file, with access to its chunks.
+    pub fn log(&self) -> &IndexedLog {
+        self.reader.log()
+    }
+
+    /// Returns the constraints.
+    pub fn topology(&self) -> &TopologyRow {
+        &self.topology
+    }
+
+    /// Returns the triangles.
+    pub fn surface(&self) -> &SurfaceRow {
+        &self.surface
+    }
+
+    /// Returns the first recorded step.
+    pub fn first_step(&self) -> u64 {
+        self.range.first
+    }
+
+    /// Returns the last recorded step.
+    pub fn last_step(&self) -> u64 {
+        self.range.last
+    }
+
+    /// Returns the number of steps between consecutive snapshots, where none is missing.
+    pub fn stride(&self) -> u64 {
+        self.stride
+    }
+
+    /// Returns the read errors since the last call, as text for users. A chunk reports its errors
+    /// once, even if it is read again.
+    pub fn drain_faults(&mut self) -> Vec<String> {
+        self.reader.drain_faults()
+    }
+
+    /// Returns the last recorded step up to `step`, or else the first recorded step.
+    ///
+    /// # Errors
+    /// If the operating system reports an error.
+    pub fn step_at(&mut self, step: u64) -> Result<u64, ReadError> {
+        let step = step.clamp(self.range.first, self.range.last);
+        Ok(self.find(step)?.map_or(self.range.first, |position| position.step))
+    }
+
+    /// Returns the next recorded step after `step`, or `step` if it is the last one.
+    ///
+    /// # Errors
+    /// If the operating system reports an error.
+    pub fn step_after(&mut self, step: u64) -> Result<u64, ReadError> {
+        let Some(position) = self.find(step)? else { return Ok(self.range.first) };
+        for chunk in self.reader.chunks.with_topic(Topic::Particles).forward_from(position.chunk) {
+            let snapshots = &self.reader.digest(chunk)?.snapshots;
+            if let Some(next) = snapshots.iter().find(|one| **one > step) {
+                return Ok(*next);
+            }
+        }
+        Ok(step)
+    }
+
+    /// Returns the state of the last recorded step up to `step`.
+    ///
+    /// # Errors
+    /// If the operating system reports an error or the snapshot has become unreadable.
+    pub fn state_at(&mut self, step: u64) -> Result<TapeState, TapeError> {
+        let step = step.clamp(self.range.first, self.range.last);
+        let missing = || TapeError::NoSnapshot(LogEnd::Complete);
+        let SnapshotPosition { chunk, step } = self.find(step)?.ok_or_else(missing)?;
+        let particles = self.reader.particles(chunk, step)?.ok_or_else(missing)?;
+        let row = self.row(chunk, step)?;
+        let mut torn = self.torn_at(chunk, step)?;
+        if let Some(row) = &row {
+            torn.constraints.truncate(row.torn_count as usize);
+            torn.causes.truncate(row.torn_count as usize);
+        }
+        let row = row.unwrap_or(StepRow { step, ..StepRow::default() });
+        let colliders = self.reader.latest(Topic::Colliders, chunk, |digest| {
+            digest.colliders.iter().rfind(|row| row.step <= step).cloned()
+        })?;
+        let status = self.reader.latest(Topic::Status, chunk, |digest| {
+            digest.statuses.iter().rfind(|row| row.step <= step).cloned()
+        })?;
+        Ok(TapeState { row, particles, torn, colliders, status })
+    }
+
+    fn find(&mut self, step: u64) -> Result<Option<SnapshotPosition>, ReadError> {
+        find(&mut self.reader, step, self.range)
+    }
+
+    /// Returns the header of a snapshot. It precedes the snapshot, possibly in the previous chunk.
+    fn row(&mut self, chunk: usize, step: u64) -> Result<Option<StepRow>, ReadError> {
+        for chunk in [Some(chunk), chunk.checked_sub(1)].into_iter().flatten() {
+            if let Some(row) = self.reader.digest(chunk)?.row(step) {
+                return Ok(Some(row));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Returns the torn constraints at a step: those of the newest keyframe before it, and the
+    /// tears since.
+    fn torn_at(&mut self, chunk: usize, step: u64) -> Result<Torn, ReadError> {
+        let (first_chunk, mut follower) = self.torn_base(chunk, step)?;
+        // One chunk earlier, because a batch of the recorder may contain changes after a keyframe
+        // before the keyframe.
+        let changes =
+            self.reader.chunks.with_tear_changes().forward_from(first_chunk.saturating_sub(1));
+        for chunk in changes.take_while(|one| *one <= chunk) {
+            for change in self.reader.digest(chunk)?.changes.clone() {
+                follower.take_change(change);
+            }
+        }
+        Ok(follower.at(step).cloned().unwrap_or_default())
+    }
+
+    /// Returns the torn constraints to start from and their chunk: those of the newest keyframe, or
+    /// those at the start of the file.
+    fn torn_base(&mut self, chunk: usize, step: u64) -> Result<(usize, TornFollower), ReadError> {
+        let from_start = TornFollower::new(Torn::before(&self.topology.torn));
+        for chunk in self.reader.chunks.with_topic(Topic::Keyframe).backward_from(chunk) {
+            match self.reader.digest(chunk)?.keyframe(step) {
+                Some((keyframe_step, Some(tears))) => {
+                    return Ok((chunk, TornFollower::from_keyframe(*keyframe_step, tears.clone())));
+                }
+                // A keyframe of another version. All keyframes of a file have the same version.
+                Some((_, None)) => return Ok((0, from_start)),
+                None => {}
+            }
+        }
+        Ok((0, from_start))
+    }
+}

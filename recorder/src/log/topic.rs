@@ -1,0 +1,139 @@
+//! The topics of a recording, and the message counts of each.
+
+use std::ops::{Index, IndexMut};
+
+/// A topic. The order is the one in which a node publishes within a step and a file stores it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Topic {
+    /// foxglove.FrameTransform: the position of the scene's origin. One message per file.
+    Tf,
+    /// [`crate::TopologyRow`]: the constraints. One message per file.
+    Topology,
+    /// [`crate::SurfaceRow`]: the triangles. One message per file.
+    Surface,
+    /// [`crate::CollidersRow`]: the colliders at the start and after each change.
+    Colliders,
+    /// [`crate::TearsRow`]: new tears. Only steps in which a constraint tore have a message.
+    Tears,
+    /// The part of the solver's state that the particles lack, in the solver's encoding.
+    Keyframe,
+    /// [`crate::OutcomeRow`]: every answered command, in order of application.
+    Outcomes,
+    /// [`crate::StatusRow`]: the status of the node.
+    Status,
+    /// [`crate::EventRow`]: notable events.
+    Events,
+    /// [`crate::StepRow`]: one message per recorded snapshot.
+    Steps,
+    /// foxglove.PointCloud: the snapshots, with their bytes unchanged.
+    Particles,
+}
+
+impl Topic {
+    /// All topics, in order.
+    pub const ALL: [Self; 11] = [
+        Self::Tf,
+        Self::Topology,
+        Self::Surface,
+        Self::Colliders,
+        Self::Tears,
+        Self::Keyframe,
+        Self::Outcomes,
+        Self::Status,
+        Self::Events,
+        Self::Steps,
+        Self::Particles,
+    ];
+
+    /// Returns the name of the topic in a file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tf => "/tf",
+            Self::Topology => "/topology",
+            Self::Surface => "/surface",
+            Self::Colliders => "/colliders",
+            Self::Tears => "/tears",
+            Self::Keyframe => "/keyframe",
+            Self::Outcomes => "/outcomes",
+            Self::Status => "/status",
+            Self::Events => "/events",
+            Self::Steps => "/steps",
+            Self::Particles => "/particles",
+        }
+    }
+
+    /// Returns the topic with this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|topic| topic.name() == name)
+    }
+
+    /// Returns the position of the topic in [`Topic::ALL`].
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// Message counts of one topic.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TopicCounts {
+    /// Messages that reached the recorder.
+    pub received: u64,
+    /// Messages in the file.
+    pub written: u64,
+    /// Messages that reached the recorder but not the file, because its queue was full.
+    pub lost: u64,
+    /// Messages that never reached the recorder, as gaps in their numbering show.
+    pub gaps: u64,
+}
+
+/// [`TopicCounts`] of every topic, indexed by [`Topic`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct AllCounts([TopicCounts; Topic::ALL.len()]);
+
+impl Index<Topic> for AllCounts {
+    type Output = TopicCounts;
+
+    fn index(&self, topic: Topic) -> &TopicCounts {
+        &self.0[topic.index()]
+    }
+}
+
+impl IndexMut<Topic> for AllCounts {
+    fn index_mut(&mut self, topic: Topic) -> &mut TopicCounts {
+        &mut self.0[topic.index()]
+    }
+}
+
+impl AllCounts {
+    /// Returns every topic with its counts, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (Topic, &TopicCounts)> {
+        Topic::ALL.into_iter().zip(&self.0)
+    }
+
+    /// Sets `received` to `written` in every topic, for a writer that cannot lose messages.
+    pub fn set_received_to_written(&mut self) {
+        for counts in &mut self.0 {
+            counts.received = counts.written;
+        }
+    }
+
+    /// Copies `written` from other counts.
+    pub fn set_written(&mut self, written: &Self) {
+        for (counts, other) in self.0.iter_mut().zip(&written.0) {
+            counts.written = other.written;
+        }
+    }
+
+    /// Copies `lost` from other counts.
+    pub fn set_lost(&mut self, lost: &Self) {
+        for (counts, other) in self.0.iter_mut().zip(&lost.0) {
+            counts.lost = other.lost;
+        }
+    }
+
+    /// Returns the number of messages that should be in the file and are not, over all topics.
+    pub fn missing(&self) -> u64 {
+        self.0.iter().map(|counts| counts.lost + counts.gaps).sum()
+    }
+}

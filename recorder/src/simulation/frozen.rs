@@ -1,0 +1,88 @@
+//! The events of a recording: the particles that froze between two snapshots.
+
+use recorder::EventRow;
+use sim_contract::{ParticleFlags, ParticleState};
+
+/// Most events of a step, so that a scene that diverges does not flood the file.
+const EVENTS_PER_STEP_MAX: usize = 1024;
+
+/// Compares the frozen particles of each snapshot with those of the previous one.
+#[derive(Debug, Default)]
+pub(crate) struct FrozenTracker {
+    /// Frozen particles of the last snapshot, ascending. `None` before the first snapshot.
+    known: Option<Vec<u32>>,
+}
+
+impl FrozenTracker {
+    /// Returns the events of a snapshot. The first snapshot has none, because its frozen particles
+    /// froze earlier. After a reset a particle can freeze again.
+    pub(crate) fn new_events(&mut self, step: u64, particles: &[ParticleState]) -> Vec<EventRow> {
+        let is_frozen = |state: &ParticleState| state.flags & ParticleFlags::FROZEN != 0;
+        // Usually empty, so this rarely allocates.
+        let frozen: Vec<u32> = (0_u32..)
+            .zip(particles)
+            .filter(|(_, state)| is_frozen(state))
+            .map(|(index, _)| index)
+            .collect();
+        let Some(known) = self.known.replace(frozen) else { return Vec::new() };
+        let frozen = self.known.iter().flatten().copied();
+        rows(step, &frozen.filter(|one| known.binary_search(one).is_err()).collect::<Vec<_>>())
+    }
+}
+
+fn rows(step: u64, frozen: &[u32]) -> Vec<EventRow> {
+    let row = |particle, text| EventRow { step, kind: "frozen".to_owned(), particle, text };
+    // Beyond the limit, the last event gives the number of particles without one.
+    let is_over_limit = frozen.len() > EVENTS_PER_STEP_MAX;
+    let named_count = if is_over_limit { EVENTS_PER_STEP_MAX - 1 } else { frozen.len() };
+    let (named, others) = frozen.split_at(named_count);
+    let mut rows: Vec<_> = named
+        .iter()
+        .map(|index| row(Some(*index), format!("particle {index} was not finite and is frozen")))
+        .collect();
+    if is_over_limit {
+        rows.push(row(None, format!("{} more particles are frozen", others.len())));
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn snapshot(frozen: &[usize], count: usize) -> Vec<ParticleState> {
+        let flags = |index| if frozen.contains(&index) { ParticleFlags::FROZEN } else { 1 };
+        let state = |index| ParticleState { flags: flags(index), ..ParticleState::default() };
+        (0..count).map(state).collect()
+    }
+
+    fn particles(rows: &[EventRow]) -> Vec<Option<u32>> {
+        rows.iter().map(|row| row.particle).collect()
+    }
+
+    #[test]
+    fn only_newly_frozen_particles_are_events() {
+        let mut tracker = FrozenTracker::default();
+        let mut events = |frozen: &[usize]| particles(&tracker.new_events(3, &snapshot(frozen, 5)));
+        assert_eq!(events(&[2]), [], "it froze before the recording");
+        assert_eq!(events(&[0, 2, 4]), [Some(0), Some(4)]);
+        assert_eq!(events(&[0, 2, 4]), []);
+        assert_eq!(events(&[]), [], "a reset");
+        assert_eq!(events(&[2]), [Some(2)]);
+    }
+
+    #[test]
+    fn the_last_event_of_a_step_over_the_limit_counts_the_remaining_particles() {
+        for (count, named) in [(EVENTS_PER_STEP_MAX, 1024), (EVENTS_PER_STEP_MAX + 1, 1023)] {
+            let mut tracker = FrozenTracker::default();
+            tracker.new_events(0, &snapshot(&[], count));
+            let all: Vec<_> = (0..count).collect();
+            let rows = tracker.new_events(1, &snapshot(&all, count));
+            assert_eq!(rows.len(), EVENTS_PER_STEP_MAX);
+            assert_eq!(rows.iter().filter(|row| row.particle.is_some()).count(), named);
+            if named == 1023 {
+                assert_eq!(rows[named].text, "2 more particles are frozen");
+            }
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! The inputs of a simulation.
+
+use recorder::RunDescription;
+use sim_contract::{CONTRACT_VERSION, Command};
+use sim_solver::{SOLVER_VERSION, Scene, Solver};
+use xxhash_rust::xxh3::Xxh3;
+
+use crate::input::command_file::TimedCommand;
+
+/// The inputs of a simulation.
+#[derive(Debug)]
+pub(crate) struct Job {
+    pub(crate) scene: Scene,
+    /// In the order of application.
+    pub(crate) commands: Vec<TimedCommand>,
+    /// Steps to compute after step 0.
+    pub(crate) steps: u64,
+}
+
+impl Job {
+    /// Returns the number of commands whose step is after the last one.
+    pub(crate) fn commands_beyond_the_end(&self) -> usize {
+        self.commands.iter().filter(|command| command.step > self.steps).count()
+    }
+
+    /// Returns the metadata of a recording of this simulation.
+    pub(crate) fn description(&self, solver: &Solver) -> RunDescription {
+        RunDescription {
+            run_id: self.run_id(),
+            epoch_ns: 0,
+            scene_name: self.scene.name.clone(),
+            origin: self.scene.origin,
+            rate_hz: self.scene.solver.rate_hz,
+            method: self.scene.solver.method as u32,
+            particle_count: count(solver.particle_count()),
+            constraint_count: count(solver.constraint_count()),
+            solver_version: SOLVER_VERSION,
+            contract_version: CONTRACT_VERSION,
+            recorder_version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+
+    /// Returns a hash of the scene and the commands, so that equal inputs have equal ids.
+    fn run_id(&self) -> u64 {
+        let mut hash = Xxh3::new();
+        hash.update(self.scene.to_toml().as_bytes());
+        for command in &self.commands {
+            let wire = Command::new(command.client_id, command.sequence, command.action);
+            hash.update(&command.step.to_le_bytes());
+            hash.update(bytemuck::bytes_of(&wire));
+        }
+        hash.digest()
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 elements of a kind")]
+pub(super) fn count(length: usize) -> u32 {
+    length as u32
+}

@@ -1,0 +1,58 @@
+//! Rows of `/colliders` and `/tears` from the state of a solver.
+
+use recorder::{CollidersRow, TearsRow};
+use sim_contract::{ColliderShape, ColliderState};
+use sim_solver::{PlacedCollider, Solver};
+
+/// Returns the colliders after `step`.
+pub(crate) fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
+    let states: Vec<_> = solver.colliders().map(|collider| state(&collider)).collect();
+    // Every shape of this solver has a row.
+    CollidersRow::new(step, &states).unwrap_or(CollidersRow { step, colliders: Vec::new() })
+}
+
+/// Returns the tears of the last step, which is `step`, or `None` if there are none.
+pub(crate) fn new_tears_row(solver: &Solver, step: u64) -> Option<TearsRow> {
+    let count = solver.new_torn_count();
+    (count > 0).then(|| newest_tears_row(solver, step, count))
+}
+
+/// Returns the newest `count` torn constraints, or all if there are fewer.
+pub(crate) fn newest_tears_row(solver: &Solver, step: u64, count: usize) -> TearsRow {
+    let first = solver.torn().len().saturating_sub(count);
+    let causes = solver.tear_causes()[first..].iter();
+    TearsRow {
+        step,
+        constraints: solver.torn()[first..].to_vec(),
+        causes: causes.map(|cause| cause.name().to_owned()).collect(),
+    }
+}
+
+fn state(collider: &PlacedCollider) -> ColliderState {
+    let PlacedCollider { shape, restitution, friction, velocity, angular_velocity } = *collider;
+    let any = ColliderState {
+        restitution,
+        friction,
+        velocity,
+        angular_velocity,
+        ..ColliderState::default()
+    };
+    let with = |shape: ColliderShape| ColliderState { shape: shape as u32, ..any };
+    match shape {
+        sim_solver::ColliderShape::Plane { normal, offset } => {
+            ColliderState { normal, offset, ..with(ColliderShape::Plane) }
+        }
+        sim_solver::ColliderShape::Box { center, half_extents, rotation } => {
+            ColliderState { center, half_extents, rotation, ..with(ColliderShape::Box) }
+        }
+        sim_solver::ColliderShape::Sphere { center, radius } => {
+            ColliderState { center, radius, ..with(ColliderShape::Sphere) }
+        }
+        sim_solver::ColliderShape::Capsule { a, b, radius } => {
+            ColliderState { a, b, radius, ..with(ColliderShape::Capsule) }
+        }
+        sim_solver::ColliderShape::Bounds { min, max } => {
+            ColliderState { a: min, b: max, ..with(ColliderShape::Bounds) }
+        }
+    }
+}

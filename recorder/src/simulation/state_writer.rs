@@ -1,0 +1,137 @@
+//! Writes the states of a solver in the order in which a node publishes.
+
+use std::io::Write;
+
+use bytemuck::cast;
+use recorder::{
+    CollidersRow, LogWriter, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TopologyRow,
+    WriteError,
+};
+use sim_contract::{ConstraintState, LoadHeader, ParticleState, Triangle};
+use sim_solver::Solver;
+
+use super::frozen::FrozenTracker;
+use super::job::count;
+use super::solver_rows::{colliders_row, new_tears_row};
+
+/// The time of the next keyframe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum KeyframeDue {
+    /// In this step.
+    Now,
+    /// In this step, if it is a whole simulated second.
+    OnTheSecond,
+}
+
+/// Writes a simulation step by step.
+pub(super) struct StateWriter<'a, W: Write> {
+    log: &'a mut LogWriter<W>,
+    run: RunDescription,
+    /// The outcomes of the next step.
+    pub(super) outcomes: Vec<OutcomeRow>,
+    outcome_count: u64,
+    /// The last written row.
+    colliders: CollidersRow,
+    frozen: FrozenTracker,
+}
+
+impl<'a, W: Write> StateWriter<'a, W> {
+    /// Starts with the load.
+    pub(super) fn new(
+        log: &'a mut LogWriter<W>,
+        run: RunDescription,
+        solver: &Solver,
+    ) -> Result<Self, WriteError> {
+        let header = LoadHeader { method: run.method, ..LoadHeader::default() };
+        let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+        let triangles: Vec<_> =
+            solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
+        log.write(&Message::Topology(TopologyRow::new(&header, &constraints)), 0)?;
+        log.write(&Message::Surface(SurfaceRow::new(&header, &triangles)), 0)?;
+        Ok(Self {
+            log,
+            run,
+            outcomes: Vec::new(),
+            outcome_count: 0,
+            // A scene without colliders has no row.
+            colliders: CollidersRow { step: 0, colliders: Vec::new() },
+            frozen: FrozenTracker::default(),
+        })
+    }
+
+    /// Writes all messages of a step. The snapshot is the last one.
+    pub(super) fn write_state(
+        &mut self,
+        solver: &Solver,
+        step: u64,
+        keyframe: KeyframeDue,
+    ) -> Result<(), WriteError> {
+        let time_ns = self.run.time_of_step_ns(step);
+        let is_second = step.is_multiple_of(u64::from(self.run.rate_hz));
+        // By simulated time, not by wall-clock time, so that equal inputs give equal files.
+        if is_second && step > 0 {
+            self.log.flush()?;
+        }
+        self.write_colliders(solver, step)?;
+        if let Some(row) = new_tears_row(solver, step) {
+            self.log.write(&Message::Tears(row), time_ns)?;
+        }
+        if is_second || keyframe == KeyframeDue::Now {
+            let bytes = solver.keyframe().encode();
+            self.log.write(&Message::Keyframe { step, bytes }, time_ns)?;
+        }
+        for row in self.outcomes.drain(..) {
+            self.outcome_count += 1;
+            self.log.write(&Message::Outcome(row), time_ns)?;
+        }
+        self.write_snapshot(solver, step)
+    }
+
+    /// Writes the colliders in each step while one moves, and after each change. The step after a
+    /// motion is a change too, because the velocity returns to 0.
+    fn write_colliders(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
+        if solver.collider_count() == 0 {
+            return Ok(());
+        }
+        let row = colliders_row(solver, step);
+        if !solver.has_moving_colliders() && row.colliders == self.colliders.colliders {
+            return Ok(());
+        }
+        self.colliders = row.clone();
+        self.log.write(&Message::Colliders(row), self.run.time_of_step_ns(step))
+    }
+
+    fn write_snapshot(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
+        let time_ns = self.run.time_of_step_ns(step);
+        let particles: Vec<ParticleState> =
+            (0..solver.particle_count()).map(|index| cast(solver.particle(index))).collect();
+        for row in self.frozen.new_events(step, &particles) {
+            self.log.write(&Message::Event(row), time_ns)?;
+        }
+        self.log.write(&Message::Step(self.row(solver, step)), time_ns)?;
+        self.log.write(&Message::Particles { step, particles }, time_ns)
+    }
+
+    fn row(&self, solver: &Solver, step: u64) -> StepRow {
+        StepRow {
+            step,
+            scene_step: solver.scene_step(),
+            state_hash: solver.state_hash(),
+            topology_revision: 0,
+            torn_count: count(solver.torn().len()),
+            outcome_count: self.outcome_count,
+            wake_late_ns: 0,
+            solve_ns: 0,
+        }
+    }
+}
+
+fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
+    ConstraintState {
+        a: constraint.a,
+        b: constraint.b,
+        rest_length: constraint.rest_length,
+        compliance: constraint.compliance,
+        kind: constraint.kind as u32,
+    }
+}

@@ -1,0 +1,17 @@
+//! The demo shows that it is building, runs all three programs until Ctrl-C, and describes the
+//! recording.
+
+use integration_tests::{Process, Program, Sandbox};
+
+#[test]
+fn the_demo_shows_its_progress_and_describes_the_recording_after_ctrl_c() {
+    let sandbox = Sandbox::new();
+    let mut demo = Process::start(Program::Demo, &sandbox, &[]);
+    demo.wait_for_line("building the programs");
+    demo.wait_for_line("open in a browser:  http://127.0.0.1:");
+    let finished = demo.interrupt();
+    assert_eq!(finished.code, Some(0), "{}", finished.stderr);
+    let (file, description) = finished.stdout.split_once('\n').unwrap_or_default();
+    assert!(description.contains("curtain"), "{description}");
+    assert!(std::fs::remove_file(file).is_ok(), "no recording at {file}");
+}

@@ -1,0 +1,61 @@
+//! The table of the page's files.
+
+/// Each path with the content of that file; one that is missing does not compile.
+macro_rules! files {
+    ($($path:literal),* $(,)?) => {
+        &[$(($path, include_str!(concat!("../../../web/", $path)))),*]
+    };
+}
+
+/// The page's files: path and content.
+pub(super) const FILES: &[(&str, &str)] = files![
+    "app.css",
+    "index.html",
+    "js/geometry/camera.js",
+    "js/geometry/math.js",
+    "js/geometry/pick.js",
+    "js/gl/buffers.js",
+    "js/gl/cloth.js",
+    "js/gl/colliders.js",
+    "js/gl/context.js",
+    "js/gl/ground.js",
+    "js/gl/points.js",
+    "js/gl/renderer.js",
+    "js/gl/shaders.js",
+    "js/gl/solids.js",
+    "js/gl/sticks.js",
+    "js/gl/theme.js",
+    "js/main.js",
+    "js/net/commands.js",
+    "js/net/messages.js",
+    "js/net/socket.js",
+    "js/net/wire.js",
+    "js/panel/charts.js",
+    "js/panel/panel.js",
+    "js/panel/parameters.js",
+    "js/panel/series.js",
+    "js/state/emitter.js",
+    "js/state/framing.js",
+    "js/state/hanging.js",
+    "js/state/simulation.js",
+    "js/state/topology.js",
+    "js/tools/brush.js",
+    "js/tools/cut.js",
+    "js/tools/grab.js",
+    "js/tools/input.js",
+    "js/tools/pin.js",
+    "js/tools/tool.js",
+    "js/tools/view.js",
+    "js/ui/banner.js",
+    "js/ui/controls.js",
+    "js/ui/dom.js",
+    "js/ui/format.js",
+    "js/ui/hud.js",
+    "js/ui/keys.js",
+    "js/ui/link.js",
+    "js/ui/overlay.js",
+    "js/ui/timeline-bar.js",
+    "js/ui/timeline.js",
+    "js/ui/views.js",
+    "js/viewer.js",
+];

@@ -1,0 +1,111 @@
+//! Stretch and energy of a state.
+
+use sim_contract::{ConstraintKind, ConstraintState, ParticleState};
+
+use crate::shown_state::single;
+
+/// Stretch and energy of a state. NaN where there is nothing to measure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Measures {
+    /// Mean of length / rest length - 1, over live structural constraints.
+    pub(crate) stretch_mean: f32,
+    /// Its maximum.
+    pub(crate) stretch_max: f32,
+    /// The constraint of the maximum.
+    pub(crate) stretch_max_constraint: u32,
+    /// Of the free particles: m v^2 / 2, in J.
+    pub(crate) kinetic_j: f64,
+    /// Of the free particles: -m g.x, in J.
+    pub(crate) potential_j: f64,
+}
+
+/// Measures a state. The ends of the constraints are particles of it.
+pub(crate) fn measure(
+    particles: &[ParticleState],
+    constraints: &[ConstraintState],
+    is_torn: &[bool],
+    gravity: [f32; 3],
+) -> Measures {
+    let (mut sum, mut count) = (0.0, 0_u32);
+    let (mut max, mut max_constraint) = (f64::NEG_INFINITY, 0);
+    for ((index, constraint), is_torn) in (0_u32..).zip(constraints).zip(is_torn) {
+        if *is_torn
+            || constraint.kind != ConstraintKind::Structural as u32
+            || constraint.rest_length <= 0.0
+        {
+            continue;
+        }
+        let [a, b] = [constraint.a, constraint.b].map(|end| particles[end as usize].position);
+        let stretch = distance(a, b) / f64::from(constraint.rest_length) - 1.0;
+        sum += stretch;
+        count += 1;
+        if stretch > max {
+            (max, max_constraint) = (stretch, index);
+        }
+    }
+    let (kinetic_j, potential_j) = energies(particles, gravity);
+    Measures {
+        stretch_mean: if count == 0 { f32::NAN } else { single(sum / f64::from(count)) },
+        stretch_max: if count == 0 { f32::NAN } else { single(max) },
+        stretch_max_constraint: max_constraint,
+        kinetic_j,
+        potential_j,
+    }
+}
+
+fn energies(particles: &[ParticleState], gravity: [f32; 3]) -> (f64, f64) {
+    let (mut kinetic, mut potential) = (0.0, 0.0);
+    // What is held has no inverse mass, and its mass is not known.
+    for particle in particles.iter().filter(|particle| particle.inverse_mass > 0.0) {
+        let mass = 1.0 / f64::from(particle.inverse_mass);
+        kinetic += 0.5 * mass * dot(particle.velocity, particle.velocity);
+        potential -= mass * dot(gravity, particle.position);
+    }
+    (kinetic, potential)
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f64 {
+    (0..3).map(|axis| f64::from(a[axis]) * f64::from(b[axis])).sum()
+}
+
+fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    (0..3).map(|axis| (f64::from(a[axis]) - f64::from(b[axis])).powi(2)).sum::<f64>().sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn particle(x: f32, inverse_mass: f32, speed: f32) -> ParticleState {
+        ParticleState {
+            position: [x, 2.0, 0.0],
+            velocity: [speed, 0.0, 0.0],
+            inverse_mass,
+            flags: 0,
+        }
+    }
+
+    fn constraint(a: u32, b: u32, kind: u32) -> ConstraintState {
+        ConstraintState { a, b, rest_length: 1.0, kind, ..ConstraintState::default() }
+    }
+
+    #[test]
+    fn stretch_is_of_live_structural_constraints() {
+        let particles = [particle(0.0, 0.0, 0.0), particle(1.1, 1.0, 0.0), particle(2.4, 1.0, 0.0)];
+        let constraints =
+            [constraint(0, 1, 0), constraint(1, 2, 0), constraint(0, 2, 0), constraint(0, 2, 1)];
+        let is_torn = [false, false, true, false];
+        let measures = measure(&particles, &constraints, &is_torn, [0.0; 3]);
+        assert!((measures.stretch_mean - 0.2).abs() < 1e-6, "{measures:?}");
+        assert!((measures.stretch_max - 0.3).abs() < 1e-6, "{measures:?}");
+        assert_eq!(measures.stretch_max_constraint, 1);
+        assert!(measure(&particles, &[], &[], [0.0; 3]).stretch_max.is_nan());
+    }
+
+    #[test]
+    fn energies_are_of_free_particles() {
+        let particles = [particle(0.0, 0.0, 9.0), particle(0.0, 0.5, 3.0)];
+        let measures = measure(&particles, &[], &[], [0.0, -10.0, 0.0]);
+        assert_eq!((measures.kinetic_j, measures.potential_j), (9.0, 40.0));
+    }
+}

@@ -1,0 +1,189 @@
+//! Reads a recording once from its start, in a thread of its own: whether every state has its
+//! recorded hash, what happened when, and what was set.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Sender;
+
+use recorder::{
+    IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, Torn, TornFollower,
+    state_hash,
+};
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{Action, ParticleState};
+
+use super::marks::Marks;
+use super::settings_log::SettingsLog;
+use crate::message::{Hashes, Mark, MarkKind};
+
+/// Time between two reports.
+const REPORT_PERIOD_NS: u64 = SECOND_NS;
+
+/// What is known of a recording so far.
+#[derive(Debug, Clone)]
+pub(super) struct Report {
+    pub(super) marks: Vec<Mark>,
+    pub(super) hashes: Hashes,
+    /// The same for the user.
+    pub(super) hash_text: String,
+    /// What was set, once all of it is known.
+    pub(super) settings: Option<SettingsLog>,
+}
+
+/// What is checked.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub(super) log: IndexedLog,
+    pub(super) first: StepRow,
+    pub(super) last_step: u64,
+    /// What was torn before the recording.
+    pub(super) torn: Torn,
+}
+
+/// Reads to the end, or until it is asked to stop.
+pub(super) fn check(mut job: Job, reports: &Sender<Report>, is_over: &AtomicBool) {
+    let mut check = Check::new(&job);
+    let count = job.log.chunks().len();
+    let mut next_report_ns = monotonic_ns() + REPORT_PERIOD_NS;
+    for chunk in 0..count {
+        if is_over.load(Ordering::Relaxed) {
+            return;
+        }
+        check.take_chunk(job.log.read_chunk(chunk));
+        if monotonic_ns() >= next_report_ns {
+            next_report_ns = monotonic_ns() + REPORT_PERIOD_NS;
+            // Nobody who listens any more is the end as well; it is noticed above.
+            let _heard = reports.send(check.interim(chunk, count));
+        }
+    }
+    let _heard = reports.send(check.finish(job.log.end()));
+}
+
+#[derive(Debug)]
+struct Check {
+    marks: Marks,
+    settings: SettingsLog,
+    torn: TornFollower,
+    row: Option<StepRow>,
+    /// A step that is late began later than this, in ns.
+    period_ns: u64,
+    equal_count: u64,
+    /// States whose hash could not be checked.
+    unknown_count: u64,
+    different_count: u64,
+    first_different: Option<u64>,
+    damaged_count: u64,
+    /// The step that was read last.
+    step: u64,
+}
+
+impl Check {
+    fn new(job: &Job) -> Self {
+        let first_step = job.first.step;
+        Self {
+            marks: Marks::new(first_step, job.last_step),
+            settings: SettingsLog::new(first_step, job.first.outcome_count),
+            torn: TornFollower::new(job.torn.clone()),
+            row: None,
+            period_ns: SECOND_NS / u64::from(job.log.run().rate_hz.max(1)),
+            equal_count: 0,
+            unknown_count: 0,
+            different_count: 0,
+            first_different: None,
+            damaged_count: 0,
+            step: first_step,
+        }
+    }
+
+    fn take_chunk(&mut self, read: Result<Vec<LoggedMessage>, ReadError>) {
+        let Ok(messages) = read else {
+            self.damaged_count += 1;
+            self.torn.lose();
+            self.settings.add_gap(self.step + 1);
+            self.row = None;
+            return;
+        };
+        for logged in &messages {
+            self.take(&logged.message);
+        }
+    }
+
+    fn take(&mut self, message: &Message) {
+        self.torn.take(message);
+        match message {
+            Message::Tears(row) => {
+                let count = u32::try_from(row.constraints.len()).unwrap_or(u32::MAX);
+                self.marks.add(MarkKind::Tear, row.step, count);
+            }
+            Message::Outcome(row) => self.take_outcome(row),
+            Message::Step(row) => {
+                if row.wake_late_ns > self.period_ns {
+                    self.marks.add(MarkKind::Late, row.step, 1);
+                }
+                self.row = Some(*row);
+            }
+            Message::Particles { step, particles } => self.compare(*step, particles),
+            _ => {}
+        }
+    }
+
+    fn take_outcome(&mut self, row: &OutcomeRow) {
+        self.settings.take(row);
+        if row.is_applied() {
+            let kind = match row.action {
+                Action::Pin { .. } | Action::Unpin { .. } => MarkKind::Pin,
+                _ => MarkKind::Command,
+            };
+            self.marks.add(kind, row.step, 1);
+        }
+    }
+
+    fn compare(&mut self, step: u64, particles: &[ParticleState]) {
+        self.step = step;
+        let row = self.row.take().filter(|row| row.step == step);
+        let torn = self.torn.at(step).map(|torn| torn.constraints.as_slice());
+        let torn = torn.zip(row).and_then(|(torn, row)| torn.get(..row.torn_count as usize));
+        match (row, torn) {
+            (Some(row), Some(torn)) if row.state_hash == state_hash(particles, torn) => {
+                self.equal_count += 1;
+            }
+            (Some(_), Some(_)) => {
+                self.different_count += 1;
+                self.first_different.get_or_insert(step);
+            }
+            _ => self.unknown_count += 1,
+        }
+    }
+
+    fn interim(&self, chunk: usize, count: usize) -> Report {
+        let percent = 100 * (chunk + 1) / count.max(1);
+        Report {
+            marks: self.marks.list(),
+            hashes: Hashes::Checking,
+            hash_text: format!("checking hashes: {percent} %"),
+            settings: None,
+        }
+    }
+
+    fn finish(self, end: &LogEnd) -> Report {
+        let count = self.equal_count + self.different_count;
+        let (hashes, mut text) = match self.first_different {
+            Some(step) => (
+                Hashes::Diverged,
+                format!("{} of {count} hashes differ, first at step {step}", self.different_count),
+            ),
+            None if self.equal_count == 0 => (Hashes::Absent, "no hashes".to_owned()),
+            None => (Hashes::Verified, format!("{count} hashes verified")),
+        };
+        if self.unknown_count > 0 {
+            text += &format!(", {} could not be checked", self.unknown_count);
+        }
+        if self.damaged_count > 0 {
+            text += &format!("; damaged chunks left out: {}", self.damaged_count);
+        }
+        if *end != LogEnd::Complete {
+            text += &format!("; the file is {end}");
+        }
+        let (marks, settings) = (self.marks.list(), Some(self.settings));
+        Report { marks, hashes, hash_text: text, settings }
+    }
+}

@@ -1,0 +1,33 @@
+// Types of the text messages that the page receives (viewer-bridge/PROTOCOL.md, section 3).
+
+/** @typedef {number | number[] | null} SettingValue */
+/** @typedef {{ name: string, unit: string, value: "vector" | "number" | "whole", min: number, max: number, above_min: boolean, off: boolean, per_kind: boolean }} Setting */
+/**
+ * @typedef {{
+ *   type: "hello", protocol: number, version: string, client: number, mode: "live" | "replay", format: string,
+ *   scenes: { name: string, rate_hz: number, dimensions: number, text: string }[], settings: Setting[],
+ *   limits: { constraints_per_cut: number, [name: string]: number },
+ * }} Hello
+ * @typedef {{
+ *   type: "node", state: "none" | "alive" | "lost", text: string, run_id: string | null, scene: string | null,
+ *   method: string | null, rate_hz: number, is_paused: boolean, is_replay: boolean, time_scale: number, process_id: number | null,
+ * }} NodeState
+ * @typedef {Record<string, SettingValue | Record<string, SettingValue>>} Values
+ * @typedef {{ type: "parameters", is_complete: boolean, values: Values | null, initial: Values | null }} Parameters
+ * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string }} OutcomeMessage
+ * @typedef {{ kind: "tear" | "pin" | "command" | "late", step: number, count: number }} Mark
+ * @typedef {{
+ *   type: "timeline", file: string, scene: string, rate_hz: number, first_step: number, last_step: number,
+ *   first_time_s: number, last_time_s: number, marks: Mark[], hashes: string, hash_text: string,
+ * }} TimelineMessage
+ * @typedef {{ type: "playback", is_playing: boolean, rate: number, is_looping: boolean, step: number, time_s: number }} Playback
+ * @typedef {Hello | NodeState | Parameters | OutcomeMessage | TimelineMessage | Playback | { type: "clients", count: number }
+ *   | { type: "reset", step: number } | { type: "notice", level: string, text: string }} TextMessage
+ */
+
+/** Reads a number. JSON has no infinities, so the protocol writes them as words. @param {unknown} value @returns {number} */
+export function toNumber(value) {
+  if (typeof value === "number") return value;
+  if (value === "inf") return Infinity;
+  return value === "-inf" ? -Infinity : NaN;
+}

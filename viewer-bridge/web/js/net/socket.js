@@ -1,0 +1,126 @@
+// The connection to the bridge: introduces the page, passes messages on, acknowledges drawn frames,
+// and reconnects with growing, randomised delays.
+
+import { decode } from "./wire.js";
+
+/** @typedef {"connecting" | "open" | "waiting" | "refused"} ConnectionState */
+/** @typedef {{ state: ConnectionState, text: string }} Connection */
+/**
+ * @typedef {{
+ *   onBinary(message: import("./wire.js").Message): void,
+ *   onText(message: import("./messages.js").TextMessage): void,
+ *   onChange(connection: Connection): void,
+ *   onFault(text: string): void,
+ * }} Handlers
+ */
+
+export const PROTOCOL = 1;
+const FIRST_DELAY_MS = 250;
+const DELAY_MAX_MS = 5000;
+/** Close codes after which another attempt cannot succeed. */
+const FINAL_CODES = new Set([4400, 4401, 4426]);
+
+/**
+ * Delay before the next attempt, in ms. It doubles each time and has a random part, so that many
+ * pages do not reconnect at the same moment.
+ * @param {number} failures number of failures so far @param {number} random 0..1
+ */
+export const delayBefore = (failures, random) => Math.min(DELAY_MAX_MS, FIRST_DELAY_MS * 2 ** failures) * (1 + random / 2);
+
+/** A message for the user about a closed connection. @param {number} code @param {string} reason */
+export function closedText(code, reason) {
+  if (code === 4401) return "This bridge requires a token. Open the full address that it printed, including everything after the “#”.";
+  if (code === 4426) return `The page and the bridge have different versions (${reason}). Reload the page.`;
+  if (code === 4400) return `The bridge could not read a message from this page (${reason}). Reload the page.`;
+  if (code === 4429) return "The page sent too many messages per second.";
+  if (code === 4408) return "The connection was too slow or timed out.";
+  return "No connection to the bridge.";
+}
+
+export class Connector {
+  /** @param {string} url @param {string | null} token @param {Handlers} handlers */
+  constructor(url, token, handlers) {
+    this.url = url;
+    this.token = token;
+    this.handlers = handlers;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    /** @type {Connection} */
+    this.connection = { state: "connecting", text: "Connecting…" };
+    this.failures = 0;
+    this.timer = 0;
+    this.framesAcknowledged = 0;
+  }
+
+  connect() {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    this.change({ state: "connecting", text: this.failures === 0 ? "Connecting…" : "Reconnecting…" });
+    const socket = new WebSocket(this.url);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => this.opened();
+    socket.onmessage = ({ data }) => (typeof data === "string" ? this.receiveText(data) : this.receiveBinary(data));
+    socket.onclose = ({ code, reason }) => this.closed(socket, code, reason);
+  }
+
+  /** Skips the rest of the delay: the tab is visible again, or the network is back. */
+  retryNow() {
+    if (this.connection.state === "waiting") this.connect();
+  }
+
+  opened() {
+    const token = this.token === null ? {} : { token: this.token };
+    this.send({ type: "hello", protocol: PROTOCOL, ...token, format: "auto" });
+  }
+
+  /** @param {WebSocket} socket @param {number} code @param {string} reason */
+  closed(socket, code, reason) {
+    if (socket !== this.socket) return;
+    this.socket = null;
+    const text = closedText(code, reason);
+    if (FINAL_CODES.has(code)) return this.change({ state: "refused", text });
+    const delay = delayBefore(this.failures++, Math.random());
+    this.timer = setTimeout(() => this.connect(), delay);
+    this.change({ state: "waiting", text: `${text} Trying again…` });
+  }
+
+  /** @param {string} data */
+  receiveText(data) {
+    const message = JSON.parse(data);
+    if (message.type === "hello") {
+      // The socket also opens before a refusal: only `hello` shows that the bridge accepted the page.
+      this.failures = 0;
+      this.change({ state: "open", text: "" });
+    }
+    this.handlers.onText(message);
+  }
+
+  /** @param {ArrayBuffer} data */
+  receiveBinary(data) {
+    try {
+      const message = decode(data);
+      if (message !== null) this.handlers.onBinary(message);
+    } catch (error) {
+      this.handlers.onFault(`A message could not be read: ${error}`);
+    }
+  }
+
+  /** @param {object} message @returns {boolean} false if there is no connection */
+  send(message) {
+    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  /** @param {number} frame number of the drawn frame */
+  acknowledge(frame) {
+    if (this.send({ type: "ack", frame })) this.framesAcknowledged++;
+  }
+
+  /** @param {Connection} connection */
+  change(connection) {
+    this.connection = connection;
+    this.handlers.onChange(connection);
+  }
+}

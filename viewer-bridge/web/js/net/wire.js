@@ -1,0 +1,251 @@
+// Decodes the binary messages of the bridge, as viewer-bridge/PROTOCOL.md defines them. No other
+// module knows an offset. Arrays are views into the message, not copies.
+
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+
+/** The header of every message. `step` is exact: the protocol keeps it below 2^53.
+ * @typedef {{ version: number, epoch: number, step: number }} Header */
+
+/**
+ * @typedef {Header & {
+ *   kind: "scene", particleCount: number, constraintCount: number, triangleCount: number,
+ *   isPlanar: boolean, canTear: boolean, hasTethers: boolean, isPbd: boolean,
+ *   min: Vec3, max: Vec3, rateHz: number, origin: Vec3,
+ *   positions: Float32Array, ends: Uint32Array, restLengths: Float32Array, triangles: Uint32Array,
+ *   constraintKinds: Uint8Array, name: string, unit: string, up: string, runId: string,
+ *   grids: { first: number, columns: number, rows: number }[],
+ * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s
+ *
+ * @typedef {Header & {
+ *   kind: "frame", simTime: number, particleCount: number,
+ *   isPaused: boolean, isReplay: boolean, isSaturated: boolean,
+ *   lo: Vec3, scale: Vec3, tornCount: number, solveUs: number, wakeLateUs: number,
+ *   number: number, publishedNs: bigint, isQuantised: boolean,
+ *   positions: Float32Array | Uint16Array, nonFinite: Uint32Array,
+ * }} Frame  coordinate = lo + scale · value; lo is 0 and scale 1 unless quantised
+ *
+ * @typedef {Header & { kind: "tear", first: number, constraints: Uint32Array, causes: Uint8Array }} Tear
+ * @typedef {Header & { kind: "pins", particles: Uint32Array, flags: Uint32Array }} Pins
+ *
+ * @typedef {Header & {
+ *   kind: "stats", solveUsP50: number, solveUsP99: number, wakeLateUsP50: number, wakeLateUsP99: number,
+ *   deadlineUs: number, realTimeFactor: number, timeScale: number,
+ *   stretchMean: number, stretchMax: number, stretchMaxConstraint: number,
+ *   kineticJ: number, potentialJ: number, lateSteps: number, skippedPeriods: number,
+ *   outcomes: number, rejected: number, frozenCount: number, tornCount: number,
+ *   readers: number, clients: number, encodeUs: number, framesPerSecond: number,
+ *   isPaused: boolean, isReplay: boolean,
+ * }} Stats
+ *
+ * @typedef {{
+ *   shape: "plane" | "box" | "sphere" | "capsule" | "bounds", restitution: number, friction: number,
+ *   radius: number, offset: number, normal: Vec3, center: Vec3, halfExtents: Vec3, rotation: number[],
+ *   a: Vec3, b: Vec3, velocity: Vec3, angularVelocity: Vec3,
+ * }} Collider
+ * @typedef {Header & { kind: "colliders", colliders: Collider[] }} Colliders
+ * @typedef {Scene | Frame | Tear | Pins | Stats | Colliders} Message
+ */
+
+/** Flags of a particle in PINS. */
+export const PIN = Object.freeze({ pinned: 1, grabbed: 2, anchored: 4, frozen: 8 });
+/** Constraint kinds in SCENE. */
+export const CONSTRAINT = Object.freeze({ structural: 0, shear: 1, bend: 2, tether: 3 });
+
+const VERSION = 1;
+const SHAPES = /** @type {const} */ (["plane", "box", "sphere", "capsule", "bounds"]);
+const COLLIDER_BYTES = 120;
+
+/** Reads consecutive fields of a message. Throws a RangeError beyond its end. */
+class Reader {
+  /** @param {ArrayBuffer} buffer */
+  constructor(buffer) {
+    this.view = new DataView(buffer);
+    this.at = 0;
+  }
+
+  u16() {
+    this.at += 2;
+    return this.view.getUint16(this.at - 2, true);
+  }
+
+  u32() {
+    this.at += 4;
+    return this.view.getUint32(this.at - 4, true);
+  }
+
+  u64() {
+    this.at += 8;
+    return this.view.getBigUint64(this.at - 8, true);
+  }
+
+  f32() {
+    this.at += 4;
+    return this.view.getFloat32(this.at - 4, true);
+  }
+
+  f64() {
+    this.at += 8;
+    return this.view.getFloat64(this.at - 8, true);
+  }
+
+  /** @returns {Vec3} */
+  f32x3() {
+    return [this.f32(), this.f32(), this.f32()];
+  }
+
+  /** Returns a view of `count` elements, and skips the padding after it.
+   * @template {Uint8Array | Uint16Array | Uint32Array | Float32Array} T
+   * @param {{ new (buffer: ArrayBuffer, at: number, count: number): T, BYTES_PER_ELEMENT: number }} Type
+   * @param {number} count @returns {T} */
+  array(Type, count) {
+    const view = new Type(/** @type {ArrayBuffer} */ (this.view.buffer), this.at, count);
+    this.at += Math.ceil((count * Type.BYTES_PER_ELEMENT) / 4) * 4;
+    return view;
+  }
+}
+
+const DECODERS = /** @type {Record<number, (reader: Reader, header: Header) => Message>} */ ({
+  1: decodeScene,
+  2: (reader, header) => decodeFrame(reader, header, false),
+  3: (reader, header) => decodeFrame(reader, header, true),
+  4: decodeTear,
+  5: decodePins,
+  6: decodeStats,
+  7: decodeColliders,
+});
+
+/**
+ * Decodes a message. Returns null for a kind or version that this page does not know.
+ * @param {ArrayBuffer} buffer
+ * @returns {Message | null}
+ * @throws {RangeError} if the message is shorter than its counts require
+ */
+export function decode(buffer) {
+  const reader = new Reader(buffer);
+  const kind = reader.u16();
+  const version = reader.u16();
+  const decoder = DECODERS[kind];
+  if (decoder === undefined || version !== VERSION) return null;
+  return decoder(reader, { version, epoch: reader.u32(), step: Number(reader.u64()) });
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Scene} */
+function decodeScene(reader, header) {
+  const particleCount = reader.u32();
+  const constraintCount = reader.u32();
+  const triangleCount = reader.u32();
+  const flags = reader.u32();
+  const min = reader.f32x3();
+  const max = reader.f32x3();
+  const rateHz = reader.u32();
+  const jsonBytes = reader.u32();
+  const origin = /** @type {Vec3} */ ([reader.f64(), reader.f64(), reader.f64()]);
+  const positions = reader.array(Float32Array, 3 * particleCount);
+  const ends = reader.array(Uint32Array, 2 * constraintCount);
+  const restLengths = reader.array(Float32Array, constraintCount);
+  const triangles = reader.array(Uint32Array, 3 * triangleCount);
+  const constraintKinds = reader.array(Uint8Array, constraintCount);
+  const json = JSON.parse(new TextDecoder().decode(reader.array(Uint8Array, jsonBytes)));
+  return {
+    kind: "scene", ...header, particleCount, constraintCount, triangleCount,
+    isPlanar: (flags & 1) !== 0, canTear: (flags & 2) !== 0, hasTethers: (flags & 4) !== 0, isPbd: (flags & 8) !== 0,
+    min, max, rateHz, origin, positions, ends, restLengths, triangles, constraintKinds,
+    name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "", grids: json.grids ?? [],
+  };
+}
+
+/** @param {Reader} reader @param {Header} header @param {boolean} isQuantised @returns {Frame} */
+function decodeFrame(reader, header, isQuantised) {
+  const simTime = reader.f64();
+  const particleCount = reader.u32();
+  const flags = reader.u32();
+  const lo = reader.f32x3();
+  const scale = reader.f32x3();
+  const nonFiniteCount = reader.u32();
+  const tornCount = reader.u32();
+  const solveUs = reader.f32();
+  const wakeLateUs = reader.f32();
+  const number = reader.u32();
+  reader.u32();
+  const publishedNs = reader.u64();
+  const positions = isQuantised ? reader.array(Uint16Array, 3 * particleCount) : reader.array(Float32Array, 3 * particleCount);
+  return {
+    kind: "frame", ...header, simTime, particleCount,
+    isPaused: (flags & 1) !== 0, isReplay: (flags & 2) !== 0, isSaturated: (flags & 4) !== 0,
+    lo: isQuantised ? lo : [0, 0, 0], scale: isQuantised ? scale : [1, 1, 1],
+    tornCount, solveUs, wakeLateUs, number, publishedNs, isQuantised, positions,
+    nonFinite: reader.array(Uint32Array, nonFiniteCount),
+  };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Tear} */
+function decodeTear(reader, header) {
+  const first = reader.u32();
+  const count = reader.u32();
+  const constraints = reader.array(Uint32Array, count);
+  return { kind: "tear", ...header, first, constraints, causes: reader.array(Uint8Array, count) };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Pins} */
+function decodePins(reader, header) {
+  const count = reader.u32();
+  reader.u32();
+  const pairs = reader.array(Uint32Array, 2 * count);
+  return {
+    kind: "pins", ...header,
+    particles: pairs.filter((_, index) => index % 2 === 0),
+    flags: pairs.filter((_, index) => index % 2 === 1),
+  };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Stats} */
+function decodeStats(reader, header) {
+  // The fields are in the order of the message: each call reads the next one.
+  const stats = {
+    kind: /** @type {const} */ ("stats"), ...header,
+    solveUsP50: reader.f32(), solveUsP99: reader.f32(),
+    wakeLateUsP50: reader.f32(), wakeLateUsP99: reader.f32(),
+    deadlineUs: reader.f32(), realTimeFactor: reader.f32(), timeScale: reader.f32(),
+    stretchMean: reader.f32(), stretchMax: reader.f32(), stretchMaxConstraint: reader.u32(),
+    kineticJ: reader.f64(), potentialJ: reader.f64(),
+    lateSteps: Number(reader.u64()), skippedPeriods: Number(reader.u64()),
+    outcomes: Number(reader.u64()), rejected: Number(reader.u64()),
+    frozenCount: reader.u32(), tornCount: reader.u32(), readers: reader.u32(), clients: reader.u32(),
+    encodeUs: reader.f32(), framesPerSecond: reader.f32(),
+  };
+  const flags = reader.u32();
+  return { ...stats, isPaused: (flags & 1) !== 0, isReplay: (flags & 2) !== 0 };
+}
+
+/** @param {Reader} reader @param {Header} header @returns {Colliders} */
+function decodeColliders(reader, header) {
+  const count = reader.u32();
+  reader.u32();
+  if (reader.at + count * COLLIDER_BYTES > reader.view.byteLength) throw new RangeError("the message ends within its colliders");
+  /** @type {Collider[]} */
+  const colliders = [];
+  for (let index = 0; index < count; index++) {
+    const collider = decodeCollider(reader);
+    if (collider !== null) colliders.push(collider);
+  }
+  return { kind: "colliders", ...header, colliders };
+}
+
+/** Skips a shape of a later version. @param {Reader} reader @returns {Collider | null} */
+function decodeCollider(reader) {
+  const shape = SHAPES[reader.u32()];
+  const restitution = reader.f32();
+  const friction = reader.f32();
+  const radius = reader.f32();
+  const offset = reader.f32();
+  const normal = reader.f32x3();
+  const center = reader.f32x3();
+  const halfExtents = reader.f32x3();
+  const rotation = [reader.f32(), reader.f32(), reader.f32(), reader.f32()];
+  const a = reader.f32x3();
+  const b = reader.f32x3();
+  const velocity = reader.f32x3();
+  const angularVelocity = reader.f32x3();
+  if (shape === undefined) return null;
+  return { shape, restitution, friction, radius, offset, normal, center, halfExtents, rotation, a, b, velocity, angularVelocity };
+}

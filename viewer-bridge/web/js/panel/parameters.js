@@ -1,0 +1,82 @@
+// The logic of the parameter panel: rows, ranges, and the mapping between slider positions and values.
+// No DOM here.
+
+import { niceCeiling } from "../ui/format.js";
+import { toNumber } from "../net/messages.js";
+
+/** @typedef {import("../net/messages.js").Values} Values */
+/** @typedef {import("../net/messages.js").SettingValue} SettingValue */
+/**
+ * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
+ * of a parameter when it is switched on.
+ * @typedef {{
+ *   name: string, label: string, unit: string, kind: "vector" | "linear" | "log" | "whole",
+ *   least: number, most: number, canBeOff?: boolean, hasZero?: boolean, whenOn?: number, method?: "xpbd" | "pbd", perKind?: boolean,
+ * }} Row
+ */
+
+/** Number of intervals of a slider. */
+export const SLIDER_STEPS = 400;
+
+/** The rows, in units of a scene in metres. The values of a scene can widen a range. @type {Row[]} */
+export const ROWS = [
+  { name: "gravity", label: "Gravity", unit: "m/s²", kind: "vector", least: -20, most: 20 },
+  { name: "wind_velocity", label: "Wind", unit: "m/s", kind: "vector", least: -20, most: 20 },
+  { name: "wind_drag", label: "Wind drag", unit: "kg/m³", kind: "linear", least: 0, most: 2, canBeOff: true, whenOn: 0.6 },
+  { name: "damping", label: "Damping", unit: "1/s", kind: "linear", least: 0, most: 5 },
+  { name: "compliance", label: "Compliance", unit: "m/N", kind: "log", least: 1e-8, most: 10, hasZero: true, method: "xpbd", perKind: true },
+  { name: "stiffness", label: "Stiffness", unit: "", kind: "linear", least: 0, most: 1, method: "pbd", perKind: true },
+  { name: "iterations", label: "Iterations", unit: "", kind: "whole", least: 1, most: 32 },
+  { name: "substeps", label: "Substeps", unit: "", kind: "whole", least: 1, most: 32 },
+  { name: "tear_force", label: "Tear force", unit: "N", kind: "log", least: 1e-3, most: 1e5, canBeOff: true, whenOn: 50 },
+  { name: "tear_stretch", label: "Tear stretch", unit: "×", kind: "linear", least: 1.01, most: 4, canBeOff: true, whenOn: 1.5 },
+  { name: "tear_distance", label: "Tear distance", unit: "m", kind: "log", least: 1e-3, most: 100, canBeOff: true, whenOn: 0.1 },
+  { name: "time_scale", label: "Pace", unit: "×", kind: "log", least: 0.01, most: 10 },
+];
+
+/** The rows for a method. @param {string | null} method */
+export const rowsOf = (method) => ROWS.filter((row) => row.method === undefined || row.method === (method ?? "xpbd"));
+
+/** The range of a row, wide enough for the initial and current values of the scene. @param {Row} row @param {...number} values */
+export function rangeOf(row, ...values) {
+  const greatest = Math.max(0, ...values.filter(Number.isFinite).map(Math.abs));
+  const most = greatest > row.most ? niceCeiling(greatest * (row.kind === "vector" ? 2 : 1)) : row.most;
+  return { least: row.kind === "vector" ? -most : row.least, most };
+}
+
+/** Slider position for a value, 0..=SLIDER_STEPS. @param {Row} row @param {{ least: number, most: number }} range @param {number} value */
+export function positionOf(row, { least, most }, value) {
+  if (row.kind !== "log") return Math.round(((value - least) / (most - least)) * SLIDER_STEPS);
+  if (row.hasZero && value <= 0) return 0;
+  const first = row.hasZero ? 1 : 0;
+  const fraction = Math.log(Math.max(value, least) / least) / Math.log(most / least);
+  return Math.round(first + Math.min(1, fraction) * (SLIDER_STEPS - first));
+}
+
+/** Value at a slider position, rounded to the precision of the slider. @param {Row} row @param {{ least: number, most: number }} range @param {number} position */
+export function valueAt(row, { least, most }, position) {
+  if (row.kind !== "log") {
+    const value = least + (position / SLIDER_STEPS) * (most - least);
+    if (row.kind === "whole") return Math.round(value);
+    // Rounded to a fraction of a slider step, so that 0 is exact and 9.81 is not 9.8099995.
+    const grain = niceCeiling((most - least) / 1000) / 2;
+    return Number((Math.round(value / grain) * grain).toPrecision(6));
+  }
+  if (row.hasZero && position === 0) return 0;
+  const first = row.hasZero ? 1 : 0;
+  return Number((least * (most / least) ** ((position - first) / (SLIDER_STEPS - first))).toPrecision(2));
+}
+
+/** The components of a vector parameter; zeros if it is off. @param {unknown} value @returns {[number, number, number]} */
+export function vectorOf(value) {
+  if (!Array.isArray(value)) return [0, 0, 0];
+  return [toNumber(value[0]), toNumber(value[1]), toNumber(value[2])];
+}
+
+/** A parameter, for one kind of constraint if it is per kind. Null if it is off, or if each constraint has its own value.
+ * @param {Values | null} values @param {string} name @param {string} kind @returns {SettingValue} */
+export function valueOf(values, name, kind) {
+  const value = values?.[name] ?? null;
+  if (value === null || typeof value !== "object" || Array.isArray(value)) return typeof value === "string" ? toNumber(value) : value;
+  return value[kind] ?? null;
+}

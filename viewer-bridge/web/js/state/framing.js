@@ -1,0 +1,81 @@
+// The box that the first view of a scene shows: the scene, and the space that it will move into.
+
+import { add, addScaled, dot, length, scale, subtract } from "../geometry/math.js";
+import { PIN } from "../net/wire.js";
+
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/math.js").Box} Box */
+/** @typedef {import("../net/wire.js").Collider} Collider */
+
+/** Half the size of the box around a scene that is a single point, in the unit of the scene. */
+const POINT_ROOM = 0.5;
+/** Greatest distance of a floor and of a solid that are still framed, in sizes of the scene. */
+const FLOOR_SIZES = 3;
+const SOLID_SIZES = 1;
+/** Margin on each side of a scene that anchors move, as a fraction of its size. */
+const CARRIED_ROOM = 0.2;
+
+/** @param {import("./simulation.js").Simulation} simulation @returns {Box} */
+export function firstViewBox(simulation) {
+  const bounds = simulation.colliders.find((one) => one.shape === "bounds");
+  if (bounds) return { min: bounds.a, max: bounds.b };
+  const { up } = simulation.axes();
+  const box = simulation.box();
+  if (length(subtract(box.max, box.min)) === 0) grow(box, POINT_ROOM);
+  const size = length(subtract(box.max, box.min));
+  const middle = scale(add(box.min, box.max), 0.5);
+  const floor = simulation.ground ?? simulation.floor();
+  if (floor !== null) {
+    const drop = dot(floor.normal, middle) - floor.offset;
+    if (drop > 0 && drop < FLOOR_SIZES * size) include(box, addScaled(middle, up, -drop));
+  }
+  if (simulation.pins.size === 1) {
+    const pivot = simulation.position([...simulation.pins.keys()][0]);
+    if (pivot !== null) for (const axis of [0, 1, 2]) if (up[axis] === 0) mirror(box, pivot, axis);
+  }
+  if ([...simulation.pins.values()].some((flags) => (flags & PIN.anchored) !== 0)) grow(box, CARRIED_ROOM * size);
+  for (const one of simulation.colliders) includeSolid(box, one, middle, size);
+  return box;
+}
+
+/** Includes a solid that is close enough, and no bigger than the scene. @param {Box} box @param {Collider} one @param {Vec3} middle @param {number} size */
+function includeSolid(box, one, middle, size) {
+  const [center, reach] = boundingSphere(one);
+  if (reach > size || length(subtract(center, middle)) > SOLID_SIZES * size + reach) return;
+  for (const axis of [0, 1, 2]) {
+    box.min[axis] = Math.min(box.min[axis], center[axis] - reach);
+    box.max[axis] = Math.max(box.max[axis], center[axis] + reach);
+  }
+}
+
+/** Centre and radius of a bounding sphere of a solid; infinite for a plane. @param {Collider} one @returns {[Vec3, number]} */
+function boundingSphere(one) {
+  if (one.shape === "sphere") return [one.center, one.radius];
+  if (one.shape === "box") return [one.center, length(one.halfExtents)];
+  if (one.shape === "capsule") return [scale(add(one.a, one.b), 0.5), length(subtract(one.b, one.a)) / 2 + one.radius];
+  return [[0, 0, 0], Infinity];
+}
+
+/** @param {Box} box @param {number} room */
+function grow(box, room) {
+  for (const axis of [0, 1, 2]) {
+    box.min[axis] -= room;
+    box.max[axis] += room;
+  }
+}
+
+/** @param {Box} box @param {Vec3} point */
+function include(box, point) {
+  for (const axis of [0, 1, 2]) {
+    box.min[axis] = Math.min(box.min[axis], point[axis]);
+    box.max[axis] = Math.max(box.max[axis], point[axis]);
+  }
+}
+
+/** Makes a box symmetric about a pivot along one axis. @param {Box} box @param {Vec3} pivot @param {number} axis */
+function mirror(box, pivot, axis) {
+  const reach = Math.max(box.max[axis] - pivot[axis], pivot[axis] - box.min[axis]);
+  if (reach < 1e-6) return;
+  box.min[axis] = pivot[axis] - reach;
+  box.max[axis] = pivot[axis] + reach;
+}

@@ -1,0 +1,289 @@
+// The state of the simulation as the page knows it: the last scene, the newest frame, torn constraints
+// and pins. Messages go in, events come out. It uses no clock, no socket and no picture.
+
+import { Emitter } from "./emitter.js";
+import { lowestReach } from "./hanging.js";
+import { Topology } from "./topology.js";
+import { PIN } from "../net/wire.js";
+import { sceneAxes } from "../geometry/camera.js";
+import { add, boxOf, dot, length, scale, subtract } from "../geometry/math.js";
+
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/math.js").Box} Box */
+/** @typedef {import("../net/wire.js").Message} Message */
+/** @typedef {import("../net/wire.js").Scene} Scene */
+/** @typedef {import("../net/wire.js").Frame} Frame */
+/** @typedef {import("../net/wire.js").Stats} Stats */
+/** @typedef {import("../net/wire.js").Collider} Collider */
+/** @typedef {import("../net/messages.js").Hello} Hello */
+/** @typedef {import("../net/messages.js").NodeState} NodeState */
+/** @typedef {import("../net/messages.js").Parameters} Parameters */
+/** @typedef {import("../net/messages.js").TimelineMessage} TimelineMessage */
+/** @typedef {import("../net/messages.js").Playback} Playback */
+/** @typedef {import("../net/messages.js").TextMessage} TextMessage */
+/** A floor: normal · x = offset. @typedef {{ normal: Vec3, offset: number }} Plane */
+
+/** Gap between the lowest point that can be reached and the ground, in radii of the scene. */
+const GROUND_GAP = 0.06;
+/** Least cosine between the normal of a floor and the up axis. */
+const FLOOR_COSINE = 0.99;
+
+/**
+ * @typedef {{
+ *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
+ *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
+ *   outcome: import("../net/messages.js").OutcomeMessage, reset: void, clients: number,
+ *   notice: { level: string, text: string }, ground: void,
+ * }} Topics
+ */
+
+/** @extends {Emitter<Topics>} */
+export class Simulation extends Emitter {
+  constructor() {
+    super();
+    /** @type {Scene | null} */
+    this.scene = null;
+    /** @type {Topology | null} */
+    this.topology = null;
+    /** @type {Frame | null} */
+    this.frame = null;
+    /** Number of the newest frame received, shown or not. A frame that a new scene overtook must be
+     * acknowledged too, or its credit is lost. @type {number | null} */
+    this.frameNumber = null;
+    /** Torn constraints, in the order of tearing. @type {number[]} */
+    this.torn = [];
+    /** Flags of the particles that are not free, as last received. @type {Map<number, number>} */
+    this.pinsReceived = new Map();
+    /** The same, with expected changes that the node has yet to publish. @type {Map<number, number>} */
+    this.pins = new Map();
+    /** @type {Collider[]} */
+    this.colliders = [];
+    /** @type {ArrayLike<number>} */
+    this.nonFinite = [];
+    /** @type {Stats | null} */
+    this.stats = null;
+    /** @type {Hello | null} */
+    this.hello = null;
+    /** @type {NodeState | null} */
+    this.node = null;
+    /** @type {Parameters | null} */
+    this.parameters = null;
+    /** @type {TimelineMessage | null} */
+    this.timeline = null;
+    /** @type {Playback | null} */
+    this.playback = null;
+    this.clients = 0;
+    /** @type {Plane | null} */
+    this.ground = null;
+    this.groundIsSettled = false;
+  }
+
+  get isReplay() {
+    return this.hello?.mode === "replay";
+  }
+
+  get isPaused() {
+    if (this.isReplay) return this.playback !== null && !this.playback.is_playing;
+    return this.node?.is_paused ?? false;
+  }
+
+  /** Applies a binary message; drops one whose epoch is not that of the scene. @param {Message} message */
+  receive(message) {
+    if (message.kind === "stats") {
+      this.stats = message;
+      return this.emit("stats", message);
+    }
+    if (message.kind === "frame") this.frameNumber = message.number;
+    if (message.kind === "scene") return this.receiveScene(message);
+    if (this.scene === null || message.epoch !== this.scene.epoch) return;
+    if (message.kind === "frame") this.receiveFrame(message);
+    else if (message.kind === "tear") this.receiveTear(message);
+    else if (message.kind === "pins") this.receivePins(message);
+    else this.receiveColliders(message.colliders);
+  }
+
+  /** @param {Scene} scene */
+  receiveScene(scene) {
+    this.scene = scene;
+    this.topology = new Topology(scene);
+    this.frame = null;
+    this.torn = [];
+    this.pinsReceived = new Map();
+    this.pins = new Map();
+    this.colliders = [];
+    this.nonFinite = [];
+    this.ground = null;
+    this.groundIsSettled = false;
+    this.emit("scene", scene);
+    this.emit("pins", undefined);
+    this.emit("colliders", []);
+  }
+
+  /** @param {Frame} frame */
+  receiveFrame(frame) {
+    if (frame.particleCount !== this.scene?.particleCount) return;
+    this.frame = frame;
+    if (!sameNumbers(frame.nonFinite, this.nonFinite)) {
+      this.nonFinite = frame.nonFinite.slice();
+      this.rebuild();
+    }
+    this.emit("frame", frame);
+  }
+
+  /** @param {import("../net/wire.js").Tear} tear */
+  receiveTear(tear) {
+    const isAppended = tear.first === this.torn.length;
+    this.torn.length = Math.min(tear.first, this.torn.length);
+    // One by one: spreading a long list as arguments overflows the stack.
+    for (const constraint of tear.constraints) this.torn.push(constraint);
+    if (!isAppended) return this.rebuild();
+    this.topology?.remove(tear.constraints);
+    this.emit("tear", undefined);
+  }
+
+  /** Recomputes which constraints and triangles are intact: after a reset, or when particles become non-finite. */
+  rebuild() {
+    this.topology?.restore();
+    this.topology?.remove(this.torn);
+    this.topology?.removeAround(Uint32Array.from(this.nonFinite));
+    this.emit("tear", undefined);
+  }
+
+  /** @param {import("../net/wire.js").Pins} pins */
+  receivePins(pins) {
+    this.pinsReceived = new Map();
+    pins.particles.forEach((particle, k) => this.pinsReceived.set(particle, pins.flags[k]));
+    this.pins = new Map(this.pinsReceived);
+    this.emit("pins", undefined);
+    if (!this.groundIsSettled) this.settleGround();
+  }
+
+  /** @param {Collider[]} colliders */
+  receiveColliders(colliders) {
+    const hadFloor = this.colliders.length > 0;
+    this.colliders = colliders;
+    this.emit("colliders", colliders);
+    if (!hadFloor) this.settleGround();
+  }
+
+  /** Chooses the ground: a floor among the colliders, else a little below the lowest point that can be reached, else none. */
+  settleGround() {
+    if (this.scene === null || this.scene.isPlanar) return;
+    const { up } = this.axes();
+    this.ground = this.floor();
+    if (this.ground === null) {
+      const lowest = lowestReach(this.scene, [...this.pins.keys()], up);
+      this.ground = lowest === null ? null : { normal: up, offset: lowest - this.radius() * GROUND_GAP };
+    }
+    this.groundIsSettled = true;
+    this.emit("ground", undefined);
+  }
+
+  /** The highest floor among the colliders. @returns {Plane | null} */
+  floor() {
+    const { up } = this.axes();
+    /** @type {Plane[]} */
+    const floors = this.colliders.flatMap((one) => floorsOf(one, up));
+    return floors.length === 0 ? null : floors.reduce((best, one) => (one.offset > best.offset ? one : best));
+  }
+
+  axes() {
+    return sceneAxes(this.scene?.up ?? "y", this.scene?.isPlanar ? 2 : 3);
+  }
+
+  /** Half the diagonal of the bounding box of the scene's positions. */
+  radius() {
+    if (this.scene === null || this.scene.particleCount === 0) return 1;
+    return Math.max(length(subtract(this.scene.max, this.scene.min)) / 2, 1e-3);
+  }
+
+  /** The centre of the bounding box of the scene's positions. @returns {Vec3} */
+  middle() {
+    return this.scene === null ? [0, 0, 0] : scale(add(this.scene.min, this.scene.max), 0.5);
+  }
+
+  /** Shows an applied pin at once: a paused node publishes it only with its next step. @param {number} particle @param {boolean} isPinned */
+  expectPin(particle, isPinned) {
+    const others = (this.pins.get(particle) ?? 0) & ~PIN.pinned;
+    if (isPinned) this.pins.set(particle, others | PIN.pinned);
+    else if (others !== 0) this.pins.set(particle, others);
+    else this.pins.delete(particle);
+    this.emit("pins", undefined);
+  }
+
+  /** Shows an applied cut at once; `torn` changes only when the bridge reports it. @param {number} epoch @param {number[]} constraints */
+  expectCut(epoch, constraints) {
+    if (epoch !== this.scene?.epoch) return;
+    this.topology?.remove(constraints);
+    this.emit("tear", undefined);
+  }
+
+  /** Drops the recording if a live bridge now serves this address. @param {Hello} hello */
+  receiveHello(hello) {
+    this.hello = hello;
+    if (hello.mode === "live") {
+      this.timeline = null;
+      this.playback = null;
+      this.emit("timeline", null);
+      this.emit("playback", null);
+    }
+    this.emit("hello", hello);
+  }
+
+  /** Reverts expected pins and cuts. If the reset undid them before the bridge published them, no later
+   * message corrects the page. */
+  receiveReset() {
+    this.pins = new Map(this.pinsReceived);
+    this.emit("pins", undefined);
+    this.rebuild();
+    this.emit("reset", undefined);
+  }
+
+  /** @param {number} particle @returns {Vec3 | null} */
+  position(particle) {
+    const { frame } = this;
+    if (frame === null || particle >= frame.particleCount || particle < 0) return null;
+    const { lo, scale: unit, positions: p } = frame;
+    const i = 3 * particle;
+    return [lo[0] + unit[0] * p[i], lo[1] + unit[1] * p[i + 1], lo[2] + unit[2] * p[i + 2]];
+  }
+
+  /** The bounding box of the newest positions. @returns {Box} */
+  box() {
+    const { frame, scene } = this;
+    if (frame === null) return scene === null ? boxOf([]) : boxOf(scene.positions);
+    const raw = boxOf(frame.positions);
+    const at = (/** @type {Vec3} */ value) => /** @type {Vec3} */ ([0, 1, 2].map((axis) => frame.lo[axis] + frame.scale[axis] * value[axis]));
+    return frame.particleCount === 0 ? raw : { min: at(raw.min), max: at(raw.max) };
+  }
+
+  /** @param {TextMessage} message */
+  receiveText(message) {
+    switch (message.type) {
+      case "hello": return this.receiveHello(message);
+      case "node": this.node = message; return this.emit("node", message);
+      case "parameters": this.parameters = message; return this.emit("parameters", message);
+      case "timeline": this.timeline = message; return this.emit("timeline", message);
+      case "playback": this.playback = message; return this.emit("playback", message);
+      case "clients": this.clients = message.count; return this.emit("clients", message.count);
+      case "outcome": return this.emit("outcome", message);
+      case "reset": return this.receiveReset();
+      case "notice": return this.emit("notice", message);
+      default: // A message of a later bridge.
+    }
+  }
+}
+
+/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
+function sameNumbers(a, b) {
+  if (a.length !== b.length) return false;
+  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
+  return true;
+}
+
+/** @param {Collider} one @param {Vec3} up @returns {Plane[]} */
+function floorsOf(one, up) {
+  if (one.shape === "plane" && dot(one.normal, up) > FLOOR_COSINE) return [{ normal: one.normal, offset: one.offset }];
+  if (one.shape === "bounds") return [{ normal: up, offset: Math.min(dot(one.a, up), dot(one.b, up)) }];
+  return [];
+}

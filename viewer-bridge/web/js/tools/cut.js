@@ -1,0 +1,64 @@
+// The cutting stroke.
+
+import { crossedSticks, projectAll } from "../geometry/pick.js";
+
+/** @typedef {import("../geometry/pick.js").Pixel} Pixel */
+/** @typedef {import("./tool.js").App} App */
+/** @typedef {import("./tool.js").Tool} Tool */
+
+/** Points of a stroke that stay drawn. */
+const STROKE_POINTS_MAX = 60;
+
+/** Cuts every constraint that meets the pointer, whichever of the two moves. @implements {Tool} */
+export class CutTool {
+  /** @param {App} app @param {Pixel} start */
+  constructor(app, start) {
+    this.app = app;
+    this.start = start;
+    /** @type {Pixel[]} */
+    this.stroke = [start];
+    /** Path of the pointer since the last check, from its position then. @type {Pixel[]} */
+    this.path = [start];
+    /** Frame and scene of the last check. */
+    this.frame = app.simulation.frame;
+    this.scene = app.simulation.scene;
+    /** Constraints that were sent already. @type {Set<number>} */
+    this.sent = new Set();
+  }
+
+  /** @param {Pixel} to */
+  move(to) {
+    this.path.push(to);
+    this.stroke.push(to);
+    if (this.stroke.length > STROKE_POINTS_MAX) this.stroke.shift();
+  }
+
+  tick() {
+    const { simulation, camera, renderer, commands } = this.app;
+    const { frame, scene, topology } = simulation;
+    if (frame === null || scene === null || topology === null) return;
+    if (this.path.length === 1 && frame === this.frame) return;
+    const past = scene === this.scene && this.frame !== null ? this.frame : frame;
+    // The present camera projects both frames, so that turning the view does not count as motion.
+    const [now, before] = [frame, past].map((one) => projectAll(one, camera.viewProjection(renderer.viewport), renderer.viewport));
+    const crossed = crossedSticks(now, before, scene.ends, topology.isGone, this.path).filter((one) => !this.sent.has(one));
+    this.path = this.path.slice(-1);
+    [this.frame, this.scene] = [frame, scene];
+    const countMax = simulation.hello?.limits.constraints_per_cut ?? 256;
+    for (let first = 0; first < crossed.length; first += countMax) {
+      const constraints = crossed.slice(first, first + countMax);
+      const isSent = commands.run("cut", { epoch: scene.epoch, constraints }, ({ status }) => {
+        if (status === "applied" && simulation.isPaused) simulation.expectCut(scene.epoch, constraints);
+      });
+      if (isSent) for (const one of constraints) this.sent.add(one);
+    }
+  }
+
+  end() {
+    this.tick();
+  }
+
+  describe() {
+    return { stroke: this.stroke };
+  }
+}

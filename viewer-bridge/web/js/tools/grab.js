@@ -1,0 +1,85 @@
+// The grab: drives one particle to the pointer, and releases it with the velocity of the pointer.
+
+import { addScaled, clamp, length, scale, subtract } from "../geometry/math.js";
+import { OVER_S } from "./tool.js";
+
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
+/** @typedef {import("../geometry/pick.js").Pixel} Pixel */
+/** @typedef {import("./tool.js").App} App */
+/** @typedef {import("./tool.js").Tool} Tool */
+
+/** Window over which the velocity of the pointer is measured, in ms. A pointer without motion for that long is at rest. */
+const VELOCITY_MS = 80;
+/** Least duration of a measured motion, in ms: about one frame. */
+const VELOCITY_MS_MIN = 16;
+
+/** Grabs a particle. Its target is where the pointer meets the camera-facing plane through it. @implements {Tool} */
+export class GrabTool {
+  /** @param {App} app @param {number} particle @param {Pixel} start */
+  constructor(app, particle, start) {
+    this.app = app;
+    this.particle = particle;
+    this.start = start;
+    this.pointer = start;
+    this.isMoved = false;
+    this.sentMs = performance.now();
+    /** Recent positions of the pointer, from the start or from just before the velocity window. */
+    this.trail = [{ ms: this.sentMs, at: start }];
+    this.origin = /** @type {Vec3} */ (app.simulation.position(particle));
+    app.commands.run("drag_begin", { particle, target: this.origin });
+  }
+
+  /** @param {Pixel} to */
+  move(to) {
+    this.pointer = to;
+    this.isMoved = true;
+    const ms = performance.now();
+    this.trail.push({ ms, at: to });
+    while (this.trail.length > 1 && this.trail[1].ms < ms - VELOCITY_MS) this.trail.shift();
+  }
+
+  /** @param {number} nowMs */
+  tick(nowMs) {
+    if (!this.isMoved) return;
+    const over_s = clamp((nowMs - this.sentMs) / 1000, OVER_S.min, OVER_S.max);
+    this.app.commands.stream("drag_move", { particle: this.particle, target: this.targetAt(this.pointer), over_s });
+    this.sentMs = nowMs;
+    this.isMoved = false;
+  }
+
+  /** @param {Pixel} at @returns {Vec3} */
+  targetAt(at) {
+    const { camera, renderer } = this.app;
+    return camera.intersectFacingPlane(at.x, at.y, renderer.viewport, this.origin);
+  }
+
+  /** Velocity of the recent motion, in scene units per second. @param {number} nowMs @returns {Vec3} */
+  velocity(nowMs) {
+    const last = this.trail[this.trail.length - 1];
+    if (last.ms < nowMs - VELOCITY_MS) return [0, 0, 0];
+    const [first] = this.trail;
+    const span = Math.max(last.ms - Math.max(first.ms, last.ms - VELOCITY_MS), VELOCITY_MS_MIN);
+    return scale(subtract(this.targetAt(last.at), this.targetAt(first.at)), 1000 / span);
+  }
+
+  /** Releases the particle. It keeps the velocity of its last step, but the last motion sent may have
+   * ended by then, or not have begun. So the target first moves on at the velocity of the pointer, and
+   * the release follows once the node has applied that. */
+  end() {
+    const { commands } = this.app;
+    const { particle } = this;
+    const release = () => commands.run("drag_end", { particle });
+    const velocity = this.velocity(performance.now());
+    if (length(velocity) === 0) {
+      this.tick(performance.now());
+      release();
+      return;
+    }
+    const target = addScaled(this.targetAt(this.pointer), velocity, OVER_S.max);
+    commands.run("drag_move", { particle, target, over_s: OVER_S.max }, release);
+  }
+
+  describe() {
+    return { line: { particle: this.particle, to: this.pointer } };
+  }
+}

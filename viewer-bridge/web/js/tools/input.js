@@ -1,0 +1,205 @@
+// Pointer and wheel input on the picture: a press starts a tool, two fingers move the view.
+
+import { clamp } from "../geometry/math.js";
+import { BrushTool } from "./brush.js";
+import { CutTool } from "./cut.js";
+import { GrabTool } from "./grab.js";
+import { togglePin } from "./pin.js";
+import { REACH, depthUnder, particleAt } from "./tool.js";
+import { ViewTool } from "./view.js";
+
+/** @typedef {import("../geometry/pick.js").Pixel} Pixel */
+/** @typedef {import("./tool.js").Tool} Tool */
+/** @typedef {"grab" | "brush" | "cut" | "pin"} Mode */
+
+export const MODES = /** @type {const} */ (["grab", "brush", "cut", "pin"]);
+/** Radius of the brush, in CSS pixels. */
+export const BRUSH = { min: 20, max: 100, step: 10, start: 50 };
+/** Duration after which a finger that rests on a particle pins it. */
+const LONG_PRESS_MS = 550;
+/** Limit on the motion of a press that still counts as at rest, in CSS pixels. */
+const SLACK = 6;
+/** Exponent of the zoom factor per unit of the wheel; a notch is 100 units. */
+const ZOOM_PER_UNIT = 0.0012;
+/** Limit on particles for hovering, which picks the nearest particle once per frame. */
+const HOVER_PARTICLES_MAX = 20_000;
+
+export class Input {
+  /** @param {HTMLCanvasElement} canvas @param {import("./tool.js").App} app @param {() => boolean} canChange returns true if commands may change the simulation */
+  constructor(canvas, app, canChange) {
+    this.canvas = canvas;
+    this.app = app;
+    this.canChange = canChange;
+    /** @type {Mode} */
+    this.mode = "grab";
+    this.brushRadius = BRUSH.start;
+    /** Position of each pressed pointer. @type {Map<number, Pixel>} */
+    this.pointers = new Map();
+    /** @type {Tool | null} */
+    this.tool = null;
+    /** Position of the mouse, or null outside the picture. @type {Pixel | null} */
+    this.hover = null;
+    /** @type {number | null} */
+    this.hovered = null;
+    this.isHoverStale = false;
+    this.longPress = 0;
+    this.listen();
+  }
+
+  listen() {
+    const { canvas } = this;
+    canvas.addEventListener("pointerdown", (event) => this.press(event));
+    canvas.addEventListener("pointermove", (event) => this.move(event));
+    for (const type of /** @type {const} */ (["pointerup", "pointercancel", "lostpointercapture"])) {
+      canvas.addEventListener(type, (event) => this.release(event));
+    }
+    canvas.addEventListener("pointerleave", () => this.leave());
+    // In pin mode, each click already toggles the pin.
+    canvas.addEventListener("dblclick", (event) => { if (this.mode !== "pin") this.pinAt(this.pixel(event), REACH.mouse); });
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+    canvas.addEventListener("wheel", (event) => this.turnWheel(event), { passive: false });
+  }
+
+  /** @param {MouseEvent} event @returns {Pixel} */
+  pixel(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  }
+
+  /** @param {PointerEvent} event */
+  press(event) {
+    const at = this.pixel(event);
+    this.pointers.set(event.pointerId, at);
+    this.canvas.setPointerCapture(event.pointerId);
+    clearTimeout(this.longPress);
+    if (this.pointers.size > 1) {
+      // A second finger ends the tool of the first: two fingers move the view.
+      this.finish();
+      return;
+    }
+    this.tool = this.begin(event, at);
+    if (event.pointerType === "touch" && this.tool instanceof GrabTool) this.waitForLongPress(this.tool);
+    this.app.renderer.isDirty = true;
+  }
+
+  /** @param {PointerEvent} event @param {Pixel} at @returns {Tool | null} */
+  begin(event, at) {
+    const { app } = this;
+    const reach = event.pointerType === "touch" ? REACH.touch : REACH.mouse;
+    if (event.button === 1 || (event.button === 0 && event.shiftKey)) return new ViewTool(app, at, "pan");
+    if (event.button === 0 && event.altKey) return new ViewTool(app, at, "orbit");
+    if (!this.canChange()) return new ViewTool(app, at, "orbit");
+    if (event.button === 2 || this.mode === "cut") return new CutTool(app, at);
+    if (this.mode === "brush") return depthUnder(app, at, this.brushRadius) === null ? new ViewTool(app, at, "orbit") : new BrushTool(app, at, this.brushRadius);
+    const particle = particleAt(app, at, reach);
+    if (particle === null) return new ViewTool(app, at, "orbit");
+    if (this.mode === "grab") return new GrabTool(app, particle, at);
+    togglePin(app, particle);
+    return null;
+  }
+
+  /** @param {GrabTool} grab */
+  waitForLongPress(grab) {
+    this.longPress = setTimeout(() => {
+      if (this.tool !== grab || distance(grab.start, grab.pointer) > SLACK) return;
+      this.finish();
+      togglePin(this.app, grab.particle);
+      navigator.vibrate?.(15);
+    }, LONG_PRESS_MS);
+  }
+
+  /** @param {PointerEvent} event */
+  move(event) {
+    const at = this.pixel(event);
+    if (event.pointerType !== "touch") this.hover = at;
+    this.isHoverStale = true;
+    const before = this.pointers.get(event.pointerId);
+    if (before === undefined) return;
+    if (this.pointers.size === 2) this.pinch(event.pointerId, before, at);
+    this.pointers.set(event.pointerId, at);
+    this.tool?.move(at);
+  }
+
+  /** Zooms and pans with two fingers: the point between them stays between them. @param {number} id @param {Pixel} before @param {Pixel} at */
+  pinch(id, before, at) {
+    const { camera, renderer } = this.app;
+    const other = [...this.pointers].find(([one]) => one !== id)?.[1];
+    if (other === undefined) return;
+    const middle = { x: (at.x + other.x) / 2, y: (at.y + other.y) / 2 };
+    camera.zoom(clamp(distance(at, other) / Math.max(distance(before, other), 1), 0.5, 2), middle.x, middle.y, renderer.viewport);
+    camera.pan((at.x - before.x) / 2, (at.y - before.y) / 2, renderer.viewport);
+    renderer.isDirty = true;
+  }
+
+  /** @param {PointerEvent} event */
+  release(event) {
+    if (!this.pointers.delete(event.pointerId)) return;
+    clearTimeout(this.longPress);
+    this.finish();
+  }
+
+  /** Ends the tool in use; a grab releases its particle. */
+  finish() {
+    this.tool?.end();
+    this.tool = null;
+    this.app.renderer.isDirty = true;
+  }
+
+  /** Drops the tool without ending it, when its connection or scene is gone. */
+  abandon() {
+    this.tool = null;
+    this.hovered = null;
+  }
+
+  leave() {
+    this.hover = null;
+    this.hovered = null;
+  }
+
+  /** @param {Pixel} at @param {number} reach */
+  pinAt(at, reach) {
+    const particle = this.canChange() ? particleAt(this.app, at, reach) : null;
+    if (particle !== null) togglePin(this.app, particle);
+    return particle !== null;
+  }
+
+  /** Toggles the pin of the grabbed particle, or of the one under the mouse. Returns false if there is none. */
+  pinHovered() {
+    if (this.tool instanceof GrabTool) {
+      togglePin(this.app, this.tool.particle);
+      return true;
+    }
+    return this.hover !== null && this.pinAt(this.hover, REACH.mouse);
+  }
+
+  /** @param {WheelEvent} event */
+  turnWheel(event) {
+    event.preventDefault();
+    const { camera, renderer } = this.app;
+    const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 30 : 1;
+    if (this.mode === "brush" && !event.ctrlKey) {
+      this.brushRadius = clamp(this.brushRadius - Math.sign(event.deltaY) * BRUSH.step, BRUSH.min, BRUSH.max);
+      if (this.tool instanceof BrushTool) this.tool.radius = this.brushRadius;
+    } else {
+      // Browsers report a pinch on a touchpad as a wheel with ctrl, in much smaller units.
+      const units = clamp(event.deltaY * lines, -300, 300) * (event.ctrlKey ? 5 : 1);
+      const at = this.pixel(event);
+      camera.zoom(Math.exp(-units * ZOOM_PER_UNIT), at.x, at.y, renderer.viewport);
+    }
+    renderer.isDirty = true;
+  }
+
+  /** Lets the tool send its message, and updates the hovered particle, once per animation frame. @param {number} nowMs */
+  tick(nowMs) {
+    this.tool?.tick(nowMs);
+    if (!this.isHoverStale || this.tool !== null) return;
+    this.isHoverStale = false;
+    const isQuick = (this.app.simulation.scene?.particleCount ?? 0) <= HOVER_PARTICLES_MAX;
+    const canPick = this.hover !== null && isQuick && this.canChange() && (this.mode === "grab" || this.mode === "pin");
+    this.hovered = canPick && this.hover !== null ? particleAt(this.app, this.hover, REACH.mouse) : null;
+    this.canvas.dataset.cursor = this.mode === "cut" ? "cut" : this.hovered === null ? this.mode : "over";
+  }
+}
+
+/** @param {Pixel} a @param {Pixel} b */
+const distance = (a, b) => Math.hypot(a.x - b.x, a.y - b.y);

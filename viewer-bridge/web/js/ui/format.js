@@ -1,0 +1,35 @@
+// Numbers as text, and round numbers for the ends of scales.
+
+/** The smallest 1, 2 or 5 times a power of ten that is at least `value`. @param {number} value */
+export function niceCeiling(value) {
+  if (!(value > 0) || !Number.isFinite(value)) return 1;
+  const power = 10 ** Math.floor(Math.log10(value));
+  const step = [1, 2, 5, 10].find((factor) => factor * power >= value * (1 - 1e-12)) ?? 10;
+  return step * power;
+}
+
+/** Values below these are noise and shown as 0: a thousandth of a percent, a nanojoule. */
+const NOISE = /** @type {Record<string, number>} */ ({ "%": 1e-5, J: 1e-9 });
+
+/** Formats a value with three digits and a metric prefix: 1234 µs becomes "1.23 ms". @param {number} value @param {string} unit */
+export function readable(value, unit) {
+  if (!Number.isFinite(value)) return "–";
+  if (Math.abs(value) < (NOISE[unit] ?? 0)) return `0 ${unit}`;
+  if (unit === "%") return `${trim(value * 100)} %`;
+  if (unit === "µs" && Math.abs(value) >= 1000) return `${trim(value / 1000)} ms`;
+  if (unit === "J" && value !== 0) {
+    if (Math.abs(value) >= 1e6) return `${trim(value / 1e6)} MJ`;
+    if (Math.abs(value) >= 1e3) return `${trim(value / 1e3)} kJ`;
+    if (Math.abs(value) < 1e-3) return `${trim(value * 1e6)} µJ`;
+    if (Math.abs(value) < 1) return `${trim(value * 1e3)} mJ`;
+  }
+  return `${trim(value)} ${unit}`;
+}
+
+/** Formats a number with three digits, without an exponent if possible. @param {number} value */
+export function trim(value) {
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e6 || size < 1e-3) return value.toExponential(1);
+  return size >= 100 ? value.toFixed(0) : String(Number(value.toPrecision(3)));
+}

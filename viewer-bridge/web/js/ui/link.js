@@ -1,0 +1,37 @@
+// The fragment of the address: the token, the scene, the camera pose, and the display toggles.
+
+/** @typedef {{ target: import("../geometry/math.js").Vec3, distance: number, yaw: number, pitch: number }} CameraPose */
+/** @typedef {{ token: string | null, scene: string | null, camera: CameraPose | null, toggles: Record<string, boolean> }} Link */
+
+/** Significant digits of a pose: well below a thousandth of the picture, in any unit. */
+const DIGITS = 5;
+
+/** @param {string} hash with or without its "#" @returns {Link} */
+export function parseLink(hash) {
+  const fields = new URLSearchParams(hash.replace(/^#/, ""));
+  /** @type {Record<string, boolean>} */
+  const toggles = {};
+  for (const [name, value] of fields) if (name.startsWith("show.")) toggles[name.slice(5)] = value === "1";
+  return { token: fields.get("token") || null, scene: fields.get("scene") || null, camera: parsePose(fields.get("camera")), toggles };
+}
+
+/** Parses a pose. Returns null for anything else: a link may be truncated or edited by hand. @param {string | null} text @returns {CameraPose | null} */
+function parsePose(text) {
+  if (text === null) return null;
+  const numbers = text.split(",").map(Number);
+  const [x, y, z, distance, yaw, pitch] = numbers;
+  if (numbers.length !== 6 || !numbers.every(Number.isFinite) || distance <= 0) return null;
+  return { target: [x, y, z], distance, yaw, pitch };
+}
+
+/** Formats the fragment, without a token. @param {Omit<Link, "token">} link */
+export function formatLink(link) {
+  const fields = [];
+  if (link.scene !== null) fields.push(`scene=${encodeURIComponent(link.scene)}`);
+  if (link.camera !== null) {
+    const { target, distance, yaw, pitch } = link.camera;
+    fields.push(`camera=${[...target, distance, yaw, pitch].map((number) => Number(number.toPrecision(DIGITS))).join(",")}`);
+  }
+  for (const [name, isOn] of Object.entries(link.toggles)) fields.push(`show.${encodeURIComponent(name)}=${isOn ? 1 : 0}`);
+  return fields.join("&");
+}

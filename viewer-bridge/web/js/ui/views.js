@@ -1,0 +1,167 @@
+// The view: display toggles, strain scale, first view of a scene, saved pictures, links.
+
+import { find, sharpContext } from "./dom.js";
+import { firstViewBox } from "../state/framing.js";
+import { formatLink } from "./link.js";
+import { niceCeiling, readable } from "./format.js";
+import { HEAT_STOPS } from "../gl/theme.js";
+
+/** @typedef {import("./link.js").CameraPose} CameraPose */
+
+/** Least end of an automatic strain scale: below it is only rounding. */
+const HEAT_MIN = 0.002;
+/** End of an automatic scale as a multiple of the mean strain; the greatest strain limits it. */
+const HEAT_MEANS = 8;
+/** Yaw and pitch of the first view, in radians. */
+const FIRST_VIEW = { yaw: 0.42, pitch: 0.16 };
+/** Limit on particles up to which scenes without a surface show them. */
+const SHOW_PARTICLES_MAX = 400;
+
+export class Views {
+  /** @param {import("../tools/tool.js").App} app @param {import("./banner.js").Banner} banner */
+  constructor(app, banner) {
+    this.app = app;
+    this.banner = banner;
+    this.range = find("heat-range", HTMLSelectElement);
+    this.legend = find("legend", HTMLElement);
+    /** Toggles set by the user. They persist across scenes. @type {Map<string, boolean>} */
+    this.chosen = new Map();
+    /** The pose of a link, for the first scene only. @type {CameraPose | null} */
+    this.linkedPose = null;
+    this.isFramed = false;
+    this.isFollowing = false;
+    this.buttons = [...find("toggles", HTMLElement).querySelectorAll("button")];
+    for (const button of this.buttons) button.addEventListener("click", () => this.toggle(button.dataset.toggle ?? ""));
+    this.range.addEventListener("change", () => this.scaleHeat());
+    app.simulation.on("scene", (scene) => this.begin(scene));
+    app.simulation.on("ground", () => { if (!this.isFramed) this.showFirstView(); });
+    app.simulation.on("frame", () => this.follow());
+    app.simulation.on("stats", () => this.scaleHeat());
+    app.simulation.on("reset", () => { if (this.isFollowing) this.showFirstView(); });
+  }
+
+  /** @param {import("../net/wire.js").Scene} scene */
+  begin(scene) {
+    const { camera, renderer, simulation } = this.app;
+    camera.axes = simulation.axes();
+    camera.isFlat = scene.isPlanar;
+    this.isFramed = false;
+    this.isFollowing = false;
+    const hasSurface = scene.triangleCount > 0;
+    const defaults = { heat: false, sticks: !hasSurface || scene.isPlanar, particles: !hasSurface && scene.particleCount <= SHOW_PARTICLES_MAX };
+    Object.assign(renderer.toggles, defaults, Object.fromEntries(this.chosen));
+    this.show();
+    this.showFirstView();
+  }
+
+  /** Shows the whole scene from the default direction, or the pose of a link. */
+  showFirstView() {
+    const { camera, renderer, simulation } = this.app;
+    const { width, height } = renderer.viewport;
+    camera.yaw = FIRST_VIEW.yaw;
+    camera.pitch = FIRST_VIEW.pitch;
+    camera.frame(firstViewBox(simulation), width / height);
+    if (this.linkedPose !== null && simulation.frame !== null) {
+      Object.assign(camera, this.linkedPose);
+      this.linkedPose = null;
+      this.isFramed = true;
+    }
+    // A scene without pins and without ground falls out of view, so the camera follows it.
+    this.isFollowing = !camera.isFlat && simulation.frame !== null && simulation.ground === null && simulation.pins.size === 0;
+    renderer.isDirty = true;
+  }
+
+  /** Shows the whole scene as it is now, from the current direction. */
+  frame() {
+    const { camera, renderer, simulation } = this.app;
+    const { width, height } = renderer.viewport;
+    camera.frame(firstViewBox(simulation), width / height);
+    this.isFramed = true;
+    renderer.isDirty = true;
+  }
+
+  follow() {
+    const { camera, simulation } = this.app;
+    if (simulation.frame !== null && !this.isFramed) {
+      this.showFirstView();
+      this.isFramed = true;
+    }
+    if (!this.isFollowing) return;
+    const { min, max } = simulation.box();
+    camera.target = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
+  }
+
+  /** @param {string} name */
+  toggle(name) {
+    const { toggles } = this.app.renderer;
+    const key = /** @type {keyof typeof toggles} */ (name);
+    toggles[key] = !toggles[key];
+    this.chosen.set(name, toggles[key]);
+    this.show();
+  }
+
+  show() {
+    const { renderer } = this.app;
+    for (const button of this.buttons) {
+      const key = /** @type {keyof typeof renderer.toggles} */ (button.dataset.toggle);
+      button.setAttribute("aria-pressed", String(renderer.toggles[key]));
+    }
+    this.legend.hidden = !renderer.toggles.heat;
+    this.scaleHeat();
+    renderer.isDirty = true;
+  }
+
+  /** Sets the end of the scale: the chosen value, or a round number above the measured strain. Hysteresis keeps it steady. */
+  scaleHeat() {
+    const { renderer, simulation } = this.app;
+    if (!renderer.toggles.heat) return;
+    const { stretchMax, stretchMean } = simulation.stats ?? { stretchMax: 0, stretchMean: 0 };
+    // A single edge at a pin can be stretched far more than the rest, and may exceed the scale.
+    const measured = Math.max(Math.min(stretchMax, stretchMean * HEAT_MEANS) || 0, HEAT_MIN);
+    const isFixed = this.range.value !== "auto";
+    if (isFixed) renderer.heatMax = Number(this.range.value);
+    else if (measured > renderer.heatMax || measured < renderer.heatMax * 0.3) renderer.heatMax = niceCeiling(measured);
+    find("heat-end", HTMLOutputElement).textContent = `≥ ${readable(renderer.heatMax, "%")}`;
+    drawRamp(find("ramp", HTMLCanvasElement));
+    renderer.isDirty = true;
+  }
+
+  savePicture() {
+    const { renderer, simulation } = this.app;
+    renderer.draw();
+    renderer.canvas.toBlob((blob) => {
+      if (blob === null) return this.banner.notify("The picture could not be saved.", "error");
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(blob);
+      link.download = `${simulation.scene?.name || "catenary"}-${simulation.frame?.step ?? 0}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    }, "image/png");
+  }
+
+  /** Writes the view into the address, and copies the address to the clipboard. */
+  async copyLink() {
+    const { camera, simulation } = this.app;
+    const { target, distance, yaw, pitch } = camera;
+    const hash = formatLink({
+      scene: simulation.isReplay ? null : simulation.scene?.name ?? null,
+      camera: { target, distance, yaw, pitch }, toggles: Object.fromEntries(this.chosen),
+    });
+    history.replaceState(null, "", `#${hash}`);
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.banner.notify("Copied a link to this view.");
+    } catch {
+      this.banner.notify("The link to this view is in the address bar.");
+    }
+  }
+}
+
+/** @param {HTMLCanvasElement} canvas */
+function drawRamp(canvas) {
+  const { context, width, height } = sharpContext(canvas);
+  const ramp = context.createLinearGradient(0, 0, width, 0);
+  HEAT_STOPS.forEach((color, stop) => ramp.addColorStop(stop / (HEAT_STOPS.length - 1), color));
+  context.fillStyle = ramp;
+  context.fillRect(0, 0, width, height);
+}

@@ -1,0 +1,74 @@
+// Plots, number formats and sliders of the panel.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { ROWS, SLIDER_STEPS, positionOf, rangeOf, rowsOf, valueAt, valueOf } from "../js/panel/parameters.js";
+import { Series } from "../js/panel/series.js";
+import { niceCeiling, readable } from "../js/ui/format.js";
+
+test("a series keeps the newest samples, and a column has their minimum and maximum", () => {
+  const series = new Series(4);
+  assert.equal(series.range(), null);
+  for (const value of [1, 9, 2, 8, 3, 7]) series.push(value);
+  assert.equal(series.last(), 7);
+  assert.deepEqual(series.columns(2), [{ min: 2, max: 8 }, { min: 3, max: 7 }]);
+  assert.deepEqual(series.range(), { min: 2, max: 8 });
+});
+
+test("a single peak is visible in its column, however narrow the plot", () => {
+  const series = new Series(1200);
+  for (let i = 0; i < 1200; i++) series.push(i === 700 ? 99 : 1);
+  assert.equal(series.columns(50).filter((column) => column.max === 99).length, 1);
+});
+
+test("unknown samples leave a gap", () => {
+  const series = new Series(2);
+  series.push(NaN);
+  series.push(5);
+  assert.deepEqual(series.columns(2), [null, { min: 5, max: 5 }]);
+});
+
+test("a scale ends at 1, 2 or 5 times a power of ten", () => {
+  assert.deepEqual([0.03, 1, 1.01, 4.2, 5, 99, 1e-7].map(niceCeiling), [0.05, 1, 2, 5, 5, 100, 1e-7]);
+  assert.equal(niceCeiling(0), 1);
+});
+
+test("numbers are formatted with a suitable metric prefix", () => {
+  assert.equal(readable(1234, "µs"), "1.23 ms");
+  assert.equal(readable(0.0123, "%"), "1.23 %");
+  assert.equal(readable(0.0005, "J"), "500 µJ");
+  assert.equal(readable(NaN, "J"), "–");
+});
+
+test("a slider position and its value convert back, within the precision of the slider", () => {
+  for (const row of ROWS) {
+    const range = rangeOf(row);
+    for (let position = 0; position <= SLIDER_STEPS; position += 7) {
+      const value = valueAt(row, range, position);
+      assert.ok(value >= range.least * (1 - 1e-9) || (row.hasZero && value === 0) || row.least < 0, `${row.name} ${value}`);
+      assert.ok(Math.abs(positionOf(row, range, value) - position) <= (row.kind === "whole" ? 20 : row.kind === "log" ? 2 : 1), `${row.name} at ${position}`);
+    }
+  }
+});
+
+test("a scene in pixels widens the range of gravity and keeps zero in the middle", () => {
+  const gravity = ROWS.find((row) => row.name === "gravity");
+  const range = rangeOf(gravity, 0, 981, 0);
+  assert.ok(range.most >= 981 && range.least === -range.most);
+  assert.equal(valueAt(gravity, range, positionOf(gravity, range, 0)), 0);
+});
+
+test("the panel shows compliance for XPBD and stiffness for PBD", () => {
+  const names = (method) => rowsOf(method).map((row) => row.name);
+  assert.ok(names("xpbd").includes("compliance") && !names("xpbd").includes("stiffness"));
+  assert.ok(names("pbd").includes("stiffness") && !names("pbd").includes("compliance"));
+});
+
+test("a parameter is read for one constraint kind, and infinity is a word", () => {
+  const values = { compliance: { structural: 0.5, shear: null }, tear_force: null, max_speed: "inf" };
+  assert.equal(valueOf(values, "compliance", "structural"), 0.5);
+  assert.equal(valueOf(values, "compliance", "shear"), null);
+  assert.equal(valueOf(values, "tear_force", "structural"), null);
+  assert.equal(valueOf(values, "max_speed", "structural"), Infinity);
+  assert.equal(valueOf(null, "damping", "structural"), null);
+});
