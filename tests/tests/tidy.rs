@@ -37,7 +37,6 @@ const CROWDED_FOLDERS: &[&str] = &[
     "recorder/src",
     "sim-node/contract/src",
     "sim-node/solver/benches/step",
-    "sim-node/solver/src",
     "sim-node/solver/src/scene",
 ];
 

@@ -30,16 +30,13 @@ mod commands;
 mod constraints;
 mod contacts;
 mod frame;
-mod hash;
 mod kernels;
-mod keyframe;
 mod parameters;
-mod particles;
 pub mod scene;
 mod solver;
+mod state;
 mod step;
 mod store;
-mod tear;
 
 pub use commands::apply::{Applied, Control};
 pub use commands::cut::{Ball, Sweep};
@@ -49,14 +46,14 @@ pub use contacts::colliders::PlacedCollider;
 pub use frame::Pose;
 pub use kernels::Kernels;
 pub use kernels::worker_pool::THREADS_MAX;
-pub use keyframe::{Keyframe, KeyframeError, RestoreError};
-pub use particles::Particle;
 pub use scene::{ColliderShape, Scene, SceneError, SolverSettings};
 pub use sim_types::{
     Action, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter, ParameterValue,
     ParameterValues, ParticleFlags, Reason, TearCause,
 };
 pub use solver::Solver;
+pub use state::keyframe::{Keyframe, KeyframeError, RestoreError};
+pub use state::particles::Particle;
 pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that

@@ -9,16 +9,16 @@ use crate::constraints::order::ProjectionOrder;
 use crate::constraints::tethers::Tethers;
 use crate::contacts::colliders::{Collider, PlacedCollider};
 use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
-use crate::hash::state_hash;
 use crate::kernels::Kernels;
 use crate::parameters::Parameters;
-use crate::particles::{Particle, Particles};
 use crate::scene::{Model, Scene, SceneAnchor, SolverSettings, substep_length};
+use crate::state::hash::state_hash;
+use crate::state::particles::{Particle, Particles};
+use crate::state::tear::Torn;
 use crate::step::anchors::Anchors;
 use crate::step::drive::ActiveGrab;
 use crate::step::wind::Air;
 use crate::store::{Configured, ParticleStore, SceneFields};
-use crate::tear::Torn;
 
 /// A running scene.
 ///

@@ -22,8 +22,8 @@ use wind::WindStep;
 use crate::constraints::builder::ConstraintBuilder;
 use crate::contacts::contact_substep::{ContactSubstep, Interval};
 use crate::contacts::obstacle::place_obstacles;
-use crate::hash::state_hash;
 use crate::solver::Solver;
+use crate::state::hash::state_hash;
 
 impl Solver {
     /// Makes one step of 1/rate seconds. Right after a reset or a restart, it publishes the state

@@ -25,8 +25,8 @@ use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
 use crate::kernels::Kernels;
-use crate::particles::Particle;
 use crate::scene::Model;
+use crate::state::particles::Particle;
 use crate::step::substep::SubstepInputs;
 
 /// Everything that a substep moves.

@@ -7,10 +7,10 @@ use std::collections::BinaryHeap;
 use sim_types::{ConstraintKind, ParticleFlags};
 
 use crate::parameters::Parameters;
-use crate::particles::Particles;
 use crate::scene::{Model, Softness};
+use crate::state::particles::Particles;
+use crate::state::tear::Torn;
 use crate::store::{Location, ParticleStore};
-use crate::tear::Torn;
 
 /// The tethers of a scene; empty if it has none.
 #[derive(Debug, Clone, Default)]

@@ -6,8 +6,8 @@ use sim_types::ParticleFlags;
 
 use super::drive::{DriveTarget, drive_towards};
 use crate::frame::{Frame, Pose};
-use crate::particles::Particles;
 use crate::scene::{SceneAnchor, SceneParticle, Waypoint};
+use crate::state::particles::Particles;
 use crate::store::ParticleStore;
 
 /// All anchors of a scene.

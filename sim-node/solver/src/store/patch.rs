@@ -27,7 +27,7 @@ use crate::constraints::fields::Pass;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::axes;
-use crate::particles::Particle;
+use crate::state::particles::Particle;
 use crate::step::schedule::Schedule;
 use crate::step::substep::SubstepInputs;
 

@@ -2,7 +2,7 @@
 
 use sim_types::ParticleFlags;
 
-use crate::particles::Particle;
+use crate::state::particles::Particle;
 
 /// State of a particle after the last substep.
 #[derive(Debug, Clone, Copy)]

@@ -10,10 +10,10 @@ use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
 
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::frame::{Frame, Pose};
-use crate::hash::state_hash;
 use crate::parameters::Parameters;
-use crate::particles::Particle;
 use crate::solver::{Due, Solver};
+use crate::state::hash::state_hash;
+use crate::state::particles::Particle;
 use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.

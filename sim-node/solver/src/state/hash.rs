@@ -2,7 +2,7 @@
 
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-use crate::particles::Particle;
+use crate::state::particles::Particle;
 
 /// Returns the XXH3-64 of 32 bytes per particle. The seed is 0 if nothing is torn, else the XXH3-64 of
 /// the torn indices in ascending order, as little-endian u32.

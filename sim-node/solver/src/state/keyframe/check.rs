@@ -6,8 +6,8 @@ use super::{Keyframe, Moved, RestoreError};
 use crate::checks::is_near;
 use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
-use crate::particles::Particle;
 use crate::solver::Solver;
+use crate::state::particles::Particle;
 use crate::step::drive::GRAB_OVER_S_MAX;
 
 /// Latest step of a scene. Up to it, f64 counts steps exactly.
