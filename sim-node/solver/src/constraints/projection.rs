@@ -54,10 +54,10 @@ impl Projection for RigidProjection<'_> {
 
 /// Constraints with every property that a scene can give them.
 ///
-/// With w = inverse mass and a = compliance / h^2, `delta_lambda` = -(C + a lambda) / (`w_a` + `w_b`
-/// + a), where lambda starts at 0 in each substep (XPBD: Macklin, Mueller, Chentanez 2016, equation
-/// 18). In method pbd a is 0, and the share is k' (Position Based Dynamics: Mueller et al. 2007,
-/// section 3.3).
+/// With w = inverse mass and a = compliance / h^2, the change of the multiplier is
+/// `delta_lambda` = -(C + a lambda) / (`w_a` + `w_b` + a). Lambda starts at 0 in each substep (XPBD:
+/// Macklin, Mueller, Chentanez 2016, equation 18). In method pbd a is 0, and the share is k'
+/// (Position Based Dynamics: Mueller et al. 2007, section 3.3).
 pub(crate) struct FullProjection<'a> {
     pub(crate) lengths: &'a [Lanes8],
     pub(crate) squares: &'a [Lanes8],

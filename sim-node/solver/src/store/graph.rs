@@ -120,7 +120,7 @@ impl Graph {
     /// Sets the fields in use, and the softness of constraints that have none of their own.
     pub(crate) fn use_fields(&mut self, layout: Layout, softness: PassSoftness) {
         (self.layout, self.softness) = (layout, softness);
-        self.schedule.rebuild(layout.optional_stages(), self.groups.iter().map(|_| 0));
+        self.schedule.rebuild(layout.optional_stages(), &self.groups.iter().map(|_| 0));
     }
 
     /// Allocates the fields of the layout. Every constraint is inactive afterwards.

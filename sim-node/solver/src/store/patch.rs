@@ -87,7 +87,7 @@ impl Patch {
         let families = &self.layout.families;
         let groups = 0..2 * families.len();
         let reaches = groups.map(|group| families[group / 2].family.reach());
-        self.schedule.rebuild(layout.optional_stages(), reaches);
+        self.schedule.rebuild(layout.optional_stages(), &reaches);
     }
 
     /// Allocates the fields of the layout. Every constraint is inactive afterwards, and no particle

@@ -38,33 +38,33 @@ pub(crate) struct GraphBlock<'a> {
 }
 
 impl<'a> GraphBlock<'a> {
-    /// Splits off the first `count` particles, or all if there are fewer.
-    pub(crate) fn split_first(&mut self, count: usize) -> GraphBlock<'a> {
-        GraphBlock {
-            particles: split_first_mut(&mut self.particles, count),
-            predicted: split_first_mut(&mut self.predicted, count),
-            gains: split_first(&mut self.gains, count),
-            tethers: split_first(&mut self.tethers, count),
-        }
-    }
-
     /// Divides the particles into blocks of `count`, the last one shorter.
-    pub(crate) fn chunks(mut self, count: usize) -> impl Iterator<Item = GraphBlock<'a>> {
-        std::iter::from_fn(move || (!self.particles.is_empty()).then(|| self.split_first(count)))
+    pub(crate) fn chunks(self, count: usize) -> impl Iterator<Item = GraphBlock<'a>> {
+        let mut rest = Some(self);
+        std::iter::from_fn(move || {
+            let (first, others) = rest.take()?.split_at(count);
+            rest = (!others.particles.is_empty()).then_some(others);
+            Some(first)
+        })
+        .filter(|block| !block.particles.is_empty())
     }
-}
 
-fn split_first_mut<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let slice = std::mem::take(rest);
-    let (first, others) = slice.split_at_mut(count.min(slice.len()));
-    *rest = others;
-    first
-}
-
-fn split_first<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
-    let (first, others) = rest.split_at(count.min(rest.len()));
-    *rest = others;
-    first
+    /// Splits after `count` particles, or at the end if there are fewer.
+    fn split_at(self, count: usize) -> (GraphBlock<'a>, GraphBlock<'a>) {
+        let Self { particles, predicted, gains, tethers } = self;
+        let end = |length: usize| count.min(length);
+        let (first_particles, particles) = particles.split_at_mut(end(particles.len()));
+        let (first_predicted, predicted) = predicted.split_at_mut(end(predicted.len()));
+        let (first_gains, gains) = gains.split_at(end(gains.len()));
+        let (first_tethers, tethers) = tethers.split_at(end(tethers.len()));
+        let first = GraphBlock {
+            particles: first_particles,
+            predicted: first_predicted,
+            gains: first_gains,
+            tethers: first_tethers,
+        };
+        (first, GraphBlock { particles, predicted, gains, tethers })
+    }
 }
 
 /// Runs consecutive stages of single particles on a block.
