@@ -115,23 +115,21 @@ impl ParticleStore {
         scene: SceneFields,
         is_torn: &[bool],
     ) -> Configured {
-        self.survey.restart_limits();
-        for constraint in 0..builder.model.constraint_count() {
-            self.survey.observe_limits(&builder.limit_lengths(constraint));
-        }
-        let used = self.survey.fields(builder.pass_count());
-        if !self.layout.extended(used, scene).fits(&self.layout) {
+        let possible = builder.possible_limit_fields();
+        let possible = ConstraintFields { multipliers: possible.tear_multipliers, ..possible };
+        if !self.layout.extended(possible, scene).fits(&self.layout) {
             return self.configure(builder, scene, is_torn);
         }
-        let configured = self.use_fields(builder.model, used, scene);
+        self.survey.restart_limits();
         for (constraint, is_torn) in (0_u32..).zip(is_torn) {
+            let limits = builder.limit_lengths(constraint);
+            self.survey.observe_limits(&limits);
             if !is_torn {
-                let limits = builder.limit_lengths(constraint);
                 let location = self.locations[constraint as usize];
                 self.writer(location).set_limits(location.index(), &limits);
             }
         }
-        configured
+        self.use_fields(builder.model, self.survey.fields(builder.pass_count()), scene)
     }
 
     /// Takes fields into use, and allocates them if they are not in memory.

@@ -5,6 +5,7 @@ use std::cell::Cell;
 use sim_types::{ConstraintKind, Method, TearCause};
 
 use super::Constraint;
+use super::fields::ConstraintFields;
 use super::parameters::{ConstraintParameters, LimitLengths, PassSoftness};
 use super::projection::TearMark;
 use super::separation::RestLength;
@@ -19,6 +20,8 @@ pub(crate) struct ConstraintBuilder<'a> {
     /// The previous stiffness, and its share per pass. The root is expensive, and most constraints
     /// have the stiffness of the one before.
     last_share: Cell<(f32, f32)>,
+    /// Limits of the constraint before, with their index in the model.
+    last_limits: Cell<Option<(u32, Limits)>>,
 }
 
 /// Values that are fixed while a scene runs, or follow from the rate.
@@ -31,7 +34,8 @@ pub(crate) struct Setup {
 
 impl<'a> ConstraintBuilder<'a> {
     pub(crate) fn new(model: &'a Model, parameters: &'a Parameters, setup: Setup) -> Self {
-        Self { model, parameters, setup, last_share: Cell::new((f32::NAN, f32::NAN)) }
+        let last_share = Cell::new((f32::NAN, f32::NAN));
+        Self { model, parameters, setup, last_share, last_limits: Cell::new(None) }
     }
 
     /// Number of passes in a substep.
@@ -112,8 +116,33 @@ impl<'a> ConstraintBuilder<'a> {
         share
     }
 
-    fn limits(&self, index: u32) -> Limits {
-        self.model.limits(index).or(self.parameters.limits())
+    fn limits(&self, constraint: u32) -> Limits {
+        let index = self.model.limits_index(constraint);
+        match self.last_limits.get() {
+            Some((last, limits)) if last == index => limits,
+            _ => {
+                let limits = self.merged_limits(self.model.all_limits()[index as usize]);
+                self.last_limits.set(Some((index, limits)));
+                limits
+            }
+        }
+    }
+
+    /// Limits of a constraint, with those of the scene where it has none of its own.
+    fn merged_limits(&self, own: Limits) -> Limits {
+        own.or(self.parameters.limits())
+    }
+
+    /// The fields of limits that any constraint may use.
+    pub(crate) fn possible_limit_fields(&self) -> ConstraintFields {
+        let mut fields = ConstraintFields::default();
+        for own in self.model.all_limits() {
+            let limits = self.merged_limits(*own);
+            fields.max_lengths |= limits.max_stretch.is_some();
+            fields.tear_lengths |= limits.tear_stretch.or(limits.tear_distance).is_some();
+            fields.tear_multipliers |= limits.tear_force.is_some();
+        }
+        fields
     }
 }
 

@@ -98,7 +98,7 @@ impl<'a> ColumnWriter<'a> {
 
 #[cfg(test)]
 mod tests {
-    //! What the writer writes is what the projections read.
+    //! Projections read the parameters that the writer wrote.
     use super::*;
     use crate::constraints::columns::{ConstraintColumns, FullPass};
     use crate::constraints::fields::Pass;

@@ -84,7 +84,7 @@ impl Contacts {
     /// Pushes one particle out, and computes the displacement with which it continues.
     ///
     /// Friction acts on the displacement: the tangential part is shortened by at most friction times
-    /// the depth gained in this substep, so that a particle on a slope stands still instead of
+    /// the depth gained in this substep, so that a particle on a slope stays at rest instead of
     /// creeping (Unified Particle Physics: Macklin et al. 2014, section 6.1). Restitution acts on
     /// the predicted approach (Detailed Rigid Body Simulation: Mueller et al. 2020, section 3.6).
     /// The push itself adds no speed.

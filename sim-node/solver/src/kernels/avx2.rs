@@ -19,7 +19,7 @@ pub(crate) struct Avx2(__m256);
 
 /// Lanes8 booleans: all bits set, or none.
 #[derive(Clone, Copy)]
-pub(crate) struct Mask(__m256);
+pub(crate) struct Avx2Mask(__m256);
 
 /// Runs work on AVX2 registers.
 ///
@@ -41,7 +41,7 @@ fn run_inlined<T: LaneWork>(work: T) -> T::Output {
 /// Wraps one intrinsic on values whose type proves that the processor has AVX2.
 macro_rules! avx2 {
     ($operation:expr) => {
-        // SAFETY: values of `Avx2` and `Mask` exist only where AVX2 does; see `Avx2`.
+        // SAFETY: values of `Avx2` and `Avx2Mask` exist only where AVX2 does; see `Avx2`.
         unsafe { $operation }
     };
 }
@@ -92,7 +92,7 @@ impl Neg for Avx2 {
 }
 
 impl Lanes for Avx2 {
-    type Mask = Mask;
+    type Mask = Avx2Mask;
 
     #[inline(always)]
     fn splat(number: f32) -> Self {
@@ -130,37 +130,37 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn is_below(self, other: Self) -> Mask {
-        Mask(avx2!(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
+    fn is_below(self, other: Self) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
-    fn is_at_most(self, other: Self) -> Mask {
-        Mask(avx2!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
+    fn is_at_most(self, other: Self) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
-    fn is_not_nan(self) -> Mask {
-        Mask(avx2!(_mm256_cmp_ps::<_CMP_ORD_Q>(self.0, self.0)))
+    fn is_not_nan(self) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_cmp_ps::<_CMP_ORD_Q>(self.0, self.0)))
     }
 
     #[inline(always)]
-    fn both(a: Mask, b: Mask) -> Mask {
-        Mask(avx2!(_mm256_and_ps(a.0, b.0)))
+    fn both(a: Avx2Mask, b: Avx2Mask) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_and_ps(a.0, b.0)))
     }
 
     #[inline(always)]
-    fn select(mask: Mask, yes: Self, no: Self) -> Self {
+    fn select(mask: Avx2Mask, yes: Self, no: Self) -> Self {
         Self(avx2!(_mm256_blendv_ps(no.0, yes.0, mask.0)))
     }
 
     #[inline(always)]
-    fn masked(self, mask: Mask) -> Self {
+    fn masked(self, mask: Avx2Mask) -> Self {
         Self(avx2!(_mm256_and_ps(self.0, mask.0)))
     }
 
     #[inline(always)]
-    fn any(mask: Mask) -> bool {
+    fn any(mask: Avx2Mask) -> bool {
         avx2!(_mm256_movemask_ps(mask.0)) != 0
     }
 }

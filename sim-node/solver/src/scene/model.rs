@@ -52,7 +52,17 @@ impl Model {
 
     /// The limits of a constraint in place of the scene's.
     pub(crate) fn limits(&self, constraint: u32) -> Limits {
-        self.limits[self.limits_of[constraint as usize] as usize]
+        self.limits[self.limits_index(constraint) as usize]
+    }
+
+    /// Index of a constraint's own limits in [`Self::all_limits`].
+    pub(crate) fn limits_index(&self, constraint: u32) -> u32 {
+        self.limits_of[constraint as usize]
+    }
+
+    /// Returns the limits that constraints have of their own.
+    pub(crate) fn all_limits(&self) -> &[Limits] {
+        &self.limits
     }
 
     pub(crate) fn push(&mut self, constraint: Constraint, family: Option<u32>) {
@@ -65,11 +75,6 @@ impl Model {
     #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]
     pub(crate) fn particle_count(&self) -> u32 {
         self.particles.len() as u32
-    }
-
-    #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 constraints")]
-    pub(crate) fn constraint_count(&self) -> u32 {
-        self.constraints.len() as u32
     }
 
     pub(crate) fn pair(&self, constraint: u32) -> [u32; 2] {

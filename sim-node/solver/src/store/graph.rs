@@ -52,7 +52,7 @@ pub(crate) struct Graph {
 }
 
 /// A constraint between particles of the graph.
-struct Link {
+struct GraphLink {
     /// Index of the constraint in the scene.
     constraint: u32,
     /// Indices in the graph.
@@ -76,7 +76,7 @@ impl Graph {
                 .filter_map(|constraint| {
                     let [a, b] = model.pair(*constraint);
                     let ends = [graph.find(a)?, graph.find(b)?];
-                    Some(Link { constraint: *constraint, ends })
+                    Some(GraphLink { constraint: *constraint, ends })
                 })
                 .collect();
             if !links.is_empty() {
@@ -95,13 +95,13 @@ impl Graph {
         Some(place as u32)
     }
 
-    fn push(&mut self, links: &[Link], is_independent: bool, locations: &mut [Location]) {
+    fn push(&mut self, links: &[GraphLink], is_independent: bool, locations: &mut [Location]) {
         let first = self.ends.len();
         #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
         let padding = self.indices.len() as u32;
         for lane_group in links.chunks(8) {
             let mut ends = [[padding; 8]; 2];
-            for (lane, Link { constraint, ends: [a, b] }) in lane_group.iter().enumerate() {
+            for (lane, GraphLink { constraint, ends: [a, b] }) in lane_group.iter().enumerate() {
                 assert!(*a.max(b) < padding, "a constraint names a particle outside of the graph");
                 let index = 8 * self.ends.len() + lane;
                 locations[*constraint as usize] = Location::in_graph(index);
