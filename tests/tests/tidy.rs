@@ -18,7 +18,7 @@ const ARROWS: [(&str, &[&str]); 8] = [
     ("sim-lessons", &["sim-solver"]),
     ("sim-node", &["sim-contract", "sim-lessons", "sim-solver"]),
     ("recorder", &["mcap", "sim-contract", "sim-solver"]),
-    ("viewer-bridge", &["foxglove", "recorder", "sim-contract"]),
+    ("viewer-bridge", &["foxglove", "recorder", "sim-contract", "sim-solver"]),
     ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),
 ];
 
