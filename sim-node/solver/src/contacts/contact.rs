@@ -118,14 +118,18 @@ impl Contacts {
     /// After the particles have advanced: moves those in contact out of the obstacles by the
     /// rounding that is left, and gives them the displacements with which they continue.
     #[inline(always)]
-    pub(crate) fn finish(&mut self, particles: &mut impl ParticleBlock, obstacles: &[Obstacle]) {
+    pub(crate) fn correct_touched(
+        &mut self,
+        particles: &mut impl ParticleBlock,
+        obstacles: &[Obstacle],
+    ) {
         if !self.touched.is_empty() {
-            self.finish_touched(particles, obstacles);
+            self.correct_all_touched(particles, obstacles);
         }
     }
 
     #[inline(never)]
-    fn finish_touched(&mut self, particles: &mut impl ParticleBlock, obstacles: &[Obstacle]) {
+    fn correct_all_touched(&mut self, particles: &mut impl ParticleBlock, obstacles: &[Obstacle]) {
         for Obstacle { solid, .. } in obstacles {
             for index in self.touched.iter().map(|index| *index as usize) {
                 let path = particles.path(index);

@@ -21,7 +21,7 @@ pub(crate) fn run_stage<W: Wide>(
         Stage::Contact => contacts.push_out::<W>(particles, inputs.obstacles),
         Stage::Advance => {
             particles.advance::<W>();
-            contacts.finish(particles, inputs.obstacles);
+            contacts.correct_touched(particles, inputs.obstacles);
         }
         Stage::Drive
         | Stage::Wind
