@@ -1,36 +1,50 @@
 //! The loop: wait for the deadline, apply commands, step, publish, observe.
 
+mod inbox;
+mod pace;
+mod progress;
+mod publisher;
+mod statistics;
+mod threads;
+mod warnings;
+
 use anyhow::Context;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Command, Endpoint, OwnerError, Reason, Stop};
 use sim_solver::{Applied, Control, Scene, Solver};
 
-use crate::commands::{Inbox, Progress};
-use crate::pace::Pace;
-use crate::publish::{Position, Publisher, StepTimes};
 use crate::scene_source;
-use crate::statistics::Statistics;
-use crate::threads::with_threads;
-use crate::warnings::Warnings;
+use inbox::Inbox;
+use pace::Pace;
+use progress::Progress;
+use publisher::{Position, Publisher, StepTimes};
+use statistics::Statistics;
+use threads::with_threads;
+use warnings::Warnings;
 
-/// Longest time between two status messages: 10 Hz.
+/// Time between two status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
-/// How often a paused node looks for commands.
+/// Time between two looks for commands while the next step is far away: an answer comes within it,
+/// and a rate of 50 Hz or more in real time costs no further wake-ups.
+const WAITING_POLL_NS: u64 = SECOND_NS / 50;
+/// Time between two looks for commands while paused: shorter, because the first step of `ctl step`
+/// or `resume` follows at once.
 const PAUSED_POLL_NS: u64 = SECOND_NS / 500;
 
-/// What a run is told.
+/// Options of a run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Options {
-    /// In place of the scenes' own.
+    /// Replaces the rate of each scene.
     pub(crate) rate_hz: Option<u32>,
+    /// Replaces the substeps of each scene.
     pub(crate) substeps: Option<u32>,
-    /// In place of as many as the scene calls for.
+    /// Replaces the number of threads that suits each scene.
     pub(crate) threads: Option<u8>,
-    /// Steps after which the run ends.
+    /// Number of steps after which the run ends.
     pub(crate) steps: Option<u64>,
     pub(crate) starts_paused: bool,
     pub(crate) waits_for_time: bool,
-    /// Every how many steps a snapshot is published.
+    /// Number of steps from one published snapshot to the next.
     pub(crate) every: u64,
 }
 
@@ -42,24 +56,24 @@ pub(crate) struct Node {
     options: Options,
     publisher: Publisher,
     inbox: Inbox,
-    /// Reused by every boundary.
+    /// Buffer that every boundary reuses.
     arrived: Vec<Command>,
     progress: Progress,
     pace: Pace,
     pub(crate) statistics: Statistics,
     pub(crate) step: u64,
-    /// When the run began, on CLOCK_MONOTONIC.
+    /// CLOCK_MONOTONIC at the start of the run.
     start_ns: u64,
-    /// How long it was paused.
-    idle_ns: u64,
-    /// When it last went on or began to wait for `resume`.
+    /// Time spent paused.
+    paused_ns: u64,
+    /// CLOCK_MONOTONIC up to which `paused_ns` is counted.
     mark_ns: u64,
     next_status_ns: u64,
     warnings: Warnings,
 }
 
 impl Node {
-    /// Takes the name and publishes the scene; the run has not begun.
+    /// Takes the name and publishes the scene, without starting the run.
     pub(crate) fn new(endpoint: &Endpoint, scene: Scene, options: Options) -> anyhow::Result<Self> {
         let solver = with_threads(Solver::new(&scene), options.threads);
         let publisher = Publisher::new(endpoint, &scene, &solver, options.every)?;
@@ -79,7 +93,7 @@ impl Node {
             statistics: Statistics::new(now_ns)?,
             step: 0,
             start_ns: now_ns,
-            idle_ns: 0,
+            paused_ns: 0,
             mark_ns: now_ns,
             next_status_ns: now_ns,
             warnings: Warnings::default(),
@@ -88,19 +102,21 @@ impl Node {
         })
     }
 
-    /// Runs until the last step or until asked to stop. `observer` is called once a second.
+    /// Runs until the last step or a request to stop. Calls `observer` once a second.
     pub(crate) fn run(&mut self, stop: &Stop, observer: impl Fn(&Self)) -> anyhow::Result<()> {
         self.start_ns = monotonic_ns();
         self.pace.restart(self.start_ns);
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.observe(&observer)?;
-        while !stop.is_asked() && !self.is_done() {
-            let wake_late_ns = self.wait(stop, &observer)?;
-            if stop.is_asked() {
+        while !stop.is_requested() && !self.is_done() {
+            let due = self.wait();
+            if stop.is_requested() {
                 break;
             }
             self.apply_commands()?;
-            if self.progress.is_stepping() {
+            if let Some(wake_late_ns) = due
+                && self.progress.is_stepping()
+            {
                 self.make_step(wake_late_ns)?;
             } else {
                 self.publisher.publish_between(&self.solver, self.position())?;
@@ -114,30 +130,34 @@ impl Node {
         self.options.steps.is_some_and(|steps| self.step >= steps)
     }
 
-    /// Waits for the deadline of the next step, or, paused, a little; returns how late it is.
-    fn wait(&mut self, stop: &Stop, observer: &impl Fn(&Self)) -> anyhow::Result<u64> {
+    /// Waits for the deadline of the next step, or until commands should be looked for again.
+    /// Returns how late the step is; `None` if it is not due yet.
+    ///
+    /// A paused node has no deadline: a command that lets it step makes the step due at once.
+    fn wait(&mut self) -> Option<u64> {
         if !self.progress.is_stepping() {
             sleep_until(monotonic_ns() + PAUSED_POLL_NS);
             let now_ns = monotonic_ns();
-            self.idle_ns += now_ns - self.mark_ns;
+            self.paused_ns += now_ns - self.mark_ns;
             self.mark_ns = now_ns;
             self.pace.restart(now_ns);
-            return Ok(0);
+            return Some(0);
         }
         if !self.options.waits_for_time {
-            return Ok(0);
+            return Some(0);
         }
-        let deadline_ns = self.pace.deadline_ns();
-        // At a few steps a second, late joiners and the status do not wait for the next one.
-        while monotonic_ns() + STATUS_PERIOD_NS < deadline_ns {
-            sleep_until(monotonic_ns() + STATUS_PERIOD_NS);
-            if stop.is_asked() {
-                return Ok(0);
-            }
-            self.observe(observer)?;
+        if self.progress.is_reset_due {
+            // It came while the node waited, and shows at once, as it does while paused.
+            self.pace.restart(monotonic_ns());
+            return Some(0);
+        }
+        let (now_ns, deadline_ns) = (monotonic_ns(), self.pace.deadline_ns());
+        if now_ns + WAITING_POLL_NS < deadline_ns {
+            sleep_until(now_ns + WAITING_POLL_NS);
+            return None;
         }
         sleep_until(deadline_ns);
-        Ok(self.pace.meet(monotonic_ns()))
+        Some(self.pace.meet(monotonic_ns()))
     }
 
     /// Applies the commands that have arrived, at the boundary before the next step.
@@ -146,8 +166,8 @@ impl Node {
             self.publisher.receive_commands(&mut self.arrived);
             self.inbox.add(self.arrived.drain(..));
         }
-        for command in self.inbox.take_turn() {
-            // Whoever commanded and then asks for the status finds the effect in it.
+        for command in self.inbox.next_turn() {
+            // A fresh status follows, so that `ctl status` shows the effect.
             self.next_status_ns = 0;
             let result = match self.solver.apply(command.client_id, &command.action()) {
                 Ok(Applied::Control(Control::Load { scene })) => {
@@ -159,26 +179,28 @@ impl Node {
             self.publisher.add_outcome(self.step + 1, command, result);
         }
         self.solver.finish_boundary();
-        self.pace.set_time_scale(self.progress.time_scale);
         let time_scale = self.progress.time_scale;
+        self.pace.set_time_scale(time_scale, monotonic_ns());
         self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
     }
 
-    /// Takes another scene; the next step shows its initial state. The rate of a run stays. An error
-    /// is one after which the old scene cannot go on either.
+    /// Replaces the scene; the next step shows the initial state of the new one. The rate must stay.
+    /// The inner result is the outcome. An outer error leaves neither scene able to continue.
     fn load(&mut self, source: &str) -> anyhow::Result<Result<(), Reason>> {
         let scene = match self.read_scene(source) {
             Ok(scene) => scene,
             Err((problem, reason)) => {
-                self.warnings.say(&format!("load {source}: {problem}"));
+                self.warnings.print(&format!("load {source}: {problem}"));
                 return Ok(Err(reason));
             }
         };
         let solver = with_threads(Solver::new_in_run(&scene), self.options.threads);
         match self.publisher.load(&scene, &solver, self.step + 1, self.progress.time_scale) {
-            Err(error @ OwnerError::Publish(_)) => Err(error).context("publishing another scene"),
+            Err(error @ OwnerError::Publish(_)) => {
+                Err(error).context("publishing the loaded scene")
+            }
             Err(error) => {
-                self.warnings.say(&format!("load {source}: {error}"));
+                self.warnings.print(&format!("load {source}: {error}"));
                 Ok(Err(Reason::NoEffectHere))
             }
             Ok(()) => {
@@ -189,7 +211,7 @@ impl Node {
         }
     }
 
-    /// A scene that this run can go on with, or what is wrong with it.
+    /// Reads a scene that this run can continue with, or returns the problem and the reason.
     fn read_scene(&self, source: &str) -> Result<Scene, (String, Reason)> {
         let out_of_range = |problem| (problem, Reason::OutOfRange);
         let mut scene =
@@ -200,7 +222,7 @@ impl Node {
         if own == other {
             return Ok(scene);
         }
-        Err((format!("it runs at {other} Hz, this node at {own} Hz"), Reason::NoEffectHere))
+        Err((format!("the scene runs at {other} Hz, this node at {own} Hz"), Reason::NoEffectHere))
     }
 
     fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
@@ -210,16 +232,16 @@ impl Node {
         let solve_ns = monotonic_ns() - before_ns;
         if self.solver.frozen_count() > frozen_count {
             let count = self.solver.frozen_count() - frozen_count;
-            self.warnings.say(&format!(
-                "step {}: {count} particles are frozen, their state was no longer finite; \
-                 `ctl reset` brings them back",
+            self.warnings.print(&format!(
+                "step {}: froze {count} particles whose state was not finite; `ctl reset` restores \
+                 them",
                 self.step + 1
             ));
         }
         self.step += 1;
         self.progress.count_step();
         if !self.progress.is_stepping() {
-            // Whoever waited for these steps and then asks for the status finds them in it.
+            // A fresh status follows, so that `ctl status` shows the steps.
             self.next_status_ns = 0;
         }
         self.statistics.record(wake_late_ns, solve_ns, self.pace.period_ns());
@@ -228,14 +250,14 @@ impl Node {
         self.publisher.publish_step(&self.solver, self.position(), times)
     }
 
-    /// Keeps late joiners served, and tells how the node does.
+    /// Serves late subscribers, calls the observer, and publishes the status.
     fn observe(&mut self, observer: &impl Fn(&Self)) -> anyhow::Result<()> {
         self.publisher.refresh();
         let now_ns = monotonic_ns();
         if self.progress.is_stepping() {
             self.mark_ns = now_ns;
         }
-        if self.statistics.turn(now_ns, self.scene.solver.rate_hz) {
+        if self.statistics.end_second(now_ns, self.scene.solver.rate_hz) {
             observer(self);
         }
         if now_ns >= self.next_status_ns {
@@ -249,9 +271,9 @@ impl Node {
         self.publisher.status(&self.scene, &self.solver, self.position(), &self.statistics)
     }
 
-    /// Simulated time per wall-clock time of the whole run, pauses apart.
+    /// Simulated time per wall-clock time of the whole run, without its pauses.
     pub(crate) fn real_time_factor(&self) -> f64 {
-        let run_ns = monotonic_ns() - self.start_ns - self.idle_ns;
+        let run_ns = monotonic_ns() - self.start_ns - self.paused_ns;
         let simulated_s = self.step as f64 / f64::from(self.scene.solver.rate_hz);
         simulated_s / (run_ns.max(1) as f64 / SECOND_NS as f64)
     }

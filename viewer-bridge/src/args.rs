@@ -59,8 +59,9 @@ pub(crate) struct Args {
     /// Name of the node: its services are NAME/particles, NAME/commands, ...
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: String,
-    /// Domain that separates these services from others on this host [default: that of iceoryx2]
-    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
+    /// Domain that separates these services from others on this host [env: CATENARY_DOMAIN]
+    /// [default: that of iceoryx2]
+    #[arg(long, value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
     domain: Option<String>,
     /// Folder with the files of the page, for development [default: the built-in files]
     #[arg(long, value_name = "DIR")]
@@ -69,7 +70,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
-        Endpoint::of_options(self.domain.as_deref(), &self.name)
+        Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
     }
 
     /// Options of the Foxglove server, if one is requested.

@@ -107,7 +107,7 @@ fn stop_signal(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> 
     let listen = |kind| signal(kind).context("listening for signals");
     let (mut interrupt, mut terminate) =
         (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
-    let is_asked = stop.is_asked();
+    let is_asked = stop.is_requested();
     Ok(async move {
         if !is_asked {
             tokio::select! {

@@ -8,13 +8,14 @@ pub(crate) struct EndpointArgs {
     /// Name of the simulation. Its services are NAME/particles, NAME/commands and so on
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: String,
-    /// Domain, which separates services from others on this host [default: that of iceoryx2]
-    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
+    /// Domain, which separates services from others on this host [env: CATENARY_DOMAIN]
+    /// [default: that of iceoryx2]
+    #[arg(long, value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
     domain: Option<String>,
 }
 
 impl EndpointArgs {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
-        Endpoint::of_options(self.domain.as_deref(), &self.name)
+        Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
     }
 }

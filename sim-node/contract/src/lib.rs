@@ -46,9 +46,10 @@ mod owner;
 mod ports;
 mod stop;
 pub mod testing;
+mod text_file;
 
 pub use client::Client;
-pub use client::request::{OwnerSeen, RequestError};
+pub use client::request::{OwnerState, RequestError};
 pub use client::state::{Change, LoadedScene, State};
 pub use client::tap::Tap;
 pub use client::views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
@@ -78,6 +79,7 @@ pub use sim_types::{
     ValueForm,
 };
 pub use stop::Stop;
+pub use text_file::{TextFileError, read_scene_file};
 
 /// The README's programs compile.
 #[cfg(doctest)]

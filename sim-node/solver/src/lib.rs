@@ -46,7 +46,7 @@ pub use contacts::colliders::PlacedCollider;
 pub use frame::Pose;
 pub use kernels::Kernels;
 pub use kernels::worker_pool::THREADS_MAX;
-pub use scene::{ColliderShape, Scene, SceneError, SolverSettings};
+pub use scene::{ColliderGeometry, Scene, SceneError, SolverSettings};
 pub use sim_types::{
     Action, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter, ParameterValue,
     ParameterValues, ParticleFlags, Reason, TearCause,

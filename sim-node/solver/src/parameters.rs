@@ -7,7 +7,9 @@ use sim_types::{
 };
 
 use crate::checks::{Context, is_near};
-use crate::scene::{Limits, Scene, Wind};
+use crate::scene::definition::Scene;
+use crate::scene::definition::limits::Limits;
+use crate::scene::definition::wind::Wind;
 
 /// Values that can change while a scene runs. Part of the state, and of a keyframe.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

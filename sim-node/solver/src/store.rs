@@ -25,7 +25,7 @@ use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
 use crate::kernels::Kernels;
-use crate::scene::Model;
+use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::substep::SubstepInputs;
 

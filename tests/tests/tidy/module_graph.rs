@@ -115,8 +115,9 @@ impl<'a> Scanner<'a> {
     }
 
     fn begins_path(&self, at: usize) -> bool {
-        let is_first = at == 0 || self.token(at - 1) != "::";
-        if !is_first || self.token(at + 1) != "::" {
+        // `pub(in crate::a)` is a visibility.
+        let is_inside = at > 0 && matches!(self.token(at - 1), "::" | "in");
+        if is_inside || self.token(at + 1) != "::" {
             return false;
         }
         let token = self.token(at);
@@ -319,7 +320,7 @@ mod tests {
         let files = [
             ("lib.rs", "mod a;"),
             ("a.rs", "mod b; pub struct A; fn f() { b::g() }"),
-            ("a/b.rs", "pub fn g() { let _ = super::A; }"),
+            ("a/b.rs", "pub(in crate::a) fn g() { let _ = super::A; }"),
         ];
         assert_eq!(circles_of("child", &files), [["a.rs", "a/b.rs"]]);
     }
@@ -335,7 +336,7 @@ mod tests {
             ),
             (
                 "a/c.rs",
-                "use super::b::B;\nmod inner { use super::B; }\nfn g(_: B) {}\n\
+                "use super::b::B;\nmod inner { use super::B; }\npub(in crate::a) fn g(_: B) {}\n\
                  #[cfg(test)]\nmod tests { use crate::B; }",
             ),
         ];

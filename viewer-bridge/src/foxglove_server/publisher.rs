@@ -56,9 +56,9 @@ struct Subscription {
 #[derive(Debug, Default)]
 struct PublisherState {
     encoder: MessageEncoder,
-    load: Option<Load>,
+    load: Option<PublishedLoad>,
     /// The state that was sent last.
-    shown: Option<Shown>,
+    shown: Option<StateId>,
     next_scene_ns: u64,
     /// Number of messages that were encoded on `/particles` and `/scene`.
     encoded_count: u64,
@@ -69,13 +69,13 @@ struct PublisherState {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Shown {
+struct StateId {
     epoch: u32,
     step: u64,
 }
 
 #[derive(Debug)]
-struct Load {
+struct PublishedLoad {
     run_id: String,
     origin: [f64; 3],
     rate_hz: u32,
@@ -103,7 +103,7 @@ impl TornList {
     }
 }
 
-impl Load {
+impl PublishedLoad {
     /// Time of a step, as in recordings.
     fn time_ns(&self, step: u64) -> u64 {
         self.epoch_ns.saturating_add(step_ns(step, self.rate_hz))
@@ -221,7 +221,7 @@ impl Publisher {
         }
     }
 
-    fn send_transform(&self, load: &Load, step: u64, sink: Option<SinkId>) {
+    fn send_transform(&self, load: &PublishedLoad, step: u64, sink: Option<SinkId>) {
         let time_ns = load.time_ns(step);
         self.send_bytes(Topic::Tf, &encode_transform(time_ns, load.origin), time_ns, sink);
     }
@@ -231,7 +231,7 @@ impl Publisher {
         let mut state = self.state();
         let run_id = &scene.text.run_id;
         let before = state.load.as_ref().filter(|load| load.run_id == *run_id);
-        let load = Load {
+        let load = PublishedLoad {
             run_id: run_id.clone(),
             origin: scene.origin,
             rate_hz: scene.rate_hz,
@@ -298,7 +298,7 @@ impl Publisher {
         self.serve_new_subscriptions(state, shown.row.step);
         let Some(load) = &state.load else { return };
         let time_ns = load.time_ns(shown.row.step);
-        let id = Shown { epoch: shown.epoch, step: shown.row.step };
+        let id = StateId { epoch: shown.epoch, step: shown.row.step };
         let is_new = state.shown.replace(id) != Some(id);
         let is_state_due = self.is_state_due.swap(false, Ordering::Relaxed);
         if (is_new || is_state_due) && self.has_subscribers(Topic::Particles) {

@@ -25,12 +25,12 @@ use crate::request::RequestSender;
 use crate::shutdown::Shutdown;
 use crate::sink::Sink;
 use crate::socket::guard::{Guard, guarded};
-use crate::socket::listen::{Endpoint, client_permits};
+use crate::socket::listen::{HttpListener, client_permits};
 
 /// A Foxglove server that listens.
 #[derive(Debug)]
 pub struct FoxgloveServer {
-    endpoint: Endpoint,
+    listener: HttpListener,
     guard: Guard,
     proxy: Proxy,
     sink: Arc<FoxgloveSink>,
@@ -50,7 +50,7 @@ impl FoxgloveServer {
     ) -> Result<Self, FoxgloveServerError> {
         let address = options.listen;
         FoxgloveOptions::check_address(address)?;
-        let endpoint = Endpoint::bind(address)
+        let listener = HttpListener::bind(address)
             .await
             .map_err(|cause| FoxgloveServerError::Listen { address, cause })?;
         let context = Context::new();
@@ -70,8 +70,8 @@ impl FoxgloveServer {
         let proxy = Proxy::new((secret, library.port()).into());
         bridge.set_library(library);
         let sink = Arc::new(FoxgloveSink::new(publisher, Arc::clone(&bridge), requests));
-        let guard = Guard::for_origins(endpoint.address(), options.origins);
-        Ok(Self { endpoint, guard, proxy, sink, bridge, context })
+        let guard = Guard::for_origins(listener.address(), options.origins);
+        Ok(Self { listener, guard, proxy, sink, bridge, context })
     }
 
     /// The sink that feeds the clients.
@@ -81,7 +81,7 @@ impl FoxgloveServer {
 
     /// Address to open in a viewer.
     pub fn url(&self) -> String {
-        format!("ws://{}", self.endpoint.address())
+        format!("ws://{}", self.listener.address())
     }
 
     /// Serves until the shutdown begins and every client has been informed.
@@ -95,7 +95,7 @@ impl FoxgloveServer {
                 let _timed_out = timeout(SHUTDOWN_TIMEOUT, library.stop().wait()).await;
             }
         };
-        tokio::join!(self.endpoint.serve(router, clients, &shutdown), stop_library);
+        tokio::join!(self.listener.serve(router, clients, &shutdown), stop_library);
         drop(self.context);
     }
 }

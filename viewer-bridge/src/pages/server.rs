@@ -19,7 +19,7 @@ use super::session::{self, Sessions};
 use crate::limits::{CLIENTS_MAX, WAITING_MAX};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::{Guard, guarded};
-use crate::socket::listen::{Endpoint, client_permits};
+use crate::socket::listen::{HttpListener, client_permits};
 use crate::socket::peer::limit;
 
 /// Options of a server.
@@ -52,7 +52,7 @@ pub enum ServerError {
 /// A server that listens.
 #[derive(Debug)]
 pub struct Server {
-    endpoint: Endpoint,
+    listener: HttpListener,
     guard: Arc<Guard>,
     assets: Assets,
 }
@@ -73,18 +73,18 @@ impl Server {
     /// The address is in use, or does not belong to this host.
     pub async fn bind(options: ServerOptions) -> Result<Self, ServerError> {
         let address = options.listen;
-        let endpoint = Endpoint::bind(address)
+        let listener = HttpListener::bind(address)
             .await
             .map_err(|cause| ServerError::Listen { address, cause })?;
-        let guard = Guard::new(endpoint.address(), options.names);
+        let guard = Guard::new(listener.address(), options.names);
         let guard = Arc::new(guard.map_err(ServerError::NoRandomNumber)?);
-        Ok(Self { endpoint, guard, assets: options.assets })
+        Ok(Self { listener, guard, assets: options.assets })
     }
 
     /// Address to open in a browser. The token follows the `#`, which no browser sends.
     pub fn url(&self) -> String {
         let token = self.guard.token().map(|token| format!("#token={token}"));
-        format!("http://{}/{}", self.endpoint.address(), token.unwrap_or_default())
+        format!("http://{}/{}", self.listener.address(), token.unwrap_or_default())
     }
 
     /// Serves until the shutdown begins and every page has been informed.
@@ -96,7 +96,7 @@ impl Server {
         let waiting = Arc::new(Semaphore::new(WAITING_MAX));
         let state = ServerState { sessions, assets: self.assets, waiting };
         let router = guarded(router(Arc::new(state)), self.guard);
-        self.endpoint.serve(router, pages, &shutdown).await;
+        self.listener.serve(router, pages, &shutdown).await;
     }
 }
 

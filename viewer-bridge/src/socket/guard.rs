@@ -51,9 +51,9 @@ pub(crate) struct Guard {
     origins: Option<Vec<String>>,
 }
 
-/// The reason for which a request is refused.
+/// The reason for which a request is denied.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub(crate) enum Refused {
+pub(crate) enum Denied {
     /// The request is meant for a host of another name.
     #[error("this host is not allowed here")]
     ForeignHost,
@@ -106,9 +106,9 @@ impl Guard {
     }
 
     /// Checks the headers of a request.
-    pub(crate) fn admit(&self, headers: &HeaderMap) -> Result<(), Refused> {
+    pub(crate) fn admit(&self, headers: &HeaderMap) -> Result<(), Denied> {
         let host = single(headers, &header::HOST).filter(|host| self.is_own(host));
-        let host = host.ok_or(Refused::ForeignHost)?;
+        let host = host.ok_or(Denied::ForeignHost)?;
         if !headers.contains_key(header::ORIGIN) {
             // A program, or a plain request for a file.
             return Ok(());
@@ -117,9 +117,9 @@ impl Guard {
         let own_origin = origin.strip_prefix("http://");
         match &self.origins {
             Some(allowed) if allowed.iter().any(|one| one == origin) => Ok(()),
-            Some(_) => Err(Refused::UnnamedOrigin { origin: origin.to_owned() }),
+            Some(_) => Err(Denied::UnnamedOrigin { origin: origin.to_owned() }),
             None if own_origin.is_some_and(|own| self.is_same_origin(own, host)) => Ok(()),
-            None => Err(Refused::ForeignOrigin { origin: origin.to_owned() }),
+            None => Err(Denied::ForeignOrigin { origin: origin.to_owned() }),
         }
     }
 
@@ -160,7 +160,7 @@ pub(crate) fn guarded(router: Router, guard: Arc<Guard>) -> Router {
 async fn check(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> Response {
     let mut response = match guard.admit(request.headers()) {
         Ok(()) => next.run(request).await,
-        Err(refused) => (StatusCode::FORBIDDEN, format!("{refused}\n")).into_response(),
+        Err(denied) => (StatusCode::FORBIDDEN, format!("{denied}\n")).into_response(),
     };
     response.headers_mut().extend(HEADERS);
     response
@@ -257,8 +257,8 @@ mod tests {
         let mut headers = HeaderMap::new();
         headers.insert(header::HOST, HeaderValue::from_static("127.0.0.1:8765"));
         headers.insert(header::ORIGIN, HeaderValue::from_static("http://evil.example"));
-        let refused = guard.admit(&headers).unwrap_err().to_string();
-        assert!(refused.contains("http://evil.example"), "{refused}");
-        assert!(refused.contains("--foxglove-origin"), "{refused}");
+        let denied = guard.admit(&headers).unwrap_err().to_string();
+        assert!(denied.contains("http://evil.example"), "{denied}");
+        assert!(denied.contains("--foxglove-origin"), "{denied}");
     }
 }

@@ -17,9 +17,9 @@ use crate::limits::{
 };
 use crate::shutdown::Shutdown;
 
-/// A bound address.
+/// A listener for HTTP connections.
 #[derive(Debug)]
-pub(crate) struct Endpoint {
+pub(crate) struct HttpListener {
     listener: TcpListener,
     address: SocketAddr,
 }
@@ -32,7 +32,7 @@ pub(crate) fn client_permits() -> ClientPermits {
     Arc::new(Semaphore::new(CLIENTS_MAX))
 }
 
-impl Endpoint {
+impl HttpListener {
     /// Binds an address; port 0 is any free port.
     pub(crate) async fn bind(address: SocketAddr) -> io::Result<Self> {
         let listener = TcpListener::bind(address).await?;

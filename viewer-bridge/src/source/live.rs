@@ -2,13 +2,14 @@
 
 mod actions;
 mod brush;
+mod command_context;
 mod dispatch;
 mod link;
-mod load_parts;
+mod newest_state;
+mod node_text;
 mod statistics;
 #[cfg(test)]
 mod tests;
-mod until_step;
 mod updates;
 
 use std::time::Duration;

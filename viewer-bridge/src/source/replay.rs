@@ -10,6 +10,7 @@ mod parameter_log;
 mod player;
 mod playhead;
 mod statistics;
+mod texts;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};

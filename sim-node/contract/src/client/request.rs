@@ -31,7 +31,7 @@ pub enum RequestError {
         /// How long it was waited for, or less if the owner went meanwhile.
         timeout: Duration,
         /// Whether anybody could have answered.
-        owner: OwnerSeen,
+        owner: OwnerState,
     },
     /// The owner has not taken the commands before this one; it was not sent.
     #[error(
@@ -39,13 +39,13 @@ pub enum RequestError {
     )]
     QueueFull {
         /// Whether anybody could have taken them.
-        owner: OwnerSeen,
+        owner: OwnerState,
     },
     /// Nobody takes commands; it was not sent.
     #[error("the command was not sent: {owner}")]
-    NobodyListens {
+    NoReceiver {
         /// Whether the owner is alive.
-        owner: OwnerSeen,
+        owner: OwnerState,
     },
     /// The command could not be put into shared memory; it was not sent.
     #[error(transparent)]
@@ -60,7 +60,7 @@ pub enum RequestError {
 
 /// Whether the owner was alive when a command went unanswered.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum OwnerSeen {
+pub enum OwnerState {
     /// It was, and said nothing.
     Alive {
         /// Its process id, where it is known.
@@ -75,7 +75,7 @@ pub enum OwnerSeen {
     },
 }
 
-impl OwnerSeen {
+impl OwnerState {
     fn look(attachment: &Attachment) -> Self {
         let endpoint = attachment.session.endpoint.clone();
         match attachment.owner() {
@@ -85,7 +85,7 @@ impl OwnerSeen {
     }
 }
 
-impl fmt::Display for OwnerSeen {
+impl fmt::Display for OwnerState {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Alive { process_id: Some(id), endpoint } => write!(
@@ -107,7 +107,7 @@ impl fmt::Display for OwnerSeen {
 
 impl RequestError {
     pub(crate) fn timeout(attachment: &Attachment, sequence: u64, timeout: Duration) -> Self {
-        Self::Timeout { sequence, timeout, owner: OwnerSeen::look(attachment) }
+        Self::Timeout { sequence, timeout, owner: OwnerState::look(attachment) }
     }
 }
 
@@ -150,9 +150,9 @@ impl Commander {
         let command = Command::new(self.client_id, sequence, action);
         let taken = self.commands.write(command)?;
         if taken == 0 {
-            let owner = OwnerSeen::look(attachment);
+            let owner = OwnerState::look(attachment);
             return Err(match reader_count(&attachment.services.commands) {
-                0 => RequestError::NobodyListens { owner },
+                0 => RequestError::NoReceiver { owner },
                 _ => RequestError::QueueFull { owner },
             });
         }

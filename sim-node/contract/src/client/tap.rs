@@ -131,12 +131,12 @@ impl Tap {
 
     /// Changes that have arrived and belong to no state yet, such as those of a paused node. They
     /// are not returned again.
-    pub fn take_pending_changes(&mut self) -> Vec<Change> {
+    pub fn drain_pending_changes(&mut self) -> Vec<Change> {
         self.assembler.take_waiting()
     }
 
     /// Errors of messages that were dropped since the last call.
-    pub fn take_errors(&mut self) -> Vec<ReadError> {
+    pub fn drain_errors(&mut self) -> Vec<ReadError> {
         std::mem::take(&mut self.errors)
     }
 

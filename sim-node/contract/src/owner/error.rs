@@ -12,7 +12,7 @@ use crate::ports::writer::PublishError;
 pub enum OwnerError {
     /// Another process has the name.
     #[error(
-        "{endpoint} is running already{by}: stop that one, or choose another --name or --domain",
+        "{endpoint} is already running{by}: stop that one, or choose another --name or --domain",
         by = process_id.map(|id| format!(", as process {id}")).unwrap_or_default()
     )]
     NameTaken {

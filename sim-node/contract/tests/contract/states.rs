@@ -51,7 +51,7 @@ fn a_state_has_everything_that_was_published_up_to_it() {
     assert_eq!((third.torn, third.colliders), (&[CUT][..], &colliders(5)[..]));
     assert_eq!((third.parameters.header.step, third.parameters.values), (5, parameters(5)));
     assert!(tap.next_state(|_| {}).is_none());
-    assert!(tap.take_errors().is_empty());
+    assert!(tap.drain_errors().is_empty());
 }
 
 #[test]

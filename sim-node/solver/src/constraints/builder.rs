@@ -10,7 +10,8 @@ use super::parameters::{ConstraintParameters, LimitLengths, PassSoftness};
 use super::projection::TearMark;
 use super::separation::RestLength;
 use crate::parameters::Parameters;
-use crate::scene::{Limits, Model};
+use crate::scene::definition::limits::Limits;
+use crate::scene::model::Model;
 
 /// Builds the parameters of each constraint.
 pub(crate) struct ConstraintBuilder<'a> {

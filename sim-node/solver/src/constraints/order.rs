@@ -5,8 +5,8 @@
 
 use std::ops::Range;
 
-use crate::scene::ConstraintOrder;
-use crate::scene::Model;
+use crate::scene::definition::settings::ConstraintOrder;
+use crate::scene::model::Model;
 
 /// Largest number of groups of independent constraints. The rest go into one serial group after
 /// them, which only a particle with more than 32 constraints needs, such as the hub of a web.

@@ -7,7 +7,8 @@ use std::collections::BinaryHeap;
 use sim_types::{ConstraintKind, ParticleFlags};
 
 use crate::parameters::Parameters;
-use crate::scene::{Model, Softness};
+use crate::scene::definition::softness::Softness;
+use crate::scene::model::Model;
 use crate::state::particles::Particles;
 use crate::state::tear::Torn;
 use crate::store::{Location, ParticleStore};

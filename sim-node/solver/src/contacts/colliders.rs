@@ -5,7 +5,7 @@ use sim_types::Reason;
 
 use super::placed_shape::PlacedShape;
 use crate::frame::{Frame, angular_velocity, rotation_about};
-use crate::scene::{ColliderShape, SceneCollider};
+use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
 
 /// A collider and its motion.
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ pub(crate) struct Collider {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedCollider {
     /// Shape and pose; a plane's normal and a box's rotation are normalised.
-    pub shape: ColliderShape,
+    pub shape: ColliderGeometry,
     /// Fraction of the approach speed with which a particle bounces.
     pub restitution: f32,
     /// Coefficient of Coulomb friction.

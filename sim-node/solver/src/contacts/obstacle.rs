@@ -7,7 +7,7 @@ use super::contact_substep::{ContactSubstep, Interval};
 use super::path::SubstepPath;
 use super::solid::{Solid, solids};
 use super::zone::Zone;
-use crate::scene::SceneCollider;
+use crate::scene::definition::collider::SceneCollider;
 
 /// A collider in one substep, or one face of bounds.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 
 use crate::frame::{Frame, Pose};
-use crate::scene::ColliderShape;
+use crate::scene::definition::collider::ColliderGeometry;
 
 /// The shape of a collider at its current pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,50 +36,50 @@ pub(crate) enum PlacedShape {
 
 impl PlacedShape {
     /// From the definition in a scene, with the normal and the rotation normalised.
-    pub(crate) fn new(shape: &ColliderShape) -> Self {
+    pub(crate) fn new(shape: &ColliderGeometry) -> Self {
         let vector = Vec3::from_array;
         match *shape {
-            ColliderShape::Plane { normal, offset } => {
+            ColliderGeometry::Plane { normal, offset } => {
                 let normal = vector(normal).as_dvec3();
                 let length = normal.dot(normal).sqrt();
                 Self::Plane { normal: (normal * (1.0 / length)).as_vec3(), offset }
             }
-            ColliderShape::Box { center, half_extents, rotation } => {
+            ColliderGeometry::Box { center, half_extents, rotation } => {
                 let pose = Pose { translation: [0.0; 3], rotation };
                 let rotation = Frame::from_pose(&pose).rotation;
                 let (center, half_extents) = (vector(center), vector(half_extents));
                 Self::Box { center, half_extents, rotation }
             }
-            ColliderShape::Sphere { center, radius } => {
+            ColliderGeometry::Sphere { center, radius } => {
                 Self::Sphere { center: vector(center), radius }
             }
-            ColliderShape::Capsule { a, b, radius } => {
+            ColliderGeometry::Capsule { a, b, radius } => {
                 Self::Capsule { a: vector(a), b: vector(b), radius }
             }
-            ColliderShape::Bounds { min, max } => {
+            ColliderGeometry::Bounds { min, max } => {
                 Self::Bounds { min: vector(min), max: vector(max) }
             }
         }
     }
 
-    pub(crate) fn to_scene(self) -> ColliderShape {
+    pub(crate) fn to_scene(self) -> ColliderGeometry {
         match self {
             Self::Plane { normal, offset } => {
-                ColliderShape::Plane { normal: normal.to_array(), offset }
+                ColliderGeometry::Plane { normal: normal.to_array(), offset }
             }
-            Self::Box { center, half_extents, rotation } => ColliderShape::Box {
+            Self::Box { center, half_extents, rotation } => ColliderGeometry::Box {
                 center: center.to_array(),
                 half_extents: half_extents.to_array(),
                 rotation: rotation.to_array(),
             },
             Self::Sphere { center, radius } => {
-                ColliderShape::Sphere { center: center.to_array(), radius }
+                ColliderGeometry::Sphere { center: center.to_array(), radius }
             }
             Self::Capsule { a, b, radius } => {
-                ColliderShape::Capsule { a: a.to_array(), b: b.to_array(), radius }
+                ColliderGeometry::Capsule { a: a.to_array(), b: b.to_array(), radius }
             }
             Self::Bounds { min, max } => {
-                ColliderShape::Bounds { min: min.to_array(), max: max.to_array() }
+                ColliderGeometry::Bounds { min: min.to_array(), max: max.to_array() }
             }
         }
     }

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use sim_types::ParticleFlags;
 
-use crate::scene::SceneParticle;
+use crate::scene::definition::element::SceneParticle;
 
 /// A particle as it is published and hashed: 32 bytes, little-endian, without padding.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]

@@ -6,7 +6,8 @@ use sim_types::ParticleFlags;
 
 use super::drive::{DriveTarget, drive_towards};
 use crate::frame::{Frame, Pose};
-use crate::scene::{SceneAnchor, SceneParticle, Waypoint};
+use crate::scene::definition::anchor::{SceneAnchor, Waypoint};
+use crate::scene::definition::element::SceneParticle;
 use crate::state::particles::Particles;
 use crate::store::ParticleStore;
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::scene::Wind;
+use crate::scene::definition::wind::Wind;
 use crate::store::{Location, ParticleStore};
 
 /// The air around the surface of a scene; empty if it has no surface.

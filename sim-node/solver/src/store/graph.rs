@@ -18,7 +18,7 @@ use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::{ConstraintParameters, PassSoftness};
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{Lanes8, PackedParticle};
-use crate::scene::Model;
+use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
 use crate::step::stage::Stage;

@@ -1,19 +1,11 @@
 //! Translates a command of a client into actions of the node.
 
-use sim_contract::{Action, Parameter, ParameterValue, ParticleState, Reason, Text};
+use sim_contract::{Action, Parameter, ParameterValue, Reason, Text};
 
 use super::brush::Stroke;
+use super::command_context::CommandContext;
 use crate::message::{Command, Refusal};
 use crate::scene::catalog;
-
-/// The state to which a command refers.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CommandContext<'a> {
-    pub(super) epoch: u32,
-    pub(super) rate_hz: u32,
-    pub(super) is_planar: bool,
-    pub(super) particles: &'a [ParticleState],
-}
 
 /// Returns the actions of a command, in order. The list is empty if there is nothing to do.
 pub(super) fn actions(
@@ -26,7 +18,7 @@ pub(super) fn actions(
         Command::Release { particle } => Action::Release { particle },
         Command::Brush { eye, ray, radius, delta, over_s, cap } => {
             let stroke = Stroke { eye, ray, radius, delta, over_s, cap };
-            let push = stroke.push(context.particles, context.is_planar, context.rate_hz);
+            let push = stroke.push(context);
             return Ok(push.into_iter().collect());
         }
         Command::Pin { particle } => Action::Pin { particle },

@@ -2,6 +2,7 @@
 
 use sim_contract::{Action, ParticleState};
 
+use super::command_context::CommandContext;
 use crate::wire::convert::to_f32;
 
 /// A brush stroke, in the units of the protocol.
@@ -18,12 +19,8 @@ pub(super) struct Stroke {
 
 impl Stroke {
     /// Returns the action for the node, or `None` if the ray hits nothing.
-    pub(super) fn push(
-        &self,
-        particles: &[ParticleState],
-        is_planar: bool,
-        rate_hz: u32,
-    ) -> Option<Action> {
+    pub(super) fn push(&self, context: CommandContext<'_>) -> Option<Action> {
+        let CommandContext { rate_hz, is_planar, particles, .. } = context;
         let center = if is_planar { self.hit_plane()? } else { self.hit_particles(particles)? };
         // A push is a displacement per step: its velocity is delta * rate.
         let share = 1.0 / (self.over_s * rate_hz as f32);
@@ -83,6 +80,14 @@ mod tests {
         cap: Some(0.15),
     };
 
+    const PLANAR: CommandContext<'_> =
+        CommandContext { epoch: 1, rate_hz: 60, is_planar: true, particles: &[] };
+
+    /// A scene in three dimensions with 100 steps per second.
+    fn solid(particles: &[ParticleState]) -> CommandContext<'_> {
+        CommandContext { epoch: 1, rate_hz: 100, is_planar: false, particles }
+    }
+
     fn at(position: [f32; 3]) -> ParticleState {
         ParticleState { position, ..ParticleState::default() }
     }
@@ -91,7 +96,7 @@ mod tests {
     fn the_particle_nearest_to_the_eye_is_the_center_and_gets_the_pointers_velocity() {
         let particles =
             [at([0.0, 0.1, -1.0]), at([0.3, 0.3, 1.0]), at([0.4, 0.4, 2.0]), at([0.0, 0.0, 6.0])];
-        let push = STROKE.push(&particles, false, 100);
+        let push = STROKE.push(solid(&particles));
         let Some(Action::Push { center, radius, delta, limit }) = push else {
             panic!("no push");
         };
@@ -103,15 +108,15 @@ mod tests {
     #[test]
     fn in_two_dimensions_the_center_is_on_the_plane() {
         let stroke = Stroke { eye: [1.0, 2.0, 5.0], ray: [1.0, 0.0, -5.0], ..STROKE };
-        let Some(Action::Push { center, delta, .. }) = stroke.push(&[], true, 60) else {
+        let Some(Action::Push { center, delta, .. }) = stroke.push(PLANAR) else {
             panic!("no push");
         };
         assert_eq!((center, delta[2]), ([2.0, 2.0, 0.0], 0.0));
-        assert!(Stroke { ray: [1.0, 0.0, 0.0], ..STROKE }.push(&[], true, 60).is_none());
+        assert!(Stroke { ray: [1.0, 0.0, 0.0], ..STROKE }.push(PLANAR).is_none());
     }
 
     #[test]
     fn a_ray_that_hits_nothing_pushes_nothing() {
-        assert!(STROKE.push(&[at([0.0, 0.6, 0.0]), at([0.0, 0.0, 9.0])], false, 60).is_none());
+        assert!(STROKE.push(solid(&[at([0.0, 0.6, 0.0]), at([0.0, 0.0, 9.0])])).is_none());
     }
 }

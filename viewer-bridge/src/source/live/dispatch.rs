@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, VecDeque};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{Action, Client, Outcome, Reason, RequestError};
 
-use super::actions::{CommandContext, actions};
+use super::actions::actions;
+use super::command_context::CommandContext;
 use crate::limits::{COMMANDS_QUEUED_MAX, GRABS_PER_CLIENT_MAX, OUTCOME_TIMEOUT};
 use crate::message::{Command, OutcomeText, Refusal, Status};
 use crate::request::ClientId;

@@ -5,20 +5,18 @@ use std::time::Duration;
 use recorder::{OutcomeRow, StatusRow, StepRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    Action, AttachError, Client, ColliderState, Endpoint, NodeStatus, ParameterValues, Snapshot,
-    SnapshotFlags, StatusFlags, Tap, TornConstraint,
+    Action, AttachError, Client, Endpoint, NodeStatus, Outcome, ParameterValues, SnapshotFlags, Tap,
 };
 
-use super::actions::CommandContext;
+use super::command_context::CommandContext;
 use super::dispatch::Dispatch;
-use super::load_parts::{LoadParts, is_same_load};
+use super::newest_state::{LoadedState, NewestState};
+use super::node_text::node_text;
 use super::statistics::statistics;
-use super::until_step::UntilStep;
 use super::updates::Updates;
 use crate::limits::{FRAMES_PER_SECOND_MAX, RELEASE_TIMEOUT};
-use crate::message::{Level, Node, NodeState, ParametersText};
+use crate::message::{Node, ParametersText};
 use crate::request::{Request, RequestKind, Requests};
-use crate::scene::load::Load;
 use crate::sink::{Demand, Sinks, State, Update};
 use crate::source::shown_state::ShownState;
 use crate::wire::frame_flag;
@@ -48,22 +46,11 @@ pub(super) enum LinkEnd {
     NewRun,
 }
 
-/// Tears and colliders that wait for the state to which they belong.
-#[derive(Debug, Default)]
-struct Changes {
-    torn: UntilStep<Vec<TornConstraint>>,
-    colliders: UntilStep<Vec<ColliderState>>,
-}
-
-impl Changes {
-    fn add(&mut self, updates: Updates) {
-        for (header, torn) in updates.tears {
-            self.torn.add(header.step, torn);
-        }
-        for (header, colliders) in updates.colliders {
-            self.colliders.add(header.step, colliders);
-        }
-    }
+/// A state of a load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct ShownId {
+    epoch: u32,
+    step: u64,
 }
 
 /// The connection to one run of a node.
@@ -72,17 +59,13 @@ pub(super) struct Link {
     tap: Tap,
     pub(super) client: Client,
     run_id: Option<u64>,
-    parts: LoadParts,
-    load: Option<Load>,
-    /// The newest state, in shared memory.
-    snapshot: Option<Snapshot>,
+    newest: NewestState,
     status: Option<NodeStatus>,
     parameters: Option<ParameterValues>,
     /// The parameters that were published last.
     published_parameters: Option<ParametersText>,
     pub(super) dispatch: Dispatch,
-    changes: Changes,
-    shown_step: Option<u64>,
+    shown_id: Option<ShownId>,
     pub(super) next_frame_ns: u64,
     next_owner_check_ns: u64,
     next_statistics_ns: u64,
@@ -94,15 +77,12 @@ impl Link {
             tap: Tap::attach(endpoint)?,
             client: Client::attach(endpoint)?,
             run_id: None,
-            parts: LoadParts::default(),
-            load: None,
-            snapshot: None,
+            newest: NewestState::default(),
             status: None,
             parameters: None,
             published_parameters: None,
             dispatch: Dispatch::default(),
-            changes: Changes::default(),
-            shown_step: None,
+            shown_id: None,
             next_frame_ns: 0,
             next_owner_check_ns: 0,
             next_statistics_ns: 0,
@@ -127,7 +107,7 @@ impl Link {
             self.tap.wait(FRESH_STATE_WAIT);
         }
         self.read(shown, sinks)?;
-        if is_due && !self.has_new_state() {
+        if is_due && !self.has_new_state(shown) {
             self.tap.wait(FRESH_STATE_WAIT);
             self.read(shown, sinks)?;
         }
@@ -153,9 +133,9 @@ impl Link {
         })
     }
 
-    fn has_new_state(&self) -> bool {
-        let newest = self.snapshot.as_ref().map(|snapshot| snapshot.header().step);
-        newest != self.shown_step
+    fn has_new_state(&self, shown: &ShownState) -> bool {
+        let id = |state: LoadedState<'_>| ShownId { epoch: shown.epoch(), step: state.header.step };
+        self.newest.get().map(id) != self.shown_id
     }
 
     fn check_owner(&mut self, now_ns: u64) -> Result<(), LinkEnd> {
@@ -185,15 +165,16 @@ impl Link {
     pub(super) fn handle(&mut self, request: Request, shown: &ShownState, sinks: &Sinks) {
         let client = request.client;
         match request.kind {
-            RequestKind::State => self.shown_step = None,
+            RequestKind::State => self.shown_id = None,
             RequestKind::Credit => {}
             RequestKind::Left => self.dispatch.remove_client(client),
             RequestKind::Command { id, command } => {
+                let state = self.newest.get();
                 let context = CommandContext {
                     epoch: shown.epoch(),
-                    rate_hz: self.load.as_ref().map_or(1, |load| load.header.rate_hz.max(1)),
-                    is_planar: self.load.as_ref().is_some_and(|load| load.summary.is_planar),
-                    particles: self.snapshot.as_ref().map_or(&[], Snapshot::particles),
+                    rate_hz: state.map_or(1, |state| state.load.header.rate_hz.max(1)),
+                    is_planar: state.is_some_and(|state| state.load.summary.is_planar),
+                    particles: state.map_or(&[], |state| state.particles),
                 };
                 if let Some(outcome) = self.dispatch.submit(client, id, command, context) {
                     sinks.publish(&Update::Answer { client, outcome: &outcome });
@@ -202,41 +183,27 @@ impl Link {
         }
     }
 
-    /// Reads everything that has arrived. The snapshot comes first, so that its dependencies are among
-    /// the other messages.
+    /// Reads everything that has arrived.
     pub(super) fn read(&mut self, shown: &mut ShownState, sinks: &Sinks) -> Result<(), LinkEnd> {
-        // An unreadable snapshot is dropped; another one follows.
-        if let Ok(Some(snapshot)) = self.tap.latest_snapshot() {
-            self.snapshot = Some(snapshot);
+        let mut updates = Updates::default();
+        let state = self.tap.latest_state(|update| updates.add(update));
+        let run_id = state.map(|state| state.header.run_id).or(updates.run_id);
+        check_run(&mut self.run_id, run_id)?;
+        if let Some(state) = state {
+            self.newest.update(&state, shown, sinks);
         }
-        let mut updates = Updates::drain(&mut self.tap);
-        self.check_run(&updates)?;
-        self.handle_outcomes(&updates, sinks);
-        self.parts.update(&mut updates);
+        self.handle_outcomes(&updates.outcomes, sinks);
         if let Some(status) = &updates.status {
             sinks.publish(&Update::Status(&StatusRow::from(status)));
             self.status = Some(*status);
         }
         self.parameters = updates.parameters.or(self.parameters);
-        self.changes.add(updates);
-        self.begin_load(shown, sinks);
         self.publish_parameters(sinks);
-        self.publish_changes(shown, sinks);
         Ok(())
     }
 
-    /// Ends the link if the messages belong to another run.
-    fn check_run(&mut self, updates: &Updates) -> Result<(), LinkEnd> {
-        let of_snapshot = || self.snapshot.as_ref().map(|snapshot| snapshot.header().run_id);
-        let Some(run_id) = updates.run_id().or_else(of_snapshot) else { return Ok(()) };
-        match self.run_id.replace(run_id) {
-            Some(known) if known != run_id => Err(LinkEnd::NewRun),
-            _ => Ok(()),
-        }
-    }
-
-    fn handle_outcomes(&mut self, updates: &Updates, sinks: &Sinks) {
-        for outcome in &updates.outcomes {
+    fn handle_outcomes(&mut self, outcomes: &[Outcome], sinks: &Sinks) {
+        for outcome in outcomes {
             sinks.publish(&Update::Outcome(&OutcomeRow::from(outcome)));
             let action = outcome.command.action();
             if outcome.is_applied() && matches!(action, Action::Reset | Action::Load { .. }) {
@@ -253,44 +220,11 @@ impl Link {
         while let Ok(Some(_)) = self.client.next_outcome(Duration::ZERO) {}
     }
 
-    /// Shows a new load once all its parts have arrived.
-    fn begin_load(&mut self, shown: &mut ShownState, sinks: &Sinks) {
-        let Some(snapshot) = &self.snapshot else { return };
-        let header = snapshot.header();
-        match self.parts.complete(header) {
-            None => {}
-            Some(Err(error)) => {
-                let text = &error.to_string();
-                sinks.publish(&Update::Notice { level: Level::Error, text });
-            }
-            Some(Ok(load)) => {
-                shown.begin_load(sinks, load.to_scene(header.step, snapshot.particles()));
-                self.load = Some(load);
-                self.shown_step = None;
-            }
-        }
-    }
-
-    /// Shows the tears, colliders and pins of the newest state.
-    fn publish_changes(&mut self, shown: &mut ShownState, sinks: &Sinks) {
-        let Some((load, snapshot)) = self.current() else { return };
-        let (step, constraint_count) = (snapshot.header().step, load.constraints.len());
-        shown.set_pins(sinks, step, snapshot.particles());
-        if let Some((step, torn)) = self.changes.torn.take_until(step)
-            && torn.iter().all(|torn| (torn.constraint as usize) < constraint_count)
-        {
-            shown.set_torn(sinks, step, &torn);
-        }
-        if let Some((step, colliders)) = self.changes.colliders.take_until(step) {
-            shown.set_colliders(sinks, step, &colliders);
-        }
-    }
-
     /// Publishes the parameters of the load on show if they have changed. They take effect at once, even
     /// if the node is paused, so they do not wait for a state.
     fn publish_parameters(&mut self, sinks: &Sinks) {
-        let Some(load) = &self.load else { return };
-        let initial = Some(load.summary.parameters);
+        let Some(state) = self.newest.get() else { return };
+        let initial = Some(state.load.summary.parameters);
         let text = ParametersText { is_complete: true, values: self.parameters, initial };
         if self.published_parameters.as_ref() != Some(&text) {
             sinks.publish(&Update::Parameters(&text));
@@ -298,35 +232,27 @@ impl Link {
         }
     }
 
-    /// Returns the load and the newest state, if they belong together. Any process of the user can
-    /// publish a state of another size.
-    fn current(&self) -> Option<(&Load, &Snapshot)> {
-        let (load, snapshot) = (self.load.as_ref()?, self.snapshot.as_ref()?);
-        is_same_load(&load.header, snapshot.header()).then_some((load, snapshot))
-    }
-
     /// Shows the newest state, if a frame is due and the state is new.
     pub(super) fn show(&mut self, shown: &ShownState, sinks: &Sinks) {
-        let Some((load, snapshot)) = self.current() else { return };
-        let header = snapshot.header();
+        let Some(LoadedState { load, header, particles }) = self.newest.get() else { return };
         let now_ns = monotonic_ns();
-        let is_due = now_ns >= self.next_frame_ns && self.shown_step != Some(header.step);
+        let id = ShownId { epoch: shown.epoch(), step: header.step };
+        let is_due = now_ns >= self.next_frame_ns && self.shown_id != Some(id);
         if !is_due || !sinks.has_demand(Demand::State) {
             return;
         }
         let flag = |own: u32, flag: u32| if header.flags & own == 0 { 0 } else { flag };
-        let step = header.step;
         let state = State {
             epoch: shown.epoch(),
             row: StepRow::from(header),
-            sim_time_s: step as f64 / f64::from(load.header.rate_hz.max(1)),
+            sim_time_s: header.step as f64 / f64::from(load.header.rate_hz.max(1)),
             flags: flag(SnapshotFlags::PAUSED, frame_flag::PAUSED)
                 | flag(SnapshotFlags::REPLAY, frame_flag::REPLAY),
             publish_monotonic_ns: header.publish_monotonic_ns,
-            particles: snapshot.particles(),
+            particles,
         };
         shown.show(sinks, state);
-        self.shown_step = Some(step);
+        self.shown_id = Some(id);
         self.next_frame_ns = now_ns + FRAME_PERIOD_NS;
     }
 
@@ -334,34 +260,16 @@ impl Link {
         if !sinks.has_demand(Demand::Statistics) {
             return;
         }
-        if let (Some(status), Some((load, snapshot))) = (&self.status, self.current()) {
+        if let (Some(status), Some(state)) = (&self.status, self.newest.get()) {
             let gravity = self.parameters.map_or([0.0; 3], |values| values.gravity);
-            let statistics = statistics(status, load, snapshot, shown, gravity);
+            let statistics = statistics(status, state, shown, gravity);
             sinks.publish(&Update::Statistics(&statistics));
         }
     }
 
     /// The state of the node for clients.
     pub(super) fn node(&self) -> Node {
-        let Some(status) = &self.status else {
-            return Node {
-                state: NodeState::Alive,
-                text: "a node runs, but has not published its status yet".to_owned(),
-                ..Node::default()
-            };
-        };
-        Node {
-            state: NodeState::Alive,
-            text: String::new(),
-            run_id: Some(format!("{:016x}", status.run_id)),
-            scene: Some(status.scene_name()),
-            method: self.load.as_ref().map(Load::method),
-            rate_hz: status.rate_hz,
-            is_paused: status.is_paused(),
-            is_replay: status.flags & StatusFlags::REPLAY != 0,
-            time_scale: status.time_scale,
-            process_id: Some(status.process_id),
-        }
+        node_text(self.status.as_ref(), self.newest.get().map(|state| state.load.method()))
     }
 
     /// Answers the open commands. If the node goes on without this bridge, ends the clients' grabs.
@@ -381,13 +289,23 @@ impl Link {
         let end_ns = monotonic_ns() + wait_ns;
         loop {
             self.dispatch.flush(&mut self.client, sinks);
-            let updates = Updates::drain(&mut self.tap);
-            self.handle_outcomes(&updates, sinks);
+            let mut updates = Updates::default();
+            self.tap.latest_state(|update| updates.add(update));
+            self.handle_outcomes(&updates.outcomes, sinks);
             let left_ns = end_ns.saturating_sub(monotonic_ns());
             if !self.dispatch.is_releasing() || left_ns == 0 {
                 return;
             }
             self.tap.wait(Duration::from_nanos(left_ns).min(IDLE_PERIOD));
         }
+    }
+}
+
+/// Ends the link if the messages belong to another run.
+fn check_run(known: &mut Option<u64>, run_id: Option<u64>) -> Result<(), LinkEnd> {
+    let Some(run_id) = run_id else { return Ok(()) };
+    match known.replace(run_id) {
+        Some(known) if known != run_id => Err(LinkEnd::NewRun),
+        _ => Ok(()),
     }
 }

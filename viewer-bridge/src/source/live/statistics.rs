@@ -1,8 +1,8 @@
 //! Statistics of a live node.
 
-use sim_contract::{NodeStatus, Snapshot, StatusFlags};
+use sim_contract::{NodeStatus, StatusFlags};
 
-use crate::scene::load::Load;
+use super::newest_state::LoadedState;
 use crate::scene::measure::{measure, torn_flags};
 use crate::source::shown_state::ShownState;
 use crate::wire::convert::{microseconds, to_f32};
@@ -11,18 +11,18 @@ use crate::wire::{Percentiles, Stamp, Statistics, statistics_flag};
 /// Collects the statistics of the node and measures the state.
 pub(super) fn statistics(
     status: &NodeStatus,
-    load: &Load,
-    snapshot: &Snapshot,
+    state: LoadedState<'_>,
     shown: &ShownState,
     gravity: [f32; 3],
 ) -> Statistics {
+    let LoadedState { load, header, particles } = state;
     let is_torn = torn_flags(load.constraints.len(), shown.torn());
-    let measures = measure(snapshot.particles(), &load.constraints, &is_torn, gravity);
+    let measures = measure(particles, &load.constraints, &is_torn, gravity);
     let percentiles = |p50, p99| Percentiles { p50: microseconds(p50), p99: microseconds(p99) };
     let flag = |own: u32, flag: u32| if status.flags & own == 0 { 0 } else { flag };
     let pace_hz = f64::from(status.rate_hz) * status.time_scale;
     Statistics {
-        stamp: Stamp { epoch: shown.epoch(), step: snapshot.header().step },
+        stamp: Stamp { epoch: shown.epoch(), step: header.step },
         solve_us: percentiles(status.solve_ns_p50, status.solve_ns_p99),
         wake_late_us: percentiles(status.wake_late_ns_p50, status.wake_late_ns_p99),
         period_us: to_f32(1e6 / pace_hz),

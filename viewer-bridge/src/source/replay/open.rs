@@ -26,6 +26,13 @@ pub(super) struct Recording {
     pub(super) file: String,
 }
 
+impl Recording {
+    /// Simulated time of a step in s.
+    pub(super) fn time_s(&self, step: u64) -> f64 {
+        step as f64 / f64::from(self.tape.run().rate_hz)
+    }
+}
+
 /// Opens a recording. The errors do not name the file.
 pub(super) fn open(path: &Path, note: &mut dyn FnMut(&str)) -> anyhow::Result<Recording> {
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {

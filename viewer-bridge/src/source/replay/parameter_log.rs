@@ -1,83 +1,106 @@
-//! The parameters at each step of a recording: those of its scene, and what was set until then.
+//! The parameters at each step of a recording: those of its scene, changed by the recorded commands.
 
 use recorder::OutcomeRow;
 use sim_contract::{Action, KindFilter, Parameter, ParameterValue, ParameterValues, Setting, Text};
 
-/// Most settings of a recording: hours of moving a slider. What is beyond is not known.
+/// Changes in a recording: hours of moving a slider. Later ones count as lost.
 const CHANGES_MAX: usize = 1 << 18;
 
-/// What has changed the parameters of a recording, in order.
+/// The changes of the parameters in a recording, in order.
 #[derive(Debug, Clone)]
 pub(super) struct ParameterLog {
-    changes: Vec<(u64, Change)>,
+    changes: Vec<Change>,
     next_index: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Change {
-    Set(Text, ParameterValue, Option<KindFilter>),
-    /// Everything is as the scene has it.
+struct Change {
+    step: u64,
+    kind: ChangeKind,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum ChangeKind {
+    Set {
+        parameter: Text,
+        value: ParameterValue,
+        kind: Option<KindFilter>,
+    },
+    /// All parameters return to their values in the scene.
     Reset,
-    /// There may have been settings that the recording has lost.
+    /// The recording may have lost changes.
     Gap,
 }
 
+/// Parameters at a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LoggedParameters {
+    pub(super) values: ParameterValues,
+    /// No change before the step was lost.
+    pub(super) is_complete: bool,
+}
+
 impl ParameterLog {
-    /// Of a recording whose first state has had that many outcomes.
+    /// Creates the log of a recording whose first state includes `outcome_count` outcomes.
     pub(super) fn new(first_step: u64, outcome_count: u64) -> Self {
-        let changes = if outcome_count == 0 { Vec::new() } else { vec![(first_step, Change::Gap)] };
-        Self { changes, next_index: outcome_count }
+        let mut log = Self { changes: Vec::new(), next_index: outcome_count };
+        if outcome_count > 0 {
+            log.add_gap(first_step);
+        }
+        log
     }
 
-    /// Takes the next outcome of the recording.
+    /// Adds the next outcome of the recording.
     pub(super) fn add_outcome(&mut self, row: &OutcomeRow) {
         if row.index > self.next_index {
             self.add_gap(row.step);
         }
         self.next_index = row.index + 1;
-        let change = match row.action {
+        let kind = match row.action {
             Action::Set { parameter, value, constraint_kind } => {
-                Change::Set(parameter, value, constraint_kind)
+                ChangeKind::Set { parameter, value, kind: constraint_kind }
             }
-            Action::Reset => Change::Reset,
+            Action::Reset => ChangeKind::Reset,
             _ => return,
         };
         if row.is_applied() {
-            self.add(row.step, change);
+            self.add(Change { step: row.step, kind });
         }
     }
 
-    /// A part of the recording cannot be read, from about this step on.
+    /// Notes that a part of the recording from about this step on is unreadable.
     pub(super) fn add_gap(&mut self, step: u64) {
-        self.add(step, Change::Gap);
+        self.add(Change { step, kind: ChangeKind::Gap });
     }
 
-    fn add(&mut self, step: u64, change: Change) {
+    fn add(&mut self, change: Change) {
         if self.changes.len() < CHANGES_MAX {
-            self.changes.push((step, change));
-        } else if let Some((_, last)) = self.changes.last_mut() {
-            *last = Change::Gap;
+            self.changes.push(change);
+        } else if let Some(last) = self.changes.last_mut() {
+            last.kind = ChangeKind::Gap;
         }
     }
 
-    /// How many changes there are up to a step: as long as it stays, the parameters do.
+    /// Number of changes up to a step. The parameters depend on it only.
     pub(super) fn count_until(&self, step: u64) -> usize {
-        self.changes.iter().take_while(|(of, _)| *of <= step).count()
+        self.changes.iter().take_while(|change| change.step <= step).count()
     }
 
-    /// The parameters after that many changes, and whether nothing can be missing.
-    pub(super) fn after(&self, count: usize, initial: ParameterValues) -> (ParameterValues, bool) {
-        let (mut values, mut is_complete) = (initial, true);
-        for (_, change) in &self.changes[..count.min(self.changes.len())] {
-            match change {
-                Change::Set(parameter, value, kind) => {
-                    apply_set(&mut values, *parameter, *value, *kind);
+    /// Parameters after the first `count` changes. `initial` are those of the scene.
+    pub(super) fn after(&self, count: usize, initial: ParameterValues) -> LoggedParameters {
+        let mut parameters = LoggedParameters { values: initial, is_complete: true };
+        for change in self.changes.iter().take(count) {
+            match change.kind {
+                ChangeKind::Set { parameter, value, kind } => {
+                    apply_set(&mut parameters.values, parameter, value, kind);
                 }
-                Change::Reset => (values, is_complete) = (initial, true),
-                Change::Gap => is_complete = false,
+                ChangeKind::Reset => {
+                    parameters = LoggedParameters { values: initial, is_complete: true };
+                }
+                ChangeKind::Gap => parameters.is_complete = false,
             }
         }
-        (values, is_complete)
+        parameters
     }
 }
 
@@ -112,36 +135,35 @@ mod tests {
         Action::Set { parameter, value: ParameterValue::Number(value), constraint_kind: None }
     }
 
-    /// Damping, and whether everything is known.
-    fn at(log: &ParameterLog, step: u64) -> (f32, bool) {
-        let (values, is_complete) = log.after(log.count_until(step), ParameterValues::default());
-        (values.damping, is_complete)
+    fn at(log: &ParameterLog, step: u64) -> LoggedParameters {
+        log.after(log.count_until(step), ParameterValues::default())
     }
 
     #[test]
-    fn parameters_are_what_was_set_until_a_step() {
+    fn parameters_have_the_values_that_were_set_up_to_a_step() {
         let mut log = ParameterLog::new(0, 0);
         log.add_outcome(&outcome(0, 10, damping(1.0)));
         log.add_outcome(&outcome(1, 20, damping(2.0)));
         log.add_outcome(&outcome(2, 30, Action::Reset));
-        assert_eq!([9, 10, 29, 30].map(|step| at(&log, step).0), [0.0, 1.0, 2.0, 0.0]);
-        assert!([9, 10, 29, 30].iter().all(|step| at(&log, *step).1));
+        assert_eq!([9, 10, 29, 30].map(|step| at(&log, step).values.damping), [0.0, 1.0, 2.0, 0.0]);
+        assert!([9, 10, 29, 30].iter().all(|step| at(&log, *step).is_complete));
     }
 
     #[test]
-    fn what_may_be_missing_is_known_again_after_a_reset() {
+    fn after_a_gap_the_parameters_are_complete_again_from_the_next_reset_on() {
         let mut log = ParameterLog::new(5, 3);
         log.add_outcome(&outcome(3, 10, Action::Reset));
         log.add_outcome(&outcome(5, 20, damping(2.0)));
-        assert_eq!([5, 10, 20].map(|step| at(&log, step).1), [false, true, false]);
+        assert_eq!([5, 10, 20].map(|step| at(&log, step).is_complete), [false, true, false]);
     }
 
     #[test]
-    fn what_was_rejected_has_set_nothing() {
+    fn a_rejected_command_changes_no_parameter() {
         let mut log = ParameterLog::new(0, 0);
         let command = Command::new(1, 0, damping(1.0));
         let rejected = Outcome::new(0, 10, command, Err(Reason::OutOfRange));
         log.add_outcome(&OutcomeRow::from(&rejected));
-        assert_eq!(at(&log, 10), (0.0, true));
+        let expected = LoggedParameters { values: ParameterValues::default(), is_complete: true };
+        assert_eq!(at(&log, 10), expected);
     }
 }

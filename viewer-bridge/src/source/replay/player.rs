@@ -5,17 +5,16 @@ use std::time::Duration;
 
 use recorder::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Reason, TornConstraint};
+use sim_contract::{ParameterValues, Reason, TornConstraint};
 
 use super::check::Report;
 use super::open::Recording;
+use super::parameter_log::LoggedParameters;
 use super::playhead::{Advanced, Playhead};
 use super::statistics::statistics;
+use super::texts;
 use crate::limits::FRAMES_PER_SECOND_MAX;
-use crate::message::{
-    Command, Hashes, Level, Node, NodeState, OutcomeText, ParametersText, Playback, Refusal,
-    Timeline,
-};
+use crate::message::{Command, Hashes, Level, OutcomeText, ParametersText, Refusal};
 use crate::request::{ClientId, Request, RequestKind, Requests};
 use crate::sink::{Demand, Sinks, State, Update};
 use crate::source::shown_state::ShownState;
@@ -45,12 +44,19 @@ pub(super) struct Player<'a> {
     /// The origin of the parameters.
     parameters_origin: Option<ParametersOrigin>,
     /// Applied commands, which are answered with the step that shows their effect.
-    answers: Vec<(ClientId, OutcomeText)>,
+    answers: Vec<Answer>,
     /// The playback has changed since it was published.
     is_playback_changed: bool,
     shown_step: Option<u64>,
     next_frame_ns: u64,
     next_statistics_ns: u64,
+}
+
+/// The answer to an applied command.
+#[derive(Debug)]
+struct Answer {
+    client: ClientId,
+    outcome: OutcomeText,
 }
 
 /// The changes of the recording and the pace from which the parameters follow.
@@ -146,7 +152,8 @@ impl<'a> Player<'a> {
                 Ok(()) => {
                     self.is_playback_changed = true;
                     let outcome = OutcomeText::pending(id, command.name());
-                    self.answers.push((client, OutcomeText { applied: 1, ..outcome }));
+                    let outcome = OutcomeText { applied: 1, ..outcome };
+                    self.answers.push(Answer { client, outcome });
                 }
                 Err(reason) => {
                     let outcome = &OutcomeText::refused(id, command.name(), reason);
@@ -256,11 +263,10 @@ impl<'a> Player<'a> {
         }
         self.parameters_origin = origin;
         let initial = self.recording.load.summary.parameters;
-        let (mut values, is_complete) = match log.zip(change_count) {
-            Some((log, count)) => log.after(count, initial),
-            None => (initial, false),
-        };
-        values.time_scale = self.playhead.rate;
+        let unknown = LoggedParameters { values: initial, is_complete: false };
+        let logged = log.zip(change_count).map(|(log, count)| log.after(count, initial));
+        let LoggedParameters { values, is_complete } = logged.unwrap_or(unknown);
+        let values = ParameterValues { time_scale: self.playhead.rate, ..values };
         let text = ParametersText { is_complete, values: Some(values), initial: Some(initial) };
         self.sinks.publish(&Update::Parameters(&text));
         self.parameters = Some(text);
@@ -281,7 +287,7 @@ impl<'a> Player<'a> {
         let state = State {
             epoch: self.shown.epoch(),
             row,
-            sim_time_s: self.time_s(row.step),
+            sim_time_s: self.recording.time_s(row.step),
             flags: frame_flag::REPLAY,
             publish_monotonic_ns: now_ns,
             particles: &self.state.particles,
@@ -289,13 +295,9 @@ impl<'a> Player<'a> {
         self.shown.show(self.sinks, state);
     }
 
-    fn time_s(&self, step: u64) -> f64 {
-        step as f64 / f64::from(self.recording.tape.run().rate_hz)
-    }
-
     /// Answers the applied commands. The state on show has their effect.
     fn publish_answers(&mut self) {
-        for (client, mut outcome) in self.answers.drain(..) {
+        for Answer { client, mut outcome } in self.answers.drain(..) {
             outcome.step = Some(self.state.row.step);
             if outcome.id.is_some() {
                 self.sinks.publish(&Update::Answer { client, outcome: &outcome });
@@ -312,47 +314,15 @@ impl<'a> Player<'a> {
     }
 
     fn publish_timeline(&self) {
-        let tape = &self.recording.tape;
-        let timeline = Timeline {
-            file: self.recording.file.clone(),
-            scene: tape.run().scene_name.clone(),
-            rate_hz: tape.run().rate_hz,
-            first_step: tape.first_step(),
-            last_step: tape.last_step(),
-            first_time_s: self.time_s(tape.first_step()),
-            last_time_s: self.time_s(tape.last_step()),
-            marks: self.report.marks.clone(),
-            hashes: self.report.hashes,
-            hash_text: self.report.hash_text.clone(),
-        };
+        let timeline = texts::timeline(self.recording, &self.report);
         self.sinks.publish(&Update::Timeline(&timeline));
     }
 
     fn publish_playback(&mut self) {
         self.is_playback_changed = false;
-        let (playhead, step) = (&self.playhead, self.state.row.step);
-        let playback = Playback {
-            is_playing: playhead.is_playing,
-            rate: playhead.rate,
-            is_looping: playhead.is_looping,
-            step,
-            time_s: self.time_s(step),
-        };
+        let playback = texts::playback(self.recording, &self.playhead, self.state.row.step);
         self.sinks.publish(&Update::Playback(&playback));
-        let run = self.recording.tape.run();
-        let node = Node {
-            state: NodeState::Alive,
-            text: String::new(),
-            run_id: Some(format!("{:016x}", run.run_id)),
-            scene: Some(run.scene_name.clone()),
-            method: Some(self.recording.load.method()),
-            rate_hz: run.rate_hz,
-            is_paused: !playhead.is_playing,
-            is_replay: true,
-            time_scale: f64::from(playhead.rate),
-            process_id: None,
-        };
-        self.sinks.publish(&Update::Node(&node));
+        self.sinks.publish(&Update::Node(&texts::node(self.recording, &self.playhead)));
         self.publish_parameters();
     }
 
