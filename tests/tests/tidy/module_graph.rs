@@ -14,7 +14,7 @@ type ModulePath = Vec<String>;
 
 /// Returns the groups of files under a `src` folder that use each other in a circle. Each group is
 /// ascending.
-pub fn circles(src: &Path) -> Vec<Vec<String>> {
+pub(crate) fn circles(src: &Path) -> Vec<Vec<String>> {
     let modules = modules(src);
     let mut graph = BTreeMap::new();
     for (module, file) in &modules {
