@@ -28,19 +28,18 @@ const LINES_MAX: usize = 500;
 const FOLDER_FILES_MAX: usize = 14;
 
 /// Folders with more source files than that.
-const CROWDED_FOLDERS: &[&str] = &["recorder/src", "sim-node/contract/src", "sim-node/solver/src"];
+const CROWDED_FOLDERS: &[&str] =
 
 /// Words that do not begin a doc comment. It begins with a noun phrase or a third-person verb.
 const OPENINGS: [&str; 5] = ["What", "How", "Whether", "Who", "That"];
 
 /// Phrases that a native engineer would not write, in lower case. A bar in each keeps this table from
-/// matching itself; a space at the end or the beginning limits the phrase to whole words.
+/// matching itself.
 const PHRASES: &[&str] = &[
     "who|ever",
     "who comes l|ate",
     "so m|any",
-    "no n|umber ",
-    "is no n|umber",
+    "no n|umber",
     "other o|nes",
     "that there is n|ot",
     "is none o|f",
@@ -51,11 +50,11 @@ const PHRASES: &[&str] = &[
     "gives b|ack",
     "worked o|ut",
     "works o|ut",
-    "is t|old ",
-    "are t|old ",
+    "is t|old",
+    "are t|old",
     "it is s|aid",
-    "has w|hat ",
-    "have w|hat ",
+    "has w|hat",
+    "have w|hat",
     "any m|ore.",
     "for e|ver",
     "in v|ain",
@@ -81,7 +80,10 @@ const PHRASES: &[&str] = &[
 const UNCHECKED: &[&str] = &[
     "ARCHITECTURE.md",
     "CHANGELOG.md",
-    "recorder",
+    "recorder/src/commands",
+    "recorder/src/input",
+    "recorder/src/log",
+    "recorder/tests",
     "sim-node/contract/src",
     "sim-node/contract/tests",
     "sim-node/lessons",
@@ -182,15 +184,13 @@ impl Prose {
         Self { text, starts }
     }
 
-    /// Returns the numbers of the lines on which a phrase begins, at the start of a word.
+    /// Returns the numbers of the lines on which a phrase of whole words begins.
     fn lines_with(&self, phrase: &str) -> Vec<usize> {
+        let is_word = |at: char| at.is_alphanumeric() || at == '_';
         let matches = self.text.match_indices(phrase).map(|(offset, _)| offset);
-        let is_word_start = |offset: &usize| {
-            !self.text[..*offset]
-                .ends_with(|before: char| before.is_alphanumeric() || before == '_')
-        };
         matches
-            .filter(is_word_start)
+            .filter(|offset| !self.text[..*offset].ends_with(is_word))
+            .filter(|offset| !self.text[offset + phrase.len()..].starts_with(is_word))
             .map(|offset| self.starts.partition_point(|start| *start <= offset))
             .collect()
     }
@@ -245,6 +245,6 @@ fn prose_avoids_banned_openings_and_phrases() {
 fn the_prose_check_finds_faults() {
     let content = "/// What it is.\n/// How it is.\nfn a() {}\n    //! Who.\n/** That. */\n";
     assert_eq!(lines_with_openings(content), [1, 4, 5]);
-    let prose = Prose::new("one\n// Two three\n// four xthree four\n");
+    let prose = Prose::new("one\n// Two three\n// four, xthree four, three fours\n");
     assert_eq!(prose.lines_with("three four"), [2]);
 }

@@ -1,8 +1,9 @@
-//! Everything that an owner publishes, for a recorder.
+//! The tap: reads everything that an owner publishes.
 
 use std::time::Duration;
 
-use crate::client::state::{Change, State, StateAssembler};
+use crate::client::change::Change;
+use crate::client::state::{State, StateAssembler};
 use crate::client::views::Snapshot;
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
@@ -24,10 +25,11 @@ use crate::ports::services::{AttachError, Attachment};
 use crate::ports::session::Session;
 use crate::ports::wake::WakeListener;
 
-/// Times that every service is read for one state: each read takes at most one buffer.
+/// Most reads of every service for one state. Each read receives at most one buffer.
 const READS_MAX: usize = 8;
 
-/// Reads everything that an owner publishes. The particles are not copied.
+/// Reads everything that an owner publishes, as a sequence of coherent states. The particles are not
+/// copied.
 #[derive(Debug)]
 pub struct Tap {
     listener: WakeListener,
@@ -45,16 +47,17 @@ pub struct Tap {
     /// The snapshot of the newest state.
     held: Option<SliceSample<ParticleState, SnapshotHeader>>,
     errors: Vec<ReadError>,
-    // Services and node go last.
+    // Dropped last: the ports belong to its services and its node.
     attachment: Attachment,
 }
 
 impl Tap {
-    /// Attaches to a running simulation. It subscribes to the outcomes first and to the particles
-    /// last, so that nothing which a snapshot builds on is missed.
+    /// Attaches to a running simulation. Subscribes to the outcomes first and to the particles last, so
+    /// that it misses no message that belongs to a snapshot.
     ///
     /// # Errors
-    /// No simulation runs there, one of another version of the contract, or no place is left.
+    /// No simulation runs there, it has another version of the contract, or a service has no place for
+    /// another reader.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
         let attachment = Attachment::open(Session::join(endpoint)?)?;
         Ok(Self::subscribe(attachment)?)
@@ -82,25 +85,26 @@ impl Tap {
         })
     }
 
-    /// Returns the oldest state that was not read, with everything that belongs to it; `None` if all
-    /// were read. A reader more than [`crate::SNAPSHOTS_BUFFERED`] states behind misses some.
+    /// Returns the oldest unread state with everything that belongs to it; `None` if all were read. A
+    /// reader more than [`crate::SNAPSHOTS_BUFFERED`] states behind misses some.
     ///
-    /// `on_message` receives every other message as it arrives, before its state if that has not
-    /// been published: outcomes and statuses of a paused node, for example.
+    /// `on_message` receives every other message as it arrives. A message can arrive before its state
+    /// is published, such as an outcome of a paused node.
     pub fn next_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
         let arrived = self.particles.next();
         self.assemble(arrived, on_message)
     }
 
-    /// Returns the newest state and skips those before it; `None` if all were read. The changes are
-    /// those since the last state that was returned. `on_message` as in [`Tap::next_state`].
+    /// Returns the newest unread state and skips those before it; `None` if all were read. Its changes
+    /// are all changes since the last returned state. `on_message` is the same as in
+    /// [`Tap::next_state`].
     pub fn latest_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
         let arrived = self.particles.newest();
         self.assemble(arrived, on_message)
     }
 
-    /// An owner publishes the particles of a step last. So once a snapshot is there, the messages
-    /// that belong to it can be read.
+    /// Reads the messages up to a snapshot and assembles its state. An owner publishes the particles of
+    /// a step last, so the messages that belong to a snapshot have arrived before it.
     fn assemble(
         &mut self,
         arrived: Result<Option<SliceSample<ParticleState, SnapshotHeader>>, ReadError>,
@@ -129,18 +133,17 @@ impl Tap {
         self.assembler.assemble(sample.user_header(), sample.payload())
     }
 
-    /// Changes that have arrived and belong to no state yet, such as those of a paused node. They
-    /// are not returned again.
+    /// Removes and returns the changes that belong to no state yet, such as those of a paused node.
     pub fn drain_pending_changes(&mut self) -> Vec<Change> {
-        self.assembler.take_waiting()
+        self.assembler.drain_pending()
     }
 
-    /// Errors of messages that were dropped since the last call.
+    /// Removes and returns the errors of messages that could not be read.
     pub fn drain_errors(&mut self) -> Vec<ReadError> {
         std::mem::take(&mut self.errors)
     }
 
-    /// Number of changes that were dropped because their state did not arrive.
+    /// Returns the number of changes that were dropped because their state did not arrive.
     pub fn lost_change_count(&self) -> u64 {
         self.assembler.lost_count()
     }
@@ -185,14 +188,14 @@ impl Tap {
         drained
     }
 
-    /// Waits until the owner wakes its readers, a signal comes, or `timeout` has passed. What
-    /// happened since the last wait ends it at once.
+    /// Waits until the owner wakes its readers, a signal arrives, or `timeout` has passed. An event since
+    /// the last wait ends it at once.
     pub fn wait(&self, timeout: Duration) {
         self.listener.wait(timeout);
     }
 
-    /// Whether the process that owns the name is alive. Looks into the file system: meant for a
-    /// few calls per second.
+    /// Returns `true` if the process that owns the name is alive. Reads the file system: call it a few
+    /// times per second at most.
     pub fn is_owner_alive(&self) -> bool {
         self.attachment.owner().is_some()
     }

@@ -13,7 +13,7 @@ use sim_types::TearCause;
 pub struct TearsHeader {
     /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// Step that the list belongs to: the newest tear, or the load or reset that emptied it.
+    /// Step of the newest tear, or of the load or reset that emptied the list.
     pub step: u64,
     /// Step of the load or reset that the list begins after. Lists with the same `since_step`
     /// continue each other.

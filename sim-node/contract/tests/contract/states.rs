@@ -1,6 +1,6 @@
-//! A tap puts states together: each snapshot comes with the load, tears, colliders, parameters and
-//! outcomes up to it. The owner acts in the test's own thread, so everything is there when it is
-//! read.
+//! A tap assembles states: each snapshot comes with the load, tears, colliders, parameters and
+//! outcomes up to it. The owner acts in the test's own thread, so all messages have arrived when the
+//! tap reads them.
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
@@ -15,7 +15,7 @@ use crate::support::{
 const CUT: TornConstraint = TornConstraint { constraint: 2, cause: TearCause::Cut as u32 };
 
 #[test]
-fn a_state_has_everything_that_was_published_up_to_it() {
+fn a_state_contains_all_messages_up_to_it() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut tap = Tap::attach(&domain.endpoint()).unwrap();
@@ -55,7 +55,7 @@ fn a_state_has_everything_that_was_published_up_to_it() {
 }
 
 #[test]
-fn outcomes_of_a_waiting_node_are_shown_at_once_and_belong_to_its_next_state() {
+fn outcomes_of_a_paused_node_arrive_at_once_and_belong_to_its_next_state() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut tap = Tap::attach(&domain.endpoint()).unwrap();
@@ -63,14 +63,14 @@ fn outcomes_of_a_waiting_node_are_shown_at_once_and_belong_to_its_next_state() {
     let command = Command::new(3, 0, Action::Pause);
     let outcome = Outcome { run_id: RUN_ID, ..Outcome::new(0, 1, command, Ok(())) };
     owner.publish_outcome(&outcome).unwrap();
-    let mut seen = Vec::new();
+    let mut outcomes = Vec::new();
     let state = tap.next_state(|message| {
         if let Update::Outcome(outcome) = message {
-            seen.push(**outcome);
+            outcomes.push(**outcome);
         }
     });
     assert!(state.is_none());
-    assert_eq!(seen, [outcome]);
+    assert_eq!(outcomes, [outcome]);
     let header = sim_contract::SnapshotHeader { topology_revision: 1, ..snapshot_header(1) };
     owner.publish_particles(&header, |index| particle(1, index)).unwrap();
     let state = tap.latest_state(|_| {}).unwrap();
@@ -78,7 +78,7 @@ fn outcomes_of_a_waiting_node_are_shown_at_once_and_belong_to_its_next_state() {
 }
 
 #[test]
-fn the_newest_state_brings_the_changes_of_those_that_were_skipped() {
+fn the_newest_state_contains_the_changes_of_skipped_states() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut tap = Tap::attach(&domain.endpoint()).unwrap();

@@ -1,5 +1,4 @@
 //! The recorder refuses bad input: files that are not recordings, missing nodes, invalid options.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Finished, Process, Program, Sandbox};
 

@@ -1,6 +1,5 @@
 //! The number of threads does not affect a simulation: recordings are equal byte for byte, and a
 //! recording made with one thread verifies with two.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::Path;
 

@@ -1,6 +1,5 @@
 //! Tears, colliders and a load in recordings of a live node: a late recorder records the state before
 //! it attached, the file ends with the load, and a recording of its playback has the same rows.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::Path;
 
