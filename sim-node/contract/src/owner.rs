@@ -224,8 +224,8 @@ impl Owner {
     /// Sends the latched messages to readers that joined since the last call, and wakes them. Cheap:
     /// call it every step, and while paused.
     pub fn refresh(&self) {
-        let readers = self.all_reader_count();
-        if readers != self.last_reader_count.replace(readers) {
+        let reader_count = self.total_reader_count();
+        if reader_count != self.last_reader_count.replace(reader_count) {
             self.wakes_due.set(WAKES_PER_READER);
         }
         self.outcomes.refresh();
@@ -242,7 +242,7 @@ impl Owner {
         self.wake.wake(event);
     }
 
-    fn all_reader_count(&self) -> usize {
+    fn total_reader_count(&self) -> usize {
         let services = &self.services;
         reader_count(&services.particles)
             + reader_count(&services.keyframe)

@@ -7,9 +7,9 @@ pub struct ParticleFlags;
 impl ParticleFlags {
     /// Held in place.
     pub const PINNED: u32 = 1;
-    /// Driven to a client's target.
+    /// Moved to a client's target.
     pub const GRABBED: u32 = 1 << 1;
-    /// Driven by an anchor's motion.
+    /// Moved by an anchor.
     pub const ANCHORED: u32 = 1 << 2;
     /// Excluded from the simulation because its state was not finite.
     pub const FROZEN: u32 = 1 << 3;

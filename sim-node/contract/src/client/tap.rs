@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use crate::client::change::Change;
 use crate::client::state::{State, StateAssembler};
-use crate::client::views::Snapshot;
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -148,8 +147,8 @@ impl Tap {
         self.assembler.lost_count()
     }
 
-    /// Shows the snapshots that have come to `sink`, oldest first, at most
-    /// [`crate::SNAPSHOTS_BUFFERED`]. A malformed one is dropped, and named in the result.
+    /// Passes at most [`crate::SNAPSHOTS_BUFFERED`] unread snapshots to `sink`, oldest first. Drops
+    /// malformed snapshots and returns their errors.
     pub fn drain_particles(
         &mut self,
         sink: impl FnMut(&SnapshotHeader, &[ParticleState]),
@@ -159,32 +158,22 @@ impl Tap {
         drained
     }
 
-    /// The newest snapshot that has come, if any has since the last call; those before it are
-    /// skipped. For those who cannot use every one; beside [`Tap::drain_particles`], each snapshot
-    /// goes to the one that is called first.
-    ///
-    /// # Errors
-    /// More than [`crate::BORROWED_SAMPLES_MAX`] snapshots are held, or a malformed one came.
-    pub fn latest_snapshot(&mut self) -> Result<Option<Snapshot>, ReadError> {
-        Ok(self.particles.newest()?.map(Snapshot))
-    }
-
-    /// Shows everything else that has come to `sink`, each kind oldest first and at most one buffer
-    /// of it. Malformed messages are dropped, and named in the result.
+    /// Passes the unread messages of all other services to `sink`: at most one buffer of each service,
+    /// oldest first. Drops malformed messages and returns their errors.
     pub fn drain_updates(&mut self, mut sink: impl FnMut(Update<'_>)) -> Drained {
         let mut drained = Drained::default();
-        let all = &mut drained;
-        self.scene.drain(all, |header, bytes| sink(Update::Scene(header, bytes)));
-        self.topology.drain(all, |header, items| sink(Update::Topology(header, items)));
-        self.surface.drain(all, |header, items| sink(Update::Surface(header, items)));
-        self.colliders.drain(all, |header, items| sink(Update::Colliders(header, items)));
-        self.tears.drain(all, |header, items| sink(Update::Tears(header, items)));
-        self.parameters.drain(all, |header, states| {
+        let result = &mut drained;
+        self.scene.drain(result, |header, bytes| sink(Update::Scene(header, bytes)));
+        self.topology.drain(result, |header, items| sink(Update::Topology(header, items)));
+        self.surface.drain(result, |header, items| sink(Update::Surface(header, items)));
+        self.colliders.drain(result, |header, items| sink(Update::Colliders(header, items)));
+        self.tears.drain(result, |header, items| sink(Update::Tears(header, items)));
+        self.parameters.drain(result, |header, states| {
             sink(Update::Parameters(header, &to_values(states)));
         });
-        self.keyframe.drain(all, |header, bytes| sink(Update::Keyframe(header, bytes)));
-        self.outcomes.drain(all, |outcome| sink(Update::Outcome(outcome)));
-        self.status.drain(all, |status| sink(Update::Status(status)));
+        self.keyframe.drain(result, |header, bytes| sink(Update::Keyframe(header, bytes)));
+        self.outcomes.drain(result, |outcome| sink(Update::Outcome(outcome)));
+        self.status.drain(result, |status| sink(Update::Status(status)));
         drained
     }
 

@@ -5,7 +5,8 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use sim_types::{Action, KindFilter, ParameterValue, Text};
 
-/// Client id of every `sim-node ctl`, so that one call can release a particle that another grabbed.
+/// Client id of every `sim-node ctl`, so that one call can release a particle that
+/// another call grabbed.
 pub const CONSOLE_CLIENT_ID: u64 = 0;
 
 /// A command: 256 bytes, alignment 8. Written by clients, read by the owner of the name; also part

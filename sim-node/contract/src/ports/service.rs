@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn the_service_names_and_qualities_of_service_are_frozen() {
-        let all = [
+        let specs = [
             &PARTICLES,
             &KEYFRAME,
             &TOPOLOGY,
@@ -338,7 +338,7 @@ mod tests {
             &WAKE,
         ];
         let mut text = String::new();
-        for spec in all {
+        for spec in specs {
             let ServiceSpec { pattern, publishers_max, readers_max, history, .. } = spec;
             let ServiceSpec { buffered, when_full, .. } = spec;
             writeln!(

@@ -141,7 +141,7 @@ impl Session {
 
     /// Waits a moment for a process that is creating or removing a service.
     pub(crate) fn pause(&self) {
-        // A signal may end the pause early, which only brings the next attempt forward.
+        // A signal may end the pause early, so the next attempt is earlier.
         let _ = self.node.wait(RETRY_PAUSE);
     }
 

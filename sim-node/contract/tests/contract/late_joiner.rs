@@ -55,36 +55,27 @@ fn a_late_tap_receives_every_kind_of_message() {
     assert_eq!((owner.reader_count(), owner.keyframe_reader_count()), (1, 1));
     owner.refresh();
     tap.wait(DEADLINE);
-    let mut steps = Vec::new();
-    let count = tap
-        .drain_particles(|header, particles| {
-            assert_eq!(particles[2], particle(header.step, 2));
-            steps.push(header.step);
-        })
-        .count;
-    assert_eq!((count, steps), (1, vec![5]));
-
     let cut = TornConstraint::new(2, Some(TearCause::Cut));
     let mut kinds = Vec::new();
-    let count = tap
-        .drain_updates(|update| {
-            kinds.push(match update {
-                Update::Scene(_, text) if text == SCENE.as_bytes() => "scene",
-                Update::Topology(_, list) if list == constraints() => "topology",
-                Update::Surface(_, list) if list == triangles() => "surface",
-                Update::Colliders(header, list) if list == colliders(header.step) => "colliders",
-                Update::Tears(header, [torn]) if header.count == 1 && *torn == cut => "tears",
-                Update::Parameters(_, values) if *values == parameters(5) => "parameters",
-                Update::Keyframe(header, b"keyframe") if header.size_bytes == 8 => "keyframe",
-                Update::Status(status) if status.step == 5 => "status",
-                update => panic!("{update:?}"),
-            });
-        })
-        .count;
+    let state = tap.next_state(|message| {
+        kinds.push(match *message {
+            Update::Scene(_, text) if text == SCENE.as_bytes() => "scene",
+            Update::Topology(_, list) if list == constraints() => "topology",
+            Update::Surface(_, list) if list == triangles() => "surface",
+            Update::Colliders(header, list) if list == colliders(header.step) => "colliders",
+            Update::Tears(header, [torn]) if header.count == 1 && *torn == cut => "tears",
+            Update::Parameters(_, values) if *values == parameters(5) => "parameters",
+            Update::Keyframe(header, b"keyframe") if header.size_bytes == 8 => "keyframe",
+            Update::Status(status) if status.step == 5 => "status",
+            update => panic!("{update:?}"),
+        });
+    });
+    let state = state.unwrap();
+    assert_eq!((state.header.step, state.particles[2]), (5, particle(5, 2)));
     let expected =
         ["scene", "topology", "surface", "colliders", "tears", "parameters", "keyframe", "status"];
     assert_eq!(kinds, expected);
-    assert_eq!(count, kinds.len());
+    assert!(tap.next_state(|_| {}).is_none());
 }
 
 #[test]

@@ -51,8 +51,12 @@ fn publish_new_step(owner: &Owner, step: u64) {
 }
 
 fn publish_new_particles(owner: &Owner, step: u64) {
-    let header =
-        SnapshotHeader { particle_count: NEW_COUNT, topology_revision: 2, ..snapshot_header(step) };
+    let header = SnapshotHeader {
+        particle_count: NEW_COUNT,
+        topology_revision: 2,
+        torn_count: 1,
+        ..snapshot_header(step)
+    };
     owner.publish_particles(&header, |_| ParticleState::default()).unwrap();
     owner.wake(Wake::Frame);
     owner.refresh();
@@ -138,21 +142,25 @@ fn a_tap_sees_both_loads_in_their_order() {
     publish_everything(&owner, 5);
     load(&mut owner);
     publish_new_step(&owner, 6);
-    let mut steps = Vec::new();
-    tap.drain_particles(|header, all| steps.push((header.step, all.len())));
-    assert_eq!(steps, [(5, 4), (6, 9)]);
-    let (mut scenes, mut tears) = (Vec::new(), Vec::new());
-    let drained = tap.drain_updates(|update| match update {
-        Update::Scene(_, text) => scenes.push(text.to_vec()),
-        Update::Tears(header, torn) => {
-            tears.push((header.step, torn.iter().map(|torn| torn.constraint).collect::<Vec<_>>()));
+    let indices = |list: &[TornConstraint]| list.iter().map(|torn| torn.constraint).collect();
+    let mut tears: Vec<(u64, Vec<u32>)> = Vec::new();
+    let first = tap.next_state(|message| {
+        if let Update::Tears(header, list) = message {
+            tears.push((header.step, indices(list)));
         }
-        _ => {}
     });
-    assert!(drained.errors.is_empty());
-    assert_eq!(scenes, [SCENE.as_bytes(), NEW_SCENE.as_bytes()]);
+    let first = first.unwrap();
+    assert_eq!((first.header.step, first.particles.len()), (5, 4));
+    assert_eq!((first.load.scene.as_slice(), first.torn[0].constraint), (SCENE.as_bytes(), 2));
     // Each load begins with an empty list.
     assert_eq!(tears, [(0, vec![]), (5, vec![2]), (6, vec![]), (6, vec![7])]);
+    let second = tap.next_state(|_| {}).unwrap();
+    assert_eq!((second.header.step, second.particles.len()), (6, 9));
+    assert_eq!(
+        (second.load.scene.as_slice(), second.torn[0].constraint),
+        (NEW_SCENE.as_bytes(), 7)
+    );
+    assert!(tap.next_state(|_| {}).is_none() && tap.drain_errors().is_empty());
 }
 
 #[test]
@@ -164,10 +172,9 @@ fn a_late_reader_receives_nothing_of_the_old_load() {
     let mut early = Tap::attach(&domain.endpoint()).unwrap();
     owner.refresh();
     // Before its first step, the new load has a scene, and no message of the old load is left.
-    assert_eq!(early.drain_particles(|header, _| panic!("step {}", header.step)).count, 0);
     let mut kinds = Vec::new();
-    early.drain_updates(|update| {
-        kinds.push(match update {
+    let state = early.next_state(|message| {
+        kinds.push(match *message {
             Update::Scene(_, text) if text == NEW_SCENE.as_bytes() => "scene",
             Update::Topology(header, _) if header.topology_revision == 2 => "topology",
             Update::Surface(header, _) if header.topology_revision == 2 => "surface",
@@ -177,6 +184,7 @@ fn a_late_reader_receives_nothing_of_the_old_load() {
             update => panic!("{update:?}"),
         });
     });
+    assert!(state.is_none());
     assert_eq!(kinds, ["scene", "topology", "surface", "tears", "parameters", "status"]);
 
     publish_new_step(&owner, 6);

@@ -20,7 +20,9 @@ fn a_reader_that_never_reads_does_not_block_the_owner() {
         publish_everything(&owner, step);
     }
     let mut steps = Vec::new();
-    tap.drain_particles(|header, _| steps.push(header.step));
+    while let Some(state) = tap.next_state(|_| {}) {
+        steps.push(state.header.step);
+    }
     assert_eq!(steps, (9936..10_000).collect::<Vec<_>>());
 }
 

@@ -61,6 +61,7 @@ pub(crate) fn snapshot_header(step: u64) -> SnapshotHeader {
         contract_version: CONTRACT_VERSION,
         run_id: RUN_ID,
         step,
+        topology_revision: 1,
         particle_count: PARTICLE_COUNT,
         ..SnapshotHeader::default()
     }
@@ -73,8 +74,11 @@ pub(crate) fn particle(step: u64, index: usize) -> ParticleState {
 }
 
 pub(crate) fn publish_step(owner: &Owner, step: u64) {
-    let header = snapshot_header(step);
-    owner.publish_particles(&header, |index| particle(step, index)).unwrap();
+    publish_snapshot(owner, &snapshot_header(step));
+}
+
+fn publish_snapshot(owner: &Owner, header: &SnapshotHeader) {
+    owner.publish_particles(header, |index| particle(header.step, index)).unwrap();
     owner.wake(Wake::Frame);
     owner.refresh();
 }
@@ -105,7 +109,7 @@ pub(crate) fn publish_everything(owner: &Owner, step: u64) {
     let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0 };
     owner.publish_keyframe(keyframe, b"keyframe").unwrap();
     owner.publish_status(&NodeStatus { step, ..NodeStatus::default() }).unwrap();
-    publish_step(owner, step);
+    publish_snapshot(owner, &SnapshotHeader { torn_count: 1, ..snapshot_header(step) });
 }
 
 /// Answers the received commands: applies `pin` at `step`, and rejects all others.
