@@ -23,6 +23,7 @@ use sim_solver::{Keyframe, Solver};
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
 use crate::cli::output;
+use crate::cli::parse::{self, whole_number};
 use crate::input::scene_source::scene_in_recording;
 use control::Control;
 use pace::Pace;
@@ -50,35 +51,35 @@ pub(crate) struct PlayArgs {
     #[command(flatten)]
     endpoint: EndpointArgs,
     /// Simulated time per wall-clock time, above 0 to 1000; pauses of the recorded run are left out
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = rate)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_hyphen_values = true, value_parser = rate)]
     rate: f64,
     /// Start again at the end, as a new run [default: end]
     #[arg(long = "loop")]
     loops: bool,
     /// Start this much simulated time after the first snapshot, such as 2s or 500ms [default: 0s]
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration)]
     start: Option<Duration>,
     /// End this much simulated time after the first snapshot [default: the end of the recording]
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration)]
     end: Option<Duration>,
     /// Wait with the first snapshot for `ctl resume` or `ctl step` [default: go on]
     #[arg(long)]
     paused: bool,
     /// Wait for this many readers before the first snapshot
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    wait_for_readers: usize,
+    #[arg(long, value_name = "N", default_value_t = 0, allow_hyphen_values = true, value_parser = whole_number)]
+    wait_for_readers: u64,
 }
 
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate) if rate > 0.0 && rate <= 1000.0 => Ok(rate),
-        _ => Err("not a number above 0 and up to 1000".to_owned()),
+        _ => Err("expected a number above 0 and up to 1000".to_owned()),
     }
 }
 
 pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
-    let endpoint = args.endpoint.endpoint()?;
+    let endpoint = args.endpoint.endpoint();
     let path = output::path_text(&args.file);
     if args.end.is_some_and(|end| end < args.start.unwrap_or_default()) {
         let problem = "--end is before --start: nothing would be played\n";
@@ -126,7 +127,7 @@ impl Pass {
     fn open(args: &PlayArgs, endpoint: &Endpoint) -> anyhow::Result<Self> {
         let log = LogReader::open(&args.file)?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
-        let mut solver = Solver::new(&scene_in_recording(&log, &output::path_text(&args.file))?);
+        let mut solver = Solver::new(&scene_in_recording(&log)?);
         let mut frames = FrameReader::new(log);
         let mut first = next_frame(&mut frames)?;
         let (topology, surface) = load_of(&first)?;
@@ -155,7 +156,7 @@ impl Pass {
     }
 
     /// Plays to the end, or until asked to stop. How the file ends, if its end was reached.
-    fn play(&mut self, readers: usize, stop: &Stop) -> anyhow::Result<Option<LogEnd>> {
+    fn play(&mut self, readers: u64, stop: &Stop) -> anyhow::Result<Option<LogEnd>> {
         let first_step = self.first.row.step;
         self.wait_for_readers(readers, first_step, stop)?;
         self.replay.publish_latched(first_step)?;
@@ -175,8 +176,8 @@ impl Pass {
         Ok(self.frames.end().cloned())
     }
 
-    fn wait_for_readers(&mut self, count: usize, step: u64, stop: &Stop) -> anyhow::Result<()> {
-        while self.replay.reader_count() < count && !stop.is_asked() {
+    fn wait_for_readers(&mut self, count: u64, step: u64, stop: &Stop) -> anyhow::Result<()> {
+        while (self.replay.reader_count() as u64) < count && !stop.is_asked() {
             self.attend(step)?;
             sleep_until(monotonic_ns() + WAIT_MAX_NS);
         }

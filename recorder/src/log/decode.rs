@@ -55,5 +55,49 @@ pub(super) fn decode_message(
 }
 
 fn row<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
-    serde_json::from_slice(data).map_err(|error| error.to_string())
+    serde_json::from_slice(data).map_err(|error| without_type_names(&error.to_string()))
+}
+
+/// Removes the names of internal types from an error of serde.
+fn without_type_names(error: &str) -> String {
+    if let Some((before, _)) = error.split_once("data did not match any variant") {
+        let position = error.rsplit_once(" at line").map_or("", |(_, position)| position);
+        return format!("{before}a value has the wrong type at line{position}");
+    }
+    let mut text = String::new();
+    let mut words = error.split(' ');
+    while let Some(word) = words.next() {
+        if !text.is_empty() {
+            text.push(' ');
+        }
+        if matches!(word, "struct" | "enum") {
+            // The next word is the name of the type.
+            words.next();
+            text.push_str("an object");
+        } else {
+            text.push_str(word);
+        }
+    }
+    text.replace("tuple an object", "an array")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::rows::{OutcomeRow, StepRow, TopologyRow};
+
+    #[test]
+    fn errors_do_not_name_internal_types() {
+        let errors = [
+            row::<StepRow>(b"7").unwrap_err(),
+            row::<StepRow>(b"{\"step\":\"x\"}").unwrap_err(),
+            row::<StepRow>(b"{").unwrap_err(),
+            row::<TopologyRow>(b"[]").unwrap_err(),
+            row::<OutcomeRow>(
+                br#"{"step":1,"client_id":1,"sequence":1,"index":0,"kind":"set","parameter":"x","value":{},"status":"","reason":""}"#,
+            )
+            .unwrap_err(),
+        ];
+        insta::assert_snapshot!(errors.join("\n"), @"");
+    }
 }
