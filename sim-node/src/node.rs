@@ -160,7 +160,8 @@ impl Node {
         }
         self.solver.finish_boundary();
         self.pace.set_time_scale(self.progress.time_scale);
-        Ok(())
+        let time_scale = self.progress.time_scale;
+        self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
     }
 
     /// Takes another scene; the next step shows its initial state. The rate of a run stays. An error
@@ -174,7 +175,7 @@ impl Node {
             }
         };
         let solver = with_threads(Solver::new_in_run(&scene), self.options.threads);
-        match self.publisher.load(&scene, &solver, self.step + 1) {
+        match self.publisher.load(&scene, &solver, self.step + 1, self.progress.time_scale) {
             Err(error @ OwnerError::Publish(_)) => Err(error).context("publishing another scene"),
             Err(error) => {
                 self.warnings.say(&format!("load {source}: {error}"));

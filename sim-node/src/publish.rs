@@ -7,8 +7,8 @@ use bytemuck::cast;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus, Outcome,
-    Owner, OwnerError, ParticleState, Reason, SnapshotFlags, SnapshotHeader, StatusFlags,
-    TearsHeader, Wake,
+    Owner, OwnerError, ParameterValues, ParticleState, Reason, SnapshotFlags, SnapshotHeader,
+    StatusFlags, TearsHeader, TornConstraint, Wake,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
@@ -53,6 +53,8 @@ pub(crate) struct Publisher {
     outcomes: Vec<Outcome>,
     outcome_count: u64,
     rejected_count: u64,
+    /// The parameters that were published last.
+    parameters: ParameterValues,
     /// How many torn constraints, and which colliders, were published last.
     torn_count: usize,
     colliders: Vec<PlacedCollider>,
@@ -67,7 +69,8 @@ impl Publisher {
         every: u64,
     ) -> anyhow::Result<Self> {
         let run_id = getrandom::u64().context("no random number for the run")?;
-        let place = LoadPlace { run_id, step: 0, topology_revision: 0 };
+        let parameters = parameter_values(solver, 1.0);
+        let place = LoadPlace { run_id, step: 0, topology_revision: 0, parameters };
         let owner = with_load(scene, solver, place, |load| Owner::create(endpoint, load))?;
         Ok(Self {
             owner,
@@ -82,6 +85,7 @@ impl Publisher {
             outcomes: Vec::new(),
             outcome_count: 0,
             rejected_count: 0,
+            parameters,
             torn_count: 0,
             colliders: Vec::new(),
         })
@@ -96,10 +100,13 @@ impl Publisher {
         scene: &Scene,
         solver: &Solver,
         step: u64,
+        time_scale: f64,
     ) -> Result<(), OwnerError> {
         let topology_revision = self.topology_revision + 1;
-        let place = LoadPlace { run_id: self.run_id, step, topology_revision };
+        let parameters = parameter_values(solver, time_scale);
+        let place = LoadPlace { run_id: self.run_id, step, topology_revision, parameters };
         with_load(scene, solver, place, |load| self.owner.load(load))?;
+        self.parameters = parameters;
         self.topology_revision = topology_revision;
         self.torn_count = 0;
         self.colliders.clear();
@@ -168,16 +175,37 @@ impl Publisher {
             return Ok(());
         }
         self.torn_count = torn.len();
-        let causes: Vec<_> = solver.tear_causes().iter().map(|cause| *cause as u8).collect();
         let header = TearsHeader {
             run_id: self.run_id,
             step,
+            since_step: step - solver.scene_step(),
             new_count: count(new_count),
             ..TearsHeader::default()
         };
-        self.owner.publish_tears(header, torn, &causes)?;
+        let torn: Vec<_> = torn
+            .iter()
+            .zip(solver.tear_causes())
+            .map(|(constraint, cause)| TornConstraint::new(*constraint, Some(*cause)))
+            .collect();
+        self.owner.publish_tears(header, &torn)?;
         self.owner.wake(Wake::Tears);
         Ok(())
+    }
+
+    /// Publishes the parameters if they differ from the ones published last. `step` is the first
+    /// step that they apply to.
+    pub(crate) fn publish_parameters(
+        &mut self,
+        solver: &Solver,
+        step: u64,
+        time_scale: f64,
+    ) -> anyhow::Result<()> {
+        let values = parameter_values(solver, time_scale);
+        if values == self.parameters {
+            return Ok(());
+        }
+        self.parameters = values;
+        Ok(self.owner.publish_parameters(self.run_id, step, &values)?)
     }
 
     /// Publishes what can be published while the node waits: outcomes, and a keyframe of the last
@@ -248,6 +276,8 @@ impl Publisher {
             torn_count: count(solver.torn().len()),
             particle_count: count(solver.particle_count()),
             flags: if position.is_paused { SnapshotFlags::PAUSED } else { 0 },
+            stride: u32::try_from(self.every).unwrap_or(u32::MAX),
+            spare: 0,
         }
     }
 
@@ -299,6 +329,13 @@ impl Publisher {
         status.set_scene_name(&scene.name);
         status
     }
+}
+
+/// The parameters of a solver that a node steps at this pace.
+fn parameter_values(solver: &Solver, time_scale: f64) -> ParameterValues {
+    #[allow(clippy::cast_possible_truncation, reason = "`set` gave it as an f32")]
+    let time_scale = time_scale as f32;
+    ParameterValues { time_scale, ..solver.parameter_values() }
 }
 
 /// step / rate in nanoseconds, rounded down; whole seconds apart, so that nothing overflows.

@@ -35,7 +35,9 @@ class SnapshotHeader(ctypes.Structure):
         ]
         + [
             (name, ctypes.c_uint32)
-            for name in "topology_revision torn_count particle_count flags".split()
+            for name in (
+                "topology_revision torn_count particle_count flags stride spare"
+            ).split()
         ]
     )
 

@@ -172,7 +172,7 @@ fn a_late_subscriber_receives_tears_with_causes_and_colliders() {
     // The node published all of this before the reader attached.
     let mut client = attach(&sandbox);
     let torn = client.torn(DEADLINE).unwrap();
-    let torn: Vec<_> = torn.constraints.iter().map(|one| (one.constraint, one.cause)).collect();
+    let torn: Vec<_> = torn.constraints.iter().map(|one| (one.constraint, one.cause())).collect();
     assert_eq!(torn, [(40, Some(TearCause::Cut)), (7, Some(TearCause::Cut))]);
     let colliders = client.colliders(DEADLINE).unwrap().colliders;
     assert_eq!(colliders.len(), 2);

@@ -17,7 +17,7 @@ use recorder::{
     CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Endpoint, Stop, TearCause};
+use sim_contract::{Endpoint, Method, Stop, TearCause};
 use sim_solver::{Keyframe, Solver};
 
 use crate::cli::endpoint_args::EndpointArgs;
@@ -137,6 +137,11 @@ impl Pass {
         let start_ns = origin_ns.saturating_add(nanoseconds(args.start.unwrap_or_default()));
         let causes = causes_before(&mut solver, &first, &topology.torn);
         let mut position = Position::new(&topology.torn, causes);
+        position.method = Method::from_number(run.method).unwrap_or_default();
+        position.since_step = first.row.step.saturating_sub(first.row.scene_step);
+        if let Some(Ok(keyframe)) = first.own_keyframe().map(Keyframe::decode) {
+            position.parameters = keyframe.parameter_values(position.method);
+        }
         while run.time_of_step_ns(first.row.step) < start_ns {
             position.skip(&first.updates);
             first = next_frame(&mut frames).context("--start is behind its last snapshot")?;

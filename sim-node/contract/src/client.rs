@@ -3,18 +3,20 @@
 use std::time::Duration;
 
 use crate::latch::Latch;
+use crate::parameters::to_values;
 use crate::reader::{ReadError, SliceReader, ValueReader};
 use crate::request::{Commander, RequestError};
 use crate::service::{
-    COLLIDERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEAR_CAUSES, TEARS, TOPOLOGY,
+    COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::services::{AttachError, Attachment};
 use crate::session::Session;
 use crate::watch::Watch;
 use crate::{
     Action, CONSOLE_CLIENT_ID, ColliderState, Colliders, CollidersHeader, ConstraintState,
-    Endpoint, LoadHeader, NodeStatus, Outcome, ParticleState, Snapshot, SnapshotHeader, Surface,
-    TearsHeader, Topology, Torn, Triangle,
+    Endpoint, LoadHeader, NodeStatus, Outcome, ParameterState, Parameters, ParametersHeader,
+    ParticleState, Snapshot, SnapshotHeader, Surface, TearsHeader, Topology, Torn, TornConstraint,
+    Triangle,
 };
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
@@ -33,8 +35,8 @@ pub struct Client {
     topology: Option<Latch<ConstraintState, LoadHeader>>,
     surface: Option<Latch<Triangle, LoadHeader>>,
     scene: Option<Latch<u8, LoadHeader>>,
-    tears: Option<Latch<u32, TearsHeader>>,
-    tear_causes: Option<Latch<u8, TearsHeader>>,
+    tears: Option<Latch<TornConstraint, TearsHeader>>,
+    parameters: Option<Latch<ParameterState, ParametersHeader>>,
     colliders: Option<Latch<ColliderState, CollidersHeader>>,
     status: Option<ValueReader<NodeStatus>>,
     commander: Option<Commander>,
@@ -72,7 +74,7 @@ impl Client {
             surface: None,
             scene: None,
             tears: None,
-            tear_causes: None,
+            parameters: None,
             colliders: None,
             status: None,
             commander: None,
@@ -159,22 +161,30 @@ impl Client {
     /// # Errors
     /// As [`Client::topology`].
     pub fn torn(&mut self, timeout: Duration) -> Result<Torn, ReadError> {
-        let services = &self.attachment.services;
-        let tears = lazily(&mut self.tears, || Latch::create(&services.tears, &TEARS))?;
-        let causes =
-            lazily(&mut self.tear_causes, || Latch::create(&services.tear_causes, &TEAR_CAUSES))?;
-        let complete = self.watch.wait_for(&self.attachment, timeout, || {
-            // The causes of a list are published before it. So causes that belong to another list
-            // belong to the next one, which is about to come.
-            let (Some(torn), Some(causes)) = (tears.newest()?, causes.newest()?) else {
-                return Ok(None);
-            };
-            let (header, is_of) = (torn.user_header(), causes.user_header());
-            Ok((header == is_of).then(|| Torn::new(header, torn.payload(), causes.payload())))
+        let service = &self.attachment.services.tears;
+        let latch = lazily(&mut self.tears, || Latch::create(service, &TEARS))?;
+        let torn = self.watch.wait_for(&self.attachment, timeout, || {
+            Ok(latch.newest()?.map(|sample| Torn {
+                header: *sample.user_header(),
+                constraints: sample.payload().to_vec(),
+            }))
         })?;
-        let without_causes =
-            || tears.held().map(|torn| Torn::new(torn.user_header(), torn.payload(), &[]));
-        Ok(complete.or_else(without_causes).unwrap_or_default())
+        Ok(torn.unwrap_or_default())
+    }
+
+    /// Returns the newest values of all parameters. Waits only if none were published yet.
+    ///
+    /// # Errors
+    /// As [`Client::topology`].
+    pub fn parameters(&mut self, timeout: Duration) -> Result<Option<Parameters>, ReadError> {
+        let service = &self.attachment.services.parameters;
+        let latch = lazily(&mut self.parameters, || Latch::create(service, &PARAMETERS))?;
+        self.watch.wait_for(&self.attachment, timeout, || {
+            Ok(latch.newest()?.map(|sample| Parameters {
+                header: *sample.user_header(),
+                values: to_values(sample.payload()),
+            }))
+        })
     }
 
     /// The colliders as they stand, each in its newest pose; waits only if they have never been

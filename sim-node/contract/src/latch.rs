@@ -28,9 +28,4 @@ impl<T: Debug + ZeroCopySend + 'static, H: Counted> Latch<T, H> {
         }
         Ok(self.held.as_ref())
     }
-
-    /// The message that was the newest when last looked for.
-    pub(crate) fn held(&self) -> Option<&SliceSample<T, H>> {
-        self.held.as_ref()
-    }
 }

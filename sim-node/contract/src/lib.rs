@@ -27,7 +27,8 @@
 //! | keyframe | bytes, [`KeyframeHeader`] | now and then: what particles lack of the state |
 //! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s, [`LoadHeader`] | once per load |
 //! | colliders | [`ColliderState`]s, [`CollidersHeader`] | per load, on change, each step while one moves |
-//! | tears, `tear_causes` | indices, [`TearCause`]s as bytes, [`TearsHeader`] | per load and on a tear: all of the load |
+//! | tears | [`TornConstraint`]s, [`TearsHeader`] | per load and on a tear: all since the load |
+//! | parameters | [`ParameterState`]s, [`ParametersHeader`] | per load and on a change: all values |
 //! | commands | [`Command`] | by clients |
 //! | outcomes | [`Outcome`] | for every command |
 //! | status | [`NodeStatus`] | ten times a second |
@@ -47,6 +48,7 @@ mod limits;
 mod load;
 mod outcome;
 mod owner;
+mod parameters;
 mod ports;
 mod reader;
 mod request;
@@ -73,6 +75,7 @@ pub use limits::*;
 pub use load::Load;
 pub use outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus};
 pub use owner::{Owner, OwnerError};
+pub use parameters::{ParameterState, ParametersHeader};
 pub use reader::{Drained, ReadError};
 pub use request::{OwnerSeen, RequestError};
 pub use service::ServiceError;
@@ -87,9 +90,9 @@ pub use snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use status::{NodeStatus, StatusFlags};
 pub use stop::Stop;
 pub use tap::{Tap, Update};
-pub use tears::TearsHeader;
+pub use tears::{TearsHeader, TornConstraint};
 pub use topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
-pub use views::{Colliders, Snapshot, Surface, Topology, Torn, TornConstraint};
+pub use views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
 pub use wake::Wake;
 pub use writer::PublishError;
 

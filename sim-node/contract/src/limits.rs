@@ -2,7 +2,7 @@
 
 /// Version of the layouts, service names and quality of service; a service attribute, checked by
 /// everyone who opens a service. It changes with any change of the bytes in shared memory.
-pub const CONTRACT_VERSION: u32 = 2;
+pub const CONTRACT_VERSION: u32 = 3;
 
 /// Most particles, and most constraints, of a scene (2^24: their indices are exact in f32).
 pub const ELEMENTS_MAX: usize = 1 << 24;

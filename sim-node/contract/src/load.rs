@@ -1,15 +1,17 @@
 //! What an owner publishes per load, and the writers whose sizes follow from it.
 
 use crate::service::{
-    COLLIDERS, KEYFRAME, PARTICLES, ServiceError, ServiceSpec, TEAR_CAUSES, TEARS,
+    COLLIDERS, KEYFRAME, PARAMETERS, PARTICLES, ServiceError, ServiceSpec, TEARS,
 };
 use crate::services::Services;
 use crate::writer::{Capacity, SliceWriter};
 use crate::{
     BORROWED_SAMPLES_MAX, COLLIDERS_MAX, ColliderState, CollidersHeader, ConstraintState,
-    ELEMENTS_MAX, KeyframeHeader, LoadHeader, OwnerError, ParticleState, PublishError,
-    SCENE_SIZE_BYTES_MAX, SNAPSHOTS_BUFFERED, SnapshotHeader, TearsHeader, Triangle,
+    ELEMENTS_MAX, KeyframeHeader, LoadHeader, OwnerError, ParameterState, ParametersHeader,
+    ParticleState, PublishError, SCENE_SIZE_BYTES_MAX, SNAPSHOTS_BUFFERED, SnapshotHeader,
+    TearsHeader, TornConstraint, Triangle,
 };
+use sim_types::{ParameterValues, SETTINGS_COUNT};
 
 /// What an owner publishes once per load, and what the sizes of its messages follow from.
 #[derive(Debug, Clone, Copy)]
@@ -24,8 +26,10 @@ pub struct Load<'a> {
     pub triangles: &'a [Triangle],
     /// How many colliders there are, at most [`COLLIDERS_MAX`].
     pub collider_count: usize,
-    /// The longest keyframe of this load, in bytes.
+    /// Size of the longest keyframe of this load, in bytes.
     pub keyframe_size_bytes_max: usize,
+    /// Values of the parameters at the first step of this load.
+    pub parameters: ParameterValues,
 }
 
 /// The writers that a load has for itself.
@@ -37,8 +41,8 @@ pub(crate) struct LoadWriters {
     scene: SliceWriter<u8, LoadHeader>,
     topology: SliceWriter<ConstraintState, LoadHeader>,
     surface: SliceWriter<Triangle, LoadHeader>,
-    tears: SliceWriter<u32, TearsHeader>,
-    tear_causes: SliceWriter<u8, TearsHeader>,
+    tears: SliceWriter<TornConstraint, TearsHeader>,
+    parameters: SliceWriter<ParameterState, ParametersHeader>,
     colliders: SliceWriter<ColliderState, CollidersHeader>,
 }
 
@@ -57,7 +61,10 @@ impl LoadWriters {
             topology: SliceWriter::create(&services.topology, single(links))?,
             surface: SliceWriter::create(&services.surface, single(load.triangles.len()))?,
             tears: SliceWriter::create(&services.tears, many(&TEARS, links))?,
-            tear_causes: SliceWriter::create(&services.tear_causes, many(&TEAR_CAUSES, links))?,
+            parameters: SliceWriter::create(
+                &services.parameters,
+                many(&PARAMETERS, SETTINGS_COUNT),
+            )?,
             colliders: SliceWriter::create(&services.colliders, colliders)?,
         })
     }
@@ -75,20 +82,31 @@ impl LoadWriters {
             let header = CollidersHeader { run_id, step, ..CollidersHeader::default() };
             self.publish_colliders(header, &[])?;
         }
-        self.publish_tears(TearsHeader { run_id, step, ..TearsHeader::default() }, &[], &[])
+        self.publish_parameters(run_id, step, &load.parameters)?;
+        self.publish_tears(
+            TearsHeader { run_id, step, since_step: step, ..TearsHeader::default() },
+            &[],
+        )
     }
 
-    /// The causes first: who has read a list finds them.
     pub(crate) fn publish_tears(
         &self,
         header: TearsHeader,
-        torn: &[u32],
-        causes: &[u8],
+        torn: &[TornConstraint],
     ) -> Result<(), PublishError> {
-        assert_eq!(torn.len(), causes.len(), "each torn constraint has a cause");
         let header = TearsHeader { count: count_of(torn), ..header };
-        self.tear_causes.write(header, |index| causes[index])?;
         self.tears.write(header, |index| torn[index])
+    }
+
+    pub(crate) fn publish_parameters(
+        &self,
+        run_id: u64,
+        step: u64,
+        values: &ParameterValues,
+    ) -> Result<(), PublishError> {
+        let settings = values.settings();
+        let header = ParametersHeader { run_id, step, count: count_of(&settings), spare: 0 };
+        self.parameters.write(header, |index| settings[index].into())
     }
 
     pub(crate) fn publish_colliders(
@@ -107,8 +125,8 @@ impl LoadWriters {
         self.topology.refresh();
         self.surface.refresh();
         self.colliders.refresh();
-        self.tear_causes.refresh();
         self.tears.refresh();
+        self.parameters.refresh();
         self.keyframe.refresh();
         self.particles.refresh();
     }

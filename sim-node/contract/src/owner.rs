@@ -18,7 +18,9 @@ use crate::writer::ValueWriter;
 use crate::{
     CLIENTS_MAX, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command, Endpoint,
     KeyframeHeader, NodeStatus, Outcome, ParticleState, PublishError, SnapshotHeader, TearsHeader,
+    TornConstraint,
 };
+use sim_types::ParameterValues;
 
 /// Why a name could not be taken, or a scene not be loaded.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -179,22 +181,30 @@ impl Owner {
         self.writers.keyframe.write(KeyframeHeader { size_bytes, ..header }, |index| bytes[index])
     }
 
-    /// Publishes all constraints torn since the load, in the order of tearing, and why: `causes`
-    /// are [`crate::TearCause`]s as numbers, one for each of `torn`; a number of none of them says
-    /// that the cause is not known. `count` is filled in.
+    /// Publishes all constraints torn since the load or the last reset, in the order of tearing.
+    /// `count` is filled in.
     ///
     /// # Errors
-    /// More than there are constraints, or no memory.
-    ///
-    /// # Panics
-    /// If `torn` and `causes` differ in length.
+    /// More torn constraints than the load has, or no memory.
     pub fn publish_tears(
         &self,
         header: TearsHeader,
-        torn: &[u32],
-        causes: &[u8],
+        torn: &[TornConstraint],
     ) -> Result<(), PublishError> {
-        self.writers.publish_tears(header, torn, causes)
+        self.writers.publish_tears(header, torn)
+    }
+
+    /// Publishes the values of all parameters, from `step` on. A load publishes its own.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn publish_parameters(
+        &self,
+        run_id: u64,
+        step: u64,
+        values: &ParameterValues,
+    ) -> Result<(), PublishError> {
+        self.writers.publish_parameters(run_id, step, values)
     }
 
     /// Publishes all colliders in their poses at the end of a step, by index; `count` is filled in.
@@ -279,7 +289,7 @@ impl Owner {
             + reader_count(&services.surface)
             + reader_count(&services.scene)
             + reader_count(&services.tears)
-            + reader_count(&services.tear_causes)
+            + reader_count(&services.parameters)
             + reader_count(&services.colliders)
             + reader_count(&services.outcomes)
             + reader_count(&self.status_service)
@@ -325,6 +335,7 @@ mod tests {
             triangles: &[],
             collider_count: 0,
             keyframe_size_bytes_max: 8,
+            parameters: ParameterValues::default(),
         }
     }
 

@@ -7,7 +7,9 @@ use iceoryx2::service::port_factory::publish_subscribe;
 
 use crate::service::ServiceError;
 use crate::session::CLEANUP_TIMEOUT;
-use crate::{CollidersHeader, KeyframeHeader, LoadHeader, SnapshotHeader, TearsHeader};
+use crate::{
+    CollidersHeader, KeyframeHeader, LoadHeader, ParametersHeader, SnapshotHeader, TearsHeader,
+};
 
 /// A header that says how long its payload is.
 pub(crate) trait Counted: Debug + Default + Copy + ZeroCopySend {
@@ -33,6 +35,12 @@ impl Counted for TearsHeader {
 }
 
 impl Counted for CollidersHeader {
+    fn count(&self) -> u64 {
+        self.count.into()
+    }
+}
+
+impl Counted for ParametersHeader {
     fn count(&self) -> u64 {
         self.count.into()
     }

@@ -178,16 +178,17 @@ fn read_error(service: &str, error: ReceiveError) -> ReadError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::TearsHeader;
     use crate::service::TEARS;
     use crate::session::{Access, Session};
     use crate::testing::TestDomain;
+    use crate::{TearsHeader, TornConstraint};
 
     #[test]
     fn a_message_whose_header_lies_about_its_length_is_refused_and_the_next_one_is_read() {
         let domain = TestDomain::new();
         let session = Session::join(&domain.endpoint()).unwrap();
-        let service: Slices<u32, TearsHeader> = session.slices(&TEARS, Access::Create).unwrap();
+        let service: Slices<TornConstraint, TearsHeader> =
+            session.slices(&TEARS, Access::Create).unwrap();
         let reader = SliceReader::create(&service, &TEARS).unwrap();
         let stranger = service.publisher_builder().initial_max_slice_len(2).create().unwrap();
         for count in [3, 2] {
@@ -199,6 +200,6 @@ mod tests {
             reader.next().unwrap_err().to_string(),
             "a message of 'sim/tears' was dropped: its header counts 3 elements, but it has 2"
         );
-        assert_eq!(reader.next().unwrap().unwrap().payload(), [0, 0]);
+        assert_eq!(reader.next().unwrap().unwrap().payload(), [TornConstraint::default(); 2]);
     }
 }

@@ -59,7 +59,7 @@ pub(crate) const TOPOLOGY: ServiceSpec = ServiceSpec { suffix: "topology", ..LAT
 pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCHED };
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };
 pub(crate) const TEARS: ServiceSpec = ServiceSpec { suffix: "tears", ..LATCHED };
-pub(crate) const TEAR_CAUSES: ServiceSpec = ServiceSpec { suffix: "tear_causes", ..LATCHED };
+pub(crate) const PARAMETERS: ServiceSpec = ServiceSpec { suffix: "parameters", ..LATCHED };
 /// As many as snapshots: while one moves, each step has its own.
 pub(crate) const COLLIDERS: ServiceSpec =
     ServiceSpec { suffix: "colliders", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
@@ -327,7 +327,7 @@ mod tests {
             &SURFACE,
             &SCENE,
             &TEARS,
-            &TEAR_CAUSES,
+            &PARAMETERS,
             &COLLIDERS,
             &COMMANDS,
             &OUTCOMES,

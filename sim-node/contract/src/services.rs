@@ -5,13 +5,14 @@ use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory};
 use thiserror::Error;
 
 use crate::service::{
-    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError,
-    TEAR_CAUSES, TEARS, TOPOLOGY,
+    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
+    ServiceError, TEARS, TOPOLOGY,
 };
 use crate::session::{Access, Events, Session, Slices, Values};
 use crate::{
     ColliderState, CollidersHeader, Command, ConstraintState, Endpoint, KeyframeHeader, LoadHeader,
-    NodeStatus, Outcome, ParticleState, SnapshotHeader, TearsHeader, Triangle,
+    NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, SnapshotHeader,
+    TearsHeader, TornConstraint, Triangle,
 };
 
 /// The services of a name.
@@ -22,8 +23,8 @@ pub(crate) struct Services {
     pub(crate) topology: Slices<ConstraintState, LoadHeader>,
     pub(crate) surface: Slices<Triangle, LoadHeader>,
     pub(crate) scene: Slices<u8, LoadHeader>,
-    pub(crate) tears: Slices<u32, TearsHeader>,
-    pub(crate) tear_causes: Slices<u8, TearsHeader>,
+    pub(crate) tears: Slices<TornConstraint, TearsHeader>,
+    pub(crate) parameters: Slices<ParameterState, ParametersHeader>,
     pub(crate) colliders: Slices<ColliderState, CollidersHeader>,
     pub(crate) commands: Values<Command>,
     pub(crate) outcomes: Values<Outcome>,
@@ -40,7 +41,7 @@ impl Services {
             surface: session.slices(&SURFACE, access)?,
             scene: session.slices(&SCENE, access)?,
             tears: session.slices(&TEARS, access)?,
-            tear_causes: session.slices(&TEAR_CAUSES, access)?,
+            parameters: session.slices(&PARAMETERS, access)?,
             colliders: session.slices(&COLLIDERS, access)?,
             commands: session.values(&COMMANDS, access)?,
             outcomes: session.values(&OUTCOMES, access)?,
@@ -154,6 +155,8 @@ fn no_node(session: &Session, finding: String) -> AttachError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sim_types::ParameterValues;
+
     use crate::testing::TestDomain;
     use crate::{CONTRACT_VERSION, Load, Owner, OwnerError};
 
@@ -174,6 +177,7 @@ mod tests {
         triangles: &[],
         collider_count: 0,
         keyframe_size_bytes_max: 0,
+        parameters: ParameterValues::DEFAULT,
     };
 
     fn join(domain: &TestDomain, contract_version: u32) -> Session {
@@ -187,7 +191,7 @@ mod tests {
         let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "service 'sim/status' has contract version 2, this program has 3: stop every program \
+            "service 'sim/status' has contract version 3, this program has 4: stop every program \
              of the other version, or start this one with another --domain"
         );
     }
@@ -201,8 +205,8 @@ mod tests {
         let new = Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY);
         let error = ServiceError::Version {
             service: "sim/status".to_owned(),
-            found: "2".to_owned(),
-            expected: 3,
+            found: "3".to_owned(),
+            expected: 4,
         };
         assert_eq!(new.unwrap_err(), OwnerError::Service(error));
         // With the last one gone, the name is as good as new.

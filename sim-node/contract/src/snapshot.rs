@@ -21,7 +21,7 @@ pub struct ParticleState {
 
 const _: () = assert!(size_of::<ParticleState>() == 32 && align_of::<ParticleState>() == 4);
 
-/// The header of each `particles` sample: 104 bytes, alignment 8. The snapshot and the keyframe of
+/// Header of each `particles` sample: 112 bytes, alignment 8. The snapshot and the keyframe of
 /// one step are together the complete state of the solver after that step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -61,9 +61,14 @@ pub struct SnapshotHeader {
     pub particle_count: u32,
     /// [`SnapshotFlags`] bits.
     pub flags: u32,
+    /// Steps from one published snapshot to the next: 1, unless the node runs with `--every`. A node
+    /// that pauses also publishes the step before the pause.
+    pub stride: u32,
+    /// Always 0.
+    pub spare: u32,
 }
 
-const _: () = assert!(size_of::<SnapshotHeader>() == 104 && align_of::<SnapshotHeader>() == 8);
+const _: () = assert!(size_of::<SnapshotHeader>() == 112 && align_of::<SnapshotHeader>() == 8);
 
 /// The bits of [`SnapshotHeader::flags`]; all others are 0.
 #[derive(Debug)]

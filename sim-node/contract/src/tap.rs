@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
+use crate::parameters::to_values;
 use crate::reader::{Drained, ReadError, SliceReader, ValueReader};
 use crate::service::{
-    COLLIDERS, KEYFRAME, OUTCOMES, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEAR_CAUSES,
+    COLLIDERS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError,
     TEARS, TOPOLOGY,
 };
 use crate::services::{AttachError, Attachment};
@@ -13,7 +14,8 @@ use crate::wake::WakeListener;
 use crate::watch::listen;
 use crate::{
     ColliderState, CollidersHeader, ConstraintState, Endpoint, KeyframeHeader, LoadHeader,
-    NodeStatus, Outcome, ParticleState, Snapshot, SnapshotHeader, TearsHeader, Triangle,
+    NodeStatus, Outcome, ParameterState, ParameterValues, ParametersHeader, ParticleState,
+    Snapshot, SnapshotHeader, TearsHeader, TornConstraint, Triangle,
 };
 
 /// Reads everything that an owner publishes, without a copy.
@@ -26,8 +28,8 @@ pub struct Tap {
     outcomes: ValueReader<Outcome>,
     status: ValueReader<NodeStatus>,
     colliders: SliceReader<ColliderState, CollidersHeader>,
-    tears: SliceReader<u32, TearsHeader>,
-    tear_causes: SliceReader<u8, TearsHeader>,
+    tears: SliceReader<TornConstraint, TearsHeader>,
+    parameters: SliceReader<ParameterState, ParametersHeader>,
     scene: SliceReader<u8, LoadHeader>,
     topology: SliceReader<ConstraintState, LoadHeader>,
     surface: SliceReader<Triangle, LoadHeader>,
@@ -48,10 +50,10 @@ pub enum Update<'a> {
     Surface(&'a LoadHeader, &'a [Triangle]),
     /// All colliders in their poses at the end of a step.
     Colliders(&'a CollidersHeader, &'a [ColliderState]),
-    /// All constraints torn since the load.
-    Tears(&'a TearsHeader, &'a [u32]),
-    /// Why they tore: [`crate::TearCause`]s as numbers, under a header equal to that of the list.
-    TearCauses(&'a TearsHeader, &'a [u8]),
+    /// All constraints torn since the load or the last reset.
+    Tears(&'a TearsHeader, &'a [TornConstraint]),
+    /// The values of all parameters.
+    Parameters(&'a ParametersHeader, &'a ParameterValues),
     /// What completes a snapshot.
     Keyframe(&'a KeyframeHeader, &'a [u8]),
     /// What became of a command.
@@ -80,7 +82,7 @@ impl Tap {
             status: ValueReader::create(&attachment.status, &STATUS)?,
             colliders: SliceReader::create(&services.colliders, &COLLIDERS)?,
             tears: SliceReader::create(&services.tears, &TEARS)?,
-            tear_causes: SliceReader::create(&services.tear_causes, &TEAR_CAUSES)?,
+            parameters: SliceReader::create(&services.parameters, &PARAMETERS)?,
             scene: SliceReader::create(&services.scene, &SCENE)?,
             topology: SliceReader::create(&services.topology, &TOPOLOGY)?,
             surface: SliceReader::create(&services.surface, &SURFACE)?,
@@ -121,9 +123,9 @@ impl Tap {
         self.surface.drain(all, |header, items| sink(Update::Surface(header, items)));
         self.colliders.drain(all, |header, items| sink(Update::Colliders(header, items)));
         self.tears.drain(all, |header, items| sink(Update::Tears(header, items)));
-        // An owner publishes them before the list. Taken after it, they are at least as new: the
-        // causes of every list shown so far have been shown with it.
-        self.tear_causes.drain(all, |header, bytes| sink(Update::TearCauses(header, bytes)));
+        self.parameters.drain(all, |header, states| {
+            sink(Update::Parameters(header, &to_values(states)));
+        });
         self.keyframe.drain(all, |header, bytes| sink(Update::Keyframe(header, bytes)));
         self.outcomes.drain(all, |outcome| sink(Update::Outcome(outcome)));
         self.status.drain(all, |status| sink(Update::Status(status)));

@@ -1,23 +1,53 @@
-//! What tore, and why.
+//! The messages of the service `tears`.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use sim_types::TearCause;
 
-/// The header of `tears`, whose payload is all constraints torn since the load, in the order of
-/// tearing, and of `tear_causes`, whose payload is why each of them tore: 24 bytes, alignment 8.
-/// The causes are published first, under an equal header.
+/// Header of `tears`: 32 bytes, alignment 8. The payload lists every constraint torn since the load
+/// or the last reset, in the order of tearing. A list repeats the ones before it, so a reader that
+/// misses a message loses nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.TearsHeader")]
 pub struct TearsHeader {
-    /// As in [`crate::SnapshotHeader`].
+    /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// The step that the newest of them tore in.
+    /// Step that the list belongs to: the newest tear, or the load or reset that emptied it.
     pub step: u64,
-    /// How many at the end of the payload are new in that step.
+    /// Step of the load or reset that the list begins after. Lists with the same `since_step`
+    /// continue each other.
+    pub since_step: u64,
+    /// Number of constraints at the end of the payload that tore in this step.
     pub new_count: u32,
     /// Length of the payload.
     pub count: u32,
 }
 
-const _: () = assert!(size_of::<TearsHeader>() == 24 && align_of::<TearsHeader>() == 8);
+const _: () = assert!(size_of::<TearsHeader>() == 32 && align_of::<TearsHeader>() == 8);
+
+/// A torn constraint: 8 bytes, alignment 4; an element of `tears`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.TornConstraint")]
+pub struct TornConstraint {
+    /// Index of the constraint.
+    pub constraint: u32,
+    /// A [`TearCause`] as a number; `u32::MAX` where the cause is unknown, as in the replay of an
+    /// old recording.
+    pub cause: u32,
+}
+
+const _: () = assert!(size_of::<TornConstraint>() == 8 && align_of::<TornConstraint>() == 4);
+
+impl TornConstraint {
+    /// A constraint that tore for a cause, or for an unknown one.
+    pub fn new(constraint: u32, cause: Option<TearCause>) -> Self {
+        Self { constraint, cause: cause.map_or(u32::MAX, |cause| cause as u32) }
+    }
+
+    /// Cause of the tear, if it is known.
+    pub fn cause(&self) -> Option<TearCause> {
+        TearCause::from_number(self.cause)
+    }
+}

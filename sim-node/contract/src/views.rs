@@ -2,8 +2,8 @@
 
 use crate::reader::SliceSample;
 use crate::{
-    ColliderState, CollidersHeader, ConstraintState, LoadHeader, ParticleState, SnapshotHeader,
-    TearCause, TearsHeader, Triangle,
+    ColliderState, CollidersHeader, ConstraintState, LoadHeader, ParameterValues, ParametersHeader,
+    ParticleState, SnapshotHeader, TearsHeader, TornConstraint, Triangle,
 };
 
 /// A snapshot in shared memory: holding it keeps the memory from being reused.
@@ -40,37 +40,22 @@ pub struct Surface {
     pub triangles: Vec<Triangle>,
 }
 
-/// A constraint that tore, and why.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TornConstraint {
-    /// Its index.
-    pub constraint: u32,
-    /// Why it tore, where that is known.
-    pub cause: Option<TearCause>,
-}
-
-/// All constraints torn since the load. Empty where nothing tore.
+/// The constraints torn since the load or the last reset. Empty if nothing tore.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Torn {
-    /// The step that the newest of them tore in, and how many were new in it.
+    /// Step of the newest tear, and number of tears in it.
     pub header: TearsHeader,
     /// The constraints, `header.count` of them, in the order of tearing.
     pub constraints: Vec<TornConstraint>,
 }
 
-impl Torn {
-    /// `causes` are those of the first constraints; behind them the causes are not known.
-    pub(crate) fn new(header: &TearsHeader, torn: &[u32], causes: &[u8]) -> Self {
-        let cause = |place: usize| {
-            causes.get(place).copied().and_then(|cause| TearCause::from_number(cause.into()))
-        };
-        let constraints = torn.iter().enumerate();
-        let constraints = constraints.map(|(place, constraint)| TornConstraint {
-            constraint: *constraint,
-            cause: cause(place),
-        });
-        Self { header: *header, constraints: constraints.collect() }
-    }
+/// The values of all parameters.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Parameters {
+    /// First step that the values apply to.
+    pub header: ParametersHeader,
+    /// The values.
+    pub values: ParameterValues,
 }
 
 /// The colliders at the end of a step. Empty where the scene has none.

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use glam::{Quat, Vec3};
 
-use sim_types::{ParticleFlags, TearCause};
+use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
 
 use crate::Solver;
 use crate::drive::Grab;
@@ -126,6 +126,12 @@ impl Keyframe {
     /// The torn constraints, in the order of tearing.
     pub fn torn(&self) -> &[u32] {
         &self.torn
+    }
+
+    /// The parameters of a scene that uses `method`, at a time scale of 1: the pace belongs to the
+    /// node and is not part of the state.
+    pub fn parameter_values(&self, method: Method) -> ParameterValues {
+        self.parameters.values(method)
     }
 
     /// Why each of [`Self::torn`] tore.

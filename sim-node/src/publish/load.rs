@@ -1,7 +1,8 @@
 //! From a scene to what is published once per load.
 
 use sim_contract::{
-    ColliderShape, ColliderState, ConstraintState, Load, LoadHeader, OwnerError, Triangle,
+    ColliderShape, ColliderState, ConstraintState, Load, LoadHeader, OwnerError, ParameterValues,
+    Triangle,
 };
 use sim_solver::{PlacedCollider, Scene, Solver, scene};
 
@@ -12,6 +13,7 @@ pub(super) struct LoadPlace {
     /// The first step that shows it.
     pub(super) step: u64,
     pub(super) topology_revision: u32,
+    pub(super) parameters: ParameterValues,
 }
 
 /// Hands a load to whoever publishes it.
@@ -40,6 +42,7 @@ pub(super) fn with_load<T>(
         triangles: &triangles,
         collider_count: solver.collider_count(),
         keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
+        parameters: place.parameters,
     })
 }
 

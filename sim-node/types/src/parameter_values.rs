@@ -89,29 +89,36 @@ impl PerKind {
 }
 
 impl Default for ParameterValues {
-    /// The values of a scene that sets none.
     fn default() -> Self {
-        Self {
-            gravity: [0.0, -9.81, 0.0],
-            damping: 0.0,
-            wind_velocity: [0.0; 3],
-            wind_drag: 0.0,
-            substeps: 4,
-            iterations: 1,
-            relaxation: 1.0,
-            max_stretch: None,
-            tear_stretch: None,
-            tear_distance: None,
-            tear_force: None,
-            max_speed: 10_000.0,
-            time_scale: 1.0,
-            compliance: PerKind::default(),
-            stiffness: PerKind::default(),
-        }
+        Self::DEFAULT
     }
 }
 
+impl PerKind {
+    /// Each constraint has its own value.
+    pub const OWN_OF_EACH: Self = Self { structural: None, shear: None, bend: None, tether: None };
+}
+
 impl ParameterValues {
+    /// The values in a scene that sets none.
+    pub const DEFAULT: Self = Self {
+        gravity: [0.0, -9.81, 0.0],
+        damping: 0.0,
+        wind_velocity: [0.0; 3],
+        wind_drag: 0.0,
+        substeps: 4,
+        iterations: 1,
+        relaxation: 1.0,
+        max_stretch: None,
+        tear_stretch: None,
+        tear_distance: None,
+        tear_force: None,
+        max_speed: 10_000.0,
+        time_scale: 1.0,
+        compliance: PerKind::OWN_OF_EACH,
+        stiffness: PerKind::OWN_OF_EACH,
+    };
+
     /// All values, by parameter and then by kind.
     pub fn settings(&self) -> [Setting; SETTINGS_COUNT] {
         let mut settings = [Setting {

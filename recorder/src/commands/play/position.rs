@@ -1,7 +1,9 @@
 //! Where a replay stands: what its headers and late readers are told, followed message by message.
 
+use std::iter::repeat;
+
 use recorder::{CollidersRow, Message, OutcomeRow, TearsRow};
-use sim_contract::{Action, TearCause};
+use sim_contract::{Action, Method, ParameterValues, TearCause, TornConstraint};
 use sim_solver::Keyframe;
 
 /// What the headers follow from, as far as it does not stand in `/steps`.
@@ -18,14 +20,15 @@ pub(crate) struct Position {
     /// Outcomes so far.
     pub(super) outcome_count: u64,
     pub(super) rejected_count: u64,
-    /// All constraints torn so far, in order.
-    pub(super) torn: Vec<u32>,
-    /// Why each of them tore, as numbers of the contract.
-    pub(super) tear_causes: Vec<u8>,
+    /// Constraints torn so far, in order.
+    pub(super) torn: Vec<TornConstraint>,
+    /// Step of the load or reset that [`Self::torn`] begins after.
+    pub(super) since_step: u64,
+    /// Parameters of the newest keyframe.
+    pub(super) parameters: ParameterValues,
+    /// Method of the scene.
+    pub(super) method: Method,
 }
-
-/// A number of no [`TearCause`]: the recording does not say why.
-const TEAR_CAUSE_NOT_KNOWN: u8 = u8::MAX;
 
 /// What a recording says between two snapshots, one by one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,12 +53,12 @@ pub(crate) fn happenings(updates: &[Message]) -> Vec<Happening<'_>> {
 }
 
 impl Position {
-    /// Begins with what was torn before the recording, and why where that is known.
+    /// Starts with the constraints that were torn before the recording, and their causes if known.
     pub(crate) fn new(torn: &[u32], causes: Option<Vec<TearCause>>) -> Self {
-        let causes = causes.map(|causes| causes.into_iter().map(|cause| cause as u8).collect());
+        let causes = causes.unwrap_or_default().into_iter().map(Some).chain(repeat(None));
+        let torn = torn.iter().zip(causes);
         Self {
-            torn: torn.to_vec(),
-            tear_causes: causes.unwrap_or_else(|| vec![TEAR_CAUSE_NOT_KNOWN; torn.len()]),
+            torn: torn.map(|(index, cause)| TornConstraint::new(*index, cause)).collect(),
             ..Self::default()
         }
     }
@@ -79,15 +82,16 @@ impl Position {
     /// Follows one message.
     pub(crate) fn follow(&mut self, happening: Happening<'_>) {
         match happening {
-            Happening::Reset(_) => {
+            Happening::Reset(step) => {
                 self.torn.clear();
-                self.tear_causes.clear();
+                self.since_step = step;
             }
             Happening::Update(Message::Keyframe { step, bytes }) => {
                 self.keyframe_step = *step;
                 // One of another version is published all the same; it says nothing here.
                 if let Ok(keyframe) = Keyframe::decode(bytes) {
                     self.is_paused = keyframe.paused;
+                    self.parameters = keyframe.parameter_values(self.method);
                 }
             }
             Happening::Update(Message::Outcome(row)) => self.follow_outcome(row),
@@ -99,8 +103,7 @@ impl Position {
     fn follow_tears(&mut self, row: &TearsRow) {
         for (place, constraint) in row.constraints.iter().enumerate() {
             let cause = row.causes.get(place).and_then(|name| TearCause::from_name(name));
-            self.torn.push(*constraint);
-            self.tear_causes.push(cause.map_or(TEAR_CAUSE_NOT_KNOWN, |cause| cause as u8));
+            self.torn.push(TornConstraint::new(*constraint, cause));
         }
     }
 

@@ -61,6 +61,7 @@ impl Replay {
             triangles: &triangles,
             collider_count: recorded.collider_count,
             keyframe_size_bytes_max: recorded.keyframe_size_bytes_max,
+            parameters: position.parameters,
         };
         let owner = Owner::create(endpoint, &load)?;
         let run = run.clone();
@@ -108,6 +109,7 @@ impl Replay {
         match update {
             Message::Keyframe { step, bytes } => {
                 self.publish_keyframe(*step, bytes)?;
+                self.owner.publish_parameters(self.run_id, *step, &self.position.parameters)?;
             }
             Message::Outcome(row) => {
                 self.owner.publish_outcome(&Outcome::from(row))?;
@@ -132,8 +134,9 @@ impl Replay {
     }
 
     fn publish_tears(&self, step: u64, new_count: u32) -> anyhow::Result<()> {
-        let header = TearsHeader { run_id: self.run_id, step, new_count, count: 0 };
-        self.owner.publish_tears(header, &self.position.torn, &self.position.tear_causes)?;
+        let since_step = self.position.since_step;
+        let header = TearsHeader { run_id: self.run_id, step, since_step, new_count, count: 0 };
+        self.owner.publish_tears(header, &self.position.torn)?;
         self.owner.wake(Wake::Tears);
         Ok(())
     }
@@ -163,6 +166,8 @@ impl Replay {
             torn_count: row.torn_count,
             particle_count: self.run.particle_count,
             flags: SnapshotFlags::REPLAY | paused,
+            stride: 1,
+            spare: 0,
         }
     }
 

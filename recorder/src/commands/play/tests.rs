@@ -111,6 +111,8 @@ fn snapshots_are_those_of_the_node_but_for_run_time_and_flag() {
         torn_count: 0,
         particle_count: 2,
         flags: SnapshotFlags::REPLAY,
+        stride: 1,
+        spare: 0,
     };
     assert_eq!(header, expected);
     assert_ne!(header.run_id, run().run_id);
@@ -169,6 +171,7 @@ fn a_name_that_is_taken_is_refused() {
         triangles: &[],
         collider_count: 0,
         keyframe_size_bytes_max: 1,
+        parameters: sim_contract::ParameterValues::default(),
     };
     let error = Owner::create(&domain.endpoint(), &load).unwrap_err();
     assert!(error.to_string().contains("is running already"), "{error}");
@@ -196,7 +199,7 @@ fn floor(step: u64, offset: f32) -> Message {
 /// Step, number of new ones, and all that is torn with why, as a client finds it.
 fn torn(client: &mut Client) -> (u64, u32, Vec<(u32, Option<TearCause>)>) {
     let torn = client.torn(TIMEOUT).unwrap();
-    let all = torn.constraints.iter().map(|one| (one.constraint, one.cause)).collect();
+    let all = torn.constraints.iter().map(|one| (one.constraint, one.cause())).collect();
     (torn.header.step, torn.header.new_count, all)
 }
 

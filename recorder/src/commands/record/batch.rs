@@ -54,8 +54,13 @@ impl Batch {
                 self.updates.push((status.run_id, row));
             }
             Update::Colliders(header, list) => self.colliders.push((*header, list.to_vec())),
-            Update::Tears(header, list) => self.tears.push((*header, list.to_vec())),
-            Update::TearCauses(header, list) => self.tear_causes.push((*header, list.to_vec())),
+            Update::Tears(header, list) => {
+                let causes = list.iter().map(|one| u8::try_from(one.cause).unwrap_or(u8::MAX));
+                self.tear_causes.push((*header, causes.collect()));
+                let constraints = list.iter().map(|one| one.constraint);
+                self.tears.push((*header, constraints.collect()));
+            }
+            Update::Parameters(..) => {}
         }
     }
 }

@@ -8,7 +8,7 @@ use sim_contract::{Client, Tap, TearCause, TearsHeader, TornConstraint, Update};
 
 use crate::support::{
     DEADLINE, MOMENT, PARTICLE_COUNT, RUN_ID, SCENE, colliders, constraints, create_owner,
-    particle, publish_colliders, publish_everything, publish_step, triangles,
+    parameters, particle, publish_colliders, publish_everything, publish_step, triangles,
 };
 
 #[test]
@@ -64,6 +64,7 @@ fn a_tap_that_comes_late_gets_every_kind_of_message() {
         .count;
     assert_eq!((count, steps), (1, vec![5]));
 
+    let cut = TornConstraint::new(2, Some(TearCause::Cut));
     let mut kinds = Vec::new();
     let count = tap
         .drain_updates(|update| {
@@ -72,8 +73,8 @@ fn a_tap_that_comes_late_gets_every_kind_of_message() {
                 Update::Topology(_, all) if all == constraints() => "topology",
                 Update::Surface(_, all) if all == triangles() => "surface",
                 Update::Colliders(header, all) if all == colliders(header.step) => "colliders",
-                Update::TearCauses(header, [3]) if header.count == 1 => "causes",
-                Update::Tears(header, [2]) if header.count == 1 => "tears",
+                Update::Tears(header, [one]) if header.count == 1 && *one == cut => "tears",
+                Update::Parameters(_, values) if *values == parameters(5) => "parameters",
                 Update::Keyframe(header, b"keyframe") if header.size_bytes == 8 => "keyframe",
                 Update::Status(status) if status.step == 5 => "status",
                 update => panic!("{update:?}"),
@@ -81,7 +82,7 @@ fn a_tap_that_comes_late_gets_every_kind_of_message() {
         })
         .count;
     let expected =
-        ["scene", "topology", "surface", "colliders", "tears", "causes", "keyframe", "status"];
+        ["scene", "topology", "surface", "colliders", "tears", "parameters", "keyframe", "status"];
     assert_eq!(kinds, expected);
     assert_eq!(count, kinds.len());
 }
@@ -90,14 +91,17 @@ fn a_tap_that_comes_late_gets_every_kind_of_message() {
 fn a_late_joiner_knows_all_torn_constraints_with_their_causes_and_where_the_colliders_are() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
-    let publish = |step, new_count, torn: &[u32], causes: &[u8]| {
-        let header = TearsHeader { run_id: RUN_ID, step, new_count, count: 0 };
-        owner.publish_tears(header, torn, causes).unwrap();
+    let publish = |step, new_count, torn: &[TornConstraint]| {
+        let header = TearsHeader { run_id: RUN_ID, step, new_count, ..TearsHeader::default() };
+        owner.publish_tears(header, torn).unwrap();
         publish_colliders(&owner, step);
         owner.refresh();
     };
-    publish(1, 1, &[2], &[TearCause::Stretch as u8]);
-    publish(3, 2, &[2, 0, 1], &[TearCause::Stretch as u8, TearCause::Cut as u8, 200]);
+    let stretched = TornConstraint::new(2, Some(TearCause::Stretch));
+    let (cut, unknown) =
+        (TornConstraint::new(0, Some(TearCause::Cut)), TornConstraint::new(1, None));
+    publish(1, 1, &[stretched]);
+    publish(3, 2, &[stretched, cut, unknown]);
 
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     // Takes its places; the owner notices it with the next refresh.
@@ -106,15 +110,30 @@ fn a_late_joiner_knows_all_torn_constraints_with_their_causes_and_where_the_coll
     owner.refresh();
     let torn = client.torn(DEADLINE).unwrap();
     assert_eq!((torn.header.step, torn.header.new_count, torn.header.count), (3, 2, 3));
-    let one = |constraint, cause| TornConstraint { constraint, cause };
-    let cut = one(0, Some(TearCause::Cut));
-    assert_eq!(torn.constraints, [one(2, Some(TearCause::Stretch)), cut, one(1, None)]);
+    assert_eq!(torn.constraints, [stretched, cut, unknown]);
+    assert_eq!((cut.cause(), unknown.cause()), (Some(TearCause::Cut), None));
     assert_eq!(client.colliders(DEADLINE).unwrap().colliders, colliders(3));
     // What is latched can be asked for again, and a new list replaces it.
     assert_eq!(client.torn(MOMENT).unwrap(), torn);
-    publish(4, 0, &[], &[]);
+    publish(4, 0, &[]);
     assert_eq!(client.torn(MOMENT).unwrap().header.step, 4);
     assert_eq!(client.colliders(MOMENT).unwrap().header.step, 4);
+}
+
+#[test]
+fn a_late_joiner_knows_the_parameters_of_the_load_and_each_change() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert_eq!(client.parameters(MOMENT).unwrap(), None);
+    owner.refresh();
+    let first = client.parameters(DEADLINE).unwrap().unwrap();
+    assert_eq!((first.header.step, first.values), (0, parameters(0)));
+    owner.publish_parameters(RUN_ID, 7, &parameters(7)).unwrap();
+    let second = client.parameters(DEADLINE).unwrap().unwrap();
+    assert_eq!((second.header.step, second.header.run_id), (7, RUN_ID));
+    assert_eq!(second.values, parameters(7));
+    assert_eq!(client.parameters(MOMENT).unwrap(), Some(second), "it can be asked for again");
 }
 
 #[test]

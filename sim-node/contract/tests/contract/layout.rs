@@ -8,7 +8,8 @@ use std::mem::offset_of;
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use sim_contract::{
     ColliderState, CollidersHeader, Command, ConstraintState, KeyframeHeader, LoadHeader,
-    NodeStatus, Outcome, ParticleState, SnapshotHeader, TearsHeader, Triangle, Wake,
+    NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, SnapshotHeader,
+    TearsHeader, TornConstraint, Triangle, Wake,
 };
 
 macro_rules! layout {
@@ -62,6 +63,8 @@ fn lay_out_states(text: &mut String) {
             torn_count,
             particle_count,
             flags,
+            stride,
+            spare,
         }
     );
     layout!(text, ConstraintState { a, b, rest_length, compliance, kind });
@@ -80,7 +83,10 @@ fn lay_out_states(text: &mut String) {
             spare,
         }
     );
-    layout!(text, TearsHeader { run_id, step, new_count, count });
+    layout!(text, TearsHeader { run_id, step, since_step, new_count, count });
+    layout!(text, TornConstraint { constraint, cause });
+    layout!(text, ParametersHeader { run_id, step, count, spare });
+    layout!(text, ParameterState { parameter, constraint_kind, form, value });
     layout!(
         text,
         ColliderState {
@@ -159,6 +165,7 @@ fn the_limits_are_frozen() {
     constants!(
         text,
         CONTRACT_VERSION,
+        SETTINGS_COUNT,
         ELEMENTS_MAX,
         COLLIDERS_MAX,
         SCENE_SIZE_BYTES_MAX,

@@ -4,8 +4,8 @@
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     COLLIDERS_MAX, Client, ColliderShape, ColliderState, CollidersHeader, ConstraintState,
-    KeyframeHeader, Load, LoadHeader, Owner, ParticleState, SnapshotHeader, Tap, TearCause,
-    TearsHeader, Triangle, Update, Wake,
+    KeyframeHeader, Load, LoadHeader, Owner, ParameterValues, ParticleState, SnapshotHeader, Tap,
+    TearCause, TearsHeader, TornConstraint, Triangle, Update, Wake,
 };
 
 use crate::support::{
@@ -29,6 +29,7 @@ fn new_load(use_it: impl FnOnce(&Load<'_>)) {
         triangles: &[Triangle { corners: [6, 7, 8] }; 3],
         collider_count: 3,
         keyframe_size_bytes_max: 64,
+        parameters: ParameterValues::default(),
     });
 }
 
@@ -40,8 +41,9 @@ fn load(owner: &mut Owner) {
 fn publish_new_step(owner: &Owner, step: u64) {
     let header = CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() };
     owner.publish_colliders(header, &[sphere(); 3]).unwrap();
-    let tears = TearsHeader { run_id: RUN_ID, step, new_count: 1, count: 0 };
-    owner.publish_tears(tears, &[7], &[TearCause::Force as u8]).unwrap();
+    let tears =
+        TearsHeader { run_id: RUN_ID, step, since_step: 6, new_count: 1, ..TearsHeader::default() };
+    owner.publish_tears(tears, &[TornConstraint::new(7, Some(TearCause::Force))]).unwrap();
     let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0 };
     owner.publish_keyframe(keyframe, b"a keyframe longer than any of the old load").unwrap();
     publish_new_particles(owner, step);
@@ -65,6 +67,7 @@ fn connect(client: &mut Client, owner: &Owner) {
     client.surface(MOMENT).unwrap();
     client.scene(MOMENT).unwrap();
     client.torn(MOMENT).unwrap();
+    client.parameters(MOMENT).unwrap();
     client.colliders(MOMENT).unwrap();
     client.latest_snapshot(MOMENT).unwrap();
     owner.refresh();
@@ -78,7 +81,7 @@ fn assert_is_new(client: &mut Client) {
     let snapshot = client.latest_snapshot(DEADLINE).unwrap().unwrap();
     assert_eq!((snapshot.header().step, snapshot.particles().len()), (6, 9));
     let torn = client.torn(DEADLINE).unwrap().constraints;
-    assert_eq!((torn[0].constraint, torn[0].cause, torn.len()), (7, Some(TearCause::Force), 1));
+    assert_eq!((torn[0], torn.len()), (TornConstraint::new(7, Some(TearCause::Force)), 1));
     assert_eq!(client.colliders(DEADLINE).unwrap().colliders, [sphere(); 3]);
 }
 
@@ -95,8 +98,10 @@ fn a_connected_client_goes_on_with_the_new_load() {
     let held = client.latest_snapshot(DEADLINE).unwrap().unwrap();
 
     load(&mut owner);
-    // Told with the load itself: what had torn is no more.
+    // The load itself says that nothing is torn, and brings its own parameters.
     assert!(client.torn(DEADLINE).unwrap().constraints.is_empty());
+    let parameters = client.parameters(DEADLINE).unwrap().unwrap();
+    assert_eq!((parameters.header.step, parameters.values), (6, ParameterValues::default()));
     publish_new_step(&owner, 6);
     assert_is_new(&mut client);
     // What was read from the old load stays readable.
@@ -138,7 +143,9 @@ fn a_tap_sees_both_loads_in_their_order() {
     let (mut scenes, mut tears) = (Vec::new(), Vec::new());
     let drained = tap.drain_updates(|update| match update {
         Update::Scene(_, text) => scenes.push(text.to_vec()),
-        Update::Tears(header, torn) => tears.push((header.step, torn.to_vec())),
+        Update::Tears(header, torn) => {
+            tears.push((header.step, torn.iter().map(|one| one.constraint).collect::<Vec<_>>()));
+        }
         _ => {}
     });
     assert!(drained.errors.is_empty());
@@ -164,12 +171,12 @@ fn a_late_joiner_is_given_nothing_of_the_old_load() {
             Update::Topology(header, _) if header.topology_revision == 2 => "topology",
             Update::Surface(header, _) if header.topology_revision == 2 => "surface",
             Update::Tears(_, []) => "tears",
-            Update::TearCauses(_, []) => "causes",
+            Update::Parameters(_, values) if *values == ParameterValues::default() => "parameters",
             Update::Status(_) => "status",
             update => panic!("{update:?}"),
         });
     });
-    assert_eq!(kinds, ["scene", "topology", "surface", "tears", "causes", "status"]);
+    assert_eq!(kinds, ["scene", "topology", "surface", "tears", "parameters", "status"]);
 
     publish_new_step(&owner, 6);
     let mut late = Client::attach(&domain.endpoint()).unwrap();

@@ -104,6 +104,7 @@ fn an_owner_can_come_again_while_a_client_stays() {
         triangles: &triangles(),
         collider_count: 0,
         keyframe_size_bytes_max: 0,
+        parameters: sim_contract::ParameterValues::default(),
     };
     let second = Owner::create(&domain.endpoint(), &load).unwrap();
     publish_step(&second, 0);

@@ -65,11 +65,12 @@ fn a_scene_without_anything_in_it_works() {
         triangles: &[],
         collider_count: 0,
         keyframe_size_bytes_max: 0,
+        parameters: sim_contract::ParameterValues::default(),
     };
     let owner = Owner::create(&domain.endpoint(), &empty).unwrap();
     let publish = || {
         owner.publish_particles(&SnapshotHeader::default(), |_| unreachable!()).unwrap();
-        owner.publish_tears(TearsHeader::default(), &[], &[]).unwrap();
+        owner.publish_tears(TearsHeader::default(), &[]).unwrap();
         owner.publish_colliders(CollidersHeader::default(), &[]).unwrap();
         owner.publish_keyframe(KeyframeHeader::default(), &[]).unwrap();
         owner.refresh();

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use sim_contract::{
     CONTRACT_VERSION, ColliderShape, ColliderState, CollidersHeader, ConstraintState, Endpoint,
-    KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError, ParticleState,
-    Reason, SnapshotHeader, TearCause, TearsHeader, Triangle, Wake,
+    KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError, ParameterValues,
+    ParticleState, Reason, SnapshotHeader, TearCause, TearsHeader, TornConstraint, Triangle, Wake,
 };
 
 /// Longer than anything here takes; tests wait for what happens, not for this.
@@ -45,8 +45,14 @@ pub(crate) fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
         triangles: &triangles(),
         collider_count: COLLIDER_COUNT,
         keyframe_size_bytes_max: 16,
+        parameters: parameters(0),
     };
     Owner::create(endpoint, &load)
+}
+
+/// The parameters from `step` on.
+pub(crate) fn parameters(step: u64) -> ParameterValues {
+    ParameterValues { damping: step as f32, ..ParameterValues::default() }
 }
 
 pub(crate) fn snapshot_header(step: u64) -> SnapshotHeader {
@@ -91,8 +97,9 @@ pub(crate) fn publish_colliders(owner: &Owner, step: u64) {
 
 /// Publishes everything that has a message of its own, with the particles of `step` last.
 pub(crate) fn publish_everything(owner: &Owner, step: u64) {
-    let tears = TearsHeader { run_id: RUN_ID, step, new_count: 1, count: 0 };
-    owner.publish_tears(tears, &[2], &[TearCause::Cut as u8]).unwrap();
+    let tears = TearsHeader { run_id: RUN_ID, step, new_count: 1, ..TearsHeader::default() };
+    owner.publish_tears(tears, &[TornConstraint::new(2, Some(TearCause::Cut))]).unwrap();
+    owner.publish_parameters(RUN_ID, step, &parameters(step)).unwrap();
     publish_colliders(owner, step);
     let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0 };
     owner.publish_keyframe(keyframe, b"keyframe").unwrap();

@@ -32,8 +32,12 @@ impl News {
             Update::Topology(header, all) => self.topology = Some((*header, all.to_vec())),
             Update::Surface(header, all) => self.surface = Some((*header, all.to_vec())),
             Update::Colliders(header, all) => self.colliders.push((*header, all.to_vec())),
-            Update::Tears(header, all) => self.tears.push((*header, all.to_vec())),
-            Update::TearCauses(header, all) => self.tear_causes.push((*header, all.to_vec())),
+            Update::Tears(header, all) => {
+                let causes = all.iter().map(|one| u8::try_from(one.cause).unwrap_or(u8::MAX));
+                self.tear_causes.push((*header, causes.collect()));
+                self.tears.push((*header, all.iter().map(|one| one.constraint).collect()));
+            }
+            Update::Parameters(..) => {}
             Update::Outcome(outcome) => self.outcomes.push(*outcome),
             Update::Status(status) => self.status = Some(*status),
             // It is for the solver.

@@ -3,7 +3,8 @@
 
 use sim_contract::{
     Action, ColliderState, CollidersHeader, Command, ConstraintState, NodeStatus,
-    OUTCOME_FLAG_CONTROL, Outcome, ParticleFlags, ParticleState, TearCause, TearsHeader, Update,
+    OUTCOME_FLAG_CONTROL, Outcome, ParticleFlags, ParticleState, TearCause, TearsHeader,
+    TornConstraint, Update,
 };
 
 use recorder::Topic;
@@ -46,9 +47,10 @@ fn add_snapshot(batch: &mut Batch, header: &SnapshotHeader) {
 /// A list of all that is torn, and that all of it was cut.
 fn add_tears(batch: &mut Batch, step: u64, torn: &[u32], new_count: u32) {
     let count = u32::try_from(torn.len()).unwrap();
-    let header = TearsHeader { run_id: RUN_ID, step, new_count, count };
-    batch.add_update(Update::Tears(&header, torn));
-    batch.add_update(Update::TearCauses(&header, &vec![TearCause::Cut as u8; torn.len()]));
+    let header = TearsHeader { run_id: RUN_ID, step, since_step: 0, new_count, count };
+    let cut = |one: &u32| TornConstraint::new(*one, Some(TearCause::Cut));
+    let torn: Vec<_> = torn.iter().map(cut).collect();
+    batch.add_update(Update::Tears(&header, &torn));
 }
 
 fn add_keyframe(batch: &mut Batch, step: u64) {

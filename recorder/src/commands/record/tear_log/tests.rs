@@ -9,7 +9,7 @@ fn snapshot(step: u64, torn_count: u32) -> SnapshotHeader {
 }
 
 fn header(step: u64, new_count: u32) -> TearsHeader {
-    TearsHeader { run_id: RUN_ID, step, new_count, count: 0 }
+    TearsHeader { run_id: RUN_ID, step, new_count, ..TearsHeader::default() }
 }
 
 /// Causes alternate: an even constraint was cut, an odd one stretched.

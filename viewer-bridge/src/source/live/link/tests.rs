@@ -45,6 +45,7 @@ fn load(step: u64, topology_revision: u32) -> OwnerLoad<'static> {
         triangles: &[],
         collider_count: 1,
         keyframe_size_bytes_max: 8,
+        parameters: sim_contract::ParameterValues::default(),
     }
 }
 
@@ -154,7 +155,9 @@ fn colliders_that_come_before_the_first_state_of_their_load_are_shown_with_it() 
 fn tears_are_shown_with_the_state_that_they_are_of() {
     let mut site = Site::start();
     let header = TearsHeader { run_id: RUN_ID, step: 2, new_count: 1, ..TearsHeader::default() };
-    site.owner.publish_tears(header, &[0], &[3]).unwrap();
+    site.owner
+        .publish_tears(header, &[sim_contract::TornConstraint { constraint: 0, cause: 3 }])
+        .unwrap();
     site.publish(1, 0, 2);
     site.read();
     assert!(site.stage.torn().is_empty());
