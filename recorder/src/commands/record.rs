@@ -2,8 +2,9 @@
 
 mod accepted;
 mod batch;
-mod collider_log;
 mod intake;
+mod latched_log;
+mod lists;
 mod queue;
 mod report;
 mod tear_log;

@@ -37,6 +37,7 @@ pub(super) fn decode_message(
         Topic::Surface => Message::Surface(row(data)?),
         Topic::Colliders => Message::Colliders(row(data)?),
         Topic::Tears => Message::Tears(row(data)?),
+        Topic::Parameters => Message::Parameters(row(data)?),
         Topic::Outcomes => Message::Outcome(row(data)?),
         Topic::Status => Message::Status(row(data)?),
         Topic::Events => Message::Event(row(data)?),

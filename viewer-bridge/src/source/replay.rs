@@ -17,7 +17,7 @@ use std::sync::mpsc::channel;
 use std::thread;
 
 use anyhow::Context;
-use recorder::{Tape, TapeState, Torn};
+use recorder::{Tape, TapeState, TornList};
 
 use crate::foxglove_server::Recording;
 use crate::message::Mode;
@@ -52,7 +52,7 @@ impl Replay {
             log: self.tape.log().try_clone()?,
             first: self.first.row,
             last_step: self.tape.last_step(),
-            torn: Torn::before(&self.tape.topology().torn),
+            torn: TornList::before(&self.tape.topology().torn),
         })
     }
 }
