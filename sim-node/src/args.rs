@@ -1,37 +1,47 @@
-//! The command line. Help texts are the doc comments here.
+//! The command line. Help texts are the doc comments.
 
+mod command;
 mod ctl;
+mod endpoint;
 mod lesson;
+mod refusal;
+mod run;
+mod scene;
 
 use std::ffi::OsString;
-use std::time::Duration;
 
 use clap::error::ErrorKind;
-use clap::{Args as ClapArgs, CommandFactory, Parser, Subcommand};
-use sim_contract::{Endpoint, NAME_DEFAULT};
-use sim_solver::THREADS_MAX;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-pub(crate) use ctl::{CtlArgs, CtlVerb, PoseArgs, TargetArgs};
+pub(crate) use command::{CommandVerb, PoseArgs};
+pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb};
+use endpoint::EndpointArgs;
 pub(crate) use lesson::LessonArgs;
+pub(crate) use run::RunArgs;
+pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
-/// Every state is published in shared memory, where other processes read it without a copy, and
-/// commands (drag, pin, pause, ...) are taken from any of them. Without arguments, the built-in
-/// scene `curtain` runs until Ctrl-C.
+/// The node publishes every state in shared memory, where other processes read it without a copy,
+/// and accepts commands (grab, pin, pause, ...) from all of them. Without arguments, it runs the
+/// built-in scene `curtain` until Ctrl-C.
 #[derive(Debug, Parser)]
 #[command(
     name = "sim-node",
     version,
-    args_conflicts_with_subcommands = true,
-    after_help = "Examples:\n  \
+    override_usage = "sim-node [run] [OPTIONS] [SCENE]\n       \
+        sim-node [--name NAME] [--domain DOMAIN] <COMMAND> ...",
+    after_help = "Exit codes: 0 done, 1 failure, 2 wrong command line, 4 the node rejected a command of `ctl`.\n\n\
+        Examples:\n  \
         sim-node                                    run the curtain\n  \
         sim-node run rope --rate 1000               run the rope at 1 kHz\n  \
         sim-node run my.toml --duration 10s --json  run a file for 10 s, then print a summary\n  \
         sim-node ctl grab 90 0.5 0.2 0.3            drag particle 90 of the running node\n  \
-        sim-node ctl set gravity 0 -1.6 0           take the running node to the moon\n  \
+        sim-node ctl set gravity 0 -1.6 0           set the gravity of the moon\n  \
+        sim-node --domain lab ctl status            show a node of another domain\n  \
         sim-node scenes                             list the built-in scenes\n  \
-        sim-node import shirt.obj -o shirt.toml     make a scene of a mesh\n  \
+        sim-node import shirt.obj -o shirt.toml     convert a mesh to a scene\n  \
         sim-node lesson                             list the lessons of physics"
 )]
 pub(crate) struct Args {
@@ -41,166 +51,105 @@ pub(crate) struct Args {
     pub(crate) run: RunArgs,
 }
 
-/// Reads the command line. Ends the program with code 2 and the usage if it is wrong.
-pub(crate) fn parse() -> Args {
-    let args = Args::parse_from(std::env::args_os().map(plain_negative));
-    // What depends on several arguments is beyond clap.
-    if let Some(Verb::Ctl(ctl)) = &args.verb
-        && let CtlVerb::Set(set) = &ctl.verb
-        && let Err(text) = set.value()
-    {
-        let mut command = Args::command();
-        command.build();
-        let ctl = command.find_subcommand_mut("ctl");
-        let set = ctl.and_then(|ctl| ctl.find_subcommand_mut("set")).cloned();
-        set.unwrap_or(command).error(ErrorKind::WrongNumberOfValues, text).exit();
-    }
-    args
-}
-
-/// A negative number as clap knows one: `-.5` and `-1e-3` look like options to it.
-fn plain_negative(word: OsString) -> OsString {
-    let text = word.to_str().filter(|text| text.starts_with('-'));
-    match text.and_then(|text| text.parse::<f64>().ok()) {
-        // Without an exponent, and with the fewest digits that read back as the same number.
-        Some(number) if number.is_finite() => number.to_string().into(),
-        _ => word,
-    }
-}
-
 #[derive(Debug, Subcommand)]
 pub(crate) enum Verb {
-    /// Run a scene until Ctrl-C, or as long as told.
+    /// Run a scene until Ctrl-C, or for a given time
     Run(RunArgs),
-    /// List the built-in scenes.
+    /// List the built-in scenes
     Scenes(ScenesArgs),
-    /// Print a scene as complete TOML, every default written out.
+    /// Print a scene as complete TOML with every default
     Show(ShowArgs),
-    /// Check a scene without running it; warn of what is probably not meant.
+    /// Check a scene without running it, and warn of likely mistakes
     Check(CheckArgs),
-    /// Make a scene of a mesh: an OBJ file becomes a cloth.
+    /// Convert an OBJ mesh to a scene of cloth
     Import(ImportArgs),
-    /// Command a running node, or ask it how it does.
+    /// Command a running node, or query its state
     Ctl(CtlArgs),
-    /// Print tables for teachers of physics: what Euler, passes, stiffness and 32 bits do.
+    /// Print tables that teach the physics: Euler, iterations, stiffness, 32-bit numbers
     Lesson(LessonArgs),
 }
 
-/// Which node.
-#[derive(Debug, ClapArgs)]
-pub(crate) struct EndpointArgs {
-    /// Name of the node: its services are NAME/particles, NAME/commands, ...
-    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
-    pub(crate) name: String,
-    /// Domain that keeps services apart from others on this host [default: that of iceoryx2]
-    #[arg(long, env = "CATENARY_DOMAIN", value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
-    pub(crate) domain: Option<String>,
+/// Reads the command line. Exits with code 2 and the usage if it is wrong.
+#[allow(clippy::print_stderr, clippy::exit, reason = "clap ends the program in the same way")]
+pub(crate) fn parse() -> Args {
+    try_parse(std::env::args_os()).unwrap_or_else(|error| {
+        let Some(text) = refusal::text(&error) else { error.exit() };
+        eprint!("{text}");
+        std::process::exit(error.exit_code())
+    })
 }
 
-#[derive(Debug, ClapArgs)]
-#[command(after_help = "Examples:\n  \
-    sim-node run curtain --rate 1000 --duration 10s --json\n  \
-    sim-node run ./my.toml --steps 5000 --as-fast-as-possible")]
-pub(crate) struct RunArgs {
-    /// A built-in scene (see `sim-node scenes`), or a TOML file: a path with / or ending in .toml
-    #[arg(default_value = "curtain")]
-    pub(crate) scene: String,
-    /// Steps per second, 1 to 100000 [default: that of the scene]
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub(crate) rate: Option<u32>,
-    /// Substeps of a step, 1 to 1000 [default: that of the scene]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) substeps: Option<u32>,
-    /// End after this many steps [default: run until Ctrl-C]
-    #[arg(long, value_name = "N", conflicts_with = "duration")]
-    pub(crate) steps: Option<u64>,
-    /// End after this much simulated time, such as 10s or 2min [default: run until Ctrl-C]
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
-    pub(crate) duration: Option<Duration>,
-    /// Start paused: wait at step 0 for `ctl resume` or `ctl step`
-    #[arg(long)]
-    pub(crate) paused: bool,
-    /// Make steps without waiting for their time
-    #[arg(long)]
-    pub(crate) as_fast_as_possible: bool,
-    /// Threads that step the solver, 1 to 64; they change no bit [default: 1 for scenes of fewer than
-    /// 4000 particles, else the cores that this process may use, less one]
-    #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u8).range(1..=i64::from(THREADS_MAX)))]
-    pub(crate) threads: Option<u8>,
-    /// Publish every K-th snapshot only, and the last one before a wait
-    #[arg(long, value_name = "K", default_value_t = 1,
-        value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    pub(crate) every: u64,
-    /// Print a summary as one JSON object on stdout at the end
-    #[arg(long)]
-    pub(crate) json: bool,
-    #[command(flatten)]
-    pub(crate) endpoint: EndpointArgs,
+/// Parses a command line, the program's name included.
+pub(crate) fn try_parse(
+    words: impl IntoIterator<Item = impl Into<OsString>>,
+) -> Result<Args, clap::Error> {
+    let mut command = Args::command();
+    let words = words.into_iter().map(|word| plain_negative(word.into()));
+    let matches = command.try_get_matches_from_mut(words)?;
+    check_order(&mut command, &matches)?;
+    let mut args = Args::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    match &mut args.verb {
+        Some(Verb::Run(run)) => run.endpoint.inherit(&args.run.endpoint),
+        Some(Verb::Ctl(ctl)) => ctl.endpoint.inherit(&args.run.endpoint),
+        _ => {}
+    }
+    check_value(&mut command, &args)?;
+    Ok(args)
 }
 
-#[derive(Debug, ClapArgs)]
-pub(crate) struct ScenesArgs {
-    /// Print an array of objects with name, particles, constraints, pins and text
-    #[arg(long)]
-    pub(crate) json: bool,
+/// Refuses arguments of `run` before another subcommand, where nothing would read them.
+fn check_order(command: &mut Command, matches: &ArgMatches) -> Result<(), clap::Error> {
+    let Some((verb, behind)) = matches.subcommand() else { return Ok(()) };
+    let is_given = |matches: &ArgMatches, id: &str| {
+        matches.try_contains_id(id).is_ok_and(|is_present| is_present)
+            && matches.value_source(id) == Some(ValueSource::CommandLine)
+    };
+    // Clap shows options of `ctl` on both sides of it.
+    let is_misplaced = |id: &str| {
+        is_given(matches, id) && !is_given(behind, id) && !EndpointArgs::IDS.contains(&id)
+    };
+    let Some(argument) = command.get_arguments().find(|one| is_misplaced(one.get_id().as_str()))
+    else {
+        return Ok(());
+    };
+    let name = argument.get_long().map_or_else(|| "SCENE".to_owned(), |long| format!("--{long}"));
+    let text =
+        format!("{name} cannot precede the subcommand '{verb}' (allowed there: --name, --domain)");
+    Err(command.error(ErrorKind::ArgumentConflict, text))
 }
 
-#[derive(Debug, ClapArgs)]
-pub(crate) struct ShowArgs {
-    /// A built-in scene or a TOML file
-    pub(crate) scene: String,
+/// Refuses a value of `ctl set` whose words do not fit together, which clap cannot see.
+fn check_value(command: &mut Command, args: &Args) -> Result<(), clap::Error> {
+    let Some(Verb::Ctl(ctl)) = &args.verb else { return Ok(()) };
+    let CtlVerb::Command(CommandVerb::Set(set)) = &ctl.verb else { return Ok(()) };
+    let Err(text) = set.value() else { return Ok(()) };
+    let ctl = command.find_subcommand_mut("ctl");
+    let set = ctl.and_then(|ctl| ctl.find_subcommand_mut("set")).cloned();
+    Err(set.unwrap_or_else(|| command.clone()).error(ErrorKind::WrongNumberOfValues, text))
 }
 
-#[derive(Debug, ClapArgs)]
-#[command(
-    after_help = "Vertices become particles, edges structural constraints, diagonals of faces shear, and the\n\
-        corners on both sides of an edge bend. Faces without area, faces that stand twice and\n\
-        vertices of no face are named and left out.\n\nExamples:\n  \
-        sim-node import shirt.obj --pin 'y > 1.45' -o shirt.toml && sim-node run ./shirt.toml\n  \
-        sim-node import net.obj --density 0.05 --pin 'group rim' --bend 0.01 > net.toml"
-)]
-pub(crate) struct ImportArgs {
-    /// A Wavefront OBJ file of triangles, quads or bigger faces
-    pub(crate) mesh: String,
-    /// File to write the scene to [default: stdout]
-    #[arg(short, long, value_name = "OUT.toml")]
-    pub(crate) output: Option<std::path::PathBuf>,
-    /// Write over an existing file
-    #[arg(long)]
-    pub(crate) overwrite: bool,
-    /// Mass per area, in kg per square unit
-    #[arg(long, value_name = "KG", default_value_t = 0.2)]
-    pub(crate) density: f32,
-    /// Vertices that are pinned: 'y > 1.9', 'x < 0 and z >= 1', 'group NAME', or none
-    #[arg(long, value_name = "CHOICE", default_value = "none")]
-    pub(crate) pin: String,
-    /// Compliance of edges, in m/N
-    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
-    pub(crate) structural: f32,
-    /// Compliance of diagonals, in m/N
-    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
-    pub(crate) shear: f32,
-    /// Compliance of bends, in m/N
-    #[arg(long, value_name = "M/N", default_value_t = 1e-2)]
-    pub(crate) bend: f32,
-}
-
-#[derive(Debug, ClapArgs)]
-pub(crate) struct CheckArgs {
-    /// A TOML file or a built-in scene
-    pub(crate) scene: String,
-    /// Print one object with the counts and the warnings
-    #[arg(long)]
-    pub(crate) json: bool,
+/// Rewrites a negative number for clap, which takes `-.5` and `-1e-3` for options.
+fn plain_negative(word: OsString) -> OsString {
+    let text = word.to_str().filter(|text| text.starts_with('-'));
+    match text.and_then(|text| text.parse::<f64>().ok()) {
+        // Without an exponent, in the fewest digits that read back as the same number.
+        Some(number) if number.is_finite() => number.to_string().into(),
+        _ => word,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn refused(line: &str) -> String {
+        let error = try_parse(line.split(' ')).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{line}");
+        refusal::text(&error).unwrap_or_else(|| error.to_string())
+    }
+
     #[test]
-    fn negative_numbers_are_written_as_clap_knows_them() {
+    fn negative_numbers_are_rewritten_without_an_exponent() {
         for (word, plain) in [
             ("-.5", "-0.5"),
             ("-1e-3", "-0.001"),
@@ -212,6 +161,59 @@ mod tests {
             ("1e-3", "1e-3"),
         ] {
             assert_eq!(plain_negative(word.into()), plain, "{word}");
+        }
+    }
+
+    #[test]
+    fn name_and_domain_are_accepted_before_and_behind_a_subcommand() {
+        for line in [
+            "sim-node --domain lab --name left ctl status",
+            "sim-node --domain lab ctl --name left status",
+            "sim-node ctl status --domain lab --name left",
+            "sim-node --name right --domain lab ctl status --name left",
+        ] {
+            let args = try_parse(line.split(' ')).unwrap();
+            let Some(Verb::Ctl(ctl)) = args.verb else { panic!("{line}: not ctl") };
+            let endpoint = ctl.endpoint.endpoint().unwrap();
+            assert_eq!((endpoint.domain(), endpoint.name()), (Some("lab"), "left"), "{line}");
+        }
+        let args = try_parse("sim-node --domain lab run rope".split(' ')).unwrap();
+        let Some(Verb::Run(run)) = args.verb else { panic!("not run") };
+        assert_eq!(run.endpoint.endpoint().unwrap().domain(), Some("lab"));
+    }
+
+    #[test]
+    fn options_of_run_are_refused_before_another_subcommand() {
+        let text = refused("sim-node --rate 100 ctl status");
+        assert!(text.contains("--rate cannot precede the subcommand 'ctl'"), "{text}");
+        let text = refused("sim-node rope scenes");
+        assert!(text.contains("SCENE cannot precede the subcommand 'scenes'"), "{text}");
+    }
+
+    #[test]
+    fn unknown_options_and_stray_numbers_are_refused_without_advice_to_escape_them() {
+        for (line, problem) in [
+            ("sim-node ctl pin -1", "the negative number '-1' is not allowed here"),
+            ("sim-node run --steps -5", "the negative number '-5' is not allowed here"),
+            ("sim-node ctl status -3", "the negative number '-3' is not allowed here"),
+            ("sim-node ctl grab 3 -1 -2 0 --fast", "there is no option '--fast' here"),
+            ("sim-node run --spee 3", "there is no option '--spee' here"),
+            ("sim-node ctl pin 1 2", "'2' is one argument too many"),
+        ] {
+            let text = refused(line);
+            assert!(text.starts_with(&format!("error: {problem}")), "{line}: {text}");
+            assert!(text.contains("--help") && !text.contains("tip:"), "{line}: {text}");
+        }
+        let text = refused("sim-node ctl grab 3 -1 -2 0 --ove 1");
+        assert!(text.contains("(did you mean '--over'?)"), "{text}");
+    }
+
+    #[test]
+    fn a_grab_takes_negative_coordinates_and_a_time_of_at_most_a_quarter_second() {
+        assert!(try_parse("sim-node ctl grab 3 -1 -2e-3 -.5 --over 0.25".split(' ')).is_ok());
+        for over in ["-1", "0.3", "nan", "soon"] {
+            let text = refused(&format!("sim-node ctl grab 3 -1 -2 0 --over {over}"));
+            assert!(text.contains("a number from 0 to 0.25"), "{text}");
         }
     }
 }

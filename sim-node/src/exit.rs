@@ -1,14 +1,16 @@
-//! How the program ends.
+//! Exit codes of the program.
 
 use std::process::{ExitCode, Termination};
 
-/// The exit code.
+/// How a subcommand ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
-    /// 0: done.
+    /// Exit code 0.
     Done,
-    /// 1: failed; the reason stands on stderr. (2 is a wrong option, which clap ends with.)
+    /// Exit code 1: failed, with the reason on stderr. (Code 2 is a wrong command line.)
     Failed,
+    /// Exit code 4: the node rejected the command of `ctl`.
+    Rejected,
 }
 
 impl Termination for Exit {
@@ -16,18 +18,16 @@ impl Termination for Exit {
         match self {
             Self::Done => ExitCode::SUCCESS,
             Self::Failed => ExitCode::FAILURE,
+            Self::Rejected => ExitCode::from(4),
         }
     }
 }
 
-/// The exit of a subcommand; an error is printed as one line on stderr, its cause behind it.
+/// Prints an error as one line on stderr, followed by its causes.
 #[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
-pub(crate) fn of(result: anyhow::Result<()>) -> Exit {
-    match result {
-        Ok(()) => Exit::Done,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            Exit::Failed
-        }
-    }
+pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        Exit::Failed
+    })
 }

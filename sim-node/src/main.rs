@@ -1,9 +1,8 @@
-//! `sim-node`: solves particles and constraints at a fixed rate, publishes every state in shared
-//! memory and takes commands from any process.
+//! `sim-node`: simulates particles and constraints at a fixed rate, publishes every state in shared
+//! memory and accepts commands from any process.
 #![forbid(unsafe_code)]
 
 mod args;
-mod check;
 mod commands;
 mod ctl;
 mod exit;
@@ -14,7 +13,9 @@ mod pace;
 mod publish;
 mod run;
 mod scene_source;
+mod scenes;
 mod statistics;
+mod table;
 mod threads;
 mod warnings;
 
@@ -26,12 +27,12 @@ fn main() -> Exit {
     let result = match args.verb {
         None => run::run(&args.run),
         Some(Verb::Run(run)) => run::run(&run),
-        Some(Verb::Scenes(list)) => check::scenes(&list),
-        Some(Verb::Show(show)) => check::show(&show),
-        Some(Verb::Check(check)) => check::check(&check),
+        Some(Verb::Scenes(list)) => scenes::list(&list),
+        Some(Verb::Show(show)) => scenes::show(&show),
+        Some(Verb::Check(check)) => scenes::check(&check),
         Some(Verb::Import(mesh)) => import::import(&mesh),
-        Some(Verb::Ctl(ctl)) => ctl::ctl(&ctl),
+        Some(Verb::Ctl(ctl)) => return exit::from_result(ctl::ctl(&ctl)),
         Some(Verb::Lesson(lesson)) => lesson::lesson(&lesson),
     };
-    exit::of(result)
+    exit::from_result(result.map(|()| Exit::Done))
 }

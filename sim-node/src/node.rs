@@ -13,9 +13,13 @@ use crate::statistics::Statistics;
 use crate::threads::with_threads;
 use crate::warnings::Warnings;
 
-/// Longest time between two status messages: 10 Hz.
+/// Time between two status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
-/// How often a paused node looks for commands.
+/// Time between two looks for commands while the next step is far away: an answer comes within it,
+/// and a rate of 50 Hz or more in real time costs no further wake-ups.
+const WAITING_POLL_NS: u64 = SECOND_NS / 50;
+/// Time between two looks for commands while paused: shorter, because the first step of `ctl step`
+/// or `resume` follows at once.
 const PAUSED_POLL_NS: u64 = SECOND_NS / 500;
 
 /// What a run is told.
@@ -94,13 +98,15 @@ impl Node {
         self.pace.restart(self.start_ns);
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.observe(&observer)?;
-        while !stop.is_asked() && !self.is_done() {
-            let wake_late_ns = self.wait(stop, &observer)?;
-            if stop.is_asked() {
+        while !stop.is_requested() && !self.is_done() {
+            let due = self.wait();
+            if stop.is_requested() {
                 break;
             }
             self.apply_commands()?;
-            if self.progress.is_stepping() {
+            if let Some(wake_late_ns) = due
+                && self.progress.is_stepping()
+            {
                 self.make_step(wake_late_ns)?;
             } else {
                 self.publisher.publish_between(&self.solver, self.position())?;
@@ -114,30 +120,34 @@ impl Node {
         self.options.steps.is_some_and(|steps| self.step >= steps)
     }
 
-    /// Waits for the deadline of the next step, or, paused, a little; returns how late it is.
-    fn wait(&mut self, stop: &Stop, observer: &impl Fn(&Self)) -> anyhow::Result<u64> {
+    /// Waits for the deadline of the next step, or until commands should be looked for again.
+    /// Returns how late the step is; `None` if it is not due yet.
+    ///
+    /// A paused node has no deadline: a command that lets it step makes the step due at once.
+    fn wait(&mut self) -> Option<u64> {
         if !self.progress.is_stepping() {
             sleep_until(monotonic_ns() + PAUSED_POLL_NS);
             let now_ns = monotonic_ns();
             self.idle_ns += now_ns - self.mark_ns;
             self.mark_ns = now_ns;
             self.pace.restart(now_ns);
-            return Ok(0);
+            return Some(0);
         }
         if !self.options.waits_for_time {
-            return Ok(0);
+            return Some(0);
         }
-        let deadline_ns = self.pace.deadline_ns();
-        // At a few steps a second, late joiners and the status do not wait for the next one.
-        while monotonic_ns() + STATUS_PERIOD_NS < deadline_ns {
-            sleep_until(monotonic_ns() + STATUS_PERIOD_NS);
-            if stop.is_asked() {
-                return Ok(0);
-            }
-            self.observe(observer)?;
+        if self.progress.is_reset_due {
+            // It came while the node waited, and shows at once, as it does while paused.
+            self.pace.restart(monotonic_ns());
+            return Some(0);
+        }
+        let (now_ns, deadline_ns) = (monotonic_ns(), self.pace.deadline_ns());
+        if now_ns + WAITING_POLL_NS < deadline_ns {
+            sleep_until(now_ns + WAITING_POLL_NS);
+            return None;
         }
         sleep_until(deadline_ns);
-        Ok(self.pace.meet(monotonic_ns()))
+        Some(self.pace.meet(monotonic_ns()))
     }
 
     /// Applies the commands that have arrived, at the boundary before the next step.
@@ -159,8 +169,8 @@ impl Node {
             self.publisher.add_outcome(self.step + 1, command, result);
         }
         self.solver.finish_boundary();
-        self.pace.set_time_scale(self.progress.time_scale);
         let time_scale = self.progress.time_scale;
+        self.pace.set_time_scale(time_scale, monotonic_ns());
         self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
     }
 

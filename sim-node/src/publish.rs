@@ -125,7 +125,8 @@ impl Publisher {
         command: Command,
         result: Result<Applied, Reason>,
     ) {
-        self.outcomes.push(Outcome::new(self.outcome_count, step, command, result.map(|_| ())));
+        let outcome = Outcome::new(self.outcome_count, step, command, result.map(|_| ()));
+        self.outcomes.push(Outcome { run_id: self.run_id, ..outcome });
         self.outcome_count += 1;
         self.rejected_count += u64::from(result.is_err());
         self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);

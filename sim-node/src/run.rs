@@ -34,7 +34,7 @@ struct Summary {
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     let mut scene = scene_source::load(&args.scene)?;
     scene.override_solver(args.rate, args.substeps).map_err(|problem| anyhow!("--{problem}"))?;
-    let endpoint = Endpoint::of_options(args.endpoint.domain.as_deref(), &args.endpoint.name)?;
+    let endpoint = args.endpoint.endpoint()?;
     let options = Options {
         rate_hz: args.rate,
         substeps: args.substeps,

@@ -40,3 +40,14 @@ fn both_examples_stay_short() {
         assert!(source.lines().count() <= 50);
     }
 }
+
+#[test]
+fn the_examples_end_with_the_text_of_an_error() {
+    let sandbox = Sandbox::new();
+    for program in [Program::Watch, Program::Drag] {
+        let finished = Process::run(program, &sandbox, &[]);
+        assert_eq!(finished.code, Some(1));
+        assert!(finished.stderr.starts_with("error: "), "{}", finished.stderr);
+        assert!(!finished.stderr.contains(['"', '{']), "{}", finished.stderr);
+    }
+}

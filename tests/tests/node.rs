@@ -128,7 +128,7 @@ fn a_second_node_with_the_same_name_is_refused_and_told_the_process_id_of_the_fi
     let process_id = ctl(&sandbox, &["status"])["process_id"].to_string();
     let second = Process::run(Program::SimNode, &sandbox, &["run", "rope"]);
     assert_eq!(second.code, Some(1));
-    assert!(second.stderr.contains("running already"), "{}", second.stderr);
+    assert!(second.stderr.contains("already running"), "{}", second.stderr);
     assert!(second.stderr.contains(&process_id), "{}", second.stderr);
     // It runs beside the first under another name.
     let _other = node(&sandbox, &["run", "rope", "--name", "other"]);

@@ -262,7 +262,7 @@ fn a_playback_refuses_to_run_beside_a_node_and_accepts_playback_commands() {
     let running = node(&sandbox, &["run", "rope"]);
     let refused = recorder(&sandbox, &["play", &file]);
     assert_eq!(refused.code, Some(1));
-    assert!(refused.stderr.contains("running already"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("already running"), "{}", refused.stderr);
     running.interrupt().success();
 
     let args = ["play", file.as_str(), "--paused", "--loop"];

@@ -1,8 +1,8 @@
-//! Pages without a screen: how many frames they get, how old these are, and what the server takes.
+//! Measures the server with pages that have no screen: frame rate, age of the frames, and CPU time.
 //!
-//! `cargo run --release -p viewer-bridge --example measure -- HOST:PORT PAGES SECONDS [PID]`, with
-//! the process id of the server for its share of a core.
-#![allow(clippy::print_stdout, reason = "it talks to the user")]
+//! `cargo run --release -p viewer-bridge --example measure -- HOST:PORT PAGES SECONDS [PID]`. With the
+//! process id of the server, prints its share of a core.
+#![allow(clippy::print_stdout, reason = "the results are for the user")]
 
 use std::fs;
 use std::net::TcpStream;
@@ -16,7 +16,7 @@ use viewer_bridge::wire::{self, decode};
 /// Ticks of `/proc/PID/stat` per second.
 const TICKS_PER_SECOND: f64 = 100.0;
 
-/// What one page got.
+/// Frames that one page received.
 #[derive(Debug, Default)]
 struct Received {
     frame_count: usize,
@@ -37,28 +37,28 @@ fn main() -> anyhow::Result<()> {
     let threads: Vec<_> = (0..pages)
         .map(|_| {
             let host = host.clone();
-            thread::spawn(move || look(&host, end_ns))
+            thread::spawn(move || receive_frames(&host, end_ns))
         })
         .collect();
     for thread in threads {
         let received = thread.join().map_err(|_| anyhow::anyhow!("a page panicked"))??;
-        show(received, seconds);
+        print(received, seconds);
     }
     sleep_until(end_ns);
     if let (Some(id), Some(before)) = (process, ticks_before) {
         let used_s = (cpu_ticks(id)? - before) / TICKS_PER_SECOND;
-        let passed_s = (monotonic_ns() - begin_ns) as f64 / SECOND_NS as f64;
-        println!("the server took {:.2} % of a core", 100.0 * used_s / passed_s);
+        let elapsed_s = (monotonic_ns() - begin_ns) as f64 / SECOND_NS as f64;
+        println!("server: {:.2} % of a core", 100.0 * used_s / elapsed_s);
     }
     Ok(())
 }
 
-/// Acknowledges every frame at once until the end.
-fn look(host: &str, end_ns: u64) -> anyhow::Result<Received> {
+/// Receives frames until the end, and acknowledges each at once.
+fn receive_frames(host: &str, end_ns: u64) -> anyhow::Result<Received> {
     let stream = TcpStream::connect(host).with_context(|| format!("connecting to {host}"))?;
     stream.set_nodelay(true)?;
     let (mut socket, _) = tungstenite::client(format!("ws://{host}/socket"), stream)?;
-    socket.send(Message::text(r#"{"type":"hello","protocol":1}"#))?;
+    socket.send(Message::text(r#"{"type":"hello","protocol":2}"#))?;
     let mut received = Received::default();
     while monotonic_ns() < end_ns {
         let Message::Binary(bytes) = socket.read()? else { continue };
@@ -74,20 +74,20 @@ fn look(host: &str, end_ns: u64) -> anyhow::Result<Received> {
     Ok(received)
 }
 
-fn show(mut received: Received, seconds: u64) {
+fn print(mut received: Received, seconds: u64) {
     received.ages_ns.sort_unstable();
-    let at = |part: usize| {
-        let place = received.ages_ns.len().saturating_sub(1) * part / 100;
+    let percentile_ms = |percent: usize| {
+        let place = received.ages_ns.len().saturating_sub(1) * percent / 100;
         received.ages_ns.get(place).map_or(f64::NAN, |age| *age as f64 / 1e6)
     };
     let per_second = |count: usize| count as f64 / seconds as f64;
     println!(
-        "{:.1} frames/s, {:.2} MB/s, from publication to here p50 {:.2} ms p90 {:.2} ms p99 {:.2} ms",
+        "{:.1} frames/s, {:.2} MB/s, age p50 {:.2} ms p90 {:.2} ms p99 {:.2} ms",
         per_second(received.frame_count),
         per_second(received.size_bytes) / 1e6,
-        at(50),
-        at(90),
-        at(99),
+        percentile_ms(50),
+        percentile_ms(90),
+        percentile_ms(99),
     );
 }
 
@@ -96,8 +96,8 @@ fn cpu_ticks(id: &str) -> anyhow::Result<f64> {
     let stat = fs::read_to_string(format!("/proc/{id}/stat"))?;
     let fields: Vec<_> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let ticks = |place: usize| -> anyhow::Result<f64> {
-        Ok(fields.get(place).context("a short stat")?.parse()?)
+        Ok(fields.get(place).context("/proc/PID/stat is too short")?.parse()?)
     };
-    // Fields 14 and 15 of the whole line; two of them stand before the bracket.
+    // Fields 14 and 15 of the whole line; two fields precede the bracket.
     Ok(ticks(11)? + ticks(12)?)
 }

@@ -1,13 +1,16 @@
-//! Shows a running simulation in a browser, and lets it be touched.
+//! Shows a running simulation or a recording in a browser and in Foxglove viewers, and lets their users
+//! touch it.
 //!
-//! A [`Source`] (a live node, or a recording) feeds a [`Hub`]; the hub serves any number of pages
-//! over sockets, and hands their commands to the source. `PROTOCOL.md` beside this crate is what
-//! both ends of a socket go by; [`wire`] is its binary half, [`message`] its text half.
+//! A [`Source`] (a live node, or a recording) publishes updates to [`Sinks`]; each [`sink::Sink`]
+//! translates them into the protocol of its clients. Commands of the clients return to the source as
+//! requests. `PROTOCOL.md` beside this crate specifies the protocol with the pages: [`wire`] is its
+//! binary half, [`message`] its text half.
 //!
 //! ```
-//! use viewer_bridge::wire::{Message, Pins, Stamp, decode};
+//! use viewer_bridge::wire::{FlaggedParticle, Message, Pins, Stamp, decode};
 //!
-//! let pins = Pins { stamp: Stamp { epoch: 1, step: 60 }, held: vec![[3, 1]] };
+//! let stamp = Stamp { epoch: 1, step: 60 };
+//! let pins = Pins { stamp, particles: vec![FlaggedParticle { particle: 3, flags: 1 }] };
 //! assert_eq!(decode(&pins.encode())?, Message::Pins(pins));
 //! # Ok::<(), viewer_bridge::wire::DecodeError>(())
 //! ```
@@ -17,13 +20,20 @@ mod foxglove_server;
 pub mod limits;
 pub mod message;
 pub mod pages;
+pub mod request;
 pub mod scene;
-pub mod shown_state;
+mod shutdown;
+pub mod sink;
 mod socket;
 pub mod source;
 pub mod wire;
 
-pub use foxglove_server::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Recording};
+pub use foxglove_server::{
+    FoxgloveOptions, FoxglovePermission, FoxgloveServer, FoxgloveServerError,
+};
 pub use pages::hub::Hub;
 pub use pages::server::{Server, ServerOptions};
+pub use shutdown::Shutdown;
+pub use sink::Sinks;
 pub use source::Source;
+pub use source::recording_times::RecordingTimes;

@@ -1,59 +1,60 @@
-//! A limit on everything that a page can ask for or leave lying, with the reason for it.
+//! Limits on everything that a client can request or leave unread, each with its reason.
 
 use std::time::Duration;
 
-/// Number of the protocol; another one cannot talk to this server.
-pub const PROTOCOL: u32 = 1;
-/// Pages at the same time: each has a thread's worth of memory and a share of the network.
+/// Protocol number. The server and a page with different numbers do not understand each other.
+pub const PROTOCOL: u32 = 2;
+/// Pages at a time, and Foxglove clients at a time: each costs memory and a share of the network.
 pub const CLIENTS_MAX: usize = 16;
-/// Connections at the same time that ask for files, or have not become sockets yet.
+/// HTTP connections at a time that request files or await their upgrade to a socket.
 pub const CONNECTIONS_MAX: usize = 128;
-/// Sockets at the same time that have not said who they are.
+/// Sockets at a time that have not sent a valid `hello`.
 pub const WAITING_MAX: usize = 64;
-/// Longest message of a page: what a stroke that cuts 256 constraints takes, many times over.
+/// Size of a message from a client. A cut of 256 constraints needs a few KiB.
 pub const MESSAGE_SIZE_BYTES_MAX: usize = 64 << 10;
-/// Messages of a page per second: a drag and an acknowledgement per frame of a 120 Hz display.
+/// Messages of a client per second: one target and one acknowledgement per frame of a 120 Hz display.
 pub const MESSAGES_PER_SECOND_MAX: u32 = 240;
-/// Messages that may come at once after a silence.
+/// Messages that a client can send at once after a pause.
 pub const MESSAGES_BURST_MAX: u32 = 480;
-/// Frames that a page has not acknowledged. With one, the network's delay halves the rate; with
-/// more, a slow page lags.
+/// Frames that a page has not acknowledged. With one, the network latency halves the frame rate;
+/// with more, a slow page lags.
 pub const FRAMES_UNACKNOWLEDGED_MAX: u32 = 2;
-/// Most frames per second: that of common displays.
+/// Frames per second: the refresh rate of common displays.
 pub const FRAMES_PER_SECOND_MAX: u32 = 60;
-/// Reliable messages that wait for one page before it is given up.
+/// Reliable messages that wait for one page. A page that lets more pile up is disconnected.
 pub const RELIABLE_QUEUED_MAX: usize = 256;
-/// Messages that wait for one Foxglove client; a new one replaces the oldest. More than a few are only
-/// old when a client that was slow gets them.
+/// Messages that wait for one Foxglove client. A new message replaces the oldest: a longer queue
+/// would only deliver older states to a slow client.
 pub const FOXGLOVE_QUEUED_MAX: usize = 8;
-/// Requests of all pages that wait for the source.
+/// Requests of all clients that wait for the source.
 pub const REQUESTS_QUEUED_MAX: usize = 4096;
-/// Commands that wait for room at the node.
+/// Commands that wait for room in the node's queue.
 pub const COMMANDS_QUEUED_MAX: usize = 4096;
-/// Constraints of one cut.
+/// Constraints in one cut.
 pub const CONSTRAINTS_PER_CUT_MAX: usize = 256;
-/// Particles that one page holds: ten fingers, and some that it forgot.
-pub const PARTICLES_HELD_MAX: usize = 16;
-/// Steps of one command.
+/// Particles that one client grabs at a time: ten fingers and a few spare.
+pub const GRABS_PER_CLIENT_MAX: usize = 16;
+/// Steps in one command.
 pub const STEPS_AT_ONCE_MAX: u32 = 10_000;
-/// Scenes up to this size are sent as they are where the page leaves the choice.
+/// Largest scene whose positions are sent as f32 to a page that leaves the choice to the server.
 pub const F32_PARTICLES_MAX: usize = 4096;
-/// Most marks on a timeline.
+/// Marks on a timeline.
 pub const MARKS_MAX: usize = 4096;
 
-/// How long a page that says nothing is believed in, and how long one message to it may take.
+/// Time without any message after which a client is disconnected, and the time in which it must
+/// accept one message.
 pub const SILENCE_MAX: Duration = Duration::from_secs(10);
-/// How often a page is asked whether it is there.
+/// Time between two pings to a client.
 pub const PING_PERIOD: Duration = Duration::from_secs(3);
-/// How long a connection has for its first message, and for the head of a request.
+/// Time for the head of a request, and for the first message of a page.
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
-/// How long a connection may last that is no socket: browsers open another one.
+/// Lifetime of a connection that does not become a WebSocket. Browsers open another one.
 pub const CONNECTION_TIMEOUT: Duration = Duration::from_mins(1);
-/// How long a command may go unanswered.
+/// Time in which the node must answer a command.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);
-/// How long a server that ends waits for the node to let go of what pages hold.
+/// Time in which the node must release the clients' grabs when the server ends.
 pub const RELEASE_TIMEOUT: Duration = Duration::from_millis(500);
-/// How long clients have to take their leave at the end.
-pub const FAREWELL_TIMEOUT: Duration = Duration::from_secs(2);
-/// Pause after a connection could not be taken.
+/// Time for clients to close their connections when the server ends.
+pub const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(2);
+/// Pause after a failed `accept`.
 pub const ACCEPT_PAUSE: Duration = Duration::from_millis(20);

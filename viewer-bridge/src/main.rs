@@ -1,4 +1,4 @@
-//! `viewer-bridge`: shows a running simulation in a browser, and lets it be touched; or a recording.
+//! `viewer-bridge`: shows a running simulation or a recording in a browser, and lets its users touch it.
 #![forbid(unsafe_code)]
 
 mod args;
@@ -13,16 +13,17 @@ use clap::Parser;
 use sim_contract::Stop;
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
-
 use viewer_bridge::pages::assets::Assets;
-use viewer_bridge::source::Requests;
+use viewer_bridge::request::{Requests, requests};
 use viewer_bridge::source::live::Live;
 use viewer_bridge::source::replay::Replay;
-use viewer_bridge::{FoxgloveOptions, FoxgloveServer, Hub, Server, ServerOptions, Source};
+use viewer_bridge::{
+    FoxgloveOptions, FoxgloveServer, Hub, Server, ServerOptions, Shutdown, Sinks, Source,
+};
 
 use args::Args;
 
-/// Threads of the server: encoding is not among its work, only sending.
+/// Threads of the servers. They only send; the thread of the source encodes.
 const SERVER_THREADS: usize = 2;
 
 #[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
@@ -38,7 +39,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = Stop::install()?;
-    let source = source(args)?;
+    let source = open_source(args)?;
     let foxglove = args.foxglove(source.recording());
     let assets = match &args.assets {
         None => Assets::Embedded,
@@ -50,61 +51,63 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .worker_threads(SERVER_THREADS)
         .enable_all()
         .build()
-        .context("starting the server's threads")?;
+        .context("starting the threads of the servers")?;
     runtime.block_on(serve(source, options, foxglove, stop))
 }
 
-/// What is shown: a recording, or whatever node has the name.
-fn source(args: &Args) -> anyhow::Result<Box<dyn Source>> {
+fn open_source(args: &Args) -> anyhow::Result<Box<dyn Source>> {
     Ok(match &args.replay {
         Some(path) => Box::new(Replay::open(path, &mut note)?),
         None => Box::new(Live::new(args.endpoint()?)),
     })
 }
 
-/// Serves until asked to stop, or until the source fails.
+/// Serves until a signal arrives or the source ends.
 async fn serve(
     source: Box<dyn Source>,
     options: ServerOptions,
     foxglove: Option<FoxgloveOptions>,
     stop: Stop,
 ) -> anyhow::Result<()> {
-    let asked_to_stop = asked(&stop)?;
+    let stop_signal = stop_signal(&stop)?;
     let server = Server::bind(options).await?;
-    let (hub, requests) = Hub::new(source.mode());
-    let hub = Arc::new(hub);
-    // Before the source starts: it has to hear everything.
+    let (sender, requests) = requests();
+    let shutdown = Shutdown::default();
+    let hub = Arc::new(Hub::new(source.mode(), sender.clone()));
+    let mut sinks = Sinks::new(shutdown.clone());
+    sinks.add(Arc::<Hub>::clone(&hub));
     let foxglove = match foxglove {
         None => None,
-        Some(options) => Some(FoxgloveServer::start(options, &hub).await?),
+        Some(options) => {
+            let server = FoxgloveServer::start(options, sender).await?;
+            sinks.add(server.sink());
+            Some(server)
+        }
     };
-    let feeding = feed(source, &hub, requests)?;
-    say_ready(&server, foxglove.as_ref());
+    let source_thread = start_source(source, sinks, requests, shutdown.clone())?;
+    announce(&server, foxglove.as_ref());
     let serve_foxglove = async {
         if let Some(foxglove) = foxglove {
-            foxglove.serve(Arc::clone(&hub)).await;
+            foxglove.serve(shutdown.clone()).await;
         }
     };
-    let watch = async {
+    let wait_for_end = async {
         tokio::select! {
-            () = asked_to_stop => {}
-            // The source has ended.
-            () = hub.closed() => {}
+            () = stop_signal => {}
+            () = shutdown.begun() => {}
         }
-        hub.close();
+        shutdown.begin();
     };
-    tokio::join!(server.serve(Arc::clone(&hub)), serve_foxglove, watch);
-    feeding
-        .join()
-        .map_err(|_| anyhow!("the thread that reads the node or the recording panicked"))?
+    tokio::join!(server.serve(hub, shutdown.clone()), serve_foxglove, wait_for_end);
+    source_thread.join().map_err(|_| anyhow!("the thread of the source panicked"))?
 }
 
-/// Waits for the signals that [`Stop`] knows of: it has taken note of what came before.
-fn asked(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> {
-    let listen = |kind| signal(kind).context("listening to signals");
+/// Waits for the signals that [`Stop`] handles. It has seen any that came earlier.
+fn stop_signal(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> {
+    let listen = |kind| signal(kind).context("listening for signals");
     let (mut interrupt, mut terminate) =
         (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
-    let is_asked = stop.is_asked();
+    let is_asked = stop.is_requested();
     Ok(async move {
         if !is_asked {
             tokio::select! {
@@ -115,35 +118,36 @@ fn asked(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> {
     })
 }
 
-/// Starts the thread of the source. With its end, however it ends, the hub is closed.
-fn feed(
+/// Starts the thread of the source. However the source ends, the shutdown begins.
+fn start_source(
     mut source: Box<dyn Source>,
-    hub: &Arc<Hub>,
+    sinks: Sinks,
     requests: Requests,
+    shutdown: Shutdown,
 ) -> anyhow::Result<JoinHandle<anyhow::Result<()>>> {
-    let hub = Arc::clone(hub);
     thread::Builder::new()
         .name("source".to_owned())
         .spawn(move || {
-            let ended = catch_unwind(AssertUnwindSafe(|| source.run(&hub, &requests)));
-            hub.close();
-            ended.unwrap_or_else(|panic| resume_unwind(panic))
+            let result = catch_unwind(AssertUnwindSafe(|| source.run(&sinks, &requests)));
+            shutdown.begin();
+            result.unwrap_or_else(|panic| resume_unwind(panic))
         })
-        .context("starting the thread that reads the node or the recording")
+        .context("starting the thread of the source")
 }
 
-fn say_ready(server: &Server, foxglove: Option<&FoxgloveServer>) {
+/// Prints the addresses.
+fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
     let url = server.url();
     if let Some(foxglove) = foxglove {
         note(&format!("foxglove {}", foxglove.url()));
     }
     note(&format!("ready {url}"));
     if url.contains('#') {
-        note("warning: other machines can reach this; whoever has the token can command the node");
+        note("warning: other machines can connect; anyone with the token can control the node");
     }
 }
 
-#[allow(clippy::print_stderr, reason = "messages to the user")]
+#[allow(clippy::print_stderr, reason = "messages for the user")]
 fn note(text: &str) {
     eprintln!("{text}");
 }

@@ -1,14 +1,15 @@
-//! The text messages, as PROTOCOL.md has them.
+//! The text messages of the protocol with the pages, as `PROTOCOL.md` describes them.
 
-pub(crate) mod check;
+mod check;
 mod from_page;
-pub mod parameters;
-pub mod reason;
-pub mod settings;
+mod refusal;
+mod timeline;
 mod to_page;
 
+pub(crate) use check::check;
 pub use from_page::{Choice, Command, FromPage, Hello, Malformed};
+pub use refusal::Refusal;
+pub use timeline::{Hashes, Mark, MarkKind, Playback, Timeline};
 pub use to_page::{
-    Hashes, Level, Limits, Mark, MarkKind, Mode, Node, NodeState, OutcomeText, ParametersText,
-    Playback, Status, Timeline, ToPage, Welcome,
+    Level, Mode, Node, NodeState, OutcomeText, PageLimits, ParametersText, Status, ToPage, Welcome,
 };

@@ -1,7 +1,9 @@
-//! The pages: their server, and the sink that feeds them.
+//! The pages: the sink that feeds them, and the server of their files and sockets.
 
 pub mod assets;
-mod connection;
+pub(crate) mod connection;
+mod frame_encoder;
+mod frame_set;
 pub mod hub;
 pub mod server;
 mod session;

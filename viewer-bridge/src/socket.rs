@@ -1,4 +1,6 @@
-//! The rules that every connection keeps, whichever protocol it speaks.
+//! The rules that every WebSocket keeps, whichever protocol it carries.
 
 pub(crate) mod guard;
-pub(crate) mod rate_limit;
+pub(crate) mod listen;
+pub(crate) mod peer;
+mod rate_limit;

@@ -10,18 +10,17 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use sim_contract::{
-    ColliderShape, ColliderState, ConstraintState, ParticleFlags, ParticleState, PlainF32, Triangle,
+    ColliderShape, ColliderState, ConstraintState, ParameterValues, ParticleFlags, ParticleState,
+    Reason, Triangle,
 };
-use viewer_bridge::message::parameters::Parameters;
-use viewer_bridge::message::settings;
 use viewer_bridge::message::{
-    Choice, FromPage, Hashes, Level, Limits, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
-    ParametersText, Playback, Status, Timeline, ToPage, Welcome,
+    Choice, FromPage, Hashes, Level, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
+    PageLimits, ParametersText, Playback, Refusal, Status, Timeline, ToPage, Welcome,
 };
 use viewer_bridge::scene::catalog;
 use viewer_bridge::wire::{
-    Colliders, Format, FrameHead, FrameLimits, Grid, Message, Pins, Scene, SceneText, Stamp,
-    Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
+    Bounds, Colliders, Format, FrameHead, FrameLimits, Message, Percentiles, Pins, Scene,
+    SceneText, Stamp, Statistics, Tear, decode, encode_frame, frame_flag, scene_flag,
 };
 
 const STAMP: Stamp = Stamp { epoch: 3, step: 1200 };
@@ -40,7 +39,7 @@ fn particles() -> Vec<ParticleState> {
 fn scene() -> Scene {
     let mut scene = Scene {
         stamp: STAMP,
-        flags: scene_flag::TEARABLE | scene_flag::TETHERS,
+        flags: scene_flag::PLANAR,
         rate_hz: 240,
         origin: [0.0, 100.5, -2.0],
         text: SceneText {
@@ -48,7 +47,6 @@ fn scene() -> Scene {
             unit: "m".to_owned(),
             up: "y".to_owned(),
             run_id: "0123456789abcdef".to_owned(),
-            grids: vec![Grid { first: 0, columns: 2, rows: 2 }],
         },
         ..Scene::default()
     };
@@ -74,8 +72,8 @@ fn head() -> FrameHead {
 fn statistics() -> Statistics {
     Statistics {
         stamp: STAMP,
-        solve_us: [10.0, 20.0],
-        wake_late_us: [50.0, 900.0],
+        solve_us: Percentiles { p50: 10.0, p99: 20.0 },
+        wake_late_us: Percentiles { p50: 50.0, p99: 900.0 },
         period_us: 4166.5,
         real_time_factor: 0.5,
         time_scale: 1.0,
@@ -121,15 +119,15 @@ fn colliders() -> Colliders {
 /// All binary messages, by name.
 fn messages() -> Vec<(&'static str, Vec<u8>)> {
     let finite = &particles()[..3];
-    let limits = FrameLimits::around([0.0; 3], [0.1; 3]);
+    let limits = FrameLimits::around(Bounds { min: [0.0; 3], max: [0.1; 3] });
     let mut far = particles();
     far[2].position[0] = 1000.0;
     let frame = |format, particles: &[ParticleState]| {
         encode_frame(&head(), particles, format, &limits).to_vec()
     };
-    let tear = Tear { stamp: STAMP, first: 1, constraints: vec![7, 3, 9], causes: vec![0, 3, 255] };
+    let tear = Tear { stamp: STAMP, first: 1, constraints: vec![7, 3, 9] };
     let nothing = Tear { stamp: STAMP, ..Tear::default() };
-    let pins = Pins { stamp: STAMP, held: Pins::of(&particles()) };
+    let pins = Pins::from_particles(STAMP, &particles());
     vec![
         ("scene", scene().encode().to_vec()),
         ("scene_without_particles", Scene { stamp: STAMP, ..Scene::default() }.encode().to_vec()),
@@ -152,7 +150,7 @@ fn fields(message: &Message) -> Value {
         Message::Scene(scene) => json!({
             "kind": 1, "epoch": scene.stamp.epoch, "step": scene.stamp.step,
             "flags": scene.flags, "rate_hz": scene.rate_hz, "origin": scene.origin,
-            "min": scene.bounds().0, "max": scene.bounds().1,
+            "min": scene.bounds().min, "max": scene.bounds().max,
             "positions": scene.positions, "ends": scene.ends,
             "rest_lengths": scene.rest_lengths, "triangles": scene.triangles,
             "kinds": scene.kinds, "text": scene.text,
@@ -169,14 +167,16 @@ fn fields(message: &Message) -> Value {
         }),
         Message::Tear(tear) => json!({
             "kind": 4, "epoch": tear.stamp.epoch, "step": tear.stamp.step,
-            "first": tear.first, "constraints": tear.constraints, "causes": tear.causes,
+            "first": tear.first, "constraints": tear.constraints,
         }),
         Message::Pins(pins) => json!({
-            "kind": 5, "epoch": pins.stamp.epoch, "step": pins.stamp.step, "held": pins.held,
+            "kind": 5, "epoch": pins.stamp.epoch, "step": pins.stamp.step,
+            "held": pins.particles.iter().map(|one| [one.particle, one.flags]).collect::<Vec<_>>(),
         }),
         Message::Statistics(one) => json!({
             "kind": 6, "epoch": one.stamp.epoch, "step": one.stamp.step,
-            "solve_us": one.solve_us, "wake_late_us": one.wake_late_us,
+            "solve_us": [one.solve_us.p50, one.solve_us.p99],
+            "wake_late_us": [one.wake_late_us.p50, one.wake_late_us.p99],
             "period_us": one.period_us, "real_time_factor": one.real_time_factor,
             "time_scale": one.time_scale, "stretch_mean": one.stretch_mean,
             "stretch_max": one.stretch_max,
@@ -247,7 +247,7 @@ fn every_message_decodes_to_what_was_encoded() {
 
 #[test]
 fn u16_positions_are_within_half_a_quantum_and_f32_positions_are_exact() {
-    let limits = FrameLimits::around([0.0; 3], [1.0; 3]);
+    let limits = FrameLimits::around(Bounds { min: [0.0; 3], max: [1.0; 3] });
     let particles: Vec<_> = (0..1000_u16)
         .map(|index| {
             let x = f32::from(index);
@@ -271,7 +271,7 @@ fn u16_positions_are_within_half_a_quantum_and_f32_positions_are_exact() {
 
 #[test]
 fn a_particle_far_away_does_not_reduce_the_resolution_of_the_others() {
-    let limits = FrameLimits::around([0.0; 3], [1.0; 3]);
+    let limits = FrameLimits::around(Bounds { min: [0.0; 3], max: [1.0; 3] });
     let mut all = particles();
     all[1].position = [1e30, 0.0, 0.0];
     let Ok(Message::Frame(frame)) = decode(&encode_frame(&head(), &all, Format::U16, &limits))
@@ -292,20 +292,19 @@ fn to_page() -> Vec<ToPage> {
         step: Some(1234),
         applied: 3,
         rejected: 1,
-        reason: "already_torn",
-        text: "it is torn already".to_owned(),
+        reason: Some(Reason::AlreadyTorn.into()),
+        text: "the constraint is already torn".to_owned(),
     };
-    let parameters = Parameters { tear_force: Some(PlainF32(20.0)), ..Parameters::default() };
+    let parameters = ParameterValues { tear_force: Some(20.0), ..ParameterValues::default() };
     vec![
         ToPage::Hello(Box::new(Welcome {
-            protocol: 1,
+            protocol: 2,
             version: "0.1.0",
             client: 3,
             mode: Mode::Live,
             format: Choice::Auto,
             scenes: catalog::all(),
-            settings: &settings::SETTINGS,
-            limits: Limits::default(),
+            limits: PageLimits::default(),
         })),
         ToPage::Node(Node { text: "no simulation runs".to_owned(), ..Node::default() }),
         ToPage::Node(Node {
@@ -323,7 +322,7 @@ fn to_page() -> Vec<ToPage> {
         ToPage::Parameters(Box::new(ParametersText {
             is_complete: true,
             values: Some(parameters),
-            initial: Some(Parameters::default()),
+            initial: Some(ParameterValues::default()),
         })),
         ToPage::Outcome(outcome.clone()),
         ToPage::Outcome(OutcomeText {
@@ -332,8 +331,8 @@ fn to_page() -> Vec<ToPage> {
             step: None,
             applied: 0,
             rejected: 0,
-            reason: "no_answer",
-            text: "the node did not answer; it may still happen".to_owned(),
+            reason: Some(Refusal::NoAnswer),
+            text: "the node did not answer; the command may still take effect".to_owned(),
             ..outcome
         }),
         ToPage::Reset { step: 1300 },
@@ -370,12 +369,12 @@ fn to_page_of_a_replay() -> Vec<ToPage> {
 
 /// One message of each kind that a page may send.
 const FROM_PAGE: [&str; 25] = [
-    r#"{"type":"hello","protocol":1,"token":"00","format":"u16"}"#,
-    r#"{"type":"hello","protocol":1}"#,
+    r#"{"type":"hello","protocol":2,"token":"00","format":"u16"}"#,
+    r#"{"type":"hello","protocol":2}"#,
     r#"{"type":"ack","frame":77}"#,
-    r#"{"type":"drag_begin","particle":90,"target":[0.5,0.2,0.3],"over_s":0.05,"id":1}"#,
-    r#"{"type":"drag_move","particle":90,"target":[0.5,0.4,0.3]}"#,
-    r#"{"type":"drag_end","particle":90}"#,
+    r#"{"type":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.05,"id":1}"#,
+    r#"{"type":"move","particle":90,"target":[0.5,0.4,0.3]}"#,
+    r#"{"type":"release","particle":90}"#,
     r#"{"type":"brush","eye":[0,0,5],"ray":[0,0,-1],"radius":0.2,"delta":[0.01,0,0],"over_s":0.016,"cap":0.05}"#,
     r#"{"type":"pin","particle":3}"#,
     r#"{"type":"unpin","particle":3}"#,

@@ -130,7 +130,7 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
 
     let mut written = Vec::new();
     visit_states(open()?, &steps, |state| {
-        if stop.is_asked() {
+        if stop.is_requested() {
             return Ok(ControlFlow::Break(()));
         }
         let step = state.row.step;

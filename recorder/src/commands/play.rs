@@ -105,7 +105,7 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
         {
             output::note(&format!("warning: {path} is {end}; played as far as it goes"));
         }
-        if !args.loops || stop.is_asked() {
+        if !args.loops || stop.is_requested() {
             let is_whole = end.is_none_or(|end| end == LogEnd::Complete);
             return Ok(if is_whole { Exit::Done } else { Exit::Loss });
         }
@@ -181,7 +181,7 @@ impl Pass {
     }
 
     fn wait_for_readers(&mut self, count: u64, step: u64, stop: &Stop) -> anyhow::Result<()> {
-        while (self.replay.reader_count() as u64) < count && !stop.is_asked() {
+        while (self.replay.reader_count() as u64) < count && !stop.is_requested() {
             self.attend(step)?;
             sleep_until(monotonic_ns() + WAIT_MAX_NS);
         }
@@ -192,7 +192,7 @@ impl Pass {
     fn wait_until_due(&mut self, time_ns: u64, step: u64, stop: &Stop) -> anyhow::Result<bool> {
         loop {
             self.attend(step)?;
-            if stop.is_asked() {
+            if stop.is_requested() {
                 return Ok(false);
             }
             let now_ns = monotonic_ns();
@@ -223,7 +223,7 @@ impl Pass {
 
     fn linger(&mut self, next_step: u64, stop: &Stop) -> anyhow::Result<()> {
         let end_ns = monotonic_ns() + LINGER_NS;
-        while monotonic_ns() < end_ns && !stop.is_asked() {
+        while monotonic_ns() < end_ns && !stop.is_requested() {
             self.attend(next_step)?;
             sleep_until(monotonic_ns() + WAIT_MAX_NS);
         }

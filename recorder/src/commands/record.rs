@@ -172,7 +172,7 @@ impl Recording {
             self.is_owner_alive = self.tap.is_owner_alive();
         }
         let passed = Duration::from_nanos(now_ns - self.begin_ns);
-        if stop.is_asked() {
+        if stop.is_requested() {
             Some(StopReason::Signal)
         } else if self.queue.is_closed() {
             Some(StopReason::WriteError)

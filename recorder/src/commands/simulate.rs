@@ -83,7 +83,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
             return ControlFlow::Continue(());
         }
         bar.set_position(step);
-        if stop.is_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if stop.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
     .with_context(|| truncation(args))?;
     bar.finish_and_clear();

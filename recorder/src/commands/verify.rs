@@ -74,7 +74,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let bar = progress_spinner();
     let (report, end) = verify(log, &path, args.threads.count(), |step| {
         bar.set_message(format!("step {step}"));
-        stop.is_asked()
+        stop.is_requested()
     })?;
     bar.finish_and_clear();
     output::result(args.as_json, &report, &report.to_string())?;

@@ -48,12 +48,12 @@ fn commands_in_recording(path: &Path) -> anyhow::Result<Vec<TimedCommand>> {
             row.outcome_count
         );
     }
-    let mut commands: Vec<_> = outcomes.into_iter().map(timed_command).collect();
+    let mut commands: Vec<_> = outcomes.iter().map(timed_command).collect();
     command_file::sort(&mut commands);
     Ok(commands)
 }
 
-fn timed_command(row: OutcomeRow) -> TimedCommand {
+fn timed_command(row: &OutcomeRow) -> TimedCommand {
     TimedCommand {
         step: row.step,
         index: Some(row.index),

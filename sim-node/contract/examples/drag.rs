@@ -1,29 +1,32 @@
-//! Drags a particle around: `cargo run -p sim-contract --example drag -- 7`
+//! Drags a particle around a circle: `cargo run -p sim-contract --example drag -- 7`
 //!
-//! Grabs the particle that the argument says (0 if there is none), moves it once around a circle
-//! in two seconds, and lets it go. `--domain` and `--name` say which simulation.
-#![allow(clippy::print_stdout, reason = "printing is what it is for")]
+//! Grabs particle 7 (without an argument, particle 0), moves it around in two seconds, and releases
+//! it. `--domain` and `--name` select the simulation.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is its purpose")]
 
-use std::error::Error;
-use std::f32::consts::TAU;
-use std::time::Duration;
+use std::{error::Error, f32::consts::TAU, process::ExitCode, time::Duration};
 
 use sim_contract::{Action, Client, Endpoint, GRAB_OVER_S_DEFAULT};
 
 const TIMEOUT: Duration = Duration::from_secs(1);
 const MOVES: u16 = 120;
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let (endpoint, arguments) = Endpoint::from_env_and_args()?;
-    let particle: u32 = arguments.first().map_or(Ok(0), |argument| argument.parse())?;
+fn main() -> ExitCode {
+    let Err(error) = drag() else { return ExitCode::SUCCESS };
+    eprintln!("error: {error}");
+    ExitCode::FAILURE
+}
 
-    let mut client = Client::attach(&endpoint).map_err(|error| error.to_string())?;
-    let rate_hz = client.topology(TIMEOUT)?.ok_or("nothing is loaded")?.header.rate_hz;
-    let snapshot = client.latest_snapshot(TIMEOUT)?.ok_or("nothing is published")?;
+fn drag() -> Result<(), Box<dyn Error>> {
+    let (endpoint, arguments) = Endpoint::from_env_and_args()?;
+    let argument = arguments.first().map_or("0", String::as_str);
+    let particle: u32 = argument.parse().map_err(|_| format!("'{argument}' is not an index"))?;
+    let mut client = Client::attach(&endpoint)?;
+    let rate_hz = client.topology(TIMEOUT)?.ok_or("the node has no scene")?.header.rate_hz;
+    let snapshot = client.latest_snapshot(TIMEOUT)?.ok_or("the node publishes nothing")?;
     let start = snapshot.particles().get(particle as usize).ok_or("no such particle")?.position;
     drop(snapshot);
-
-    // A command has taken effect when its outcome says so, and at the step that it names.
+    // The outcome proves that a command took effect, and names the first step that shows it.
     let over_s = GRAB_OVER_S_DEFAULT;
     let grab = client.request(Action::Grab { particle, target: start, over_s }, TIMEOUT)?;
     if !grab.is_applied() {
@@ -31,12 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut step = grab.step;
     for index in 1..=MOVES {
-        // Simulated time sets the pace: each move takes effect 1/60 s after the one before, so
-        // wait for the step before that.
-        let awaited = step + u64::from(rate_hz / 60).saturating_sub(1);
-        while client.latest_snapshot(TIMEOUT)?.ok_or("the node stands still")?.header().step
-            < awaited
-        {}
+        // Simulated time sets the pace: one move every 1/60 s.
+        let due = step + u64::from(rate_hz / 60).saturating_sub(1);
+        while client.latest_snapshot(TIMEOUT)?.ok_or("the node is paused")?.header().step < due {}
         let angle = TAU * f32::from(index) / f32::from(MOVES);
         let target = [start[0] + angle.sin(), start[1] + 1.0 - angle.cos(), start[2]];
         step = client.request(Action::Move { particle, target, over_s }, TIMEOUT)?.step;

@@ -1,23 +1,34 @@
 //! What third parties use: reading snapshots and sending commands.
 
+pub(crate) mod request;
+pub(crate) mod state;
+pub(crate) mod tap;
+pub(crate) mod views;
+pub(crate) mod watch;
+
 use std::time::Duration;
 
-use crate::latch::Latch;
-use crate::parameters::to_values;
-use crate::reader::{ReadError, SliceReader, ValueReader};
-use crate::request::{Commander, RequestError};
-use crate::service::{
+use crate::client::request::{Commander, RequestError};
+use crate::client::views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
+use crate::client::watch::Watch;
+use crate::endpoint::Endpoint;
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::command::CONSOLE_CLIENT_ID;
+use crate::messages::outcome::Outcome;
+use crate::messages::parameters::to_values;
+use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::status::NodeStatus;
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
+use crate::ports::latch::Latch;
+use crate::ports::reader::{ReadError, SliceReader, ValueReader};
+use crate::ports::service::{
     COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
-use crate::services::{AttachError, Attachment};
-use crate::session::Session;
-use crate::watch::Watch;
-use crate::{
-    Action, CONSOLE_CLIENT_ID, ColliderState, Colliders, CollidersHeader, ConstraintState,
-    Endpoint, LoadHeader, NodeStatus, Outcome, ParameterState, Parameters, ParametersHeader,
-    ParticleState, Snapshot, SnapshotHeader, Surface, TearsHeader, Topology, Torn, TornConstraint,
-    Triangle,
-};
+use crate::ports::services::{AttachError, Attachment};
+use crate::ports::session::Session;
+use sim_types::Action;
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
 ///

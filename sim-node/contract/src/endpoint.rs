@@ -1,12 +1,12 @@
-//! Where a simulation is found: a domain of the host and a name within it.
+//! Address of a simulation: a domain of the host and a name within it.
 
 use std::fmt;
 
 use thiserror::Error;
 
-/// The name of a simulation unless told otherwise.
+/// Default name of a simulation.
 pub const NAME_DEFAULT: &str = "sim";
-/// The environment variable that stands for `--domain`.
+/// Environment variable that stands for an absent `--domain`.
 pub const DOMAIN_VARIABLE: &str = "CATENARY_DOMAIN";
 
 /// Longest name of a domain, in characters: it is part of a socket path of at most 107 bytes.
@@ -17,40 +17,49 @@ const NAME_LENGTH_MAX: usize = 64;
 /// The address of a simulation: a domain and a name. Programs meet where both are equal.
 ///
 /// The default domain is iceoryx2's own configuration, so `iox2 service list` shows the services.
-/// A named domain is separate from it and from every other one: its processes and files are not
-/// seen elsewhere. Joining either sets the log level of iceoryx2 to errors, unless the variable
-/// `IOX2_LOG_LEVEL` says otherwise.
+/// A named domain is separate from it and from every other domain: its processes and files are
+/// visible nowhere else. Joining a domain sets the log level of iceoryx2 to errors, unless the
+/// variable `IOX2_LOG_LEVEL` sets another.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Endpoint {
     domain: Option<String>,
     name: String,
 }
 
-/// Why an endpoint was refused.
+/// Reason why an endpoint is refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum EndpointError {
-    /// The domain is empty, too long, or has a character that file names should not have.
+    /// The domain is empty, too long, or contains a character that is not allowed in it.
     #[error(
-        "'{domain}' is no name of a domain (allowed: 1 to {DOMAIN_LENGTH_MAX} of a-z, 0-9, '_', '-')"
+        "'{domain}' is not a valid domain (allowed: 1 to {DOMAIN_LENGTH_MAX} of a-z, 0-9, '_', '-')"
     )]
     Domain {
-        /// What was given.
+        /// The refused domain.
         domain: String,
     },
-    /// The name is empty, too long, or has a character that service names should not have.
+    /// The environment variable [`DOMAIN_VARIABLE`] holds such a domain, and no option replaces it.
     #[error(
-        "'{name}' is no name of a simulation (allowed: 1 to {NAME_LENGTH_MAX} of A-Z, a-z, 0-9, '_', '-', '.')"
+        "the environment variable {DOMAIN_VARIABLE} is '{domain}', which is not a valid domain \
+         (allowed: 1 to {DOMAIN_LENGTH_MAX} of a-z, 0-9, '_', '-')"
+    )]
+    Variable {
+        /// Value of the variable.
+        domain: String,
+    },
+    /// The name is empty, too long, or contains a character that is not allowed in it.
+    #[error(
+        "'{name}' is not a valid name of a simulation (allowed: 1 to {NAME_LENGTH_MAX} of A-Z, a-z, 0-9, '_', '-', '.')"
     )]
     Name {
-        /// What was given.
+        /// The refused name.
         name: String,
     },
-    /// An option stands at the end of the command line, without its value.
+    /// An option ends the command line without its value.
     #[error("{option} needs a value (for example {option} {example})")]
     MissingValue {
         /// `--domain` or `--name`.
         option: &'static str,
-        /// A value that would be accepted.
+        /// An acceptable value.
         example: &'static str,
     },
 }
@@ -88,24 +97,39 @@ impl Endpoint {
         Ok(Self { domain: domain.map(str::to_owned), name: name.to_owned() })
     }
 
-    /// As [`Endpoint::new`], of the options `--domain` and `--name` of a program: there an empty
-    /// domain, as an empty variable gives it, counts as absent.
+    /// Endpoint from the options `--domain` and `--name` of a program. Without `--domain`, the
+    /// environment variable [`DOMAIN_VARIABLE`] gives the domain. An empty domain stands for
+    /// iceoryx2's own.
+    ///
+    /// # Errors
+    /// As [`Endpoint::new`]; a variable that is not a valid domain is an error of its own.
+    pub fn from_options(domain: Option<&str>, name: Option<&str>) -> Result<Self, EndpointError> {
+        Self::resolve(domain, domain_variable().as_deref(), name)
+    }
+
+    fn resolve(
+        domain: Option<&str>,
+        variable: Option<&str>,
+        name: Option<&str>,
+    ) -> Result<Self, EndpointError> {
+        if let (None, Some(domain)) = (domain, variable)
+            && !(domain.is_empty() || is_domain(domain))
+        {
+            return Err(EndpointError::Variable { domain: domain.to_owned() });
+        }
+        let domain = domain.or(variable).filter(|domain| !domain.is_empty());
+        Self::new(domain, name.unwrap_or(NAME_DEFAULT))
+    }
+
+    /// Parses the value of an option `--domain`, which may be empty.
     ///
     /// # Errors
     /// As [`Endpoint::new`].
-    pub fn of_options(domain: Option<&str>, name: &str) -> Result<Self, EndpointError> {
-        Self::new(domain.filter(|domain| !domain.is_empty()), name)
-    }
-
-    /// The value of an option `--domain`, if it is one.
-    ///
-    /// # Errors
-    /// As [`Endpoint::of_options`].
     pub fn parse_domain(text: &str) -> Result<String, EndpointError> {
-        Self::of_options(Some(text), NAME_DEFAULT).map(|_| text.to_owned())
+        Self::resolve(Some(text), None, None).map(|_| text.to_owned())
     }
 
-    /// The value of an option `--name`, if it is one.
+    /// Parses the value of an option `--name`.
     ///
     /// # Errors
     /// As [`Endpoint::new`].
@@ -113,23 +137,21 @@ impl Endpoint {
         Self::new(None, text).map(|_| text.to_owned())
     }
 
-    /// Reads `--domain` and `--name` from the command line and `CATENARY_DOMAIN` from the
-    /// environment (the option wins, and an empty variable counts as absent). Also returns the
-    /// other arguments, in order and without the program's name. For programs that are too small
-    /// for an argument parser.
+    /// Reads `--domain` and `--name` from the command line, with the rules of
+    /// [`Endpoint::from_options`]. Also returns the other arguments in order, without the program's
+    /// name. For programs too small for an argument parser.
     ///
     /// # Errors
-    /// As [`Endpoint::new`], or an option without its value.
+    /// As [`Endpoint::from_options`], or an option without its value.
     pub fn from_env_and_args() -> Result<(Self, Vec<String>), EndpointError> {
-        Self::parse(std::env::var(DOMAIN_VARIABLE).ok(), std::env::args().skip(1))
+        Self::parse(domain_variable().as_deref(), std::env::args().skip(1))
     }
 
     fn parse(
-        variable: Option<String>,
+        variable: Option<&str>,
         mut arguments: impl Iterator<Item = String>,
     ) -> Result<(Self, Vec<String>), EndpointError> {
-        let mut domain = variable.filter(|domain| !domain.is_empty());
-        let mut name = None;
+        let (mut domain, mut name) = (None, None);
         let mut others = Vec::new();
         while let Some(argument) = arguments.next() {
             let (option, value) = match argument.split_once('=') {
@@ -148,26 +170,30 @@ impl Endpoint {
                 _ => others.push(argument),
             }
         }
-        let endpoint = Self::new(domain.as_deref(), name.as_deref().unwrap_or(NAME_DEFAULT))?;
-        Ok((endpoint, others))
+        Ok((Self::resolve(domain.as_deref(), variable, name.as_deref())?, others))
     }
 
-    /// The name of the simulation; its services are called `<name>/...`.
+    /// Name of the simulation; its services are called `<name>/...`.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The domain; `None` is iceoryx2's own.
+    /// Domain of the simulation; `None` is iceoryx2's own.
     pub fn domain(&self) -> Option<&str> {
         self.domain.as_deref()
     }
 
-    /// The options that lead another program here, for messages.
+    /// Options that give another program this endpoint, for messages.
     pub(crate) fn options(&self) -> String {
         let domain = self.domain.iter().map(|domain| format!(" --domain {domain}"));
         let name = (self.name != NAME_DEFAULT).then(|| format!(" --name {}", self.name));
         domain.chain(name).collect()
     }
+}
+
+/// Value of [`DOMAIN_VARIABLE`]; characters that are not UTF-8 make it an invalid domain.
+fn domain_variable() -> Option<String> {
+    std::env::var_os(DOMAIN_VARIABLE).map(|value| value.to_string_lossy().into_owned())
 }
 
 fn is_domain(domain: &str) -> bool {
@@ -189,7 +215,7 @@ mod tests {
         arguments: &[&str],
     ) -> Result<(Endpoint, Vec<String>), EndpointError> {
         let arguments = arguments.iter().map(|argument| (*argument).to_owned());
-        Endpoint::parse(variable.map(str::to_owned), arguments)
+        Endpoint::parse(variable, arguments)
     }
 
     #[test]
@@ -200,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn options_are_taken_out_of_the_arguments_wherever_they_stand() {
+    fn options_are_removed_from_the_arguments_at_any_position() {
         let (endpoint, others) =
             parse(None, &["7", "--domain", "lab", "--name=left", "x"]).unwrap();
         assert_eq!(endpoint, Endpoint::new(Some("lab"), "left").unwrap());
@@ -210,14 +236,27 @@ mod tests {
     }
 
     #[test]
-    fn the_variable_gives_the_domain_and_the_option_wins_over_it() {
+    fn the_option_overrides_the_variable() {
         assert_eq!(parse(Some("lab"), &[]).unwrap().0.domain(), Some("lab"));
         assert_eq!(parse(Some("lab"), &["--domain", "home"]).unwrap().0.domain(), Some("home"));
+        assert_eq!(parse(Some("lab"), &["--domain="]).unwrap().0.domain(), None);
         assert_eq!(parse(Some(""), &[]).unwrap().0.domain(), None);
     }
 
     #[test]
-    fn wrong_names_are_refused_with_what_is_allowed() {
+    fn an_invalid_variable_is_blamed_by_its_name_unless_an_option_replaces_it() {
+        assert_eq!(
+            parse(Some("Big Lab"), &[]).unwrap_err().to_string(),
+            "the environment variable CATENARY_DOMAIN is 'Big Lab', which is not a valid domain \
+             (allowed: 1 to 24 of a-z, 0-9, '_', '-')"
+        );
+        let error = parse(Some("Big Lab"), &["--domain", "Lab"]).unwrap_err().to_string();
+        assert!(error.starts_with("'Lab' is not a valid domain (allowed: "), "{error}");
+        assert_eq!(parse(Some("Big Lab"), &["--domain", "lab"]).unwrap().0.domain(), Some("lab"));
+    }
+
+    #[test]
+    fn invalid_names_are_refused_with_the_allowed_characters() {
         let long = "x".repeat(25);
         for domain in ["", "Lab", "a/b", "..", "a b", "é", long.as_str()] {
             let error = Endpoint::new(Some(domain), "sim").unwrap_err().to_string();

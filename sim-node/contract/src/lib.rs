@@ -39,62 +39,45 @@
 
 mod client;
 pub mod clock;
-mod collider;
-mod command;
-mod domain;
 mod endpoint;
-mod latch;
 mod limits;
-mod load;
-mod outcome;
+mod messages;
 mod owner;
-mod parameters;
 mod ports;
-mod reader;
-mod request;
-mod service;
-mod services;
-mod session;
-mod snapshot;
-mod status;
 mod stop;
-mod tap;
-mod tears;
 pub mod testing;
-mod topology;
-mod views;
-mod wake;
-mod watch;
-mod writer;
 
 pub use client::Client;
-pub use collider::{ColliderState, CollidersHeader};
-pub use command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
+pub use client::request::{OwnerState, RequestError};
+pub use client::state::{Change, LoadedScene, State};
+pub use client::tap::Tap;
+pub use client::views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
 pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
 pub use limits::*;
-pub use load::Load;
-pub use outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus};
-pub use owner::{Owner, OwnerError};
-pub use parameters::{ParameterState, ParametersHeader};
-pub use reader::{Drained, ReadError};
-pub use request::{OwnerSeen, RequestError};
-pub use service::ServiceError;
-pub use services::AttachError;
+pub use messages::collider::{ColliderState, CollidersHeader};
+pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
+pub use messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus};
+pub use messages::parameters::{ParameterState, ParametersHeader};
+pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
+pub use messages::status::{NodeStatus, StatusFlags};
+pub use messages::tears::{TearsHeader, TornConstraint};
+pub use messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+pub use messages::update::Update;
+pub use owner::Owner;
+pub use owner::error::OwnerError;
+pub use owner::load::Load;
+pub use ports::reader::{Drained, ReadError};
+pub use ports::service::ServiceError;
+pub use ports::services::AttachError;
+pub use ports::wake::Wake;
+pub use ports::writer::PublishError;
 pub use sim_types::{
     Action, COORDINATE_MAX, ColliderShape, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Method,
     NumberRange, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
     ParticleFlags, PerKind, PlainF32, Reason, SETTINGS_COUNT, Setting, TearCause, Text, TextError,
     ValueForm,
 };
-pub use snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
-pub use status::{NodeStatus, StatusFlags};
 pub use stop::Stop;
-pub use tap::{Tap, Update};
-pub use tears::{TearsHeader, TornConstraint};
-pub use topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
-pub use views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
-pub use wake::Wake;
-pub use writer::PublishError;
 
 /// The README's programs compile.
 #[cfg(doctest)]

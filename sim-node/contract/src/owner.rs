@@ -1,73 +1,34 @@
 //! The owner of a name: the node or replay that publishes everything and takes the commands.
 
+pub(crate) mod error;
+pub(crate) mod load;
+
 use std::cell::Cell;
 
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
-use thiserror::Error;
 
-use crate::load::{Load, LoadWriters, check_limits, check_shared_memory};
-use crate::ports::{Places, create_port, reader_count};
-use crate::reader::subscribe;
-use crate::service::{OUTCOMES, STATUS, ServiceError, WAKE};
-use crate::services::{Services, owner};
-use crate::session::{Access, Events, Session, Values};
-use crate::wake::{Wake, WakeSender};
-use crate::writer::ValueWriter;
-use crate::{
-    CLIENTS_MAX, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command, Endpoint,
-    KeyframeHeader, NodeStatus, Outcome, ParticleState, PublishError, SnapshotHeader, TearsHeader,
-    TornConstraint,
-};
+use crate::endpoint::Endpoint;
+use crate::limits::{CLIENTS_MAX, COMMANDS_BUFFERED};
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::command::Command;
+use crate::messages::outcome::Outcome;
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::status::NodeStatus;
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::KeyframeHeader;
+use crate::owner::error::OwnerError;
+use crate::owner::load::{Load, LoadWriters, check_limits, check_shared_memory};
+use crate::ports::port::{Places, create_port, reader_count};
+use crate::ports::reader::subscribe;
+use crate::ports::service::{OUTCOMES, STATUS, ServiceError, WAKE};
+use crate::ports::services::{Services, owner};
+use crate::ports::session::{Access, Events, Session, Values};
+use crate::ports::wake::{Wake, WakeSender};
+use crate::ports::writer::PublishError;
+use crate::ports::writer::ValueWriter;
 use sim_types::ParameterValues;
-
-/// Why a name could not be taken, or a scene not be loaded.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum OwnerError {
-    /// Another process has the name.
-    #[error(
-        "{endpoint} is running already{by}: stop that one, or choose another --name or --domain",
-        by = process_id.map(|id| format!(", as process {id}")).unwrap_or_default()
-    )]
-    NameTaken {
-        /// Whose.
-        endpoint: Endpoint,
-        /// The process that has it, where it is known.
-        process_id: Option<u32>,
-    },
-    /// The snapshots would not fit into shared memory.
-    #[error(
-        "{particle_count} particles need {needed_mib} MiB of shared memory ({samples} snapshots for one stalled reader), but /dev/shm has {available_mib} MiB left: take a smaller scene, or enlarge it (mount -o remount,size=... /dev/shm; docker run --shm-size ...)"
-    )]
-    NotEnoughSharedMemory {
-        /// Particles of the scene.
-        particle_count: u32,
-        /// Snapshots that one reader can keep from being overwritten.
-        samples: usize,
-        /// What they take, rounded up.
-        needed_mib: u64,
-        /// What is available, rounded down.
-        available_mib: u64,
-    },
-    /// The load is beyond a limit of the contract.
-    #[error("the scene has {count} {what}, at most {max} are possible: take a smaller scene")]
-    TooLarge {
-        /// What there is too much of.
-        what: &'static str,
-        /// How much.
-        count: usize,
-        /// The limit.
-        max: usize,
-    },
-    /// A service could not be created or connected to.
-    #[error(transparent)]
-    Service(#[from] ServiceError),
-    /// The load could not be published.
-    #[error(transparent)]
-    Publish(#[from] PublishError),
-}
 
 /// The process that owns a name: it publishes everything and takes the commands.
 ///
@@ -320,10 +281,12 @@ fn wake_sender(service: &Events) -> Result<WakeSender, ServiceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::SURFACE;
-    use crate::session::Slices;
+    use crate::client::Client;
+    use crate::limits::OWNER_PUBLISHERS_MAX;
+    use crate::messages::topology::{LoadHeader, Triangle};
+    use crate::ports::service::SURFACE;
+    use crate::ports::session::Slices;
     use crate::testing::TestDomain;
-    use crate::{Client, LoadHeader, OWNER_PUBLISHERS_MAX, Triangle};
 
     const SOON: std::time::Duration = std::time::Duration::from_secs(10);
 

@@ -31,7 +31,7 @@ impl Stop {
     }
 
     /// Whether a signal has come.
-    pub fn is_asked(&self) -> bool {
+    pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }

@@ -4,7 +4,8 @@ use std::fs;
 use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::{Endpoint, NAME_DEFAULT, domain};
+use crate::endpoint::{Endpoint, NAME_DEFAULT};
+use crate::ports::domain;
 
 /// A domain that no other test has, and whose files are removed when it is dropped. Drop it after
 /// everything that is in it.

@@ -1,103 +1,105 @@
-//! What a verb of `ctl` asks of the node.
+//! The action of each command of `ctl`.
 
 use std::path;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use sim_contract::{Action, KindFilter, Text};
 
-use crate::args::{CtlVerb, PoseArgs, TargetArgs};
+use crate::args::{CommandVerb, PoseArgs};
 use crate::scene_source;
 
-/// The action of a verb; the questions have none.
-pub(super) fn of(verb: &CtlVerb) -> anyhow::Result<Action> {
+/// Action of a command.
+pub(super) fn from_verb(verb: &CommandVerb) -> anyhow::Result<Action> {
     Ok(match verb {
-        CtlVerb::Pin { particle } => Action::Pin { particle: *particle },
-        CtlVerb::Unpin { particle } => Action::Unpin { particle: *particle },
-        CtlVerb::Grab(args) => {
-            Action::Grab { particle: args.particle, target: target(args), over_s: args.over }
-        }
-        CtlVerb::Move(args) => {
-            Action::Move { particle: args.particle, target: target(args), over_s: args.over }
-        }
-        CtlVerb::Release { particle } => Action::Release { particle: *particle },
-        CtlVerb::Push(args) => Action::Push {
+        CommandVerb::Pin { particle } => Action::Pin { particle: *particle },
+        CommandVerb::Unpin { particle } => Action::Unpin { particle: *particle },
+        CommandVerb::Grab(args) => Action::Grab {
+            particle: args.particle,
+            target: args.target.vector(),
+            over_s: args.over,
+        },
+        CommandVerb::Move(args) => Action::Move {
+            particle: args.particle,
+            target: args.target.vector(),
+            over_s: args.over,
+        },
+        CommandVerb::Release { particle } => Action::Release { particle: *particle },
+        CommandVerb::Push(args) => Action::Push {
             center: args.center.vector(),
             radius: args.radius,
             delta: numbers(&args.delta)?,
             limit: args.limit,
         },
-        CtlVerb::Cut { constraint } => Action::Cut { constraint: *constraint },
-        CtlVerb::CutRadius(args) => {
+        CommandVerb::Cut { constraint } => Action::Cut { constraint: *constraint },
+        CommandVerb::CutRadius(args) => {
             Action::CutRadius { center: args.center.vector(), radius: args.radius }
         }
-        CtlVerb::CutSegment(args) => Action::CutSegment {
+        CommandVerb::CutSegment(args) => Action::CutSegment {
             from: numbers(&args.from)?,
             to: numbers(&args.to)?,
             direction: numbers(&args.direction)?,
         },
-        CtlVerb::MoveAnchor { anchor, pose } => {
+        CommandVerb::MoveAnchor { anchor, pose } => {
             let (translation, rotation) = translation_and_rotation(pose)?;
             Action::MoveAnchor { anchor: *anchor, translation, rotation }
         }
-        CtlVerb::MoveCollider { collider, pose } => {
+        CommandVerb::MoveCollider { collider, pose } => {
             let (translation, rotation) = translation_and_rotation(pose)?;
             Action::MoveCollider { collider: *collider, translation, rotation }
         }
-        CtlVerb::Set(args) => Action::Set {
+        CommandVerb::Set(args) => Action::Set {
             parameter: text(&args.parameter)?,
             value: args.value().map_err(anyhow::Error::msg)?,
             constraint_kind: args.constraint_kind().map(KindFilter::Known),
         },
-        CtlVerb::Load { scene } => Action::Load { scene: scene_of(scene)? },
-        CtlVerb::Pause => Action::Pause,
-        CtlVerb::Resume => Action::Resume,
-        CtlVerb::Step { count } => Action::Step { count: *count },
-        CtlVerb::Reset => Action::Reset,
-        CtlVerb::Status | CtlVerb::Hash => bail!("a question is no command"),
+        CommandVerb::Load { scene } => Action::Load { scene: scene_text(scene)? },
+        CommandVerb::Pause => Action::Pause,
+        CommandVerb::Resume => Action::Resume,
+        CommandVerb::Step { count } => Action::Step { count: *count },
+        CommandVerb::Reset => Action::Reset,
     })
-}
-
-fn target(args: &TargetArgs) -> [f32; 3] {
-    [args.x, args.y, args.z]
 }
 
 fn translation_and_rotation(pose: &PoseArgs) -> anyhow::Result<([f32; 3], [f32; 4])> {
     Ok(([pose.x, pose.y, pose.z], numbers(&pose.rotation)?))
 }
 
-/// Clap has counted them already.
+/// The numbers as an array; clap has counted them already.
 fn numbers<const COUNT: usize>(values: &[f32]) -> anyhow::Result<[f32; COUNT]> {
-    <[f32; COUNT]>::try_from(values).with_context(|| format!("{COUNT} numbers are needed"))
+    <[f32; COUNT]>::try_from(values)
+        .with_context(|| format!("expected {COUNT} numbers, got {}", values.len()))
 }
 
-/// A file is named as the node finds it, which runs in another folder. What is wrong with a scene
-/// is said here, with its line; an outcome has no room for it.
-fn scene_of(source: &str) -> anyhow::Result<Text> {
+/// Name of a built-in scene, or absolute path of a file: the node may run in another folder. Checks
+/// the scene first, because an outcome has no room for the place of an error.
+fn scene_text(source: &str) -> anyhow::Result<Text> {
     scene_source::load(source)?;
     if !scene_source::is_path(source) {
         return text(source);
     }
-    let path = path::absolute(source).with_context(|| format!("{source}: no path"))?;
-    text(path.to_str().with_context(|| format!("{}: not UTF-8", path.display()))?)
+    let path = path::absolute(source)
+        .with_context(|| format!("{source}: cannot make the path absolute"))?;
+    text(path.to_str().with_context(|| format!("{}: the path is not UTF-8", path.display()))?)
 }
 
+/// Text of a command, which must not be cut short: it would mean something else.
 fn text(text: &str) -> anyhow::Result<Text> {
     Text::new(text).with_context(|| format!("'{text}' does not fit into a command"))
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
     use sim_contract::{ConstraintKind, ParameterValue};
 
     use super::*;
-    use crate::args::{Args, Verb};
+    use crate::args::{CtlVerb, Verb, try_parse};
 
     fn action(line: &str) -> Action {
         let words = ["sim-node", "ctl"].into_iter().chain(line.split_whitespace());
-        let args = Args::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
+        let args = try_parse(words).unwrap_or_else(|error| panic!("{line}: {error}"));
         let Some(Verb::Ctl(ctl)) = args.verb else { panic!("{line}: not ctl") };
-        of(&ctl.verb).unwrap()
+        let CtlVerb::Command(verb) = ctl.verb else { panic!("{line}: not a command") };
+        from_verb(&verb).unwrap()
     }
 
     fn set(name: &str, value: ParameterValue, kind: Option<ConstraintKind>) -> Action {
@@ -123,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_is_a_translation_and_perhaps_a_rotation() {
+    fn a_pose_is_a_translation_with_an_optional_rotation() {
         let translation = [0.0, 0.1, -0.2];
         let expected =
             Action::MoveAnchor { anchor: 3, translation, rotation: [0.0, 0.0, 0.0, 1.0] };
@@ -146,12 +148,12 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_is_a_name_or_a_path_that_the_node_finds() {
+    fn a_scene_is_a_built_in_name_or_an_absolute_path() {
         assert_eq!(action("load rope"), Action::Load { scene: Text::cut("rope") });
         let Action::Load { scene } = action("load ./scenes/rope.toml") else { panic!("no load") };
         assert!(scene.as_str().starts_with('/') && scene.as_str().ends_with("/scenes/rope.toml"));
-        let verb = CtlVerb::Load { scene: "nix".to_owned() };
-        let error = of(&verb).unwrap_err().to_string();
+        let verb = CommandVerb::Load { scene: "nix".to_owned() };
+        let error = from_verb(&verb).unwrap_err().to_string();
         assert!(error.starts_with("there is no built-in scene 'nix'"), "{error}");
         let error = format!("{:#}", text(&"x".repeat(161)).unwrap_err());
         assert!(error.ends_with("the text has 161 bytes (allowed: at most 160)"), "{error}");

@@ -1,11 +1,13 @@
-//! What to do about a rejected command, where its reason alone does not tell.
+//! Advice on an outcome that does not explain itself.
+
+use std::time::Duration;
 
 use sim_contract::{
-    Action, OffMeaning, Outcome, PARAMETERS, Parameter, ParameterInfo, Reason, ValueForm,
+    Action, Client, OffMeaning, Outcome, PARAMETERS, Parameter, ParameterInfo, Reason, ValueForm,
 };
 
-/// Words behind the reason, or none.
-pub(super) fn of(action: &Action, outcome: &Outcome) -> String {
+/// Cause or remedy of a rejection, to print behind its reason; may be empty.
+pub(super) fn for_rejection(action: &Action, outcome: &Outcome) -> String {
     let Some(reason) = Reason::from_name(outcome.reason_name()) else { return String::new() };
     match (action, reason) {
         (Action::Set { .. }, Reason::UnknownParameter) => {
@@ -16,22 +18,40 @@ pub(super) fn of(action: &Action, outcome: &Outcome) -> String {
                 .map_or_else(String::new, |known| format!(" (allowed: {})", allowed(known.info())))
         }
         (Action::Set { .. }, Reason::NoEffectHere) => {
-            " (compliance belongs to method \"xpbd\", stiffness to \"pbd\")".to_owned()
+            " (method \"xpbd\" has compliance, method \"pbd\" has stiffness)".to_owned()
         }
         (Action::Grab { .. } | Action::Move { .. }, Reason::OutOfRange) => {
             " (allowed: coordinates within 1e7, z 0 in 2-D, --over 0 to 0.25)".to_owned()
         }
         (Action::Load { .. }, Reason::NoEffectHere) => {
-            " (the scene runs at another rate than the node, or needs more memory than there is; \
-             the node's messages say which)"
+            " (the scene runs at another rate than the node, or needs more memory than available; \
+             see the messages of the node)"
                 .to_owned()
         }
         (Action::Load { .. }, Reason::OutOfRange) => {
-            " (the node cannot read that scene; its messages say why)".to_owned()
+            " (the node cannot read that scene; see its messages)".to_owned()
         }
         (Action::Step { .. }, Reason::NoEffectHere) => " (the node is not paused)".to_owned(),
         _ => String::new(),
     }
+}
+
+/// Explains an applied command that changes nothing visible.
+pub(super) fn for_applied(
+    client: &mut Client,
+    timeout: Duration,
+    action: &Action,
+) -> Option<&'static str> {
+    let Action::Set { parameter, .. } = action else { return None };
+    if parameter.as_str() != Parameter::WindVelocity.name() {
+        return None;
+    }
+    // Without an answer there is no advice; the command was applied all the same.
+    if client.surface(timeout).ok()??.triangles.is_empty() {
+        return Some("this has no effect: the scene has no surface");
+    }
+    let is_still = client.parameters(timeout).ok()??.values.wind_drag == 0.0;
+    is_still.then_some("this has no effect while wind_drag is 0 (see `ctl set wind_drag`)")
 }
 
 /// Allowed values of a parameter, in words.

@@ -88,7 +88,7 @@ fn show_progress(stop: &Stop, node: &mut Process, domain: &str) -> anyhow::Resul
     let domain = Some(domain).filter(|domain| !domain.is_empty());
     let endpoint = Endpoint::new(domain, sim_contract::NAME_DEFAULT)?;
     let mut client = Client::attach(&endpoint)?;
-    while !stop.is_asked() && node.is_running() {
+    while !stop.is_requested() && node.is_running() {
         if let Some(status) = client.status(POLL)? {
             eprint!("\rstep {:>8}  x{:.3} real time ", status.step, status.real_time_factor);
         }

@@ -44,8 +44,8 @@ impl Bridge {
         let url = format!("ws://{}/socket", self.host);
         let (socket, _) = tungstenite::client(url, stream).unwrap();
         let mut page = Page { socket, texts: VecDeque::new(), last_id: 0 };
-        page.send(&json!({ "type": "hello", "protocol": 1, "format": "f32" }));
-        assert_eq!(page.text(|text| text["type"] == "hello")["protocol"], 1);
+        page.send(&json!({ "type": "hello", "protocol": 2, "format": "f32" }));
+        assert_eq!(page.text(|text| text["type"] == "hello")["protocol"], 2);
         page
     }
 }

@@ -8,7 +8,7 @@ use integration_tests::{Process, Program, Sandbox};
 use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
 use serde_json::{Value, json};
 use sim_contract::ParticleFlags;
-use viewer_bridge::wire::Message;
+use viewer_bridge::wire::{FlaggedParticle, Message};
 
 use super::page::{Bridge, Page};
 
@@ -34,7 +34,7 @@ struct State {
     positions: Vec<[f32; 3]>,
     torn: Vec<u32>,
     /// Particle and flags.
-    pins: Vec<[u32; 2]>,
+    pins: Vec<FlaggedParticle>,
 }
 
 fn recording(sandbox: &Sandbox) -> String {
@@ -58,7 +58,9 @@ fn states(file: &str) -> (Vec<State>, RunDescription) {
             step: frame.row.step,
             positions: frame.particles.iter().map(|one| one.position).collect(),
             torn: torn.clone(),
-            pins: pins.map(|(particle, one)| [particle, one.flags]).collect(),
+            pins: pins
+                .map(|(particle, one)| FlaggedParticle { particle, flags: one.flags })
+                .collect(),
         });
     }
     (states, frames.log().run().clone())
@@ -84,7 +86,7 @@ fn apply_tears(torn: &mut Vec<u32>, frame: &Frame) {
 struct View {
     page: Page,
     torn: Vec<u32>,
-    pins: Vec<[u32; 2]>,
+    pins: Vec<FlaggedParticle>,
 }
 
 impl View {
@@ -102,7 +104,7 @@ impl View {
                 None
             }
             Message::Pins(message) => {
-                *pins = message.held;
+                *pins = message.particles;
                 None
             }
             Message::Frame(frame) if matches(frame.head.stamp.step) => {
@@ -146,7 +148,9 @@ fn scrubbing_shows_the_recorded_state_of_each_step() {
         assert_eq!(view.seek(step), states[usize::try_from(step).unwrap()], "at step {step}");
     }
     assert_eq!(states[700].torn, [9]);
-    assert!(states[100].pins.contains(&[100, ParticleFlags::PINNED]));
+    assert!(
+        states[100].pins.contains(&FlaggedParticle { particle: 100, flags: ParticleFlags::PINNED })
+    );
     // A page that connects now sees the same.
     assert_eq!(View::new(&bridge).shown(|_| true), states[700]);
 }
@@ -267,8 +271,8 @@ fn a_recording_cannot_be_changed() {
     let mut page = bridge.page();
     let epoch = page.scene().stamp.epoch;
     for message in [
-        json!({ "type": "drag_begin", "particle": 90, "target": [0, 0, 0] }),
-        json!({ "type": "drag_end", "particle": 90 }),
+        json!({ "type": "grab", "particle": 90, "target": [0, 0, 0] }),
+        json!({ "type": "release", "particle": 90 }),
         json!({ "type": "pin", "particle": 90 }),
         json!({ "type": "cut", "epoch": epoch, "constraints": [1] }),
         json!({ "type": "cut_radius", "center": [0, 0, 0], "radius": 1 }),
@@ -355,7 +359,7 @@ fn a_damaged_part_is_skipped_and_reported() {
     let notice = view.page.text(|text| text["type"] == "notice");
     assert!(notice["text"].as_str().unwrap().contains("is damaged"), "{notice}");
     let timeline = bridge.page().text(|text| {
-        text["hash_text"].as_str().is_some_and(|text| text.contains("damaged chunks left out: 1"))
+        text["hash_text"].as_str().is_some_and(|text| text.contains("damaged chunks skipped: 1"))
     });
     assert_eq!(timeline["hashes"], "verified");
 }
@@ -366,11 +370,11 @@ fn a_file_that_is_not_a_recording_is_named_before_anything_is_served() {
     let whole = std::fs::read(recording(&sandbox)).unwrap();
     let head = sandbox.path("head.mcap");
     std::fs::write(&head, &whole[..300]).unwrap();
-    let give = "give a file that `recorder record` or `recorder simulate` has written";
+    let give = "give a file written by `recorder record` or `recorder simulate`";
     let again = "record again with `recorder record`";
     let folder = sandbox.path("");
     let cases = [
-        (sandbox.path("missing.mcap"), "there is no such file", give),
+        (sandbox.path("missing.mcap"), "no such file", give),
         (sandbox.write("empty.mcap", ""), "is empty", again),
         (
             sandbox.write("text.mcap", "this is not a recording, but long"),

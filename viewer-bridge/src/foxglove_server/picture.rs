@@ -1,4 +1,4 @@
-//! `/scene`: sticks and surface, as one message that draws them.
+//! `/scene`: the drawing of sticks and surface.
 
 use std::collections::BTreeSet;
 
@@ -8,12 +8,12 @@ use foxglove::messages::{
     TriangleListPrimitive, Vector3,
 };
 use recorder::WORLD_FRAME;
-use sim_contract::ParticleState;
 use sim_contract::clock::SECOND_NS;
+use sim_contract::{ParticleState, TornConstraint};
 
 use crate::wire::Scene;
 
-/// Width of a stick in pixels, however far away it is.
+/// Width of a stick in pixels, at any distance.
 const STICK_WIDTH_PX: f64 = 1.5;
 const STICK_COLOR: Color = Color { r: 0.45, g: 0.6, b: 0.75, a: 1.0 };
 const SURFACE_COLOR: Color = Color { r: 0.72, g: 0.2, b: 0.18, a: 0.85 };
@@ -22,18 +22,18 @@ const IDENTITY: Pose = Pose {
     orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
 };
 
-/// What is drawn of a load: its constraints and triangles, and which of them are left.
+/// The drawing of a load: its constraints and triangles, without the torn ones.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
     sticks: Vec<[u32; 2]>,
     triangles: Vec<[u32; 3]>,
     is_torn: Vec<bool>,
-    /// A triangle goes with the first of its edges that tears.
+    /// A triangle disappears when the first of its edges tears.
     is_gone: Vec<bool>,
 }
 
 impl Picture {
-    /// Of a load of which nothing is torn.
+    /// Creates the drawing of a load without torn constraints.
     pub(super) fn new(scene: &Scene) -> Self {
         Self {
             is_torn: vec![false; scene.ends.len()],
@@ -43,11 +43,11 @@ impl Picture {
         }
     }
 
-    /// Takes the list of all that is torn.
-    pub(super) fn set_torn(&mut self, torn: &[u32]) {
+    /// Replaces the list of torn constraints.
+    pub(super) fn set_torn(&mut self, torn: &[TornConstraint]) {
         self.is_torn.fill(false);
         let mut edges = BTreeSet::new();
-        for constraint in torn.iter().map(|constraint| *constraint as usize) {
+        for constraint in torn.iter().map(|torn| torn.constraint as usize) {
             if let Some(ends) = self.sticks.get(constraint) {
                 self.is_torn[constraint] = true;
                 edges.insert(ordered(*ends));
@@ -59,14 +59,14 @@ impl Picture {
         }
     }
 
-    /// The message for a state, with the same two entities each time: each replaces the one before.
+    /// Draws a state. The two entities have the same ids each time, so each replaces its predecessor.
     pub(super) fn draw(&self, time_ns: u64, particles: &[ParticleState]) -> SceneUpdate {
-        let is_place = |particle: &u32| {
+        let has_place = |particle: &u32| {
             let particle = particles.get(*particle as usize);
             particle.is_some_and(|one| one.position.iter().all(|axis| axis.is_finite()))
         };
-        let sticks = left(&self.sticks, &self.is_torn, is_place);
-        let triangles = left(&self.triangles, &self.is_gone, is_place);
+        let sticks = remaining(&self.sticks, &self.is_torn, has_place);
+        let triangles = remaining(&self.triangles, &self.is_gone, has_place);
         let points = points(particles);
         let surface = TriangleListPrimitive {
             pose: Some(IDENTITY),
@@ -99,18 +99,18 @@ fn ordered([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// The particles of the elements that are left and whose particles all have a place.
-fn left<const N: usize>(
+/// Returns the particles of the elements that are left and whose particles all have a finite position.
+fn remaining<const N: usize>(
     elements: &[[u32; N]],
     is_gone: &[bool],
-    is_place: impl Fn(&u32) -> bool,
+    has_place: impl Fn(&u32) -> bool,
 ) -> Vec<u32> {
     let elements = elements.iter().zip(is_gone);
-    let left = elements.filter(|(element, is_gone)| !**is_gone && element.iter().all(&is_place));
+    let left = elements.filter(|(element, is_gone)| !**is_gone && element.iter().all(&has_place));
     left.flat_map(|(element, _)| *element).collect()
 }
 
-/// Positions as the message has them; one that is none is not drawn, but counts.
+/// Converts the positions. A position that is not finite keeps its index but is not drawn.
 fn points(particles: &[ParticleState]) -> Vec<Point3> {
     let finite = |axis: f32| if axis.is_finite() { f64::from(axis) } else { 0.0 };
     let positions = particles.iter().map(|particle| particle.position.map(finite));
@@ -162,16 +162,17 @@ mod tests {
     }
 
     #[test]
-    fn what_tore_and_the_triangles_along_it_are_not_drawn() {
+    fn torn_constraints_and_the_triangles_along_them_are_not_drawn() {
         let mut picture = picture();
-        picture.set_torn(&[2, 99]);
+        let torn = [2, 99].map(|constraint| TornConstraint::new(constraint, None));
+        picture.set_torn(&torn);
         assert_eq!(indices(&picture.draw(0, &particles())), (&[0, 1, 1, 2][..], &[0, 1, 2][..]));
         picture.set_torn(&[]);
         assert_eq!(indices(&picture.draw(0, &particles())).1.len(), 6);
     }
 
     #[test]
-    fn what_hangs_on_a_particle_without_a_place_is_not_drawn() {
+    fn elements_of_a_particle_that_is_not_finite_are_not_drawn() {
         let mut particles = particles();
         particles[3].position[1] = f32::NAN;
         let update = picture().draw(0, &particles);

@@ -1,211 +1,252 @@
-//! What clients subscribe to: the topics of a recording, and `/scene`.
+//! The topics: those of a recording, and `/scene`.
 //!
-//! Nothing is encoded for a topic that nobody subscribes to. Messages wait in a short queue for each
-//! client, in which new ones replace old ones: a slow client misses some, and delays nobody.
+//! A message is encoded only if a client subscribes to its topic. Messages wait in a short queue for
+//! each client, in which new ones replace old ones: a slow client misses some and delays nobody.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use foxglove::messages::SceneUpdate;
-use foxglove::{Channel, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId};
-use recorder::{Message, MessageEncoder, TearsRow, Topic, TopicFormat, encode_transform};
+use foxglove::messages::{FrameTransform, PointCloud, SceneUpdate};
+use foxglove::{
+    Channel, Context, Encode, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId,
+};
+use recorder::{
+    Message, MessageEncoder, OutcomeRow, StatusRow, StepRow, TearsRow, Topic, TopicFormat,
+    encode_transform,
+};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
-use sim_contract::{ParticleState, TearCause};
+use sim_contract::{TearCause, TornConstraint};
 
-use super::desk::Desk;
 use super::picture::Picture;
-use super::playback::{Recording, step_ns};
-use crate::message::{OutcomeText, ToPage};
+use crate::sink::{State, Torn};
+use crate::source::recording_times::{RecordingTimes, step_ns};
 use crate::wire::Scene;
 
-/// The topics that are sent as they are recorded.
+/// Topics with the messages of a recording.
 const TOPICS: [Topic; 6] =
     [Topic::Tf, Topic::Tears, Topic::Outcomes, Topic::Status, Topic::Steps, Topic::Particles];
 const SCENE_TOPIC: &str = "/scene";
-/// Time from a picture to the next. One is twice the size of the particles, and made anew each time.
+/// Time between two messages on `/scene`. Each is twice as large as the particles and encoded anew.
 const SCENE_PERIOD_NS: u64 = SECOND_NS / 10;
-/// Greetings that wait for the source at most: all topics of all clients.
-const GREETINGS_MAX: usize = 256;
+/// New subscriptions that wait for the source: more than all topics of all clients.
+const NEW_SUBSCRIPTIONS_MAX: usize = 256;
 
-/// What clients subscribe to.
+/// Publishes on the topics.
 #[derive(Debug)]
-pub(crate) struct Publisher {
+pub(super) struct Publisher {
     channels: [Arc<RawChannel>; TOPICS.len()],
     scene: Channel<SceneUpdate>,
-    desk: Arc<Desk>,
-    /// Where a recording is shown: its times are those of the messages.
-    recording: Option<Recording>,
-    state: Mutex<State>,
-    /// Subscriptions that have not been given what was said before they came.
-    greetings: Mutex<Vec<(Topic, SinkId)>>,
-    /// Whether the state is wanted even if it was shown.
-    is_frame_due: AtomicBool,
-    /// The same for the picture, whenever the last one was.
+    /// Times of the recording on show, which are those of the messages.
+    recording: Option<RecordingTimes>,
+    state: Mutex<PublisherState>,
+    /// Subscriptions whose clients have not received the earlier messages of the topic.
+    new_subscriptions: Mutex<Vec<Subscription>>,
+    /// The next state must be sent even if it was sent before.
+    is_state_due: AtomicBool,
+    /// The next state must be drawn on `/scene`, whenever the last one was.
     is_scene_due: AtomicBool,
 }
 
-/// What is on show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Subscription {
+    topic: Topic,
+    sink: SinkId,
+}
+
 #[derive(Debug, Default)]
-struct State {
+struct PublisherState {
     encoder: MessageEncoder,
-    load: Option<Load>,
-    /// Load and step of the state that was sent last.
-    shown: Option<(u32, u64)>,
+    load: Option<PublishedLoad>,
+    /// The state that was sent last.
+    shown: Option<StateId>,
     next_scene_ns: u64,
-    /// How many states and pictures were encoded.
+    /// Number of messages that were encoded on `/particles` and `/scene`.
     encoded_count: u64,
-    /// What a late subscriber is given.
-    torn: Option<Torn>,
-    status: Option<Message>,
-    step: Option<Message>,
+    /// Earlier messages for late subscribers.
+    torn: Option<TornList>,
+    status: Option<StatusRow>,
+    step: Option<StepRow>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct StateId {
+    epoch: u32,
+    step: u64,
 }
 
 #[derive(Debug)]
-struct Load {
-    epoch: u32,
+struct PublishedLoad {
     run_id: String,
     origin: [f64; 3],
     rate_hz: u32,
-    /// When step 0 would have been, in ns since 1970, had the node never paused.
+    /// Time of step 0 in ns since 1970, if the node had never paused.
     epoch_ns: u64,
     picture: Picture,
 }
 
-/// All that is torn.
+/// All torn constraints since a step.
 #[derive(Debug)]
-struct Torn {
-    /// Since when it is all.
+struct TornList {
     step: u64,
-    constraints: Vec<u32>,
-    /// May be shorter: not known then.
-    causes: Vec<u8>,
+    all: Vec<TornConstraint>,
 }
 
-impl Torn {
-    /// The message that tells of what stands at `first` and behind it.
+impl TornList {
+    /// The row with the entries from `first` on.
     fn row(&self, first: usize) -> Message {
-        let cause = |place: usize| {
-            self.causes.get(place).and_then(|cause| TearCause::from_number((*cause).into()))
-        };
-        let name = |cause: Option<TearCause>| cause.map_or("unknown", TearCause::name);
-        let places = first..self.constraints.len();
-        let causes = places.map(|place| name(cause(place)).to_owned()).collect();
-        let constraints = self.constraints[first..].to_vec();
+        let rows = self.all[first..].iter();
+        let cause =
+            |torn: &TornConstraint| torn.cause().map_or("unknown", TearCause::name).to_owned();
+        let causes = rows.clone().map(cause).collect();
+        let constraints = rows.map(|torn| torn.constraint).collect();
         Message::Tears(TearsRow { step: self.step, constraints, causes })
     }
 }
 
-impl Load {
-    /// The time of a step, as recordings have it.
+impl PublishedLoad {
+    /// Time of a step, as in recordings.
     fn time_ns(&self, step: u64) -> u64 {
         self.epoch_ns.saturating_add(step_ns(step, self.rate_hz))
     }
 }
 
+/// Need of a redrawn `/scene`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SceneNeed {
+    /// A client subscribes to it; it needs a state.
+    State,
+    /// Nobody subscribes to it.
+    Nothing,
+}
+
 impl Publisher {
     pub(super) fn new(
         context: &Arc<Context>,
-        desk: Arc<Desk>,
-        recording: Option<Recording>,
+        recording: Option<RecordingTimes>,
     ) -> Result<Self, FoxgloveError> {
         let mut channels = Vec::new();
         for topic in TOPICS {
-            let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
-            let schema = schema.map(|one| Schema::new(one.name, one.encoding, one.data));
-            let builder = context.channel_builder(topic.name()).message_encoding(encoding);
-            channels.push(builder.schema(schema).build_raw()?);
+            let builder = context.channel_builder(topic.name());
+            let builder = builder.message_encoding(TopicFormat::for_topic(topic).encoding);
+            channels.push(builder.schema(schema(topic)).build_raw()?);
         }
         let Ok(channels) = channels.try_into() else { unreachable!("one channel for each topic") };
         Ok(Self {
             channels,
             scene: context.channel_builder(SCENE_TOPIC).build(),
-            desk,
             recording,
             state: Mutex::default(),
-            greetings: Mutex::default(),
-            is_frame_due: AtomicBool::new(false),
+            new_subscriptions: Mutex::default(),
+            is_state_due: AtomicBool::new(false),
             is_scene_due: AtomicBool::new(false),
         })
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
-        // Every change of the state is complete at every point where a panic could come.
+    fn state(&self) -> MutexGuard<'_, PublisherState> {
+        // Every change under this lock is complete wherever a panic could occur.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn channel(&self, topic: Topic) -> Option<&RawChannel> {
-        let place = TOPICS.iter().position(|one| *one == topic)?;
-        Some(&self.channels[place])
+    fn new_subscriptions(&self) -> MutexGuard<'_, Vec<Subscription>> {
+        self.new_subscriptions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn is_heard(&self, topic: Topic) -> bool {
+    fn channel(&self, topic: Topic) -> Option<&RawChannel> {
+        let index = TOPICS.iter().position(|one| *one == topic)?;
+        Some(&self.channels[index])
+    }
+
+    fn has_subscribers(&self, topic: Topic) -> bool {
         self.channel(topic).is_some_and(RawChannel::has_sinks)
     }
 
-    /// Whether anybody waits for a state.
-    pub(crate) fn is_awaiting(&self) -> bool {
-        self.is_heard(Topic::Particles)
-            || self.is_heard(Topic::Steps)
+    /// Returns whether a client waits for a state.
+    pub(super) fn is_state_awaited(&self) -> bool {
+        self.has_subscribers(Topic::Particles)
+            || self.has_subscribers(Topic::Steps)
             || self.scene.has_sinks()
-            || !self.greetings.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
+            || !self.new_subscriptions().is_empty()
     }
 
-    /// How many states and pictures were encoded.
     #[cfg(test)]
     pub(super) fn encoded_count(&self) -> u64 {
         self.state().encoded_count
     }
 
-    /// Somebody subscribed: it gets what was said before, with the next state.
-    pub(super) fn greet(&self, topic: &str, sink: Option<SinkId>) {
+    /// Notes a new subscription. The client receives the earlier messages with the next state.
+    pub(super) fn add_subscription(&self, topic: &str, sink: Option<SinkId>) {
         if topic == SCENE_TOPIC {
             self.is_scene_due.store(true, Ordering::Relaxed);
         }
-        self.is_frame_due.store(true, Ordering::Relaxed);
-        let mut greetings = self.greetings.lock().unwrap_or_else(PoisonError::into_inner);
+        self.is_state_due.store(true, Ordering::Relaxed);
+        let mut subscriptions = self.new_subscriptions();
         if let (Some(topic), Some(sink)) = (Topic::from_name(topic), sink)
-            && greetings.len() < GREETINGS_MAX
-            && !greetings.contains(&(topic, sink))
+            && subscriptions.len() < NEW_SUBSCRIPTIONS_MAX
+            && !subscriptions.contains(&Subscription { topic, sink })
         {
-            greetings.push((topic, sink));
+            subscriptions.push(Subscription { topic, sink });
         }
     }
 
-    /// Sends bytes to all who subscribed, or to one. `time_ns`: of the step, since 1970.
-    fn log(&self, channel: &RawChannel, bytes: &[u8], time_ns: u64, sink: Option<SinkId>) {
-        channel.log_with_meta_to_sink(bytes, self.metadata(time_ns), sink);
+    /// Forgets the new subscriptions to a topic whose message has just been sent to everybody.
+    fn settle(&self, topic: Topic) {
+        self.new_subscriptions().retain(|subscription| subscription.topic != topic);
     }
 
-    /// When a message was made: a live one now, one of a recording at its step.
-    fn metadata(&self, time_ns: u64) -> PartialMetadata {
-        PartialMetadata::with_log_time(self.recording.map_or_else(realtime_ns, |_| time_ns))
+    /// Draws the next state on `/scene`, even if it was drawn before.
+    pub(super) fn redraw_scene(&self) -> SceneNeed {
+        self.is_scene_due.store(true, Ordering::Relaxed);
+        if self.scene.has_sinks() { SceneNeed::State } else { SceneNeed::Nothing }
     }
 
-    /// Another load is on show.
-    pub(crate) fn begin(&self, scene: &Scene) {
+    /// Time of a message: now for a live one, that of its step for a recorded one.
+    fn metadata(&self, step_time_ns: u64) -> PartialMetadata {
+        let time_ns = if self.recording.is_some() { step_time_ns } else { realtime_ns() };
+        PartialMetadata::with_log_time(time_ns)
+    }
+
+    /// Sends bytes to all subscribers, or to one.
+    fn send_bytes(&self, topic: Topic, bytes: &[u8], time_ns: u64, sink: Option<SinkId>) {
+        if let Some(channel) = self.channel(topic) {
+            channel.log_with_meta_to_sink(bytes, self.metadata(time_ns), sink);
+        }
+    }
+
+    /// Encodes a row and sends it to all subscribers, or to one.
+    fn send(&self, state: &mut PublisherState, row: &Message, sink: Option<SinkId>) {
+        let time_ns = state.load.as_ref().map_or(0, |load| load.time_ns(row.step()));
+        // Every row has a JSON form.
+        if let Ok(bytes) = state.encoder.encode(row, time_ns) {
+            self.send_bytes(row.topic(), bytes, time_ns, sink);
+        }
+    }
+
+    fn send_transform(&self, load: &PublishedLoad, step: u64, sink: Option<SinkId>) {
+        let time_ns = load.time_ns(step);
+        self.send_bytes(Topic::Tf, &encode_transform(time_ns, load.origin), time_ns, sink);
+    }
+
+    /// Begins a new load.
+    pub(super) fn begin_load(&self, scene: &Scene) {
         let mut state = self.state();
-        let text = &scene.text;
-        let before = state.load.as_ref().filter(|load| load.run_id == text.run_id);
-        let now_ns = realtime_ns().saturating_sub(step_ns(scene.stamp.step, scene.rate_hz));
-        let load = Load {
-            epoch: scene.stamp.epoch,
-            run_id: text.run_id.clone(),
+        let run_id = &scene.text.run_id;
+        let before = state.load.as_ref().filter(|load| load.run_id == *run_id);
+        let load = PublishedLoad {
+            run_id: run_id.clone(),
             origin: scene.origin,
             rate_hz: scene.rate_hz,
             epoch_ns: match (self.recording, before) {
-                (Some(recording), _) => recording.epoch_ns,
+                (Some(times), _) => times.epoch_ns,
                 (None, Some(before)) => before.epoch_ns,
-                (None, None) => now_ns,
+                (None, None) => {
+                    realtime_ns().saturating_sub(step_ns(scene.stamp.step, scene.rate_hz))
+                }
             },
             picture: Picture::new(scene),
         };
-        self.desk.set_epoch(load.epoch);
-        if let Some(channel) = self.channel(Topic::Tf) {
-            let time_ns = load.time_ns(scene.stamp.step);
-            if channel.has_sinks() {
-                self.log(channel, &encode_transform(time_ns, load.origin), time_ns, None);
-                self.settle(Topic::Tf);
-            }
+        if self.has_subscribers(Topic::Tf) {
+            self.send_transform(&load, scene.stamp.step, None);
+            self.settle(Topic::Tf);
         }
         state.load = Some(load);
         state.torn = None;
@@ -213,72 +254,56 @@ impl Publisher {
         self.is_scene_due.store(true, Ordering::Relaxed);
     }
 
-    /// Takes the list of all that is torn; what stands before `first` was known.
-    pub(crate) fn set_torn(&self, step: u64, torn: &[u32], causes: &[u8], first: usize) {
+    /// Publishes a change of the list of torn constraints.
+    pub(super) fn publish_torn(&self, torn: &Torn<'_>) {
         let mut state = self.state();
         let Some(load) = &mut state.load else { return };
-        load.picture.set_torn(torn);
+        load.picture.set_torn(torn.all);
         self.is_scene_due.store(true, Ordering::Relaxed);
-        let torn = Torn { step, constraints: torn.to_vec(), causes: causes.to_vec() };
-        if self.is_heard(Topic::Tears) && first < torn.constraints.len() {
-            self.send(&mut state, &torn.row(first), None);
+        let list = TornList { step: torn.stamp.step, all: torn.all.to_vec() };
+        if self.has_subscribers(Topic::Tears) && torn.known_count < torn.all.len() {
+            self.send(&mut state, &list.row(torn.known_count), None);
         }
-        state.torn = (!torn.constraints.is_empty()).then_some(torn);
+        state.torn = (!torn.all.is_empty()).then_some(list);
     }
 
-    /// Says something on a topic of recordings. It is made only where somebody hears it, or where
-    /// late subscribers are told as well.
-    pub(crate) fn say(&self, topic: Topic, make: impl FnOnce() -> Message) {
-        let is_latched = matches!(topic, Topic::Status | Topic::Steps);
-        let is_heard = self.is_heard(topic);
-        if !is_heard && !is_latched {
-            return;
+    /// Publishes an outcome. Late subscribers do not receive it.
+    pub(super) fn publish_outcome(&self, row: &OutcomeRow) {
+        if self.has_subscribers(Topic::Outcomes) {
+            self.send(&mut self.state(), &Message::Outcome(row.clone()), None);
+            self.settle(Topic::Outcomes);
         }
-        let message = make();
+    }
+
+    /// Publishes the status of the node and keeps it for late subscribers.
+    pub(super) fn publish_status(&self, row: &StatusRow) {
         let mut state = self.state();
-        // A state that is shown again was said already, and late subscribers are given it.
-        let is_known = topic == Topic::Steps
-            && state.step.as_ref().is_some_and(|before| before.step() == message.step());
-        if is_heard && !is_known {
-            self.send(&mut state, &message, None);
-            self.settle(topic);
+        if self.has_subscribers(Topic::Status) {
+            self.send(&mut state, &Message::Status(row.clone()), None);
+            self.settle(Topic::Status);
         }
-        match topic {
-            Topic::Status => state.status = Some(message),
-            Topic::Steps => state.step = Some(message),
-            _ => {}
-        }
+        state.status = Some(row.clone());
     }
 
-    /// Encodes a message and sends it, to all or to one.
-    fn send(&self, state: &mut State, message: &Message, sink: Option<SinkId>) {
-        let time_ns = state.load.as_ref().map_or(0, |load| load.time_ns(message.step()));
-        let Some(channel) = self.channel(message.topic()) else { return };
-        // Every row has a JSON form.
-        if let Ok(bytes) = state.encoder.encode(message, time_ns) {
-            self.log(channel, bytes, time_ns, sink);
-        }
+    /// Publishes a state: its step and particles once, and the picture at most ten times a second.
+    pub(super) fn publish_state(&self, shown: &State<'_>) {
+        self.publish_state_at(monotonic_ns(), shown);
     }
 
-    /// Shows a state: particles each time, the picture as often as it is made.
-    pub(crate) fn show(&self, step: u64, particles: &[ParticleState]) {
-        self.show_at(monotonic_ns(), step, particles);
-    }
-
-    /// The same at that time of the monotonic clock.
-    pub(super) fn show_at(&self, now_ns: u64, step: u64, particles: &[ParticleState]) {
+    /// Publishes a state at a time of the monotonic clock.
+    pub(super) fn publish_state_at(&self, now_ns: u64, shown: &State<'_>) {
         let mut state = self.state();
         let state = &mut *state;
-        self.serve_greetings(state, step);
+        self.publish_step(state, shown.row);
+        self.serve_new_subscriptions(state, shown.row.step);
         let Some(load) = &state.load else { return };
-        let time_ns = load.time_ns(step);
-        let is_new = state.shown.replace((load.epoch, step)) != Some((load.epoch, step));
-        let is_frame_due = self.is_frame_due.swap(false, Ordering::Relaxed);
-        if let Some(channel) = self.channel(Topic::Particles)
-            && (is_new || is_frame_due)
-            && channel.has_sinks()
-        {
-            self.log(channel, state.encoder.encode_particles(particles, time_ns), time_ns, None);
+        let time_ns = load.time_ns(shown.row.step);
+        let id = StateId { epoch: shown.epoch, step: shown.row.step };
+        let is_new = state.shown.replace(id) != Some(id);
+        let is_state_due = self.is_state_due.swap(false, Ordering::Relaxed);
+        if (is_new || is_state_due) && self.has_subscribers(Topic::Particles) {
+            let bytes = state.encoder.encode_particles(shown.particles, time_ns);
+            self.send_bytes(Topic::Particles, bytes, time_ns, None);
             state.encoded_count += 1;
         }
         if !self.scene.has_sinks() {
@@ -286,73 +311,54 @@ impl Publisher {
         }
         let is_scene_due = self.is_scene_due.swap(false, Ordering::Relaxed);
         if is_scene_due || (is_new && now_ns >= state.next_scene_ns) {
-            let picture = load.picture.draw(time_ns, particles);
+            let picture = load.picture.draw(time_ns, shown.particles);
             self.scene.log_with_meta(&picture, self.metadata(time_ns));
             state.next_scene_ns = now_ns + SCENE_PERIOD_NS;
             state.encoded_count += 1;
         }
     }
 
-    /// All who subscribed to a topic were told: none of them is late any more.
-    fn settle(&self, topic: Topic) {
-        let mut greetings = self.greetings.lock().unwrap_or_else(PoisonError::into_inner);
-        greetings.retain(|(other, _)| *other != topic);
+    /// Publishes a step, unless it is already known, and keeps it for late subscribers.
+    fn publish_step(&self, state: &mut PublisherState, row: StepRow) {
+        let is_known = state.step.is_some_and(|known| known.step == row.step);
+        if !is_known && self.has_subscribers(Topic::Steps) {
+            self.send(state, &Message::Step(row), None);
+            self.settle(Topic::Steps);
+        }
+        state.step = Some(row);
     }
 
-    /// Gives late subscribers what was said before they came.
-    fn serve_greetings(&self, state: &mut State, step: u64) {
-        let greetings = {
-            let mut greetings = self.greetings.lock().unwrap_or_else(PoisonError::into_inner);
-            std::mem::take(&mut *greetings)
-        };
-        for (topic, sink) in greetings {
-            let said = match topic {
+    /// Sends the earlier messages to the clients that have subscribed since the last state.
+    fn serve_new_subscriptions(&self, state: &mut PublisherState, step: u64) {
+        let subscriptions = std::mem::take(&mut *self.new_subscriptions());
+        for Subscription { topic, sink } in subscriptions {
+            let row = match topic {
                 Topic::Tf => {
-                    if let (Some(channel), Some(load)) = (self.channel(topic), &state.load) {
-                        let time_ns = load.time_ns(step);
-                        let bytes = encode_transform(time_ns, load.origin);
-                        self.log(channel, &bytes, time_ns, Some(sink));
+                    if let Some(load) = &state.load {
+                        self.send_transform(load, step, Some(sink));
                     }
                     continue;
                 }
                 Topic::Tears => state.torn.as_ref().map(|torn| torn.row(0)),
-                Topic::Status => state.status.take(),
-                Topic::Steps => state.step.take(),
-                _ => continue,
+                Topic::Status => state.status.clone().map(Message::Status),
+                Topic::Steps => state.step.map(Message::Step),
+                _ => None,
             };
-            let Some(message) = said else { continue };
-            self.send(state, &message, Some(sink));
-            match topic {
-                Topic::Tears => {}
-                Topic::Status => state.status = Some(message),
-                _ => state.step = Some(message),
+            if let Some(row) = row {
+                self.send(state, &row, Some(sink));
             }
         }
     }
+}
 
-    /// Hears what pages are told, as far as it concerns clients. Whether a state is wanted for it.
-    pub(crate) fn hear(&self, message: &ToPage) -> bool {
-        match message {
-            ToPage::Parameters(parameters) => self.desk.set_parameters(parameters.values),
-            // The last picture may be older than the state at which everything stops.
-            ToPage::Node(node) if node.is_paused => {
-                self.is_scene_due.store(true, Ordering::Relaxed);
-                return self.scene.has_sinks();
-            }
-            ToPage::Playback(playback) => {
-                self.desk.set_playback(*playback);
-                if !playback.is_playing {
-                    self.is_scene_due.store(true, Ordering::Relaxed);
-                    return self.scene.has_sinks();
-                }
-            }
-            _ => {}
+/// The schema of a topic: the library's own where it has one, otherwise that of recordings.
+fn schema(topic: Topic) -> Option<Schema> {
+    match topic {
+        Topic::Tf => FrameTransform::get_schema(),
+        Topic::Particles => PointCloud::get_schema(),
+        _ => {
+            let schema = TopicFormat::for_topic(topic).schema;
+            schema.map(|schema| Schema::new(schema.name, schema.encoding, schema.data))
         }
-        false
-    }
-
-    /// Gives the outcome of a command to the client that asked.
-    pub(crate) fn answer(&self, outcome: &OutcomeText) {
-        self.desk.answer(outcome);
     }
 }

@@ -1,23 +1,24 @@
-//! What is encoded, for whom, and how often: the publisher with subscribers of its own, no server.
+//! The publisher encodes what its subscribers need, and no more often. There is no server: the tests
+//! subscribe directly.
 
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex};
 
 use foxglove::{ChannelId, Context, FoxgloveError, Metadata, RawChannel, Sink, SinkId};
-use recorder::{Message, StepRow, Topic};
+use recorder::StepRow;
 use sim_contract::clock::SECOND_NS;
-use sim_contract::{ParticleState, SnapshotHeader};
+use sim_contract::{ParticleState, TornConstraint};
 
-use super::desk::Desk;
 use super::publisher::Publisher;
-use super::{FoxgloveOptions, Recording};
+use crate::sink::{State, Torn};
+use crate::source::recording_times::RecordingTimes;
 use crate::wire::{Scene, Stamp};
 
-/// A subscriber that keeps what it is given.
+/// A subscriber that keeps its messages.
 struct Listener {
     id: SinkId,
     channels: Mutex<Vec<(String, ChannelId)>>,
     /// Topic, time and size of each message.
-    heard: Mutex<Vec<(String, u64, usize)>>,
+    messages: Mutex<Vec<(String, u64, usize)>>,
 }
 
 impl Sink for Listener {
@@ -32,7 +33,7 @@ impl Sink for Listener {
         metadata: &Metadata,
     ) -> Result<(), FoxgloveError> {
         let message = (channel.topic().to_owned(), metadata.log_time, bytes.len());
-        self.heard.lock().unwrap().push(message);
+        self.messages.lock().unwrap().push(message);
         Ok(())
     }
 
@@ -53,42 +54,48 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(recording: Option<Recording>) -> Self {
+    fn new(recording: Option<RecordingTimes>) -> Self {
         let context = Context::new();
-        let options = FoxgloveOptions {
-            listen: "127.0.0.1:0".parse().unwrap(),
-            origins: Vec::new(),
-            takes_commands: false,
-            recording,
-        };
-        let desk = Arc::new(Desk::new(Weak::new(), &options));
-        let publisher = Publisher::new(&context, desk, recording).unwrap();
+        let publisher = Publisher::new(&context, recording).unwrap();
         Self { context, publisher }
     }
 
-    fn begin(&self, epoch: u32) {
+    fn begin_load(&self, epoch: u32) {
         let stamp = Stamp { epoch, step: 0 };
         let (positions, ends) = (vec![[0.0; 3]; 2], vec![[0, 1]]);
         let rate_hz = 100;
-        self.publisher.begin(&Scene { stamp, rate_hz, positions, ends, ..Scene::default() });
+        self.publisher.begin_load(&Scene { stamp, rate_hz, positions, ends, ..Scene::default() });
+    }
+
+    fn set_torn(&self, step: u64, torn: &[TornConstraint]) {
+        let stamp = Stamp { epoch: 1, step };
+        self.publisher.publish_torn(&Torn { stamp, all: torn, known_count: 0 });
     }
 
     fn show(&self, now_ns: u64, step: u64) {
-        self.publisher.show_at(now_ns, step, &[ParticleState::default(); 2]);
+        let state = State {
+            epoch: 1,
+            row: StepRow { step, ..StepRow::default() },
+            sim_time_s: 0.0,
+            flags: 0,
+            publish_monotonic_ns: 0,
+            particles: &[ParticleState::default(); 2],
+        };
+        self.publisher.publish_state_at(now_ns, &state);
     }
 
     fn listen(&self, topics: &[&str]) -> Arc<Listener> {
         let listener = Arc::new(Listener {
             id: SinkId::next(),
             channels: Mutex::default(),
-            heard: Mutex::default(),
+            messages: Mutex::default(),
         });
         self.context.add_sink(Arc::<Listener>::clone(&listener));
         for topic in topics {
             let channels = listener.channels.lock().unwrap();
             let (_, channel) = channels.iter().find(|(name, _)| name == topic).unwrap();
             self.context.subscribe_channels(listener.id, &[*channel]);
-            self.publisher.greet(topic, Some(listener.id));
+            self.publisher.add_subscription(topic, Some(listener.id));
         }
         listener
     }
@@ -96,16 +103,15 @@ impl Bench {
 
 impl Listener {
     fn topics(&self) -> Vec<String> {
-        self.heard.lock().unwrap().drain(..).map(|(topic, ..)| topic).collect()
+        self.messages.lock().unwrap().drain(..).map(|(topic, ..)| topic).collect()
     }
 }
 
 #[test]
-fn nothing_is_encoded_for_nobody() {
+fn nothing_is_encoded_without_subscribers() {
     let bench = Bench::new(None);
-    bench.begin(1);
-    assert!(!bench.publisher.is_awaiting());
-    bench.publisher.say(Topic::Outcomes, || panic!("a message is made for nobody"));
+    bench.begin_load(1);
+    assert!(!bench.publisher.is_state_awaited());
     (0..100).for_each(|step| bench.show(step * SECOND_NS, step));
     assert_eq!(bench.publisher.encoded_count(), 0);
     let listener = bench.listen(&["/tf", "/status"]);
@@ -113,65 +119,57 @@ fn nothing_is_encoded_for_nobody() {
     assert_eq!((bench.publisher.encoded_count(), listener.topics()), (0, vec!["/tf".to_owned()]));
     bench.context.remove_sink(listener.id);
     bench.show(2 * SECOND_NS, 101);
-    assert!(!bench.publisher.is_awaiting());
+    assert!(!bench.publisher.is_state_awaited());
 }
 
 #[test]
-fn a_state_is_sent_once_and_the_picture_ten_times_a_second() {
+fn a_state_is_sent_once_and_the_scene_ten_times_a_second() {
     let bench = Bench::new(None);
-    let listener = bench.listen(&["/particles", "/scene"]);
-    bench.begin(1);
+    let listener = bench.listen(&["/particles", "/scene", "/steps"]);
+    bench.begin_load(1);
     for step in 0..60 {
         bench.show(step * SECOND_NS / 60, step);
-        // The hub shows a state again to pages that come.
+        // Sources show a state again for new pages.
         bench.show(step * SECOND_NS / 60, step);
     }
     let topics = listener.topics();
     let count = |topic: &str| topics.iter().filter(|one| *one == topic).count();
-    assert_eq!((count("/particles"), count("/scene")), (60, 10));
+    assert_eq!((count("/particles"), count("/scene"), count("/steps")), (60, 10, 60));
     assert_eq!(bench.publisher.encoded_count(), 70);
 }
 
 #[test]
-fn a_late_subscriber_is_given_the_state_though_nothing_moves() {
+fn a_late_subscriber_receives_the_earlier_messages_even_if_nothing_moves() {
     let bench = Bench::new(None);
-    bench.begin(1);
-    bench.publisher.set_torn(3, &[0], &[3], 0);
-    let say_step = || {
-        bench.publisher.say(Topic::Steps, || {
-            let header = SnapshotHeader { step: 3, ..bytemuck::Zeroable::zeroed() };
-            Message::Step(StepRow::from(&header))
-        });
-    };
-    say_step();
+    bench.begin_load(1);
+    bench.set_torn(3, &[TornConstraint::new(0, None)]);
     bench.show(0, 3);
     let first = bench.listen(&["/particles", "/scene", "/tears", "/steps", "/tf"]);
-    say_step();
     bench.show(1, 3);
-    let mut heard = first.topics();
-    heard.sort();
-    assert_eq!(heard, ["/particles", "/scene", "/steps", "/tears", "/tf"]);
+    let mut topics = first.topics();
+    topics.sort();
+    assert_eq!(topics, ["/particles", "/scene", "/steps", "/tears", "/tf"]);
     let second = bench.listen(&["/tears"]);
     bench.show(2, 3);
     assert_eq!(second.topics(), ["/tears"]);
     assert!(!first.topics().iter().any(|topic| topic == "/tears"));
-    // A load has no tears of the one before.
-    bench.begin(2);
+    // A load does not have the tears of the previous one.
+    bench.begin_load(2);
     let third = bench.listen(&["/tears"]);
     bench.show(3, 0);
     assert_eq!(third.topics(), Vec::<String>::new());
 }
 
 #[test]
-fn messages_of_a_recording_have_its_times() {
+fn recorded_messages_have_the_times_of_the_recording() {
     let epoch_ns = 7 * SECOND_NS;
-    let recording = Recording { epoch_ns, rate_hz: 100, first_step: 0, last_step: 100 };
+    let recording = RecordingTimes { epoch_ns, rate_hz: 100, first_step: 0, last_step: 100 };
     let bench = Bench::new(Some(recording));
     let listener = bench.listen(&["/particles"]);
-    bench.begin(1);
+    bench.begin_load(1);
     bench.show(0, 50);
-    let heard = listener.heard.lock().unwrap().clone();
-    let size = heard[0].2;
-    assert_eq!(heard, [("/particles".to_owned(), epoch_ns + SECOND_NS / 2, size)]);
+    let messages = listener.messages.lock().unwrap().clone();
+    let size = messages[0].2;
+    assert_eq!(messages, [("/particles".to_owned(), epoch_ns + SECOND_NS / 2, size)]);
     assert!(size > 64);
 }

@@ -1,28 +1,25 @@
-//! The numbers of a command, at the door.
+//! Range checks of the numbers in a command, before it reaches the source.
 
-use sim_contract::ParameterValue;
+use sim_contract::{ParameterValue, Reason};
 
+use super::from_page::Command;
 use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
-use crate::message::Command;
 
-/// Greatest coordinate, as everywhere in the simulation.
+/// Largest coordinate in m, as in the node.
 const COORDINATE_MAX: f32 = 1e7;
-/// Longest time to a target, in s.
+/// Longest time in which a grabbed particle reaches its target, in s.
 const OVER_S_MAX: f32 = 0.25;
-/// Shortest time of a stroke of the brush, in s.
+/// Shortest time of a brush stroke, in s.
 const BRUSH_OVER_S_MIN: f32 = 1e-3;
-/// Paces of `rate`.
+/// Range of `rate`.
 const RATES: std::ops::RangeInclusive<f32> = 0.1..=10.0;
-/// Longest name of a scene or parameter, in bytes: that of the contract.
+/// Longest name of a scene or parameter, as in the contract.
 const NAME_SIZE_BYTES_MAX: usize = sim_contract::Text::SIZE_BYTES_MAX;
 
-/// Why a command is refused here: the word of the reason.
-pub(crate) type Refused = &'static str;
-
-/// Whether the numbers are finite and in range.
-pub(crate) fn check(command: &Command) -> Result<(), Refused> {
+/// Checks that the numbers are finite and in range.
+pub(crate) fn check(command: &Command) -> Result<(), Reason> {
     match command {
-        Command::DragBegin { target, over_s, .. } | Command::DragMove { target, over_s, .. } => {
+        Command::Grab { target, over_s, .. } | Command::Move { target, over_s, .. } => {
             points(&[*target])?;
             within(*over_s, 0.0, OVER_S_MAX)
         }
@@ -33,7 +30,7 @@ pub(crate) fn check(command: &Command) -> Result<(), Refused> {
             within(*over_s, BRUSH_OVER_S_MIN, OVER_S_MAX)?;
             cap.map_or(Ok(()), |cap| within(cap, 0.0, f32::MAX))
         }
-        Command::Cut { constraints, .. } => allowed(constraints.len() <= CONSTRAINTS_PER_CUT_MAX),
+        Command::Cut { constraints, .. } => at_most(constraints.len(), CONSTRAINTS_PER_CUT_MAX),
         Command::CutSegment { from, to, direction: along } => {
             points(&[*from, *to, *along])?;
             direction(along)
@@ -48,12 +45,13 @@ pub(crate) fn check(command: &Command) -> Result<(), Refused> {
             numbers(rotation)?;
             direction(rotation)
         }
+        Command::Step { count: 0 } => Err(Reason::OutOfRange),
         Command::Step { count } => {
-            allowed(*count != 0 && count.unsigned_abs() <= STEPS_AT_ONCE_MAX)
+            at_most(count.unsigned_abs() as usize, STEPS_AT_ONCE_MAX as usize)
         }
-        Command::Load { scene } => allowed(scene.len() <= NAME_SIZE_BYTES_MAX),
+        Command::Load { scene } => at_most(scene.len(), NAME_SIZE_BYTES_MAX),
         Command::Set { parameter, value, .. } => {
-            allowed(parameter.len() <= NAME_SIZE_BYTES_MAX)?;
+            at_most(parameter.len(), NAME_SIZE_BYTES_MAX)?;
             match value {
                 ParameterValue::Number(number) => within(*number, f32::MIN, f32::MAX),
                 ParameterValue::Vector(vector) => numbers(vector),
@@ -61,7 +59,7 @@ pub(crate) fn check(command: &Command) -> Result<(), Refused> {
             }
         }
         Command::Rate { value } => within(*value, *RATES.start(), *RATES.end()),
-        Command::DragEnd { .. }
+        Command::Release { .. }
         | Command::Pin { .. }
         | Command::Unpin { .. }
         | Command::Pause {}
@@ -72,47 +70,47 @@ pub(crate) fn check(command: &Command) -> Result<(), Refused> {
     }
 }
 
-fn allowed(is_allowed: bool) -> Result<(), Refused> {
-    if is_allowed { Ok(()) } else { Err("out_of_range") }
+fn at_most(count: usize, max: usize) -> Result<(), Reason> {
+    if count <= max { Ok(()) } else { Err(Reason::OutOfRange) }
 }
 
-fn within(number: f32, min: f32, max: f32) -> Result<(), Refused> {
+fn within(number: f32, min: f32, max: f32) -> Result<(), Reason> {
     if !number.is_finite() {
-        return Err("non_finite");
+        return Err(Reason::NonFinite);
     }
-    allowed((min..=max).contains(&number))
+    if (min..=max).contains(&number) { Ok(()) } else { Err(Reason::OutOfRange) }
 }
 
-fn numbers(all: &[f32]) -> Result<(), Refused> {
+fn numbers(all: &[f32]) -> Result<(), Reason> {
     all.iter().try_for_each(|number| within(*number, -COORDINATE_MAX, COORDINATE_MAX))
 }
 
-fn points(all: &[[f32; 3]]) -> Result<(), Refused> {
+fn points(all: &[[f32; 3]]) -> Result<(), Reason> {
     all.iter().try_for_each(|point| numbers(point))
 }
 
-/// Of any length but 0.
-fn direction(vector: &[f32]) -> Result<(), Refused> {
-    allowed(vector.iter().any(|axis| *axis != 0.0))
+/// Checks that a vector has a direction.
+fn direction(vector: &[f32]) -> Result<(), Reason> {
+    if vector.iter().all(|axis| *axis == 0.0) { Err(Reason::OutOfRange) } else { Ok(()) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::message::FromPage;
+    use crate::message::from_page::FromPage;
 
-    fn check_text(text: &str) -> Result<(), Refused> {
+    fn check_text(text: &str) -> Result<(), Reason> {
         match FromPage::parse(text).unwrap() {
             FromPage::Command { command, .. } => check(&command),
-            other => panic!("{other:?} is no command"),
+            other => panic!("{other:?} is not a command"),
         }
     }
 
     #[test]
     fn numbers_out_of_range_are_refused() {
         for text in [
-            r#"{"type":"drag_begin","particle":1,"target":[0,1e8,0]}"#,
-            r#"{"type":"drag_move","particle":1,"target":[0,0,0],"over_s":0.3}"#,
+            r#"{"type":"grab","particle":1,"target":[0,1e8,0]}"#,
+            r#"{"type":"move","particle":1,"target":[0,0,0],"over_s":0.3}"#,
             r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,0],"radius":1,"delta":[0,0,0],"over_s":0.1}"#,
             r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,1],"radius":-1,"delta":[0,0,0],"over_s":0.1}"#,
             r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,1],"radius":1,"delta":[0,0,0],"over_s":0}"#,
@@ -123,28 +121,28 @@ mod tests {
             r#"{"type":"step","count":10001}"#,
             r#"{"type":"rate","value":11}"#,
         ] {
-            assert_eq!(check_text(text), Err("out_of_range"), "{text}");
+            assert_eq!(check_text(text), Err(Reason::OutOfRange), "{text}");
         }
         let ids = vec!["1"; CONSTRAINTS_PER_CUT_MAX + 1].join(",");
         let cut = format!(r#"{{"type":"cut","epoch":1,"constraints":[{ids}]}}"#);
-        assert_eq!(check_text(&cut), Err("out_of_range"));
+        assert_eq!(check_text(&cut), Err(Reason::OutOfRange));
     }
 
     #[test]
     fn numbers_that_are_not_finite_are_refused() {
         for text in [
-            r#"{"type":"drag_begin","particle":1,"target":[0,1e39,0]}"#,
+            r#"{"type":"grab","particle":1,"target":[0,1e39,0]}"#,
             r#"{"type":"set","parameter":"gravity","value":[0,"nan",0]}"#,
             r#"{"type":"set","parameter":"damping","value":"inf"}"#,
         ] {
-            assert_eq!(check_text(text), Err("non_finite"), "{text}");
+            assert_eq!(check_text(text), Err(Reason::NonFinite), "{text}");
         }
     }
 
     #[test]
-    fn what_the_protocol_shows_is_allowed() {
+    fn numbers_at_the_ends_of_their_ranges_are_allowed() {
         for text in [
-            r#"{"type":"drag_begin","particle":1,"target":[0,1e7,-1e7],"over_s":0}"#,
+            r#"{"type":"grab","particle":1,"target":[0,1e7,-1e7],"over_s":0}"#,
             r#"{"type":"brush","eye":[0,0,1],"ray":[0,0,-2],"radius":1,"delta":[0,0,0],"over_s":0.1,"cap":0}"#,
             r#"{"type":"set","parameter":"compliance","value":1e20}"#,
             r#"{"type":"set","parameter":"tear_force","value":null}"#,

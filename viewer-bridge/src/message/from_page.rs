@@ -1,4 +1,4 @@
-//! What a page says.
+//! Messages from a page to the server.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -6,21 +6,21 @@ use serde_json::{Map, Value};
 use sim_contract::{GRAB_OVER_S_DEFAULT, KindFilter, ParameterValue};
 use thiserror::Error;
 
-/// A message of a page.
+/// A message from a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FromPage {
-    /// Its first one.
+    /// The first message.
     Hello(Hello),
-    /// The last frame that it has drawn.
+    /// The last frame that the page has drawn.
     Ack {
         /// Number of the frame.
         frame: u32,
     },
-    /// Something to do.
+    /// A command.
     Command {
-        /// The page's number for it; then it is always answered.
+        /// The page's number for the command. A command with a number is always answered.
         id: Option<u32>,
-        /// What to do.
+        /// The command.
         command: Command,
     },
 }
@@ -29,47 +29,47 @@ pub enum FromPage {
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hello {
-    /// The protocol that it speaks.
+    /// Protocol number of the page.
     pub protocol: u32,
-    /// What proves that it was given the address.
+    /// Token from the printed address.
     #[serde(default)]
     pub token: Option<String>,
-    /// How it wants positions.
+    /// Format in which the page wants positions.
     #[serde(default)]
     pub format: Choice,
 }
 
-/// How a page wants positions.
+/// Format of positions.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Choice {
-    /// As they are while there are few, else in 65,536 steps.
+    /// f32 for a small scene, u16 for a large one.
     #[default]
     Auto,
-    /// As they are.
+    /// The values of the node.
     F32,
-    /// In 65,536 steps of their box.
+    /// 65,536 steps across the bounding box.
     U16,
 }
 
-/// Something to do.
+/// A command of a client.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-#[allow(missing_docs, reason = "PROTOCOL.md has every field with its unit and range")]
+#[allow(missing_docs, reason = "PROTOCOL.md describes every field with its unit and range")]
 pub enum Command {
-    DragBegin {
+    Grab {
         particle: u32,
         target: [f32; 3],
         #[serde(default = "over_s_default")]
         over_s: f32,
     },
-    DragMove {
+    Move {
         particle: u32,
         target: [f32; 3],
         #[serde(default = "over_s_default")]
         over_s: f32,
     },
-    DragEnd {
+    Release {
         particle: u32,
     },
     Brush {
@@ -152,12 +152,12 @@ fn one() -> i32 {
 }
 
 impl Command {
-    /// Its word in messages.
+    /// Type in messages.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::DragBegin { .. } => "drag_begin",
-            Self::DragMove { .. } => "drag_move",
-            Self::DragEnd { .. } => "drag_end",
+            Self::Grab { .. } => "grab",
+            Self::Move { .. } => "move",
+            Self::Release { .. } => "release",
             Self::Brush { .. } => "brush",
             Self::Pin { .. } => "pin",
             Self::Unpin { .. } => "unpin",
@@ -179,7 +179,8 @@ impl Command {
     }
 }
 
-/// Why a text is no message. It ends the connection: the page is broken, or none of ours.
+/// The reason for which a text is not a message. The server closes the connection then: the page
+/// is broken, or not ours.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{0}")]
 pub struct Malformed(String);
@@ -191,10 +192,11 @@ struct Ack {
 }
 
 impl FromPage {
-    /// Reads a message.
+    /// Parses a message.
     ///
     /// # Errors
-    /// No JSON object, an unknown type, a field too many, too few or of another kind.
+    /// The text is not a JSON object, its type is unknown, or a field is missing, unknown or of the
+    /// wrong type.
     pub fn parse(text: &str) -> Result<Self, Malformed> {
         let mut fields: Map<String, Value> = read(text)?;
         match fields.get("type").and_then(Value::as_str) {
@@ -226,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wrong_type_or_field_is_malformed() {
+    fn an_unknown_type_or_a_wrong_field_is_malformed() {
         for text in [
             "",
             "[]",
@@ -245,8 +247,8 @@ mod tests {
             r#"{"type":"hello"}"#,
             r#"{"type":"hello","protocol":1,"colour":2}"#,
             r#"{"type":"hello","protocol":1,"format":"f64"}"#,
-            r#"{"type":"drag_begin","particle":1,"target":[0,0]}"#,
-            r#"{"type":"drag_begin","particle":1,"target":[0,0,"nan"]}"#,
+            r#"{"type":"grab","particle":1,"target":[0,0]}"#,
+            r#"{"type":"grab","particle":1,"target":[0,0,"nan"]}"#,
             r#"{"type":"set","parameter":"damping","value":true}"#,
         ] {
             assert!(FromPage::parse(text).is_err(), "{text}");
@@ -254,20 +256,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_optional_has_a_default() {
+    fn optional_fields_have_defaults() {
         let hello = Hello { protocol: 1, token: None, format: Choice::Auto };
         let text = r#"{"type":"hello","protocol":1}"#;
         assert_eq!(FromPage::parse(text), Ok(FromPage::Hello(hello)));
         let command = Command::Step { count: 1 };
         let text = r#"{"type":"step"}"#;
         assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: None, command }));
-        let command = Command::DragMove { particle: 3, target: [0.0; 3], over_s: 1.0 / 60.0 };
-        let text = r#"{"id":4,"type":"drag_move","particle":3,"target":[0,0,0]}"#;
+        let command = Command::Move { particle: 3, target: [0.0; 3], over_s: 1.0 / 60.0 };
+        let text = r#"{"id":4,"type":"move","particle":3,"target":[0,0,0]}"#;
         assert_eq!(FromPage::parse(text), Ok(FromPage::Command { id: Some(4), command }));
     }
 
     #[test]
-    fn null_switches_off_but_no_value_is_malformed() {
+    fn null_switches_a_parameter_off_but_a_missing_value_is_malformed() {
         let text = r#"{"type":"set","parameter":"tear_force","value":null}"#;
         let command = Command::Set {
             parameter: "tear_force".to_owned(),

@@ -1,107 +1,104 @@
-//! What a page is told.
+//! Messages from the server to a page.
 
-mod timeline;
+use serde::{Serialize, Serializer};
+use sim_contract::ParameterValues;
 
-use serde::Serialize;
-
-pub use timeline::{Hashes, Mark, MarkKind, Playback, Timeline};
-
-use super::Choice;
+use super::from_page::Choice;
+use super::refusal::Refusal;
+use super::timeline::{Playback, Timeline};
 use crate::limits;
-use crate::message::parameters::Parameters;
-use crate::message::reason;
-use crate::message::settings::SettingEntry;
 use crate::scene::catalog::SceneEntry;
 
 /// A message to a page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum ToPage {
-    /// The answer to its first message.
+    /// The answer to the first message of the page.
     Hello(Box<Welcome>),
-    /// Whether there is a node, and how it stands.
+    /// The state of the node.
     Node(Node),
     /// The parameters of the scene.
     Parameters(Box<ParametersText>),
-    /// What became of a command.
+    /// The answer to a command.
     Outcome(OutcomeText),
-    /// The scene begins anew.
+    /// The scene is back at its beginning.
     Reset {
-        /// The step that shows its initial state.
+        /// First step that shows it.
         step: u64,
     },
-    /// How many pages there are.
+    /// The number of pages has changed.
     Clients {
-        /// This one included.
+        /// Number of pages, including the receiver.
         count: usize,
     },
-    /// Something to show to the user.
+    /// A message for the user.
     Notice {
-        /// How bad it is.
+        /// Its severity.
         level: Level,
-        /// What to show.
+        /// The message.
         text: String,
     },
-    /// What a recording holds.
+    /// The contents of a recording.
     Timeline(Box<Timeline>),
-    /// How a recording is played.
+    /// The playback of a recording.
     Playback(Playback),
 }
 
 impl ToPage {
-    /// As JSON.
+    /// Encodes the message as JSON.
+    ///
+    /// # Panics
+    /// Never: every message consists of numbers and text, which have a JSON form.
     pub fn to_json(&self) -> String {
-        // Numbers and texts always have a JSON form.
-        serde_json::to_string(self).unwrap_or_default()
+        #[allow(clippy::expect_used, reason = "a miss is a fault of these types")]
+        serde_json::to_string(self).expect("a message has a JSON form")
     }
 }
 
-/// What feeds the server.
+/// Kind of source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
-    /// A node, or whatever else owns its name.
+    /// A node, or another owner of its services.
     Live,
     /// A recording.
     Replay,
 }
 
-/// The server's side of the greeting.
+/// The server's half of the greeting.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Welcome {
-    /// Number of the protocol.
+    /// Protocol number.
     pub protocol: u32,
     /// Version of the program.
     pub version: &'static str,
     /// Number of the page.
     pub client: u32,
-    /// What feeds the server.
+    /// Kind of source.
     pub mode: Mode,
-    /// How the page will get positions.
+    /// Format in which the page receives positions.
     pub format: Choice,
-    /// What can be loaded.
+    /// Scenes that can be loaded.
     pub scenes: Vec<SceneEntry>,
-    /// What can be set.
-    pub settings: &'static [SettingEntry],
-    /// What a page has to keep to.
-    pub limits: Limits,
+    /// Limits that the page must keep.
+    pub limits: PageLimits,
 }
 
-/// What a page has to keep to: the constants of [`crate::limits`].
+/// Limits that a page must keep: constants of [`crate::limits`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[allow(missing_docs, reason = "named as the constants, which say what they are")]
-pub struct Limits {
+#[allow(missing_docs, reason = "the constants of the same names have the documentation")]
+pub struct PageLimits {
     pub message_bytes: usize,
     pub messages_per_second: u32,
     pub clients: usize,
     pub frames_unacknowledged: u32,
     pub constraints_per_cut: usize,
-    pub particles_held: usize,
+    pub grabs_per_client: usize,
     pub steps_at_once: u32,
     pub frames_per_second: u32,
 }
 
-impl Default for Limits {
+impl Default for PageLimits {
     fn default() -> Self {
         Self {
             message_bytes: limits::MESSAGE_SIZE_BYTES_MAX,
@@ -109,34 +106,34 @@ impl Default for Limits {
             clients: limits::CLIENTS_MAX,
             frames_unacknowledged: limits::FRAMES_UNACKNOWLEDGED_MAX,
             constraints_per_cut: limits::CONSTRAINTS_PER_CUT_MAX,
-            particles_held: limits::PARTICLES_HELD_MAX,
+            grabs_per_client: limits::GRABS_PER_CLIENT_MAX,
             steps_at_once: limits::STEPS_AT_ONCE_MAX,
             frames_per_second: limits::FRAMES_PER_SECOND_MAX,
         }
     }
 }
 
-/// Whether there is a node.
+/// Presence of a node.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum NodeState {
-    /// None has been seen.
+    /// No node has been seen yet.
     #[default]
     None,
-    /// It runs.
+    /// The node runs.
     Alive,
-    /// It ended, or was killed.
+    /// The node ended or was killed.
     Lost,
 }
 
-/// Whether there is a node, and how it stands.
+/// The state of the node.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Node {
-    /// Whether there is one.
+    /// Presence of a node.
     pub state: NodeState,
-    /// The same for the user, with what to do.
+    /// The same for the user, with the remedy.
     pub text: String,
-    /// 16 hexadecimal digits.
+    /// Number of the run, 16 hexadecimal digits.
     pub run_id: Option<String>,
     /// Name of the scene.
     pub scene: Option<String>,
@@ -144,84 +141,123 @@ pub struct Node {
     pub method: Option<&'static str>,
     /// Steps per second.
     pub rate_hz: u32,
-    /// Whether it waits for `resume` or `step`.
+    /// The node waits for `resume` or `step`.
     pub is_paused: bool,
-    /// Whether a recording is played.
+    /// A recording plays on the node's services.
     pub is_replay: bool,
-    /// The pace that is asked for.
+    /// Requested simulated seconds per second.
     pub time_scale: f64,
-    /// The process.
+    /// Process of the node.
     pub process_id: Option<u32>,
 }
 
-/// The parameters of the scene; none without a scene.
+/// The parameters of the scene; `None` without a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParametersText {
-    /// Whether every command that changed them was seen.
+    /// Every command that changed a parameter has been seen.
     pub is_complete: bool,
-    /// As they are.
-    pub values: Option<Parameters>,
-    /// As the scene has them.
-    pub initial: Option<Parameters>,
+    /// Present values.
+    pub values: Option<ParameterValues>,
+    /// Values of the scene.
+    pub initial: Option<ParameterValues>,
 }
 
-/// Whether a command took effect.
+impl ParametersText {
+    /// The message without a scene.
+    pub(crate) const UNKNOWN: Self = Self { is_complete: false, values: None, initial: None };
+}
+
+/// Fate of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// At least one of its parts, or nothing was to do.
+    /// At least one of its parts was applied, or it has none.
     Applied,
-    /// None of it.
+    /// No part was applied.
     Rejected,
     /// Not known.
     Unanswered,
 }
 
-/// What became of a command.
+/// The answer to a command.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutcomeText {
-    /// The page's number for it.
+    /// The client's number for the command.
     pub id: Option<u32>,
-    /// Its word.
+    /// Type of the command.
     pub kind: &'static str,
-    /// Whether it took effect.
+    /// Fate of the command.
     pub status: Status,
-    /// The first step that shows it.
+    /// First step that shows its effect.
     pub step: Option<u64>,
-    /// How many of its parts were applied.
+    /// Number of its parts that were applied.
     pub applied: u32,
-    /// How many were rejected.
+    /// Number of its parts that were rejected.
     pub rejected: u32,
-    /// Word of the first rejection, or "".
-    pub reason: &'static str,
+    /// Reason of the first rejection; "" in JSON if there is none.
+    #[serde(serialize_with = "name_or_empty")]
+    pub reason: Option<Refusal>,
     /// A sentence for the user, or "".
     pub text: String,
 }
 
+#[allow(
+    clippy::ref_option,
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes the field by reference"
+)]
+fn name_or_empty<S: Serializer>(
+    reason: &Option<Refusal>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(reason.map_or("", Refusal::name))
+}
+
 impl OutcomeText {
-    /// The outcome of what was refused before it reached a node; `reason` is its word.
-    pub fn refused(id: Option<u32>, kind: &'static str, reason: &'static str) -> Self {
+    /// The answer to a command whose parts have no outcome yet.
+    pub(crate) fn pending(id: Option<u32>, kind: &'static str) -> Self {
         Self {
             id,
             kind,
-            status: Status::Rejected,
+            status: Status::Applied,
             step: None,
             applied: 0,
-            rejected: 1,
-            reason,
-            text: reason::text(reason).to_owned(),
+            rejected: 0,
+            reason: None,
+            text: String::new(),
+        }
+    }
+
+    /// The answer to a command that was refused before it reached a node.
+    pub fn refused(id: Option<u32>, kind: &'static str, reason: Refusal) -> Self {
+        let mut outcome = Self { status: Status::Rejected, ..Self::pending(id, kind) };
+        outcome.reject_part(reason);
+        outcome
+    }
+
+    /// Counts a rejected part.
+    pub(crate) fn reject_part(&mut self, reason: Refusal) {
+        self.rejected += 1;
+        self.explain(reason);
+    }
+
+    /// Gives the reason, unless the outcome already has one.
+    pub(crate) fn explain(&mut self, reason: Refusal) {
+        if self.reason.is_none() {
+            self.reason = Some(reason);
+            reason.text().clone_into(&mut self.text);
         }
     }
 }
 
-/// How bad something is.
+/// Severity of a message for the user.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// Good to know.
+    /// Information.
     Info,
-    /// Something may not be as expected.
+    /// Something may be unexpected.
     Warning,
-    /// Something is not.
+    /// Something is wrong.
     Error,
 }

@@ -1,4 +1,4 @@
-//! The files of the page: built into the program, or, for who works on them, read from a folder.
+//! The files of the page: built into the program, or read from a folder during development.
 
 mod files;
 
@@ -12,21 +12,21 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use files::FILES;
 
-/// Where the files come from.
+/// The origin of the files.
 #[derive(Debug, Clone, Default)]
 pub enum Assets {
-    /// Out of the program.
+    /// The files in the program.
     #[default]
     Embedded,
-    /// Out of this folder, as they are at the moment.
+    /// The files in this folder, read at each request.
     Folder(PathBuf),
 }
 
 impl Assets {
-    /// The files of a folder.
+    /// Uses the files of a folder.
     ///
     /// # Errors
-    /// It is no folder, or cannot be read.
+    /// The path is not a folder, or cannot be read.
     pub fn folder(path: &Path) -> io::Result<Self> {
         let folder = path.canonicalize()?;
         if folder.is_dir() {
@@ -36,11 +36,11 @@ impl Assets {
         }
     }
 
-    /// The answer to a request for a path such as `js/main.js`; the empty one is the page.
+    /// Answers a request for a path such as `js/main.js`. The empty path is the page.
     pub(crate) fn answer(&self, path: &str, headers: &HeaderMap) -> Response {
         let path = if path.is_empty() { "index.html" } else { path };
         let (Some(content), Some(mime)) = (self.content(path), mime(path)) else {
-            return (StatusCode::NOT_FOUND, "there is no such file\n").into_response();
+            return (StatusCode::NOT_FOUND, "no such file\n").into_response();
         };
         let tag = format!("\"{:016x}\"", xxh3_64(&content));
         if headers
@@ -60,7 +60,7 @@ impl Assets {
                 file.map(|(_, content)| content.as_bytes().to_vec())
             }
             Self::Folder(folder) => {
-                // What leaves the folder, by dots or by a link, is not there.
+                // A path that leaves the folder, by dots or by a link, does not exist.
                 let file = folder.join(path).canonicalize().ok()?;
                 if file.starts_with(folder) { fs::read(file).ok() } else { None }
             }
@@ -68,7 +68,7 @@ impl Assets {
     }
 }
 
-/// What a file is; what is none of these is not served.
+/// Media type of a file. Files of other types are not served.
 fn mime(path: &str) -> Option<&'static str> {
     let (_, ending) = path.rsplit_once('.')?;
     Some(match ending {

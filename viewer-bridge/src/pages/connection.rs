@@ -1,4 +1,4 @@
-//! A page, seen from its task.
+//! A page, seen from the task that serves it.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -8,17 +8,19 @@ use axum::extract::ws::Message;
 use bytes::Bytes;
 use tokio::sync::{mpsc, watch};
 
-use super::hub::{FrameSet, wants_f32};
+use super::frame_set::{FrameSet, format_for};
 use crate::limits::FRAMES_UNACKNOWLEDGED_MAX;
 use crate::message::Choice;
+use crate::request::ClientId;
+use crate::wire::Format;
 
-/// How many frames a page has not acknowledged.
+/// Number of frames that a page has not acknowledged.
 #[derive(Debug, Default)]
-pub(crate) struct Credit(AtomicU32);
+pub(super) struct Credit(AtomicU32);
 
 impl Credit {
-    /// Whether the page may be sent one more.
-    pub(crate) fn is_left(&self) -> bool {
+    /// Returns whether the page can receive another frame.
+    pub(super) fn is_left(&self) -> bool {
         self.0.load(Ordering::Relaxed) < FRAMES_UNACKNOWLEDGED_MAX
     }
 
@@ -27,71 +29,88 @@ impl Credit {
     }
 }
 
-/// A page that was taken in.
+/// A page that has joined.
 #[derive(Debug)]
 pub(crate) struct Connection {
-    /// Its number.
-    pub(crate) client: u32,
+    pub(super) client: ClientId,
     pub(super) choice: Choice,
-    /// Reliable messages; ends when the hub gives the page up.
+    /// Reliable messages. The queue ends when the hub gives the page up.
     pub(crate) queue: mpsc::Receiver<Message>,
     pub(crate) frames: watch::Receiver<Arc<FrameSet>>,
-    pub(crate) credit: Arc<Credit>,
+    pub(super) credit: Arc<Credit>,
+    pub(super) sent: SentFrames,
 }
 
-/// What of the lossy path a page has had.
+/// The lossy messages that a page has received.
 #[derive(Debug, Default)]
-pub(crate) struct Shown {
-    /// Numbers of the frames that were sent and not acknowledged, ascending.
+pub(super) struct SentFrames {
+    /// Numbers of the frames that are not acknowledged, ascending.
     unacknowledged: VecDeque<u32>,
-    /// Number of the frame that was sent last, or of one that was missed since.
-    last: Option<u32>,
-    /// The colliders that were sent last.
+    /// Number of the newest frame that was sent or missed.
+    newest: Option<u32>,
+    /// Number of the colliders that were sent last.
     colliders: Option<u64>,
 }
 
-/// What a page is sent of the newest frame.
+/// Messages for a page that show the newest frame.
 #[derive(Debug)]
-pub(crate) enum Taken {
-    /// The frame, with the colliders before it if they have changed.
+pub(super) enum NextFrame {
+    /// The frame, after the colliders if they have changed.
     Frame(Vec<Bytes>),
-    /// It has had it.
+    /// The page has received it before.
     Nothing,
-    /// It was not encoded as this page wants it: the page had no credit when it was shown.
+    /// It was not encoded in the page's format: the page had no credit at that time.
     Missed,
 }
 
+/// Effect of an acknowledgement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Acknowledged {
+    /// The page had no credit and has some now.
+    CreditRestored,
+    /// The page had credit before, or still has none.
+    Unchanged,
+}
+
 impl Connection {
-    /// Takes the newest frame. That one was missed is said once.
-    pub(crate) fn take_frame(&mut self, shown: &mut Shown) -> Taken {
+    /// Returns the newest frame for the page. Reports a missed frame once.
+    pub(super) fn next_frame(&mut self) -> NextFrame {
         let frame = Arc::clone(&self.frames.borrow_and_update());
-        let wants_f32 = wants_f32(self.choice, frame.particle_count);
-        let encoded = if wants_f32 { &frame.f32 } else { &frame.u16 };
-        if shown.last == Some(frame.number) || (frame.f32.is_none() && frame.u16.is_none()) {
-            return Taken::Nothing;
+        let encoded = match format_for(self.choice, frame.particle_count) {
+            Format::F32 => &frame.f32,
+            Format::U16 => &frame.u16,
+        };
+        let sent = &mut self.sent;
+        if sent.newest == Some(frame.number) || (frame.f32.is_none() && frame.u16.is_none()) {
+            return NextFrame::Nothing;
         }
-        shown.last = Some(frame.number);
-        let Some(encoded) = encoded else { return Taken::Missed };
+        sent.newest = Some(frame.number);
+        let Some(encoded) = encoded else { return NextFrame::Missed };
         let mut messages = Vec::with_capacity(2);
         if let Some(colliders) = &frame.colliders
-            && shown.colliders != Some(colliders.number)
+            && sent.colliders != Some(colliders.number)
         {
-            shown.colliders = Some(colliders.number);
+            sent.colliders = Some(colliders.number);
             messages.push(colliders.bytes.clone());
         }
         messages.push(encoded.clone());
-        shown.unacknowledged.push_back(frame.number);
-        self.credit.set_used(shown.unacknowledged.len());
-        Taken::Frame(messages)
+        sent.unacknowledged.push_back(frame.number);
+        self.credit.set_used(sent.unacknowledged.len());
+        NextFrame::Frame(messages)
     }
 
-    /// The page has drawn that frame. Whether it had no credit before, and has some now.
-    pub(crate) fn acknowledge(&self, frame: u32, shown: &mut Shown) -> bool {
+    /// Notes that the page has drawn a frame.
+    pub(super) fn acknowledge(&mut self, frame: u32) -> Acknowledged {
         let had_credit = self.credit.is_left();
-        while shown.unacknowledged.front().is_some_and(|sent| *sent <= frame) {
-            shown.unacknowledged.pop_front();
+        let unacknowledged = &mut self.sent.unacknowledged;
+        while unacknowledged.front().is_some_and(|sent| *sent <= frame) {
+            unacknowledged.pop_front();
         }
-        self.credit.set_used(shown.unacknowledged.len());
-        !had_credit && self.credit.is_left()
+        self.credit.set_used(unacknowledged.len());
+        if !had_credit && self.credit.is_left() {
+            Acknowledged::CreditRestored
+        } else {
+            Acknowledged::Unchanged
+        }
     }
 }

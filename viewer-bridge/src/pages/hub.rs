@@ -1,298 +1,196 @@
-//! Between one source and many pages.
+//! The sink of the pages: between one source and many pages.
 //!
-//! There are two paths. Reliable messages go into a bounded queue of each page; what is latched is
-//! also given to pages that come later. Frames are lossy: a page takes the newest one whenever it
-//! has credit. A frame is shown after everything that it builds on was queued, and a page's task
-//! empties its queue before it sends a frame: so no frame arrives before its scene.
+//! Messages take one of two paths. Reliable messages go into a bounded queue for each page; the latched
+//! ones are also sent to pages that join later. Frames are lossy: a page receives the newest one when
+//! it has credit. A frame is published after the messages that it depends on, and the task of a page
+//! empties its queue before it sends a frame. Therefore no frame arrives before its scene.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::ws::Message;
 use bytes::Bytes;
-use recorder::Topic;
 use tokio::sync::{mpsc, watch};
 
-pub(crate) use super::connection::{Connection, Credit, Shown, Taken};
-
-use crate::foxglove_server::{CLIENT_FIRST, Publisher};
-use crate::limits::{F32_PARTICLES_MAX, PROTOCOL, RELIABLE_QUEUED_MAX};
-use crate::message::settings;
-use crate::message::{Choice, Limits, Mode, ToPage, Welcome};
+use super::connection::{Connection, Credit, SentFrames};
+use super::frame_encoder::FrameEncoder;
+pub use super::frame_set::Formats;
+use super::frame_set::{FrameSet, format_for};
+use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
+use crate::message::{Choice, Mode, PageLimits, ToPage, Welcome};
+use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog;
-use crate::source::{Ask, Request, RequestSender, Requests, requests};
+use crate::sink::{Demand, Sink, Torn, Update};
+use crate::wire::convert::count_u32;
+use crate::wire::{Statistics, Tear};
 
-/// What a page that comes late is given, in this order.
+/// Latched messages, in the order in which a new page receives them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Slot {
-    /// Whether there is a node.
+enum Slot {
     Node,
-    /// The parameters.
     Parameters,
-    /// What a recording holds.
     Timeline,
-    /// How it is played.
     Playback,
-    /// The load. A new one empties the slots behind it.
+    /// A new scene empties the slots after this one.
     Scene,
-    /// What is torn.
     Tear,
-    /// What is not free.
     Pins,
 }
 
-/// The state of a step, encoded as often as there is a demand for.
-#[derive(Debug, Clone, Default)]
-pub struct FrameSet {
-    /// Number of the frame; ascending.
-    pub number: u32,
-    /// Particles in it.
-    pub particle_count: usize,
-    /// Encoded as FRAME f32.
-    pub f32: Option<Bytes>,
-    /// Encoded as FRAME u16.
-    pub u16: Option<Bytes>,
-    /// The colliders of the load, if it has any.
-    pub colliders: Option<ColliderSet>,
-}
-
-/// Colliders in their poses.
-#[derive(Debug, Clone)]
-pub struct ColliderSet {
-    /// Changes with every change.
-    pub number: u64,
-    /// Encoded as COLLIDERS.
-    pub bytes: Bytes,
-}
-
-/// Which encodings pages wait for.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Demand {
-    /// FRAME f32.
-    pub f32: bool,
-    /// FRAME u16.
-    pub u16: bool,
-    /// Foxglove clients wait for a state.
-    pub foxglove: bool,
-}
-
-impl Demand {
-    /// Whether anybody waits for a frame.
-    pub fn is_any(self) -> bool {
-        self.is_of_pages() || self.foxglove
-    }
-
-    /// Whether a page does.
-    pub fn is_of_pages(self) -> bool {
-        self.f32 || self.u16
-    }
-}
-
-/// How that page gets a scene of that many particles.
-pub(super) fn wants_f32(choice: Choice, particle_count: usize) -> bool {
-    match choice {
-        Choice::Auto => particle_count <= F32_PARTICLES_MAX,
-        Choice::F32 => true,
-        Choice::U16 => false,
-    }
-}
-
-/// Between one source and many pages.
+/// The sink of the pages.
 #[derive(Debug)]
 pub struct Hub {
     mode: Mode,
-    state: Mutex<State>,
+    state: Mutex<HubState>,
+    encoder: Mutex<FrameEncoder>,
     frames: watch::Sender<Arc<FrameSet>>,
-    closed: watch::Sender<bool>,
     requests: RequestSender,
-    /// The Foxglove side, if there is one.
-    publisher: OnceLock<Arc<Publisher>>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct HubState {
     latched: BTreeMap<Slot, Message>,
-    clients: BTreeMap<u32, Member>,
-    /// Number of the last page that came.
-    last_client: u32,
+    pages: BTreeMap<ClientId, Page>,
+    last_number: u32,
 }
 
 /// A page, seen from the hub.
 #[derive(Debug)]
-struct Member {
+struct Page {
     queue: mpsc::Sender<Message>,
     choice: Choice,
     credit: Arc<Credit>,
 }
 
-impl State {
-    /// Queues a message for everyone. Whoever has no room is given up: its task sees the end of its
-    /// queue, and closes.
+impl HubState {
+    /// Queues a message for every page. Removes a page whose queue is full: its task sees the end of
+    /// the queue and closes the connection.
     fn queue(&mut self, message: &Message) {
-        self.clients.retain(|_, member| member.queue.try_send(message.clone()).is_ok());
+        self.pages.retain(|_, page| page.queue.try_send(message.clone()).is_ok());
+    }
+
+    fn queue_count(&mut self) {
+        let count = text(&ToPage::Clients { count: self.pages.len() });
+        self.queue(&count);
+    }
+
+    /// Queues a message for every page and keeps it for later ones.
+    fn latch(&mut self, slot: Slot, message: Message) {
+        self.queue(&message);
+        if slot == Slot::Scene {
+            self.latched.retain(|slot, _| *slot < Slot::Scene);
+        }
+        self.latched.insert(slot, message);
     }
 }
 
+/// A panic in one task must not stop the others. Every change under this lock is complete wherever a
+/// panic could occur.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn text(message: &ToPage) -> Message {
+    Message::Text(message.to_json().into())
+}
+
 impl Hub {
-    /// A hub without pages, and the requests of those that will come.
-    pub fn new(mode: Mode) -> (Self, Requests) {
-        let (sender, receiver) = requests();
-        let hub = Self {
+    /// Creates a hub without pages. The requests of its pages go to `requests`.
+    pub fn new(mode: Mode, requests: RequestSender) -> Self {
+        Self {
             mode,
             state: Mutex::default(),
+            encoder: Mutex::default(),
             frames: watch::Sender::default(),
-            closed: watch::Sender::new(false),
-            requests: sender,
-            publisher: OnceLock::new(),
-        };
-        (hub, receiver)
-    }
-
-    /// A panic in one task must not take the others with it: every change of the state is complete
-    /// at every point where it could come.
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Adds the Foxglove side; the first one stays.
-    pub(crate) fn set_publisher(&self, publisher: Arc<Publisher>) {
-        let _first = self.publisher.set(publisher);
-    }
-
-    /// The Foxglove side, if there is one.
-    pub(crate) fn publisher(&self) -> Option<&Publisher> {
-        self.publisher.get().map(Arc::as_ref)
-    }
-
-    /// Says something on a topic of recordings, to Foxglove clients; it is made only if one hears it.
-    pub fn say(&self, topic: Topic, make: impl FnOnce() -> recorder::Message) {
-        if let Some(publisher) = self.publisher() {
-            publisher.say(topic, make);
+            requests,
         }
     }
 
-    /// Tells everyone something that stays true: pages that come later are told as well.
-    pub fn latch(&self, slot: Slot, message: &ToPage) {
-        if self.publisher().is_some_and(|publisher| publisher.hear(message)) {
-            self.request(CLIENT_FIRST, Ask::Frame);
+    /// Returns the formats that pages with credit wait for, in a scene of this many particles.
+    pub fn awaited_formats(&self, particle_count: usize) -> Formats {
+        let mut formats = Formats::default();
+        for page in lock(&self.state).pages.values().filter(|page| page.credit.is_left()) {
+            formats.add(format_for(page.choice, particle_count));
         }
-        self.latch_bytes(slot, &text(message), None);
+        formats
     }
 
-    /// The same for a binary message. Where `change` is given, those who are here get that, and
-    /// `full` is for those who come.
-    pub fn latch_binary(&self, slot: Slot, full: Bytes, change: Option<Bytes>) {
-        self.latch_bytes(slot, &Message::Binary(full), change.map(Message::Binary).as_ref());
-    }
-
-    fn latch_bytes(&self, slot: Slot, full: &Message, change: Option<&Message>) {
-        let mut state = self.state();
-        if slot == Slot::Scene {
-            state.latched.retain(|slot, _| *slot < Slot::Scene);
-        }
-        state.latched.insert(slot, full.clone());
-        state.queue(change.unwrap_or(full));
-    }
-
-    /// Nothing is known of that any more; those who are here keep what they were told.
-    pub fn forget(&self, slot: Slot) {
-        self.state().latched.remove(&slot);
-    }
-
-    /// Tells everyone who is here.
-    pub fn broadcast(&self, message: &ToPage) {
-        self.state().queue(&text(message));
-    }
-
-    /// The same for a binary message.
-    pub fn broadcast_binary(&self, bytes: Bytes) {
-        self.state().queue(&Message::Binary(bytes));
-    }
-
-    /// Tells one page, if it is still here.
-    pub fn send(&self, client: u32, message: &ToPage) {
-        if client >= CLIENT_FIRST {
-            if let (Some(publisher), ToPage::Outcome(outcome)) = (self.publisher(), message) {
-                publisher.answer(outcome);
-            }
-            return;
-        }
-        let mut state = self.state();
-        if let Some(member) = state.clients.get(&client)
-            && member.queue.try_send(text(message)).is_err()
-        {
-            state.clients.remove(&client);
-        }
-    }
-
-    /// Shows a frame to all who have credit, now or later; the one before it is forgotten.
-    pub fn show(&self, frame: FrameSet) {
-        self.frames.send_replace(Arc::new(frame));
-    }
-
-    /// Shows the last frame once more, to those who have not seen it.
-    pub fn show_again(&self) {
-        self.frames.send_modify(|_| {});
-    }
-
-    /// Which encodings pages with credit wait for, in a scene of that many particles.
-    pub fn demand(&self, particle_count: usize) -> Demand {
-        let foxglove = self.publisher().is_some_and(Publisher::is_awaiting);
-        let mut demand = Demand { foxglove, ..Demand::default() };
-        for member in self.state().clients.values().filter(|member| member.credit.is_left()) {
-            if wants_f32(member.choice, particle_count) {
-                demand.f32 = true;
-            } else {
-                demand.u16 = true;
-            }
-        }
-        demand
-    }
-
-    /// How many pages there are.
+    /// Number of pages.
     pub fn client_count(&self) -> usize {
-        self.state().clients.len()
+        lock(&self.state).pages.len()
     }
 
-    /// Ends everything: pages are told that the server goes, and the source ends.
-    pub fn close(&self) {
-        self.closed.send_replace(true);
-        self.state().clients.clear();
+    fn latch(&self, slot: Slot, message: &ToPage) {
+        lock(&self.state).latch(slot, text(message));
     }
 
-    /// Whether the server ends.
-    pub fn is_closed(&self) -> bool {
-        *self.closed.borrow()
+    fn latch_binary(&self, slot: Slot, bytes: Bytes) {
+        lock(&self.state).latch(slot, Message::Binary(bytes));
     }
 
-    /// Waits for the end of the server.
-    pub async fn closed(&self) {
-        let mut closed = self.closed.subscribe();
-        // The sender is ours: it cannot be gone.
-        let _ended = closed.wait_for(|is_closed| *is_closed).await;
+    fn broadcast(&self, message: &ToPage) {
+        lock(&self.state).queue(&text(message));
     }
 
-    /// Takes in a page; its queue begins with the greeting and everything latched.
+    /// Sends the change of the list to the pages, and keeps the whole list for later ones.
+    fn publish_torn(&self, Torn { stamp, all, known_count }: &Torn<'_>) {
+        let tear = |first: usize| {
+            let constraints = all[first..].iter().map(|torn| torn.constraint).collect();
+            let tear = Tear { stamp: *stamp, first: count_u32(first), constraints };
+            Message::Binary(tear.encode())
+        };
+        let mut state = lock(&self.state);
+        state.queue(&tear(*known_count));
+        state.latched.insert(Slot::Tear, tear(0));
+    }
+
+    fn publish_statistics(&self, statistics: &Statistics) {
+        let rate = lock(&self.encoder).take_rate();
+        let mut state = lock(&self.state);
+        let statistics = Statistics {
+            client_count: count_u32(state.pages.len()),
+            encode_us: rate.encode_us,
+            frames_per_second: rate.frames_per_second,
+            ..*statistics
+        };
+        state.queue(&Message::Binary(statistics.encode()));
+    }
+
+    /// Sends a message to one page, if it is still there.
+    pub(super) fn send(&self, client: ClientId, message: &ToPage) {
+        let mut state = lock(&self.state);
+        if let Some(page) = state.pages.get(&client)
+            && page.queue.try_send(text(message)).is_err()
+        {
+            state.pages.remove(&client);
+        }
+    }
+
+    /// Adds a page. Its queue begins with the greeting and the latched messages.
     pub(crate) fn join(&self, choice: Choice) -> Connection {
         let (queue, receiver) = mpsc::channel(RELIABLE_QUEUED_MAX);
         let credit = Arc::new(Credit::default());
-        let mut state = self.state();
-        state.last_client += 1;
-        let client = state.last_client;
-        let welcome = text(&ToPage::Hello(Box::new(self.welcome(client, choice))));
+        let mut state = lock(&self.state);
+        if state.pages.is_empty() {
+            // Frames before a pause without pages are not part of the rate.
+            lock(&self.encoder).take_rate();
+        }
+        state.last_number += 1;
+        let number = state.last_number;
+        let client = ClientId::Page(number);
+        let welcome = text(&ToPage::Hello(Box::new(self.welcome(number, choice))));
         for message in std::iter::once(&welcome).chain(state.latched.values()) {
-            // The queue is longer than this.
+            // The queue has room for all of them.
             let _queued = queue.try_send(message.clone());
         }
-        state.clients.insert(client, Member { queue, choice, credit: Arc::clone(&credit) });
-        let count = text(&ToPage::Clients { count: state.clients.len() });
-        state.queue(&count);
+        state.pages.insert(client, Page { queue, choice, credit: Arc::clone(&credit) });
+        state.queue_count();
         drop(state);
         let mut frames = self.frames.subscribe();
         frames.mark_unchanged();
-        let connection = Connection { client, choice, queue: receiver, frames, credit };
-        self.request(client, Ask::Frame);
-        connection
+        self.request(client, RequestKind::State);
+        let sent = SentFrames::default();
+        Connection { client, choice, queue: receiver, frames, credit, sent }
     }
 
     fn welcome(&self, client: u32, format: Choice) -> Welcome {
@@ -307,28 +205,74 @@ impl Hub {
             mode: self.mode,
             format,
             scenes,
-            settings: &settings::SETTINGS,
-            limits: Limits::default(),
+            limits: PageLimits::default(),
         }
     }
 
-    /// Lets a page go.
-    pub(crate) fn leave(&self, client: u32) {
-        let mut state = self.state();
-        state.clients.remove(&client);
-        let count = text(&ToPage::Clients { count: state.clients.len() });
-        state.queue(&count);
+    /// Removes a page.
+    pub(super) fn leave(&self, client: ClientId) {
+        let mut state = lock(&self.state);
+        state.pages.remove(&client);
+        state.queue_count();
         drop(state);
-        self.request(client, Ask::Left);
+        self.request(client, RequestKind::Left);
     }
 
-    /// Hands a request to the source; whether it was taken.
-    pub(crate) fn request(&self, client: u32, ask: Ask) -> bool {
-        self.requests.send(Request { client, ask })
+    /// Sends a request other than a command to the source.
+    pub(super) fn request(&self, client: ClientId, kind: RequestKind) {
+        // Only commands are refused, unless the source has ended.
+        let _sent = self.requests.send(client, kind);
+    }
+
+    /// Sender of requests to the source.
+    pub(super) fn requests(&self) -> &RequestSender {
+        &self.requests
     }
 }
 
-/// A text message.
-fn text(message: &ToPage) -> Message {
-    Message::Text(message.to_json().into())
+impl Sink for Hub {
+    fn has_demand(&self, demand: Demand) -> bool {
+        match demand {
+            Demand::State => lock(&self.state).pages.values().any(|page| page.credit.is_left()),
+            Demand::Statistics => self.client_count() > 0,
+        }
+    }
+
+    fn publish(&self, update: &Update<'_>) {
+        match *update {
+            Update::Load(scene) => {
+                lock(&self.encoder).begin_load(scene);
+                self.latch_binary(Slot::Scene, scene.encode());
+            }
+            Update::Torn(torn) => self.publish_torn(&torn),
+            Update::Pins(pins) => self.latch_binary(Slot::Pins, pins.encode()),
+            Update::Colliders(colliders) => lock(&self.encoder).set_colliders(colliders),
+            Update::State(state) => {
+                let formats = self.awaited_formats(state.particles.len());
+                if formats.is_any() {
+                    let frame = lock(&self.encoder).encode(&state, formats);
+                    self.frames.send_replace(Arc::new(frame));
+                }
+            }
+            Update::SameState => self.frames.send_modify(|_| {}),
+            Update::Statistics(statistics) => self.publish_statistics(statistics),
+            Update::Node(node) => self.latch(Slot::Node, &ToPage::Node(node.clone())),
+            Update::Parameters(parameters) => {
+                self.latch(Slot::Parameters, &ToPage::Parameters(Box::new(parameters.clone())));
+            }
+            Update::Timeline(timeline) => {
+                self.latch(Slot::Timeline, &ToPage::Timeline(Box::new(timeline.clone())));
+            }
+            Update::Playback(playback) => self.latch(Slot::Playback, &ToPage::Playback(*playback)),
+            Update::Reset { step } => self.broadcast(&ToPage::Reset { step }),
+            Update::Notice { level, text } => {
+                self.broadcast(&ToPage::Notice { level, text: text.to_owned() });
+            }
+            Update::Answer { client, outcome } => {
+                self.send(client, &ToPage::Outcome(outcome.clone()));
+            }
+            // Pages receive the answers to their own commands, and statistics.
+            Update::Status(_) | Update::Outcome(_) => {}
+        }
+    }
 }

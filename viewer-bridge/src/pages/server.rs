@@ -1,4 +1,4 @@
-//! The HTTP server: the page's files, and a WebSocket for each page.
+//! The HTTP server of the pages: their files, and a WebSocket for each.
 
 use std::io;
 use std::net::SocketAddr;
@@ -6,191 +6,127 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Path, Request, State};
+use axum::extract::{Path, State};
 use axum::http::{HeaderMap, StatusCode};
-use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use hyper::server::conn::http1;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
 use thiserror::Error;
-use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
-use tokio::time::{sleep, timeout};
 
-use crate::limits::{
-    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, CONNECTIONS_MAX, FAREWELL_TIMEOUT,
-    HELLO_TIMEOUT, MESSAGE_SIZE_BYTES_MAX, WAITING_MAX,
-};
-use crate::pages::assets::Assets;
-use crate::pages::hub::Hub;
-use crate::pages::session;
-use crate::socket::guard::{Guard, HEADERS};
+use super::assets::Assets;
+use super::hub::Hub;
+use super::session::{self, Sessions};
+use crate::limits::{CLIENTS_MAX, WAITING_MAX};
+use crate::shutdown::Shutdown;
+use crate::socket::guard::{Guard, guarded};
+use crate::socket::listen::{HttpListener, client_permits};
+use crate::socket::peer::limit;
 
-/// What a server is told.
+/// Options of a server.
 #[derive(Debug)]
 pub struct ServerOptions {
-    /// Where it listens; port 0 is any that is free.
+    /// Address; port 0 is any free port.
     pub listen: SocketAddr,
-    /// Names by which it may be called beside its addresses.
+    /// Names of this host besides its addresses.
     pub names: Vec<String>,
-    /// The page's files.
+    /// Files of the page.
     pub assets: Assets,
 }
 
-/// Why a server does not start.
+/// The reason for which a server does not start.
 #[derive(Debug, Error)]
 pub enum ServerError {
-    /// The address cannot be listened at.
+    /// The address cannot be used.
     #[error("cannot listen at {address}: {cause}")]
     Listen {
         /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// Error of the system.
         cause: io::Error,
     },
-    /// There is no token without it.
-    #[error("the system gives no random number for a token: {0}")]
+    /// A token needs a random number.
+    #[error("the system provides no random number for a token: {0}")]
     NoRandomNumber(getrandom::Error),
 }
 
 /// A server that listens.
 #[derive(Debug)]
 pub struct Server {
-    listener: TcpListener,
-    address: SocketAddr,
-    guard: Guard,
+    listener: HttpListener,
+    guard: Arc<Guard>,
     assets: Assets,
 }
 
-/// What the handlers share.
+/// State that the handlers share.
 #[derive(Debug)]
-pub(crate) struct Site {
-    pub(crate) hub: Arc<Hub>,
-    pub(crate) guard: Guard,
+struct ServerState {
+    sessions: Sessions,
     assets: Assets,
-    /// A permit for each page.
-    pub(crate) places: Arc<Semaphore>,
-    /// A permit for each socket that has not said who it is: whoever has no token takes no place.
+    /// A permit for each socket that has not sent a valid `hello`.
     waiting: Arc<Semaphore>,
 }
 
 impl Server {
-    /// Takes the address.
+    /// Binds the address.
     ///
     /// # Errors
-    /// It is taken, or not of this host.
+    /// The address is in use, or does not belong to this host.
     pub async fn bind(options: ServerOptions) -> Result<Self, ServerError> {
-        let listen = |cause| ServerError::Listen { address: options.listen, cause };
-        let listener = TcpListener::bind(options.listen).await.map_err(listen)?;
-        let address = listener.local_addr().map_err(listen)?;
-        let guard = Guard::new(address, options.names).map_err(ServerError::NoRandomNumber)?;
-        Ok(Self { listener, address, guard, assets: options.assets })
+        let address = options.listen;
+        let listener = HttpListener::bind(address)
+            .await
+            .map_err(|cause| ServerError::Listen { address, cause })?;
+        let guard = Guard::new(listener.address(), options.names);
+        let guard = Arc::new(guard.map_err(ServerError::NoRandomNumber)?);
+        Ok(Self { listener, guard, assets: options.assets })
     }
 
-    /// What to open in a browser. The token is behind the `#`, which no browser sends.
+    /// Address to open in a browser. The token follows the `#`, which no browser sends.
     pub fn url(&self) -> String {
         let token = self.guard.token().map(|token| format!("#token={token}"));
-        format!("http://{}/{}", self.address, token.unwrap_or_default())
+        format!("http://{}/{}", self.listener.address(), token.unwrap_or_default())
     }
 
-    /// Serves until the hub is closed, and then until every page was told.
-    pub async fn serve(self, hub: Arc<Hub>) {
-        let places = Arc::new(Semaphore::new(CLIENTS_MAX));
-        let site = Site {
-            hub: Arc::clone(&hub),
-            guard: self.guard,
-            assets: self.assets,
-            places: Arc::clone(&places),
-            waiting: Arc::new(Semaphore::new(WAITING_MAX)),
-        };
-        let router = router(Arc::new(site));
-        tokio::select! {
-            () = accept(&self.listener, &router) => {}
-            () = hub.closed() => {}
-        }
-        // The last permit comes back when the last page has gone.
-        let all = u32::try_from(CLIENTS_MAX).unwrap_or(u32::MAX);
-        let _gone = timeout(FAREWELL_TIMEOUT, places.acquire_many(all)).await;
+    /// Serves until the shutdown begins and every page has been informed.
+    pub async fn serve(self, hub: Arc<Hub>, shutdown: Shutdown) {
+        let pages = client_permits();
+        let (guard, shutdown_of_pages) = (Arc::clone(&self.guard), shutdown.clone());
+        let sessions =
+            Sessions { hub, guard, shutdown: shutdown_of_pages, pages: Arc::clone(&pages) };
+        let waiting = Arc::new(Semaphore::new(WAITING_MAX));
+        let state = ServerState { sessions, assets: self.assets, waiting };
+        let router = guarded(router(Arc::new(state)), self.guard);
+        self.listener.serve(router, pages, &shutdown).await;
     }
 }
 
-fn router(site: Arc<Site>) -> Router {
+fn router(state: Arc<ServerState>) -> Router {
     Router::new()
         .route("/", get(page))
         .route("/socket", get(socket))
         .route("/{*path}", get(file))
-        .layer(middleware::from_fn_with_state(Arc::clone(&site), guarded))
-        .with_state(site)
+        .with_state(state)
 }
 
-/// Takes connections as long as it is polled.
-async fn accept(listener: &TcpListener, router: &Router) {
-    let connections = Arc::new(Semaphore::new(CONNECTIONS_MAX));
-    // The semaphore is never closed.
-    while let Ok(permit) = Arc::clone(&connections).acquire_owned().await {
-        let Ok((stream, _)) = listener.accept().await else {
-            // A connection that broke before it was taken, or no file handle is left.
-            sleep(ACCEPT_PAUSE).await;
-            continue;
-        };
-        let router = router.clone();
-        tokio::spawn(async move {
-            converse(stream, router).await;
-            drop(permit);
-        });
-    }
-}
-
-/// Serves one connection.
-async fn converse(stream: TcpStream, router: Router) {
-    // Small messages go at once; where the system refuses, they go a little later.
-    let _set = stream.set_nodelay(true);
-    let service = TowerToHyperService::new(router);
-    let connection = http1::Builder::new()
-        .timer(TokioTimer::new())
-        .header_read_timeout(HELLO_TIMEOUT)
-        .serve_connection(TokioIo::new(stream), service)
-        .with_upgrades();
-    // Whoever breaks off in the middle is gone; nobody is left to be told. A socket has ended this
-    // connection, and is served beside it.
-    let _ended = timeout(CONNECTION_TIMEOUT, connection).await;
-}
-
-/// Checks every request, known path or not, and gives every answer the headers of the site.
-async fn guarded(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
-    let mut response = if site.guard.admits(request.headers()) {
-        next.run(request).await
-    } else {
-        (StatusCode::FORBIDDEN, "this host or origin is not allowed here\n").into_response()
-    };
-    response.headers_mut().extend(HEADERS);
-    response
-}
-
-async fn page(State(site): State<Arc<Site>>, headers: HeaderMap) -> Response {
-    site.assets.answer("", &headers)
+async fn page(State(state): State<Arc<ServerState>>, headers: HeaderMap) -> Response {
+    state.assets.answer("", &headers)
 }
 
 async fn file(
-    State(site): State<Arc<Site>>,
+    State(state): State<Arc<ServerState>>,
     Path(path): Path<String>,
     headers: HeaderMap,
 ) -> Response {
-    site.assets.answer(&path, &headers)
+    state.assets.answer(&path, &headers)
 }
 
-async fn socket(State(site): State<Arc<Site>>, upgrade: WebSocketUpgrade) -> Response {
-    let waiting = Arc::clone(&site.waiting).try_acquire_owned();
-    let is_full = site.places.available_permits() == 0;
+async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> Response {
+    let waiting = Arc::clone(&state.waiting).try_acquire_owned();
+    let is_full = state.sessions.pages.available_permits() == 0;
     let Some(waiting) = waiting.ok().filter(|_| !is_full) else {
         let text = format!("{CLIENTS_MAX} pages are open already; close one\n");
         return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
     };
-    upgrade
-        .max_message_size(MESSAGE_SIZE_BYTES_MAX)
-        .max_frame_size(MESSAGE_SIZE_BYTES_MAX)
-        .write_buffer_size(0)
-        .on_upgrade(async move |socket| session::serve(socket, &site, waiting).await)
+    limit(upgrade)
+        .on_upgrade(async move |socket| session::serve(socket, &state.sessions, waiting).await)
 }

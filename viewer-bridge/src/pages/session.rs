@@ -1,240 +1,158 @@
-//! The task of one page.
+//! The conversation with one page.
 
-use std::time::Duration;
+use std::sync::Arc;
 
-use axum::Error;
-use axum::extract::ws::{CloseFrame, Message, WebSocket};
-use bytes::Bytes;
-use sim_contract::clock::monotonic_ns;
-use tokio::sync::OwnedSemaphorePermit;
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use axum::extract::ws::{Message, WebSocket};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::timeout;
 
-use crate::limits::{HELLO_TIMEOUT, PING_PERIOD, PROTOCOL, SILENCE_MAX};
-use crate::message::check::check;
-use crate::message::reason;
-use crate::message::{Command, FromPage, Hello, OutcomeText, ToPage};
-use crate::pages::hub::{Connection, Hub, Shown, Taken};
-use crate::pages::server::Site;
-use crate::socket::rate_limit::RateLimit;
-use crate::source::Ask;
+use super::connection::{Acknowledged, Connection, NextFrame};
+use super::hub::Hub;
+use crate::limits::{HELLO_TIMEOUT, PROTOCOL};
+use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, check};
+use crate::request::{ClientId, RequestKind};
+use crate::shutdown::Shutdown;
+use crate::socket::guard::Guard;
+use crate::socket::peer::{End, GOING_AWAY, Peer, TOO_SLOW};
 
-/// How a conversation ends: a code of PROTOCOL.md, and why.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct End {
-    code: u16,
-    reason: String,
-}
-
-/// How long a page has to take its leave.
-const FAREWELL_TIMEOUT: Duration = Duration::from_secs(1);
-/// Longest reason in a close frame, in bytes.
-const REASON_SIZE_BYTES_MAX: usize = 123;
-
-const SERVER_ENDS: u16 = 1001;
-const TOO_BIG: u16 = 1009;
+/// All places are taken.
 const FULL: u16 = 1013;
+/// A message is malformed.
 const MALFORMED: u16 = 4400;
+/// The token is missing or wrong.
 const NO_TOKEN: u16 = 4401;
-const TOO_SLOW: u16 = 4408;
+/// The page speaks another version of the protocol.
 const OTHER_PROTOCOL: u16 = 4426;
-const FLOOD: u16 = 4429;
 
-fn end(code: u16, reason: impl Into<String>) -> End {
-    End { code, reason: reason.into() }
+/// State that all conversations share.
+#[derive(Debug)]
+pub(super) struct Sessions {
+    pub(super) hub: Arc<Hub>,
+    pub(super) guard: Arc<Guard>,
+    pub(super) shutdown: Shutdown,
+    /// A permit for each page.
+    pub(super) pages: Arc<Semaphore>,
 }
 
-/// Serves a page until it goes, or breaks the rules. Until it has said who it is, it only waits.
-pub(crate) async fn serve(mut socket: WebSocket, site: &Site, waiting: OwnedSemaphorePermit) {
-    let ended = match timeout(HELLO_TIMEOUT, greet(&mut socket, site)).await {
-        Ok(Ok(hello)) => match site.places.try_acquire() {
+/// Serves a page until it leaves or breaks the rules. A page counts against the limit once it has sent
+/// a valid token; until then it only holds `waiting`.
+pub(super) async fn serve(socket: WebSocket, sessions: &Sessions, waiting: OwnedSemaphorePermit) {
+    let mut peer = Peer::new(socket);
+    let end = match timeout(HELLO_TIMEOUT, receive_hello(&mut peer, &sessions.guard)).await {
+        Ok(Ok(hello)) => match sessions.pages.try_acquire() {
             Ok(_place) => {
                 drop(waiting);
-                return take_in(socket, &site.hub, &hello).await;
+                return serve_page(peer, sessions, &hello).await;
             }
-            Err(_) => Some(end(FULL, "too many pages are open already; close one")),
+            Err(_) => End::closed(FULL, "too many pages are open already; close one"),
         },
-        Ok(Err(ended)) => ended,
-        Err(_) => Some(end(TOO_SLOW, "no hello came")),
+        Ok(Err(end)) => end,
+        Err(_) => End::closed(TOO_SLOW, "no hello arrived"),
     };
-    close(&mut socket, ended).await;
+    peer.close(end).await;
 }
 
-async fn take_in(mut socket: WebSocket, hub: &Hub, hello: &Hello) {
+async fn serve_page(mut peer: Peer, sessions: &Sessions, hello: &Hello) {
+    let hub = &sessions.hub;
     let connection = hub.join(hello.format);
     let client = connection.client;
-    let ended = converse(&mut socket, hub, connection).await;
+    let end = converse(&mut peer, sessions, connection).await;
     hub.leave(client);
-    close(&mut socket, ended).await;
+    peer.close(end).await;
 }
 
-/// Waits for the first message, and checks it. `None` as an error: the page has gone.
-async fn greet(socket: &mut WebSocket, site: &Site) -> Result<Hello, Option<End>> {
-    let text = loop {
-        match socket.recv().await {
-            Some(Ok(Message::Text(text))) => break text,
-            Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
-            Some(Ok(Message::Binary(_))) => {
-                return Err(Some(end(MALFORMED, "binary messages are not taken")));
-            }
-            Some(Err(error)) => return Err(broken(&error)),
-            Some(Ok(Message::Close(_))) | None => return Err(None),
-        }
+/// Waits for the first message of a page and checks it.
+async fn receive_hello(peer: &mut Peer, guard: &Guard) -> Result<Hello, End> {
+    let FromPage::Hello(hello) = parse(&peer.receive().await?)? else {
+        return Err(End::closed(MALFORMED, "the first message must be hello"));
     };
-    let hello = match FromPage::parse(&text) {
-        Ok(FromPage::Hello(hello)) => hello,
-        Ok(_) => return Err(Some(end(MALFORMED, "the first message has to be hello"))),
-        Err(error) => return Err(Some(end(MALFORMED, error.to_string()))),
-    };
-    if !site.guard.accepts(hello.token.as_deref()) {
-        return Err(Some(end(NO_TOKEN, "the token is missing or wrong; open the printed address")));
+    if !guard.accepts(hello.token.as_deref()) {
+        let reason = "the token is missing or wrong; open the printed address";
+        return Err(End::closed(NO_TOKEN, reason));
     }
     if hello.protocol != PROTOCOL {
-        return Err(Some(end(OTHER_PROTOCOL, format!("this server speaks protocol {PROTOCOL}"))));
+        let reason = format!("this server speaks protocol {PROTOCOL}; reload the page");
+        return Err(End::closed(OTHER_PROTOCOL, reason));
     }
     Ok(hello)
 }
 
-/// Talks with a page that was taken in. Gives what to tell it at the end; nothing if it has gone.
-async fn converse(socket: &mut WebSocket, hub: &Hub, mut connection: Connection) -> Option<End> {
-    let mut shown = Shown::default();
-    let mut limit = RateLimit::new(monotonic_ns());
-    let mut heard_ns = monotonic_ns();
-    let mut ping = interval(PING_PERIOD);
-    ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
+fn parse(message: &Message) -> Result<FromPage, End> {
+    match message {
+        Message::Text(text) => {
+            FromPage::parse(text).map_err(|error| End::closed(MALFORMED, error.to_string()))
+        }
+        _ => Err(End::closed(MALFORMED, "binary messages are not accepted")),
+    }
+}
+
+/// Talks with a page that has joined, until the end.
+async fn converse(peer: &mut Peer, sessions: &Sessions, mut connection: Connection) -> End {
+    let hub = &sessions.hub;
     loop {
         let has_credit = connection.credit.is_left();
-        let sent = tokio::select! {
+        let result = tokio::select! {
             biased;
             message = connection.queue.recv() => match message {
-                Some(message) => send(socket, message).await,
-                None => return Some(given_up(hub)),
+                Some(message) => peer.send(message).await,
+                None => Err(End::closed(TOO_SLOW, "too many messages were left unread")),
             },
-            incoming = socket.recv() => {
-                heard_ns = monotonic_ns();
-                match incoming {
-                    None | Some(Ok(Message::Close(_))) => return None,
-                    Some(Err(error)) => return broken(&error),
-                    Some(Ok(_)) if !limit.allows(heard_ns) => {
-                        return Some(end(FLOOD, "too many messages a second"));
-                    }
-                    Some(Ok(message)) => take(message, hub, &connection, &mut shown),
-                }
+            message = peer.receive() => {
+                message.and_then(|message| accept(&message, hub, &mut connection))
             }
             changed = connection.frames.changed(), if has_credit => match changed {
-                Ok(()) => send_frame(socket, hub, &mut connection, &mut shown).await,
-                Err(_) => return Some(given_up(hub)),
+                Ok(()) => send_frame(peer, hub, &mut connection).await,
+                Err(_) => Err(End::closed(GOING_AWAY, "the server ends")),
             },
-            _ = ping.tick() => {
-                let silence_ns = monotonic_ns().saturating_sub(heard_ns);
-                if Duration::from_nanos(silence_ns) > SILENCE_MAX {
-                    return Some(end(TOO_SLOW, "nothing was heard of this page"));
-                }
-                send(socket, Message::Ping(Bytes::new())).await
-            }
+            () = sessions.shutdown.begun() => Err(End::closed(GOING_AWAY, "the server ends")),
         };
-        if let Err(ended) = sent {
-            return ended;
+        if let Err(end) = result {
+            return end;
         }
     }
 }
 
-/// Sends the newest frame, after everything reliable that it builds on.
-async fn send_frame(
-    socket: &mut WebSocket,
-    hub: &Hub,
-    connection: &mut Connection,
-    shown: &mut Shown,
-) -> Result<(), Option<End>> {
-    let frame = match connection.take_frame(shown) {
-        Taken::Frame(frame) => frame,
-        Taken::Nothing => return Ok(()),
-        Taken::Missed => {
-            hub.request(connection.client, Ask::Frame);
+/// Sends the newest frame, after the reliable messages that it depends on.
+async fn send_frame(peer: &mut Peer, hub: &Hub, connection: &mut Connection) -> Result<(), End> {
+    let frame = match connection.next_frame() {
+        NextFrame::Frame(frame) => frame,
+        NextFrame::Nothing => return Ok(()),
+        NextFrame::Missed => {
+            hub.request(connection.client, RequestKind::State);
             return Ok(());
         }
     };
     while let Ok(message) = connection.queue.try_recv() {
-        send(socket, message).await?;
+        peer.send(message).await?;
     }
     for bytes in frame {
-        send(socket, Message::Binary(bytes)).await?;
+        peer.send(Message::Binary(bytes)).await?;
     }
     Ok(())
 }
 
-/// Sends one message; a page that takes none for so long is given up.
-async fn send(socket: &mut WebSocket, message: Message) -> Result<(), Option<End>> {
-    match timeout(SILENCE_MAX, socket.send(message)).await {
-        Ok(Ok(())) => Ok(()),
-        Ok(Err(_)) | Err(_) => Err(None),
-    }
-}
-
-/// Takes a message of the page.
-fn take(
-    message: Message,
-    hub: &Hub,
-    connection: &Connection,
-    shown: &mut Shown,
-) -> Result<(), Option<End>> {
-    let text = match message {
-        Message::Text(text) => text,
-        Message::Ping(_) | Message::Pong(_) | Message::Close(_) => return Ok(()),
-        Message::Binary(_) => return Err(Some(end(MALFORMED, "binary messages are not taken"))),
-    };
-    match FromPage::parse(&text) {
-        Ok(FromPage::Ack { frame }) => {
-            if connection.acknowledge(frame, shown) {
-                hub.request(connection.client, Ask::Credit);
+/// Handles a message of a page that has joined.
+fn accept(message: &Message, hub: &Hub, connection: &mut Connection) -> Result<(), End> {
+    match parse(message)? {
+        FromPage::Ack { frame } => {
+            if connection.acknowledge(frame) == Acknowledged::CreditRestored {
+                hub.request(connection.client, RequestKind::Credit);
             }
         }
-        Ok(FromPage::Command { id, command }) => hand_over(hub, connection.client, id, command),
-        Ok(FromPage::Hello(_)) => return Err(Some(end(MALFORMED, "a second hello"))),
-        Err(error) => return Err(Some(end(MALFORMED, error.to_string()))),
+        FromPage::Command { id, command } => submit(hub, connection.client, id, command),
+        FromPage::Hello(_) => return Err(End::closed(MALFORMED, "hello was sent twice")),
     }
     Ok(())
 }
 
-/// Checks a command and hands it to the source, or answers it with a refusal.
-fn hand_over(hub: &Hub, client: u32, id: Option<u32>, command: Command) {
+/// Checks a command and sends it to the source. Answers it here if it is refused.
+fn submit(hub: &Hub, client: ClientId, id: Option<u32>, command: Command) {
     let kind = command.name();
-    let refused = check(&command).err().or_else(|| {
-        let is_taken = hub.request(client, Ask::Command { id, command });
-        (!is_taken).then_some(reason::BUSY)
+    let submitted = check(&command).map_err(Refusal::from).and_then(|()| {
+        let request = RequestKind::Command { id, command };
+        hub.requests().send(client, request).map_err(|_| Refusal::Busy)
     });
-    if let Some(reason) = refused {
-        let outcome = OutcomeText::refused(id, kind, reason);
-        hub.send(client, &ToPage::Outcome(outcome));
+    if let Err(reason) = submitted {
+        hub.send(client, &ToPage::Outcome(OutcomeText::refused(id, kind, reason)));
     }
-}
-
-/// Why the hub let go of the page.
-fn given_up(hub: &Hub) -> End {
-    if hub.is_closed() {
-        end(SERVER_ENDS, "the server ends")
-    } else {
-        end(TOO_SLOW, "too many messages were left unread")
-    }
-}
-
-/// What a failed read means: a message too long is answered, a broken connection cannot be.
-fn broken(error: &Error) -> Option<End> {
-    // axum hides the kind of error; its text is that of the library below.
-    let is_too_long = error.to_string().contains("too long");
-    is_too_long.then(|| end(TOO_BIG, "a message is longer than 64 KiB"))
-}
-
-/// Says why, and gives the page a moment to read it.
-async fn close(socket: &mut WebSocket, ended: Option<End>) {
-    let Some(ended) = ended else { return };
-    let cut = ended.reason.floor_char_boundary(REASON_SIZE_BYTES_MAX);
-    let reason = ended.reason[..cut].into();
-    let frame = Message::Close(Some(CloseFrame { code: ended.code, reason }));
-    let farewell = async {
-        if socket.send(frame).await.is_ok() {
-            // What it had sent meanwhile is read and dropped: a reset would take the reason with it.
-            while socket.recv().await.is_some_and(|message| message.is_ok()) {}
-        }
-    };
-    let _late = timeout(FAREWELL_TIMEOUT, farewell).await;
 }

@@ -1,56 +1,41 @@
-//! The scenes that every node knows by name.
+//! The built-in scenes, which every node knows by name.
 
 use serde::Serialize;
+use sim_solver::builtin;
 
-use crate::scene::summary::SceneSummary;
+use super::summary::SceneSummary;
 
-/// A scene of the picker.
+/// A scene in the picker of a page.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SceneEntry {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
     /// Steps per second.
     pub rate_hz: u32,
-    /// 2 or 3.
+    /// Number of dimensions: 2 or 3.
     pub dimensions: u32,
-    /// What it is, in one line.
+    /// Description in one line.
     pub text: &'static str,
 }
 
-/// The texts that `sim-node` is built with. A test compares the names with what it lists.
-const SCENES: [(&str, &str); 14] = [
-    ("curtain", include_str!("../../../sim-node/scenes/curtain.toml")),
-    ("rope", include_str!("../../../sim-node/scenes/rope.toml")),
-    ("flag", include_str!("../../../sim-node/scenes/flag.toml")),
-    ("ragdoll", include_str!("../../../sim-node/scenes/ragdoll.toml")),
-    ("spider-web", include_str!("../../../sim-node/scenes/spider-web.toml")),
-    ("rope-bridge", include_str!("../../../sim-node/scenes/rope-bridge.toml")),
-    ("elastic-mesh", include_str!("../../../sim-node/scenes/elastic-mesh.toml")),
-    ("tearable-cloth", include_str!("../../../sim-node/scenes/tearable-cloth.toml")),
-    ("spring-cloth", include_str!("../../../sim-node/scenes/spring-cloth.toml")),
-    ("carried-cloth", include_str!("../../../sim-node/scenes/carried-cloth.toml")),
-    ("drop-box", include_str!("../../../sim-node/scenes/drop-box.toml")),
-    ("drop-box-braced", include_str!("../../../sim-node/scenes/drop-box-braced.toml")),
-    ("pendulum", include_str!("../../../sim-node/scenes/pendulum.toml")),
-    ("free-fall", include_str!("../../../sim-node/scenes/free-fall.toml")),
-];
-
-/// All of them, in the order of the picker.
+/// All built-in scenes, in the order of the picker.
 pub fn all() -> Vec<SceneEntry> {
-    SCENES.iter().map(|(name, text)| entry(name, text)).collect()
+    builtin::names().map(entry).collect()
 }
 
-/// Whether a node knows a scene of that name.
+/// Returns whether a built-in scene has this name.
 pub fn is_known(name: &str) -> bool {
-    SCENES.iter().any(|(known, _)| *known == name)
+    builtin::text(name).is_some()
 }
 
-fn entry(name: &'static str, text: &'static str) -> SceneEntry {
-    let summary = SceneSummary::read(text);
+#[allow(clippy::expect_used, reason = "a miss is a fault of the built-in scenes")]
+fn entry(name: &'static str) -> SceneEntry {
+    let summary = builtin::text(name).and_then(SceneSummary::from_toml);
+    let summary = summary.expect("a built-in scene is valid");
     SceneEntry {
         name,
         rate_hz: summary.rate_hz,
         dimensions: if summary.is_planar { 2 } else { 3 },
-        text: text.lines().next().unwrap_or_default().trim_start_matches(['#', ' ']),
+        text: builtin::summary(name).expect("a built-in scene has a description"),
     }
 }

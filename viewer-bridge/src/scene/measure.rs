@@ -1,25 +1,34 @@
 //! Stretch and energy of a state.
 
-use sim_contract::{ConstraintKind, ConstraintState, ParticleState};
+use sim_contract::{ConstraintKind, ConstraintState, ParticleState, TornConstraint};
 
-use crate::shown_state::single;
+use crate::wire::convert::to_f32;
 
-/// Stretch and energy of a state. NaN where there is nothing to measure.
+/// Stretch and energy of a state. NaN without any structural constraint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Measures {
-    /// Mean of length / rest length - 1, over live structural constraints.
+    /// Mean of length / rest length - 1 over the structural constraints that are not torn.
     pub(crate) stretch_mean: f32,
-    /// Its maximum.
+    /// Maximum of the same.
     pub(crate) stretch_max: f32,
-    /// The constraint of the maximum.
+    /// Constraint with the maximum.
     pub(crate) stretch_max_constraint: u32,
-    /// Of the free particles: m v^2 / 2, in J.
+    /// Kinetic energy of the free particles, m v^2 / 2, in J.
     pub(crate) kinetic_j: f64,
-    /// Of the free particles: -m g.x, in J.
+    /// Potential energy of the free particles, -m g.x, in J.
     pub(crate) potential_j: f64,
 }
 
-/// Measures a state. The ends of the constraints are particles of it.
+/// Marks the torn constraints.
+pub(crate) fn torn_flags(constraint_count: usize, torn: &[TornConstraint]) -> Vec<bool> {
+    let mut is_torn = vec![false; constraint_count];
+    for TornConstraint { constraint, .. } in torn {
+        is_torn[*constraint as usize] = true;
+    }
+    is_torn
+}
+
+/// Measures a state. Every end of a constraint must be one of its particles.
 pub(crate) fn measure(
     particles: &[ParticleState],
     constraints: &[ConstraintState],
@@ -45,8 +54,8 @@ pub(crate) fn measure(
     }
     let (kinetic_j, potential_j) = energies(particles, gravity);
     Measures {
-        stretch_mean: if count == 0 { f32::NAN } else { single(sum / f64::from(count)) },
-        stretch_max: if count == 0 { f32::NAN } else { single(max) },
+        stretch_mean: if count == 0 { f32::NAN } else { to_f32(sum / f64::from(count)) },
+        stretch_max: if count == 0 { f32::NAN } else { to_f32(max) },
         stretch_max_constraint: max_constraint,
         kinetic_j,
         potential_j,
@@ -55,7 +64,7 @@ pub(crate) fn measure(
 
 fn energies(particles: &[ParticleState], gravity: [f32; 3]) -> (f64, f64) {
     let (mut kinetic, mut potential) = (0.0, 0.0);
-    // What is held has no inverse mass, and its mass is not known.
+    // A held particle has inverse mass 0; its mass is unknown.
     for particle in particles.iter().filter(|particle| particle.inverse_mass > 0.0) {
         let mass = 1.0 / f64::from(particle.inverse_mass);
         kinetic += 0.5 * mass * dot(particle.velocity, particle.velocity);
@@ -90,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_is_of_live_structural_constraints() {
+    fn stretch_covers_the_structural_constraints_that_are_not_torn() {
         let particles = [particle(0.0, 0.0, 0.0), particle(1.1, 1.0, 0.0), particle(2.4, 1.0, 0.0)];
         let constraints =
             [constraint(0, 1, 0), constraint(1, 2, 0), constraint(0, 2, 0), constraint(0, 2, 1)];
@@ -103,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn energies_are_of_free_particles() {
+    fn energies_cover_the_free_particles() {
         let particles = [particle(0.0, 0.0, 9.0), particle(0.0, 0.5, 3.0)];
         let measures = measure(&particles, &[], &[], [0.0, -10.0, 0.0]);
         assert_eq!((measures.kinetic_j, measures.potential_j), (9.0, 40.0));

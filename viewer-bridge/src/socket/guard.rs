@@ -1,15 +1,22 @@
-//! Who may talk to the server: the check of Host and Origin on every request, and the token.
+//! The admission of requests: the check of Host and Origin on every request, and the token.
 //!
-//! A browser lets any page open a WebSocket to any host and tells only its Origin: this check is all
-//! that keeps other pages out. The check of Host keeps out names that were made to point here.
+//! A browser lets any page open a WebSocket to any host and sends only its Origin along. This check is
+//! all that keeps foreign pages out. The check of Host stops foreign names that resolve to this host
+//! (DNS rebinding).
 
 use std::hint::black_box;
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::Router;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use thiserror::Error;
 
-/// What every answer carries.
-pub(crate) const HEADERS: [(HeaderName, HeaderValue); 7] = [
+/// The headers of every response.
+const HEADERS: [(HeaderName, HeaderValue); 7] = [
     (
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static(
@@ -32,34 +39,44 @@ pub(crate) const HEADERS: [(HeaderName, HeaderValue); 7] = [
     (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
 ];
 
-/// The rules of one server.
+/// The admission rules of one server.
 #[derive(Debug, Clone)]
 pub(crate) struct Guard {
     address: SocketAddr,
-    /// Names by which it may be called beside its addresses.
+    /// Names of this host besides its addresses.
     names: Vec<String>,
-    /// What a page has to know where anybody could reach the server.
+    /// Secret that a page must know, where other machines can reach the server.
     token: Option<String>,
-    /// Origins that are let in; none: those of this server's own pages.
+    /// Admitted origins; `None` admits the origins of this server's own pages.
     origins: Option<Vec<String>>,
 }
 
-/// Whether a request is let in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Admission {
-    /// It is.
-    Granted,
-    /// It is meant for a host of another name.
+/// The reason for which a request is denied.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub(crate) enum Denied {
+    /// The request is meant for a host of another name.
+    #[error("this host is not allowed here")]
     ForeignHost,
-    /// It comes from a page that has no business here.
-    ForeignOrigin,
+    /// The request comes from a page of another origin.
+    #[error("the origin {origin} is not allowed here")]
+    ForeignOrigin {
+        /// The origin.
+        origin: String,
+    },
+    /// The request comes from a page, and only the named origins are admitted.
+    #[error("the origin {origin} is not allowed here; see --foxglove-origin")]
+    UnnamedOrigin {
+        /// The origin.
+        origin: String,
+    },
 }
 
 impl Guard {
-    /// The rules of a server at that address. Elsewhere than on loopback it has a token.
+    /// Creates the rules of a server with pages. A server that does not listen on loopback demands a
+    /// token.
     ///
     /// # Errors
-    /// The system gives no random number.
+    /// The system provides no random numbers.
     pub(crate) fn new(address: SocketAddr, names: Vec<String>) -> Result<Self, getrandom::Error> {
         let token = if address.ip().is_loopback() {
             None
@@ -69,18 +86,18 @@ impl Guard {
         Ok(Self { address, names, token, origins: None })
     }
 
-    /// The rules of a server on loopback that has no pages: only those of these origins, and programs,
-    /// which have none, are let in.
+    /// Creates the rules of a server on loopback without pages. It admits programs, which send no
+    /// origin, and pages of these origins.
     pub(crate) fn for_origins(address: SocketAddr, origins: Vec<String>) -> Self {
         Self { address, names: Vec::new(), token: None, origins: Some(origins) }
     }
 
-    /// The token, where there has to be one.
+    /// The token, where one is demanded.
     pub(crate) fn token(&self) -> Option<&str> {
         self.token.as_deref()
     }
 
-    /// Whether a first message with that token is let in.
+    /// Returns whether a first message with this token is accepted.
     pub(crate) fn accepts(&self, token: Option<&str>) -> bool {
         match &self.token {
             None => true,
@@ -88,32 +105,34 @@ impl Guard {
         }
     }
 
-    /// Whether a request with these headers is let in.
-    pub(crate) fn admits(&self, headers: &HeaderMap) -> bool {
-        self.admission(headers) == Admission::Granted
-    }
-
-    /// The same, with what is wrong.
-    pub(crate) fn admission(&self, headers: &HeaderMap) -> Admission {
-        let Some(host) = single(headers, &header::HOST).filter(|host| self.is_own(host)) else {
-            return Admission::ForeignHost;
-        };
+    /// Checks the headers of a request.
+    pub(crate) fn admit(&self, headers: &HeaderMap) -> Result<(), Denied> {
+        let host = single(headers, &header::HOST).filter(|host| self.is_own(host));
+        let host = host.ok_or(Denied::ForeignHost)?;
         if !headers.contains_key(header::ORIGIN) {
-            // No browser, or a plain request for a file.
-            return Admission::Granted;
+            // A program, or a plain request for a file.
+            return Ok(());
         }
-        let is_allowed = single(headers, &header::ORIGIN).is_some_and(|origin| {
-            match (&self.origins, origin.strip_prefix("http://")) {
-                (Some(allowed), _) => allowed.iter().any(|one| one == origin),
-                (None, Some(origin)) if self.token.is_none() => self.is_own(origin),
-                (None, Some(origin)) => origin.eq_ignore_ascii_case(host),
-                (None, None) => false,
-            }
-        });
-        if is_allowed { Admission::Granted } else { Admission::ForeignOrigin }
+        let origin = single(headers, &header::ORIGIN).unwrap_or("?");
+        let own_origin = origin.strip_prefix("http://");
+        match &self.origins {
+            Some(allowed) if allowed.iter().any(|one| one == origin) => Ok(()),
+            Some(_) => Err(Denied::UnnamedOrigin { origin: origin.to_owned() }),
+            None if own_origin.is_some_and(|own| self.is_same_origin(own, host)) => Ok(()),
+            None => Err(Denied::ForeignOrigin { origin: origin.to_owned() }),
+        }
     }
 
-    /// Whether that is this server: a name or address, and the port unless it is the usual one.
+    /// Returns whether a page at `origin` is one of this server's, when its browser calls the server
+    /// `host`.
+    fn is_same_origin(&self, origin: &str, host: &str) -> bool {
+        match &self.token {
+            None => self.is_own(origin),
+            Some(_) => origin.eq_ignore_ascii_case(host),
+        }
+    }
+
+    /// Returns whether `authority` is this server: a name or address, and the port unless it is 80.
     fn is_own(&self, authority: &str) -> bool {
         let (name, port) = match authority.rsplit_once(':') {
             Some((name, port)) if !port.contains(']') => (name, port.parse().ok()),
@@ -124,8 +143,8 @@ impl Guard {
         }
         let address = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>();
         if let Ok(address) = address {
-            // A page cannot make an address point elsewhere; so elsewhere than on loopback, where
-            // the server may have several, every one is allowed.
+            // A page cannot redirect an address, so every address is allowed where the server can
+            // have several.
             return self.token.is_some() || address.is_loopback();
         }
         name.eq_ignore_ascii_case("localhost")
@@ -133,7 +152,21 @@ impl Guard {
     }
 }
 
-/// The value of a header that stands exactly once.
+/// Puts a guard in front of every route, known path or not, and adds the headers to every response.
+pub(crate) fn guarded(router: Router, guard: Arc<Guard>) -> Router {
+    router.layer(middleware::from_fn_with_state(guard, check))
+}
+
+async fn check(State(guard): State<Arc<Guard>>, request: Request, next: Next) -> Response {
+    let mut response = match guard.admit(request.headers()) {
+        Ok(()) => next.run(request).await,
+        Err(denied) => (StatusCode::FORBIDDEN, format!("{denied}\n")).into_response(),
+    };
+    response.headers_mut().extend(HEADERS);
+    response
+}
+
+/// Returns the value of a header that occurs exactly once.
 fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     match (values.next(), values.next()) {
@@ -142,7 +175,7 @@ fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     }
 }
 
-/// Compares without telling by its duration how much is right; the length is no secret.
+/// Compares in a time that depends only on the lengths, which are not secret.
 fn is_same(own: &[u8], other: &[u8]) -> bool {
     own.len() == other.len()
         && black_box(own.iter().zip(other).fold(0, |all, (a, b)| black_box(all | (a ^ b)))) == 0
@@ -162,11 +195,11 @@ mod tests {
         if let Some(origin) = origin {
             headers.insert(header::ORIGIN, origin.parse().unwrap());
         }
-        guard.admits(&headers)
+        guard.admit(&headers).is_ok()
     }
 
     #[test]
-    fn on_loopback_only_names_of_loopback_are_let_in() {
+    fn on_loopback_only_names_of_loopback_are_admitted() {
         let guard = guard("127.0.0.1:8080");
         for host in ["127.0.0.1:8080", "localhost:8080", "[::1]:8080", "LOCALHOST:8080", "lab:8080"]
         {
@@ -184,18 +217,18 @@ mod tests {
     }
 
     #[test]
-    fn two_hosts_or_none_are_refused() {
+    fn a_request_with_two_hosts_or_none_is_refused() {
         let guard = guard("127.0.0.1:80");
         let mut headers = HeaderMap::new();
-        assert!(!guard.admits(&headers));
+        assert!(guard.admit(&headers).is_err());
         headers.append(header::HOST, HeaderValue::from_static("localhost"));
-        assert!(guard.admits(&headers));
+        assert!(guard.admit(&headers).is_ok());
         headers.append(header::HOST, HeaderValue::from_static("localhost"));
-        assert!(!guard.admits(&headers));
+        assert!(guard.admit(&headers).is_err());
     }
 
     #[test]
-    fn elsewhere_a_token_is_demanded_and_the_origin_is_the_host() {
+    fn beyond_loopback_a_token_is_demanded_and_the_origin_must_be_the_host() {
         let guard = guard("0.0.0.0:8080");
         assert!(admits(&guard, "10.0.0.7:8080", Some("http://10.0.0.7:8080")));
         assert!(!admits(&guard, "10.0.0.7:8080", Some("http://10.0.0.8:8080")));
@@ -208,5 +241,24 @@ mod tests {
         );
         assert!(!guard.accepts(Some(&token.replace(&token[..1], "g"))));
         assert!(self::guard("[::1]:8080").accepts(None));
+    }
+
+    #[test]
+    fn with_named_origins_only_these_and_programs_are_admitted() {
+        let address = "127.0.0.1:8765".parse().unwrap();
+        let guard = Guard::for_origins(address, vec!["https://viewer.example".to_owned()]);
+        assert!(admits(&guard, "127.0.0.1:8765", None));
+        assert!(admits(&guard, "localhost:8765", Some("https://viewer.example")));
+        for origin in
+            ["null", "http://evil.example", "http://127.0.0.1:8765", "http://viewer.example"]
+        {
+            assert!(!admits(&guard, "127.0.0.1:8765", Some(origin)), "{origin}");
+        }
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, HeaderValue::from_static("127.0.0.1:8765"));
+        headers.insert(header::ORIGIN, HeaderValue::from_static("http://evil.example"));
+        let denied = guard.admit(&headers).unwrap_err().to_string();
+        assert!(denied.contains("http://evil.example"), "{denied}");
+        assert!(denied.contains("--foxglove-origin"), "{denied}");
     }
 }

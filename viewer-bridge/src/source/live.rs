@@ -1,70 +1,83 @@
-//! A live node as a source: it looks for one, shows it, and looks again when it has gone.
+//! A live node as a source. It searches for a node, shows it, and searches again when it is gone.
 
 mod actions;
 mod brush;
+mod command_context;
 mod dispatch;
 mod link;
-mod load;
-mod news;
-mod waiting;
+mod newest_state;
+mod node_text;
+mod statistics;
+#[cfg(test)]
+mod tests;
+mod updates;
 
 use std::time::Duration;
 
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{AttachError, Endpoint};
 
-use crate::message::reason;
-use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, ToPage};
-use crate::pages::hub::Hub;
-use crate::pages::hub::Slot;
-use crate::shown_state::Stage;
-use crate::source::{Ask, Requests, Source};
+use super::feed::Source;
+use crate::message::{Mode, Node, NodeState, OutcomeText, ParametersText, Refusal};
+use crate::request::{RequestKind, Requests};
+use crate::sink::{Sinks, Update};
+use crate::source::shown_state::ShownState;
 use link::{Link, LinkEnd};
 
-/// How often a node is looked for.
+/// Time between two searches for a node.
 const SEARCH_PERIOD: Duration = Duration::from_millis(300);
-/// How often the end of the server is looked for meanwhile.
-const LOOK_PERIOD: Duration = Duration::from_millis(50);
+/// Time between two checks for the end of the program during a search.
+const SHUTDOWN_CHECK_PERIOD: Duration = Duration::from_millis(50);
 
-/// A live node, or whatever else owns its name.
+/// A live node, or another owner of its services.
 #[derive(Debug)]
 pub struct Live {
     endpoint: Endpoint,
-    stage: Stage,
-    /// What pages were told last.
+    shown: ShownState,
+    /// The state of the node that was published last.
     node: Node,
 }
 
 impl Live {
-    /// The node of that name.
+    /// Shows the node at this endpoint.
     pub fn new(endpoint: Endpoint) -> Self {
-        Self { endpoint, stage: Stage::default(), node: Node::default() }
+        Self { endpoint, shown: ShownState::default(), node: Node::default() }
     }
 
-    /// Waits for a node; none if the server ends before.
-    fn search(&mut self, hub: &Hub, requests: &Requests) -> Option<Link> {
-        while !hub.is_closed() {
+    /// Waits for a node. Returns `None` if the program ends first.
+    fn search(&mut self, sinks: &Sinks, requests: &Requests) -> Option<Link> {
+        while !sinks.is_shutting_down() {
             match Link::attach(&self.endpoint) {
                 Ok(link) => return Some(link),
-                Err(error) => self.tell_absence(hub, &error),
+                Err(error) => self.publish_absence(sinks, &error),
             }
-            refuse_for_a_while(hub, requests);
+            refuse_requests(sinks, requests);
         }
         None
     }
 
-    fn tell_absence(&mut self, hub: &Hub, error: &AttachError) {
+    fn publish_absence(&mut self, sinks: &Sinks, error: &AttachError) {
         let state = match self.node.state {
             NodeState::None => NodeState::None,
             NodeState::Alive | NodeState::Lost => NodeState::Lost,
         };
-        self.tell(hub, Node { state, text: error.to_string(), ..Node::default() });
+        self.publish_node(sinks, Node { state, text: error.to_string(), ..Node::default() });
     }
 
-    fn tell(&mut self, hub: &Hub, node: Node) {
+    fn publish_node(&mut self, sinks: &Sinks, node: Node) {
         if node != self.node {
-            hub.latch(Slot::Node, &ToPage::Node(node.clone()));
+            sinks.publish(&Update::Node(&node));
             self.node = node;
+        }
+    }
+
+    /// Shows the node until the link ends.
+    fn show(&mut self, link: &mut Link, sinks: &Sinks, requests: &Requests) -> LinkEnd {
+        loop {
+            match link.exchange(&mut self.shown, sinks, requests) {
+                Ok(()) => self.publish_node(sinks, link.node()),
+                Err(end) => return end,
+            }
         }
     }
 }
@@ -74,25 +87,22 @@ impl Source for Live {
         Mode::Live
     }
 
-    fn run(&mut self, hub: &Hub, requests: &Requests) -> anyhow::Result<()> {
-        hub.latch(Slot::Node, &ToPage::Node(self.node.clone()));
-        let unknown = ParametersText { is_complete: false, values: None, initial: None };
-        hub.latch(Slot::Parameters, &ToPage::Parameters(Box::new(unknown)));
-        while let Some(mut link) = self.search(hub, requests) {
-            let end = loop {
-                match link.round(&mut self.stage, hub, requests) {
-                    Ok(()) => self.tell(hub, link.node()),
-                    Err(end) => break end,
-                }
-            };
-            link.leave(hub, &end);
+    fn run(&mut self, sinks: &Sinks, requests: &Requests) -> anyhow::Result<()> {
+        sinks.publish(&Update::Node(&self.node));
+        sinks.publish(&Update::Parameters(&ParametersText::UNKNOWN));
+        while let Some(mut link) = self.search(sinks, requests) {
+            let end = self.show(&mut link, sinks, requests);
+            link.close(sinks, end);
             match end {
-                LinkEnd::Closed => break,
-                // Found again at once, under its new number.
+                LinkEnd::ShuttingDown => break,
+                // The search finds the new run at once.
                 LinkEnd::NewRun => {}
-                LinkEnd::Lost(text) => {
-                    let text = text.unwrap_or_else(|| "the node has ended".to_owned());
-                    self.tell(hub, Node { state: NodeState::Lost, text, ..Node::default() });
+                LinkEnd::Lost => {
+                    let text = "the node has ended".to_owned();
+                    self.publish_node(
+                        sinks,
+                        Node { state: NodeState::Lost, text, ..Node::default() },
+                    );
                 }
             }
         }
@@ -100,17 +110,18 @@ impl Source for Live {
     }
 }
 
-/// Answers what pages ask for while there is nobody to ask.
-fn refuse_for_a_while(hub: &Hub, requests: &Requests) {
+/// Refuses commands until the next search.
+fn refuse_requests(sinks: &Sinks, requests: &Requests) {
     let end_ns = monotonic_ns() + u64::try_from(SEARCH_PERIOD.as_nanos()).unwrap_or(u64::MAX);
-    while monotonic_ns() < end_ns && !hub.is_closed() {
-        let Some(request) = requests.next(LOOK_PERIOD) else { continue };
-        if request.ask == Ask::Frame {
-            hub.show_again();
-        }
-        if let Ask::Command { id, command } = request.ask {
-            let outcome = OutcomeText::refused(id, command.name(), reason::NO_NODE);
-            hub.send(request.client, &ToPage::Outcome(outcome));
+    while monotonic_ns() < end_ns && !sinks.is_shutting_down() {
+        let Some(request) = requests.next(SHUTDOWN_CHECK_PERIOD) else { continue };
+        match request.kind {
+            RequestKind::State => sinks.publish(&Update::SameState),
+            RequestKind::Command { id, command } => {
+                let outcome = OutcomeText::refused(id, command.name(), Refusal::NoNode);
+                sinks.publish(&Update::Answer { client: request.client, outcome: &outcome });
+            }
+            RequestKind::Credit | RequestKind::Left => {}
         }
     }
 }

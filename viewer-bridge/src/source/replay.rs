@@ -1,15 +1,16 @@
-//! A recording as a source: it is wound to where the timeline of the pages stands, and shown there.
+//! A recording as a source: shows the state at the place of the playhead.
 //!
-//! Only the chunks around that place are read; what a timeline has to mark is found meanwhile by
-//! another thread, which reads the file once from its start.
+//! The player reads only the chunks around that place. Another thread reads the file once from its
+//! start, to check the hashes and to find the marks of the timeline.
 
 mod check;
 mod marks;
 mod open;
+mod parameter_log;
 mod player;
 mod playhead;
-mod settings_log;
 mod statistics;
+mod texts;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,42 +18,37 @@ use std::sync::mpsc::channel;
 use std::thread;
 
 use anyhow::Context;
-use recorder::{Tape, TapeState, TornList};
+use recorder::TornList;
 
-use crate::foxglove_server::Recording;
+use super::feed::Source;
 use crate::message::Mode;
-use crate::pages::hub::Hub;
-use crate::scene::load::Load;
-use crate::source::{Requests, Source};
+use crate::request::Requests;
+use crate::sink::Sinks;
+use crate::source::recording_times::RecordingTimes;
 use check::{Job, check};
+use open::Recording;
 use player::Player;
 
-/// A recording.
+/// A recording as a source.
 #[derive(Debug)]
-pub struct Replay {
-    tape: Tape,
-    load: Load,
-    /// The state at the first step.
-    first: TapeState,
-    /// Name of the file, for pages: where it lies is not theirs to know.
-    file: String,
-}
+pub struct Replay(Recording);
 
 impl Replay {
-    /// Opens a recording. `tell` is told what the user should know of it.
+    /// Opens a recording. `note` receives messages for the user.
     ///
     /// # Errors
-    /// It is no recording, or there is nothing in it to show; the text says what to do.
-    pub fn open(path: &Path, tell: &mut dyn FnMut(&str)) -> anyhow::Result<Self> {
-        open::open(path, tell).with_context(|| path.display().to_string())
+    /// The file is not a recording, or has no state to show. The message names the remedy.
+    pub fn open(path: &Path, note: &mut dyn FnMut(&str)) -> anyhow::Result<Self> {
+        open::open(path, note).map(Self).with_context(|| path.display().to_string())
     }
 
     fn job(&self) -> anyhow::Result<Job> {
+        let Recording { tape, first, .. } = &self.0;
         Ok(Job {
-            log: self.tape.log().try_clone()?,
-            first: self.first.row,
-            last_step: self.tape.last_step(),
-            torn: TornList::before(&self.tape.topology().torn),
+            log: tape.log().try_clone()?,
+            first: first.row,
+            last_step: tape.last_step(),
+            torn: TornList::before(&tape.topology().torn),
         })
     }
 }
@@ -62,27 +58,28 @@ impl Source for Replay {
         Mode::Replay
     }
 
-    fn recording(&self) -> Option<Recording> {
-        let run = self.tape.run();
-        Some(Recording {
+    fn recording(&self) -> Option<RecordingTimes> {
+        let tape = &self.0.tape;
+        let run = tape.run();
+        Some(RecordingTimes {
             epoch_ns: run.epoch_ns,
             rate_hz: run.rate_hz,
-            first_step: self.tape.first_step(),
-            last_step: self.tape.last_step(),
+            first_step: tape.first_step(),
+            last_step: tape.last_step(),
         })
     }
 
-    fn run(&mut self, hub: &Hub, requests: &Requests) -> anyhow::Result<()> {
-        let (job, file) = (self.job()?, self.file.clone());
+    fn run(&mut self, sinks: &Sinks, requests: &Requests) -> anyhow::Result<()> {
+        let (job, file) = (self.job()?, self.0.file.clone());
         let (sender, reports) = channel();
-        let is_over = AtomicBool::new(false);
+        let is_cancelled = AtomicBool::new(false);
         thread::scope(|scope| {
             thread::Builder::new()
                 .name("check".to_owned())
-                .spawn_scoped(scope, || check(job, &sender, &is_over))
+                .spawn_scoped(scope, || check(job, &sender, &is_cancelled))
                 .context("starting the thread that checks the recording")?;
-            let played = Player::new(self, reports, hub).run(requests);
-            is_over.store(true, Ordering::Relaxed);
+            let played = Player::new(&mut self.0, reports, sinks).run(requests);
+            is_cancelled.store(true, Ordering::Relaxed);
             played.context(file)
         })
     }

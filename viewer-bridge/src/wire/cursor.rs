@@ -1,12 +1,12 @@
-//! Reading a message from its beginning.
+//! Reads a message from its beginning to its end.
 
-use super::DecodeError;
+use super::decode_error::DecodeError;
 
-/// What is left of a message.
+/// The unread rest of a message.
 #[derive(Debug)]
 pub(super) struct Cursor<'a> {
     rest: &'a [u8],
-    /// Where `rest` begins in the message.
+    /// Place of `rest` in the message.
     at: usize,
 }
 
@@ -15,18 +15,18 @@ impl<'a> Cursor<'a> {
         Self { rest: bytes, at: 0 }
     }
 
-    pub(super) fn take(&mut self, size: usize) -> Result<&'a [u8], DecodeError> {
-        let (taken, rest) = self
+    pub(super) fn bytes(&mut self, size: usize) -> Result<&'a [u8], DecodeError> {
+        let (bytes, rest) = self
             .rest
             .split_at_checked(size)
             .ok_or(DecodeError::TooShort { at: self.at, needed: size })?;
         (self.rest, self.at) = (rest, self.at + size);
-        Ok(taken)
+        Ok(bytes)
     }
 
     fn array<const N: usize>(&mut self) -> Result<[u8; N], DecodeError> {
         let mut array = [0; N];
-        array.copy_from_slice(self.take(N)?);
+        array.copy_from_slice(self.bytes(N)?);
         Ok(array)
     }
 
@@ -54,8 +54,8 @@ impl<'a> Cursor<'a> {
         Ok([self.f32()?, self.f32()?, self.f32()?])
     }
 
-    /// `count` elements, each read by `one`. A count that the message cannot hold is refused before
-    /// anything is allocated for it.
+    /// Reads `count` elements of `size` bytes with `one`. Refuses a count that the message cannot hold
+    /// before it allocates memory.
     pub(super) fn list<T>(
         &mut self,
         count: u32,
@@ -69,15 +69,15 @@ impl<'a> Cursor<'a> {
         (0..count).map(|_| one(self)).collect()
     }
 
-    /// Bytes, and the zeros behind them up to the next multiple of four.
+    /// Reads bytes and the zeros after them up to the next multiple of four.
     pub(super) fn padded(&mut self, count: u32) -> Result<Vec<u8>, DecodeError> {
-        let bytes = self.take(count as usize)?.to_vec();
+        let bytes = self.bytes(count as usize)?.to_vec();
         self.pad()?;
         Ok(bytes)
     }
 
     pub(super) fn pad(&mut self) -> Result<(), DecodeError> {
-        self.take(self.at.next_multiple_of(4) - self.at).map(|_| ())
+        self.bytes(self.at.next_multiple_of(4) - self.at).map(|_| ())
     }
 
     pub(super) fn end(&self) -> Result<(), DecodeError> {

@@ -1,10 +1,12 @@
-//! Reading what a server sends: for tests, and for clients in Rust.
-
-use thiserror::Error;
+//! The decoder of the binary messages, for tests and for clients in Rust.
 
 use super::cursor::Cursor;
-use super::frame;
-use super::{Colliders, Format, Frame, KIND_VERSION, Kind, Pins, Scene, Stamp, Statistics, Tear};
+use super::decode_error::DecodeError;
+use super::frame::{self, Format, Frame};
+use super::header::{KIND_VERSION, Kind, Stamp};
+use super::scene::Scene;
+use super::small::{Colliders, Pins, Tear};
+use super::statistics::Statistics;
 
 /// A binary message.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,49 +19,16 @@ pub enum Message {
     Tear(Tear),
     /// All particles that are not free.
     Pins(Pins),
-    /// How node and simulation do.
+    /// Statistics of the node and the scene.
     Statistics(Box<Statistics>),
     /// All colliders.
     Colliders(Colliders),
 }
 
-/// Why bytes are not a message.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum DecodeError {
-    /// They end too early.
-    #[error("the message ends at byte {at}, where {needed} more are needed")]
-    TooShort {
-        /// Where.
-        at: usize,
-        /// What the next field takes.
-        needed: usize,
-    },
-    /// They go on behind the end.
-    #[error("{extra} bytes follow the end of the message")]
-    TooLong {
-        /// How many.
-        extra: usize,
-    },
-    /// Kind or version is unknown.
-    #[error("kind {kind} of version {version} is not known")]
-    Unknown {
-        /// The kind.
-        kind: u16,
-        /// Its version.
-        version: u16,
-    },
-    /// The JSON of a scene is none.
-    #[error("the scene's text: {detail}")]
-    Json {
-        /// What is wrong with it.
-        detail: String,
-    },
-}
-
-/// Reads one message.
+/// Decodes one message.
 ///
 /// # Errors
-/// An unknown kind, or bytes that are too few or too many for it.
+/// The kind is unknown, or the message has too few or too many bytes.
 pub fn decode(bytes: &[u8]) -> Result<Message, DecodeError> {
     let mut cursor = Cursor::new(bytes);
     let (kind, version) = (cursor.u16()?, cursor.u16()?);

@@ -1,31 +1,33 @@
-//! FRAME: the positions of a step.
+//! FRAME: the positions after a step.
 
 use bytes::Bytes;
 use sim_contract::ParticleState;
 
 use super::cursor::Cursor;
-use super::{DecodeError, Kind, Stamp, Writer, count_of};
+use super::decode_error::DecodeError;
+use super::header::{Kind, Stamp};
+use super::writer::Writer;
 
-/// How positions are written.
+/// Encoding of positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// As the node has them.
+    /// The values of the node.
     F32,
-    /// In 65,536 steps of their box.
+    /// 65,536 steps across their bounding box.
     U16,
 }
 
 /// The bits of a frame's flags.
 pub mod frame_flag {
-    /// The step was made while the node was paused.
+    /// The node was paused when it made the step.
     pub const PAUSED: u32 = 1;
-    /// A recording is shown.
+    /// A recording is on show.
     pub const REPLAY: u32 = 1 << 1;
-    /// Positions were outside of what u16 covers, and stand at its border.
+    /// Positions outside the box that u16 covers were moved to its border.
     pub const SATURATED: u32 = 1 << 2;
 }
 
-/// What a frame says beside its positions.
+/// Everything in a frame except its positions.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FrameHead {
     /// Load and step.
@@ -34,44 +36,53 @@ pub struct FrameHead {
     pub sim_time_s: f64,
     /// [`frame_flag`] bits; the encoder adds SATURATED.
     pub flags: u32,
-    /// Constraints torn in this state.
+    /// Number of torn constraints in this state.
     pub torn_count: u32,
-    /// Time of the solver for the step, in µs.
+    /// Solver time of the step in µs.
     pub solve_us: f32,
-    /// How late the step began, in µs.
+    /// Delay of the step's start after its deadline, in µs.
     pub wake_late_us: f32,
-    /// Number of the frame, for its acknowledgement.
+    /// Number of the frame, for the acknowledgement.
     pub number: u32,
-    /// CLOCK_MONOTONIC at publication, in ns.
+    /// `CLOCK_MONOTONIC` at publication, in ns.
     pub publish_monotonic_ns: u64,
 }
 
-/// The most that u16 positions cover: beyond it, one particle that flies off would take all
-/// resolution from the others.
+/// The largest box that u16 positions cover. Without it, one particle that flies off would cost all
+/// others their resolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameLimits {
     min: [f32; 3],
     max: [f32; 3],
 }
 
-/// Half of the covered box, in half diagonals of the scene's.
+/// An axis-aligned box; zeros if it contains nothing.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Bounds {
+    /// Lower corner.
+    pub min: [f32; 3],
+    /// Upper corner.
+    pub max: [f32; 3],
+}
+
+/// Half edge of the covered box, in half diagonals of the scene's box.
 const COVERED_HALF_DIAGONALS: f32 = 16.0;
-/// Least half edge of the covered box, in m: a scene of one particle has no size.
+/// Smallest half edge of the covered box, in m: a scene of one particle has no extent.
 const COVERED_HALF_EDGE_MIN: f32 = 10.0;
-/// Highest value of a u16 coordinate.
+/// Largest value of a u16 coordinate.
 const STEPS: f32 = 65_535.0;
-/// Size of a frame before its positions.
+/// Size of the part before the positions.
 const HEAD_SIZE_BYTES: usize = 88;
 
 impl Default for FrameLimits {
     fn default() -> Self {
-        Self::around([0.0; 3], [0.0; 3])
+        Self::around(Bounds::default())
     }
 }
 
 impl FrameLimits {
-    /// The limits of a scene whose positions lie in that box.
-    pub fn around(min: [f32; 3], max: [f32; 3]) -> Self {
+    /// Computes the limits for a scene whose positions lie in this box.
+    pub fn around(Bounds { min, max }: Bounds) -> Self {
         let squares: f32 = (0..3).map(|axis| (max[axis] - min[axis]).powi(2)).sum();
         let reach = (squares.sqrt() * 0.5 * COVERED_HALF_DIAGONALS).max(COVERED_HALF_EDGE_MIN);
         let middle = |axis: usize| f32::midpoint(min[axis], max[axis]);
@@ -80,35 +91,39 @@ impl FrameLimits {
     }
 }
 
-/// The box around all finite positions (zeros where there are none), and the particles that are not.
-pub(super) fn bounds(particles: &[ParticleState]) -> ([f32; 3], [f32; 3], Vec<u32>) {
-    let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    let mut not_finite = Vec::new();
-    for (index, particle) in (0_u32..).zip(particles) {
-        let position = particle.position;
-        if position.iter().all(|axis| axis.is_finite()) {
-            for axis in 0..3 {
-                min[axis] = min[axis].min(position[axis]);
-                max[axis] = max[axis].max(position[axis]);
+impl Bounds {
+    /// Computes the bounding box of the finite positions.
+    pub fn around(positions: impl Iterator<Item = [f32; 3]>) -> Self {
+        let empty = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+        let bounds = positions.filter(is_finite).fold(empty, |mut bounds, position| {
+            for (axis, coordinate) in position.into_iter().enumerate() {
+                bounds.min[axis] = bounds.min[axis].min(coordinate);
+                bounds.max[axis] = bounds.max[axis].max(coordinate);
             }
-        } else {
-            not_finite.push(index);
-        }
+            bounds
+        });
+        if bounds.min[0] > bounds.max[0] { Self::default() } else { bounds }
     }
-    if min[0] > max[0] {
-        return ([0.0; 3], [0.0; 3], not_finite);
-    }
-    (min, max, not_finite)
 }
 
-/// Writes a frame.
+fn is_finite(position: &[f32; 3]) -> bool {
+    position.iter().all(|axis| axis.is_finite())
+}
+
+/// Encodes a frame.
 pub fn encode(
     head: &FrameHead,
     particles: &[ParticleState],
     format: Format,
     limits: &FrameLimits,
 ) -> Bytes {
-    let (mut lo, mut hi, not_finite) = bounds(particles);
+    let positions = particles.iter().map(|particle| particle.position);
+    let Bounds { min: mut lo, max: mut hi } = Bounds::around(positions);
+    let not_finite: Vec<u32> = (0..)
+        .zip(particles)
+        .filter(|(_, particle)| !is_finite(&particle.position))
+        .map(|(index, _)| index)
+        .collect();
     let mut flags = head.flags;
     if format == Format::U16 {
         for axis in 0..3 {
@@ -128,11 +143,11 @@ pub fn encode(
     let size = HEAD_SIZE_BYTES + 3 * coordinate_size * particles.len() + 4 * not_finite.len() + 4;
     let mut writer = Writer::new(kind, head.stamp, size);
     writer.f64(head.sim_time_s);
-    writer.u32(count_of(particles));
+    writer.count(particles);
     writer.u32(flags);
     writer.vector(lo);
     writer.vector(scale);
-    writer.u32(count_of(&not_finite));
+    writer.count(&not_finite);
     writer.u32(head.torn_count);
     writer.f32(head.solve_us);
     writer.f32(head.wake_late_us);
@@ -140,8 +155,8 @@ pub fn encode(
     writer.u32(0);
     writer.u64(head.publish_monotonic_ns);
     match format {
-        Format::F32 => put_f32(&mut writer.0, particles, lo),
-        Format::U16 => put_u16(&mut writer.0, particles, lo, scale),
+        Format::F32 => put_f32(writer.reserve(12 * particles.len()), particles, lo),
+        Format::U16 => put_u16(writer.reserve(6 * particles.len()), particles, lo, scale),
     }
     writer.pad();
     for particle in not_finite {
@@ -150,26 +165,20 @@ pub fn encode(
     writer.finish()
 }
 
-fn put_f32(bytes: &mut Vec<u8>, particles: &[ParticleState], lo: [f32; 3]) {
-    let begin = bytes.len();
-    bytes.resize(begin + 12 * particles.len(), 0);
-    for (place, particle) in bytes[begin..].chunks_exact_mut(12).zip(particles) {
-        let is_finite = particle.position.iter().all(|axis| axis.is_finite());
-        let position = if is_finite { particle.position } else { lo };
+fn put_f32(bytes: &mut [u8], particles: &[ParticleState], lo: [f32; 3]) {
+    for (place, particle) in bytes.chunks_exact_mut(12).zip(particles) {
+        let position = if is_finite(&particle.position) { particle.position } else { lo };
         for (bytes, axis) in place.chunks_exact_mut(4).zip(position) {
             bytes.copy_from_slice(&axis.to_le_bytes());
         }
     }
 }
 
-fn put_u16(bytes: &mut Vec<u8>, particles: &[ParticleState], lo: [f32; 3], scale: [f32; 3]) {
-    let begin = bytes.len();
-    bytes.resize(begin + 6 * particles.len(), 0);
-    // An axis along which nothing extends has the value 0 everywhere.
+fn put_u16(bytes: &mut [u8], particles: &[ParticleState], lo: [f32; 3], scale: [f32; 3]) {
+    // Along an axis without extent, every value is 0.
     let per_unit = scale.map(|scale| if scale > 0.0 { 1.0 / scale } else { 0.0 });
-    for (place, particle) in bytes[begin..].chunks_exact_mut(6).zip(particles) {
-        let is_finite = particle.position.iter().all(|axis| axis.is_finite());
-        let position = if is_finite { particle.position } else { lo };
+    for (place, particle) in bytes.chunks_exact_mut(6).zip(particles) {
+        let position = if is_finite(&particle.position) { particle.position } else { lo };
         for (axis, bytes) in place.chunks_exact_mut(2).enumerate() {
             let value = quantised((position[axis] - lo[axis]) * per_unit[axis]);
             bytes.copy_from_slice(&value.to_le_bytes());
@@ -177,30 +186,30 @@ fn put_u16(bytes: &mut Vec<u8>, particles: &[ParticleState], lo: [f32; 3], scale
     }
 }
 
-/// The nearest step.
+/// Rounds to the nearest step.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "the cast saturates, and what is outside of the box belongs at its border"
+    reason = "the cast saturates, and a position outside the box belongs at its border"
 )]
 fn quantised(steps: f32) -> u16 {
     (steps + 0.5) as u16
 }
 
-/// A frame as it was read.
+/// A decoded frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// How its positions were written.
+    /// Encoding of the positions.
     pub format: Format,
-    /// Everything beside the positions.
+    /// Everything except the positions.
     pub head: FrameHead,
-    /// Least corner of the box.
+    /// Lower corner of the box.
     pub lo: [f32; 3],
-    /// Units of a step, by axis.
+    /// Size of a step along each axis.
     pub scale: [f32; 3],
-    /// The positions, u16 as the numbers that they stand for.
+    /// The positions; u16 values are converted to coordinates.
     pub positions: Vec<[f32; 3]>,
-    /// The particles whose position is not finite.
+    /// Particles whose position is not finite.
     pub not_finite: Vec<u32>,
 }
 

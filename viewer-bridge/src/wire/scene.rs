@@ -1,26 +1,22 @@
-//! SCENE: what does not change until the next load.
+//! SCENE: everything that does not change until the next load.
 
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use sim_contract::{ConstraintState, ParticleState, Triangle};
 
 use super::cursor::Cursor;
-use super::frame::bounds;
-use super::{DecodeError, Kind, Stamp, Writer, count_of};
+use super::decode_error::DecodeError;
+use super::frame::Bounds;
+use super::header::{Kind, Stamp};
+use super::writer::Writer;
 
 /// The bits of a scene's flags.
 pub mod scene_flag {
-    /// Two dimensions: z is 0.
+    /// The scene has two dimensions: z is 0.
     pub const PLANAR: u32 = 1;
-    /// Constraints tear by themselves.
-    pub const TEARABLE: u32 = 1 << 1;
-    /// It has generated tethers.
-    pub const TETHERS: u32 = 1 << 2;
-    /// Constraints have a stiffness, not a compliance.
-    pub const PBD: u32 = 1 << 3;
 }
 
-/// A load with the positions of its first snapshot.
+/// A load with the positions of its first state.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Scene {
     /// Load and step.
@@ -29,7 +25,7 @@ pub struct Scene {
     pub flags: u32,
     /// Steps per second.
     pub rate_hz: u32,
-    /// What positions are relative to.
+    /// Origin of all positions, for display.
     pub origin: [f64; 3],
     /// Positions at the step of the stamp.
     pub positions: Vec<[f32; 3]>,
@@ -41,7 +37,7 @@ pub struct Scene {
     pub triangles: Vec<[u32; 3]>,
     /// Kinds of the constraints.
     pub kinds: Vec<u8>,
-    /// Names, and what is rare.
+    /// Names.
     pub text: SceneText,
 }
 
@@ -52,27 +48,14 @@ pub struct SceneText {
     pub name: String,
     /// Unit of lengths.
     pub unit: String,
-    /// "y", "-y" or "z".
+    /// Direction of up: "y", "-y" or "z".
     pub up: String,
-    /// 16 hexadecimal digits.
+    /// Number of the run, 16 hexadecimal digits.
     pub run_id: String,
-    /// Particles that form sheets.
-    pub grids: Vec<Grid>,
-}
-
-/// A sheet: particle `first + row * columns + column`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Grid {
-    /// Its first particle.
-    pub first: u32,
-    /// Particles of a row.
-    pub columns: u32,
-    /// Rows.
-    pub rows: u32,
 }
 
 impl Scene {
-    /// Takes over what the node publishes; positions that are not finite become 0.
+    /// Copies the geometry from the node's messages. Positions that are not finite become 0.
     pub fn set_geometry(
         &mut self,
         particles: &[ParticleState],
@@ -88,41 +71,41 @@ impl Scene {
         self.triangles = triangles.iter().map(|one| one.corners).collect();
     }
 
-    /// The box around the positions.
-    pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
-        let particle =
-            |position: &[f32; 3]| ParticleState { position: *position, ..ParticleState::default() };
-        let particles: Vec<_> = self.positions.iter().map(particle).collect();
-        let (min, max, _) = bounds(&particles);
-        (min, max)
+    /// Bounding box of the positions.
+    pub fn bounds(&self) -> Bounds {
+        Bounds::around(self.positions.iter().copied())
     }
 
-    /// As bytes.
+    /// Encodes the message.
+    ///
+    /// # Panics
+    /// Never: the names have a JSON form.
     pub fn encode(&self) -> Bytes {
-        let json = serde_json::to_vec(&self.text).unwrap_or_default();
+        #[allow(clippy::expect_used, reason = "a miss is a fault of the type")]
+        let json = serde_json::to_vec(&self.text).expect("strings have a JSON form");
         let size = 96
             + 12 * self.positions.len()
             + 13 * self.ends.len()
             + 12 * self.triangles.len()
             + json.len();
-        let (min, max) = self.bounds();
+        let Bounds { min, max } = self.bounds();
         let mut writer = Writer::new(Kind::Scene, self.stamp, size);
-        writer.u32(count_of(&self.positions));
-        writer.u32(count_of(&self.ends));
-        writer.u32(count_of(&self.triangles));
+        writer.count(&self.positions);
+        writer.count(&self.ends);
+        writer.count(&self.triangles);
         writer.u32(self.flags);
         writer.vector(min);
         writer.vector(max);
         writer.u32(self.rate_hz);
-        writer.u32(count_of(&json));
+        writer.count(&json);
         self.origin.iter().for_each(|axis| writer.f64(*axis));
         self.positions.iter().for_each(|position| writer.vector(*position));
         self.ends.iter().flatten().for_each(|end| writer.u32(*end));
         self.rest_lengths.iter().for_each(|length| writer.f32(*length));
         self.triangles.iter().flatten().for_each(|corner| writer.u32(*corner));
-        writer.put(&self.kinds);
+        writer.bytes(&self.kinds);
         writer.pad();
-        writer.put(&json);
+        writer.bytes(&json);
         writer.pad();
         writer.finish()
     }

@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use sim_contract::TornConstraint;
 use viewer_bridge::limits::FRAMES_UNACKNOWLEDGED_MAX;
-use viewer_bridge::message::{Node, ToPage};
-use viewer_bridge::pages::hub::{Demand, Slot};
-use viewer_bridge::source::{Ask, Request};
+use viewer_bridge::message::Node;
+use viewer_bridge::pages::hub::Formats;
+use viewer_bridge::request::{ClientId, Request, RequestKind};
+use viewer_bridge::sink::Update;
 use viewer_bridge::wire::Format::{F32, U16};
 use viewer_bridge::wire::Message;
 
@@ -14,6 +16,14 @@ use crate::support::{Site, wait_for};
 /// Limit on the wait for a request of a page.
 const REQUEST_TIMEOUT: Duration = Duration::from_mins(1);
 
+/// The first page.
+const PAGE: ClientId = ClientId::Page(1);
+
+fn torn(constraints: &[u32]) -> Vec<TornConstraint> {
+    let torn = constraints.iter();
+    torn.map(|constraint| TornConstraint::new(*constraint, None)).collect()
+}
+
 fn ack(frame: u32) -> String {
     format!(r#"{{"type":"ack","frame":{frame}}}"#)
 }
@@ -21,10 +31,10 @@ fn ack(frame: u32) -> String {
 #[test]
 fn a_late_page_receives_the_state_in_order() {
     let mut site = Site::start();
-    site.hub.latch(Slot::Node, &ToPage::Node(Node::default()));
+    site.publish(&Update::Node(&Node::default()));
     site.begin(2);
-    site.stage.set_torn(&site.hub, 5, &[3, 1], &[0]);
-    site.stage.set_torn(&site.hub, 6, &[3, 1, 2], &[0, 1, 2]);
+    site.shown.set_torn(&site.sinks, 5, &torn(&[3, 1]));
+    site.shown.set_torn(&site.sinks, 6, &torn(&[3, 1, 2]));
     let mut page = site.page();
     assert_eq!(page.text()["type"], "node");
     let Message::Scene(scene) = page.binary() else { panic!("no scene") };
@@ -39,22 +49,17 @@ fn tears_come_as_changes_and_a_reset_empties_the_list() {
     let mut site = Site::start();
     let mut page = site.page();
     site.begin(2);
-    site.stage.set_torn(&site.hub, 5, &[3], &[0]);
-    site.stage.set_torn(&site.hub, 6, &[3, 1], &[0, 3]);
-    site.stage.set_torn(&site.hub, 7, &[], &[]);
-    site.stage.set_torn(&site.hub, 8, &[2], &[1]);
+    site.shown.set_torn(&site.sinks, 5, &torn(&[3]));
+    site.shown.set_torn(&site.sinks, 6, &torn(&[3, 1]));
+    site.shown.set_torn(&site.sinks, 7, &torn(&[]));
+    site.shown.set_torn(&site.sinks, 8, &torn(&[2]));
     let mut tears = Vec::new();
     while tears.len() < 4 {
         if let Message::Tear(tear) = page.binary() {
-            tears.push((tear.stamp.step, tear.first, tear.constraints, tear.causes));
+            tears.push((tear.stamp.step, tear.first, tear.constraints));
         }
     }
-    let expected = [
-        (5, 0, vec![3], vec![0]),
-        (6, 1, vec![1], vec![3]),
-        (7, 0, vec![], vec![]),
-        (8, 0, vec![2], vec![1]),
-    ];
+    let expected = [(5, 0, vec![3]), (6, 1, vec![1]), (7, 0, vec![]), (8, 0, vec![2])];
     assert_eq!(tears, expected);
 }
 
@@ -68,13 +73,13 @@ fn a_page_receives_two_frames_and_then_the_newest_after_an_acknowledgement() {
     site.show(2, 1);
     assert_eq!((first.0, page.frame().0), (1, 2));
     // The credit is used up: of the following frames, only the last one waits.
-    assert_eq!(site.hub.demand(1), Demand::default());
+    assert_eq!(site.hub.awaited_formats(1), Formats::default());
     for step in 3..50 {
         site.show(step, 1);
     }
     page.say(&ack(first.1));
     // The page has credit again: the source learns of the demand, and shows its newest frame.
-    wait_for("demand", || site.hub.demand(1).is_any().then_some(()));
+    wait_for("demand", || site.hub.awaited_formats(1).is_any().then_some(()));
     site.show(50, 1);
     assert_eq!(page.frame().0, 50);
 }
@@ -83,16 +88,22 @@ fn a_page_receives_two_frames_and_then_the_newest_after_an_acknowledgement() {
 fn a_page_with_the_newest_frame_does_not_request_another() {
     let mut site = Site::start();
     let mut page = site.page();
-    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Frame }));
+    assert_eq!(
+        site.requests.next(REQUEST_TIMEOUT),
+        Some(Request { client: PAGE, kind: RequestKind::State })
+    );
     site.begin(1);
     for step in 1..=FRAMES_UNACKNOWLEDGED_MAX {
         site.show(step.into(), 1);
         assert_eq!(page.frame().1, step);
     }
     page.say(&ack(FRAMES_UNACKNOWLEDGED_MAX));
-    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Credit }));
+    assert_eq!(
+        site.requests.next(REQUEST_TIMEOUT),
+        Some(Request { client: PAGE, kind: RequestKind::Credit })
+    );
     // It does not receive the same frame again when another page needs it.
-    site.hub.show_again();
+    site.publish(&Update::SameState);
     site.show(9, 1);
     assert_eq!(page.frame().0, 9);
 }
@@ -101,7 +112,7 @@ fn a_page_with_the_newest_frame_does_not_request_another() {
 fn a_page_that_missed_the_newest_frame_requests_it() {
     let mut site = Site::start();
     let mut slow = site.silent_page();
-    slow.say(r#"{"type":"hello","protocol":1,"format":"u16"}"#);
+    slow.say(r#"{"type":"hello","protocol":2,"format":"u16"}"#);
     slow.text_of("hello");
     site.begin(1);
     for step in 1..=2 {
@@ -114,8 +125,14 @@ fn a_page_that_missed_the_newest_frame_requests_it() {
     site.show(3, 1);
     while site.requests.next(Duration::ZERO).is_some() {}
     slow.say(&ack(2));
-    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Credit }));
-    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Frame }));
+    assert_eq!(
+        site.requests.next(REQUEST_TIMEOUT),
+        Some(Request { client: PAGE, kind: RequestKind::Credit })
+    );
+    assert_eq!(
+        site.requests.next(REQUEST_TIMEOUT),
+        Some(Request { client: PAGE, kind: RequestKind::State })
+    );
     site.show(3, 1);
     assert_eq!(slow.frame().0, 3);
 }
@@ -135,7 +152,7 @@ fn a_slow_page_is_never_more_than_three_frames_behind() {
         let (shown, number) = page.frame();
         assert!(step - shown <= 15, "step {shown} is shown at step {step}");
         page.say(&ack(number));
-        wait_for("credit", || site.hub.demand(1).is_any().then_some(()));
+        wait_for("credit", || site.hub.awaited_formats(1).is_any().then_some(()));
     }
 }
 
@@ -147,7 +164,7 @@ fn a_frame_never_precedes_its_scene() {
     for step in 0..200 {
         site.begin(1);
         site.show(step, 1);
-        site.hub.broadcast(&ToPage::Reset { step });
+        site.publish(&Update::Reset { step });
         let mut is_over = false;
         while !is_over {
             match page.next().unwrap() {
@@ -173,7 +190,7 @@ fn each_page_receives_its_requested_format() {
     let mut pages = Vec::new();
     for format in ["auto", "f32", "u16"] {
         let mut page = site.silent_page();
-        page.say(&format!(r#"{{"type":"hello","protocol":1,"format":"{format}"}}"#));
+        page.say(&format!(r#"{{"type":"hello","protocol":2,"format":"{format}"}}"#));
         assert_eq!(page.text()["format"], format);
         pages.push(page);
     }
@@ -196,30 +213,36 @@ fn each_page_receives_its_requested_format() {
 #[test]
 fn there_is_no_demand_without_pages() {
     let mut site = Site::start();
-    assert_eq!(site.hub.demand(10), Demand::default());
+    assert_eq!(site.hub.awaited_formats(10), Formats::default());
     let page = site.page();
-    assert_eq!(site.hub.demand(10), Demand { f32: true, ..Demand::default() });
-    assert_eq!(site.hub.demand(100_000), Demand { u16: true, ..Demand::default() });
+    assert_eq!(site.hub.awaited_formats(10), Formats { f32: true, ..Formats::default() });
+    assert_eq!(site.hub.awaited_formats(100_000), Formats { u16: true, ..Formats::default() });
     site.begin(1);
     drop(page);
     site.wait_for_clients(0);
-    assert_eq!(site.hub.demand(10), Demand::default());
+    assert_eq!(site.hub.awaited_formats(10), Formats::default());
 }
 
 #[test]
 fn the_source_learns_of_pages_that_connect_and_disconnect() {
     let site = Site::start();
     let page = site.page();
-    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Frame }));
+    assert_eq!(
+        site.requests.next(REQUEST_TIMEOUT),
+        Some(Request { client: PAGE, kind: RequestKind::State })
+    );
     // The connection breaks without a close message.
     drop(page);
-    assert_eq!(site.requests.next(REQUEST_TIMEOUT), Some(Request { client: 1, ask: Ask::Left }));
+    assert_eq!(
+        site.requests.next(REQUEST_TIMEOUT),
+        Some(Request { client: PAGE, kind: RequestKind::Left })
+    );
 }
 
 #[test]
 fn a_page_receives_the_end_of_the_server_as_a_close_code() {
     let site = Site::start();
     let mut page = site.page();
-    site.hub.close();
+    site.shutdown.begin();
     assert_eq!(page.close_code(), Some(1001));
 }

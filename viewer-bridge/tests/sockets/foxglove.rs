@@ -1,36 +1,36 @@
 //! The Foxglove server over real sockets: delivery, permissions, and clients that violate the protocol.
-//! There is no node: the tests feed the hub, and answer commands.
+//! There is no node: the tests publish to the sink, and answer commands.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 use std::time::Duration;
 
 use bytemuck::cast_slice;
 use serde_json::{Value, json};
-use sim_contract::ParticleState;
+use sim_contract::{ParameterValues, ParticleState, Reason, TearCause, TornConstraint};
 use tokio::runtime::Runtime;
-use viewer_bridge::message::parameters::Parameters;
-use viewer_bridge::message::{
-    Command, Mode, OutcomeText, ParametersText, Playback, Status, ToPage,
+use viewer_bridge::message::{Command, OutcomeText, ParametersText, Playback, Status};
+use viewer_bridge::request::{ClientId, RequestKind, Requests, requests};
+use viewer_bridge::sink::{Demand, Update};
+use viewer_bridge::source::shown_state::ShownState;
+use viewer_bridge::wire::Scene;
+use viewer_bridge::{
+    FoxgloveOptions, FoxglovePermission, FoxgloveServer, FoxgloveServerError, RecordingTimes,
+    Shutdown, Sinks,
 };
-use viewer_bridge::pages::hub::{Demand, Slot};
-use viewer_bridge::shown_state::Stage;
-use viewer_bridge::source::{Ask, Requests};
-use viewer_bridge::wire::{FrameHead, Scene, Stamp};
-use viewer_bridge::{FoxgloveOptions, FoxgloveServer, FoxgloveServerError, Hub, Recording};
 
 use crate::foxglove_client::{Binary, Client, connect};
-use crate::support::wait_for;
+use crate::support::{state, wait_for};
 
 /// Limit on simultaneous connections.
 const CLIENTS_MAX: usize = viewer_bridge::limits::CLIENTS_MAX;
 
 /// A running Foxglove server. Dropping it ends the server.
 struct Site {
-    hub: Arc<Hub>,
+    sinks: Sinks,
+    shutdown: Shutdown,
     requests: Requests,
     url: String,
-    stage: Stage,
+    shown: ShownState,
     _runtime: Runtime,
 }
 
@@ -38,7 +38,7 @@ fn options() -> FoxgloveOptions {
     FoxgloveOptions {
         listen: "127.0.0.1:0".parse().unwrap(),
         origins: vec!["https://viewer.example".to_owned()],
-        takes_commands: true,
+        permission: FoxglovePermission::Commands,
         recording: None,
     }
 }
@@ -46,65 +46,81 @@ fn options() -> FoxgloveOptions {
 impl Site {
     fn start(options: FoxgloveOptions) -> Self {
         let runtime = Runtime::new().unwrap();
-        let mode = if options.recording.is_some() { Mode::Replay } else { Mode::Live };
-        let (hub, requests) = Hub::new(mode);
-        let hub = Arc::new(hub);
-        let server = runtime.block_on(FoxgloveServer::start(options, &hub)).unwrap();
-        let url = server.url();
-        runtime.spawn(server.serve(Arc::clone(&hub)));
-        Self { hub, requests, url, stage: Stage::default(), _runtime: runtime }
+        let (sender, requests) = requests();
+        let server = runtime.block_on(FoxgloveServer::start(options, sender)).unwrap();
+        let (url, shutdown) = (server.url(), Shutdown::default());
+        let mut sinks = Sinks::new(shutdown.clone());
+        sinks.add(server.sink());
+        runtime.spawn(server.serve(shutdown.clone()));
+        let shown = ShownState::default();
+        Self { sinks, shutdown, requests, url, shown, _runtime: runtime }
     }
 
     /// Shows a scene with `count` particles, connected in a row.
     fn begin(&mut self, count: u32) {
         let positions = (0..count).map(|_| [0.0; 3]).collect();
         let ends = (1..count).map(|particle| [particle - 1, particle]).collect();
-        self.stage.begin(&self.hub, Scene { positions, ends, rate_hz: 240, ..Scene::default() });
+        let scene = Scene { positions, ends, rate_hz: 240, ..Scene::default() };
+        self.shown.begin_load(&self.sinks, scene);
     }
 
     fn show(&mut self, step: u64, particles: &[ParticleState]) {
-        let head = FrameHead { stamp: Stamp { epoch: 0, step }, ..FrameHead::default() };
-        self.stage.show(&self.hub, head, particles);
+        self.shown.show(&self.sinks, state(step, particles));
     }
 
     /// Waits until a subscription has reached the source.
     fn wait_for_subscription(&self) {
         wait_for("a subscription", || {
             let request = self.requests.next(Duration::ZERO)?;
-            (request.ask == Ask::Frame).then_some(())
+            (request.kind == RequestKind::State).then_some(())
         });
     }
 
     /// Waits for the next command, and returns it with its client and id. Skips subscriptions.
-    fn command(&self) -> (u32, Option<u32>, Command) {
+    fn command(&self) -> (ClientId, Option<u32>, Command) {
         wait_for("a command", || match self.requests.next(Duration::ZERO)? {
-            request if request.ask == Ask::Frame => None,
-            request => match request.ask {
-                Ask::Command { id, command } => Some((request.client, id, command)),
+            request if request.kind == RequestKind::State => None,
+            request => match request.kind {
+                RequestKind::Command { id, command } => Some((request.client, id, command)),
                 other => panic!("no command: {other:?}"),
             },
         })
     }
 
-    /// Answers a command: applied if `reason` is empty, otherwise rejected.
-    fn answer(&self, client: u32, id: Option<u32>, kind: &'static str, reason: &'static str) {
-        let mut outcome = OutcomeText::refused(id, kind, reason);
-        if reason.is_empty() {
-            outcome = OutcomeText { status: Status::Applied, applied: 1, rejected: 0, ..outcome };
-            outcome.step = Some(8);
-        }
-        self.hub.send(client, &ToPage::Outcome(outcome));
+    /// Answers that a command was applied at step 8.
+    fn apply(&self, client: ClientId, id: Option<u32>, kind: &'static str) {
+        let outcome = OutcomeText {
+            id,
+            kind,
+            status: Status::Applied,
+            step: Some(8),
+            applied: 1,
+            rejected: 0,
+            reason: None,
+            text: String::new(),
+        };
+        self.sinks.publish(&Update::Answer { client, outcome: &outcome });
     }
 
-    fn set_parameters(&self, values: Parameters) {
+    /// Answers that a command was rejected.
+    fn reject(&self, client: ClientId, id: Option<u32>, kind: &'static str, reason: Reason) {
+        let outcome = OutcomeText::refused(id, kind, reason.into());
+        self.sinks.publish(&Update::Answer { client, outcome: &outcome });
+    }
+
+    fn set_parameters(&self, values: ParameterValues) {
         let text = ParametersText { is_complete: true, values: Some(values), initial: None };
-        self.hub.latch(Slot::Parameters, &ToPage::Parameters(Box::new(text)));
+        self.sinks.publish(&Update::Parameters(&text));
+    }
+
+    fn has_demand(&self) -> bool {
+        self.sinks.has_demand(Demand::State)
     }
 }
 
 impl Drop for Site {
     fn drop(&mut self) {
-        self.hub.close();
+        self.shutdown.begin();
     }
 }
 
@@ -149,7 +165,9 @@ fn a_client_receives_only_the_topics_that_it_subscribed_to() {
     client.subscribe(3, "/tf");
     client.subscribe(4, "/scene");
     (0..3).for_each(|_| site.wait_for_subscription());
-    site.stage.set_torn(&site.hub, 8, &[2, 0], &[0, 3]);
+    let torn = [(2, TearCause::Force), (0, TearCause::Cut)]
+        .map(|(constraint, cause)| TornConstraint::new(constraint, Some(cause)));
+    site.shown.set_torn(&site.sinks, 8, &torn);
     site.show(8, &state);
     let tears = json!({ "step": 8, "constraints": [2, 0], "causes": ["force", "cut"] });
     assert_eq!(client.json(2), tears);
@@ -166,19 +184,19 @@ fn a_client_receives_only_the_topics_that_it_subscribed_to() {
 #[test]
 fn there_is_no_demand_after_the_last_client_unsubscribed() {
     let mut site = Site::start(options());
-    assert_eq!(site.hub.demand(1), Demand::default());
+    assert!(!site.has_demand());
     let (mut client, _) = Client::start(&site.url);
     let (mut other, _) = Client::start(&site.url);
     client.subscribe(1, "/scene");
     other.subscribe(1, "/particles");
-    wait_for("a demand", || site.hub.demand(1).foxglove.then_some(()));
+    wait_for("a demand", || site.has_demand().then_some(()));
     (0..2).for_each(|_| site.wait_for_subscription());
     client.unsubscribe(1);
     drop(other);
     // The initial messages that were due to the clients are dropped as well.
     site.begin(1);
     site.show(0, &particles(1, 0.0));
-    wait_for("no demand", || (!site.hub.demand(1).foxglove).then_some(()));
+    wait_for("no demand", || (!site.has_demand()).then_some(()));
 }
 
 #[test]
@@ -198,7 +216,7 @@ fn a_service_call_becomes_a_command_and_returns_the_outcome() {
     client.call(step, 1, &json!({ "count": 3 }));
     let (sender, id, command) = site.command();
     assert_eq!(command, Command::Step { count: 3 });
-    site.answer(sender, id, "step", "");
+    site.apply(sender, id, "step");
     let answer = client.response(1);
     assert_eq!((&answer["status"], &answer["step"]), (&json!("applied"), &json!(8)));
     for (name, command) in
@@ -207,7 +225,7 @@ fn a_service_call_becomes_a_command_and_returns_the_outcome() {
         client.call(number(name), 2, &json!({}));
         let (sender, id, asked) = site.command();
         assert_eq!(asked, command);
-        site.answer(sender, id, name, "no_effect_here");
+        site.reject(sender, id, name, Reason::NoEffectHere);
         let failure = client.text("serviceCallFailure");
         assert_eq!(failure["callId"], 2);
         assert!(failure["message"].as_str().unwrap().contains("no effect"), "{failure}");
@@ -223,8 +241,9 @@ fn a_service_call_becomes_a_command_and_returns_the_outcome() {
 
 #[test]
 fn a_client_cannot_change_anything_without_permission() {
-    let site = Site::start(FoxgloveOptions { takes_commands: false, ..options() });
-    site.set_parameters(Parameters::default());
+    let site =
+        Site::start(FoxgloveOptions { permission: FoxglovePermission::ReadOnly, ..options() });
+    site.set_parameters(ParameterValues::default());
     let (mut client, server) = Client::start(&site.url);
     for capability in server["capabilities"].as_array().unwrap() {
         assert!(capability != "clientPublish" && capability != "services", "{server}");
@@ -248,7 +267,7 @@ fn a_client_cannot_change_anything_without_permission() {
 #[test]
 fn a_client_can_read_set_and_subscribe_to_parameters() {
     let site = Site::start(options());
-    site.set_parameters(Parameters::default());
+    site.set_parameters(ParameterValues::default());
     let (mut client, _) = Client::start(&site.url);
     let (mut other, _) = Client::start(&site.url);
     other.say(&json!({ "op": "subscribeParameterUpdates", "parameterNames": ["damping"] }));
@@ -258,12 +277,10 @@ fn a_client_can_read_set_and_subscribe_to_parameters() {
     client.say(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
     let (sender, id, command) = site.command();
     assert!(matches!(&command, Command::Set { parameter, .. } if parameter == "damping"));
-    site.answer(sender, id, "set", "");
+    site.apply(sender, id, "set");
     assert!(client.text("status")["message"].as_str().unwrap().contains("dance"));
     assert_eq!(parameter(&client.text("parameterValues"), "damping"), json!(3.5));
-    let mut values = Parameters::default();
-    values.damping.0 = 3.5;
-    site.set_parameters(values);
+    site.set_parameters(ParameterValues { damping: 3.5, ..ParameterValues::default() });
     assert_eq!(parameter(&other.text("parameterValues"), "damping"), json!(3.5));
 }
 
@@ -275,14 +292,14 @@ fn published_commands_reach_the_source_and_grabs_end_with_the_client() {
     client.advertise(5, "/commands");
     client.publish(5, &grab);
     let (holder, id, command) = site.command();
-    assert_eq!(command, Command::DragBegin { particle: 3, target: [0.0, 1.0, 2.0], over_s: 0.1 });
-    site.answer(holder, id, "drag_begin", "grabbed_by_other");
+    assert_eq!(command, Command::Grab { particle: 3, target: [0.0, 1.0, 2.0], over_s: 0.1 });
+    site.reject(holder, id, "grab", Reason::GrabbedByOther);
     let status = client.text("status");
     assert!(status["message"].as_str().unwrap().contains("somebody else"), "{status}");
-    let leaves = |holder: u32| {
+    let leaves = |holder: ClientId| {
         wait_for("the client to leave", || {
             let request = site.requests.next(Duration::ZERO)?;
-            (request.ask == Ask::Left && request.client == holder).then_some(())
+            (request.kind == RequestKind::Left && request.client == holder).then_some(())
         });
     };
     client.unadvertise(5);
@@ -318,9 +335,9 @@ fn an_invalid_command_is_refused_and_does_not_reach_the_source() {
     client.publish(1, &json!({ "kind": "pause" }));
     client.advertise(2, "/commands");
     client.publish(2, &json!({ "kind": "resume" }));
-    let command = wait_for("a command", || match site.requests.next(Duration::ZERO)?.ask {
-        Ask::Command { command, .. } => Some(command),
-        Ask::Left | Ask::Frame | Ask::Credit => None,
+    let command = wait_for("a command", || match site.requests.next(Duration::ZERO)?.kind {
+        RequestKind::Command { command, .. } => Some(command),
+        RequestKind::Left | RequestKind::State | RequestKind::Credit => None,
     });
     assert_eq!(command, Command::Resume {});
 }
@@ -340,10 +357,9 @@ fn other_pages_and_other_protocols_are_refused() {
 #[test]
 fn an_address_other_than_loopback_is_refused() {
     let runtime = Runtime::new().unwrap();
-    let hub = Arc::new(Hub::new(Mode::Live).0);
     for address in ["0.0.0.0:0", "[::]:0", "10.1.2.3:8765"] {
         let options = FoxgloveOptions { listen: address.parse().unwrap(), ..options() };
-        let refused = runtime.block_on(FoxgloveServer::start(options, &hub)).unwrap_err();
+        let refused = runtime.block_on(FoxgloveServer::start(options, requests().0)).unwrap_err();
         assert!(matches!(refused, FoxgloveServerError::NotLoopback { .. }), "{refused}");
         assert!(refused.to_string().contains("ssh -L"), "{refused}");
     }
@@ -353,7 +369,7 @@ fn an_address_other_than_loopback_is_refused() {
 fn a_client_over_the_limit_is_refused_until_another_disconnects() {
     let site = Site::start(options());
     let mut clients: Vec<_> = (0..CLIENTS_MAX).map(|_| Client::start(&site.url)).collect();
-    assert_eq!(connect(&site.url, None).err(), Some(0));
+    assert_eq!(connect(&site.url, None).err(), Some(503));
     clients.pop();
     wait_for("a free slot", || connect(&site.url, None).ok());
 }
@@ -406,7 +422,7 @@ fn a_client_that_does_not_read_delays_no_other_and_then_receives_the_newest_stat
 fn a_client_can_observe_and_control_playback() {
     let second_ns = 1_000_000_000;
     let recording =
-        Recording { epoch_ns: 5 * second_ns, rate_hz: 240, first_step: 0, last_step: 480 };
+        RecordingTimes { epoch_ns: 5 * second_ns, rate_hz: 240, first_step: 0, last_step: 480 };
     let mut site = Site::start(FoxgloveOptions { recording: Some(recording), ..options() });
     let (mut client, server) = Client::start(&site.url);
     let capabilities: Vec<String> = serde_json::from_value(server["capabilities"].clone()).unwrap();
@@ -422,7 +438,7 @@ fn a_client_can_observe_and_control_playback() {
         })
     };
     let paused = Playback { is_playing: false, rate: 1.0, is_looping: false, step: 0, time_s: 0.0 };
-    site.hub.latch(Slot::Playback, &ToPage::Playback(paused));
+    site.sinks.publish(&Update::Playback(&paused));
     assert_eq!(state(&mut client), (1, 5 * second_ns, 1.0, false, String::new()));
     client.play(0, 2.0, Some(6 * second_ns), "seven");
     let commands = [(); 3].map(|()| site.command().2);
@@ -430,7 +446,7 @@ fn a_client_can_observe_and_control_playback() {
     assert_eq!(commands, [seek, Command::Rate { value: 2.0 }, Command::Resume {}]);
     assert_eq!(state(&mut client), (0, 6 * second_ns, 2.0, true, "seven".to_owned()));
     let ended = Playback { step: 480, rate: 2.0, ..paused };
-    site.hub.latch(Slot::Playback, &ToPage::Playback(ended));
+    site.sinks.publish(&Update::Playback(&ended));
     assert_eq!(state(&mut client), (3, 7 * second_ns, 2.0, false, String::new()));
     site.begin(2);
     client.subscribe(1, "/particles");

@@ -62,16 +62,16 @@ fn the_token_is_required_on_other_addresses_than_loopback() {
     let site = Site::listen("0.0.0.0:0");
     let token = site.url.split_once("#token=").unwrap().1.to_owned();
     for hello in [
-        r#"{"type":"hello","protocol":1}"#.to_owned(),
-        r#"{"type":"hello","protocol":1,"token":"0123456789abcdef0123456789abcdef"}"#.to_owned(),
-        format!(r#"{{"type":"hello","protocol":1,"token":"{}"}}"#, &token[..31]),
+        r#"{"type":"hello","protocol":2}"#.to_owned(),
+        r#"{"type":"hello","protocol":2,"token":"0123456789abcdef0123456789abcdef"}"#.to_owned(),
+        format!(r#"{{"type":"hello","protocol":2,"token":"{}"}}"#, &token[..31]),
     ] {
         let mut page = site.silent_page();
         page.say(&hello);
         assert_eq!(page.close_code(), Some(4401), "{hello}");
     }
     let mut page = site.silent_page();
-    page.say(&format!(r#"{{"type":"hello","protocol":1,"token":"{token}"}}"#));
+    page.say(&format!(r#"{{"type":"hello","protocol":2,"token":"{token}"}}"#));
     assert_eq!(page.text()["type"], "hello");
 }
 

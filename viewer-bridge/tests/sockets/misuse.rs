@@ -7,10 +7,11 @@ use std::time::Duration;
 
 use serde_json::json;
 use tungstenite::Message;
-use viewer_bridge::message::ToPage;
-use viewer_bridge::source::Ask;
+use viewer_bridge::message::Level;
+use viewer_bridge::request::RequestKind;
+use viewer_bridge::sink::Update;
 
-use crate::support::{Site, filler, wait_for};
+use crate::support::{Site, wait_for};
 
 #[test]
 fn a_first_message_other_than_hello_ends_the_connection() {
@@ -20,7 +21,7 @@ fn a_first_message_other_than_hello_ends_the_connection() {
         ("hello", 4400),
         (r#"{"type":"pause"}"#, 4400),
         (r#"{"type":"hello"}"#, 4400),
-        (r#"{"type":"hello","protocol":2}"#, 4426),
+        (r#"{"type":"hello","protocol":1}"#, 4426),
     ] {
         let mut page = site.silent_page();
         page.say(text);
@@ -37,8 +38,8 @@ fn a_malformed_message_ends_the_connection() {
         "[]",
         r#"{"type":"dance"}"#,
         r#"{"type":"pin","particle":1,"colour":2}"#,
-        r#"{"type":"drag_move","particle":1,"target":["nan",0,0]}"#,
-        r#"{"type":"hello","protocol":1}"#,
+        r#"{"type":"move","particle":1,"target":["nan",0,0]}"#,
+        r#"{"type":"hello","protocol":2}"#,
     ] {
         let mut page = site.page();
         page.say(text);
@@ -61,7 +62,7 @@ fn a_message_that_is_too_long_ends_the_connection() {
     let code = page.close_code();
     assert!(code.is_none_or(|code| code == 1009), "{code:?}");
     site.wait_for_clients(1);
-    site.hub.broadcast(&ToPage::Reset { step: 1 });
+    site.publish(&Update::Reset { step: 1 });
     assert_eq!(other.text_of("reset")["step"], 1);
 }
 
@@ -83,20 +84,20 @@ fn a_flood_ends_the_connection() {
 fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
     let site = Site::start();
     let mut page = site.page();
-    page.say(r#"{"type":"drag_begin","particle":1,"target":[0,1e8,0],"id":5}"#);
+    page.say(r#"{"type":"grab","particle":1,"target":[0,1e8,0],"id":5}"#);
     let outcome = page.text_of("outcome");
     assert_eq!(
         outcome,
         json!({
-            "type": "outcome", "id": 5, "kind": "drag_begin", "status": "rejected", "step": null,
+            "type": "outcome", "id": 5, "kind": "grab", "status": "rejected", "step": null,
             "applied": 0, "rejected": 1, "reason": "out_of_range",
-            "text": "a value is out of its range",
+            "text": "a value is out of range",
         })
     );
     page.say(r#"{"type":"pin","particle":1,"id":6}"#);
     wait_for("the command", || {
         let request = site.requests.next(Duration::ZERO)?;
-        matches!(request.ask, Ask::Command { id: Some(6), .. }).then_some(())
+        matches!(request.kind, RequestKind::Command { id: Some(6), .. }).then_some(())
     });
 }
 
@@ -121,9 +122,10 @@ fn a_page_that_leaves_reliable_messages_unread_is_disconnected_and_others_receiv
     let mut reader = site.page();
     let _stalled = site.page();
     // More than the socket buffers and the queue can hold.
+    let text = "x".repeat(64 << 10);
     for _ in 0..1000 {
-        site.hub.broadcast_binary(filler(64 << 10));
-        while !matches!(reader.next().unwrap(), Message::Binary(_)) {}
+        site.publish(&Update::Notice { level: Level::Info, text: &text });
+        assert_eq!(reader.text_of("notice")["text"], text);
     }
     assert_eq!(site.hub.client_count(), 1);
 }

@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
-use bytes::Bytes;
+use recorder::StepRow;
 use serde_json::Value;
 use sim_contract::ParticleState;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
@@ -16,10 +16,11 @@ use tungstenite::protocol::CloseFrame;
 use tungstenite::{Message, WebSocket};
 use viewer_bridge::message::Mode;
 use viewer_bridge::pages::assets::Assets;
-use viewer_bridge::shown_state::Stage;
-use viewer_bridge::source::Requests;
-use viewer_bridge::wire::{self, FrameHead, Scene, Stamp, decode};
-use viewer_bridge::{Hub, Server, ServerOptions};
+use viewer_bridge::request::{Requests, requests};
+use viewer_bridge::sink::{State, Update};
+use viewer_bridge::source::shown_state::ShownState;
+use viewer_bridge::wire::{self, Scene, decode};
+use viewer_bridge::{Hub, Server, ServerOptions, Shutdown, Sinks};
 
 /// Limit on every wait. It is generous, because the machine may be busy.
 const DEADLINE: Duration = Duration::from_mins(1);
@@ -27,10 +28,12 @@ const DEADLINE: Duration = Duration::from_mins(1);
 /// A running server. Dropping it ends the server.
 pub(crate) struct Site {
     pub(crate) hub: Arc<Hub>,
+    pub(crate) sinks: Sinks,
+    pub(crate) shutdown: Shutdown,
     pub(crate) requests: Requests,
     pub(crate) address: SocketAddr,
     pub(crate) url: String,
-    pub(crate) stage: Stage,
+    pub(crate) shown: ShownState,
     _runtime: Runtime,
 }
 
@@ -47,12 +50,16 @@ impl Site {
             assets: Assets::Embedded,
         };
         let server = runtime.block_on(Server::bind(options)).unwrap();
-        let (hub, requests) = Hub::new(Mode::Live);
-        let (hub, url) = (Arc::new(hub), server.url());
+        let (sender, requests) = requests();
+        let shutdown = Shutdown::default();
+        let (hub, url) = (Arc::new(Hub::new(Mode::Live, sender)), server.url());
+        let mut sinks = Sinks::new(shutdown.clone());
+        sinks.add(Arc::<Hub>::clone(&hub));
         let port = url.rsplit(':').next().unwrap().split('/').next().unwrap();
         let address = SocketAddr::from(([127, 0, 0, 1], port.parse().unwrap()));
-        runtime.spawn(server.serve(Arc::clone(&hub)));
-        Self { hub, requests, address, url, stage: Stage::default(), _runtime: runtime }
+        runtime.spawn(server.serve(Arc::clone(&hub), shutdown.clone()));
+        let shown = ShownState::default();
+        Self { hub, sinks, shutdown, requests, address, url, shown, _runtime: runtime }
     }
 
     /// Returns the request of a browser when a page of `origin` opens a socket.
@@ -86,7 +93,7 @@ impl Site {
     /// Opens a page, and reads the server's `hello`.
     pub(crate) fn page(&self) -> Page {
         let mut page = self.silent_page();
-        page.say(r#"{"type":"hello","protocol":1}"#);
+        page.say(r#"{"type":"hello","protocol":2}"#);
         assert_eq!(page.text()["type"], "hello");
         page
     }
@@ -105,14 +112,17 @@ impl Site {
     /// Shows a scene with `particle_count` particles.
     pub(crate) fn begin(&mut self, particle_count: usize) {
         let scene = Scene { positions: vec![[0.0; 3]; particle_count], ..Scene::default() };
-        self.stage.begin(&self.hub, scene);
+        self.shown.begin_load(&self.sinks, scene);
     }
 
     /// Shows a frame of a step.
     pub(crate) fn show(&mut self, step: u64, particle_count: usize) {
-        let head = FrameHead { stamp: Stamp { epoch: 0, step }, ..FrameHead::default() };
         let particles = vec![ParticleState::default(); particle_count];
-        self.stage.show(&self.hub, head, &particles);
+        self.shown.show(&self.sinks, state(step, &particles));
+    }
+
+    pub(crate) fn publish(&self, update: &Update<'_>) {
+        self.sinks.publish(update);
     }
 
     pub(crate) fn wait_for_clients(&self, count: usize) {
@@ -122,7 +132,19 @@ impl Site {
 
 impl Drop for Site {
     fn drop(&mut self) {
-        self.hub.close();
+        self.shutdown.begin();
+    }
+}
+
+/// The state after a step.
+pub(crate) fn state(step: u64, particles: &[ParticleState]) -> State<'_> {
+    State {
+        epoch: 0,
+        row: StepRow { step, ..StepRow::default() },
+        sim_time_s: 0.0,
+        flags: 0,
+        publish_monotonic_ns: 0,
+        particles,
     }
 }
 
@@ -214,9 +236,4 @@ pub(crate) fn wait_for<T>(what: &str, mut condition: impl FnMut() -> Option<T>) 
         assert!(monotonic_ns() < end_ns, "waited {DEADLINE:?} for {what}");
         sleep_until(monotonic_ns() + SECOND_NS / 500);
     }
-}
-
-/// A message of a given size with meaningless content.
-pub(crate) fn filler(size_bytes: usize) -> Bytes {
-    Bytes::from(vec![0; size_bytes])
 }

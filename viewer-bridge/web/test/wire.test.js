@@ -21,7 +21,7 @@ const readers = {
     ends: Array.from({ length: m.constraintCount }, (_, i) => [m.ends[2 * i], m.ends[2 * i + 1]]),
     min: m.min, max: m.max, origin: m.origin, rate_hz: m.rateHz,
     flags: (m.isPlanar ? 1 : 0) | (m.canTear ? 2 : 0) | (m.hasTethers ? 4 : 0) | (m.isPbd ? 8 : 0),
-    text: { name: m.name, unit: m.unit, up: m.up, run_id: m.runId, grids: m.grids },
+    text: { name: m.name, unit: m.unit, up: m.up, run_id: m.runId },
   }),
   frame: (m) => ({
     sim_time_s: m.simTime, number: m.number, torn_count: m.tornCount, solve_us: m.solveUs, wake_late_us: m.wakeLateUs,
@@ -29,7 +29,7 @@ const readers = {
     flags: (m.isPaused ? 1 : 0) | (m.isReplay ? 2 : 0) | (m.isSaturated ? 4 : 0),
     positions: Array.from({ length: m.particleCount }, (_, i) => [0, 1, 2].map((k) => m.lo[k] + m.scale[k] * m.positions[3 * i + k])),
   }),
-  tear: (m) => ({ first: m.first, constraints: [...m.constraints], causes: [...m.causes] }),
+  tear: (m) => ({ first: m.first, constraints: [...m.constraints] }),
   pins: (m) => ({ held: [...m.particles].map((particle, i) => [particle, m.flags[i]]) }),
   stats: (m) => ({
     solve_us: [m.solveUsP50, m.solveUsP99], wake_late_us: [m.wakeLateUsP50, m.wakeLateUsP99], period_us: m.deadlineUs,

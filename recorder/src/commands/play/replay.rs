@@ -137,7 +137,8 @@ impl Replay {
                 self.publish_keyframe(*step, bytes)?;
             }
             Message::Outcome(row) => {
-                self.owner.publish_outcome(&Outcome::from(row))?;
+                let outcome = Outcome { run_id: self.run_id, ..Outcome::from(row) };
+                self.owner.publish_outcome(&outcome)?;
                 self.owner.wake(Wake::Outcome);
             }
             Message::Status(row) => self.status = Some(row.clone()),
@@ -224,6 +225,7 @@ impl Replay {
             let result = self.control.obey(command.action());
             let index = self.position.outcome_count;
             let mut outcome = Outcome::new(index, next_step, command, result);
+            outcome.run_id = self.run_id;
             outcome.flags = sim_contract::OUTCOME_FLAG_CONTROL;
             self.owner.publish_outcome(&outcome)?;
             self.owner.wake(Wake::Outcome);

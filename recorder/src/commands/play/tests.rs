@@ -172,7 +172,7 @@ fn a_name_in_use_is_refused() {
         parameters: sim_contract::ParameterValues::default(),
     };
     let error = Owner::create(&domain.endpoint(), &load).unwrap_err();
-    assert!(error.to_string().contains("is running already"), "{error}");
+    assert!(error.to_string().contains("is already running"), "{error}");
 }
 
 #[test]

@@ -117,7 +117,8 @@ mod tests {
 
     /// A list in which even constraints were cut and odd ones stretched.
     fn list(step: u64, since_step: u64, torn: &[u32]) -> TearList {
-        let cause = |one: u32| if one % 2 == 0 { TearCause::Cut } else { TearCause::Stretch };
+        let cause =
+            |one: u32| if one.is_multiple_of(2) { TearCause::Cut } else { TearCause::Stretch };
         let header = TearsHeader { run_id: RUN_ID, step, since_step, new_count: 1, count: 0 };
         let torn = torn.iter().map(|one| TornConstraint::new(*one, Some(cause(*one)))).collect();
         TearList { header, torn }

@@ -5,7 +5,7 @@ use std::thread;
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    Action, COMMANDS_BUFFERED, CONSOLE_CLIENT_ID, Client, Endpoint, Outcome, Owner, OwnerSeen,
+    Action, COMMANDS_BUFFERED, CONSOLE_CLIENT_ID, Client, Endpoint, Outcome, Owner, OwnerState,
     RequestError,
 };
 
@@ -102,7 +102,7 @@ fn a_command_that_nobody_takes_times_out_and_says_that_no_node_answers() {
     );
     drop(owner);
     let error = client.request(PIN, MOMENT).unwrap_err();
-    let RequestError::NobodyListens { owner: OwnerSeen::Gone { .. } } = &error else {
+    let RequestError::NoReceiver { owner: OwnerState::Gone { .. } } = &error else {
         panic!("{error}");
     };
     assert_eq!(
@@ -123,7 +123,10 @@ fn a_command_that_cannot_be_queued_is_an_error_and_those_before_it_are_kept() {
         client.send(PIN).unwrap();
     }
     let error = client.send(RELEASE).unwrap_err();
-    assert!(matches!(error, RequestError::QueueFull { owner: OwnerSeen::Alive { .. } }), "{error}");
+    assert!(
+        matches!(error, RequestError::QueueFull { owner: OwnerState::Alive { .. } }),
+        "{error}"
+    );
     let commands = received(&owner);
     let expected: Vec<_> = (1..=COMMANDS_BUFFERED as u64).map(|number| (5, number, PIN)).collect();
     assert_eq!(commands, expected);

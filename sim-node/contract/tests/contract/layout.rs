@@ -127,7 +127,7 @@ fn lay_out_commands_and_status(text: &mut String) {
             spare,
         }
     );
-    layout!(text, Outcome { index, step, status, reason, flags, spare, command });
+    layout!(text, Outcome { run_id, index, step, status, reason, flags, spare, command });
     layout!(
         text,
         NodeStatus {

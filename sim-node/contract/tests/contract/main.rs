@@ -7,4 +7,5 @@ mod layout;
 mod load;
 mod ownership;
 mod readers;
+mod states;
 mod support;

@@ -23,7 +23,7 @@ fn a_second_owner_is_refused_and_told_who_has_the_name() {
     assert_eq!(
         text,
         format!(
-            "'sim' in domain '{domain_name}' is running already, as process {process}: stop that \
+            "'sim' in domain '{domain_name}' is already running, as process {process}: stop that \
              one, or choose another --name or --domain"
         )
     );

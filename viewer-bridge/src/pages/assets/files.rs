@@ -1,13 +1,13 @@
 //! The table of the page's files.
 
-/// Each path with the content of that file; one that is missing does not compile.
+/// Pairs each path with the content of the file. A missing file does not compile.
 macro_rules! files {
     ($($path:literal),* $(,)?) => {
         &[$(($path, include_str!(concat!("../../../web/", $path)))),*]
     };
 }
 
-/// The page's files: path and content.
+/// The files of the page: path and content.
 pub(super) const FILES: &[(&str, &str)] = files![
     "app.css",
     "index.html",

@@ -1,125 +1,123 @@
-//! Commands on their way: from pages to the node, and their outcomes back.
+//! Sends the clients' commands to the node, and the outcomes back.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{Action, Client, Outcome, RequestError};
+use sim_contract::{Action, Client, Outcome, Reason, RequestError};
 
-use super::actions::{Context, actions};
-use crate::limits::{COMMANDS_QUEUED_MAX, OUTCOME_TIMEOUT, PARTICLES_HELD_MAX};
-use crate::message::reason;
-use crate::message::{Command, OutcomeText, Status, ToPage};
-use crate::pages::hub::Hub;
+use super::actions::actions;
+use super::command_context::CommandContext;
+use crate::limits::{COMMANDS_QUEUED_MAX, GRABS_PER_CLIENT_MAX, OUTCOME_TIMEOUT};
+use crate::message::{Command, OutcomeText, Refusal, Status};
+use crate::request::ClientId;
+use crate::sink::{Sinks, Update};
 
-/// Commands on their way, and what pages hold. All pages are one client of the node: who of them
-/// holds a particle is known here only.
+/// Open commands and grabs. The node sees all clients as one, so only the bridge knows which of them
+/// grabs a particle.
 #[derive(Debug, Default)]
 pub(super) struct Dispatch {
-    /// Which page holds a particle, or will when the node has applied what is on its way.
-    holders: BTreeMap<u32, Holder>,
-    /// Unanswered commands by number, ascending in time.
-    tickets: BTreeMap<u64, Ticket>,
-    last_ticket: u64,
-    /// What has not been sent yet.
+    /// Grabs by particle, including those that the node has not applied yet.
+    grabs: BTreeMap<u32, GrabOwner>,
+    /// Open commands by number, ascending in time.
+    open: BTreeMap<u64, OpenCommand>,
+    last_command: u64,
+    /// Actions that wait for room in the node's queue.
     outbox: VecDeque<Part>,
-    /// What has no outcome yet, by the sequence number that the node was told.
+    /// Actions without an outcome, by their sequence number.
     sent: BTreeMap<u64, Part>,
 }
 
-/// Who holds a particle.
+/// The owner of a grab.
 #[derive(Debug, Clone, Copy)]
-struct Holder {
-    client: u32,
-    /// The node has said so. Until then a reset does not end it: the grab may come after.
+struct GrabOwner {
+    client: ClientId,
+    /// The node has applied the grab. Until then a reset does not end it, because the grab may come
+    /// after the reset.
     is_applied: bool,
 }
 
-/// An action, and the command that it is a part of.
+/// An action of a command.
 #[derive(Debug, Clone, Copy)]
 struct Part {
-    /// None where nobody waits for the outcome.
-    ticket: Option<u64>,
+    /// Number of the command; `None` if no client waits for the outcome.
+    command: Option<u64>,
     action: Action,
 }
 
-/// A command that a page waits for.
+/// A command whose client waits for the answer.
 #[derive(Debug)]
-struct Ticket {
-    client: u32,
+struct OpenCommand {
+    client: ClientId,
     deadline_ns: u64,
-    /// Actions without an outcome.
-    open: usize,
+    /// Number of its actions without an outcome.
+    open_count: usize,
     outcome: OutcomeText,
 }
 
+/// The outcome of an action.
+#[derive(Debug, Clone, Copy)]
+struct PartOutcome {
+    /// First step that shows it.
+    step: Option<u64>,
+    result: Result<(), Refusal>,
+}
+
 impl Dispatch {
-    /// Takes a command of a page.
-    pub(super) fn take(
+    /// Accepts a command of a client. Returns the answer if it is known at once.
+    pub(super) fn submit(
         &mut self,
-        client: u32,
+        client: ClientId,
         id: Option<u32>,
         command: Command,
-        context: Context<'_>,
-    ) -> Option<(u32, OutcomeText)> {
+        context: CommandContext<'_>,
+    ) -> Option<OutcomeText> {
         let kind = command.name();
-        let mut outcome = OutcomeText {
-            id,
-            kind,
-            status: Status::Applied,
-            step: None,
-            applied: 0,
-            rejected: 0,
-            reason: "",
-            text: String::new(),
-        };
-        let parts = self.hold(client, &command).and_then(|()| actions(command, context));
-        match parts {
-            Err(reason) => {
-                refuse(&mut outcome, reason);
-                outcome.status = Status::Rejected;
-                Some((client, outcome))
-            }
-            Ok(parts) if parts.is_empty() => id.map(|_| (client, outcome)),
+        match self.update_grabs(client, &command).and_then(|()| actions(command, context)) {
+            Err(reason) => Some(OutcomeText::refused(id, kind, reason)),
+            Ok(parts) if parts.is_empty() => id.map(|_| OutcomeText::pending(id, kind)),
             Ok(parts) => {
-                self.last_ticket += 1;
-                let number = self.last_ticket;
-                let timeout_ns = u64::try_from(OUTCOME_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
-                let deadline_ns = monotonic_ns() + timeout_ns;
-                let ticket = Ticket { client, deadline_ns, open: parts.len(), outcome };
-                self.tickets.insert(number, ticket);
-                self.outbox
-                    .extend(parts.into_iter().map(|action| Part { ticket: Some(number), action }));
+                self.open_command(client, OutcomeText::pending(id, kind), parts);
                 None
             }
         }
     }
 
-    /// Keeps the book of who holds what.
-    fn hold(&mut self, client: u32, command: &Command) -> Result<(), &'static str> {
+    fn open_command(&mut self, client: ClientId, outcome: OutcomeText, parts: Vec<Action>) {
+        self.last_command += 1;
+        let number = self.last_command;
+        let timeout_ns = u64::try_from(OUTCOME_TIMEOUT.as_nanos()).unwrap_or(u64::MAX);
+        let deadline_ns = monotonic_ns() + timeout_ns;
+        let command = OpenCommand { client, deadline_ns, open_count: parts.len(), outcome };
+        self.open.insert(number, command);
+        let parts = parts.into_iter().map(|action| Part { command: Some(number), action });
+        self.outbox.extend(parts);
+    }
+
+    /// Notes a client's grabs, and refuses to touch those of others.
+    fn update_grabs(&mut self, client: ClientId, command: &Command) -> Result<(), Refusal> {
         if self.outbox.len() >= COMMANDS_QUEUED_MAX {
-            return Err(reason::BUSY);
+            return Err(Refusal::Busy);
         }
-        let holder = |particle: &u32| self.holders.get(particle).map(|holder| holder.client);
+        let owner = |particle: &u32| self.grabs.get(particle).map(|grab| grab.client);
         match command {
-            Command::DragBegin { particle, .. } => {
-                if holder(particle).is_some_and(|other| other != client) {
-                    return Err("grabbed_by_other");
+            Command::Grab { particle, .. } => {
+                if owner(particle).is_some_and(|other| other != client) {
+                    return Err(Reason::GrabbedByOther.into());
                 }
-                let held = self.holders.values().filter(|one| one.client == client).count();
-                if held >= PARTICLES_HELD_MAX && holder(particle).is_none() {
-                    return Err(reason::TOO_MANY_HELD);
+                let count = self.grabs.values().filter(|grab| grab.client == client).count();
+                if count >= GRABS_PER_CLIENT_MAX && owner(particle).is_none() {
+                    return Err(Refusal::TooManyGrabs);
                 }
-                let holder = Holder { client, is_applied: false };
-                self.holders.entry(*particle).or_insert(holder);
+                self.grabs.entry(*particle).or_insert(GrabOwner { client, is_applied: false });
             }
-            Command::DragMove { particle, .. } | Command::DragEnd { particle } => {
-                match holder(particle) {
-                    None => return Err("not_grabbed"),
-                    Some(other) if other != client => return Err("grabbed_by_other"),
+            Command::Move { particle, .. } | Command::Release { particle } => {
+                match owner(particle) {
+                    None => return Err(Reason::NotGrabbed.into()),
+                    Some(other) if other != client => return Err(Reason::GrabbedByOther.into()),
                     Some(_) => {}
                 }
-                if matches!(command, Command::DragEnd { .. }) {
-                    self.holders.remove(particle);
+                if matches!(command, Command::Release { .. }) {
+                    self.grabs.remove(particle);
                 }
             }
             _ => {}
@@ -127,27 +125,27 @@ impl Dispatch {
         Ok(())
     }
 
-    /// A page has gone: what it holds is let go.
-    pub(super) fn leave(&mut self, client: u32) {
-        let held = self.holders.extract_if(.., |_, holder| holder.client == client);
-        self.outbox.extend(held.map(|(particle, _)| release(particle)));
-        self.tickets.retain(|_, ticket| ticket.client != client);
+    /// Ends the grabs of a client that has left, and drops its open commands.
+    pub(super) fn remove_client(&mut self, client: ClientId) {
+        let grabs = self.grabs.extract_if(.., |_, grab| grab.client == client);
+        self.outbox.extend(grabs.map(|(particle, _)| release(particle)));
+        self.open.retain(|_, command| command.client != client);
     }
 
-    /// All pages go: what they hold is let go.
+    /// Ends all grabs.
     pub(super) fn release_all(&mut self) {
-        let held = std::mem::take(&mut self.holders);
-        self.outbox.extend(held.into_keys().map(release));
+        let grabs = std::mem::take(&mut self.grabs);
+        self.outbox.extend(grabs.into_keys().map(release));
     }
 
-    /// Whether the node has yet to let go of something.
+    /// Returns whether a release is still without an outcome.
     pub(super) fn is_releasing(&self) -> bool {
-        let mut on_their_way = self.outbox.iter().chain(self.sent.values());
-        on_their_way.any(|part| matches!(part.action, Action::Release { .. }))
+        let mut pending = self.outbox.iter().chain(self.sent.values());
+        pending.any(|part| matches!(part.action, Action::Release { .. }))
     }
 
-    /// Hands the node as much as it takes.
-    pub(super) fn flush(&mut self, node: &mut Client, hub: &Hub) {
+    /// Sends as many actions as the node's queue accepts.
+    pub(super) fn flush(&mut self, node: &mut Client, sinks: &Sinks) {
         while let Some(part) = self.outbox.pop_front() {
             match node.send(part.action) {
                 Ok(sequence) => {
@@ -158,109 +156,113 @@ impl Dispatch {
                     return;
                 }
                 Err(_) => {
-                    self.forget_unsent(part.action);
-                    self.close_part(hub, part.ticket, None, Err(reason::NO_NODE));
+                    self.forget_unsent_grab(part.action);
+                    let outcome = PartOutcome { step: None, result: Err(Refusal::NoNode) };
+                    self.close_part(sinks, part.command, outcome);
                 }
             }
         }
     }
 
-    /// Takes the outcome of what this bridge sent.
-    pub(super) fn take_outcome(&mut self, hub: &Hub, outcome: &Outcome) {
-        let ticket = self.answered(outcome.command.sequence);
-        let result = if outcome.is_applied() { Ok(()) } else { Err(outcome.reason_name()) };
+    /// Handles the outcome of an action that this bridge sent.
+    pub(super) fn on_outcome(&mut self, sinks: &Sinks, outcome: &Outcome) {
+        let command = self.remove_sent(outcome.command.sequence);
+        let result = match Reason::from_number(outcome.reason) {
+            _ if outcome.is_applied() => Ok(()),
+            Some(reason) => Err(reason.into()),
+            None => Err(Refusal::Unknown),
+        };
         match outcome.command.action() {
-            Action::Grab { particle, .. } if result.is_err() => self.forget_unless_held(particle),
-            // Where nobody holds it, what lets it go is on its way already.
-            Action::Grab { particle, .. } => self.set_applied(particle, true),
-            Action::Release { particle } => self.set_applied(particle, false),
+            Action::Grab { particle, .. } if result.is_err() => self.forget_lost_grab(particle),
+            // If the grab has no owner, its release has been sent already.
+            Action::Grab { particle, .. } => {
+                if let Some(grab) = self.grabs.get_mut(&particle) {
+                    grab.is_applied = true;
+                }
+            }
+            Action::Release { particle } => {
+                if let Some(grab) = self.grabs.get_mut(&particle) {
+                    grab.is_applied = false;
+                }
+            }
             _ => {}
         }
-        self.close_part(hub, ticket, Some(outcome.step), result);
+        self.close_part(sinks, command, PartOutcome { step: Some(outcome.step), result });
     }
 
-    /// The ticket of what the node has answered. It answers in the order of sending: what was sent
-    /// before has been answered as well, and that was missed.
-    fn answered(&mut self, sequence: u64) -> Option<u64> {
+    /// Removes an answered action and returns the number of its command. The node answers in the order
+    /// of sending, so the answers to earlier actions were missed; they are removed as well.
+    fn remove_sent(&mut self, sequence: u64) -> Option<u64> {
         let mut later = self.sent.split_off(&sequence);
         let part = later.remove(&sequence);
         self.sent = later;
-        part?.ticket
+        part?.command
     }
 
-    fn set_applied(&mut self, particle: u32, is_applied: bool) {
-        if let Some(holder) = self.holders.get_mut(&particle) {
-            holder.is_applied = is_applied;
+    /// Ends the grabs that the node had applied before a reset or a load. The node answers in the order
+    /// of application, so a grab without an answer comes after it.
+    pub(super) fn end_applied_grabs(&mut self) {
+        for grab in self.grabs.values_mut() {
+            grab.is_applied = false;
         }
-    }
-
-    /// The state is another one: nobody holds anything any more, but for what is grabbed after it.
-    /// The node answers in the order of application: what it has not answered comes after.
-    pub(super) fn forget_holders(&mut self) {
-        for holder in self.holders.values_mut() {
-            holder.is_applied = false;
-        }
-        let particles: Vec<_> = self.holders.keys().copied().collect();
+        let particles: Vec<_> = self.grabs.keys().copied().collect();
         for particle in particles {
-            self.forget_unless_held(particle);
+            self.forget_lost_grab(particle);
         }
     }
 
-    /// A grab has come to nothing: unless another one did or may, nobody holds the particle.
-    fn forget_unless_held(&mut self, particle: u32) {
-        let is_applied = self.holders.get(&particle).is_some_and(|holder| holder.is_applied);
-        let grabs = |part: &Part| matches!(part.action, Action::Grab { particle: grabbed, .. } if grabbed == particle);
-        if !is_applied && !self.sent.values().chain(&self.outbox).any(grabs) {
-            self.holders.remove(&particle);
+    /// Forgets the owner of a grab that failed or ended, unless another grab of the particle was
+    /// applied or is on its way.
+    fn forget_lost_grab(&mut self, particle: u32) {
+        let is_applied = self.grabs.get(&particle).is_some_and(|grab| grab.is_applied);
+        let is_grab = |part: &Part| matches!(part.action, Action::Grab { particle: grabbed, .. } if grabbed == particle);
+        if !is_applied && !self.sent.values().chain(&self.outbox).any(is_grab) {
+            self.grabs.remove(&particle);
         }
     }
 
-    fn close_part(
-        &mut self,
-        hub: &Hub,
-        number: Option<u64>,
-        step: Option<u64>,
-        result: Result<(), &'static str>,
-    ) {
+    /// Adds the outcome of an action to its command. Answers the command after the last one.
+    fn close_part(&mut self, sinks: &Sinks, number: Option<u64>, part: PartOutcome) {
         let Some(number) = number else { return };
-        let Some(ticket) = self.tickets.get_mut(&number) else { return };
-        let outcome = &mut ticket.outcome;
-        outcome.step = outcome.step.max(step);
-        match result {
+        let Some(command) = self.open.get_mut(&number) else { return };
+        let outcome = &mut command.outcome;
+        outcome.step = outcome.step.max(part.step);
+        match part.result {
             Ok(()) => outcome.applied += 1,
-            Err(reason) => refuse(outcome, reason),
+            Err(reason) => outcome.reject_part(reason),
         }
-        ticket.open -= 1;
-        if ticket.open == 0
-            && let Some(ticket) = self.tickets.remove(&number)
+        command.open_count -= 1;
+        if command.open_count == 0
+            && let Some(command) = self.open.remove(&number)
         {
-            ticket.answer(hub);
+            command.answer(sinks);
         }
     }
 
-    /// Answers what the node has not, for too long or for ever.
-    pub(super) fn expire(&mut self, hub: &Hub, now_ns: u64) {
-        while let Some(first) = self.tickets.first_entry()
+    /// Answers the commands whose deadline has passed.
+    pub(super) fn expire(&mut self, sinks: &Sinks, now_ns: u64) {
+        while let Some(first) = self.open.first_entry()
             && first.get().deadline_ns <= now_ns
         {
-            let (number, mut ticket) = first.remove_entry();
+            let (number, mut command) = first.remove_entry();
             self.withdraw(number);
-            if ticket.outcome.applied + ticket.outcome.rejected == 0 {
-                ticket.outcome.status = Status::Unanswered;
+            if command.outcome.applied + command.outcome.rejected == 0 {
+                command.outcome.status = Status::Unanswered;
             }
-            explain(&mut ticket.outcome, reason::NO_ANSWER);
-            ticket.answer(hub);
+            command.outcome.explain(Refusal::NoAnswer);
+            command.answer(sinks);
         }
     }
 
-    /// Sends no more of a command, but for what lets go of a particle: nobody else would.
+    /// Drops the unsent actions of a command, except releases: no other client can release the
+    /// particles.
     fn withdraw(&mut self, number: u64) {
         let mut withdrawn = Vec::new();
         self.outbox.retain_mut(|part| {
-            if part.ticket != Some(number) {
+            if part.command != Some(number) {
                 return true;
             }
-            part.ticket = None;
+            part.command = None;
             let is_release = matches!(part.action, Action::Release { .. });
             if !is_release {
                 withdrawn.push(part.action);
@@ -268,43 +270,29 @@ impl Dispatch {
             is_release
         });
         for action in withdrawn {
-            self.forget_unsent(action);
+            self.forget_unsent_grab(action);
         }
     }
 
-    /// An action will not be sent: nobody holds what it would have grabbed.
-    fn forget_unsent(&mut self, action: Action) {
+    fn forget_unsent_grab(&mut self, action: Action) {
         if let Action::Grab { particle, .. } = action {
-            self.forget_unless_held(particle);
+            self.forget_lost_grab(particle);
         }
     }
 }
 
-impl Ticket {
-    fn answer(mut self, hub: &Hub) {
+impl OpenCommand {
+    fn answer(mut self, sinks: &Sinks) {
         if self.outcome.status == Status::Applied && self.outcome.applied == 0 {
             self.outcome.status = Status::Rejected;
         }
         if self.outcome.id.is_some() || self.outcome.status != Status::Applied {
-            hub.send(self.client, &ToPage::Outcome(self.outcome));
+            sinks.publish(&Update::Answer { client: self.client, outcome: &self.outcome });
         }
     }
 }
 
-/// Lets go of a particle for whoever cannot ask for it any more.
+/// Releases a particle whose client cannot do it.
 fn release(particle: u32) -> Part {
-    Part { ticket: None, action: Action::Release { particle } }
-}
-
-fn refuse(outcome: &mut OutcomeText, reason: &'static str) {
-    outcome.rejected += 1;
-    explain(outcome, reason);
-}
-
-/// The first reason is told.
-fn explain(outcome: &mut OutcomeText, reason: &'static str) {
-    if outcome.reason.is_empty() {
-        outcome.reason = reason;
-        reason::text(reason).clone_into(&mut outcome.text);
-    }
+    Part { command: None, action: Action::Release { particle } }
 }

@@ -1,5 +1,5 @@
-//! Reads a recording once from its start, in a thread of its own: whether every state has its
-//! recorded hash, what happened when, and what was set.
+//! Reads a recording once from its start, in a thread of its own: compares every state with its recorded
+//! hash, and collects the marks of the timeline and the changes of parameters.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
@@ -12,67 +12,67 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Action, ParticleState};
 
 use super::marks::Marks;
-use super::settings_log::SettingsLog;
+use super::parameter_log::ParameterLog;
 use crate::message::{Hashes, Mark, MarkKind};
 
 /// Time between two reports.
 const REPORT_PERIOD_NS: u64 = SECOND_NS;
 
-/// What is known of a recording so far.
+/// The result so far.
 #[derive(Debug, Clone)]
 pub(super) struct Report {
     pub(super) marks: Vec<Mark>,
     pub(super) hashes: Hashes,
-    /// The same for the user.
+    /// The result of the hashes for the user.
     pub(super) hash_text: String,
-    /// What was set, once all of it is known.
-    pub(super) settings: Option<SettingsLog>,
+    /// Changes of parameters; `None` until the whole file is read.
+    pub(super) parameters: Option<ParameterLog>,
 }
 
-/// What is checked.
+/// A recording to check.
 #[derive(Debug)]
 pub(super) struct Job {
     pub(super) log: IndexedLog,
     pub(super) first: StepRow,
     pub(super) last_step: u64,
-    /// What was torn before the recording.
+    /// Constraints that were torn before the recording.
     pub(super) torn: TornList,
 }
 
-/// Reads to the end, or until it is asked to stop.
-pub(super) fn check(mut job: Job, reports: &Sender<Report>, is_over: &AtomicBool) {
+/// Reads to the end, or until it is cancelled.
+pub(super) fn check(mut job: Job, reports: &Sender<Report>, is_cancelled: &AtomicBool) {
     let mut check = Check::new(&job);
     let count = job.log.chunks().len();
     let mut next_report_ns = monotonic_ns() + REPORT_PERIOD_NS;
     for chunk in 0..count {
-        if is_over.load(Ordering::Relaxed) {
+        if is_cancelled.load(Ordering::Relaxed) {
             return;
         }
-        check.take_chunk(job.log.read_chunk(chunk));
+        check.add_chunk(job.log.read_chunk(chunk));
         if monotonic_ns() >= next_report_ns {
             next_report_ns = monotonic_ns() + REPORT_PERIOD_NS;
-            // Nobody who listens any more is the end as well; it is noticed above.
-            let _heard = reports.send(check.interim(chunk, count));
+            // The receiver only goes away after the cancellation.
+            let _sent = reports.send(check.interim(chunk, count));
         }
     }
-    let _heard = reports.send(check.finish(job.log.end()));
+    let _sent = reports.send(check.finish(job.log.end()));
 }
 
 #[derive(Debug)]
 struct Check {
     marks: Marks,
-    settings: SettingsLog,
+    parameters: ParameterLog,
     torn: TearTracker,
     row: Option<StepRow>,
-    /// A step that is late began later than this, in ns.
+    /// A step is late if it began later than this, in ns.
     period_ns: u64,
     equal_count: u64,
-    /// States whose hash could not be checked.
+    /// Number of states whose hash could not be checked.
     unknown_count: u64,
     different_count: u64,
     first_different: Option<u64>,
     damaged_count: u64,
-    /// The step that was read last.
+    /// The last step that was read.
     step: u64,
 }
 
@@ -81,7 +81,7 @@ impl Check {
         let first_step = job.first.step;
         Self {
             marks: Marks::new(first_step, job.last_step),
-            settings: SettingsLog::new(first_step, job.first.outcome_count),
+            parameters: ParameterLog::new(first_step, job.first.outcome_count),
             torn: TearTracker::new(job.torn.clone()),
             row: None,
             period_ns: SECOND_NS / u64::from(job.log.run().rate_hz.max(1)),
@@ -94,27 +94,27 @@ impl Check {
         }
     }
 
-    fn take_chunk(&mut self, read: Result<Vec<LoggedMessage>, ReadError>) {
+    fn add_chunk(&mut self, read: Result<Vec<LoggedMessage>, ReadError>) {
         let Ok(messages) = read else {
             self.damaged_count += 1;
             self.torn.mark_gap();
-            self.settings.add_gap(self.step + 1);
+            self.parameters.add_gap(self.step + 1);
             self.row = None;
             return;
         };
         for logged in &messages {
-            self.take(&logged.message);
+            self.add(&logged.message);
         }
     }
 
-    fn take(&mut self, message: &Message) {
+    fn add(&mut self, message: &Message) {
         self.torn.process(message);
         match message {
             Message::Tears(row) => {
                 let count = u32::try_from(row.constraints.len()).unwrap_or(u32::MAX);
                 self.marks.add(MarkKind::Tear, row.step, count);
             }
-            Message::Outcome(row) => self.take_outcome(row),
+            Message::Outcome(row) => self.add_outcome(row),
             Message::Step(row) => {
                 if row.wake_late_ns > self.period_ns {
                     self.marks.add(MarkKind::Late, row.step, 1);
@@ -126,8 +126,8 @@ impl Check {
         }
     }
 
-    fn take_outcome(&mut self, row: &OutcomeRow) {
-        self.settings.take(row);
+    fn add_outcome(&mut self, row: &OutcomeRow) {
+        self.parameters.add_outcome(row);
         if row.is_applied() {
             let kind = match row.action {
                 Action::Pin { .. } | Action::Unpin { .. } => MarkKind::Pin,
@@ -160,7 +160,7 @@ impl Check {
             marks: self.marks.list(),
             hashes: Hashes::Checking,
             hash_text: format!("checking hashes: {percent} %"),
-            settings: None,
+            parameters: None,
         }
     }
 
@@ -178,12 +178,12 @@ impl Check {
             text += &format!(", {} could not be checked", self.unknown_count);
         }
         if self.damaged_count > 0 {
-            text += &format!("; damaged chunks left out: {}", self.damaged_count);
+            text += &format!("; damaged chunks skipped: {}", self.damaged_count);
         }
         if *end != LogEnd::Complete {
             text += &format!("; the file is {end}");
         }
-        let (marks, settings) = (self.marks.list(), Some(self.settings));
-        Report { marks, hashes, hash_text: text, settings }
+        let (marks, parameters) = (self.marks.list(), Some(self.parameters));
+        Report { marks, hashes, hash_text: text, parameters }
     }
 }

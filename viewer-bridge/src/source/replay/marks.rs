@@ -1,4 +1,4 @@
-//! The marks of a timeline: those close together are added up, so that there is a limit to them.
+//! The marks of a timeline. Marks that are close together are merged, which limits their number.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use crate::message::{Mark, MarkKind};
 
 /// Kinds of marks.
 const KINDS: [MarkKind; 4] = [MarkKind::Tear, MarkKind::Pin, MarkKind::Command, MarkKind::Late];
-/// Most marks of a kind: more than a screen has pixels for.
+/// Marks of one kind: as many as a wide screen has pixels.
 const PER_KIND_MAX: u64 = (MARKS_MAX / KINDS.len()) as u64;
 
 /// The marks of a recording.
@@ -15,42 +15,55 @@ const PER_KIND_MAX: u64 = (MARKS_MAX / KINDS.len()) as u64;
 pub(super) struct Marks {
     first_step: u64,
     last_step: u64,
-    /// By stretch of the timeline and kind: the first step, and how many.
-    found: BTreeMap<(u64, usize), (u64, u32)>,
+    merged: BTreeMap<Place, Merged>,
+}
+
+/// A section of the timeline, and a kind by its index in [`KINDS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Place {
+    section: u64,
+    kind_index: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Merged {
+    first_step: u64,
+    count: u32,
 }
 
 impl Marks {
-    /// Between these steps.
+    /// Creates the marks of a timeline between these steps.
     pub(super) fn new(first_step: u64, last_step: u64) -> Self {
-        Self { first_step, last_step, found: BTreeMap::new() }
+        Self { first_step, last_step, merged: BTreeMap::new() }
     }
 
-    /// Adds some of a step. Those of steps behind the end are shown at the end.
+    /// Adds `count` events at a step. Events after the last step count as being at it.
     pub(super) fn add(&mut self, kind: MarkKind, step: u64, count: u32) {
         let step = step.clamp(self.first_step, self.last_step);
         let steps = u128::from(self.last_step - self.first_step) + 1;
-        let stretch = if steps <= u128::from(PER_KIND_MAX) {
+        let section = if steps <= u128::from(PER_KIND_MAX) {
             step - self.first_step
         } else {
-            let stretch = u128::from(step - self.first_step) * u128::from(PER_KIND_MAX) / steps;
-            u64::try_from(stretch).unwrap_or(PER_KIND_MAX - 1)
+            let section = u128::from(step - self.first_step) * u128::from(PER_KIND_MAX) / steps;
+            u64::try_from(section).unwrap_or(PER_KIND_MAX - 1)
         };
-        let place = KINDS.iter().position(|one| *one == kind).unwrap_or_default();
-        let (first, sum) = self.found.entry((stretch, place)).or_insert((step, 0));
-        *first = step.min(*first);
-        *sum = sum.saturating_add(count);
+        #[allow(clippy::expect_used, reason = "a miss is a fault of the list of kinds")]
+        let kind_index =
+            KINDS.iter().position(|one| *one == kind).expect("every kind is in the list");
+        let merged = self.merged.entry(Place { section, kind_index });
+        let merged = merged.or_insert(Merged { first_step: step, count: 0 });
+        merged.first_step = merged.first_step.min(step);
+        merged.count = merged.count.saturating_add(count);
     }
 
-    /// All of them, ascending by step.
+    /// All marks, ascending by step.
     pub(super) fn list(&self) -> Vec<Mark> {
-        let marks = self.found.iter();
-        let mut marks: Vec<_> = marks
-            .map(|((_, place), (step, count))| Mark {
-                kind: KINDS[*place],
-                step: *step,
-                count: *count,
-            })
-            .collect();
+        let marks = self.merged.iter().map(|(place, merged)| Mark {
+            kind: KINDS[place.kind_index],
+            step: merged.first_step,
+            count: merged.count,
+        });
+        let mut marks: Vec<_> = marks.collect();
         marks.sort_by_key(|mark| mark.step);
         marks
     }
@@ -75,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn however_many_there_are_the_list_is_short_ascending_and_counts_all() {
+    fn the_list_stays_short_and_ascending_and_counts_every_event() {
         let mut marks = Marks::new(5, 1_000_000);
         for step in (0..142_857).rev().map(|place| 5 + 7 * place) {
             for kind in KINDS {
@@ -90,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_up_to_the_greatest_number_have_a_place() {
+    fn the_largest_step_has_a_place() {
         let mut marks = Marks::new(0, u64::MAX);
         marks.add(MarkKind::Pin, u64::MAX, 1);
         assert_eq!(marks.list()[0].step, u64::MAX);

@@ -1,373 +1,345 @@
-//! Plays a recording for pages: obeys them, winds the tape to where the timeline stands, and shows
-//! what is there.
+//! Plays a recording: obeys the clients, moves to the place of the playhead, and shows its state.
 
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use recorder::{Message, ReadError, TapeState, Topic};
-use sim_contract::PlainF32;
+use recorder::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{ParameterValues, Reason, TornConstraint};
 
-use super::Replay;
 use super::check::Report;
-use super::playhead::{Passed, Playhead};
+use super::open::Recording;
+use super::parameter_log::LoggedParameters;
+use super::playhead::{Advanced, Playhead};
+use super::statistics::statistics;
+use super::texts;
 use crate::limits::FRAMES_PER_SECOND_MAX;
-use crate::message::reason;
-use crate::message::{
-    Command, Hashes, Level, Node, NodeState, OutcomeText, ParametersText, Playback, Status,
-    Timeline, ToPage,
-};
-use crate::pages::hub::Hub;
-use crate::pages::hub::Slot;
-use crate::shown_state::{Stage, single};
-use crate::source::{Ask, Request, Requests};
-use crate::wire::{FrameHead, Stamp, frame_flag};
+use crate::message::{Command, Hashes, Level, OutcomeText, ParametersText, Refusal};
+use crate::request::{ClientId, Request, RequestKind, Requests};
+use crate::sink::{Demand, Sinks, State, Update};
+use crate::source::shown_state::ShownState;
+use crate::wire::frame_flag;
 
-/// Time from a frame to the next.
+/// Time between two frames.
 const FRAME_PERIOD_NS: u64 = SECOND_NS / FRAMES_PER_SECOND_MAX as u64;
-/// How often the end of the server is looked for while nothing is to do.
+/// Time between two checks for the end of the program while nothing happens.
 const IDLE_PERIOD: Duration = Duration::from_millis(50);
-/// How often statistics are sent.
+/// Time between two statistics.
 const STATISTICS_PERIOD_NS: u64 = SECOND_NS / 4;
-/// Requests that are taken before the tape is wound: of many seeks, the last one counts.
-const REQUESTS_PER_ROUND_MAX: usize = 1024;
+/// Requests that are handled before the next state is read. Of many seeks, only the last one counts.
+const REQUESTS_AT_ONCE_MAX: usize = 1024;
 
 /// Plays a recording.
 #[derive(Debug)]
 pub(super) struct Player<'a> {
-    pub(super) replay: &'a mut Replay,
-    pub(super) hub: &'a Hub,
+    recording: &'a mut Recording,
+    sinks: &'a Sinks,
     reports: Receiver<Report>,
     report: Report,
-    pub(super) stage: Stage,
-    pub(super) playhead: Playhead,
-    /// What is on show.
-    pub(super) state: TapeState,
-    pub(super) parameters: Option<ParametersText>,
-    /// What they follow from: how many changes of the recording, and the pace.
-    parameters_of: Option<(Option<usize>, f32)>,
-    /// Commands that were obeyed, to be answered with the step that shows it.
-    answers: Vec<(u32, OutcomeText)>,
-    /// Whether pages are to be told how the recording is played.
-    is_changed: bool,
-    /// The state that was shown last.
+    shown: ShownState,
+    playhead: Playhead,
+    /// The state at the place of the playhead.
+    state: TapeState,
+    parameters: Option<ParametersText>,
+    /// The origin of the parameters.
+    parameters_origin: Option<ParametersOrigin>,
+    /// Applied commands, which are answered with the step that shows their effect.
+    answers: Vec<Answer>,
+    /// The playback has changed since it was published.
+    is_playback_changed: bool,
     shown_step: Option<u64>,
-    due_ns: u64,
+    next_frame_ns: u64,
     next_statistics_ns: u64,
 }
 
+/// The answer to an applied command.
+#[derive(Debug)]
+struct Answer {
+    client: ClientId,
+    outcome: OutcomeText,
+}
+
+/// The changes of the recording and the pace from which the parameters follow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ParametersOrigin {
+    change_count: Option<usize>,
+    rate: f32,
+}
+
 impl<'a> Player<'a> {
-    /// Stands at the first step.
-    pub(super) fn new(replay: &'a mut Replay, reports: Receiver<Report>, hub: &'a Hub) -> Self {
-        let (tape, state) = (&replay.tape, replay.first.clone());
+    /// Starts at the first step.
+    pub(super) fn new(
+        recording: &'a mut Recording,
+        reports: Receiver<Report>,
+        sinks: &'a Sinks,
+    ) -> Self {
+        let (tape, state) = (&recording.tape, recording.first.clone());
         let playhead = Playhead::new(tape.first_step(), tape.last_step(), tape.run().rate_hz);
         let report = Report {
             marks: Vec::new(),
             hashes: Hashes::Checking,
             hash_text: "checking hashes".to_owned(),
-            settings: None,
+            parameters: None,
         };
         Self {
-            replay,
-            hub,
+            recording,
+            sinks,
             reports,
             report,
-            stage: Stage::default(),
+            shown: ShownState::default(),
             playhead,
             state,
             parameters: None,
-            parameters_of: None,
+            parameters_origin: None,
             answers: Vec::new(),
-            is_changed: true,
+            is_playback_changed: true,
             shown_step: None,
-            due_ns: 0,
+            next_frame_ns: 0,
             next_statistics_ns: 0,
         }
     }
 
-    /// Plays until the server ends.
+    /// Plays until the program ends.
     pub(super) fn run(mut self, requests: &Requests) -> Result<(), ReadError> {
-        let scene = self.replay.load.to_scene(self.state.row.step, &self.state.particles);
-        self.tell_timeline();
-        self.tell_playback();
-        self.stage.begin(self.hub, scene);
-        self.set_changes();
-        while !self.hub.is_closed() {
-            self.take_requests(requests)?;
-            self.take_reports();
+        let scene = self.recording.load.to_scene(self.state.row.step, &self.state.particles);
+        self.publish_timeline();
+        self.publish_playback();
+        self.shown.begin_load(self.sinks, scene);
+        self.publish_changes();
+        while !self.sinks.is_shutting_down() {
+            self.handle_requests(requests)?;
+            self.update_report();
             let now_ns = monotonic_ns();
-            if self.playhead.advance(now_ns) == Passed::End {
-                self.is_changed = true;
+            if self.playhead.advance(now_ns) == Advanced::ToEnd {
+                self.is_playback_changed = true;
             }
-            if self.is_awaited() || self.is_changed {
-                self.wind(now_ns)?;
+            if self.is_awaited() || self.is_playback_changed {
+                self.read_state(now_ns)?;
             }
-            if self.is_changed {
-                self.tell_playback();
+            if self.is_playback_changed {
+                self.publish_playback();
             }
             self.show(now_ns);
-            self.answer();
-            self.tell_statistics_if_due(now_ns);
+            self.publish_answers();
+            self.publish_statistics_if_due(now_ns);
         }
         Ok(())
     }
 
-    /// Whether a page waits for a frame.
     fn is_awaited(&self) -> bool {
-        self.hub.demand(self.state.particles.len()).is_any()
+        self.sinks.has_demand(Demand::State)
     }
 
-    /// Takes what pages ask for, until the next frame is due or something is to be shown.
-    fn take_requests(&mut self, requests: &Requests) -> Result<(), ReadError> {
-        let until_due = Duration::from_nanos(self.due_ns.saturating_sub(monotonic_ns()));
-        let is_going = self.playhead.is_playing && self.is_awaited();
-        let mut timeout = if is_going { until_due } else { IDLE_PERIOD };
-        for _ in 0..REQUESTS_PER_ROUND_MAX {
+    /// Handles requests until the next frame is due or a request has changed the playback.
+    fn handle_requests(&mut self, requests: &Requests) -> Result<(), ReadError> {
+        let until_due = Duration::from_nanos(self.next_frame_ns.saturating_sub(monotonic_ns()));
+        let is_moving = self.playhead.is_playing && self.is_awaited();
+        let mut timeout = if is_moving { until_due } else { IDLE_PERIOD };
+        for _ in 0..REQUESTS_AT_ONCE_MAX {
             let Some(request) = requests.next(timeout) else { break };
-            self.take(request)?;
+            self.handle(request)?;
             timeout = Duration::ZERO;
         }
         Ok(())
     }
 
-    fn take(&mut self, Request { client, ask }: Request) -> Result<(), ReadError> {
-        match ask {
-            Ask::Frame => self.shown_step = None,
-            // Nothing is held.
-            Ask::Credit | Ask::Left => {}
-            Ask::Command { id, command } => {
-                let result = self.obey(&command)?;
-                let outcome = outcome(id, &command, result);
-                if result.is_ok() {
-                    self.is_changed = true;
-                    self.answers.push((client, outcome));
-                } else {
-                    self.hub.send(client, &ToPage::Outcome(outcome));
+    fn handle(&mut self, Request { client, kind }: Request) -> Result<(), ReadError> {
+        match kind {
+            RequestKind::State => self.shown_step = None,
+            // A recording has no grabs.
+            RequestKind::Credit | RequestKind::Left => {}
+            RequestKind::Command { id, command } => match self.obey(&command)? {
+                Ok(()) => {
+                    self.is_playback_changed = true;
+                    let outcome = OutcomeText::pending(id, command.name());
+                    let outcome = OutcomeText { applied: 1, ..outcome };
+                    self.answers.push(Answer { client, outcome });
                 }
-            }
+                Err(reason) => {
+                    let outcome = &OutcomeText::refused(id, command.name(), reason);
+                    self.sinks.publish(&Update::Answer { client, outcome });
+                }
+            },
         }
         Ok(())
     }
 
-    /// Obeys, or says why not: a recording cannot be changed.
-    fn obey(&mut self, command: &Command) -> Result<Result<(), &'static str>, ReadError> {
+    /// Obeys a command that controls the playback. A recording cannot be changed.
+    fn obey(&mut self, command: &Command) -> Result<Result<(), Refusal>, ReadError> {
         let now_ns = monotonic_ns();
-        let head = &mut self.playhead;
+        let playhead = &mut self.playhead;
         match command {
-            Command::Pause {} => head.pause(now_ns),
-            Command::Resume {} => head.resume(now_ns),
-            Command::Rate { value } => head.set_rate(*value, now_ns),
-            Command::Loop { is_on } => head.is_looping = *is_on,
+            Command::Pause {} => playhead.pause(now_ns),
+            Command::Resume {} => playhead.resume(now_ns),
+            Command::Rate { value } => playhead.set_rate(*value, now_ns),
+            Command::Loop { is_on } => playhead.is_looping = *is_on,
             Command::Seek { step } => {
-                let step = self.replay.tape.step_at(*step)?;
-                head.go_to(step, now_ns);
+                let step = self.recording.tape.step_at(*step)?;
+                playhead.go_to(step, now_ns);
             }
-            Command::Step { .. } if head.is_playing => return Ok(Err("no_effect_here")),
+            Command::Step { .. } if playhead.is_playing => {
+                return Ok(Err(Reason::NoEffectHere.into()));
+            }
             Command::Step { count } => {
                 let step = self.step_by(*count, now_ns)?;
                 self.playhead.go_to(step, now_ns);
             }
-            _ => return Ok(Err(reason::ONLY_LIVE)),
+            _ => return Ok(Err(Refusal::OnlyLive)),
         }
         Ok(Ok(()))
     }
 
-    /// The recorded step that many recorded ones on, or back.
+    /// Returns the recorded step `count` recorded steps ahead, or back.
     fn step_by(&mut self, count: i32, now_ns: u64) -> Result<u64, ReadError> {
-        let tape = &mut self.replay.tape;
+        let tape = &mut self.recording.tape;
         let here = tape.step_at(self.playhead.step(now_ns))?;
         let distance = u64::from(count.unsigned_abs()).saturating_mul(tape.stride());
         if count < 0 {
             return tape.step_at(here.saturating_sub(distance));
         }
         let there = tape.step_at(here.saturating_add(distance))?;
-        // Where steps are missing, the next one is further away.
+        // Across a gap in the recording, the next step is farther away.
         if there > here { Ok(there) } else { tape.step_after(here) }
     }
 
-    /// Winds the tape to where the timeline stands.
-    fn wind(&mut self, now_ns: u64) -> Result<(), ReadError> {
-        let step = self.replay.tape.step_at(self.playhead.step(now_ns))?;
+    /// Reads the state at the place of the playhead.
+    fn read_state(&mut self, now_ns: u64) -> Result<(), ReadError> {
+        let step = self.recording.tape.step_at(self.playhead.step(now_ns))?;
         if step != self.state.row.step {
-            match self.replay.tape.state_at(step) {
+            match self.recording.tape.state_at(step) {
                 Ok(state) => self.set_state(state),
-                Err(recorder::TapeError::Read(error)) => return Err(error),
-                // It was readable when it was looked for: what is on show stays.
+                Err(TapeError::Read(error)) => return Err(error),
+                // The state became unreadable since the search; the present one stays.
                 Err(_) => {}
             }
         }
-        for text in self.replay.tape.drain_faults() {
-            let text = format!("{}: {text}; it is left out", self.replay.file);
-            self.hub.broadcast(&ToPage::Notice { level: Level::Warning, text });
+        for fault in self.recording.tape.drain_faults() {
+            let text = &format!("{}: {fault}; it is skipped", self.recording.file);
+            self.sinks.publish(&Update::Notice { level: Level::Warning, text });
         }
         Ok(())
     }
 
     fn set_state(&mut self, state: TapeState) {
-        // The step at which the scene of a state was at its beginning.
+        // The step at which the scene was at its beginning.
         let beginning = |state: &TapeState| state.row.step.wrapping_sub(state.row.scene_step);
-        let is_other_beginning = beginning(&state) != beginning(&self.state);
+        let is_after_reset = beginning(&state) != beginning(&self.state);
         self.state = state;
-        self.set_changes();
-        if is_other_beginning {
-            self.hub.broadcast(&ToPage::Reset { step: self.state.row.step });
+        self.publish_changes();
+        if is_after_reset {
+            self.sinks.publish(&Update::Reset { step: self.state.row.step });
         }
     }
 
-    /// Puts pins, tears, colliders and parameters on the stage.
-    fn set_changes(&mut self) {
-        let (state, hub, step) = (&self.state, self.hub, self.state.row.step);
-        self.stage.set_pins(hub, step, &state.particles);
-        let constraint_count = self.replay.load.constraints.len();
-        let torn = &state.torn.constraints;
-        if torn.iter().all(|constraint| (*constraint as usize) < constraint_count) {
-            let causes = state.torn.causes.iter();
-            let causes: Vec<_> =
-                causes.map(|cause| cause.map_or(u8::MAX, |cause| cause as u8)).collect();
-            self.stage.set_torn(hub, step, torn, &causes);
+    /// Shows the pins, tears, colliders and parameters of the state.
+    fn publish_changes(&mut self) {
+        let (state, step) = (&self.state, self.state.row.step);
+        self.shown.set_pins(self.sinks, step, &state.particles);
+        let constraint_count = self.recording.load.constraints.len();
+        let torn = &state.torn;
+        if torn.constraints.iter().all(|constraint| (*constraint as usize) < constraint_count) {
+            let causes = torn.causes.iter().copied().chain(std::iter::repeat(None));
+            let torn: Vec<_> = torn
+                .constraints
+                .iter()
+                .zip(causes)
+                .map(|(constraint, cause)| TornConstraint::new(*constraint, cause))
+                .collect();
+            self.shown.set_torn(self.sinks, step, &torn);
         }
         if let Some(row) = &state.colliders {
-            self.stage.set_colliders(step, &row.states());
+            self.shown.set_colliders(self.sinks, step, &row.states());
         }
-        self.set_parameters();
+        self.publish_parameters();
     }
 
-    /// The parameters at this step, once all that was set is known.
-    fn set_parameters(&mut self) {
-        let settings = self.report.settings.as_ref();
-        let count = settings.map(|log| log.count_until(self.state.row.step));
-        let of = Some((count, self.playhead.rate));
-        if of == self.parameters_of {
+    /// Publishes the parameters at this step, if they have changed.
+    fn publish_parameters(&mut self) {
+        let log = self.report.parameters.as_ref();
+        let change_count = log.map(|log| log.count_until(self.state.row.step));
+        let origin = Some(ParametersOrigin { change_count, rate: self.playhead.rate });
+        if origin == self.parameters_origin {
             return;
         }
-        self.parameters_of = of;
-        let initial = self.replay.load.summary.parameters;
-        let (mut values, is_complete) = match settings.zip(count) {
-            Some((log, count)) => log.after(count, initial),
-            None => (initial, false),
-        };
-        values.time_scale = PlainF32(self.playhead.rate);
+        self.parameters_origin = origin;
+        let initial = self.recording.load.summary.parameters;
+        let unknown = LoggedParameters { values: initial, is_complete: false };
+        let logged = log.zip(change_count).map(|(log, count)| log.after(count, initial));
+        let LoggedParameters { values, is_complete } = logged.unwrap_or(unknown);
+        let values = ParameterValues { time_scale: self.playhead.rate, ..values };
         let text = ParametersText { is_complete, values: Some(values), initial: Some(initial) };
-        self.hub.latch(Slot::Parameters, &ToPage::Parameters(Box::new(text.clone())));
+        self.sinks.publish(&Update::Parameters(&text));
         self.parameters = Some(text);
     }
 
-    /// Shows the state, if it was not shown: at once where a page asked for it.
+    /// Shows the state if it is new and a frame is due. A frame is due at once after a command.
     fn show(&mut self, now_ns: u64) {
         let row = self.state.row;
-        let is_due = now_ns >= self.due_ns || !self.answers.is_empty();
+        let is_due = now_ns >= self.next_frame_ns || !self.answers.is_empty();
         if !is_due || !self.is_awaited() {
             return;
         }
-        self.due_ns = now_ns + FRAME_PERIOD_NS;
+        self.next_frame_ns = now_ns + FRAME_PERIOD_NS;
         if self.shown_step == Some(row.step) {
             return;
         }
-        let micros = |ns: u64| single(ns as f64 / 1000.0);
-        let head = FrameHead {
-            stamp: Stamp { epoch: 0, step: row.step },
-            sim_time_s: self.time_s(row.step),
-            flags: frame_flag::REPLAY,
-            torn_count: row.torn_count,
-            solve_us: micros(row.solve_ns),
-            wake_late_us: micros(row.wake_late_ns),
-            number: 0,
-            publish_monotonic_ns: now_ns,
-        };
         self.shown_step = Some(row.step);
-        self.hub.say(Topic::Steps, || Message::Step(row));
-        self.stage.show(self.hub, head, &self.state.particles);
+        let state = State {
+            epoch: self.shown.epoch(),
+            row,
+            sim_time_s: self.recording.time_s(row.step),
+            flags: frame_flag::REPLAY,
+            publish_monotonic_ns: now_ns,
+            particles: &self.state.particles,
+        };
+        self.shown.show(self.sinks, state);
     }
 
-    fn time_s(&self, step: u64) -> f64 {
-        step as f64 / f64::from(self.replay.tape.run().rate_hz)
-    }
-
-    /// Answers what was obeyed: all of it is in the state on show.
-    fn answer(&mut self) {
-        for (client, mut outcome) in self.answers.drain(..) {
+    /// Answers the applied commands. The state on show has their effect.
+    fn publish_answers(&mut self) {
+        for Answer { client, mut outcome } in self.answers.drain(..) {
             outcome.step = Some(self.state.row.step);
             if outcome.id.is_some() {
-                self.hub.send(client, &ToPage::Outcome(outcome));
+                self.sinks.publish(&Update::Answer { client, outcome: &outcome });
             }
         }
     }
 
-    fn take_reports(&mut self) {
+    /// Takes the newest report of the check.
+    fn update_report(&mut self) {
         let Some(report) = self.reports.try_iter().last() else { return };
         self.report = report;
-        self.tell_timeline();
-        self.set_parameters();
+        self.publish_timeline();
+        self.publish_parameters();
     }
 
-    /// Tells pages what the recording holds.
-    fn tell_timeline(&self) {
-        let tape = &self.replay.tape;
-        let timeline = Timeline {
-            file: self.replay.file.clone(),
-            scene: tape.run().scene_name.clone(),
-            rate_hz: tape.run().rate_hz,
-            first_step: tape.first_step(),
-            last_step: tape.last_step(),
-            first_time_s: self.time_s(tape.first_step()),
-            last_time_s: self.time_s(tape.last_step()),
-            marks: self.report.marks.clone(),
-            hashes: self.report.hashes,
-            hash_text: self.report.hash_text.clone(),
-        };
-        self.hub.latch(Slot::Timeline, &ToPage::Timeline(Box::new(timeline)));
+    fn publish_timeline(&self) {
+        let timeline = texts::timeline(self.recording, &self.report);
+        self.sinks.publish(&Update::Timeline(&timeline));
     }
 
-    /// Tells pages how the recording is played.
-    fn tell_playback(&mut self) {
-        self.is_changed = false;
-        let (head, step) = (&self.playhead, self.state.row.step);
-        let playback = Playback {
-            is_playing: head.is_playing,
-            rate: head.rate,
-            is_looping: head.is_looping,
-            step,
-            time_s: self.time_s(step),
-        };
-        self.hub.latch(Slot::Playback, &ToPage::Playback(playback));
-        let (load, run) = (&self.replay.load, self.replay.tape.run());
-        let node = Node {
-            state: NodeState::Alive,
-            text: String::new(),
-            run_id: Some(format!("{:016x}", run.run_id)),
-            scene: Some(run.scene_name.clone()),
-            method: Some(load.method()),
-            rate_hz: run.rate_hz,
-            is_paused: !head.is_playing,
-            is_replay: true,
-            time_scale: f64::from(head.rate),
-            process_id: None,
-        };
-        self.hub.latch(Slot::Node, &ToPage::Node(node));
-        self.set_parameters();
+    fn publish_playback(&mut self) {
+        self.is_playback_changed = false;
+        let playback = texts::playback(self.recording, &self.playhead, self.state.row.step);
+        self.sinks.publish(&Update::Playback(&playback));
+        self.sinks.publish(&Update::Node(&texts::node(self.recording, &self.playhead)));
+        self.publish_parameters();
     }
 
-    fn tell_statistics_if_due(&mut self, now_ns: u64) {
-        if now_ns >= self.next_statistics_ns {
-            self.next_statistics_ns = now_ns + STATISTICS_PERIOD_NS;
-            if let Some(status) = &self.state.status {
-                self.hub.say(Topic::Status, || Message::Status(status.clone()));
-            }
-            self.tell_statistics();
+    fn publish_statistics_if_due(&mut self, now_ns: u64) {
+        if now_ns < self.next_statistics_ns {
+            return;
         }
-    }
-}
-
-fn outcome(id: Option<u32>, command: &Command, result: Result<(), &'static str>) -> OutcomeText {
-    let reason = result.err().unwrap_or("");
-    OutcomeText {
-        id,
-        kind: command.name(),
-        status: if result.is_ok() { Status::Applied } else { Status::Rejected },
-        step: None,
-        applied: u32::from(result.is_ok()),
-        rejected: u32::from(result.is_err()),
-        reason,
-        text: reason::text(reason).to_owned(),
+        self.next_statistics_ns = now_ns + STATISTICS_PERIOD_NS;
+        if let Some(status) = &self.state.status {
+            self.sinks.publish(&Update::Status(status));
+        }
+        if self.sinks.has_demand(Demand::Statistics) {
+            let values = self.parameters.as_ref().and_then(|text| text.values);
+            let gravity = values.map_or([0.0; 3], |values| values.gravity);
+            let (state, shown, playhead) = (&self.state, &self.shown, &self.playhead);
+            let statistics = statistics(self.recording, state, shown, playhead, gravity);
+            self.sinks.publish(&Update::Statistics(&statistics));
+        }
     }
 }

@@ -1,35 +1,35 @@
-//! Where a replay is: it goes on with the clock while it plays.
+//! The place in a recording. It advances with the clock while the recording plays.
 
 use sim_contract::clock::SECOND_NS;
 
-/// Where a replay is, and how it goes on. All times are CLOCK_MONOTONIC in ns.
+/// The place in a recording and its progress. All times are `CLOCK_MONOTONIC` in ns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Playhead {
     first_step: u64,
     last_step: u64,
     rate_hz: u32,
-    /// Whether it goes on.
+    /// The place advances.
     pub(super) is_playing: bool,
-    /// Whether it begins again at its end.
+    /// The place returns to the first step after the last one.
     pub(super) is_looping: bool,
-    /// Simulated time per time.
+    /// Simulated seconds per second.
     pub(super) rate: f32,
-    /// Where it was at a moment, in steps.
+    /// Place at `base_ns`, in steps.
     base_step: f64,
     base_ns: u64,
 }
 
-/// What the clock has done to a replay.
+/// Effect of the clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Passed {
-    /// It goes on, or stands.
-    Time,
-    /// It has come to its end, and stands there or begins again.
-    End,
+pub(super) enum Advanced {
+    /// The recording plays on, or is paused.
+    Within,
+    /// The recording has reached its end. It pauses there, or starts again.
+    ToEnd,
 }
 
 impl Playhead {
-    /// At the first step, standing.
+    /// Starts at the first step, paused.
     pub(super) fn new(first_step: u64, last_step: u64, rate_hz: u32) -> Self {
         Self {
             first_step,
@@ -43,12 +43,12 @@ impl Playhead {
         }
     }
 
-    /// The step that is due. It may lie between two recorded ones.
+    /// The step at this time. It may lie between two recorded steps.
     pub(super) fn step(&self, now_ns: u64) -> u64 {
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "positive, and rounded down on purpose"
+            reason = "the place is positive, and its step is rounded down"
         )]
         let step = self.place(now_ns) as u64;
         step.clamp(self.first_step, self.last_step)
@@ -58,39 +58,39 @@ impl Playhead {
         if !self.is_playing {
             return self.base_step;
         }
-        let passed_s = now_ns.saturating_sub(self.base_ns) as f64 / SECOND_NS as f64;
-        self.base_step + passed_s * f64::from(self.rate) * f64::from(self.rate_hz)
+        let elapsed_s = now_ns.saturating_sub(self.base_ns) as f64 / SECOND_NS as f64;
+        self.base_step + elapsed_s * f64::from(self.rate) * f64::from(self.rate_hz)
     }
 
-    /// Looks at the clock.
-    pub(super) fn advance(&mut self, now_ns: u64) -> Passed {
+    /// Advances to this time.
+    pub(super) fn advance(&mut self, now_ns: u64) -> Advanced {
         let place = self.place(now_ns);
         if !self.is_playing || place < self.last_step as f64 {
-            return Passed::Time;
+            return Advanced::Within;
         }
         if !self.is_looping {
             self.is_playing = false;
             self.base_step = self.last_step as f64;
-            return Passed::End;
+            return Advanced::ToEnd;
         }
-        // The last step is shown as long as any other.
+        // The last step is on show for as long as any other.
         let period = (self.last_step - self.first_step + 1) as f64;
-        let passed = place - self.first_step as f64;
-        if passed < period {
-            return Passed::Time;
+        let elapsed = place - self.first_step as f64;
+        if elapsed < period {
+            return Advanced::Within;
         }
-        self.base_step = self.first_step as f64 + passed % period;
+        self.base_step = self.first_step as f64 + elapsed % period;
         self.base_ns = now_ns;
-        Passed::End
+        Advanced::ToEnd
     }
 
-    /// Stands where it is.
+    /// Pauses at the present place.
     pub(super) fn pause(&mut self, now_ns: u64) {
         self.go_to(self.step(now_ns), now_ns);
         self.is_playing = false;
     }
 
-    /// Goes on; at the end, from the beginning.
+    /// Plays on; at the end, from the beginning.
     pub(super) fn resume(&mut self, now_ns: u64) {
         if self.is_playing {
             return;
@@ -102,13 +102,13 @@ impl Playhead {
         self.is_playing = true;
     }
 
-    /// Goes on, or stands, from another step.
+    /// Moves to a step.
     pub(super) fn go_to(&mut self, step: u64, now_ns: u64) {
         self.base_step = step as f64;
         self.base_ns = now_ns;
     }
 
-    /// Goes on at another pace.
+    /// Changes the pace.
     pub(super) fn set_rate(&mut self, rate: f32, now_ns: u64) {
         (self.base_step, self.base_ns) = (self.place(now_ns), now_ns);
         self.rate = rate;
@@ -119,7 +119,7 @@ impl Playhead {
 mod tests {
     use super::*;
 
-    /// 100 Hz: a step each 10 ms.
+    /// One step every 10 ms.
     fn playhead() -> Playhead {
         Playhead::new(50, 150, 100)
     }
@@ -129,11 +129,11 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_with_the_clock_while_it_plays() {
+    fn the_place_advances_with_the_clock_while_playing() {
         let mut head = playhead();
         assert_eq!(head.step(ms(500)), 50);
         head.resume(ms(1000));
-        assert_eq!((head.step(ms(1105)), head.advance(ms(1105))), (60, Passed::Time));
+        assert_eq!((head.step(ms(1105)), head.advance(ms(1105))), (60, Advanced::Within));
         head.pause(ms(1105));
         assert_eq!(head.step(ms(9000)), 60);
         head.resume(ms(9000));
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn another_pace_begins_where_the_one_before_was() {
+    fn a_change_of_pace_keeps_the_place() {
         let mut head = playhead();
         head.resume(0);
         head.set_rate(0.1, ms(200));
@@ -152,35 +152,38 @@ mod tests {
     }
 
     #[test]
-    fn it_stands_at_its_end_and_then_plays_from_the_beginning() {
+    fn playback_pauses_at_the_end_and_resumes_from_the_beginning() {
         let mut head = playhead();
         head.resume(0);
-        assert_eq!(head.advance(ms(999)), Passed::Time);
-        assert_eq!(head.advance(ms(3000)), Passed::End);
+        assert_eq!(head.advance(ms(999)), Advanced::Within);
+        assert_eq!(head.advance(ms(3000)), Advanced::ToEnd);
         assert_eq!((head.step(ms(3000)), head.is_playing), (150, false));
         head.resume(ms(4000));
         assert_eq!((head.step(ms(4015)), head.is_playing), (51, true));
     }
 
     #[test]
-    fn a_loop_shows_every_step_for_as_long() {
+    fn a_loop_shows_every_step_for_the_same_time() {
         let mut head = playhead();
         head.is_looping = true;
         head.resume(0);
-        assert_eq!((head.advance(ms(1005)), head.step(ms(1005))), (Passed::Time, 150));
-        assert_eq!((head.advance(ms(1015)), head.step(ms(1015))), (Passed::End, 50));
-        // Nobody looked for several rounds.
-        assert_eq!((head.advance(ms(1015 + 3 * 1010 + 20)), head.is_playing), (Passed::End, true));
+        assert_eq!((head.advance(ms(1005)), head.step(ms(1005))), (Advanced::Within, 150));
+        assert_eq!((head.advance(ms(1015)), head.step(ms(1015))), (Advanced::ToEnd, 50));
+        // Several rounds pass without a call.
+        assert_eq!(
+            (head.advance(ms(1015 + 3 * 1010 + 20)), head.is_playing),
+            (Advanced::ToEnd, true)
+        );
         assert_eq!(head.step(ms(1015 + 3 * 1010 + 20)), 52);
     }
 
     #[test]
-    fn a_recording_of_one_step_stands() {
+    fn a_recording_of_one_step_stays_paused() {
         let mut head = Playhead::new(7, 7, 60);
         head.resume(0);
         assert_eq!(
             (head.advance(ms(1)), head.step(ms(1)), head.is_playing),
-            (Passed::End, 7, false)
+            (Advanced::ToEnd, 7, false)
         );
     }
 }

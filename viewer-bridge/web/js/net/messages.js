@@ -1,11 +1,10 @@
 // Types of the text messages that the page receives (viewer-bridge/PROTOCOL.md, section 3).
 
 /** @typedef {number | number[] | null} SettingValue */
-/** @typedef {{ name: string, unit: string, value: "vector" | "number" | "whole", min: number, max: number, above_min: boolean, off: boolean, per_kind: boolean }} Setting */
 /**
  * @typedef {{
  *   type: "hello", protocol: number, version: string, client: number, mode: "live" | "replay", format: string,
- *   scenes: { name: string, rate_hz: number, dimensions: number, text: string }[], settings: Setting[],
+ *   scenes: { name: string, rate_hz: number, dimensions: number, text: string }[],
  *   limits: { constraints_per_cut: number, [name: string]: number },
  * }} Hello
  * @typedef {{

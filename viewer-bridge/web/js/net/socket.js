@@ -14,7 +14,7 @@ import { decode } from "./wire.js";
  * }} Handlers
  */
 
-export const PROTOCOL = 1;
+export const PROTOCOL = 2;
 const FIRST_DELAY_MS = 250;
 const DELAY_MAX_MS = 5000;
 /** Close codes after which another attempt cannot succeed. */

@@ -9,11 +9,10 @@
 /**
  * @typedef {Header & {
  *   kind: "scene", particleCount: number, constraintCount: number, triangleCount: number,
- *   isPlanar: boolean, canTear: boolean, hasTethers: boolean, isPbd: boolean,
+ *   isPlanar: boolean,
  *   min: Vec3, max: Vec3, rateHz: number, origin: Vec3,
  *   positions: Float32Array, ends: Uint32Array, restLengths: Float32Array, triangles: Uint32Array,
  *   constraintKinds: Uint8Array, name: string, unit: string, up: string, runId: string,
- *   grids: { first: number, columns: number, rows: number }[],
  * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s
  *
  * @typedef {Header & {
@@ -24,7 +23,7 @@
  *   positions: Float32Array | Uint16Array, nonFinite: Uint32Array,
  * }} Frame  coordinate = lo + scale · value; lo is 0 and scale 1 unless quantised
  *
- * @typedef {Header & { kind: "tear", first: number, constraints: Uint32Array, causes: Uint8Array }} Tear
+ * @typedef {Header & { kind: "tear", first: number, constraints: Uint32Array }} Tear
  * @typedef {Header & { kind: "pins", particles: Uint32Array, flags: Uint32Array }} Pins
  *
  * @typedef {Header & {
@@ -148,9 +147,9 @@ function decodeScene(reader, header) {
   const json = JSON.parse(new TextDecoder().decode(reader.array(Uint8Array, jsonBytes)));
   return {
     kind: "scene", ...header, particleCount, constraintCount, triangleCount,
-    isPlanar: (flags & 1) !== 0, canTear: (flags & 2) !== 0, hasTethers: (flags & 4) !== 0, isPbd: (flags & 8) !== 0,
+    isPlanar: (flags & 1) !== 0,
     min, max, rateHz, origin, positions, ends, restLengths, triangles, constraintKinds,
-    name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "", grids: json.grids ?? [],
+    name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "",
   };
 }
 
@@ -182,8 +181,7 @@ function decodeFrame(reader, header, isQuantised) {
 function decodeTear(reader, header) {
   const first = reader.u32();
   const count = reader.u32();
-  const constraints = reader.array(Uint32Array, count);
-  return { kind: "tear", ...header, first, constraints, causes: reader.array(Uint8Array, count) };
+  return { kind: "tear", ...header, first, constraints: reader.array(Uint32Array, count) };
 }
 
 /** @param {Reader} reader @param {Header} header @returns {Pins} */

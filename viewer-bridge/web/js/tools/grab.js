@@ -26,7 +26,7 @@ export class GrabTool {
     /** Recent positions of the pointer, from the start or from just before the velocity window. */
     this.trail = [{ ms: this.sentMs, at: start }];
     this.origin = /** @type {Vec3} */ (app.simulation.position(particle));
-    app.commands.run("drag_begin", { particle, target: this.origin });
+    app.commands.run("grab", { particle, target: this.origin });
   }
 
   /** @param {Pixel} to */
@@ -42,7 +42,7 @@ export class GrabTool {
   tick(nowMs) {
     if (!this.isMoved) return;
     const over_s = clamp((nowMs - this.sentMs) / 1000, OVER_S.min, OVER_S.max);
-    this.app.commands.stream("drag_move", { particle: this.particle, target: this.targetAt(this.pointer), over_s });
+    this.app.commands.stream("move", { particle: this.particle, target: this.targetAt(this.pointer), over_s });
     this.sentMs = nowMs;
     this.isMoved = false;
   }
@@ -68,7 +68,7 @@ export class GrabTool {
   end() {
     const { commands } = this.app;
     const { particle } = this;
-    const release = () => commands.run("drag_end", { particle });
+    const release = () => commands.run("release", { particle });
     const velocity = this.velocity(performance.now());
     if (length(velocity) === 0) {
       this.tick(performance.now());
@@ -76,7 +76,7 @@ export class GrabTool {
       return;
     }
     const target = addScaled(this.targetAt(this.pointer), velocity, OVER_S.max);
-    commands.run("drag_move", { particle, target, over_s: OVER_S.max }, release);
+    commands.run("move", { particle, target, over_s: OVER_S.max }, release);
   }
 
   describe() {

@@ -1,0 +1,1 @@
+//! Contains nothing: this package only has dependencies.

@@ -1,0 +1,11 @@
+//! The messages in shared memory: plain data of fixed layout.
+
+pub(crate) mod collider;
+pub(crate) mod command;
+pub(crate) mod outcome;
+pub(crate) mod parameters;
+pub(crate) mod snapshot;
+pub(crate) mod status;
+pub(crate) mod tears;
+pub(crate) mod topology;
+pub(crate) mod update;

@@ -1,0 +1,119 @@
+//! The messages of the service `parameters`.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+use sim_types::{ConstraintKind, Parameter, ParameterValue, ParameterValues, Setting};
+
+/// Header of `parameters`: 24 bytes, alignment 8. The payload holds the values of all parameters.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.ParametersHeader")]
+pub struct ParametersHeader {
+    /// Same as in [`crate::SnapshotHeader`].
+    pub run_id: u64,
+    /// First step that these values apply to.
+    pub step: u64,
+    /// Length of the payload.
+    pub count: u32,
+    /// Always 0.
+    pub spare: u32,
+}
+
+const _: () = assert!(size_of::<ParametersHeader>() == 24 && align_of::<ParametersHeader>() == 8);
+
+/// The value of one parameter: 24 bytes, alignment 4; an element of `parameters`. Parameters that
+/// have a value for each kind of constraint have one element for each.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.ParameterState")]
+pub struct ParameterState {
+    /// A [`Parameter`] as a number.
+    pub parameter: u32,
+    /// A [`ConstraintKind`] as a number, for a parameter that has a value for each kind; else 0.
+    pub constraint_kind: u32,
+    /// Form of the value: 0 off, 1 a number, 2 three numbers.
+    pub form: u32,
+    /// The number, or the three numbers; the rest is 0.
+    pub value: [f32; 3],
+}
+
+const _: () = assert!(size_of::<ParameterState>() == 24 && align_of::<ParameterState>() == 4);
+
+impl From<Setting> for ParameterState {
+    fn from(setting: Setting) -> Self {
+        let (form, value) = match setting.value {
+            ParameterValue::Off => (0, [0.0; 3]),
+            ParameterValue::Number(number) => (1, [number, 0.0, 0.0]),
+            ParameterValue::Vector(vector) => (2, vector),
+        };
+        Self {
+            parameter: setting.parameter as u32,
+            constraint_kind: setting.constraint_kind.map_or(0, |kind| kind as u32),
+            form,
+            value,
+        }
+    }
+}
+
+impl ParameterState {
+    /// The parameter and its value; `None` for a parameter, kind or form of another version.
+    pub fn setting(&self) -> Option<Setting> {
+        let parameter = Parameter::from_number(self.parameter)?;
+        let constraint_kind = if parameter.info().is_per_kind {
+            Some(ConstraintKind::from_number(self.constraint_kind)?)
+        } else {
+            None
+        };
+        let value = match self.form {
+            0 => ParameterValue::Off,
+            1 => ParameterValue::Number(self.value[0]),
+            2 => ParameterValue::Vector(self.value),
+            _ => return None,
+        };
+        Some(Setting { parameter, constraint_kind, value })
+    }
+}
+
+/// Collects the values of a message. Parameters that it lacks have their defaults.
+pub(crate) fn to_values(states: &[ParameterState]) -> ParameterValues {
+    let mut values = ParameterValues::default();
+    for setting in states.iter().filter_map(ParameterState::setting) {
+        values.set(setting);
+    }
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_types::PerKind;
+
+    use super::*;
+
+    #[test]
+    fn parameters_survive_the_wire() {
+        let values = ParameterValues {
+            gravity: [0.0, -1.6, 0.5],
+            substeps: 9,
+            tear_force: Some(0.25),
+            time_scale: 0.5,
+            stiffness: PerKind { bend: Some(0.125), ..PerKind::default() },
+            ..ParameterValues::default()
+        };
+        let states = values.settings().map(ParameterState::from);
+        assert_eq!(to_values(&states), values);
+    }
+
+    #[test]
+    fn an_element_of_another_version_is_skipped() {
+        let good =
+            ParameterState { parameter: Parameter::Damping as u32, form: 1, ..Default::default() };
+        for wrong in [
+            ParameterState { parameter: 99, ..good },
+            ParameterState { form: 3, ..good },
+            ParameterState { parameter: Parameter::Stiffness as u32, constraint_kind: 4, ..good },
+        ] {
+            assert_eq!(wrong.setting(), None);
+            assert_eq!(to_values(&[wrong]), ParameterValues::default());
+        }
+    }
+}

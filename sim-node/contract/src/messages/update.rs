@@ -1,0 +1,33 @@
+//! A message of any service but `particles`, in shared memory.
+
+use sim_types::ParameterValues;
+
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::outcome::Outcome;
+use crate::messages::parameters::ParametersHeader;
+use crate::messages::status::NodeStatus;
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+
+/// A message that is not a snapshot, in shared memory.
+#[derive(Debug, Clone, Copy)]
+pub enum Update<'a> {
+    /// The scene of a load, as TOML.
+    Scene(&'a LoadHeader, &'a [u8]),
+    /// The constraints of a load.
+    Topology(&'a LoadHeader, &'a [ConstraintState]),
+    /// The triangles of a load; may be none.
+    Surface(&'a LoadHeader, &'a [Triangle]),
+    /// All colliders in their poses at the end of a step.
+    Colliders(&'a CollidersHeader, &'a [ColliderState]),
+    /// All constraints torn since the load or the last reset.
+    Tears(&'a TearsHeader, &'a [TornConstraint]),
+    /// The values of all parameters.
+    Parameters(&'a ParametersHeader, &'a ParameterValues),
+    /// What completes a snapshot.
+    Keyframe(&'a KeyframeHeader, &'a [u8]),
+    /// What became of a command.
+    Outcome(&'a Outcome),
+    /// How the node is doing.
+    Status(&'a NodeStatus),
+}

@@ -1,0 +1,236 @@
+//! All services of a name together, and who owns it.
+
+use iceoryx2::node::NodeView;
+use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory};
+use thiserror::Error;
+
+use crate::endpoint::Endpoint;
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::command::Command;
+use crate::messages::outcome::Outcome;
+use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
+use crate::messages::status::NodeStatus;
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::ports::service::{
+    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
+    ServiceError, TEARS, TOPOLOGY,
+};
+use crate::ports::session::{Access, Events, Session, Slices, Values};
+
+/// The services of a name.
+#[derive(Debug)]
+pub(crate) struct Services {
+    pub(crate) particles: Slices<ParticleState, SnapshotHeader>,
+    pub(crate) keyframe: Slices<u8, KeyframeHeader>,
+    pub(crate) topology: Slices<ConstraintState, LoadHeader>,
+    pub(crate) surface: Slices<Triangle, LoadHeader>,
+    pub(crate) scene: Slices<u8, LoadHeader>,
+    pub(crate) tears: Slices<TornConstraint, TearsHeader>,
+    pub(crate) parameters: Slices<ParameterState, ParametersHeader>,
+    pub(crate) colliders: Slices<ColliderState, CollidersHeader>,
+    pub(crate) commands: Values<Command>,
+    pub(crate) outcomes: Values<Outcome>,
+    pub(crate) wake: Events,
+}
+
+impl Services {
+    /// All but `status`, which comes first and decides whether the others may be touched.
+    pub(crate) fn access(session: &Session, access: Access) -> Result<Self, ServiceError> {
+        Ok(Self {
+            particles: session.slices(&PARTICLES, access)?,
+            keyframe: session.slices(&KEYFRAME, access)?,
+            topology: session.slices(&TOPOLOGY, access)?,
+            surface: session.slices(&SURFACE, access)?,
+            scene: session.slices(&SCENE, access)?,
+            tears: session.slices(&TEARS, access)?,
+            parameters: session.slices(&PARAMETERS, access)?,
+            colliders: session.slices(&COLLIDERS, access)?,
+            commands: session.values(&COMMANDS, access)?,
+            outcomes: session.values(&OUTCOMES, access)?,
+            wake: session.events(access)?,
+        })
+    }
+}
+
+/// Why a program could not attach to a simulation.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum AttachError {
+    /// Nobody owns the name.
+    #[error(
+        "no simulation runs as {endpoint}: {finding}; start one with `sim-node run{options}`, or say with --domain and --name where it runs"
+    )]
+    NoNode {
+        /// Where it was looked for.
+        endpoint: Endpoint,
+        /// What was looked for, and what was found.
+        finding: String,
+        /// The options that start one there.
+        options: String,
+    },
+    /// A service could not be opened or connected to.
+    #[error(transparent)]
+    Service(#[from] ServiceError),
+    /// The system gives no random number for the client's id.
+    #[error("the system gives no random number for a client id: {detail}")]
+    NoRandomNumber {
+        /// What the system says.
+        detail: String,
+    },
+}
+
+/// A process that is alive and owns the name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct OwnerProcess {
+    /// Its process id, where iceoryx2 knows it.
+    pub(crate) id: Option<u32>,
+}
+
+/// The process that owns the name, if one is alive: the publisher of `status`.
+pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
+    let mut publisher_nodes = Vec::new();
+    status.dynamic_config().list_publishers(|publisher| {
+        publisher_nodes.push(publisher.node_id);
+        CallbackProgression::Continue
+    });
+    let mut owner = None;
+    if publisher_nodes.is_empty() {
+        return owner;
+    }
+    let listed = status.nodes(|node| match node {
+        NodeState::Alive(node) if publisher_nodes.contains(node.id()) => {
+            let id = node.details().as_ref().map(|details| details.process_id().value());
+            owner = Some(OwnerProcess { id: id.and_then(|id| u32::try_from(id).ok()) });
+            CallbackProgression::Stop
+        }
+        _ => CallbackProgression::Continue,
+    });
+    // Where nodes cannot be told alive or dead, a publisher is taken for a living one.
+    if listed.is_err() { Some(OwnerProcess { id: None }) } else { owner }
+}
+
+/// A program's view of a simulation that somebody else owns.
+#[derive(Debug)]
+pub(crate) struct Attachment {
+    pub(crate) services: Services,
+    pub(crate) status: Values<NodeStatus>,
+    // The node goes last.
+    pub(crate) session: Session,
+}
+
+/// Tries to open what an owner that is just starting has not created yet.
+const TRIES_MAX: usize = 100;
+
+impl Attachment {
+    /// Opens everything, with an owner that is alive.
+    pub(crate) fn open(session: Session) -> Result<Self, AttachError> {
+        let status = match session.values(&STATUS, Access::Open) {
+            Err(ServiceError::Missing { service, .. }) => {
+                return Err(no_node(&session, format!("there is no service '{service}'")));
+            }
+            result => result?,
+        };
+        for _ in 0..TRIES_MAX {
+            if owner(&status).is_none() {
+                break;
+            }
+            match Services::access(&session, Access::Open) {
+                Err(ServiceError::Missing { .. }) => session.pause(),
+                services => return Ok(Self { services: services?, status, session }),
+            }
+        }
+        let service = session.service_name(&STATUS);
+        Err(no_node(&session, format!("service '{service}' has no living publisher")))
+    }
+
+    pub(crate) fn owner(&self) -> Option<OwnerProcess> {
+        owner(&self.status)
+    }
+}
+
+fn no_node(session: &Session, finding: String) -> AttachError {
+    let endpoint = session.endpoint.clone();
+    let options = endpoint.options();
+    AttachError::NoNode { endpoint, finding, options }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim_types::ParameterValues;
+
+    use crate::limits::CONTRACT_VERSION;
+    use crate::owner::Owner;
+    use crate::owner::error::OwnerError;
+    use crate::owner::load::Load;
+    use crate::testing::TestDomain;
+
+    const EMPTY: Load<'_> = Load {
+        header: LoadHeader {
+            run_id: 0,
+            step: 0,
+            origin: [0.0; 3],
+            topology_revision: 0,
+            count: 0,
+            particle_count: 0,
+            rate_hz: 240,
+            method: 0,
+            spare: 0,
+        },
+        scene: b"",
+        constraints: &[],
+        triangles: &[],
+        collider_count: 0,
+        keyframe_size_bytes_max: 0,
+        parameters: ParameterValues::DEFAULT,
+    };
+
+    fn join(domain: &TestDomain, contract_version: u32) -> Session {
+        Session::join_with_version(&domain.endpoint(), contract_version).unwrap()
+    }
+
+    #[test]
+    fn a_client_of_another_contract_version_is_refused_and_told_both() {
+        let domain = TestDomain::new();
+        let _owner = Owner::create_in(join(&domain, CONTRACT_VERSION), &EMPTY).unwrap();
+        let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "service 'sim/status' has contract version 3, this program has 4: stop every program \
+             of the other version, or start this one with another --domain"
+        );
+    }
+
+    #[test]
+    fn an_owner_is_refused_where_clients_keep_services_of_another_version() {
+        let domain = TestDomain::new();
+        let old = Owner::create_in(join(&domain, CONTRACT_VERSION), &EMPTY).unwrap();
+        let client = Attachment::open(join(&domain, CONTRACT_VERSION)).unwrap();
+        drop(old);
+        let new = Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY);
+        let error = ServiceError::Version {
+            service: "sim/status".to_owned(),
+            found: "3".to_owned(),
+            expected: 4,
+        };
+        assert_eq!(new.unwrap_err(), OwnerError::Service(error));
+        // With the last one gone, the name is as good as new.
+        drop(client);
+        Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY).unwrap();
+    }
+
+    #[test]
+    fn a_stranger_among_the_services_is_told_from_another_version() {
+        let domain = TestDomain::new();
+        let session = join(&domain, CONTRACT_VERSION);
+        let _stranger = session.values::<u64>(&STATUS, Access::Create).unwrap();
+        let error = Attachment::open(join(&domain, CONTRACT_VERSION)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "service 'sim/status' exists, but is not one of this contract (IncompatibleTypes): \
+             choose another --name or --domain"
+        );
+    }
+}

@@ -1,0 +1,255 @@
+//! Command lines of the commands of `ctl`: each one is applied by the node and has an outcome.
+
+use clap::{ArgAction, Args as ClapArgs, Subcommand};
+use sim_contract::{
+    ConstraintKind, GRAB_OVER_S_DEFAULT, PARAMETERS, ParameterInfo, ParameterValue,
+};
+use sim_solver::GRAB_OVER_S_MAX;
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum CommandVerb {
+    /// Hold a particle at its present position
+    #[command(after_help = "Example: sim-node ctl pin 3")]
+    Pin {
+        /// Index of the particle
+        particle: u32,
+    },
+    /// Free a pinned particle, from rest
+    #[command(after_help = "Example: sim-node ctl unpin 3")]
+    Unpin {
+        /// Index of the particle
+        particle: u32,
+    },
+    /// Grab a particle and drive it to a target
+    #[command(after_help = "Example: sim-node ctl grab 90 0.5 -0.2 0.3 --over 0.1")]
+    Grab(TargetArgs),
+    /// Drive a grabbed particle to a new target
+    #[command(after_help = "Example: sim-node ctl move 90 0.6 -0.2 0.3")]
+    Move(TargetArgs),
+    /// Release a grabbed particle with the velocity of its last motion
+    #[command(after_help = "Example: sim-node ctl release 90")]
+    Release {
+        /// Index of the particle
+        particle: u32,
+    },
+    /// Set the velocity of all free particles within a sphere, as a brush does
+    Push(PushArgs),
+    /// Tear a constraint
+    #[command(after_help = "Example: sim-node ctl cut 17")]
+    Cut {
+        /// Index of the constraint
+        constraint: u32,
+    },
+    /// Tear all constraints with an end within a sphere
+    CutRadius(CutRadiusArgs),
+    /// Tear all constraints that cross a strip
+    CutSegment(CutSegmentArgs),
+    /// Move an anchor to a pose and end its path
+    #[command(
+        allow_negative_numbers = true,
+        after_help = "Example: sim-node ctl move-anchor 0 0.2 0 -0.1"
+    )]
+    MoveAnchor {
+        /// Index of the anchor
+        anchor: u32,
+        #[command(flatten)]
+        pose: PoseArgs,
+    },
+    /// Move a collider to a pose within one step
+    #[command(
+        allow_negative_numbers = true,
+        after_help = "Example: sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8"
+    )]
+    MoveCollider {
+        /// Index of the collider
+        collider: u32,
+        #[command(flatten)]
+        pose: PoseArgs,
+    },
+    /// Set a parameter of the simulation
+    Set(SetArgs),
+    /// Load another scene; the step number continues
+    #[command(after_help = "Examples:\n  sim-node ctl load rope\n  sim-node ctl load ./my.toml")]
+    Load {
+        /// Built-in scene, or TOML file that the node can read: a path with / or ending in .toml
+        scene: String,
+    },
+    /// Pause the node at its next step boundary
+    Pause,
+    /// Resume a paused node
+    Resume,
+    /// Let a paused node make COUNT steps, and wait for the last one
+    #[command(after_help = "Example: sim-node ctl step 10")]
+    Step {
+        /// Number of steps, at least 1
+        #[arg(default_value_t = 1)]
+        count: u32,
+    },
+    /// Restore the initial state in the next step; the step number continues
+    Reset,
+}
+
+/// A point, as three arguments.
+#[derive(Debug, Clone, Copy, ClapArgs)]
+pub(crate) struct PointArgs {
+    /// Point in m, relative to the origin of the scene
+    x: f32,
+    /// Point in m, relative to the origin of the scene
+    y: f32,
+    /// Point in m, relative to the origin of the scene
+    z: f32,
+}
+
+impl PointArgs {
+    pub(crate) fn vector(self) -> [f32; 3] {
+        [self.x, self.y, self.z]
+    }
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(allow_negative_numbers = true)]
+pub(crate) struct TargetArgs {
+    /// Index of the particle
+    pub(crate) particle: u32,
+    #[command(flatten)]
+    pub(crate) target: PointArgs,
+    /// Time to the target in seconds, 0 to 0.25, rounded up to whole steps [default: 1/60]
+    #[arg(long, value_name = "SECONDS", default_value_t = GRAB_OVER_S_DEFAULT,
+        hide_default_value = true, value_parser = over_s)]
+    pub(crate) over: f32,
+}
+
+fn over_s(text: &str) -> Result<f32, String> {
+    let number = text.parse().ok().filter(|number| (0.0..=GRAB_OVER_S_MAX).contains(number));
+    number.ok_or_else(|| format!("it must be a number from 0 to {GRAB_OVER_S_MAX}"))
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Example: sim-node ctl push 0.5 0.5 0 --radius 0.2 --delta 0 0 -0.01 --limit 0.02"
+)]
+pub(crate) struct PushArgs {
+    #[command(flatten)]
+    pub(crate) center: PointArgs,
+    /// Radius of the sphere in m; a particle at exactly this distance is outside
+    #[arg(long, value_name = "R")]
+    pub(crate) radius: f32,
+    /// Displacement of the particles in the next step, in m
+    #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
+        value_names = ["DX", "DY", "DZ"])]
+    pub(crate) delta: Vec<f32>,
+    /// Limit on each component of DELTA, in m [default: no limit]
+    #[arg(long, value_name = "L")]
+    pub(crate) limit: Option<f32>,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Example: sim-node ctl cut-radius 0.5 0.5 0 --radius 0.1"
+)]
+pub(crate) struct CutRadiusArgs {
+    #[command(flatten)]
+    pub(crate) center: PointArgs,
+    /// Radius of the sphere in m; a particle at exactly this distance is outside
+    #[arg(long, value_name = "R")]
+    pub(crate) radius: f32,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Example: sim-node ctl cut-segment --from 0 0.5 0 --to 1 0.5 0 --direction 0 0 1"
+)]
+pub(crate) struct CutSegmentArgs {
+    /// Start of the segment in m, relative to the origin of the scene
+    #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
+        value_names = ["X", "Y", "Z"])]
+    pub(crate) from: Vec<f32>,
+    /// End of the segment in m, relative to the origin of the scene
+    #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
+        value_names = ["X", "Y", "Z"])]
+    pub(crate) to: Vec<f32>,
+    /// Direction along which the strip extends from the segment, without end on both sides
+    #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "1"],
+        value_names = ["DX", "DY", "DZ"])]
+    pub(crate) direction: Vec<f32>,
+}
+
+/// A pose relative to the pose at load.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct PoseArgs {
+    /// Translation from the pose at load, in m
+    pub(crate) x: f32,
+    /// Translation from the pose at load, in m
+    pub(crate) y: f32,
+    /// Translation from the pose at load, in m
+    pub(crate) z: f32,
+    /// Rotation from the pose at load, as a quaternion
+    #[arg(long, num_args = 4, action = ArgAction::Set, default_values = ["0", "0", "0", "1"],
+        value_names = ["QX", "QY", "QZ", "QW"])]
+    pub(crate) rotation: Vec<f32>,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:\n  \
+        sim-node ctl set damping 0.5\n  \
+        sim-node ctl set gravity 0 -1.6 0\n  \
+        sim-node ctl set tear_stretch off\n  \
+        sim-node ctl set compliance 1e-4 --kind bend"
+)]
+pub(crate) struct SetArgs {
+    #[arg(help = parameters_help())]
+    pub(crate) parameter: String,
+    /// A number, three numbers for a vector, or "off"
+    #[arg(num_args = 1..=3, required = true, value_name = "VALUE", value_parser = setting_word)]
+    pub(crate) values: Vec<SettingWord>,
+    /// Kind of the constraints that get the compliance or stiffness [default: all kinds]
+    #[arg(long, value_name = "KIND", value_parser = ["structural", "shear", "bend", "tether"])]
+    pub(crate) kind: Option<String>,
+}
+
+/// Names of the parameters, with their units.
+fn parameters_help() -> String {
+    let name = |info: &ParameterInfo| match info.unit {
+        "" => info.name.to_owned(),
+        unit => format!("{} ({unit})", info.name),
+    };
+    PARAMETERS.iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
+/// One word of the value of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum SettingWord {
+    Number(f32),
+    Off,
+}
+
+fn setting_word(text: &str) -> Result<SettingWord, String> {
+    if text == "off" {
+        return Ok(SettingWord::Off);
+    }
+    let number = text.parse().map_err(|_| "it must be a number or \"off\"".to_owned());
+    number.map(SettingWord::Number)
+}
+
+impl SetArgs {
+    /// Value that the words form together.
+    pub(crate) fn value(&self) -> Result<ParameterValue, &'static str> {
+        use SettingWord::{Number, Off};
+        match *self.values {
+            [Off] => Ok(ParameterValue::Off),
+            [Number(number)] => Ok(ParameterValue::Number(number)),
+            [Number(x), Number(y), Number(z)] => Ok(ParameterValue::Vector([x, y, z])),
+            _ => Err("VALUE must be one number, three numbers for a vector, or \"off\" alone"),
+        }
+    }
+
+    /// Kind of the constraints that get the value; `None` is all kinds.
+    pub(crate) fn constraint_kind(&self) -> Option<ConstraintKind> {
+        self.kind.as_deref().and_then(ConstraintKind::from_name)
+    }
+}

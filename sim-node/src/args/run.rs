@@ -1,0 +1,54 @@
+//! Command line of `run`.
+
+use std::time::Duration;
+
+use clap::Args as ClapArgs;
+use sim_solver::THREADS_MAX;
+
+use super::endpoint::EndpointArgs;
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Examples:\n  \
+    sim-node run                                              run the curtain in real time\n  \
+    sim-node run curtain --rate 1000 --duration 10s --json    run 10 s at 1 kHz, then print a summary\n  \
+    sim-node run ./my.toml --steps 5000 --as-fast-as-possible run a file without waiting\n  \
+    sim-node run rope --name left --domain lab                run beside other nodes")]
+pub(crate) struct RunArgs {
+    /// Built-in scene (see `sim-node scenes`), or TOML file: a path with / or ending in .toml
+    #[arg(default_value = "curtain")]
+    pub(crate) scene: String,
+    /// Steps per second, 1 to 100000 [default: the rate of the scene]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) rate: Option<u32>,
+    /// Substeps per step, 1 to 1000 [default: the substeps of the scene]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) substeps: Option<u32>,
+    /// Exit after N steps [default: run until Ctrl-C]
+    #[arg(long, value_name = "N", conflicts_with = "duration")]
+    pub(crate) steps: Option<u64>,
+    /// Exit after this much simulated time, such as 10s or 2min [default: run until Ctrl-C]
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub(crate) duration: Option<Duration>,
+    /// Start paused: wait at step 0 for `ctl resume` or `ctl step`
+    #[arg(long)]
+    pub(crate) paused: bool,
+    /// Make each step as soon as the last one is done, without waiting for its time
+    #[arg(long)]
+    pub(crate) as_fast_as_possible: bool,
+    /// Threads of the solver, 1 to 64; their number changes no bit [default: 1 for scenes with fewer
+    /// than 4000 particles, else one less than the cores available to this process]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u8).range(1..=i64::from(THREADS_MAX)))]
+    pub(crate) threads: Option<u8>,
+    /// Publish only every K-th snapshot, and the last one before a pause
+    #[arg(long, value_name = "K", default_value_t = 1,
+        value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub(crate) every: u64,
+    /// Print a summary as one JSON object on stdout at the end
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) endpoint: EndpointArgs,
+}

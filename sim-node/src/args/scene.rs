@@ -1,0 +1,72 @@
+//! Command lines of the subcommands that handle scenes without running them.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Examples:\n  \
+    sim-node scenes           list the built-in scenes with their rate and size\n  \
+    sim-node scenes --json    list them for a program")]
+pub(crate) struct ScenesArgs {
+    /// Print a JSON array with one object for each scene
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Example:\n  \
+    sim-node show curtain > my.toml    start a scene of your own from a built-in one")]
+pub(crate) struct ShowArgs {
+    /// Built-in scene, or TOML file
+    pub(crate) scene: String,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "An error exits with 1 and names file, line, field and the allowed values. \
+    Warnings do not\nchange the exit code.\n\nExamples:\n  \
+    sim-node check my.toml\n  \
+    sim-node check --json my.toml"
+)]
+pub(crate) struct CheckArgs {
+    /// TOML file, or built-in scene
+    pub(crate) scene: String,
+    /// Print one JSON object with the counts and the warnings
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Vertices become particles. Edges become structural constraints, diagonals of faces shear\n\
+        constraints, and the corners on both sides of an edge bend constraints. Faces without\n\
+        area, duplicate faces and vertices without a face are left out with a warning.\n\nExamples:\n  \
+        sim-node import shirt.obj --pin 'y > 1.45' -o shirt.toml && sim-node run ./shirt.toml\n  \
+        sim-node import net.obj --density 0.05 --pin 'group rim' --bend 0.01 > net.toml"
+)]
+pub(crate) struct ImportArgs {
+    /// Wavefront OBJ file of triangles, quads or larger faces
+    pub(crate) mesh: String,
+    /// File to write the scene to [default: stdout]
+    #[arg(short, long, value_name = "OUT.toml")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace an existing file
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    /// Mass per area, in kg per square unit
+    #[arg(long, value_name = "KG", default_value_t = 0.2)]
+    pub(crate) density: f32,
+    /// Vertices to pin: 'y > 1.9', 'x < 0 and z >= 1', 'group NAME', or none
+    #[arg(long, value_name = "CHOICE", default_value = "none")]
+    pub(crate) pin: String,
+    /// Compliance of structural constraints, in m/N
+    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
+    pub(crate) structural: f32,
+    /// Compliance of shear constraints, in m/N
+    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
+    pub(crate) shear: f32,
+    /// Compliance of bend constraints, in m/N
+    #[arg(long, value_name = "M/N", default_value_t = 1e-2)]
+    pub(crate) bend: f32,
+}

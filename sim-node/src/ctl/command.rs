@@ -1,0 +1,84 @@
+//! A command with its outcome.
+
+use std::time::Duration;
+
+use anyhow::bail;
+use serde::Serialize;
+use sim_contract::{Action, Client, OUTCOME_FLAG_CONTROL, Outcome};
+
+use super::hint;
+use crate::args::CtlArgs;
+use crate::exit::Exit;
+
+/// An outcome in JSON: the command with its result.
+#[derive(Serialize)]
+struct OutcomeRow {
+    index: u64,
+    step: u64,
+    status: &'static str,
+    reason: &'static str,
+    #[serde(flatten)]
+    action: Action,
+}
+
+/// Sends a command and prints its outcome. Waits for the last step of `step`.
+#[allow(clippy::print_stdout, reason = "the result of the command")]
+#[allow(clippy::print_stderr, reason = "messages to the user")]
+pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyhow::Result<Exit> {
+    let outcome = client.request(action, args.timeout)?;
+    if let Action::Step { count } = action
+        && outcome.is_applied()
+    {
+        wait_for_steps(client, args.timeout, &outcome, count)?;
+    }
+    let row = OutcomeRow {
+        index: outcome.index,
+        step: outcome.step,
+        status: if outcome.is_applied() { "applied" } else { "rejected" },
+        reason: outcome.reason_name(),
+        action: outcome.command.action(),
+    };
+    let (step, reason) = (row.step, row.reason);
+    if args.json {
+        println!("{}", serde_json::to_string(&row)?);
+    } else if outcome.is_applied() {
+        println!("applied at step {step}");
+    } else {
+        println!("rejected at step {step}: {reason}{}", hint::for_rejection(&row.action, &outcome));
+    }
+    if !outcome.is_applied() {
+        return Ok(Exit::Rejected);
+    }
+    if let Some(hint) = hint::for_applied(client, args.timeout, &row.action) {
+        eprintln!("hint: {hint}");
+    }
+    Ok(Exit::Done)
+}
+
+/// Waits until the steps are made, so that a query after this call shows them.
+fn wait_for_steps(
+    client: &mut Client,
+    timeout: Duration,
+    outcome: &Outcome,
+    count: u32,
+) -> anyhow::Result<()> {
+    let last = outcome.step + u64::from(count) - 1;
+    let timeout = timeout + period(client, timeout)?;
+    while let Some(snapshot) = client.next_snapshot(timeout)? {
+        if snapshot.header().step >= last {
+            return Ok(());
+        }
+    }
+    // A replay may end before it has shown all of them.
+    if outcome.flags & OUTCOME_FLAG_CONTROL != 0 {
+        return Ok(());
+    }
+    bail!("the node began the steps up to {last}, but published none for {timeout:?}")
+}
+
+/// Wall-clock time between two steps, which is long at a small time scale.
+fn period(client: &mut Client, timeout: Duration) -> anyhow::Result<Duration> {
+    let Some(status) = client.status(timeout)? else { return Ok(Duration::ZERO) };
+    let seconds = 1.0 / (f64::from(status.rate_hz) * status.time_scale);
+    Ok(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO))
+}

@@ -1,0 +1,78 @@
+//! `ctl get`: the parameters of the simulation.
+
+use anyhow::bail;
+use serde_json::{Map, Value};
+use sim_contract::{Client, OffMeaning, Parameter, ParameterValue, Setting};
+
+use crate::args::CtlArgs;
+use crate::table::{Align, Table};
+
+/// Prints one parameter, or all of them.
+#[allow(clippy::print_stdout, reason = "the result of the command")]
+pub(super) fn print(
+    client: &mut Client,
+    args: &CtlArgs,
+    parameter: Option<Parameter>,
+) -> anyhow::Result<()> {
+    let Some(parameters) = client.parameters(args.timeout)? else {
+        bail!("the node published no parameters within {:?}; is it stopped?", args.timeout);
+    };
+    let is_asked = |name: &str| parameter.is_none_or(|parameter| parameter.name() == name);
+    let step = parameters.header.step;
+    if args.json {
+        let mut object = Map::from_iter([("step".to_owned(), step.into())]);
+        if let Value::Object(values) = serde_json::to_value(parameters.values)? {
+            object.extend(values.into_iter().filter(|(name, _)| is_asked(name)));
+        }
+        println!("{}", Value::Object(object));
+        return Ok(());
+    }
+    let mut table = Table::new([
+        ("parameter", Align::Left),
+        ("constraints", Align::Left),
+        ("value", Align::Left),
+        ("unit", Align::Left),
+    ]);
+    let settings = parameters.values.settings();
+    for setting in settings.iter().filter(|setting| is_asked(setting.parameter.name())) {
+        table.add(cells(setting));
+    }
+    print!("since step {step}\n{}", table.text());
+    Ok(())
+}
+
+/// Name, kind of constraints, value and unit.
+fn cells(setting: &Setting) -> [String; 4] {
+    let info = setting.parameter.info();
+    let value = match (setting.value, info.off) {
+        (ParameterValue::Number(number), _) => number.to_string(),
+        (ParameterValue::Vector(vector), _) => vector.map(|number| number.to_string()).join(" "),
+        (ParameterValue::Off, OffMeaning::OwnOfEach) => "as loaded".to_owned(),
+        (ParameterValue::Off, _) => "off".to_owned(),
+    };
+    let unit = if matches!(setting.value, ParameterValue::Off) { "" } else { info.unit };
+    let kind = setting.constraint_kind.map_or("", |kind| kind.name());
+    [info.name.to_owned(), kind.to_owned(), value, unit.to_owned()]
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_contract::ConstraintKind;
+
+    use super::*;
+
+    #[test]
+    fn values_are_shown_as_ctl_set_accepts_them() {
+        let cells = |parameter, constraint_kind, value| {
+            cells(&Setting { parameter, constraint_kind, value }).join("|")
+        };
+        let gravity = ParameterValue::Vector([0.0, -9.81, 0.0]);
+        assert_eq!(cells(Parameter::Gravity, None, gravity), "gravity||0 -9.81 0|m/s²");
+        assert_eq!(cells(Parameter::TearForce, None, ParameterValue::Off), "tear_force||off|");
+        let shear = Some(ConstraintKind::Shear);
+        let number = ParameterValue::Number(1e-4);
+        assert_eq!(cells(Parameter::Compliance, shear, number), "compliance|shear|0.0001|m/N");
+        let off = ParameterValue::Off;
+        assert_eq!(cells(Parameter::Compliance, shear, off), "compliance|shear|as loaded|");
+    }
+}

@@ -1,0 +1,109 @@
+//! `ctl status`: the state of the node.
+
+use anyhow::bail;
+use serde::Serialize;
+use sim_contract::{Client, NodeStatus};
+
+use crate::args::CtlArgs;
+
+/// A status in JSON.
+#[derive(Serialize)]
+struct StatusRow {
+    scene: String,
+    run_id: String,
+    process_id: u32,
+    step: u64,
+    paused: bool,
+    rate_hz: u32,
+    real_time_factor: f64,
+    time_scale: f64,
+    particles: u32,
+    constraints: u32,
+    torn_constraints: u32,
+    frozen_particles: u64,
+    readers: u32,
+    outcomes: u64,
+    rejected_commands: u64,
+    late_steps: u64,
+    skipped_periods: u64,
+    wake_late_ns_p50: u64,
+    wake_late_ns_p99: u64,
+    solve_ns_p50: u64,
+    solve_ns_p99: u64,
+}
+
+impl StatusRow {
+    fn new(status: &NodeStatus) -> Self {
+        Self {
+            scene: status.scene_name(),
+            run_id: format!("{:016x}", status.run_id),
+            process_id: status.process_id,
+            step: status.step,
+            paused: status.is_paused(),
+            rate_hz: status.rate_hz,
+            real_time_factor: status.real_time_factor,
+            time_scale: status.time_scale,
+            particles: status.particle_count,
+            constraints: status.constraint_count,
+            torn_constraints: status.torn_count,
+            frozen_particles: status.frozen_count,
+            readers: status.reader_count,
+            outcomes: status.outcome_count,
+            rejected_commands: status.rejected_count,
+            late_steps: status.late_steps,
+            skipped_periods: status.skipped_periods,
+            wake_late_ns_p50: status.wake_late_ns_p50,
+            wake_late_ns_p99: status.wake_late_ns_p99,
+            solve_ns_p50: status.solve_ns_p50,
+            solve_ns_p99: status.solve_ns_p99,
+        }
+    }
+
+    /// Lines for people: rounded, and with units.
+    fn lines(&self) -> [(&'static str, String); 12] {
+        let times = |p50_ns: u64, p99_ns: u64| {
+            let micros = |ns: u64| ns as f64 / 1000.0;
+            format!("{:.1} us median, {:.1} us 99th percentile", micros(p50_ns), micros(p99_ns))
+        };
+        let state = if self.paused { "paused" } else { "running" };
+        let frozen = match self.frozen_particles {
+            0 => String::new(),
+            count => format!(", {count} frozen"),
+        };
+        let skipped = match self.skipped_periods {
+            0 => String::new(),
+            count => format!(", {count} periods skipped"),
+        };
+        [
+            ("scene", self.scene.clone()),
+            ("process", format!("{}, run {}", self.process_id, self.run_id)),
+            ("step", format!("{}, {state}", self.step)),
+            ("rate", format!("{} Hz, time scale {:.3}", self.rate_hz, self.time_scale)),
+            ("real time", format!("x{:.3}", self.real_time_factor)),
+            ("particles", format!("{}{frozen}", self.particles)),
+            ("constraints", format!("{}, {} torn", self.constraints, self.torn_constraints)),
+            ("commands", format!("{}, {} rejected", self.outcomes, self.rejected_commands)),
+            ("readers", self.readers.to_string()),
+            ("late", format!("{} steps{skipped}", self.late_steps)),
+            ("wake-up delay", times(self.wake_late_ns_p50, self.wake_late_ns_p99)),
+            ("step time", times(self.solve_ns_p50, self.solve_ns_p99)),
+        ]
+    }
+}
+
+/// Prints the newest status.
+#[allow(clippy::print_stdout, reason = "the result of the command")]
+pub(super) fn print(client: &mut Client, args: &CtlArgs) -> anyhow::Result<()> {
+    let Some(status) = client.status(args.timeout)? else {
+        bail!("the node published no status within {:?}; is it stopped?", args.timeout);
+    };
+    let row = StatusRow::new(&status);
+    if args.json {
+        println!("{}", serde_json::to_string(&row)?);
+        return Ok(());
+    }
+    for (key, value) in row.lines() {
+        println!("{key:<14} {value}");
+    }
+    Ok(())
+}

@@ -1,0 +1,150 @@
+//! `sim-node ctl` as a person uses it: exit codes, queries, hints and errors.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use integration_tests::{Finished, Process, Program, Sandbox, ctl};
+
+fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
+    Process::start_ready(Program::SimNode, sandbox, args)
+}
+
+fn run(sandbox: &Sandbox, line: &str) -> Finished {
+    let args: Vec<_> = line.split(' ').collect();
+    Process::run(Program::SimNode, sandbox, &args)
+}
+
+#[test]
+fn a_rejected_command_exits_with_4_and_an_applied_one_with_0() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let applied = run(&sandbox, "ctl pin 90");
+    assert_eq!((applied.code, applied.stdout.as_str()), (Some(0), "applied at step 1\n"));
+    let rejected = run(&sandbox, "ctl pin 168");
+    assert_eq!(
+        (rejected.code, rejected.stdout.as_str()),
+        (Some(4), "rejected at step 1: unknown_particle\n")
+    );
+    let json = run(&sandbox, "ctl --json pin 168");
+    assert_eq!(json.code, Some(4));
+    assert!(json.stdout.contains(r#""status":"rejected","reason":"unknown_particle""#));
+}
+
+#[test]
+fn particles_are_printed_with_their_flags_by_name() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let all = ctl(&sandbox, &["particles"]);
+    let all = all["particles"].as_array().unwrap();
+    assert_eq!(all.len(), 168);
+    let pinned = all.iter().filter(|one| one["flags"] == serde_json::json!(["pinned"]));
+    assert_eq!(pinned.count(), 14);
+    ctl(&sandbox, &["grab", "90", "0.5", "-0.2", "0.3", "--over", "0"]);
+    ctl(&sandbox, &["step"]);
+    let some = ctl(&sandbox, &["particles", "90", "3"]);
+    assert_eq!(some["step"], 1);
+    assert_eq!(some["particles"][0]["position"][0], 0.5);
+    assert_eq!(some["particles"][0]["flags"], serde_json::json!(["grabbed"]));
+    assert_eq!(some["particles"][1]["index"], 3);
+    let table = run(&sandbox, "ctl particles 90").success();
+    let row: Vec<_> = table.lines().nth(2).unwrap().split_whitespace().collect();
+    assert_eq!((row[0], row[1], row[2], row[3]), ("90", "0.5000", "-0.2000", "0.3000"));
+    assert_eq!(row[8], "grabbed");
+    let unknown = run(&sandbox, "ctl particles 168");
+    assert_eq!(
+        (unknown.code, unknown.stderr.as_str()),
+        (Some(1), "error: the scene has no particle 168 (allowed: 0 to 167)\n")
+    );
+}
+
+#[test]
+fn nearest_names_the_particle_at_a_point() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let position = ctl(&sandbox, &["particles", "90"])["particles"][0]["position"].clone();
+    let point: Vec<_> = position.as_array().unwrap().iter().map(ToString::to_string).collect();
+    let nearest = ctl(&sandbox, &["nearest", &point[0], &point[1], &point[2]]);
+    assert_eq!((&nearest["index"], &nearest["distance"]), (&90.into(), &0.0.into()));
+    assert_eq!(nearest["position"], position);
+    let text = run(&sandbox, "ctl nearest -100 -2e1 -.5").success();
+    assert!(text.starts_with("particle ") && text.contains(" m away (step 0)"), "{text}");
+}
+
+#[test]
+fn wind_without_a_surface_is_applied_with_a_hint() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "rope", "--paused"]);
+    let applied = run(&sandbox, "ctl set wind_velocity 3 0 0");
+    assert_eq!((applied.code, applied.stdout.as_str()), (Some(0), "applied at step 1\n"));
+    assert_eq!(applied.stderr, "hint: this has no effect: the scene has no surface\n");
+}
+
+#[test]
+fn wind_without_drag_is_applied_with_a_hint() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let without = run(&sandbox, "ctl set wind_velocity 3 0 0");
+    assert_eq!(without.code, Some(0));
+    assert!(without.stderr.starts_with("hint: this has no effect while wind_drag is 0"));
+    run(&sandbox, "ctl set wind_drag 0.5").success();
+    assert_eq!(run(&sandbox, "ctl set wind_velocity 4 0 0").stderr, "");
+}
+
+#[test]
+fn get_shows_the_parameters_as_they_were_set() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    ctl(&sandbox, &["set", "gravity", "0", "-1.5", "0"]);
+    ctl(&sandbox, &["set", "compliance", "0.001", "--kind", "bend"]);
+    let all = ctl(&sandbox, &["get"]);
+    assert_eq!(all["gravity"], serde_json::json!([0.0, -1.5, 0.0]));
+    assert!(all["step"] == 1 && all["tear_force"].is_null(), "{all}");
+    let one = ctl(&sandbox, &["get", "substeps"]);
+    assert_eq!(one.as_object().unwrap().len(), 2, "{one}");
+    let table = run(&sandbox, "ctl get gravity").success();
+    assert_eq!(
+        table,
+        "since step 1\nparameter  constraints  value     unit\ngravity                 0 -1.5 0  m/s²\n"
+    );
+    let unknown = run(&sandbox, "ctl get colour");
+    assert_eq!(unknown.code, Some(2));
+    assert!(unknown.stderr.contains("(allowed: gravity, damping, "), "{}", unknown.stderr);
+}
+
+#[test]
+fn name_and_domain_are_accepted_before_the_subcommand() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "rope", "--paused", "--name", "left"]);
+    let line = ["--domain", sandbox.domain(), "--name", "left", "ctl", "hash", "--json"];
+    let found = Process::start_in(Program::SimNode, "elsewhere", &line).wait().json();
+    assert_eq!(found["step"], 0);
+}
+
+#[test]
+fn all_programs_blame_the_environment_for_a_bad_domain_in_it() {
+    for (program, args) in [
+        (Program::SimNode, &["run", "rope", "--steps", "1"][..]),
+        (Program::SimNode, &["ctl", "status"]),
+        (Program::Recorder, &["record", "-o", "never.mcap"]),
+        (Program::ViewerBridge, &["--listen", "127.0.0.1:0"]),
+        (Program::Watch, &[]),
+    ] {
+        let finished = Process::start_in(program, "Big Lab", args).wait();
+        assert_eq!(finished.code, Some(1), "{program:?}: {}", finished.stderr);
+        let blamed = "the environment variable CATENARY_DOMAIN is 'Big Lab', which is not a valid \
+                      domain (allowed: 1 to 24 of a-z, 0-9, '_', '-')";
+        assert!(finished.stderr.contains(blamed), "{program:?}: {}", finished.stderr);
+        assert!(!finished.stderr.contains("--domain"), "{program:?}: {}", finished.stderr);
+    }
+}
+
+#[test]
+fn import_names_the_option_that_replaces_an_existing_file() {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let scene = sandbox.write("scene.toml", "version = 1\n");
+    let refused = run(&sandbox, &format!("import {mesh} -o {scene}"));
+    assert_eq!(
+        (refused.code, refused.stderr),
+        (Some(1), format!("error: {scene}: the file exists (--overwrite replaces it)\n"))
+    );
+    run(&sandbox, &format!("import {mesh} -o {scene} --overwrite")).success();
+}

@@ -1,0 +1,56 @@
+//! The commands of the README compile each third-party crate once: whichever package they select,
+//! Cargo enables the same features. The crate `build-features` sees to that.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+/// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
+const PROGRAMS: [&str; 4] = ["sim-node", "recorder", "viewer-bridge", "integration-tests"];
+const PACKAGES: [&str; 8] = [
+    "sim-types",
+    "sim-contract",
+    "sim-solver",
+    "sim-lessons",
+    "sim-node",
+    "recorder",
+    "viewer-bridge",
+    "integration-tests",
+];
+
+/// Third-party crates of a selection, each with its version and features. A crate that is used by
+/// build scripts as well appears twice if its features differ there.
+#[allow(clippy::disallowed_methods, reason = "Cargo alone resolves features")]
+fn crates(selection: &[&str], edges: &str) -> BTreeSet<String> {
+    let output = Command::new(option_env!("CARGO").unwrap_or("cargo"))
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap())
+        .args(["tree", "--locked", "--prefix", "none"])
+        .args(["--edges", edges, "--format", "{p} [{f}]"])
+        .args(selection)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines = text.lines().map(|line| line.replace(" (proc-macro)", "").replace(" (*)", ""));
+    // Members of the workspace show their path.
+    lines.filter(|line| !line.contains('/')).collect()
+}
+
+#[test]
+fn every_selection_of_packages_enables_the_same_features() {
+    let everything =
+        ["normal,build", "normal,build,dev"].map(|edges| crates(&["--workspace"], edges));
+    let everything: BTreeSet<String> = everything.into_iter().flatten().collect();
+    let programs = PROGRAMS.map(|package| (package, "normal,build"));
+    let packages = PACKAGES.map(|package| (package, "normal,build,dev"));
+    for (package, edges) in programs.into_iter().chain(packages) {
+        let selected = crates(&["--package", package], edges);
+        let others: Vec<_> = selected.difference(&everything).collect();
+        assert!(
+            others.is_empty(),
+            "-p {package} ({edges}) enables other features than --workspace; \
+             add those of --workspace to .cargo/build-features/Cargo.toml: {others:#?}"
+        );
+    }
+}

@@ -1,0 +1,65 @@
+//! Commands that clients publish: those of the file format, one JSON object per message.
+
+use sim_contract::Action;
+
+use crate::message::Command;
+
+/// Topic of published commands.
+pub(super) const TOPIC: &str = "/commands";
+
+/// Parses a command. A cut refers to the load on show, `epoch`. The error is for the user.
+pub(super) fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
+    let action: Action = serde_json::from_slice(payload).map_err(|error| error.to_string())?;
+    Ok(match action {
+        Action::Pin { particle } => Command::Pin { particle },
+        Action::Unpin { particle } => Command::Unpin { particle },
+        Action::Grab { particle, target, over_s } => Command::Grab { particle, target, over_s },
+        Action::Move { particle, target, over_s } => Command::Move { particle, target, over_s },
+        Action::Release { particle } => Command::Release { particle },
+        Action::Pause => Command::Pause {},
+        Action::Resume => Command::Resume {},
+        Action::Step { count } => Command::Step { count: i32::try_from(count).unwrap_or(i32::MAX) },
+        Action::Reset => Command::Reset {},
+        Action::Cut { constraint } => Command::Cut { epoch, constraints: vec![constraint] },
+        Action::CutRadius { center, radius } => Command::CutRadius { center, radius },
+        Action::CutSegment { from, to, direction } => Command::CutSegment { from, to, direction },
+        Action::MoveAnchor { anchor, translation, rotation } => {
+            Command::MoveAnchor { anchor, translation, rotation }
+        }
+        Action::MoveCollider { collider, translation, rotation } => {
+            Command::MoveCollider { collider, translation, rotation }
+        }
+        Action::Set { parameter, value, constraint_kind } => {
+            Command::Set { parameter: parameter.as_str().to_owned(), value, constraint_kind }
+        }
+        Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
+        Action::Push { .. } => return Err("push is not accepted here".to_owned()),
+        Action::Unknown { .. } => return Err("no such command".to_owned()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn published_commands_are_those_of_the_file_format() {
+        let read = |text: &str| parse(text.as_bytes(), 7);
+        assert_eq!(read(r#"{"kind":"pin","particle":3}"#), Ok(Command::Pin { particle: 3 }));
+        let cut = Command::Cut { epoch: 7, constraints: vec![5] };
+        assert_eq!(read(r#"{"kind":"cut","constraint":5}"#), Ok(cut));
+        let grab = Command::Grab { particle: 1, target: [0.0, 1.0, 2.0], over_s: 0.1 };
+        let text = r#"{"kind":"grab","particle":1,"target":[0,1,2],"over_s":0.1}"#;
+        assert_eq!(read(text), Ok(grab));
+        assert_eq!(read(r#"{"kind":"pause"}"#), Ok(Command::Pause {}));
+    }
+
+    #[test]
+    fn other_messages_are_refused_with_the_reason() {
+        for text in ["", "[]", "{}", r#"{"kind":"dance"}"#, r#"{"kind":"pin"}"#] {
+            assert!(parse(text.as_bytes(), 1).is_err(), "{text}");
+        }
+        let push = br#"{"kind":"push","center":[0,0,0],"radius":1,"delta":[0,0,0]}"#;
+        assert_eq!(parse(push, 1), Err("push is not accepted here".to_owned()));
+    }
+}

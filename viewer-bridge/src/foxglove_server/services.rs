@@ -1,0 +1,95 @@
+//! The services: pause, resume, step and reset.
+
+use std::sync::Arc;
+
+use foxglove::Schema;
+use foxglove::websocket::service::{Handler, Request, Responder, Service, ServiceSchema};
+use serde::Deserialize;
+
+use super::request_bridge::RequestBridge;
+use crate::message::Command;
+
+/// Names of the services: those of the commands.
+const NAMES: [&str; 4] = ["pause", "resume", "step", "reset"];
+
+const STEP_SCHEMA: &str = r#"{"type":"object","additionalProperties":false,"properties":{"count":{"type":"integer","minimum":1,"maximum":10000,"default":1}}}"#;
+const EMPTY_SCHEMA: &str = r#"{"type":"object","additionalProperties":false,"properties":{}}"#;
+const OUTCOME_SCHEMA: &str = r#"{"type":"object","properties":{"kind":{"type":"string"},"status":{"type":"string"},"step":{"type":["integer","null"]},"applied":{"type":"integer"},"rejected":{"type":"integer"},"reason":{"type":"string"},"text":{"type":"string"}}}"#;
+
+/// Creates all services.
+pub(super) fn services(bridge: &Arc<RequestBridge>) -> Vec<Service> {
+    let service = |name| {
+        let request = if name == "step" { STEP_SCHEMA } else { EMPTY_SCHEMA };
+        let schema = ServiceSchema::new(format!("catenary.{name}"))
+            .with_request("json", json_schema(&format!("catenary.{name}.Request"), request))
+            .with_response("json", json_schema("catenary.Answer", OUTCOME_SCHEMA));
+        Service::builder(name, schema).handler(ServiceHandler(Arc::clone(bridge)))
+    };
+    NAMES.map(service).into()
+}
+
+fn json_schema(name: &str, schema: &'static str) -> Schema {
+    Schema::new(name, "jsonschema", schema.as_bytes())
+}
+
+struct ServiceHandler(Arc<RequestBridge>);
+
+impl Handler for ServiceHandler {
+    fn call(&self, request: Request, responder: Responder) {
+        match parse(request.service_name(), request.payload()) {
+            Ok(command) => self.0.call(request.client_id(), command, responder),
+            Err(error) => responder.respond_err(error),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StepRequest {
+    #[serde(default = "one")]
+    count: i32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EmptyRequest {}
+
+fn one() -> i32 {
+    1
+}
+
+/// Parses the request of a call. An empty request has the defaults.
+fn parse(name: &str, payload: &[u8]) -> Result<Command, String> {
+    let payload = if payload.is_empty() { b"{}" } else { payload };
+    if name == "step" {
+        let request: StepRequest =
+            serde_json::from_slice(payload).map_err(|error| malformed(&error))?;
+        return Ok(Command::Step { count: request.count });
+    }
+    let EmptyRequest {} = serde_json::from_slice(payload).map_err(|error| malformed(&error))?;
+    match name {
+        "pause" => Ok(Command::Pause {}),
+        "resume" => Ok(Command::Resume {}),
+        "reset" => Ok(Command::Reset {}),
+        _ => Err("no such service".to_owned()),
+    }
+}
+
+fn malformed(error: &serde_json::Error) -> String {
+    format!("malformed request: {error}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_service_has_a_command() {
+        for name in NAMES {
+            assert_eq!(parse(name, b"").map(|command| command.name()), Ok(name));
+            assert!(parse(name, br#"{"colour":1}"#).is_err(), "{name}");
+        }
+        assert_eq!(parse("step", br#"{"count":5}"#), Ok(Command::Step { count: 5 }));
+        assert!(parse("step", br#"{"count":1.5}"#).is_err());
+    }
+}

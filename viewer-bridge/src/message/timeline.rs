@@ -1,0 +1,82 @@
+//! Messages about a recording: its contents and its playback.
+
+use serde::Serialize;
+
+/// The contents of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Timeline {
+    /// Name of the file.
+    pub file: String,
+    /// Name of the scene.
+    pub scene: String,
+    /// Steps per second.
+    pub rate_hz: u32,
+    /// First recorded step.
+    pub first_step: u64,
+    /// Last recorded step.
+    pub last_step: u64,
+    /// Simulated time of the first step, in s.
+    pub first_time_s: f64,
+    /// Simulated time of the last step, in s.
+    pub last_time_s: f64,
+    /// Events, ascending by step; at most [`crate::limits::MARKS_MAX`].
+    pub marks: Vec<Mark>,
+    /// Result of the check of the recorded hashes.
+    pub hashes: Hashes,
+    /// The same for the user.
+    pub hash_text: String,
+}
+
+/// Events of one kind at a place on the timeline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Mark {
+    /// Kind of event.
+    pub kind: MarkKind,
+    /// Step of the first one.
+    pub step: u64,
+    /// Number of events.
+    pub count: u32,
+}
+
+/// Kind of event in a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MarkKind {
+    /// Constraints tore.
+    Tear,
+    /// Particles were pinned or unpinned.
+    Pin,
+    /// Other commands were applied.
+    Command,
+    /// Steps began late.
+    Late,
+}
+
+/// Result of the comparison of each recorded state with its recorded hash.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Hashes {
+    /// The check is not finished.
+    Checking,
+    /// Every state that could be checked has its hash.
+    Verified,
+    /// At least one state has another hash.
+    Diverged,
+    /// The recording has no hashes.
+    Absent,
+}
+
+/// The playback of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Playback {
+    /// Time advances.
+    pub is_playing: bool,
+    /// Simulated seconds per second.
+    pub rate: f32,
+    /// The playback starts again at its end.
+    pub is_looping: bool,
+    /// Step on show.
+    pub step: u64,
+    /// Simulated time on show, in s.
+    pub time_s: f64,
+}

@@ -1,0 +1,63 @@
+//! The newest state, as pages receive it.
+
+use bytes::Bytes;
+
+use crate::limits::F32_PARTICLES_MAX;
+use crate::message::Choice;
+use crate::wire::Format;
+
+/// The newest state, in every format that a page waited for.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct FrameSet {
+    /// Number of the frame; ascending.
+    pub(crate) number: u32,
+    /// Number of particles.
+    pub(crate) particle_count: usize,
+    /// FRAME f32.
+    pub(crate) f32: Option<Bytes>,
+    /// FRAME u16.
+    pub(crate) u16: Option<Bytes>,
+    /// The colliders of the load, if it has any.
+    pub(crate) colliders: Option<ColliderSet>,
+}
+
+/// The colliders of a state.
+#[derive(Debug, Clone)]
+pub(crate) struct ColliderSet {
+    /// Changes with every change of the colliders.
+    pub(crate) number: u64,
+    /// COLLIDERS.
+    pub(crate) bytes: Bytes,
+}
+
+/// The formats that pages wait for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Formats {
+    /// FRAME f32.
+    pub f32: bool,
+    /// FRAME u16.
+    pub u16: bool,
+}
+
+impl Formats {
+    /// Returns whether a page waits for a frame.
+    pub fn is_any(self) -> bool {
+        self.f32 || self.u16
+    }
+
+    pub(super) fn add(&mut self, format: Format) {
+        match format {
+            Format::F32 => self.f32 = true,
+            Format::U16 => self.u16 = true,
+        }
+    }
+}
+
+/// The format in which a page receives a scene of this many particles.
+pub(super) fn format_for(choice: Choice, particle_count: usize) -> Format {
+    match choice {
+        Choice::F32 => Format::F32,
+        Choice::Auto if particle_count <= F32_PARTICLES_MAX => Format::F32,
+        Choice::Auto | Choice::U16 => Format::U16,
+    }
+}

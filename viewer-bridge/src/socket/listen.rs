@@ -1,0 +1,89 @@
+//! Accepts HTTP connections and hands them to a router, within the limits on time and number.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio::time::{sleep, timeout};
+
+use crate::limits::{
+    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, CONNECTIONS_MAX, HELLO_TIMEOUT, SHUTDOWN_TIMEOUT,
+};
+use crate::shutdown::Shutdown;
+
+/// A listener for HTTP connections.
+#[derive(Debug)]
+pub(crate) struct HttpListener {
+    listener: TcpListener,
+    address: SocketAddr,
+}
+
+/// The permits of the clients of one server: [`CLIENTS_MAX`] at a time.
+pub(crate) type ClientPermits = Arc<Semaphore>;
+
+/// Creates the permits of a server.
+pub(crate) fn client_permits() -> ClientPermits {
+    Arc::new(Semaphore::new(CLIENTS_MAX))
+}
+
+impl HttpListener {
+    /// Binds an address; port 0 is any free port.
+    pub(crate) async fn bind(address: SocketAddr) -> io::Result<Self> {
+        let listener = TcpListener::bind(address).await?;
+        let address = listener.local_addr()?;
+        Ok(Self { listener, address })
+    }
+
+    /// The address, with the real port.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Serves until the shutdown begins. Then waits until every client has returned its permit, but
+    /// not longer than [`SHUTDOWN_TIMEOUT`].
+    pub(crate) async fn serve(self, router: Router, clients: ClientPermits, shutdown: &Shutdown) {
+        tokio::select! {
+            () = accept(&self.listener, &router) => {}
+            () = shutdown.begun() => {}
+        }
+        let all = u32::try_from(CLIENTS_MAX).unwrap_or(u32::MAX);
+        let _all_returned = timeout(SHUTDOWN_TIMEOUT, clients.acquire_many(all)).await;
+    }
+}
+
+/// Accepts connections for as long as it is polled.
+async fn accept(listener: &TcpListener, router: &Router) {
+    let connections = Arc::new(Semaphore::new(CONNECTIONS_MAX));
+    // The semaphore is never closed.
+    while let Ok(permit) = Arc::clone(&connections).acquire_owned().await {
+        let Ok((stream, _)) = listener.accept().await else {
+            // The connection broke before it was accepted, or the process has no file handle left.
+            sleep(ACCEPT_PAUSE).await;
+            continue;
+        };
+        let router = router.clone();
+        tokio::spawn(async move {
+            serve_connection(stream, router).await;
+            drop(permit);
+        });
+    }
+}
+
+async fn serve_connection(stream: TcpStream, router: Router) {
+    // Without the option, small messages are only delayed.
+    let _set = stream.set_nodelay(true);
+    let service = TowerToHyperService::new(router);
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(HELLO_TIMEOUT)
+        .serve_connection(TokioIo::new(stream), service)
+        .with_upgrades();
+    // A broken connection needs no report. A WebSocket is served by its own task after the upgrade.
+    let _ended = timeout(CONNECTION_TIMEOUT, connection).await;
+}

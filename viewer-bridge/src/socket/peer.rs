@@ -1,0 +1,136 @@
+//! The WebSocket of one client, with the limits on size, rate and silence.
+
+use std::time::Duration;
+
+use axum::Error;
+use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade};
+use bytes::Bytes;
+use sim_contract::clock::monotonic_ns;
+use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
+use tokio_tungstenite::tungstenite;
+
+use super::rate_limit::RateLimit;
+use crate::limits::{MESSAGE_SIZE_BYTES_MAX, PING_PERIOD, SILENCE_MAX};
+
+/// The server ends.
+pub(crate) const GOING_AWAY: u16 = 1001;
+/// A message is too long.
+const MESSAGE_TOO_LONG: u16 = 1009;
+/// The client was silent, or too slow.
+pub(crate) const TOO_SLOW: u16 = 4408;
+/// The client sent too many messages.
+const TOO_MANY_MESSAGES: u16 = 4429;
+
+/// Time for a client to read the close frame.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Longest reason in a close frame, in bytes.
+const REASON_SIZE_BYTES_MAX: usize = 123;
+
+/// The end of a conversation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum End {
+    /// The client has left, or its connection is broken.
+    Gone,
+    /// The server closes the connection.
+    Closed {
+        /// Close code, as in `PROTOCOL.md`.
+        code: u16,
+        /// Reason for the user.
+        reason: String,
+    },
+}
+
+impl End {
+    pub(crate) fn closed(code: u16, reason: impl Into<String>) -> Self {
+        Self::Closed { code, reason: reason.into() }
+    }
+
+    /// The end after a failed read. A message that is too long can be answered; a broken connection
+    /// cannot.
+    fn from_error(error: Error) -> Self {
+        match error.into_inner().downcast_ref() {
+            Some(tungstenite::Error::Capacity(_)) => {
+                Self::closed(MESSAGE_TOO_LONG, "a message is longer than 64 KiB")
+            }
+            _ => Self::Gone,
+        }
+    }
+}
+
+/// The WebSocket of one client.
+#[derive(Debug)]
+pub(crate) struct Peer {
+    socket: WebSocket,
+    rate: RateLimit,
+    last_message_ns: u64,
+    ping: Interval,
+}
+
+/// Sets the limits of a WebSocket before the upgrade.
+pub(crate) fn limit(upgrade: WebSocketUpgrade) -> WebSocketUpgrade {
+    upgrade
+        .max_message_size(MESSAGE_SIZE_BYTES_MAX)
+        .max_frame_size(MESSAGE_SIZE_BYTES_MAX)
+        .write_buffer_size(0)
+}
+
+impl Peer {
+    pub(crate) fn new(socket: WebSocket) -> Self {
+        let now_ns = monotonic_ns();
+        let mut ping = interval(PING_PERIOD);
+        ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        Self { socket, rate: RateLimit::new(now_ns), last_message_ns: now_ns, ping }
+    }
+
+    /// Returns the next text or binary message, and pings the client while it waits. Dropping the
+    /// future loses no message.
+    pub(crate) async fn receive(&mut self) -> Result<Message, End> {
+        loop {
+            tokio::select! {
+                biased;
+                incoming = self.socket.recv() => {
+                    self.last_message_ns = monotonic_ns();
+                    match incoming {
+                        None | Some(Ok(Message::Close(_))) => return Err(End::Gone),
+                        Some(Err(error)) => return Err(End::from_error(error)),
+                        Some(Ok(_)) if !self.rate.allows(self.last_message_ns) => {
+                            return Err(End::closed(TOO_MANY_MESSAGES, "too many messages a second"));
+                        }
+                        Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+                        Some(Ok(message)) => return Ok(message),
+                    }
+                }
+                _ = self.ping.tick() => {
+                    let silence_ns = monotonic_ns().saturating_sub(self.last_message_ns);
+                    if Duration::from_nanos(silence_ns) > SILENCE_MAX {
+                        return Err(End::closed(TOO_SLOW, "the client does not answer"));
+                    }
+                    self.send(Message::Ping(Bytes::new())).await?;
+                }
+            }
+        }
+    }
+
+    /// Sends a message. A client that does not accept it within [`SILENCE_MAX`] is given up.
+    pub(crate) async fn send(&mut self, message: Message) -> Result<(), End> {
+        match timeout(SILENCE_MAX, self.socket.send(message)).await {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(_)) | Err(_) => Err(End::Gone),
+        }
+    }
+
+    /// Sends the reason of the end and gives the client a moment to read it.
+    pub(crate) async fn close(mut self, end: End) {
+        let End::Closed { code, reason } = end else { return };
+        let reason = reason[..reason.floor_char_boundary(REASON_SIZE_BYTES_MAX)].into();
+        let farewell = async {
+            let frame = Message::Close(Some(CloseFrame { code, reason }));
+            if self.socket.send(frame).await.is_ok() {
+                // Unread messages would make the system reset the connection, and the client would
+                // never see the reason.
+                while self.socket.recv().await.is_some_and(|message| message.is_ok()) {}
+            }
+        };
+        let _timed_out = timeout(CLOSE_TIMEOUT, farewell).await;
+    }
+}

@@ -1,0 +1,285 @@
+//! A link and an owner in one process. The owner publishes in the order of each test.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::Message;
+use serde_json::{Value, json};
+use sim_contract::testing::TestDomain;
+use sim_contract::{
+    Action, COMMANDS_BUFFERED, ColliderState, CollidersHeader, Command as Sent, ConstraintState,
+    Load as OwnerLoad, LoadHeader, NodeStatus, Outcome, Owner, ParameterValues, ParticleState,
+    SnapshotHeader, TearsHeader, TornConstraint,
+};
+
+use super::link::Link;
+use crate::message::{Choice, Command, Mode};
+use crate::pages::connection::Connection;
+use crate::pages::hub::Hub;
+use crate::request::{ClientId, Request, RequestKind, Requests, requests};
+use crate::sink::Sinks;
+use crate::source::shown_state::ShownState;
+use crate::wire::{Message as Wire, decode};
+
+const RUN_ID: u64 = 7;
+const PAGE: ClientId = ClientId::Page(1);
+const TARGET: [f32; 3] = [1.0, 2.0, 3.0];
+
+/// An owner, a link to it, and a page. The domain is dropped last.
+struct Fixture {
+    link: Link,
+    shown: ShownState,
+    sinks: Sinks,
+    requests: Requests,
+    page: Connection,
+    owner: Owner,
+    outcome_count: u64,
+    _domain: TestDomain,
+}
+
+/// Two particles that a constraint joins, and a collider.
+fn load(step: u64, topology_revision: u32) -> OwnerLoad<'static> {
+    const STRUT: ConstraintState =
+        ConstraintState { a: 0, b: 1, rest_length: 1.0, compliance: 0.0, kind: 0 };
+    OwnerLoad {
+        header: LoadHeader {
+            run_id: RUN_ID,
+            step,
+            topology_revision,
+            particle_count: 2,
+            rate_hz: 60,
+            ..LoadHeader::default()
+        },
+        scene: b"version = 1",
+        constraints: &[STRUT],
+        triangles: &[],
+        collider_count: 1,
+        keyframe_size_bytes_max: 8,
+        parameters: ParameterValues::default(),
+    }
+}
+
+impl Fixture {
+    /// Shows the first load.
+    fn start() -> Self {
+        let domain = TestDomain::new();
+        let owner = Owner::create(&domain.endpoint(), &load(0, 0)).unwrap();
+        let link = Link::attach(&domain.endpoint()).unwrap();
+        let (sender, requests) = requests();
+        let hub = Arc::new(Hub::new(Mode::Live, sender));
+        let page = hub.join(Choice::F32);
+        let (shown, mut sinks) = (ShownState::default(), Sinks::default());
+        sinks.add(hub);
+        let mut fixture =
+            Self { link, shown, sinks, requests, page, owner, outcome_count: 0, _domain: domain };
+        fixture.owner.refresh();
+        fixture.publish(0, 0, 2);
+        fixture.read();
+        assert_eq!(fixture.shown.epoch(), 1);
+        fixture
+    }
+
+    /// Publishes a state with `particle_count` particles.
+    fn publish(&self, step: u64, topology_revision: u32, particle_count: u32) {
+        let header = SnapshotHeader {
+            run_id: RUN_ID,
+            step,
+            topology_revision,
+            particle_count,
+            ..SnapshotHeader::default()
+        };
+        self.owner.publish_particles(&header, |_| ParticleState::default()).unwrap();
+    }
+
+    fn read(&mut self) {
+        self.link.read(&mut self.shown, &self.sinks).unwrap();
+        self.link.next_frame_ns = 0;
+        self.link.show(&self.shown, &self.sinks);
+    }
+
+    /// The newest message with parameters in the queue of the page.
+    fn page_parameters(&mut self) -> Value {
+        let texts = std::iter::from_fn(|| self.page.queue.try_recv().ok());
+        let texts = texts.filter_map(|message| match message {
+            Message::Text(text) => serde_json::from_str::<Value>(&text).ok(),
+            _ => None,
+        });
+        texts.filter(|text| text["type"] == "parameters").last().unwrap()
+    }
+
+    /// The radii of the colliders in the newest frame.
+    fn radii(&self) -> Vec<f32> {
+        let frame = self.page.frames.borrow();
+        let Some(set) = &frame.colliders else { return Vec::new() };
+        let Ok(Wire::Colliders(all)) = decode(&set.bytes) else { panic!("not COLLIDERS") };
+        all.colliders.iter().map(|collider| collider.radius).collect()
+    }
+
+    fn command(&mut self, command: Command) {
+        self.request(RequestKind::Command { id: None, command });
+    }
+
+    fn request(&mut self, kind: RequestKind) {
+        self.link.handle(Request { client: PAGE, kind }, &self.shown, &self.sinks);
+        self.link.dispatch.flush(&mut self.link.client, &self.sinks);
+    }
+
+    /// Commands that have arrived at the owner.
+    fn arrived(&self) -> Vec<Sent> {
+        let mut arrived = Vec::new();
+        self.owner.receive_commands(&mut arrived);
+        arrived
+    }
+
+    /// Publishes that a command was applied.
+    fn answer(&mut self, command: Sent) {
+        let outcome = Outcome::new(self.outcome_count, 1, command, Ok(()));
+        self.outcome_count += 1;
+        self.owner.publish_outcome(&outcome).unwrap();
+    }
+
+    /// Publishes that the reset of another client was applied.
+    fn reset(&mut self) {
+        self.answer(Sent::new(1, 1, Action::Reset));
+    }
+}
+
+fn grab() -> Command {
+    Command::Grab { particle: 1, target: TARGET, over_s: 0.0 }
+}
+
+fn pull() -> Command {
+    Command::Move { particle: 1, target: TARGET, over_s: 0.0 }
+}
+
+fn actions(commands: &[Sent]) -> Vec<Action> {
+    commands.iter().map(Sent::action).collect()
+}
+
+const MOVE: Action = Action::Move { particle: 1, target: TARGET, over_s: 0.0 };
+const RELEASE: Action = Action::Release { particle: 1 };
+
+#[test]
+fn colliders_that_arrive_before_the_first_state_of_their_load_are_shown_with_it() {
+    let mut fixture = Fixture::start();
+    let collider = ColliderState { shape: 2, radius: 0.5, ..ColliderState::default() };
+    fixture.owner.load(&load(1, 1)).unwrap();
+    let header = CollidersHeader { run_id: RUN_ID, step: 1, ..CollidersHeader::default() };
+    fixture.owner.publish_colliders(header, &[collider]).unwrap();
+    fixture.read();
+    assert_eq!((fixture.shown.epoch(), fixture.radii()), (1, vec![]));
+    fixture.publish(1, 1, 2);
+    fixture.read();
+    assert_eq!((fixture.shown.epoch(), fixture.radii()), (2, vec![0.5]));
+}
+
+#[test]
+fn tears_are_shown_with_their_state() {
+    let mut fixture = Fixture::start();
+    let header = TearsHeader { run_id: RUN_ID, step: 2, new_count: 1, ..TearsHeader::default() };
+    fixture.owner.publish_tears(header, &[TornConstraint::new(0, None)]).unwrap();
+    fixture.publish(1, 0, 2);
+    fixture.read();
+    assert!(fixture.shown.torn().is_empty());
+    fixture.publish(2, 0, 2);
+    fixture.read();
+    let torn: Vec<_> = fixture.shown.torn().iter().map(|torn| torn.constraint).collect();
+    assert_eq!(torn, [0]);
+}
+
+#[test]
+fn published_parameters_take_effect_at_once_and_keep_the_initial_values() {
+    let mut fixture = Fixture::start();
+    let parameters = fixture.page_parameters();
+    assert_eq!(parameters["values"]["damping"], 0.0);
+    let values = ParameterValues { damping: 1.5, ..ParameterValues::default() };
+    fixture.owner.publish_parameters(RUN_ID, 1, &values).unwrap();
+    fixture.read();
+    let parameters = fixture.page_parameters();
+    assert_eq!(parameters["values"]["damping"], 1.5);
+    assert_eq!(
+        (&parameters["initial"]["damping"], &parameters["is_complete"]),
+        (&json!(0.0), &json!(true))
+    );
+}
+
+#[test]
+fn a_state_of_another_size_is_neither_shown_nor_measured() {
+    let mut fixture = Fixture::start();
+    let status = NodeStatus { run_id: RUN_ID, rate_hz: 60, time_scale: 1.0, ..Default::default() };
+    fixture.owner.publish_status(&status).unwrap();
+    fixture.publish(1, 0, 1);
+    fixture.read();
+    fixture.link.publish_statistics(&fixture.shown, &fixture.sinks);
+    assert_eq!(fixture.page.frames.borrow().particle_count, 2);
+    // It does not begin a load either.
+    fixture.owner.load(&load(2, 1)).unwrap();
+    fixture.publish(2, 1, 1);
+    fixture.read();
+    assert_eq!(fixture.shown.epoch(), 1);
+    fixture.publish(3, 1, 2);
+    fixture.read();
+    assert_eq!(fixture.shown.epoch(), 2);
+}
+
+#[test]
+fn a_grab_that_the_node_applies_after_a_reset_still_belongs_to_the_page() {
+    let mut fixture = Fixture::start();
+    fixture.command(grab());
+    fixture.command(pull());
+    let sent = fixture.arrived();
+    assert_eq!(sent.len(), 2);
+    fixture.reset();
+    fixture.read();
+    fixture.command(pull());
+    assert_eq!(actions(&fixture.arrived()), [MOVE]);
+    fixture.answer(sent[0]);
+    fixture.read();
+    fixture.command(pull());
+    assert_eq!(actions(&fixture.arrived()), [MOVE]);
+    fixture.request(RequestKind::Left);
+    assert_eq!(actions(&fixture.arrived()), [RELEASE]);
+}
+
+#[test]
+fn a_grab_that_the_node_applied_before_a_reset_has_ended() {
+    let mut fixture = Fixture::start();
+    fixture.command(grab());
+    let sent = fixture.arrived();
+    fixture.answer(sent[0]);
+    fixture.reset();
+    fixture.read();
+    fixture.command(pull());
+    fixture.request(RequestKind::Left);
+    assert!(fixture.arrived().is_empty());
+}
+
+#[test]
+fn a_grab_of_a_page_that_leaves_before_the_reset_is_answered_is_released() {
+    let mut fixture = Fixture::start();
+    fixture.command(grab());
+    fixture.reset();
+    fixture.read();
+    fixture.request(RequestKind::Left);
+    let sent = fixture.arrived();
+    assert_eq!(actions(&sent)[1..], [RELEASE]);
+}
+
+#[test]
+fn a_release_waits_for_room_at_the_node_and_is_sent_without_another_request() {
+    let mut fixture = Fixture::start();
+    fixture.command(grab());
+    let sent = fixture.arrived();
+    fixture.answer(sent[0]);
+    fixture.read();
+    for _ in 0..COMMANDS_BUFFERED {
+        fixture.command(pull());
+    }
+    fixture.command(pull());
+    fixture.command(Command::Release { particle: 1 });
+    fixture.link.dispatch.expire(&fixture.sinks, u64::MAX);
+    assert_eq!(actions(&fixture.arrived()), vec![MOVE; COMMANDS_BUFFERED]);
+    while fixture.requests.next(Duration::ZERO).is_some() {}
+    fixture.link.exchange(&mut fixture.shown, &fixture.sinks, &fixture.requests).unwrap();
+    assert_eq!(actions(&fixture.arrived()), [RELEASE]);
+}
