@@ -18,7 +18,7 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// Moves the lists of a batch into the lists.
+    /// Moves the lists out of a batch.
     pub(crate) fn add(&mut self, batch: &mut Batch) {
         self.tears.add(take(&mut batch.tears));
         for one in batch.colliders.drain(..) {
