@@ -61,9 +61,8 @@ fn row<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
 
 /// Removes the names of internal types from an error of serde.
 fn without_type_names(error: &str) -> String {
-    if let Some((before, _)) = error.split_once("data did not match any variant") {
-        let position = error.rsplit_once(" at line").map_or("", |(_, position)| position);
-        return format!("{before}a value has the wrong type at line{position}");
+    if error.contains("variant") {
+        return "a field is missing or has the wrong type".to_owned();
     }
     let mut text = String::new();
     let mut words = error.split(' ');
@@ -71,15 +70,18 @@ fn without_type_names(error: &str) -> String {
         if !text.is_empty() {
             text.push(' ');
         }
-        if matches!(word, "struct" | "enum") {
-            // The next word is the name of the type.
-            words.next();
-            text.push_str("an object");
-        } else {
-            text.push_str(word);
-        }
+        text.push_str(match word {
+            "struct" => {
+                // The next word is the name of the type.
+                words.next();
+                "an object"
+            }
+            "u32" | "u64" => "a whole number",
+            "f32" | "f64" => "a number",
+            _ => word,
+        });
     }
-    text.replace("tuple an object", "an array")
+    text
 }
 
 #[cfg(test)]
@@ -94,11 +96,22 @@ mod tests {
             row::<StepRow>(b"{\"step\":\"x\"}").unwrap_err(),
             row::<StepRow>(b"{").unwrap_err(),
             row::<TopologyRow>(b"[]").unwrap_err(),
+            row::<TopologyRow>(
+                br#"{"step":0,"revision":0,"a":[],"b":[],"rest_length":[],"kind":[],"torn":[]}"#,
+            )
+            .unwrap_err(),
             row::<OutcomeRow>(
                 br#"{"step":1,"client_id":1,"sequence":1,"index":0,"kind":"set","parameter":"x","value":{},"status":"","reason":""}"#,
             )
             .unwrap_err(),
         ];
-        insta::assert_snapshot!(errors.join("\n"), @"");
+        insta::assert_snapshot!(errors.join("\n"), @r#"
+        invalid type: integer `7`, expected an object at line 1 column 1
+        invalid type: string "x", expected a whole number at line 1 column 11
+        EOF while parsing an object at line 1 column 1
+        invalid type: sequence, expected an object at line 1 column 0
+        a field is missing or has the wrong type
+        expected a number, three numbers or null at line 1 column 111
+        "#);
     }
 }
