@@ -2,7 +2,7 @@
 
 use std::process::{ExitCode, Termination};
 
-/// How a subcommand ended.
+/// End of a subcommand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
     /// Exit code 0.

@@ -5,20 +5,20 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use sim_solver::Scene;
+use sim_contract::read_scene_file;
+use sim_solver::{Scene, SceneError};
 
 use crate::args::ImportArgs;
-use crate::scene_source;
 
 /// Writes a scene that contains the mesh, and so does not need its file.
 #[allow(clippy::print_stdout, reason = "the result of the command")]
 #[allow(clippy::print_stderr, reason = "messages to the user")]
 pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
-    let mesh = scene_source::read(&args.mesh)
+    let mesh = read_scene_file(&args.mesh)
         .with_context(|| format!("{}: cannot read the mesh", args.mesh))?;
     let text = scene_text(args);
     let scene = Scene::from_toml_with_files(&text, &args.mesh, &|_| Ok(mesh.clone()))
-        .map_err(|error| anyhow!("{}: {}", args.mesh, error.problem))?;
+        .map_err(import_error)?;
     let counts = scene.counts();
     for warning in scene.warnings() {
         eprintln!("warning: {warning}");
@@ -58,6 +58,17 @@ fn scene_text(args: &ImportArgs) -> String {
     )
 }
 
+/// Names the option that is wrong, or the mesh.
+fn import_error(error: SceneError) -> anyhow::Error {
+    let SceneError { field, problem, .. } = &error;
+    match field.rsplit('.').next() {
+        Some("path") => anyhow!("{problem}"),
+        Some("pinned") => anyhow!("--pin: {problem}"),
+        Some(key @ ("density" | "structural" | "shear" | "bend")) => anyhow!("--{key}: {problem}"),
+        _ => error.into(),
+    }
+}
+
 /// Basic string of TOML, which has the escapes of JSON.
 fn quoted_text(text: &str) -> String {
     serde_json::Value::from(text).to_string()
@@ -80,4 +91,37 @@ fn write(path: &Path, text: &str, args: &ImportArgs) -> anyhow::Result<()> {
     })?;
     file.write_all(text.as_bytes())
         .with_context(|| format!("{}: cannot write the scene", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::args::{Args, Verb};
+
+    /// Returns the error of an import, given the text of the mesh.
+    fn error(mesh: &str, options: &[&str]) -> String {
+        let arguments = ["sim-node", "import", "a.obj"].iter().chain(options);
+        let Some(Verb::Import(args)) = Args::try_parse_from(arguments).unwrap().verb else {
+            panic!("not an import");
+        };
+        let read = |_: &str| Ok(mesh.to_owned());
+        let scene = Scene::from_toml_with_files(&scene_text(&args), "a.obj", &read);
+        import_error(scene.unwrap_err()).to_string()
+    }
+
+    #[test]
+    fn an_error_names_the_mesh_once_or_the_option() {
+        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        assert_eq!(
+            error("v 0 0 0\nf 1 1\n", &[]),
+            "a.obj: line 2: a face has 2 corners (allowed: 3 or more)"
+        );
+        assert_eq!(
+            error(triangle, &["--density", "0"]),
+            "--density: 0 is out of range (allowed: a number > 0)"
+        );
+        assert!(error(triangle, &["--pin", "up"]).starts_with("--pin: 'up' is not an expression"));
+    }
 }

@@ -3,21 +3,15 @@
 #![forbid(unsafe_code)]
 
 mod args;
-mod commands;
 mod ctl;
 mod exit;
 mod import;
 mod lesson;
 mod node;
-mod pace;
-mod publish;
 mod run;
 mod scene_source;
 mod scenes;
-mod statistics;
 mod table;
-mod threads;
-mod warnings;
 
 use args::Verb;
 use exit::Exit;

@@ -1,17 +1,26 @@
 //! The loop: wait for the deadline, apply commands, step, publish, observe.
 
+mod inbox;
+mod pace;
+mod progress;
+mod publisher;
+mod statistics;
+mod threads;
+mod warnings;
+
 use anyhow::Context;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Command, Endpoint, OwnerError, Reason, Stop};
 use sim_solver::{Applied, Control, Scene, Solver};
 
-use crate::commands::{Inbox, Progress};
-use crate::pace::Pace;
-use crate::publish::{Position, Publisher, StepTimes};
 use crate::scene_source;
-use crate::statistics::Statistics;
-use crate::threads::with_threads;
-use crate::warnings::Warnings;
+use inbox::Inbox;
+use pace::Pace;
+use progress::Progress;
+use publisher::{Position, Publisher, StepTimes};
+use statistics::Statistics;
+use threads::with_threads;
+use warnings::Warnings;
 
 /// Time between two status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
@@ -22,19 +31,20 @@ const WAITING_POLL_NS: u64 = SECOND_NS / 50;
 /// or `resume` follows at once.
 const PAUSED_POLL_NS: u64 = SECOND_NS / 500;
 
-/// What a run is told.
+/// Options of a run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Options {
-    /// In place of the scenes' own.
+    /// Replaces the rate of each scene.
     pub(crate) rate_hz: Option<u32>,
+    /// Replaces the substeps of each scene.
     pub(crate) substeps: Option<u32>,
-    /// In place of as many as the scene calls for.
+    /// Replaces the number of threads that suits each scene.
     pub(crate) threads: Option<u8>,
-    /// Steps after which the run ends.
+    /// Number of steps after which the run ends.
     pub(crate) steps: Option<u64>,
     pub(crate) starts_paused: bool,
     pub(crate) waits_for_time: bool,
-    /// Every how many steps a snapshot is published.
+    /// Number of steps from one published snapshot to the next.
     pub(crate) every: u64,
 }
 
@@ -46,24 +56,24 @@ pub(crate) struct Node {
     options: Options,
     publisher: Publisher,
     inbox: Inbox,
-    /// Reused by every boundary.
+    /// Buffer that every boundary reuses.
     arrived: Vec<Command>,
     progress: Progress,
     pace: Pace,
     pub(crate) statistics: Statistics,
     pub(crate) step: u64,
-    /// When the run began, on CLOCK_MONOTONIC.
+    /// CLOCK_MONOTONIC at the start of the run.
     start_ns: u64,
-    /// How long it was paused.
-    idle_ns: u64,
-    /// When it last went on or began to wait for `resume`.
+    /// Time spent paused.
+    paused_ns: u64,
+    /// CLOCK_MONOTONIC up to which `paused_ns` is counted.
     mark_ns: u64,
     next_status_ns: u64,
     warnings: Warnings,
 }
 
 impl Node {
-    /// Takes the name and publishes the scene; the run has not begun.
+    /// Takes the name and publishes the scene, without starting the run.
     pub(crate) fn new(endpoint: &Endpoint, scene: Scene, options: Options) -> anyhow::Result<Self> {
         let solver = with_threads(Solver::new(&scene), options.threads);
         let publisher = Publisher::new(endpoint, &scene, &solver, options.every)?;
@@ -83,7 +93,7 @@ impl Node {
             statistics: Statistics::new(now_ns)?,
             step: 0,
             start_ns: now_ns,
-            idle_ns: 0,
+            paused_ns: 0,
             mark_ns: now_ns,
             next_status_ns: now_ns,
             warnings: Warnings::default(),
@@ -92,7 +102,7 @@ impl Node {
         })
     }
 
-    /// Runs until the last step or until asked to stop. `observer` is called once a second.
+    /// Runs until the last step or a request to stop. Calls `observer` once a second.
     pub(crate) fn run(&mut self, stop: &Stop, observer: impl Fn(&Self)) -> anyhow::Result<()> {
         self.start_ns = monotonic_ns();
         self.pace.restart(self.start_ns);
@@ -128,7 +138,7 @@ impl Node {
         if !self.progress.is_stepping() {
             sleep_until(monotonic_ns() + PAUSED_POLL_NS);
             let now_ns = monotonic_ns();
-            self.idle_ns += now_ns - self.mark_ns;
+            self.paused_ns += now_ns - self.mark_ns;
             self.mark_ns = now_ns;
             self.pace.restart(now_ns);
             return Some(0);
@@ -156,8 +166,8 @@ impl Node {
             self.publisher.receive_commands(&mut self.arrived);
             self.inbox.add(self.arrived.drain(..));
         }
-        for command in self.inbox.take_turn() {
-            // Whoever commanded and then asks for the status finds the effect in it.
+        for command in self.inbox.next_turn() {
+            // A fresh status follows, so that `ctl status` shows the effect.
             self.next_status_ns = 0;
             let result = match self.solver.apply(command.client_id, &command.action()) {
                 Ok(Applied::Control(Control::Load { scene })) => {
@@ -174,21 +184,23 @@ impl Node {
         self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
     }
 
-    /// Takes another scene; the next step shows its initial state. The rate of a run stays. An error
-    /// is one after which the old scene cannot go on either.
+    /// Replaces the scene; the next step shows the initial state of the new one. The rate must stay.
+    /// The inner result is the outcome. An outer error leaves neither scene able to continue.
     fn load(&mut self, source: &str) -> anyhow::Result<Result<(), Reason>> {
         let scene = match self.read_scene(source) {
             Ok(scene) => scene,
             Err((problem, reason)) => {
-                self.warnings.say(&format!("load {source}: {problem}"));
+                self.warnings.print(&format!("load {source}: {problem}"));
                 return Ok(Err(reason));
             }
         };
         let solver = with_threads(Solver::new_in_run(&scene), self.options.threads);
         match self.publisher.load(&scene, &solver, self.step + 1, self.progress.time_scale) {
-            Err(error @ OwnerError::Publish(_)) => Err(error).context("publishing another scene"),
+            Err(error @ OwnerError::Publish(_)) => {
+                Err(error).context("publishing the loaded scene")
+            }
             Err(error) => {
-                self.warnings.say(&format!("load {source}: {error}"));
+                self.warnings.print(&format!("load {source}: {error}"));
                 Ok(Err(Reason::NoEffectHere))
             }
             Ok(()) => {
@@ -199,7 +211,7 @@ impl Node {
         }
     }
 
-    /// A scene that this run can go on with, or what is wrong with it.
+    /// Reads a scene that this run can continue with, or returns the problem and the reason.
     fn read_scene(&self, source: &str) -> Result<Scene, (String, Reason)> {
         let out_of_range = |problem| (problem, Reason::OutOfRange);
         let mut scene =
@@ -210,7 +222,7 @@ impl Node {
         if own == other {
             return Ok(scene);
         }
-        Err((format!("it runs at {other} Hz, this node at {own} Hz"), Reason::NoEffectHere))
+        Err((format!("the scene runs at {other} Hz, this node at {own} Hz"), Reason::NoEffectHere))
     }
 
     fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
@@ -220,16 +232,16 @@ impl Node {
         let solve_ns = monotonic_ns() - before_ns;
         if self.solver.frozen_count() > frozen_count {
             let count = self.solver.frozen_count() - frozen_count;
-            self.warnings.say(&format!(
-                "step {}: {count} particles are frozen, their state was no longer finite; \
-                 `ctl reset` brings them back",
+            self.warnings.print(&format!(
+                "step {}: froze {count} particles whose state was not finite; `ctl reset` restores \
+                 them",
                 self.step + 1
             ));
         }
         self.step += 1;
         self.progress.count_step();
         if !self.progress.is_stepping() {
-            // Whoever waited for these steps and then asks for the status finds them in it.
+            // A fresh status follows, so that `ctl status` shows the steps.
             self.next_status_ns = 0;
         }
         self.statistics.record(wake_late_ns, solve_ns, self.pace.period_ns());
@@ -238,14 +250,14 @@ impl Node {
         self.publisher.publish_step(&self.solver, self.position(), times)
     }
 
-    /// Keeps late joiners served, and tells how the node does.
+    /// Serves late subscribers, calls the observer, and publishes the status.
     fn observe(&mut self, observer: &impl Fn(&Self)) -> anyhow::Result<()> {
         self.publisher.refresh();
         let now_ns = monotonic_ns();
         if self.progress.is_stepping() {
             self.mark_ns = now_ns;
         }
-        if self.statistics.turn(now_ns, self.scene.solver.rate_hz) {
+        if self.statistics.end_second(now_ns, self.scene.solver.rate_hz) {
             observer(self);
         }
         if now_ns >= self.next_status_ns {
@@ -259,9 +271,9 @@ impl Node {
         self.publisher.status(&self.scene, &self.solver, self.position(), &self.statistics)
     }
 
-    /// Simulated time per wall-clock time of the whole run, pauses apart.
+    /// Simulated time per wall-clock time of the whole run, without its pauses.
     pub(crate) fn real_time_factor(&self) -> f64 {
-        let run_ns = monotonic_ns() - self.start_ns - self.idle_ns;
+        let run_ns = monotonic_ns() - self.start_ns - self.paused_ns;
         let simulated_s = self.step as f64 / f64::from(self.scene.solver.rate_hz);
         simulated_s / (run_ns.max(1) as f64 / SECOND_NS as f64)
     }

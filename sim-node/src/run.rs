@@ -1,4 +1,4 @@
-//! `run`: the node with its messages for the user.
+//! `run`: runs a scene and prints messages for the user.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::time::Duration;
@@ -12,7 +12,7 @@ use crate::args::RunArgs;
 use crate::node::{Node, Options};
 use crate::scene_source;
 
-/// What is said at the end of a run.
+/// Summary at the end of a run.
 #[derive(Debug, Serialize)]
 struct Summary {
     scene: String,
@@ -47,7 +47,7 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     warn(&scene);
     let stop = Stop::install()?;
     let mut node = Node::new(&endpoint, scene, options)?;
-    say_ready(&endpoint, &node);
+    print_ready(&endpoint, &node);
     let is_terminal = stderr().is_terminal();
     let shows_status = is_terminal && !args.json;
     let result = node.run(&stop, |node| {
@@ -56,13 +56,13 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         }
     });
     let summary = Summary::new(&node);
-    // The ports go before the summary is written: who reads it may start the next node.
+    // The name is free before the summary is printed: its reader may start the next node.
     drop(node);
     result?;
     summary.print(args.json, shows_status)
 }
 
-/// Steps in a simulated time, rounded up.
+/// Number of steps in a simulated time, rounded up.
 fn steps_in(time: Duration, rate_hz: u32) -> u64 {
     let steps = (time.as_nanos() * u128::from(rate_hz)).div_ceil(1_000_000_000);
     u64::try_from(steps).unwrap_or(u64::MAX)
@@ -76,7 +76,7 @@ fn warn(scene: &Scene) {
 }
 
 #[allow(clippy::print_stderr, reason = "messages to the user")]
-fn say_ready(endpoint: &Endpoint, node: &Node) {
+fn print_ready(endpoint: &Endpoint, node: &Node) {
     let settings = &node.scene.solver;
     let threads = node.solver.threads();
     eprintln!(
@@ -91,12 +91,12 @@ fn say_ready(endpoint: &Endpoint, node: &Node) {
     );
 }
 
-/// One line on the terminal, over the one before.
+/// Prints one status line on the terminal, over the previous one.
 fn show_status(node: &Node) {
     let status = node.status();
     let micros = |ns: u64| ns as f64 / 1000.0;
-    // A status line that cannot be shown is not worth ending a simulation for.
-    let _unshown = write!(
+    // A failure to show the status is no reason to stop.
+    let _ignored = write!(
         stderr(),
         "\r\x1b[Kstep {} {} x{:.3} real time | step time p50 {:.1} us p99 {:.1} us | {} late | {} readers",
         status.step,

@@ -1,7 +1,6 @@
 //! The options that select a simulation.
 
-use clap::error::ErrorKind;
-use sim_contract::{Endpoint, NAME_DEFAULT};
+use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 
 /// The name and the domain of a simulation.
 #[derive(Debug, Clone, clap::Args)]
@@ -18,12 +17,8 @@ pub(crate) struct EndpointArgs {
 }
 
 impl EndpointArgs {
-    /// Returns the endpoint. Without `--domain`, the variable `CATENARY_DOMAIN` gives the domain. Exits
-    /// with code 2 if its value is invalid.
-    pub(crate) fn endpoint(&self) -> Endpoint {
-        let endpoint = Endpoint::from_options(self.domain.as_deref(), Some(&self.name));
-        endpoint.unwrap_or_else(|error| {
-            clap::Error::raw(ErrorKind::ValueValidation, format!("{error}\n")).exit()
-        })
+    /// Returns the endpoint. Without `--domain`, the variable `CATENARY_DOMAIN` gives the domain.
+    pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
+        Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
     }
 }

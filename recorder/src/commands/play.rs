@@ -81,7 +81,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
-    let endpoint = args.endpoint.endpoint();
+    let endpoint = args.endpoint.endpoint()?;
     let path = output::path_text(&args.file);
     if args.end.is_some_and(|end| end < args.start.unwrap_or_default()) {
         let problem = "--end is before --start: nothing would be played\n";

@@ -79,7 +79,7 @@ fn queue_bytes(text: &str) -> Result<u64, String> {
 
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
-    let endpoint = args.endpoint.endpoint();
+    let endpoint = args.endpoint.endpoint()?;
     let tap = Tap::attach(&endpoint)?;
     let path = args.output.clone().unwrap_or_else(|| default_path(endpoint.name(), realtime_ns()));
     let file = args.file.create(&path)?;

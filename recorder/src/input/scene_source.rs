@@ -3,14 +3,11 @@
 use std::io::Read;
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use recorder::LogReader;
-use sim_solver::{Scene, builtin};
-
-use super::text_file::read_text_file;
-
-/// Largest scene, in bytes, and largest file that a scene refers to.
-const SCENE_SIZE_BYTES_MAX: u64 = 1 << 30;
+use sim_contract::read_scene_file;
+use sim_solver::Scene;
+use sim_solver::scene::LoadError;
 
 /// Reads and validates a scene. `source` is a recording if it ends in `.mcap`, else a scene file if
 /// it contains `/` or ends in `.toml`, else the name of a built-in scene.
@@ -19,26 +16,11 @@ pub(crate) fn load_scene(source: &str) -> anyhow::Result<Scene> {
         let log = LogReader::open(Path::new(source)).with_context(|| source.to_owned())?;
         return scene_in_recording(&log).with_context(|| source.to_owned());
     }
-    if source.contains('/') || has_extension(source, ".toml") {
-        let text = read_text_file(Path::new(source), SCENE_SIZE_BYTES_MAX)
-            .with_context(|| format!("{source}: cannot read the scene"))?;
-        return Ok(Scene::from_toml_with_files(&text, source, &|path| read_beside(source, path))?);
-    }
-    let Some(text) = builtin::text(source) else {
-        let names: Vec<_> = builtin::names().collect();
-        bail!(
-            "there is no built-in scene '{source}' (allowed: {}, a path with / or ending in \
-             .toml, or a recording ending in .mcap)",
-            names.join(", ")
-        );
-    };
-    Ok(Scene::from_toml(text, source)?)
-}
-
-/// Reads a file that a scene refers to. `path` is relative to the scene file.
-fn read_beside(scene: &str, path: &str) -> Result<String, String> {
-    let folder = Path::new(scene).parent().unwrap_or(Path::new(""));
-    read_text_file(&folder.join(path), SCENE_SIZE_BYTES_MAX).map_err(|error| error.to_string())
+    let read = |path: &Path| read_scene_file(path).map_err(|error| error.to_string());
+    Scene::load(source, &read).map_err(|error| match error {
+        LoadError::UnknownName(_) => anyhow!("{error}; or give a recording ending in .mcap"),
+        other => other.into(),
+    })
 }
 
 /// Parses the scene in a recording. Errors do not name the recording.
@@ -53,4 +35,35 @@ pub(crate) fn scene_in_recording<R: Read>(log: &LogReader<R>) -> anyhow::Result<
 /// Tests the suffix. The documented rule is case-sensitive.
 pub(super) fn has_extension(source: &str, extension: &str) -> bool {
     source.ends_with(extension)
+}
+
+#[cfg(test)]
+mod tests {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+
+    use super::*;
+
+    #[test]
+    fn a_fifo_in_place_of_a_scene_is_refused_without_waiting() {
+        let name = format!("{}-recorder-fifo.toml", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        let path = path.to_str().unwrap();
+        let error = load_scene(path).unwrap_err().to_string();
+        fs::remove_file(path).unwrap();
+        assert_eq!(
+            error,
+            format!("{path}: cannot read the scene: it is a FIFO, not a regular file")
+        );
+    }
+
+    #[test]
+    fn an_unknown_scene_is_refused_with_the_known_ones_and_the_recordings() {
+        let error = load_scene("knot").unwrap_err().to_string();
+        assert!(
+            error.starts_with("there is no built-in scene 'knot' (allowed: curtain,"),
+            "{error}"
+        );
+        assert!(error.ends_with("or give a recording ending in .mcap"), "{error}");
+    }
 }

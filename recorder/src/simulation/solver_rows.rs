@@ -39,19 +39,19 @@ fn state(collider: &PlacedCollider) -> ColliderState {
     };
     let with = |shape: ColliderShape| ColliderState { shape: shape as u32, ..any };
     match shape {
-        sim_solver::ColliderShape::Plane { normal, offset } => {
+        sim_solver::ColliderGeometry::Plane { normal, offset } => {
             ColliderState { normal, offset, ..with(ColliderShape::Plane) }
         }
-        sim_solver::ColliderShape::Box { center, half_extents, rotation } => {
+        sim_solver::ColliderGeometry::Box { center, half_extents, rotation } => {
             ColliderState { center, half_extents, rotation, ..with(ColliderShape::Box) }
         }
-        sim_solver::ColliderShape::Sphere { center, radius } => {
+        sim_solver::ColliderGeometry::Sphere { center, radius } => {
             ColliderState { center, radius, ..with(ColliderShape::Sphere) }
         }
-        sim_solver::ColliderShape::Capsule { a, b, radius } => {
+        sim_solver::ColliderGeometry::Capsule { a, b, radius } => {
             ColliderState { a, b, radius, ..with(ColliderShape::Capsule) }
         }
-        sim_solver::ColliderShape::Bounds { min, max } => {
+        sim_solver::ColliderGeometry::Bounds { min, max } => {
             ColliderState { a: min, b: max, ..with(ColliderShape::Bounds) }
         }
     }

@@ -46,6 +46,7 @@ mod owner;
 mod ports;
 mod stop;
 pub mod testing;
+mod text_file;
 
 pub use client::Client;
 pub use client::request::{OwnerState, RequestError};
@@ -78,6 +79,7 @@ pub use sim_types::{
     ValueForm,
 };
 pub use stop::Stop;
+pub use text_file::{TextFileError, read_scene_file};
 
 /// The README's programs compile.
 #[cfg(doctest)]

@@ -1,9 +1,9 @@
 //! Prints a state hash of every built-in scene and of two test scenes that use every mechanism:
 //! `cargo run --release -p sim-solver --example state_hashes`
 //!
-//! Each scene makes 10,000 steps (a big one 1,000) with commands of every kind. Two builds that print the same lines
-//! make the same bits, whatever their optimisation. The lines are also kept in
-//! `tests/state_hashes.txt`, which may change only together with the solver's version.
+//! Each scene makes 10,000 steps (a large one 1,000) with commands of every kind. Two builds that
+//! print the same lines compute the same bits, regardless of optimisation. `tests/state_hashes.txt`
+//! has the same lines. It may change only together with the solver's version.
 #![allow(clippy::print_stdout, reason = "printing is what it is for")]
 
 use std::error::Error;
@@ -19,7 +19,7 @@ const SCENES: [(&str, &str); 2] = [
     ("stiffness", include_str!("../tests/scenes/stiffness.toml")),
 ];
 
-/// Steps of a scene; of a big one fewer, as a build without optimisation takes minutes.
+/// Returns the number of steps. Large scenes make fewer, because a debug build takes minutes.
 fn steps(solver: &Solver) -> u32 {
     if solver.particle_count() < 500 { 10_000 } else { 1_000 }
 }
@@ -29,13 +29,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The solver's version, then a line for each scene.
+/// Returns the solver's version, then a line for each scene.
 pub(crate) fn lines() -> Result<String, Box<dyn Error>> {
     let built_in = builtin::names().filter_map(|name| Some((name, builtin::text(name)?)));
     let scenes: Result<Vec<_>, _> =
         built_in.chain(SCENES).map(|(name, text)| Scene::from_toml(text, name)).collect();
     let scenes = scenes?;
-    // All at once: without optimisation they take minutes.
+    // All scenes run at the same time, because a debug build takes minutes.
     let hashes: Vec<_> = thread::scope(|scope| {
         let running: Vec<_> = scenes.iter().map(|scene| scope.spawn(|| run(scene))).collect();
         running.into_iter().map(thread::ScopedJoinHandle::join).collect()
@@ -51,7 +51,7 @@ pub(crate) fn lines() -> Result<String, Box<dyn Error>> {
 fn run(scene: &Scene) -> u64 {
     let mut solver = Solver::new(scene);
     for step in 0..steps(&solver) {
-        // A command that means nothing in a scene is refused by every build alike.
+        // A command without meaning in a scene is refused by every build.
         let _refused = command(&mut solver, step);
         solver.step();
     }

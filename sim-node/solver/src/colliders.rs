@@ -4,7 +4,7 @@ use glam::{DVec3, Quat, Vec3};
 
 use crate::Reason;
 use crate::frame::{Frame, angular_velocity, rotation_about};
-use crate::scene::{ColliderShape, SceneCollider};
+use crate::scene::{ColliderGeometry, SceneCollider};
 
 /// The form of a collider where it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +57,7 @@ pub(crate) struct Collider {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedCollider {
     /// Its form and place; a plane's normal and a box's rotation have length 1.
-    pub shape: ColliderShape,
+    pub shape: ColliderGeometry,
     /// Share of the approach speed that a particle keeps.
     pub restitution: f32,
     /// Coulomb's coefficient.
@@ -176,50 +176,50 @@ impl Collider {
 
 impl Body {
     /// As the scene gives it, its normal and its rotation brought to length 1.
-    fn new(shape: &ColliderShape) -> Self {
+    fn new(shape: &ColliderGeometry) -> Self {
         let vector = Vec3::from_array;
         match *shape {
-            ColliderShape::Plane { normal, offset } => {
+            ColliderGeometry::Plane { normal, offset } => {
                 let normal = vector(normal).as_dvec3();
                 let length = normal.dot(normal).sqrt();
                 Self::Plane { normal: (normal * (1.0 / length)).as_vec3(), offset }
             }
-            ColliderShape::Box { center, half_extents, rotation } => {
+            ColliderGeometry::Box { center, half_extents, rotation } => {
                 let pose = crate::Pose { translation: [0.0; 3], rotation };
                 let rotation = Frame::from_pose(&pose).rotation;
                 let (center, half_extents) = (vector(center), vector(half_extents));
                 Self::Box { center, half_extents, rotation }
             }
-            ColliderShape::Sphere { center, radius } => {
+            ColliderGeometry::Sphere { center, radius } => {
                 Self::Sphere { center: vector(center), radius }
             }
-            ColliderShape::Capsule { a, b, radius } => {
+            ColliderGeometry::Capsule { a, b, radius } => {
                 Self::Capsule { a: vector(a), b: vector(b), radius }
             }
-            ColliderShape::Bounds { min, max } => {
+            ColliderGeometry::Bounds { min, max } => {
                 Self::Bounds { min: vector(min), max: vector(max) }
             }
         }
     }
 
-    fn shape(&self) -> ColliderShape {
+    fn shape(&self) -> ColliderGeometry {
         match *self {
             Self::Plane { normal, offset } => {
-                ColliderShape::Plane { normal: normal.to_array(), offset }
+                ColliderGeometry::Plane { normal: normal.to_array(), offset }
             }
-            Self::Box { center, half_extents, rotation } => ColliderShape::Box {
+            Self::Box { center, half_extents, rotation } => ColliderGeometry::Box {
                 center: center.to_array(),
                 half_extents: half_extents.to_array(),
                 rotation: rotation.to_array(),
             },
             Self::Sphere { center, radius } => {
-                ColliderShape::Sphere { center: center.to_array(), radius }
+                ColliderGeometry::Sphere { center: center.to_array(), radius }
             }
             Self::Capsule { a, b, radius } => {
-                ColliderShape::Capsule { a: a.to_array(), b: b.to_array(), radius }
+                ColliderGeometry::Capsule { a: a.to_array(), b: b.to_array(), radius }
             }
             Self::Bounds { min, max } => {
-                ColliderShape::Bounds { min: min.to_array(), max: max.to_array() }
+                ColliderGeometry::Bounds { min: min.to_array(), max: max.to_array() }
             }
         }
     }

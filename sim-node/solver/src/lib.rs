@@ -64,7 +64,7 @@ pub use frame::Pose;
 pub use kernels::Kernels;
 pub use keyframe::{Keyframe, KeyframeError, RestoreError};
 pub use particles::Particle;
-pub use scene::{ColliderShape, Scene, SceneError, SolverSettings};
+pub use scene::{ColliderGeometry, Scene, SceneError, SolverSettings};
 pub use sim_types::{
     Action, COORDINATE_MAX, ConstraintKind, Method, PARAMETERS, Parameter, ParameterValue,
     ParameterValues, ParticleFlags, Reason, TearCause,

@@ -1,7 +1,7 @@
-//! The built-in scenes: the counts of the documents, and that each moves as its name says.
+//! The built-in scenes: they have the counts of the tutorials, and move as their names say.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{ColliderShape, Scene, Solver, builtin};
+use sim_solver::{ColliderGeometry, Scene, Solver, builtin};
 
 fn scene(name: &str) -> Scene {
     Scene::from_toml(builtin::text(name).unwrap(), name).unwrap()
@@ -23,7 +23,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (b[axis] - a[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Longest length of a constraint against its rest length.
+/// Returns the largest length / rest length of all constraints.
 fn max_stretch(solver: &Solver) -> f64 {
     let lengths = solver.constraints().map(|one| {
         let length = distance(position(solver, one.a as usize), position(solver, one.b as usize));
@@ -38,7 +38,7 @@ fn speed(solver: &Solver) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Area of the polygon of the first four particles.
+/// Returns the area of the polygon of the first four particles.
 fn box_area(solver: &Solver) -> f64 {
     let corner = |index: usize| position(solver, index % 4);
     let cross = |index: usize| {
@@ -49,7 +49,7 @@ fn box_area(solver: &Solver) -> f64 {
 }
 
 #[test]
-fn every_scene_has_the_counts_of_the_documents() {
+fn every_scene_has_the_counts_of_the_tutorials() {
     // Particles, constraints, pins.
     for (name, counts) in [
         ("curtain", [168, 596, 14]),
@@ -74,7 +74,7 @@ fn every_scene_has_the_counts_of_the_documents() {
     assert_eq!(builtin::names().count(), 14);
 }
 
-/// Runs one scene for a number of steps, whatever its rate.
+/// Runs a scene for a number of steps and asserts that it stays finite.
 fn assert_finite_for(name: &str, steps: u32) {
     let mut solver = Solver::new(&scene(name));
     for step in 0..steps {
@@ -129,22 +129,22 @@ fn the_top_row_of_the_carried_cloth_follows_its_anchor() {
 }
 
 #[test]
-fn the_box_goes_through_the_carried_cloth_and_holds_none_of_it() {
+fn the_box_moves_through_the_carried_cloth_and_contains_none_of_it() {
     let mut solver = Solver::new(&scene("carried-cloth"));
     let mut pushed = 0.0;
     for _ in 0..60 * 6 {
         solver.step();
-        let ColliderShape::Box { center, .. } = solver.colliders().next().unwrap().shape else {
+        let ColliderGeometry::Box { center, .. } = solver.colliders().next().unwrap().shape else {
             continue;
         };
         for index in 0..solver.particle_count() {
-            // Within the ball in the box, whatever its rotation.
+            // Inside the inscribed sphere of the box, which is independent of its rotation.
             let depth = 3.0 - distance(position(&solver, index), center.map(f64::from));
             assert!(depth < 1e-3, "particle {index} is {depth} deep");
             pushed = f64::max(pushed, position(&solver, index)[2]);
         }
     }
-    assert!(pushed > 8.0, "the box pushes the cloth along: {pushed}");
+    assert!(pushed > 8.0, "the box pushes the cloth: {pushed}");
 }
 
 #[test]
@@ -160,11 +160,11 @@ fn the_spring_cloth_stretches_by_at_most_15_percent() {
 }
 
 #[test]
-fn the_tearable_cloth_hangs_whole_and_tears_where_it_is_pulled() {
+fn the_tearable_cloth_hangs_without_tears_and_tears_where_it_is_pulled() {
     let mut solver = after("tearable-cloth", 600);
     assert_eq!(solver.torn(), []);
     assert!(max_stretch(&solver) < 1.5, "{}", max_stretch(&solver));
-    // Its lowest point is pulled 300 px down in a quarter of a second, and again.
+    // Its lowest point is pulled down by 300 px in a quarter of a second, twice.
     let lowest = 32 * 121 + 60;
     for pull in 1..=3_u8 {
         let [x, y, _] = solver.particle(lowest).position;
@@ -188,7 +188,7 @@ fn the_ragdoll_falls_over_and_comes_to_rest_in_one_piece() {
     assert!(speed(&solver) < 0.5, "{}", speed(&solver));
 }
 
-/// How far the middle of the bridge goes up and down in six seconds.
+/// Returns the range of heights of the bridge's middle in six seconds.
 fn range_of_height(mut bridge: Solver) -> f64 {
     let (mut low, mut high) = (9.0, -9.0);
     for _ in 0..240 * 6 {
@@ -208,20 +208,20 @@ fn the_web_the_bridge_and_the_flag_hang_and_move() {
     let bridge = after("rope-bridge", 240 * 10);
     let sag = 1.0 - position(&bridge, 24)[1];
     assert!(sag > 0.1 && sag < 0.8, "the middle sags by {sag}");
-    // In still air it comes to rest; in gusts, it does not.
+    // It comes to rest in still air, but not in gusts.
     let (in_gusts, mut calm) = (after("rope-bridge", 240 * 60), Solver::new(&scene("rope-bridge")));
     calm.set("wind_drag", sim_solver::ParameterValue::Off, None).unwrap();
     (0..240 * 60).for_each(|_| calm.step());
     let (moving, still) = (range_of_height(in_gusts), range_of_height(calm));
     assert!(moving > 0.02 && still < 0.005, "{moving} m in gusts, {still} m in still air");
     let flag = after("flag", 240 * 10);
-    // Its free end flies down the wind, not straight down.
+    // Its free end points downwind, not straight down.
     let end = position(&flag, 30 + 31 * 10);
     assert!(end[0] > 0.7, "the middle of the free edge is at {end:?}");
 }
 
 #[test]
-fn the_elastic_block_bounces_and_comes_back_to_its_form() {
+fn the_elastic_block_bounces_and_recovers_its_form() {
     let mut solver = Solver::new(&scene("elastic-mesh"));
     let height = |solver: &Solver| {
         let heights = (0..96).map(|index| position(solver, index)[1]);
@@ -239,10 +239,10 @@ fn the_elastic_block_bounces_and_comes_back_to_its_form() {
             highest_low = f64::max(highest_low, low);
         }
     }
-    assert!(least < 0.95 * start, "it is squeezed: {least} of {start}");
-    assert!(highest_low > 0.02, "it bounces: {highest_low}");
+    assert!(least < 0.95 * start, "the block is squeezed: {least} of {start}");
+    assert!(highest_low > 0.02, "the block bounces: {highest_low}");
     let end = height(&solver);
-    assert!((end / start - 1.0).abs() < 0.1, "its form comes back: {end} of {start}");
+    assert!((end / start - 1.0).abs() < 0.1, "the block recovers: {end} of {start}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Commands on the state: what they do, and that a rejected one changes no bit.
+//! Effects of commands on the state. A rejected command changes no bit.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::{Grip, Particle, ParticleFlags, Reason, Scene, Solver, builtin};
@@ -33,7 +33,7 @@ fn bits(solver: &Solver) -> Vec<u8> {
 }
 
 #[test]
-fn a_pinned_particle_stands_bit_for_bit_and_falls_from_rest_when_unpinned() {
+fn a_pinned_particle_stays_bit_for_bit_and_falls_from_rest_when_unpinned() {
     let mut solver = curtain();
     step(&mut solver, 60);
     let before = solver.particle(90);
@@ -51,7 +51,7 @@ fn a_pinned_particle_stands_bit_for_bit_and_falls_from_rest_when_unpinned() {
 }
 
 #[test]
-fn a_grab_reaches_its_target_in_whole_steps_in_a_straight_line() {
+fn a_grabbed_particle_reaches_its_target_in_a_straight_line_after_whole_steps() {
     let mut solver = one_particle("");
     solver.grab(CLIENT, grip(0, [0.4, -0.8, 1.2])).unwrap();
     for quarter in 1..=4 {
@@ -70,8 +70,8 @@ fn a_grab_reaches_its_target_in_whole_steps_in_a_straight_line() {
 }
 
 #[test]
-fn a_release_keeps_the_velocity_of_the_hand_at_each_phase_of_its_moves() {
-    // 60 Hz moves of 0.05 m on a 240 Hz node: 3 m/s, at whichever of the four steps it lets go.
+fn a_release_keeps_the_velocity_of_the_grab_at_each_phase_of_its_moves() {
+    // Moves of 0.05 m at 60 Hz on a node of 240 Hz are 3 m/s, at each of the four steps.
     for phase in 1..=4 {
         let mut solver = one_particle("gravity = [0, 0, 0]");
         solver.grab(CLIENT, grip(0, [0.05, 0.0, 0.0])).unwrap();
@@ -89,7 +89,7 @@ fn a_release_keeps_the_velocity_of_the_hand_at_each_phase_of_its_moves() {
 }
 
 #[test]
-fn a_target_too_far_is_followed_at_max_speed() {
+fn a_distant_target_is_followed_at_max_speed() {
     let mut solver = one_particle("");
     solver.grab(CLIENT, grip(0, [1e6, 0.0, 0.0])).unwrap();
     step(&mut solver, 24);
@@ -98,7 +98,7 @@ fn a_target_too_far_is_followed_at_max_speed() {
 }
 
 #[test]
-fn a_pinned_particle_can_be_carried_and_stays_where_it_is_let_go() {
+fn a_pinned_particle_can_be_grabbed_and_stays_where_it_is_released() {
     let mut solver = curtain();
     solver.grab(CLIENT, grip(0, [-0.6, 1.2, 0.1])).unwrap();
     step(&mut solver, 8);
@@ -110,7 +110,7 @@ fn a_pinned_particle_can_be_carried_and_stays_where_it_is_let_go() {
 }
 
 #[test]
-fn only_the_client_that_holds_a_particle_moves_and_releases_it() {
+fn only_the_client_that_grabbed_a_particle_moves_and_releases_it() {
     let mut solver = curtain();
     assert_eq!(solver.release(CLIENT, 5), Err(Reason::NotGrabbed));
     assert_eq!(solver.move_grabbed(CLIENT, grip(5, [0.0; 3])), Err(Reason::NotGrabbed));
@@ -163,7 +163,7 @@ fn in_two_dimensions_a_target_off_the_plane_is_out_of_range() {
 }
 
 #[test]
-fn a_reset_shows_the_initial_state_in_its_own_step_and_then_goes_on_as_from_the_start() {
+fn a_reset_shows_the_initial_state_in_its_own_step_and_then_repeats_the_run() {
     let mut fresh = curtain();
     let initial = bits(&fresh);
     let mut solver = curtain();
@@ -180,8 +180,8 @@ fn a_reset_shows_the_initial_state_in_its_own_step_and_then_goes_on_as_from_the_
 }
 
 #[test]
-fn a_state_that_overflows_freezes_its_particle_where_it_last_stood() {
-    // Two particles at the end of the range on a stick: the squared distance overflows.
+fn a_particle_that_overflows_freezes_at_its_last_position() {
+    // A stick joins two particles at the end of the range, and the squared distance overflows.
     let text = "version = 1\norigin = [0, 0, 0]\n[solver]\nmax_speed = 3e38\n\
          [[particle]]\nposition = [0, 0, 0]\nvelocity = [1e7, 0, 0]\n\
          [[particle]]\nposition = [1, 0, 0]\n[[constraint]]\nparticles = [0, 1]\nrest_length = 1e30\n";
@@ -197,7 +197,7 @@ fn a_state_that_overflows_freezes_its_particle_where_it_last_stood() {
 }
 
 #[test]
-fn what_is_held_survives_a_neighbour_that_blows_up_and_the_state_can_be_restored() {
+fn fixed_particles_survive_a_neighbour_that_blows_up_and_the_state_can_be_restored() {
     // Particle 1 overflows between a pinned and a grabbed one.
     let text = "version = 1\n[solver]\nmax_speed = 3e38\n[[particle]]\nposition = [0, 0, 0]\npinned = true\n\
          [[particle]]\nposition = [1, 0, 0]\n[[particle]]\nposition = [2, 0, 0]\n\

@@ -1,4 +1,4 @@
-//! The same scene and commands give the same bits, in one piece or restored in the middle from a
+//! The same scene and commands give the same bits, in one run or restored in the middle from a
 //! snapshot and a keyframe.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -9,7 +9,7 @@ use sim_solver::{
 };
 
 #[derive(Debug, Clone)]
-enum Wish {
+enum RandomCommand {
     Pin(u32),
     Unpin(u32),
     Grab(u32, [f32; 3]),
@@ -25,7 +25,7 @@ enum Wish {
     Reset,
 }
 
-/// Parameters with a number, each with the range that a share of 0 to 1 is spread over.
+/// Parameters with a number. Each has the range to which 0 to 1 is mapped.
 const SETTINGS: [(&str, f32, f32); 9] = [
     ("damping", 0.0, 5.0),
     ("wind_drag", 0.0, 2.0),
@@ -38,58 +38,58 @@ const SETTINGS: [(&str, f32, f32); 9] = [
     ("stiffness", 0.1, 1.0),
 ];
 
-fn wish() -> impl Strategy<Value = Wish> {
-    // A few particles only, so that pins, grabs and releases meet.
+fn random_command() -> impl Strategy<Value = RandomCommand> {
+    // Few particles, so that pins, grabs and releases coincide.
     let particle = 80..90_u32;
     let target = prop::array::uniform3(-1.0..1.0_f32);
     let point = target.clone();
     prop_oneof![
-        4 => particle.clone().prop_map(Wish::Pin),
-        4 => particle.clone().prop_map(Wish::Unpin),
-        6 => (particle.clone(), target.clone()).prop_map(|(one, to)| Wish::Grab(one, to)),
-        6 => (particle.clone(), target).prop_map(|(one, to)| Wish::Move(one, to)),
-        4 => particle.prop_map(Wish::Release),
-        2 => point.clone().prop_map(Wish::Push),
-        2 => (0..400_u32).prop_map(Wish::Cut),
-        1 => point.clone().prop_map(Wish::CutRadius),
-        1 => (point.clone(), point.clone()).prop_map(|(from, to)| Wish::CutSegment(from, to)),
-        1 => point.clone().prop_map(Wish::MoveAnchor),
-        1 => (0..5_u32, point).prop_map(|(index, to)| Wish::MoveCollider(index, to)),
-        3 => (0..SETTINGS.len(), 0.0..1.0_f32).prop_map(|(which, value)| Wish::Set(which, value)),
-        3 => Just(Wish::Reset),
+        4 => particle.clone().prop_map(RandomCommand::Pin),
+        4 => particle.clone().prop_map(RandomCommand::Unpin),
+        6 => (particle.clone(), target.clone()).prop_map(|(one, to)| RandomCommand::Grab(one, to)),
+        6 => (particle.clone(), target).prop_map(|(one, to)| RandomCommand::Move(one, to)),
+        4 => particle.prop_map(RandomCommand::Release),
+        2 => point.clone().prop_map(RandomCommand::Push),
+        2 => (0..400_u32).prop_map(RandomCommand::Cut),
+        1 => point.clone().prop_map(RandomCommand::CutRadius),
+        1 => (point.clone(), point.clone()).prop_map(|(from, to)| RandomCommand::CutSegment(from, to)),
+        1 => point.clone().prop_map(RandomCommand::MoveAnchor),
+        1 => (0..5_u32, point).prop_map(|(index, to)| RandomCommand::MoveCollider(index, to)),
+        3 => (0..SETTINGS.len(), 0.0..1.0_f32).prop_map(|(which, value)| RandomCommand::Set(which, value)),
+        3 => Just(RandomCommand::Reset),
     ]
 }
 
-/// Applies a wish; a rejection is as good an outcome as any.
-fn apply(solver: &mut Solver, wish: &Wish) {
+/// Applies a command. A rejection is a valid outcome, too.
+fn apply(solver: &mut Solver, command: &RandomCommand) {
     let grip = |particle, target| Grip { particle, target, over_s: 0.05 };
-    let _outcome = match *wish {
-        Wish::Pin(particle) => solver.pin(particle),
-        Wish::Unpin(particle) => solver.unpin(particle),
-        Wish::Grab(particle, target) => solver.grab(1, grip(particle, target)),
-        Wish::Move(particle, target) => solver.move_grabbed(1, grip(particle, target)),
-        Wish::Release(particle) => solver.release(1, particle),
-        Wish::Push(center) => solver.push(Push {
+    let _outcome = match *command {
+        RandomCommand::Pin(particle) => solver.pin(particle),
+        RandomCommand::Unpin(particle) => solver.unpin(particle),
+        RandomCommand::Grab(particle, target) => solver.grab(1, grip(particle, target)),
+        RandomCommand::Move(particle, target) => solver.move_grabbed(1, grip(particle, target)),
+        RandomCommand::Release(particle) => solver.release(1, particle),
+        RandomCommand::Push(center) => solver.push(Push {
             ball: Ball { center, radius: 0.4 },
             delta: center,
             limit: Some(0.01),
         }),
-        Wish::Cut(constraint) => solver.cut(constraint),
-        Wish::CutRadius(center) => solver.cut_radius(Ball { center, radius: 0.1 }),
-        Wish::CutSegment(from, to) => {
+        RandomCommand::Cut(constraint) => solver.cut(constraint),
+        RandomCommand::CutRadius(center) => solver.cut_radius(Ball { center, radius: 0.1 }),
+        RandomCommand::CutSegment(from, to) => {
             solver.cut_segment(Sweep { from, to, direction: [0.0, 0.0, 1.0] })
         }
-        Wish::MoveAnchor(translation) => {
+        RandomCommand::MoveAnchor(translation) => {
             solver.move_anchor(0, Pose { translation, rotation: [0.1, 0.0, 0.2, 1.0] })
         }
-        Wish::MoveCollider(collider, translation) => {
+        RandomCommand::MoveCollider(collider, translation) => {
             solver.move_collider(collider, Pose { translation, rotation: [0.0, 0.0, 0.0, 1.0] })
         }
-        Wish::Set(which, share) => {
+        RandomCommand::Set(which, share) => {
             let (name, low, high) = SETTINGS[which];
             solver.set(name, ParameterValue::Number(low + share * (high - low)), None)
         }
-        Wish::Reset => {
+        RandomCommand::Reset => {
             solver.reset();
             Ok(())
         }
@@ -104,7 +104,7 @@ fn particles(solver: &Solver) -> Vec<Particle> {
     (0..solver.particle_count()).map(|index| solver.particle(index)).collect()
 }
 
-/// A copy of a state by its snapshot and keyframe alone.
+/// Copies a state through its snapshot and keyframe only.
 fn copy(solver: &Solver, scene: &Scene) -> Solver {
     let mut copy = Solver::new(scene);
     let keyframe = Keyframe::decode(&solver.keyframe().encode()).unwrap();
@@ -112,7 +112,7 @@ fn copy(solver: &Solver, scene: &Scene) -> Solver {
     copy
 }
 
-fn assert_go_on_alike(mut solver: Solver, scene: &Scene) {
+fn assert_continues_alike(mut solver: Solver, scene: &Scene) {
     let mut copy = copy(&solver, scene);
     for _ in 0..500 {
         solver.step();
@@ -122,7 +122,7 @@ fn assert_go_on_alike(mut solver: Solver, scene: &Scene) {
 }
 
 #[test]
-fn a_collider_moved_at_the_boundary_of_a_reset_is_there_in_its_step() {
+fn a_collider_moved_together_with_a_reset_has_its_new_pose_in_that_step() {
     let text = "version = 1\ngravity = [0, 0, 0]\n[[particle]]\nposition = [0, 0.1, 0]\n\
          [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n";
     let scene = Scene::from_toml(text, "test").unwrap();
@@ -133,13 +133,13 @@ fn a_collider_moved_at_the_boundary_of_a_reset_is_there_in_its_step() {
     solver.move_collider(0, pose).unwrap();
     solver.step();
     let shape = solver.colliders().next().unwrap().shape;
-    assert!(matches!(shape, sim_solver::ColliderShape::Plane { offset: 0.5, .. }), "{shape:?}");
-    assert_go_on_alike(solver, &scene);
+    assert!(matches!(shape, sim_solver::ColliderGeometry::Plane { offset: 0.5, .. }), "{shape:?}");
+    assert_continues_alike(solver, &scene);
 }
 
 #[test]
-fn cuts_beside_a_pin_at_one_boundary_leave_the_same_tethers_in_a_copy() {
-    // Two ways to particle 3; the cut of the short one, a pin and another cut of a lower index.
+fn cuts_and_a_pin_at_one_boundary_leave_the_same_tethers_in_a_copy() {
+    // Particle 3 has two paths. Cut the short one, pin, and cut another with a lower index.
     let text = "version = 1\n[solver]\ntethers = true\n[[particle]]\nposition = [0, 0, 0]\npinned = true\n\
          [[particle]]\nposition = [1, 0, 0]\n[[particle]]\nposition = [0, 0, 1.5]\n\
          [[particle]]\nposition = [1, 0, 1.5]\n[[particle]]\nposition = [9, 0, 0]\n\
@@ -152,11 +152,11 @@ fn cuts_beside_a_pin_at_one_boundary_leave_the_same_tethers_in_a_copy() {
     solver.pin(4).unwrap();
     solver.cut(0).unwrap();
     solver.step();
-    assert_go_on_alike(solver, &scene);
+    assert_continues_alike(solver, &scene);
 }
 
 #[test]
-fn numbers_that_no_run_writes_are_refused_in_a_keyframe() {
+fn keyframes_with_impossible_numbers_are_refused() {
     let scene = scene();
     let mut solver = Solver::new(&scene);
     solver.grab(1, Grip { particle: 90, target: [0.5; 3], over_s: 0.25 }).unwrap();
@@ -167,12 +167,12 @@ fn numbers_that_no_run_writes_are_refused_in_a_keyframe() {
         Solver::new(&scene).restore(&particles(&solver), &keyframe)
     };
     assert_eq!(restored(&bytes), Ok(()));
-    // The version takes four bytes, the pause one, then comes the scene step as a varint.
+    // The version has four bytes and the pause flag one. The scene step follows as a varint.
     assert_eq!(bytes[5], 1);
     let ages = [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x01];
     let old = [&bytes[..5], &ages, &bytes[6..]].concat();
     assert!(restored(&old).unwrap_err().to_string().contains("scene step"));
-    // 60 steps of a quarter of a second, less the one that was made.
+    // 60 steps of a quarter of a second, minus the one already made.
     let place = bytes.iter().rposition(|byte| *byte == 59).unwrap();
     let slow = [&bytes[..place], &[0xff, 0xff, 0xff, 0xff, 0x0f], &bytes[place + 1..]].concat();
     assert!(restored(&slow).unwrap_err().to_string().contains("longer than any"));
@@ -180,7 +180,7 @@ fn numbers_that_no_run_writes_are_refused_in_a_keyframe() {
     assert!(Keyframe::decode(&long).unwrap_err().to_string().contains("1 bytes too many"));
 }
 
-/// A built-in scene, and those that use every mechanism.
+/// A built-in scene, and the scenes that use every mechanism.
 const TEXTS: [&str; 3] = [
     include_str!("../../scenes/curtain.toml"),
     include_str!("scenes/everything.toml"),
@@ -192,7 +192,7 @@ proptest! {
 
     #[test]
     fn a_snapshot_and_its_keyframe_are_the_complete_state(
-        steps in prop::collection::vec(prop::collection::vec(wish(), 0..5), 1..60),
+        steps in prop::collection::vec(prop::collection::vec(random_command(), 0..5), 1..60),
         stop in 0..60_usize,
         text in 0..TEXTS.len(),
         is_used in any::<bool>(),
@@ -200,12 +200,12 @@ proptest! {
         let scene = Scene::from_toml(TEXTS[text], "test").unwrap();
         let mut whole = Solver::new(&scene);
         let mut restored = None;
-        for (index, wishes) in steps.iter().enumerate() {
+        for (index, commands) in steps.iter().enumerate() {
             if index == stop.min(steps.len() - 1) {
                 let bytes = whole.keyframe().encode();
                 prop_assert!(bytes.len() <= whole.keyframe_size_bytes_max());
                 let keyframe = Keyframe::decode(&bytes).unwrap();
-                // Nothing of another state may be left, whatever was done before.
+                // Nothing of the earlier state may remain.
                 let mut solver = if is_used { whole.clone() } else { Solver::new(&scene) };
                 if is_used {
                     solver.cut(3).ok();
@@ -217,8 +217,8 @@ proptest! {
                 restored = Some(solver);
             }
             for solver in std::iter::once(&mut whole).chain(&mut restored) {
-                for wish in wishes {
-                    apply(solver, wish);
+                for command in commands {
+                    apply(solver, command);
                 }
                 solver.step();
             }
@@ -231,7 +231,7 @@ proptest! {
 }
 
 #[test]
-fn the_hash_is_that_of_the_published_bytes() {
+fn the_state_hash_is_the_hash_of_the_published_bytes() {
     let mut solver = Solver::new(&scene());
     for _ in 0..100 {
         solver.step();
@@ -253,7 +253,7 @@ fn a_pinned_scene_keeps_its_hash() {
 }
 
 #[test]
-fn no_published_number_is_minus_zero() {
+fn minus_zero_is_never_published() {
     let text = "version = 1\ngravity = [-0.0, -9.81, 0]\n[[particle]]\nposition = [-0.0, 0, -0.0]\nvelocity = [-0.0, 0, 0]\n";
     let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
     for _ in 0..3 {
@@ -266,7 +266,7 @@ fn no_published_number_is_minus_zero() {
 }
 
 #[test]
-fn a_state_that_is_none_is_refused_and_changes_nothing() {
+fn an_invalid_state_is_refused_and_changes_nothing() {
     let mut solver = Solver::new(&scene());
     solver.grab(1, Grip { particle: 90, target: [0.0; 3], over_s: 0.0 }).unwrap();
     solver.step();

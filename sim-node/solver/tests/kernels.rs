@@ -1,12 +1,12 @@
-//! Every kernel, and every number of threads, makes the bits of the reference, which projects one constraint after the other and
-//! knows no sheets: on every scene, at every size around a vector's, with everything that a
-//! constraint can have.
+//! Every kernel and every number of threads gives the bits of the reference, which projects the
+//! constraints one after another and treats sheets as graphs: on every scene, at every size around
+//! that of a vector, and with every property of a constraint.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::{Ball, Grip, Kernels, ParameterValue, Push, Scene, Solver, TearCause, builtin};
 
-/// Steps all kernels side by side, with commands between, and compares every particle; gives the
-/// reference back.
+/// Steps all kernels side by side with the same commands, compares every particle, and returns the
+/// reference.
 fn assert_same_bits(text: &str, name: &str, steps: u32) -> Solver {
     let scene = Scene::from_toml(text, name).unwrap();
     let mut reference = Solver::with_kernels(&scene, Kernels::Reference);
@@ -28,7 +28,7 @@ fn assert_same_bits(text: &str, name: &str, steps: u32) -> Solver {
     reference
 }
 
-/// A little of everything; what a scene refuses, every kernel refuses.
+/// Applies a mix of commands. All kernels refuse the same ones.
 fn command(solver: &mut Solver, step: u32) {
     let count = u32::try_from(solver.particle_count()).unwrap();
     if count == 0 {
@@ -61,7 +61,7 @@ fn release_all(solver: &mut Solver, count: u32) {
 }
 
 #[test]
-fn on_every_built_in_scene() {
+fn kernels_agree_on_every_built_in_scene() {
     for name in builtin::names() {
         let text = builtin::text(name).unwrap();
         let is_big = Solver::new(&Scene::from_toml(text, name).unwrap()).particle_count() > 500;
@@ -70,13 +70,13 @@ fn on_every_built_in_scene() {
 }
 
 #[test]
-fn on_scenes_with_every_mechanism() {
+fn kernels_agree_on_scenes_with_every_mechanism() {
     for text in [include_str!("scenes/everything.toml"), include_str!("scenes/stiffness.toml")] {
         assert_same_bits(text, "test", 300);
     }
 }
 
-/// A sheet that falls onto a ball and a floor.
+/// Returns a sheet that falls onto a sphere and a floor.
 fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
     format!(
         "version = 1\n[solver]\nrate_hz = 120\n{solver}\n\
@@ -89,7 +89,7 @@ fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
 
 const LINKS: &str = "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"corners\"";
 
-/// What a scene can ask of its constraints.
+/// Settings and generator keys that affect constraints.
 const VARIANTS: [(&str, &str, &str); 8] = [
     ("rigid", "substeps = 3", LINKS),
     ("passes", "substeps = 2\niterations = 3\nrelaxation = 1.2", LINKS),
@@ -110,7 +110,7 @@ const VARIANTS: [(&str, &str, &str); 8] = [
 ];
 
 #[test]
-fn on_sheets_of_every_size_around_a_vector() {
+fn kernels_agree_on_sheets_of_every_size_around_a_vector() {
     for (name, solver, generator) in VARIANTS {
         let mut causes = Vec::new();
         for size in [1, 2, 3, 7, 8, 9, 15, 16, 17, 31, 32, 33] {
@@ -120,7 +120,7 @@ fn on_sheets_of_every_size_around_a_vector() {
                 causes.extend_from_slice(assert_same_bits(&text, &name, 24).tear_causes());
             }
         }
-        // What is said to tear does.
+        // Scenes with a tear limit do tear.
         let tears = |cause| causes.contains(&cause);
         let by_itself = [TearCause::Force, TearCause::Stretch, TearCause::Distance].map(tears);
         match name {
@@ -132,7 +132,7 @@ fn on_sheets_of_every_size_around_a_vector() {
 }
 
 #[test]
-fn on_sheets_that_are_taken_in_strips() {
+fn kernels_agree_on_sheets_that_are_split_into_strips() {
     for (name, solver, generator) in VARIANTS {
         for columns in [127, 128, 129, 200, 255, 256, 257, 400] {
             let name = format!("{name}, {columns} x 12");
@@ -142,7 +142,7 @@ fn on_sheets_that_are_taken_in_strips() {
 }
 
 #[test]
-fn on_ropes_of_every_length_around_a_vector() {
+fn kernels_agree_on_ropes_of_every_length_around_a_vector() {
     for count in [2, 3, 7, 8, 9, 16, 17, 31, 32, 33, 300] {
         let text = format!(
             "version = 1\n[solver]\nsubsteps = 5\ntethers = true\n[[generate]]\nshape = \"rope\"\n\
@@ -153,8 +153,8 @@ fn on_ropes_of_every_length_around_a_vector() {
 }
 
 #[test]
-fn on_sheets_that_are_sewn_to_something_else() {
-    // One constraint of another kind makes a graph of the first sheet; the second stays one.
+fn kernels_agree_on_sheets_that_are_joined_to_other_shapes() {
+    // An explicit constraint turns the first sheet into a graph. The second remains a sheet.
     let cloth = "[[generate]]\nshape = \"cloth\"\ncolumns = 12\nrows = 9\nspacing = 0.1\n";
     let text = format!(
         "version = 1\n[solver]\nsubsteps = 3\n[[particle]]\nposition = [0, -1, 0]\n\
@@ -165,7 +165,7 @@ fn on_sheets_that_are_sewn_to_something_else() {
 }
 
 #[test]
-fn where_ends_coincide_and_lengths_are_zero() {
+fn kernels_agree_where_ends_coincide_and_lengths_are_zero() {
     let mut text = "version = 1\n[solver]\nsubsteps = 2\niterations = 2\n".to_owned();
     for index in 0..24 {
         let x = f64::from(index / 2) * 0.25;
@@ -179,7 +179,7 @@ fn where_ends_coincide_and_lengths_are_zero() {
     assert_same_bits(&text, "zero", 120);
 }
 
-/// Steps several numbers of threads side by side with one.
+/// Steps one thread and several numbers of threads side by side.
 fn assert_same_bits_of_threads(text: &str, name: &str, steps: u32) {
     let scene = Scene::from_toml(text, name).unwrap();
     let mut alone = Solver::new(&scene);
@@ -204,14 +204,14 @@ fn assert_same_bits_of_threads(text: &str, name: &str, steps: u32) {
 }
 
 #[test]
-fn threads_make_the_same_bits_on_every_built_in_scene() {
+fn threads_give_the_same_bits_on_every_built_in_scene() {
     for name in builtin::names() {
         assert_same_bits_of_threads(builtin::text(name).unwrap(), name, 30);
     }
 }
 
 #[test]
-fn threads_make_the_same_bits_on_big_sheets() {
+fn threads_give_the_same_bits_on_large_sheets() {
     for (name, solver, generator) in VARIANTS {
         for (columns, rows) in [(70, 240), (300, 90)] {
             let name = format!("{name}, {columns} x {rows}");
@@ -221,8 +221,8 @@ fn threads_make_the_same_bits_on_big_sheets() {
 }
 
 #[test]
-fn threads_make_the_same_bits_on_big_graphs() {
-    // A constraint from each of two sheets to a particle of the other makes a graph of both.
+fn threads_give_the_same_bits_on_large_graphs() {
+    // A constraint from each of two sheets to the other turns both into a graph.
     for (name, solver, generator) in VARIANTS {
         let text = sheet(150, 140, solver, generator);
         let sewn = format!("{text}[[constraint]]\nparticles = [500, 900]\n");
@@ -231,7 +231,7 @@ fn threads_make_the_same_bits_on_big_graphs() {
 }
 
 #[test]
-fn after_parameters_have_changed() {
+fn kernels_agree_after_parameters_have_changed() {
     let text = sheet(33, 17, "substeps = 2\ntethers = true", LINKS);
     let scene = Scene::from_toml(&text, "set").unwrap();
     let settings = [

@@ -1,12 +1,12 @@
-//! Meshes from OBJ text: a plane, a ball and a tube like a sleeve become the cloth that they look
-//! like; what is degenerate is named and left out.
+//! Meshes from OBJ text: a plane, a sphere and a tube become cloth; degenerate parts are omitted with a
+//! warning.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::scene::Mesh;
 use sim_solver::{Scene, SceneError, Solver};
 
-/// A scene of one mesh.
-fn scene_of(obj: &str, keys: &str) -> Result<Scene, SceneError> {
+/// Returns a scene with one mesh.
+fn mesh_scene(obj: &str, keys: &str) -> Result<Scene, SceneError> {
     let text = format!("version = 1\n[[generate]]\nshape = \"obj\"\npath = \"mesh.obj\"\n{keys}\n");
     let read = |path: &str| {
         assert_eq!(path, "mesh.obj");
@@ -15,8 +15,15 @@ fn scene_of(obj: &str, keys: &str) -> Result<Scene, SceneError> {
     Scene::from_toml_with_files(&text, "test.toml", &read)
 }
 
-/// A sheet of columns x rows vertices in quads, or in triangles.
-fn plane(columns: usize, rows: usize, is_quads: bool) -> String {
+/// Faces of a sheet.
+#[derive(Clone, Copy, PartialEq)]
+enum Faces {
+    Quads,
+    Triangles,
+}
+
+/// Returns a sheet of columns x rows vertices.
+fn plane(columns: usize, rows: usize, faces: Faces) -> String {
     let mut text = String::new();
     for row in 0..rows {
         for column in 0..columns {
@@ -27,7 +34,7 @@ fn plane(columns: usize, rows: usize, is_quads: bool) -> String {
         for column in 1..columns {
             let below = row * columns + column + 1;
             let above = below - columns;
-            text += &if is_quads {
+            text += &if faces == Faces::Quads {
                 format!("f {} {} {} {}\n", above - 1, below - 1, below, above)
             } else {
                 format!("f {0} {1} {2}\nf {0} {2} {3}\n", above - 1, below - 1, below, above)
@@ -37,8 +44,8 @@ fn plane(columns: usize, rows: usize, is_quads: bool) -> String {
     text
 }
 
-/// Rings of vertices around y: a ball where the radius follows a circle, a sleeve where it does not.
-fn around(rings: usize, spokes: usize, radius: impl Fn(f64) -> f64) -> String {
+/// Returns rings of vertices around y: a sphere where the radius follows a circle, else a tube.
+fn rings_around_y(rings: usize, spokes: usize, radius: impl Fn(f64) -> f64) -> String {
     let mut text = String::new();
     for ring in 0..rings {
         let share = ring as f64 / (rings - 1) as f64;
@@ -69,28 +76,29 @@ fn assert_finite_for(scene: &Scene, steps: u32) {
         let square: f32 = (0..3).map(|axis| (b[axis] - a[axis]).powi(2)).sum();
         square.sqrt() / one.rest_length
     });
-    assert!(lengths.fold(0.0, f32::max) < 3.0, "it is torn out of its form");
+    assert!(lengths.fold(0.0, f32::max) < 3.0, "the mesh has lost its form");
 }
 
 #[test]
 fn a_plane_of_quads_is_the_cloth_of_its_columns_and_rows() {
-    let counts = scene_of(&plane(14, 12, true), "pinned = \"y > -0.05\"").unwrap().counts();
+    let counts =
+        mesh_scene(&plane(14, 12, Faces::Quads), "pinned = \"y > -0.05\"").unwrap().counts();
     assert_eq!((counts.particles, counts.pins, counts.triangles), (168, 14, 286));
-    // Along the edges, both diagonals, over two cells.
+    // Edges, both diagonals, and bends over two cells.
     assert_eq!(counts.constraints, 310 + 286 + 284);
 }
 
 #[test]
-fn a_plane_of_triangles_has_its_diagonals_as_edges_and_the_others_as_bends() {
-    let counts = scene_of(&plane(5, 4, false), "").unwrap().counts();
+fn a_plane_of_triangles_has_one_diagonal_as_edges_and_the_other_as_bends() {
+    let counts = mesh_scene(&plane(5, 4, Faces::Triangles), "").unwrap().counts();
     assert_eq!((counts.particles, counts.triangles), (20, 24));
-    // Edges: 31 and 12 diagonals; each of the 24 inner edges has a bend, but 6 pairs of them meet.
+    // 31 edges and 12 diagonals. Each of the 24 inner edges has a bend, but 6 pairs of them coincide.
     assert!(counts.constraints > 43 && counts.constraints <= 43 + 29, "{}", counts.constraints);
 }
 
 #[test]
-fn mass_by_density_is_that_of_the_area() {
-    let scene = scene_of(&plane(11, 11, true), "density = 0.3").unwrap();
+fn the_mass_by_density_is_proportional_to_the_area() {
+    let scene = mesh_scene(&plane(11, 11, Faces::Quads), "density = 0.3").unwrap();
     let solver = Solver::new(&scene);
     let mass: f64 =
         (0..121).map(|index| 1.0 / f64::from(solver.particle(index).inverse_mass)).sum();
@@ -98,83 +106,92 @@ fn mass_by_density_is_that_of_the_area() {
 }
 
 #[test]
-fn planes_balls_and_sleeves_stay_finite() {
-    let ball = around(9, 12, |share| 0.01 + 0.5 * (std::f64::consts::PI * share).sin());
-    let sleeve = around(12, 16, |share| 0.3 - 0.1 * share);
+fn planes_spheres_and_tubes_stay_finite() {
+    let sphere = rings_around_y(9, 12, |share| 0.01 + 0.5 * (std::f64::consts::PI * share).sin());
+    let tube = rings_around_y(12, 16, |share| 0.3 - 0.1 * share);
     for (obj, keys) in [
-        (plane(10, 8, false), "pinned = \"y > -0.05 and x < 0.05\""),
-        (plane(10, 8, true), "pinned = [0, 9]\ncompliance = { bend = 1e-2 }"),
-        (ball, "density = 0.2\ncompliance = { shear = 1e-3, bend = 1e-2 }"),
-        (sleeve, "density = 0.2\npinned = \"y >= 1\"\ncompliance = { bend = 1e-2 }"),
+        (plane(10, 8, Faces::Triangles), "pinned = \"y > -0.05 and x < 0.05\""),
+        (plane(10, 8, Faces::Quads), "pinned = [0, 9]\ncompliance = { bend = 1e-2 }"),
+        (sphere, "density = 0.2\ncompliance = { shear = 1e-3, bend = 1e-2 }"),
+        (tube, "density = 0.2\npinned = \"y >= 1\"\ncompliance = { bend = 1e-2 }"),
     ] {
-        let scene = scene_of(&obj, keys).unwrap();
-        assert_eq!(scene.findings, Vec::<String>::new());
+        let scene = mesh_scene(&obj, keys).unwrap();
+        assert_eq!(scene.read_warnings, Vec::<String>::new());
         assert_finite_for(&scene, 10_000);
     }
 }
 
 #[test]
-fn degenerate_meshes_are_named_and_what_is_left_stays_finite() {
-    let plane = plane(4, 4, true);
-    for (extra, finding) in [
-        ("v 9 9 9\nv 8 8 8\n", "2 vertices belong to no face: left out"),
-        ("f 1 2 6 5\n", "1 faces stand twice, the first is face 10: left out"),
-        ("f 1 2 3\n", "1 faces have no area, the first is face 10: left out"),
-        ("v 0.1 0 0.3\nf 1 2 17\n", "1 edges have more than two faces: no bends across them"),
+fn degenerate_parts_are_omitted_with_a_warning_and_the_rest_stays_finite() {
+    let plane = plane(4, 4, Faces::Quads);
+    for (extra, warning) in [
+        ("v 9 9 9\nv 8 8 8\n", "2 vertices belong to no face and are omitted"),
+        ("f 1 2 6 5\n", "face 10 is a duplicate and is omitted"),
+        ("f 1 2 3\n", "face 10 has no area and is omitted"),
+        ("v 0.1 0 0.3\nf 1 2 17\n", "1 edge has more than two faces and gets no bends"),
         ("v 0.5 0.5 0\nv 0.6 0.6 0\nv 0.7 0.5 0\nv 0.6 0.3 0\nf 4 17 18 19 20\n", ""),
     ] {
-        // The fourth adds a third face to an edge that has one: give it a second one first.
-        let extra = if finding.contains("edges") {
+        // The fourth case needs an edge that has two faces already.
+        let extra = if warning.contains("edge") {
             "v 0.1 0 0.3\nv 0.1 0 -0.3\nf 1 2 17\nf 1 2 18\n"
         } else {
             extra
         };
-        let scene = scene_of(&format!("{plane}{extra}"), "pinned = \"y > -0.05\"").unwrap();
-        let found: Vec<_> =
-            scene.findings.iter().map(|one| one.trim_start_matches("mesh.obj: ")).collect();
-        assert_eq!(found, if finding.is_empty() { vec![] } else { vec![finding] });
-        assert!(scene.warnings().iter().any(|one| one.contains(finding)) || finding.is_empty());
+        let scene = mesh_scene(&format!("{plane}{extra}"), "pinned = \"y > -0.05\"").unwrap();
+        let warnings: Vec<_> =
+            scene.read_warnings.iter().map(|one| one.trim_start_matches("mesh.obj: ")).collect();
+        assert_eq!(warnings, if warning.is_empty() { vec![] } else { vec![warning] });
+        assert!(scene.warnings().iter().any(|one| one.contains(warning)) || warning.is_empty());
         assert_finite_for(&scene, 10_000);
     }
 }
 
 #[test]
-fn corners_can_be_counted_back_and_have_textures_and_normals() {
+fn corners_may_be_negative_and_have_textures_and_normals() {
     let text = "# made by hand\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0\nvt 0 0\nvn 0 0 1\ns off\nf -3/1/1 -2//1 -1/1\n";
-    let read = Mesh::from_obj(text).unwrap();
-    assert_eq!((read.mesh.vertices.len(), read.mesh.faces), (3, vec![vec![0, 1, 2]]));
+    let mesh = Mesh::from_obj(text).unwrap().mesh;
+    assert_eq!((mesh.vertices.len(), mesh.faces), (3, vec![vec![0, 1, 2]]));
 }
 
 #[test]
 fn groups_can_be_pinned() {
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng collar\nf 1 2 3\ng body\nf 2 3 4\n";
-    let scene = scene_of(text, "pinned = \"group collar\"").unwrap();
+    let scene = mesh_scene(text, "pinned = \"group collar\"").unwrap();
     assert_eq!(scene.counts().pins, 3);
-    let error = scene_of(text, "pinned = \"group hem\"").unwrap_err().to_string();
-    assert!(error.contains("there is no group 'hem' (allowed: body, collar)"), "{error}");
+    let error = mesh_scene(text, "pinned = \"group hem\"").unwrap_err().to_string();
+    assert!(error.contains("the mesh has no group 'hem' (allowed: body, collar)"), "{error}");
 }
 
 #[test]
-fn the_effective_text_needs_the_file_no_more() {
-    let scene = scene_of(&plane(4, 3, true), "density = 0.2\npinned = \"x < 0.05\"").unwrap();
+fn the_complete_text_of_a_scene_contains_its_mesh() {
+    let scene =
+        mesh_scene(&plane(4, 3, Faces::Quads), "density = 0.2\npinned = \"x < 0.05\"").unwrap();
     let again = Scene::from_toml(&scene.to_toml(), "test").unwrap();
     assert_eq!(again, scene);
     assert_eq!(again.to_toml(), scene.to_toml());
 }
 
 #[test]
-fn what_is_wrong_with_a_mesh_is_named_with_its_place() {
+fn errors_in_a_mesh_name_the_line_of_the_scene_and_of_the_mesh() {
     for (obj, keys, expected) in [
         (
             "v 1 2\n",
             "",
-            "test.toml:4: generate[0].path: mesh.obj: line 1: a vertex needs three finite",
+            "test.toml:4: generate[0].path: mesh.obj: line 1: a vertex is malformed (allowed: three finite numbers)",
         ),
-        ("v 0 0 0\nf 1 2 3\n", "", "mesh.obj: line 2: there is no vertex 2 yet (allowed: 1 to 1)"),
-        ("v 0 0 0\nv 1 0 0\nf 1 2\n", "", "line 3: a face of 2 corners (allowed: 3 or more)"),
-        ("f a b c\n", "", "line 1: 'a' is no corner of a face"),
-        ("", "", "it has no face with an area (allowed: a readable OBJ file)"),
-        ("v nan 0 0\n", "", "line 1: a vertex needs three finite numbers"),
+        (
+            "v 0 0 0\nf 1 2 3\n",
+            "",
+            "mesh.obj: line 2: vertex 2 is not defined before this line (allowed: 1 to 1)",
+        ),
+        ("v 0 0 0\nv 1 0 0\nf 1 2\n", "", "line 3: a face has 2 corners (allowed: 3 or more)"),
+        (
+            "f a b c\n",
+            "",
+            "line 1: 'a' is not a corner of a face (allowed: the number of a vertex)",
+        ),
+        ("", "", "mesh.obj: the mesh has no face with an area (allowed: at least one)"),
+        ("v nan 0 0\n", "", "line 1: a vertex is malformed"),
         (
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
             "density = 0",
@@ -183,18 +200,19 @@ fn what_is_wrong_with_a_mesh_is_named_with_its_place() {
         (
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
             "pinned = \"w > 3\"",
-            "'w > 3' is no choice of vertices",
+            "'w > 3' is not an expression for vertices",
         ),
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "rows = 3", "rows: unknown field of a obj"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "rows = 3", "rows: unknown key of the shape obj"),
     ] {
-        let error = scene_of(obj, keys).unwrap_err().to_string();
+        let error = mesh_scene(obj, keys).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}\n  instead of\n{expected}");
+        assert!(error.matches("(allowed").count() <= 1, "{error}");
     }
     let text = "version = 1\n[[generate]]\nshape = \"obj\"\npath = \"mesh.obj\"\n";
     let error = Scene::from_toml(text, "x.toml").unwrap_err().to_string();
-    assert!(error.contains("no files can be read here"), "{error}");
+    assert!(error.contains("a scene without a file cannot name files"), "{error}");
     let text =
         "version = 1\n[[generate]]\nshape = \"obj\"\nvertices = [[0, 0, 0]]\nfaces = [[0, 1, 2]]\n";
     let error = Scene::from_toml(text, "x.toml").unwrap_err().to_string();
-    assert!(error.contains("face 0 is none"), "{error}");
+    assert!(error.contains("face 0 is [0, 1, 2]"), "{error}");
 }

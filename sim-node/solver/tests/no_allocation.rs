@@ -1,4 +1,4 @@
-//! The step allocates nothing: a counting allocator watches it, commands included.
+//! Neither steps nor commands allocate. A counting allocator checks it.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -9,7 +9,7 @@ use sim_solver::{Grip, ParameterValue, Scene, Solver, builtin};
 struct Counting;
 
 thread_local! {
-    /// Of this thread: the one that waits for the test allocates when it likes.
+    /// Allocations of this thread. The thread that waits for the test may allocate.
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -17,16 +17,16 @@ fn allocations() -> u64 {
     ALLOCATIONS.get()
 }
 
-// SAFETY: every call goes on to the system's allocator unchanged; counting touches no memory of it.
+// SAFETY: every call is forwarded to the system's allocator unchanged. Counting touches none of its memory.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller keeps the contract of `alloc`, which is the system's.
+        // SAFETY: the caller upholds the contract of `alloc`, which is the system's.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the pointer came from `System.alloc` with this layout, as above.
+        // SAFETY: the pointer came from `System.alloc` with this layout.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -36,7 +36,7 @@ static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn neither_steps_nor_commands_allocate() {
-    // Tethers are worked out anew at the boundary where something is pinned, which may allocate.
+    // A pin recomputes the tethers at its boundary, which may allocate.
     let text = builtin::text("curtain").unwrap().replace("tethers = true", "tethers = false");
     let scene = Scene::from_toml(&text, "curtain").unwrap();
     let mut solver = Solver::new(&scene);
@@ -51,11 +51,11 @@ fn neither_steps_nor_commands_allocate() {
         solver.step();
     }
     assert_eq!(allocations() - before, 0);
-    // Contacts, wind, anchors and a storm of tears in the middle of a step neither.
+    // Contacts, wind, anchors and many tears in one step do not allocate either.
     for text in [include_str!("scenes/everything.toml"), include_str!("scenes/stiffness.toml")] {
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
         solver.step();
-        // A parameter is worked out at its boundary, which may allocate.
+        // A parameter takes effect at its boundary, which may allocate.
         solver.set("tear_distance", ParameterValue::Number(0.0), None).unwrap();
         solver.step();
         let before = allocations();
@@ -65,7 +65,7 @@ fn neither_steps_nor_commands_allocate() {
         assert_eq!(allocations() - before, 0);
         assert!(solver.torn().len() > 100, "{} tore", solver.torn().len());
     }
-    // The counter does count.
+    // The counter works.
     drop(std::hint::black_box(vec![0_u8; 100]));
     assert!(allocations() > before);
 }

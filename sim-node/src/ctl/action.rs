@@ -74,7 +74,7 @@ fn numbers<const COUNT: usize>(values: &[f32]) -> anyhow::Result<[f32; COUNT]> {
 /// the scene first, because an outcome has no room for the place of an error.
 fn scene_text(source: &str) -> anyhow::Result<Text> {
     scene_source::load(source)?;
-    if !scene_source::is_path(source) {
+    if !sim_solver::scene::is_path(source) {
         return text(source);
     }
     let path = path::absolute(source)

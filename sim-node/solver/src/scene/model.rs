@@ -1,65 +1,61 @@
-//! What a scene expands to: every particle, constraint and triangle.
+//! Expansion of a scene: every particle, constraint and triangle.
 
-use sim_types::Method;
-
-use super::{Limits, Scene, SceneParticle};
+use super::definition::element::{SceneConstraint, SceneParticle};
+use super::definition::limits::Limits;
 use crate::constraints::Constraint;
 use crate::families::Sheet;
+use sim_types::Method;
 
 /// Every particle, constraint and triangle of a scene; immutable from load to load.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Model {
     pub(crate) particles: Vec<SceneParticle>,
-    /// By index.
     pub(crate) constraints: Vec<Constraint>,
-    /// Constraint by constraint: the group of independent constraints that its shape declares.
+    /// By constraint: the group of independent constraints that its shape declares.
     pub(crate) families: Vec<Option<u32>>,
     /// Sheets that declare families.
     pub(crate) sheets: Vec<Sheet>,
-    /// Limits that stand in place of the scene's.
+    /// Distinct limits that replace the scene's.
     limits: Vec<Limits>,
-    /// Constraint by constraint: its place in `limits`.
-    limits_of: Vec<u32>,
+    /// By constraint: index into `limits`.
+    limit_indices: Vec<u32>,
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// What the softness of the constraints means.
+    /// Meaning of the constraints' softness.
     pub(crate) method: Method,
 }
 
 impl Model {
-    /// Explicit particles first, then those of each generator; constraints alike.
-    pub(crate) fn new(scene: &Scene) -> Self {
-        let method = scene.solver.method;
-        let mut model = Self { particles: scene.particles.clone(), method, ..Self::default() };
-        for constraint in &scene.constraints {
-            let [a, b] = constraint.particles;
-            let compliance = constraint.softness.value();
-            let (rest_length, kind) = (constraint.rest_length, constraint.kind);
-            model.begin_limits(constraint.limits);
-            model.push(Constraint { a, b, rest_length, compliance, kind }, None);
-        }
-        for generator in &scene.generators {
-            generator.build(scene.up, &mut model);
-        }
-        model
+    /// Creates a model with the explicit particles of a scene.
+    pub(crate) fn new(method: Method, particles: Vec<SceneParticle>) -> Self {
+        Self { particles, method, ..Self::default() }
     }
 
-    /// The constraints that follow have these limits of their own.
-    pub(crate) fn begin_limits(&mut self, limits: Limits) {
+    /// Sets the limits of the constraints that are pushed from now on.
+    pub(crate) fn set_limits(&mut self, limits: Limits) {
         if self.limits.last() != Some(&limits) {
             self.limits.push(limits);
         }
     }
 
-    /// The limits of a constraint in place of the scene's.
+    /// Returns the limits of a constraint that replace the scene's.
     pub(crate) fn limits(&self, constraint: u32) -> Limits {
-        self.limits[self.limits_of[constraint as usize] as usize]
+        self.limits[self.limit_indices[constraint as usize] as usize]
     }
 
+    /// Adds an explicit constraint with its own limits.
+    pub(crate) fn push_explicit(&mut self, constraint: &SceneConstraint) {
+        let SceneConstraint { particles: [a, b], rest_length, kind, softness, limits } =
+            *constraint;
+        self.set_limits(limits);
+        self.push(Constraint { a, b, rest_length, compliance: softness.value(), kind }, None);
+    }
+
+    /// Adds a constraint, with the family that its shape declares.
     pub(crate) fn push(&mut self, constraint: Constraint, family: Option<u32>) {
         self.constraints.push(constraint);
         self.families.push(family);
         #[allow(clippy::cast_possible_truncation, reason = "at most one per constraint")]
-        self.limits_of.push(self.limits.len() as u32 - 1);
+        self.limit_indices.push(self.limits.len() as u32 - 1);
     }
 
     #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]
@@ -67,12 +63,13 @@ impl Model {
         self.particles.len() as u32
     }
 
+    /// Returns the particles of a constraint.
     pub(crate) fn pair(&self, constraint: u32) -> [u32; 2] {
         let Constraint { a, b, .. } = self.constraints[constraint as usize];
         [a, b]
     }
 
-    /// The distance of two particles in f32, as a step would measure it.
+    /// Returns the distance between two particles in f32, as a step measures it.
     pub(crate) fn distance(&self, a: u32, b: u32) -> f32 {
         self.distance_squared(a, b).sqrt()
     }

@@ -1,4 +1,4 @@
-//! Anchors and hands: particles that follow a moving frame, and what they pull along.
+//! Anchors: particles that follow a moving frame, and their interplay with pins and grabs.
 
 use sim_solver::{Grip, ParticleFlags, Pose, Reason};
 
@@ -6,8 +6,8 @@ use super::{assert_close, assert_near, bits, position, solver, step, velocity};
 
 const NO_TURN: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// Two particles on a frame that goes 1 m along x in a second, waits, turns by 90 degrees about z
-/// around (0, 1, 0) in the third one.
+/// Two particles on a frame. It moves 1 m along x in the first second, waits, and rotates by 90
+/// degrees about z around (0, 1, 0) in the third.
 const CARRIED: &str = "[solver]\nrate_hz = 100\nsubsteps = 2\n\
      [[particle]]\nposition = [0, 1, 0]\n[[particle]]\nposition = [1, 1, 0]\n\
      [[particle]]\nposition = [0, 0.5, 0]\n[[constraint]]\nparticles = [0, 2]\n\
@@ -25,23 +25,23 @@ fn a_frame_carries_its_particles_along_its_path() {
     for _ in 0..5 {
         step(&mut solver, 10);
     }
-    assert_near("half of the way", 0.5, position(&solver, 0)[0], 1e-6);
+    assert_near("halfway", 0.5, position(&solver, 0)[0], 1e-6);
     assert_close("speed", 1.0, velocity(&solver, 0)[0], 1e-4);
     step(&mut solver, 50);
-    assert_near("whole way", 1.0, position(&solver, 0)[0], 1e-6);
+    assert_near("end of the translation", 1.0, position(&solver, 0)[0], 1e-6);
     step(&mut solver, 100);
     assert_eq!((position(&solver, 1), velocity(&solver, 1)), ([2.0, 1.0, 0.0], [0.0; 3]));
     step(&mut solver, 100);
-    // Turned about its origin, which the translation has carried along.
-    assert_near("x after the turn", 1.0, position(&solver, 1)[0], 1e-5);
-    assert_near("y after the turn", 2.0, position(&solver, 1)[1], 1e-5);
+    // The frame rotates about its origin, which has moved with the translation.
+    assert_near("x after the rotation", 1.0, position(&solver, 1)[0], 1e-5);
+    assert_near("y after the rotation", 2.0, position(&solver, 1)[1], 1e-5);
     step(&mut solver, 300);
-    assert_near("it stands after its path", 2.0, position(&solver, 1)[1], 1e-5);
+    assert_near("the frame stands still after its path", 2.0, position(&solver, 1)[1], 1e-5);
     assert_eq!(velocity(&solver, 1), [0.0; 3]);
 }
 
 #[test]
-fn a_repeated_path_begins_again() {
+fn a_repeated_path_starts_again_when_it_ends() {
     let text = "[solver]\nrate_hz = 100\n[[particle]]\nposition = [0, 0, 0]\n\
          [[anchor]]\nparticles = [0]\nrepeat = true\npath = [{ time = 0 }, { time = 1, translation = [0, 2, 0] },\n\
          { time = 2 }]\n";
@@ -53,7 +53,7 @@ fn a_repeated_path_begins_again() {
 }
 
 #[test]
-fn a_client_moves_a_frame_that_then_stands_and_a_reset_gives_it_back_its_path() {
+fn a_frame_moved_by_a_client_stands_still_until_a_reset_restores_its_path() {
     let mut solver = solver(CARRIED);
     step(&mut solver, 50);
     let pose = Pose { translation: [0.0, 0.5, 0.0], rotation: NO_TURN };
@@ -65,7 +65,7 @@ fn a_client_moves_a_frame_that_then_stands_and_a_reset_gives_it_back_its_path() 
     assert_eq!((position(&solver, 1), velocity(&solver, 1)), ([1.0, 1.5, 0.0], [0.0; 3]));
     solver.reset();
     step(&mut solver, 51);
-    assert_near("on its path again", 0.5, position(&solver, 0)[0], 1e-6);
+    assert_near("back on its path", 0.5, position(&solver, 0)[0], 1e-6);
     assert_eq!(solver.move_anchor(1, pose), Err(Reason::UnknownAnchor));
     let wrong = Pose { rotation: [0.0; 4], ..pose };
     assert_eq!(solver.move_anchor(0, wrong), Err(Reason::OutOfRange));
@@ -74,12 +74,12 @@ fn a_client_moves_a_frame_that_then_stands_and_a_reset_gives_it_back_its_path() 
 }
 
 #[test]
-fn an_anchor_holds_what_the_scene_pins_and_a_client_can_pin_and_grab_it() {
+fn an_anchor_overrides_a_pin_of_the_scene_and_a_client_can_pin_and_grab_its_particles() {
     let text =
         CARRIED.replacen("position = [0, 1, 0]\n", "position = [0, 1, 0]\npinned = true\n", 1);
     let mut solver = solver(&text);
     step(&mut solver, 50);
-    assert_near("it follows", 0.5, position(&solver, 0)[0], 1e-6);
+    assert_near("follows its frame", 0.5, position(&solver, 0)[0], 1e-6);
     solver.pin(0).unwrap();
     let held = solver.particle(0).position;
     step(&mut solver, 20);
@@ -88,14 +88,14 @@ fn an_anchor_holds_what_the_scene_pins_and_a_client_can_pin_and_grab_it() {
     solver.unpin(0).unwrap();
     solver.grab(5, Grip { particle: 0, target: [0.5, 1.2, 0.0], over_s: 0.1 }).unwrap();
     step(&mut solver, 10);
-    assert_near("in the hand", 1.2, position(&solver, 0)[1], 1e-6);
+    assert_near("grabbed", 1.2, position(&solver, 0)[1], 1e-6);
     solver.release(5, 0).unwrap();
     step(&mut solver, 20);
-    assert_near("with its frame again", 1.0, position(&solver, 0)[0], 1e-6);
+    assert_near("back on its frame", 1.0, position(&solver, 0)[0], 1e-6);
 }
 
 #[test]
-fn a_carried_state_goes_on_bit_for_bit_from_a_keyframe() {
+fn a_state_with_anchors_continues_bit_for_bit_from_a_keyframe() {
     let scene = format!(
         "version = 1\n{CARRIED}[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [0.2, 0.2, 0.2]\n\
          velocity = [0.1, 0, 0]\nangular_velocity = [0, 0.3, 1]\n[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 0.3\n"

@@ -1,7 +1,7 @@
-//! Colliders: nothing penetrates them, nothing tunnels, and they move as they are told.
+//! Colliders: particles neither penetrate them nor tunnel through them, and they move as commanded.
 
 use proptest::prelude::*;
-use sim_solver::{ColliderShape, Pose};
+use sim_solver::{ColliderGeometry, Pose};
 
 use super::{
     FLOOR, assert_at_most, assert_close, assert_near, position, rates, solver, step, stepped,
@@ -9,7 +9,7 @@ use super::{
 };
 
 #[test]
-fn what_starts_inside_leaves_with_less_than_g_dt() {
+fn a_particle_that_starts_inside_leaves_with_less_than_g_dt() {
     for substeps in [1, 4, 20] {
         for shape in [
             FLOOR,
@@ -32,7 +32,7 @@ fn what_starts_inside_leaves_with_less_than_g_dt() {
 }
 
 #[test]
-fn nothing_tunnels_through_a_thin_box_a_plane_or_bounds_at_the_highest_speed() {
+fn nothing_tunnels_through_a_thin_box_a_plane_or_bounds_at_max_speed() {
     for shape in [
         "[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1e5, 1e-3, 1e5]\n",
         "[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1e-3, 1e5, 1e5]\nrotation = [0, 0, 1, 1]\n",
@@ -51,7 +51,7 @@ fn nothing_tunnels_through_a_thin_box_a_plane_or_bounds_at_the_highest_speed() {
 }
 
 #[test]
-fn a_fast_moving_box_does_not_pass_over_a_particle() {
+fn a_fast_box_does_not_pass_over_a_particle() {
     let text = "gravity = [0, 0, 0]\n".to_owned()
         + &rates(60, 1)
         + "[[particle]]\nposition = [0, 0, 0]\n[[collider]]\nshape = \"box\"\ncenter = [-10, 0, 0]\n\
@@ -62,7 +62,7 @@ fn a_fast_moving_box_does_not_pass_over_a_particle() {
 }
 
 #[test]
-fn a_box_that_moves_through_a_cloth_carries_it_and_holds_no_particle() {
+fn a_box_that_moves_through_a_cloth_pushes_it_and_contains_no_particle() {
     let text = rates(60, 4)
         + "[[generate]]\nshape = \"cloth\"\ncolumns = 11\nrows = 11\nspacing = 0.2\norigin = [-1, 1, 0]\n\
            diagonals = 1\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, -2]\nhalf_extents = [0.3, 0.4, 0.3]\n\
@@ -74,15 +74,15 @@ fn a_box_that_moves_through_a_cloth_carries_it_and_holds_no_particle() {
         let shape = solver.colliders().next().unwrap().shape;
         for index in 0..solver.particle_count() {
             let depth = depth_in(&shape, position(&solver, index));
-            assert!(depth < 1e-5, "particle {index} is {depth} inside");
+            assert!(depth < 1e-5, "particle {index} is {depth} m inside");
             carried = f64::max(carried, position(&solver, index)[2]);
         }
     }
-    assert!(carried > 0.5, "the box pushes the cloth in front of it: {carried}");
+    assert!(carried > 0.5, "the box pushes the cloth: {carried}");
 }
 
 #[test]
-fn what_lies_on_a_thin_box_is_not_pulled_through_it() {
+fn a_particle_on_a_thin_box_is_not_pulled_through_it() {
     let text = rates(240, 4)
         + "[[particle]]\nposition = [0, 0.3, 0]\n[[particle]]\nposition = [0, -3, 0]\nmass = 100\npinned = true\n\
            [[constraint]]\nparticles = [0, 1]\nrest_length = 0.5\ncompliance = 1e-5\n\
@@ -95,7 +95,7 @@ fn what_lies_on_a_thin_box_is_not_pulled_through_it() {
 }
 
 #[test]
-fn a_box_pushes_out_by_the_nearest_face_with_ties_in_their_order() {
+fn a_box_pushes_particles_out_through_the_nearest_face_with_ties_in_fixed_order() {
     let place = |at: [f64; 3]| {
         let text = "gravity = [0, 0, 0]\n".to_owned()
             + &rates(60, 1)
@@ -112,11 +112,11 @@ fn a_box_pushes_out_by_the_nearest_face_with_ties_in_their_order() {
 }
 
 #[test]
-fn the_very_middle_of_a_ball_has_a_way_out() {
+fn a_particle_at_the_center_of_a_sphere_is_pushed_out() {
     for shape in [
         "[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\n",
         "[[collider]]\nshape = \"capsule\"\na = [-2, 0, 0]\nb = [2, 0, 0]\nradius = 1\n",
-        // So short that its direction is none.
+        // Too short to have a direction in f32.
         "[[collider]]\nshape = \"capsule\"\na = [0, 0, 0]\nb = [0, 1e-25, 0]\nradius = 1\n",
     ] {
         let text = "gravity = [0, 0, 0]\n".to_owned()
@@ -131,7 +131,7 @@ fn the_very_middle_of_a_ball_has_a_way_out() {
 }
 
 #[test]
-fn balls_and_capsules_push_to_their_surface_along_the_shortest_way() {
+fn spheres_and_capsules_push_particles_to_the_nearest_point_of_their_surface() {
     let capsule = "shape = \"capsule\"\na = [-1, 0, 0]\nb = [1, 0, 0]\nradius = 0.5\n";
     let sphere = "shape = \"sphere\"\ncenter = [0, 1, 0]\nradius = 2\n";
     for (solid, at, expected) in [
@@ -155,17 +155,18 @@ fn balls_and_capsules_push_to_their_surface_along_the_shortest_way() {
 }
 
 #[test]
-fn a_collider_goes_and_turns_with_its_own_velocities() {
+fn a_collider_moves_and_rotates_with_its_own_velocities() {
     let text = rates(100, 2)
         + "[[collider]]\nshape = \"box\"\ncenter = [1, 2, 3]\nhalf_extents = [1, 1, 1]\n\
            velocity = [0.5, 0, -1]\nangular_velocity = [0, 0, 2]\n";
     let solver = stepped(&text, 250);
     let placed = solver.colliders().next().unwrap();
-    let ColliderShape::Box { center, rotation, .. } = placed.shape else { panic!("{placed:?}") };
+    let ColliderGeometry::Box { center, rotation, .. } = placed.shape else { panic!("{placed:?}") };
     for (axis, expected) in [2.25, 2.0, 0.5].into_iter().enumerate() {
-        assert_near("centre", expected, f64::from(center[axis]), 1e-5);
+        assert_near("center", expected, f64::from(center[axis]), 1e-5);
     }
-    // Half of the angle of 5 radians; a rotation is the same with all signs changed.
+    // The quaternion has half of the angle of 5 radians. It is the same rotation with all signs
+    // changed.
     let [x, y, z, w] = rotation.map(|part| f64::from(part) * f64::from(rotation[3].signum()));
     let sign = 2.5_f64.cos().signum();
     assert_near("z", 2.5_f64.sin() * sign, z, 1e-6);
@@ -175,7 +176,7 @@ fn a_collider_goes_and_turns_with_its_own_velocities() {
 }
 
 #[test]
-fn bounds_keep_a_box_of_the_pixel_demonstration_inside_in_every_snapshot() {
+fn bounds_keep_the_box_of_the_pixel_demonstration_inside_in_every_snapshot() {
     let text = "dimensions = 2\nup = \"-y\"\nunit = \"px\"\ngravity = [0, 50, 0]\n[solver]\nrate_hz = 60\nsubsteps = 4\n\
          [[particle]]\nposition = [220, 20, 0]\nvelocity = [90, 0, 0]\n[[particle]]\nposition = [280, 20, 0]\n\
          [[particle]]\nposition = [280, 60, 0]\n[[particle]]\nposition = [220, 60, 0]\n\
@@ -197,7 +198,7 @@ fn bounds_keep_a_box_of_the_pixel_demonstration_inside_in_every_snapshot() {
 }
 
 #[test]
-fn a_client_moves_a_collider_with_the_velocity_that_its_way_implies() {
+fn a_collider_moved_by_a_client_has_the_velocity_of_its_displacement() {
     let text = "gravity = [0, 0, 0]\n".to_owned()
         + &rates(100, 4)
         + "[[particle]]\nposition = [0.5, 0, 0]\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [0.4, 1, 1]\n";
@@ -209,10 +210,10 @@ fn a_client_moves_a_collider_with_the_velocity_that_its_way_implies() {
     assert_close("speed of the face", 20.0, velocity(&solver, 0)[0], 1e-4);
     let placed = solver.colliders().next().unwrap();
     assert!(
-        matches!(placed.shape, ColliderShape::Box { center: [x, ..], .. } if (x - 0.2).abs() < 1e-6)
+        matches!(placed.shape, ColliderGeometry::Box { center: [x, ..], .. } if (x - 0.2).abs() < 1e-6)
     );
     assert!(solver.has_moving_colliders());
-    // From then on it stands.
+    // Then it stands still.
     step(&mut solver, 1);
     assert!(!solver.has_moving_colliders());
     assert_eq!(solver.colliders().next().unwrap().velocity, [0.0; 3]);
@@ -243,23 +244,23 @@ proptest! {
                 let at = position(&solver, 0);
                 let depth = depth_in(&solver.colliders().next().unwrap().shape, at);
                 let size = at.iter().fold(1.0_f64, |most, axis| most.max(axis.abs()));
-                prop_assert!(depth < 2e-6 * size, "{at:?} is {depth} inside of {solid}");
+                prop_assert!(depth < 2e-6 * size, "{at:?} is {depth} m inside {solid}");
             }
         }
     }
 }
 
-/// How far a point is inside of a plane or a box, in f64 and by the definition of the shape.
-fn depth_in(shape: &ColliderShape, at: [f64; 3]) -> f64 {
+/// Returns the depth of a point inside a plane or a box, in f64 and by the definition of the shape.
+fn depth_in(shape: &ColliderGeometry, at: [f64; 3]) -> f64 {
     match *shape {
-        ColliderShape::Plane { normal, offset } => {
+        ColliderGeometry::Plane { normal, offset } => {
             let height: f64 = (0..3).map(|axis| f64::from(normal[axis]) * at[axis]).sum();
             f64::from(offset) - height
         }
-        ColliderShape::Box { center, half_extents, rotation } => {
+        ColliderGeometry::Box { center, half_extents, rotation } => {
             let [x, y, z, w] = rotation.map(f64::from);
             let arm: Vec<f64> = (0..3).map(|axis| at[axis] - f64::from(center[axis])).collect();
-            // Columns of the rotation's matrix.
+            // Columns of the rotation matrix.
             let axes = [
                 [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],
                 [2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)],

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::{assert_at_most, assert_close, assert_near, distance, position, solver, step, stepped};
 
-/// Two particles at distance 2 on a stick of length 1, without gravity.
+/// Returns two particles at distance 2 on a stick of length 1, without gravity.
 fn stick(mass_a: f64, mass_b: f64, extra: &str) -> String {
     format!(
         "gravity = [0, 0, 0]\n[solver]\nrate_hz = 60\nsubsteps = 1\n{extra}\n\
@@ -26,7 +26,7 @@ fn a_stick_moves_its_ends_in_proportion_to_their_inverse_masses() {
 }
 
 #[test]
-fn a_pinned_end_stays_bit_for_bit_and_the_other_one_makes_the_whole_way() {
+fn a_pinned_end_stays_bit_for_bit_and_the_other_end_takes_the_whole_correction() {
     let text = "gravity = [0, 0, 0]\n[solver]\nsubsteps = 1\n[[particle]]\nposition = [0.1, 0.2, 0.3]\npinned = true\n\
          [[particle]]\nposition = [2.1, 0.2, 0.3]\n[[constraint]]\nparticles = [0, 1]\nrest_length = 1\n";
     let solver = stepped(text, 1);
@@ -46,7 +46,7 @@ fn two_pinned_ends_and_coincident_ends_change_nothing() {
 }
 
 #[test]
-fn a_stick_of_rest_length_zero_brings_its_ends_together() {
+fn a_stick_of_rest_length_zero_pulls_its_ends_together() {
     let text = "gravity = [0, 0, 0]\n[solver]\nsubsteps = 1\niterations = 3\n[[particle]]\nposition = [0, 0, 0]\n\
          [[particle]]\nposition = [2, 0, 0.7]\n[[constraint]]\nparticles = [0, 1]\nrest_length = 0\n";
     let solver = stepped(text, 3);
@@ -54,7 +54,7 @@ fn a_stick_of_rest_length_zero_brings_its_ends_together() {
 }
 
 #[test]
-fn pbd_leaves_one_minus_stiffness_of_the_error_for_1_to_64_passes() {
+fn pbd_leaves_one_minus_stiffness_of_the_error_with_1_to_64_passes() {
     for stiffness in [0.0, 0.1, 0.3, 0.6, 0.9, 1.0] {
         for iterations in 1..=64 {
             let extra = format!("method = \"pbd\"\niterations = {iterations}");
@@ -66,7 +66,7 @@ fn pbd_leaves_one_minus_stiffness_of_the_error_for_1_to_64_passes() {
     }
 }
 
-/// A mass on a compliant stick, swinging out under strong damping.
+/// Returns a mass on a compliant stick, with strong damping.
 fn hanging_mass(mass: f64, compliance: f64, extra: &str) -> String {
     format!(
         "[solver]\n{extra}\ndamping = 4\n\
@@ -92,8 +92,8 @@ fn a_compliant_stick_settles_at_weight_times_compliance_at_every_rate() {
 }
 
 #[test]
-fn an_undamped_spring_swings_as_implicit_euler_says() {
-    // (1 + w^2 h^2) x' = 2 x - x_previous: one free particle on a pinned compliant stick.
+fn an_undamped_spring_oscillates_as_in_implicit_euler() {
+    // A free particle on a compliant stick with a pinned end: (1 + w^2 h^2) x' = 2 x - x_previous.
     let text = "gravity = [0, 0, 0]\n[solver]\nrate_hz = 60\nsubsteps = 1\n\
          [[particle]]\nposition = [0, 0, 0]\npinned = true\n[[particle]]\nposition = [1.5, 0, 0]\n\
          [[constraint]]\nparticles = [0, 1]\nrest_length = 1\ncompliance = 0.001\n";
@@ -104,7 +104,7 @@ fn an_undamped_spring_swings_as_implicit_euler_says() {
         solver.step();
         (previous, x) = (x, (2.0 * x - previous) / (1.0 + w2h2));
         let found = position(&solver, 1)[0] - 1.0;
-        assert_near(&format!("swing, step {step}"), x, found, 1e-5);
+        assert_near(&format!("position, step {step}"), x, found, 1e-5);
     }
 }
 
@@ -122,8 +122,8 @@ fn a_tether_pulls_but_never_pushes() {
 }
 
 #[test]
-fn relaxation_makes_its_share_of_each_correction() {
-    // One pass of a rigid stick leaves 1 - w of the error, in both methods.
+fn a_pass_applies_the_relaxation_factor_to_each_correction() {
+    // One pass over a rigid stick leaves 1 - w of the error, with both methods.
     for method in ["xpbd", "pbd"] {
         for relaxation in [0.25, 0.5, 1.0, 1.5, 1.9] {
             let extra = format!("method = \"{method}\"\nrelaxation = {relaxation}");
@@ -134,8 +134,8 @@ fn relaxation_makes_its_share_of_each_correction() {
 }
 
 #[test]
-fn with_many_passes_over_relaxation_converges_faster() {
-    // A chain of 20 links, pulled out to half again its length, in one substep of many passes.
+fn over_relaxation_converges_faster_with_many_passes() {
+    // A chain of 20 links, stretched to 1.5 times its length, in one substep of many passes.
     let residual = |relaxation: f64, passes: u32| {
         let text = format!(
             "gravity = [0, 0, 0]\n[solver]\nrate_hz = 60\nsubsteps = 1\niterations = {passes}\n\
@@ -156,7 +156,7 @@ fn with_many_passes_over_relaxation_converges_faster() {
     assert_at_most("w 1.95 converges", residual(1.95, 16), residual(1.95, 1000));
 }
 
-/// A rope of `count` moving particles that hangs straight down from a pinned one.
+/// Returns a rope of `count` free particles that hangs straight down from a pinned one.
 fn hanging_rope(count: u32, settings: &str) -> String {
     format!(
         "[solver]\n{settings}\n[[generate]]\nshape = \"rope\"\ncount = {}\nfrom = [0, 0, 0]\n\
@@ -168,7 +168,7 @@ fn hanging_rope(count: u32, settings: &str) -> String {
 
 #[test]
 fn a_plain_rope_stretches_by_g_h2_n2_over_2_p() {
-    // Settled, in any order of projection; the law is exact to O(1/N).
+    // At rest, in any order of projection. The law is exact to O(1/N).
     for (substeps, passes) in [(20, 1), (10, 2), (5, 4)] {
         let settings =
             format!("rate_hz = 60\nsubsteps = {substeps}\niterations = {passes}\ndamping = 2");
@@ -193,7 +193,7 @@ fn a_hanging_chain_is_the_discrete_catenary() {
         let middle = f64::midpoint(low, high);
         if span_of(middle) < span { low = middle } else { high = middle }
     }
-    // Let down from a tent of two straight halves.
+    // The chain starts as a tent with two straight sides.
     let half: f64 = 0.5;
     let rise = (half * half - (span / 2.0) * (span / 2.0)).sqrt();
     let mut text = "[solver]\nrate_hz = 240\nsubsteps = 20\ndamping = 3\n".to_owned();
@@ -225,8 +225,8 @@ fn a_hanging_chain_is_the_discrete_catenary() {
 }
 
 #[test]
-fn a_limit_of_stretch_holds_from_the_first_step() {
-    // A soft spring that would stretch by 0.49 m at rest, under 1.1 times its length.
+fn max_stretch_holds_from_the_first_step() {
+    // A soft spring that would stretch by 0.49 m at rest is limited to 1.1 times its length.
     let text = "[solver]\nrate_hz = 60\nsubsteps = 4\nmax_stretch = 1.1\n\
          [[particle]]\nposition = [0, 0, 0]\npinned = true\n[[particle]]\nposition = [0, -1, 0]\n\
          [[constraint]]\nparticles = [0, 1]\ncompliance = 0.05\n";
@@ -239,7 +239,7 @@ fn a_limit_of_stretch_holds_from_the_first_step() {
 }
 
 #[test]
-fn a_constraint_can_lift_the_limit_of_the_scene() {
+fn a_constraint_can_turn_off_the_limit_of_the_scene() {
     let text = "[solver]\nrate_hz = 60\nsubsteps = 4\ndamping = 3\nmax_stretch = 1.1\n\
          [[particle]]\nposition = [0, 0, 0]\npinned = true\n[[particle]]\nposition = [0, -1, 0]\n\
          [[constraint]]\nparticles = [0, 1]\ncompliance = 0.05\nmax_stretch = inf\n";
@@ -247,8 +247,8 @@ fn a_constraint_can_lift_the_limit_of_the_scene() {
 }
 
 #[test]
-fn a_limit_of_stretch_is_consistent_with_the_velocity() {
-    // The limit takes away the speed along the stick that would exceed it: no spring back.
+fn max_stretch_is_consistent_with_the_velocity() {
+    // The limit removes the speed along the stick that would exceed it, without a rebound.
     let text = "gravity = [0, 0, 0]\n[solver]\nrate_hz = 60\nsubsteps = 1\nmax_stretch = 1.1\nmethod = \"pbd\"\n\
          [[particle]]\nposition = [0, 0, 0]\npinned = true\n\
          [[particle]]\nposition = [1, 0, 0]\nvelocity = [60, 0, 0]\n\
@@ -256,7 +256,7 @@ fn a_limit_of_stretch_is_consistent_with_the_velocity() {
     let mut solver = solver(text);
     step(&mut solver, 1);
     assert_near("position", 1.1, position(&solver, 1)[0], 1e-6);
-    assert_near("speed = way / h", 6.0, super::velocity(&solver, 1)[0], 1e-4);
+    assert_near("speed = displacement / h", 6.0, super::velocity(&solver, 1)[0], 1e-4);
     step(&mut solver, 1);
     assert_near("position", 1.1, position(&solver, 1)[0], 1e-6);
     assert_near("speed", 0.0, super::velocity(&solver, 1)[0], 1e-4);

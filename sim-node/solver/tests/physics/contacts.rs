@@ -1,4 +1,4 @@
-//! What a contact does to a velocity: bounces, friction, moving surfaces, corners.
+//! Velocities after contacts: bounces, friction, moving surfaces, corners.
 
 use proptest::prelude::*;
 use sim_solver::{Pose, Solver};
@@ -8,7 +8,7 @@ use super::{
     velocity,
 };
 
-/// Steps until a condition holds.
+/// Steps the solver until a condition holds.
 fn step_until(solver: &mut Solver, condition: impl Fn(&Solver) -> bool) {
     for _ in 0..10_000 {
         if condition(solver) {
@@ -19,7 +19,7 @@ fn step_until(solver: &mut Solver, condition: impl Fn(&Solver) -> bool) {
     panic!("10,000 steps, and it has not come");
 }
 
-/// The highest point between the next two contacts with the floor.
+/// Returns the highest point between the next two contacts with the floor.
 fn next_apex(solver: &mut Solver) -> f64 {
     step_until(solver, |solver| velocity(solver, 0)[1] > 0.0);
     let mut apex = position(solver, 0)[1];
@@ -33,7 +33,7 @@ fn next_apex(solver: &mut Solver) -> f64 {
     apex
 }
 
-/// A particle on a plane inclined by `angle`, without speed, on the surface.
+/// Returns a particle at rest on a plane inclined by `angle`.
 fn slope(angle: f64, friction: f64, substeps: u32) -> String {
     rates(60, substeps)
         + "[[particle]]\nposition = [0, 0, 0]\n"
@@ -45,7 +45,7 @@ fn slope(angle: f64, friction: f64, substeps: u32) -> String {
 }
 
 #[test]
-fn bounces_reach_e_to_the_2n_of_the_height_alike_at_60_and_61_hz() {
+fn the_nth_bounce_reaches_e_to_the_2n_of_the_height_at_60_and_61_hz() {
     for restitution in [0.3, 0.5, 0.8] {
         for rate in [60, 61] {
             let text = rates(rate, 20)
@@ -57,7 +57,7 @@ fn bounces_reach_e_to_the_2n_of_the_height_alike_at_60_and_61_hz() {
             for bounce in 1..=3 {
                 expected *= restitution * restitution;
                 if expected < 0.02 {
-                    // So low that a snapshot at 60 Hz no longer sees the apex.
+                    // The bounce is too short for a snapshot at 60 Hz to show its apex.
                     break;
                 }
                 let what = format!("bounce {bounce}, e {restitution}, {rate} Hz");
@@ -85,11 +85,11 @@ fn a_particle_on_the_floor_comes_to_rest_after_its_bounces() {
 }
 
 #[test]
-fn an_approach_of_up_to_twice_g_h_ends_at_rest_and_a_faster_one_bounces() {
+fn an_approach_of_up_to_2_g_h_ends_at_rest_and_a_faster_one_bounces() {
     for substeps in [1, 4] {
         let h = 1.0 / 60.0 / f64::from(substeps);
         for (share, bounces) in [(0.995, false), (1.005, true)] {
-            // Predicted: its own speed, and what gravity adds in a substep.
+            // The predicted speed: the particle's own, plus the gain by gravity in a substep.
             let speed = share * 9.81 * h;
             let text = rates(60 * substeps, 1)
                 + &format!("[[particle]]\nposition = [0, 0, 0]\nvelocity = [0, {}, 0]\n", -speed)
@@ -102,7 +102,7 @@ fn an_approach_of_up_to_twice_g_h_ends_at_rest_and_a_faster_one_bounces() {
 }
 
 #[test]
-fn a_slope_holds_below_the_angle_of_friction() {
+fn a_particle_rests_on_a_slope_below_the_angle_of_friction() {
     for substeps in [1, 4, 20] {
         for (friction, share) in [(0.3_f64, 0.95), (0.5, 0.95), (1.0, 0.9)] {
             let angle = friction.atan() * share;
@@ -122,8 +122,8 @@ fn a_slope_holds_below_the_angle_of_friction() {
 }
 
 #[test]
-fn a_slope_lets_go_above_the_angle_of_friction() {
-    // s = g (sin - mu cos) t^2 / 2, and in m substeps as in a free fall.
+fn a_particle_slides_down_a_slope_above_the_angle_of_friction() {
+    // s = g (sin - mu cos) t^2 / 2, with the same sum over m substeps as in free fall.
     for substeps in [1, 4, 20] {
         for (friction, share) in [(0.3_f64, 1.3), (0.5, 1.5), (0.0, 0.0)] {
             let angle = if friction == 0.0 { 0.3 } else { friction.atan() * share };
@@ -146,7 +146,7 @@ fn a_slope_lets_go_above_the_angle_of_friction() {
 
 #[test]
 fn friction_is_the_same_far_from_the_origin_and_in_many_substeps() {
-    // A slope of 30 degrees and friction 0.5: g (sin - mu cos), from the 1st to the 2nd second.
+    // A slope of 30 degrees with friction 0.5: g (sin - mu cos), from the 1st to the 2nd second.
     let angle = std::f64::consts::FRAC_PI_6;
     let expected = 9.81 * (angle.sin() - 0.5 * angle.cos());
     for along in [0.0, 10.0, 30.0] {
@@ -175,12 +175,12 @@ fn friction_stops_a_slide_after_v2_over_2_mu_g() {
         + FLOOR
         + "friction = 0.4\n";
     let solver = stepped(&text, 480);
-    assert_close("way", 4.0 / (2.0 * 0.4 * 9.81), position(&solver, 0)[0], 0.03);
+    assert_close("distance", 4.0 / (2.0 * 0.4 * 9.81), position(&solver, 0)[0], 0.03);
     assert_near("speed", 0.0, velocity(&solver, 0)[0], 1e-6);
 }
 
 #[test]
-fn a_moving_floor_carries_what_lies_on_it_and_lifts_it() {
+fn a_moving_floor_carries_and_lifts_the_particles_on_it() {
     let text = rates(240, 4)
         + "[[particle]]\nposition = [0, 0, 0]\n"
         + FLOOR
@@ -192,8 +192,8 @@ fn a_moving_floor_carries_what_lies_on_it_and_lifts_it() {
 }
 
 #[test]
-fn a_bat_adds_its_own_speed_to_the_bounce() {
-    // A wall at 3 m/s meets a particle at rest: e = 1 sends it off with 6 m/s.
+fn a_moving_wall_adds_its_own_speed_to_the_bounce() {
+    // A wall at 3 m/s hits a particle at rest. With e = 1 the particle leaves at 6 m/s.
     let text = "gravity = [0, 0, 0]\n".to_owned()
         + &rates(240, 4)
         + "[[particle]]\nposition = [0.1, 0, 0]\n[[collider]]\nshape = \"plane\"\nnormal = [1, 0, 0]\noffset = 0\n\
@@ -202,8 +202,8 @@ fn a_bat_adds_its_own_speed_to_the_bounce() {
 }
 
 #[test]
-fn a_turning_box_drags_its_surface_along() {
-    // On the top of a box that turns about y, friction gives the speed omega r of that place.
+fn a_rotating_box_carries_particles_along_by_friction() {
+    // On top of a box that rotates about y, friction gives a particle the local speed omega r.
     let text = rates(240, 4)
         + "[[particle]]\nposition = [0.5, 0.2, 0]\n[[collider]]\nshape = \"box\"\ncenter = [0, 0, 0]\n\
            half_extents = [2, 0.2, 2]\nfriction = 1\nangular_velocity = [0, 0.8, 0]\n";
@@ -214,8 +214,8 @@ fn a_turning_box_drags_its_surface_along() {
 }
 
 #[test]
-fn a_plane_that_turns_leaves_in_place_what_lies_on_its_own_point() {
-    // The point of a plane that turns is the one nearest to the origin, carried along by its moves.
+fn a_rotating_plane_leaves_a_particle_at_its_pivot_in_place() {
+    // A plane rotates about its point nearest to the origin, which moves with it.
     for (offset, sideways) in [(0.0, 10.0), (5.0, 0.0), (2.0, -3.0)] {
         let text = "gravity = [0, 0, 0]\n".to_owned()
             + &rates(240, 4)
@@ -237,7 +237,7 @@ fn a_plane_that_turns_leaves_in_place_what_lies_on_its_own_point() {
 }
 
 #[test]
-fn a_bounce_on_the_floor_is_no_slide_along_the_wall() {
+fn a_bounce_on_the_floor_causes_no_friction_on_the_wall() {
     let text = rates(240, 1)
         + "[[particle]]\nposition = [0.004, 0.004, 0]\nvelocity = [-5, -5, 0]\n"
         + FLOOR

@@ -1,10 +1,10 @@
-//! Cuts and pushes: exactly what they are meant to reach.
+//! The reach and the effect of cuts and pushes.
 
 use sim_solver::{Ball, Push, Reason, Solver, Sweep, TearCause};
 
 use super::{assert_near, bits, position, solver, step, velocity};
 
-/// A net of 5 x 4 particles, 1 m apart, in the plane of x and y: (c, r) at (c, -r, 0).
+/// A net of 5 x 4 particles, 1 m apart, in the xy plane. Particle (c, r) is at (c, -r, 0).
 const NET: &str = "gravity = [0, 0, 0]\n[solver]\nrate_hz = 100\nsubsteps = 1\n[[generate]]\nshape = \"cloth\"\n\
      columns = 5\nrows = 4\nspacing = 1\nlinks = [\"structural\"]\npinned = \"none\"\n";
 
@@ -12,7 +12,7 @@ fn ball(center: [f32; 3], radius: f32) -> Ball {
     Ball { center, radius }
 }
 
-/// The two particles of each torn constraint.
+/// Returns the two particles of each torn constraint.
 fn torn_pairs(solver: &Solver) -> Vec<[u32; 2]> {
     let all: Vec<_> = solver.constraints().map(|one| [one.a, one.b]).collect();
     solver.torn().iter().map(|index| all[*index as usize]).collect()
@@ -29,15 +29,15 @@ fn a_cut_tears_one_constraint_before_the_step() {
 }
 
 #[test]
-fn a_cut_in_a_radius_tears_what_has_an_end_strictly_within_it() {
+fn a_cut_with_a_radius_tears_constraints_with_an_end_strictly_inside() {
     let mut solver = solver(NET);
-    // Particle 6 is (1, -1); its neighbours are exactly 1 away, and not within.
+    // Particle 6 is at (1, -1). Its neighbours are exactly 1 m away, and thus not inside.
     solver.cut_radius(ball([1.0, -1.0, 0.0], 1.0)).unwrap();
     step(&mut solver, 1);
     let mut pairs = torn_pairs(&solver);
     pairs.sort_unstable();
     assert_eq!(pairs, [[1, 6], [5, 6], [6, 7], [6, 11]]);
-    // Again: what is torn is torn; nothing new.
+    // The same cut again tears nothing new.
     solver.cut_radius(ball([1.0, -1.0, 0.0], 1.0)).unwrap();
     solver.cut_radius(ball([1.0, -1.0, 0.0], 0.0)).unwrap();
     step(&mut solver, 1);
@@ -45,9 +45,9 @@ fn a_cut_in_a_radius_tears_what_has_an_end_strictly_within_it() {
 }
 
 #[test]
-fn a_sweep_tears_what_crosses_it_seen_along_its_direction() {
+fn a_sweep_tears_constraints_that_cross_it_in_its_view_direction() {
     let mut solver = solver(NET);
-    // Between the first and the second row, over columns 1 to 3, from far in front of the net.
+    // Between the first and the second row, across columns 1 to 3, seen from far in front.
     let sweep =
         Sweep { from: [0.5, -0.5, 30.0], to: [3.5, -0.5, 30.0], direction: [0.0, 0.0, -2.0] };
     solver.cut_segment(sweep).unwrap();
@@ -56,7 +56,7 @@ fn a_sweep_tears_what_crosses_it_seen_along_its_direction() {
 }
 
 #[test]
-fn a_sweep_in_the_plane_cuts_as_seen_from_above_it() {
+fn a_sweep_in_the_plane_of_the_net_cuts_in_its_view_direction() {
     let text = NET.replace("gravity", "dimensions = 2\ngravity");
     let mut solver = solver(&text);
     let (from, to, direction) = ([0.2, 0.3, 0.0], [0.8, -1.4, 0.0], [0.0, 0.0, 1.0]);
@@ -68,7 +68,7 @@ fn a_sweep_in_the_plane_cuts_as_seen_from_above_it() {
 }
 
 #[test]
-fn a_sweep_that_covers_nothing_cuts_nothing_and_one_without_direction_is_refused() {
+fn a_sweep_without_area_cuts_nothing_and_a_sweep_without_direction_is_refused() {
     let mut solver = solver(NET);
     let at = [0.5, 0.0, 0.0];
     let sweep = |to: [f32; 3], direction: [f32; 3]| Sweep { from: at, to, direction };
@@ -82,10 +82,10 @@ fn a_sweep_that_covers_nothing_cuts_nothing_and_one_without_direction_is_refused
 }
 
 #[test]
-fn a_push_gives_what_is_strictly_within_its_ball_the_clamped_velocity_of_the_brush() {
+fn a_push_gives_particles_strictly_inside_its_sphere_the_clamped_velocity_of_the_brush() {
     let mut solver = solver(NET);
     solver.pin(0).unwrap();
-    // Reaches (0, 0), which is pinned, (1, 0) and (0, -1); (1, -1) is sqrt(2) away.
+    // The push reaches (1, 0), (0, -1) and the pinned (0, 0). (1, -1) is sqrt(2) away.
     let push = Push { ball: ball([0.0; 3], 1.25), delta: [0.03, -0.5, 0.01], limit: Some(0.1) };
     solver.push(push).unwrap();
     for (index, expected) in
@@ -100,7 +100,7 @@ fn a_push_gives_what_is_strictly_within_its_ball_the_clamped_velocity_of_the_bru
 }
 
 #[test]
-fn the_step_after_a_push_goes_as_far_as_the_brush() {
+fn a_pushed_particle_moves_as_far_as_the_brush_in_the_next_step() {
     let mut solver = solver(
         "gravity = [0, 0, 0]\n[solver]\nrate_hz = 240\nsubsteps = 4\n[[particle]]\nposition = [0, 0, 0]\n",
     );
@@ -108,7 +108,7 @@ fn the_step_after_a_push_goes_as_far_as_the_brush() {
     solver.push(push).unwrap();
     step(&mut solver, 1);
     for (axis, expected) in [0.02, -10.0, 10.0].into_iter().enumerate() {
-        assert_near("way in one step", expected, position(&solver, 0)[axis], 1e-4);
+        assert_near("distance in one step", expected, position(&solver, 0)[axis], 1e-4);
     }
     solver
         .push(Push { limit: None, delta: [0.5, 0.0, 0.0], ball: ball([0.0, -10.0, 10.0], 1.0) })

@@ -1,6 +1,5 @@
-//! The physics against closed forms and invariants: what gravity, a stick, a spring, a slope or a
-//! threshold must do is known without running anything. Each comparison prints what was expected,
-//! what was found and the tolerance.
+//! The physics against closed forms and invariants, which are known without running the solver. Each
+//! comparison prints the expected value, the actual value and the tolerance.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stdout, reason = "the numbers of a comparison, for whoever asks for them")]
 
@@ -19,15 +18,15 @@ mod wind;
 
 use sim_solver::{Particle, Scene, Solver};
 
-/// A floor at y = 0; keys of it can follow.
+/// A floor at y = 0. More of its keys can follow.
 const FLOOR: &str = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n";
 
-/// The head of a scene's settings.
+/// Returns the start of a `[solver]` table. More of its keys can follow.
 fn rates(rate_hz: u32, substeps: u32) -> String {
     format!("[solver]\nrate_hz = {rate_hz}\nsubsteps = {substeps}\n")
 }
 
-/// The solver of a scene without its first line.
+/// Returns the solver of a scene. `text` lacks only the line with the version.
 fn solver(text: &str) -> Solver {
     Solver::new(&Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap())
 }
@@ -44,25 +43,25 @@ fn stepped(text: &str, steps: u32) -> Solver {
     solver
 }
 
-/// A number against its closed form, within an absolute tolerance.
+/// Asserts that a number agrees with its closed form within an absolute tolerance.
 #[track_caller]
-fn assert_near(what: &str, expected: f64, found: f64, tolerance: f64) {
-    println!("{what}: expected {expected}, found {found}, tolerance {tolerance}");
-    let error = (found - expected).abs();
-    assert!(error <= tolerance, "{what}: expected {expected}, found {found}, off by {error}");
+fn assert_near(name: &str, expected: f64, actual: f64, tolerance: f64) {
+    println!("{name}: expected {expected}, got {actual}, tolerance {tolerance}");
+    let error = (actual - expected).abs();
+    assert!(error <= tolerance, "{name}: expected {expected}, got {actual}, off by {error}");
 }
 
-/// A number against its closed form, within a share of it.
+/// Asserts that a number agrees with its closed form within a fraction of it.
 #[track_caller]
-fn assert_close(what: &str, expected: f64, found: f64, share: f64) {
-    assert_near(what, expected, found, share * expected.abs());
+fn assert_close(name: &str, expected: f64, actual: f64, fraction: f64) {
+    assert_near(name, expected, actual, fraction * expected.abs());
 }
 
-/// A number that must not exceed another one.
+/// Asserts that a number does not exceed a limit.
 #[track_caller]
-fn assert_at_most(what: &str, most: f64, found: f64) {
-    println!("{what}: at most {most}, found {found}");
-    assert!(found <= most, "{what}: found {found}, more than {most}");
+fn assert_at_most(name: &str, max: f64, actual: f64) {
+    println!("{name}: at most {max}, got {actual}");
+    assert!(actual <= max, "{name}: got {actual}, more than {max}");
 }
 
 fn position(solver: &Solver, index: usize) -> [f64; 3] {
@@ -82,7 +81,7 @@ fn particles(solver: &Solver) -> impl Iterator<Item = Particle> + '_ {
     (0..solver.particle_count()).map(|index| solver.particle(index))
 }
 
-/// Every bit of the published state.
+/// Returns every bit of the published state.
 fn bits(solver: &Solver) -> Vec<u8> {
     bytemuck::cast_slice(&particles(solver).collect::<Vec<_>>()).to_vec()
 }

@@ -1,4 +1,4 @@
-//! Motion of free particles and of the whole: gravity, damping, momentum, energy, pendulums.
+//! Motion of free particles and of systems: gravity, damping, momentum, energy, pendulums.
 
 use proptest::prelude::*;
 use sim_solver::{Particle, Solver};
@@ -47,10 +47,10 @@ fn free_fall_is_exact_a_kilometre_from_the_origin_in_tiny_substeps() {
 
 #[test]
 fn free_fall_to_the_ground_is_exact_from_any_height_in_any_number_of_substeps() {
-    // -g h^2 m (m + 1) / 2 after m substeps. Positions without a velocity lose gravity where h^2 g
-    // is below their resolution: at 10 m, in 256 substeps, a particle would hang in the air. With
-    // one, what positions round away evens out, but for 11 mm at 1 km and 256 substeps:
-    // (resolution / h)^2 / (8 g).
+    // -g h^2 m (m + 1) / 2 after m substeps. A state of positions alone loses gravity where h^2 g is
+    // below their resolution: at 10 m with 256 substeps, a particle would hang in the air. With a
+    // velocity, the rounding of positions averages out, except for (resolution / h)^2 / (8 g), which
+    // is 11 mm at 1 km with 256 substeps.
     for (height, frames) in [(0.3, 15), (10.0, 86), (100.0, 271), (1000.0, 857)] {
         for substeps in [1, 4, 16, 64, 256] {
             let head = rates(60, substeps);
@@ -64,19 +64,19 @@ fn free_fall_to_the_ground_is_exact_from_any_height_in_any_number_of_substeps() 
 }
 
 #[test]
-fn without_forces_a_particle_goes_straight_on() {
+fn a_particle_without_forces_moves_in_a_straight_line() {
     let text = "gravity = [0, 0, 0]\n[solver]\nrate_hz = 60\nsubsteps = 1\n\
          [[particle]]\nposition = [0, 0, 0]\nvelocity = [3, -1, 0.5]\n";
     let solver = stepped(text, 600);
     for (axis, speed) in [3.0, -1.0, 0.5].into_iter().enumerate() {
-        assert_close("way", 10.0 * speed, position(&solver, 0)[axis], 1e-5);
+        assert_close("distance", 10.0 * speed, position(&solver, 0)[axis], 1e-5);
         assert_close("speed", speed, velocity(&solver, 0)[axis], 1e-5);
     }
 }
 
 #[test]
-fn steps_of_a_second_give_the_table_of_semi_implicit_euler() {
-    // 0, 10, 30, 60, ... 550 m and 10 n m/s: exact in f32, as all of them are whole numbers.
+fn steps_of_one_second_match_the_table_of_semi_implicit_euler() {
+    // 0, 10, 30, 60, ... 550 m and 10 n m/s. All are whole numbers and thus exact in f32.
     let mut solver = solver(
         "gravity = [10, 0, 0]\n[solver]\nrate_hz = 1\nsubsteps = 1\n[[particle]]\nposition = [0, 0, 0]\n",
     );
@@ -89,7 +89,7 @@ fn steps_of_a_second_give_the_table_of_semi_implicit_euler() {
 }
 
 #[test]
-fn steps_of_a_hundredth_are_right_after_a_thousand_seconds() {
+fn steps_of_a_hundredth_of_a_second_are_accurate_after_a_thousand_seconds() {
     // a h^2 m (m + 1) / 2: 500.5 m at 10 s, 5,000,050 m at 1,000 s, where f32 resolves half a
     // metre.
     let mut solver = solver(
@@ -105,8 +105,8 @@ fn steps_of_a_hundredth_are_right_after_a_thousand_seconds() {
 }
 
 #[test]
-fn damping_takes_away_its_share_of_the_speed_in_each_substep() {
-    // v = v0 (1 - c h)^m; the half-life at high rates is ln 2 / c.
+fn damping_removes_a_fixed_fraction_of_the_speed_in_each_substep() {
+    // v = v0 (1 - c h)^m. The half-life at high rates is ln 2 / c.
     for (rate, substeps, damping) in [(60, 1, 0.3), (60, 20, 0.3), (240, 4, 5.0)] {
         let text = format!(
             "gravity = [0, 0, 0]\n[solver]\nrate_hz = {rate}\nsubsteps = {substeps}\ndamping = {damping}\n\
@@ -120,7 +120,7 @@ fn damping_takes_away_its_share_of_the_speed_in_each_substep() {
 }
 
 #[test]
-fn a_push_of_nothing_stops_what_it_touches() {
+fn a_push_with_zero_velocity_stops_particles_in_its_reach() {
     let mut solver =
         solver("gravity = [0, 0, 0]\n[[particle]]\nposition = [0, 0, 0]\nvelocity = [3, 2, 1]\n");
     step(&mut solver, 5);
@@ -132,7 +132,7 @@ fn a_push_of_nothing_stops_what_it_touches() {
 }
 
 #[test]
-fn damping_ends_at_gravity_over_damping_at_every_rate() {
+fn the_terminal_speed_is_gravity_over_damping_at_every_rate() {
     for rate in [60, 480] {
         let text = format!(
             "[solver]\nrate_hz = {rate}\nsubsteps = 1\ndamping = 2.0\n[[particle]]\nposition = [0, 0, 0]\n"
@@ -141,7 +141,12 @@ fn damping_ends_at_gravity_over_damping_at_every_rate() {
         assert_close("terminal speed", -9.81 / 2.0, velocity(&solver, 0)[1], 1e-4);
         let before = position(&solver, 0)[1];
         step(&mut solver, rate);
-        assert_close("terminal way in 1 s", -9.81 / 2.0, position(&solver, 0)[1] - before, 1e-4);
+        assert_close(
+            "terminal distance in 1 s",
+            -9.81 / 2.0,
+            position(&solver, 0)[1] - before,
+            1e-4,
+        );
     }
 }
 
@@ -153,7 +158,7 @@ fn speed_is_limited_to_max_speed() {
 }
 
 #[test]
-fn gravity_is_what_the_scene_says_in_its_unit_and_direction() {
+fn gravity_has_the_magnitude_and_direction_of_the_scene() {
     for gravity in [[0.0, 981.0, 0.0], [0.0, 0.0, -1.62], [3.0, -4.0, 5.0]] {
         let text = format!(
             "gravity = {gravity:?}\n[solver]\nrate_hz = 100\nsubsteps = 1\n[[particle]]\nposition = [0, 0, 0]\n"
@@ -179,7 +184,7 @@ fn a_box_of_the_pixel_demonstration_falls_340_pixels_in_3_69_seconds() {
     assert_near("seconds", (2.0 * 340.0 / 50.0_f64).sqrt(), f64::from(steps) / 1000.0, 2e-3);
 }
 
-/// A pendulum of length 1 m let go at an angle from the vertical, without damping.
+/// Returns a pendulum of 1 m, released at an angle from the vertical, without damping.
 fn pendulum(angle: f64, rate: u32, substeps: u32) -> Solver {
     solver(&format!(
         "[solver]\nrate_hz = {rate}\nsubsteps = {substeps}\n[[particle]]\nposition = [0, 0, 0]\npinned = true\n\
@@ -189,7 +194,7 @@ fn pendulum(angle: f64, rate: u32, substeps: u32) -> Solver {
     ))
 }
 
-/// Period of a pendulum by the elliptic integral: 2 pi sqrt(L/g) / agm(1, cos(angle / 2)).
+/// Returns the period of a pendulum by the elliptic integral: 2 pi sqrt(L/g) / agm(1, cos(angle / 2)).
 fn period(angle: f64) -> f64 {
     let (mut a, mut b) = (1.0, (angle / 2.0).cos());
     for _ in 0..20 {
@@ -198,7 +203,7 @@ fn period(angle: f64) -> f64 {
     std::f64::consts::TAU / 9.81_f64.sqrt() / a
 }
 
-/// Seconds from the first to the second crossing of the vertical in the same direction.
+/// Returns the seconds from the first to the second crossing of the vertical in the same direction.
 fn measured_period(solver: &mut Solver, rate: u32) -> f64 {
     let mut crossings = Vec::new();
     let mut before = position(solver, 1)[0];
@@ -217,7 +222,7 @@ fn measured_period(solver: &mut Solver, rate: u32) -> f64 {
 }
 
 #[test]
-fn the_period_of_a_pendulum_is_the_elliptic_integral() {
+fn the_period_of_a_pendulum_agrees_with_the_elliptic_integral() {
     assert_near("agm, angle 0.1", 2.007_321, period(0.1), 1e-6);
     assert_near("agm, angle 1", 2.139_138, period(1.0), 1e-6);
     for (angle, substeps, share) in
@@ -245,7 +250,7 @@ fn an_undamped_pendulum_never_gains_energy() {
         for _ in 0..60 * 60 {
             step(&mut solver, 1);
             let found = energy(&solver);
-            assert!(found <= start + 1e-3 * 9.81, "60 x {substeps}: {found}, began with {start}");
+            assert!(found <= start + 1e-3 * 9.81, "60 x {substeps}: {found}, started with {start}");
         }
         assert_at_most("energy after a minute", start + 1e-3 * 9.81, energy(&solver));
         assert_near("length", 1.0, distance(&solver, 0, 1), 1e-3);
@@ -265,7 +270,7 @@ fn two_dimensions_keep_z_at_plus_zero_bit_for_bit() {
 
 #[test]
 fn a_stiff_cloth_in_grouped_order_gains_no_energy() {
-    // A sheet let go from the horizontal; the same in listed order blows up.
+    // A sheet released from the horizontal. In listed order it blows up.
     let text = "[solver]\nrate_hz = 60\nsubsteps = 8\n[[generate]]\nshape = \"cloth\"\ncolumns = 40\nrows = 40\n\
          spacing = 0.05\ndown = [0, 0, 1]\n";
     let mut solver = solver(text);
@@ -279,7 +284,7 @@ fn a_stiff_cloth_in_grouped_order_gains_no_energy() {
     let start = energy(&solver);
     for _ in 0..600 {
         solver.step();
-        // 1e-3 m g L of each of the 1600 particles, L = 2 m.
+        // 1e-3 m g L for each of the 1600 particles, with L = 2 m.
         assert!(energy(&solver) <= start + 1600.0 * 1e-3 * 9.81 * 2.0);
     }
 }
@@ -299,7 +304,7 @@ proptest! {
             text += &format!("[[constraint]]\nparticles = [{a}, {b}]\nrest_length = {rest}\n");
         }
         let solver = stepped(&text, 3);
-        // Speeds reach 1e3 m/s in a substep of 1/960 s; 1e-6 of m v is rounding.
+        // Speeds reach 1e3 m/s in a substep of 1/960 s. A millionth of m v is rounding.
         for axis in momentum(&solver) {
             prop_assert!(axis.abs() < 0.05, "momentum {axis}");
         }

@@ -1,4 +1,4 @@
-//! Parameters that change while a scene runs: without a jump, and refused where they are wrong.
+//! Parameters that change while a scene runs: they cause no jump, and wrong values are refused.
 
 use sim_solver::{ConstraintKind, PARAMETERS, ParameterValue, Reason, Solver};
 
@@ -21,7 +21,7 @@ fn elongation(solver: &Solver) -> f64 {
 }
 
 #[test]
-fn a_setting_itself_moves_nothing() {
+fn setting_a_parameter_moves_nothing_by_itself() {
     for (name, setting) in [
         ("gravity", Vector([1.0, -1.0, 0.0])),
         ("damping", Number(0.1)),
@@ -42,7 +42,7 @@ fn a_setting_itself_moves_nothing() {
         let before = bits(&solver);
         solver.set(name, setting, None).unwrap();
         assert_eq!(bits(&solver), before, "{name}");
-        // One step at most adds what the new force gives it: 1 m/s is far beyond that.
+        // The next step adds at most the effect of the new force.
         step(&mut solver, 1);
         let speed = velocity(&solver, 1).iter().map(|axis| axis.abs()).fold(0.0, f64::max);
         assert!(speed < 0.1, "{name}: {speed} m/s after one step");
@@ -50,7 +50,7 @@ fn a_setting_itself_moves_nothing() {
 }
 
 #[test]
-fn another_gravity_or_compliance_settles_at_its_own_elongation() {
+fn a_new_gravity_or_compliance_settles_at_its_own_elongation() {
     let mut solver = settled();
     assert_close("before", 2.0 * 9.81e-3, elongation(&solver), 1e-3);
     solver.set("gravity", Vector([0.0, -1.62, 0.0]), None).unwrap();
@@ -78,7 +78,7 @@ fn more_substeps_or_iterations_leave_a_hanging_mass_where_it_is() {
 }
 
 #[test]
-fn a_tear_limit_acts_from_the_next_step_and_off_is_never() {
+fn a_tear_limit_acts_from_the_next_step_until_it_is_off() {
     let mut solver = settled();
     solver.set("tear_force", Number(19.0), None).unwrap();
     solver.set("tear_force", Off, None).unwrap();
@@ -103,7 +103,7 @@ fn stiffness_belongs_to_pbd_and_compliance_to_xpbd() {
 }
 
 #[test]
-fn a_reset_brings_the_parameters_of_the_scene_back() {
+fn a_reset_restores_the_parameters_of_the_scene() {
     let mut solver = settled();
     solver.set("gravity", Vector([0.0, 0.0, 0.0]), None).unwrap();
     solver.set("substeps", Number(9.0), None).unwrap();
@@ -113,7 +113,7 @@ fn a_reset_brings_the_parameters_of_the_scene_back() {
 }
 
 #[test]
-fn wrong_settings_change_no_bit_of_the_future() {
+fn a_wrong_value_changes_no_bit_of_the_future() {
     let mut wrong = vec![
         ("colour", Number(1.0), None, Reason::UnknownParameter),
         ("gravity", Number(1.0), None, Reason::OutOfRange),

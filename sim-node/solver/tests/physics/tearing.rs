@@ -1,10 +1,10 @@
-//! Tearing: exactly at its threshold, at every rate, and final.
+//! Tearing: exactly above its threshold, at every rate, and for good.
 
 use sim_solver::TearCause;
 
 use super::{assert_near, distance, solver, step, stepped};
 
-/// Two particles at a distance on a stick of length 1, without gravity.
+/// Returns two particles on a stick of length 1, without gravity.
 fn stick(ends: [&str; 2], at: f32, limit: &str) -> String {
     format!(
         "gravity = [0, 0, 0]\n[solver]\nsubsteps = 2\n{limit}\n\
@@ -41,13 +41,13 @@ fn a_stick_tears_strictly_above_its_stretch_or_distance_with_free_and_pinned_end
 
 #[test]
 fn a_stick_between_two_pins_tears_as_well() {
-    // Nothing moves, but it is too long.
+    // Nothing moves, but the stick is too long.
     let torn = stepped(&stick([PINNED, PINNED], 2.0, "tear_stretch = 1.5"), 1);
     assert_eq!(torn.torn(), [0]);
 }
 
 #[test]
-fn a_torn_stick_still_acts_in_its_last_step_and_never_again() {
+fn a_torn_stick_acts_until_the_end_of_its_step_and_never_again() {
     let text = stick(["", ""], 1.6, "tear_stretch = 1.5");
     let mut solver = solver(&text);
     step(&mut solver, 1);
@@ -55,11 +55,11 @@ fn a_torn_stick_still_acts_in_its_last_step_and_never_again() {
     let speed = super::velocity(&solver, 1)[0];
     step(&mut solver, 60);
     assert_eq!((solver.torn(), solver.new_torn_count()), (&[0][..], 0));
-    // Both fly on with what the last correction gave them.
+    // Both particles keep the velocity of the last correction.
     assert_near("speed", speed, super::velocity(&solver, 1)[0], 1e-3);
 }
 
-/// A mass that hangs still on a rigid stick.
+/// Returns a mass that hangs at rest on a rigid stick.
 fn hanging(rate: u32, substeps: u32, mass: f64, tear_force: f64) -> String {
     format!(
         "[solver]\nrate_hz = {rate}\nsubsteps = {substeps}\ntear_force = {tear_force}\n\
@@ -75,7 +75,7 @@ fn a_hanging_mass_tears_its_stick_at_its_weight_at_every_rate() {
             for mass in [0.1, 2.0, 1000.0] {
                 let weight = mass * 9.81;
                 let above = stepped(&hanging(rate, substeps, mass, weight * 1.001), rate);
-                assert_eq!(above.torn(), [], "{mass} kg at {rate} x {substeps}: bears its weight");
+                assert_eq!(above.torn(), [], "{mass} kg at {rate} x {substeps}: holds");
                 let below = stepped(&hanging(rate, substeps, mass, weight * 0.999), rate);
                 assert_eq!(below.torn(), [0], "{mass} kg at {rate} x {substeps}: tears");
                 assert_eq!(below.tear_causes(), [TearCause::Force]);
@@ -85,8 +85,8 @@ fn a_hanging_mass_tears_its_stick_at_its_weight_at_every_rate() {
 }
 
 #[test]
-fn a_soft_stick_tears_by_force_when_its_spring_pulls_that_hard() {
-    // 0.1 m beyond its length at 1e-3 m/N: 100 N, of which an implicit step of 1/60 s leaves
+fn a_soft_stick_tears_at_the_force_of_its_spring() {
+    // 0.1 m beyond the rest length at 1e-3 m/N is 100 N. An implicit step of 1/60 s reduces it to
     // C / (h^2 (w + compliance / h^2)).
     let tears_at = |tear_force: f64| {
         let text = format!(
@@ -111,7 +111,7 @@ fn pbd_constraints_tear_by_force_as_well() {
 }
 
 #[test]
-fn a_constraint_has_its_own_limit_in_place_of_the_scene() {
+fn the_limit_of_a_constraint_replaces_that_of_the_scene() {
     let text = stick(["", ""], 1.6, "tear_stretch = 1.5") + "tear_stretch = inf\n";
     assert_eq!(stepped(&text, 5).torn(), []);
     let text = stick(["", ""], 1.6, "") + "tear_distance = 0.5\n";
@@ -122,13 +122,13 @@ fn a_constraint_has_its_own_limit_in_place_of_the_scene() {
 }
 
 #[test]
-fn rest_length_zero_knows_no_ratio() {
+fn ratios_have_no_effect_with_rest_length_zero() {
     let text = stick([PINNED, ""], 1.0, "tear_stretch = 1.5\nmax_stretch = 2");
     assert_eq!(stepped(&text.replace("rest_length = 1", "rest_length = 0"), 5).torn(), []);
 }
 
 #[test]
-fn tears_of_one_step_stand_by_index_whatever_tore_them() {
+fn the_tears_of_a_step_are_sorted_by_index_regardless_of_their_cause() {
     let mut text = "gravity = [0, 0, 0]\n[solver]\nsubsteps = 1\ntear_stretch = 1.5\n".to_owned();
     for pair in 0..4 {
         text += &format!(
@@ -158,7 +158,7 @@ fn tears_of_one_step_stand_by_index_whatever_tore_them() {
 }
 
 #[test]
-fn the_hash_knows_what_is_torn_and_not_when() {
+fn the_hash_depends_on_which_constraints_are_torn_but_not_on_when() {
     let text = stick([PINNED, PINNED], 1.0, "");
     let mut solver = solver(&text);
     let whole = solver.state_hash();

@@ -1,10 +1,10 @@
-//! Generated tethers: no rope is longer than its rigid length, and a tear or a pin changes them.
+//! Generated tethers: they keep ropes at their rigid length, and tears and pins change them.
 
 use sim_solver::Solver;
 
 use super::{assert_at_most, assert_near, distance, position, solver, step, stepped};
 
-/// A rope of `count` moving particles and 0.05 m links that hangs straight down.
+/// Returns a rope of `count` free particles with links of 0.05 m that hangs straight down.
 fn rope(count: u32, tethers: bool) -> String {
     format!(
         "[solver]\nrate_hz = 60\nsubsteps = 4\ndamping = 1\ntethers = {tethers}\n[[generate]]\n\
@@ -18,7 +18,7 @@ fn rope(count: u32, tethers: bool) -> String {
 fn a_tethered_rope_of_100_stretches_by_at_most_a_thousandth() {
     let length = |solver: &Solver| -position(solver, 100)[1];
     let plain = length(&stepped(&rope(100, false), 60 * 30));
-    assert!(plain > 5.0 * 1.1, "without tethers it does stretch: {plain}");
+    assert!(plain > 5.0 * 1.1, "the rope stretches without tethers: {plain}");
     let mut tethered = solver(&rope(100, true));
     for _ in 0..60 * 30 {
         step(&mut tethered, 1);
@@ -28,8 +28,8 @@ fn a_tethered_rope_of_100_stretches_by_at_most_a_thousandth() {
 }
 
 #[test]
-fn one_pass_of_tethers_brings_a_torn_out_chain_to_its_rigid_length() {
-    // The single pass over the links leaves the middle one at 2 m and the last one at 3 m.
+fn one_pass_of_tethers_restores_the_rigid_length_of_a_stretched_chain() {
+    // The single pass over the links leaves the middle particle at 2 m and the last at 3 m.
     let chain = |tethers: bool| {
         stepped(
             &format!(
@@ -49,7 +49,7 @@ fn one_pass_of_tethers_brings_a_torn_out_chain_to_its_rigid_length() {
 }
 
 #[test]
-fn a_swinging_rope_keeps_every_particle_within_its_path() {
+fn every_particle_of_a_swinging_rope_stays_within_the_length_of_its_path() {
     let text = "[solver]\nrate_hz = 60\nsubsteps = 2\ntethers = true\n[[generate]]\n\
          shape = \"rope\"\ncount = 41\nfrom = [0, 0, 0]\nto = [2, 0, 0]\n";
     let mut solver = solver(text);
@@ -63,8 +63,8 @@ fn a_swinging_rope_keeps_every_particle_within_its_path() {
     }
 }
 
-/// Two pins 1.2 m apart; a particle hangs on a rigid chain of two from the first one, and on one
-/// long rigid link from the second one.
+/// Two pins 1.2 m apart. A particle hangs on a rigid chain of two links from the first pin, and on
+/// one long rigid link from the second.
 const FORK: &str = "[solver]\nrate_hz = 60\nsubsteps = 4\ntethers = true\n\
      [[particle]]\nposition = [0, 0, 0]\npinned = true\n\
      [[particle]]\nposition = [1.2, 0, 0]\npinned = true\n\
@@ -73,43 +73,43 @@ const FORK: &str = "[solver]\nrate_hz = 60\nsubsteps = 4\ntethers = true\n\
      [[constraint]]\nparticles = [1, 3]\nrest_length = 9\nkind = \"tether\"\n";
 
 #[test]
-fn a_cut_path_drops_its_tethers_and_a_pin_finds_new_ones() {
+fn a_cut_drops_the_tethers_of_its_paths_and_a_pin_creates_new_ones() {
     let mut solver = solver(FORK);
     step(&mut solver, 10);
     assert_near("hangs from the nearest root", 0.6, distance(&solver, 0, 3), 1e-4);
-    // The upper link goes; the pair falls free of the first pin at once.
+    // The upper link is cut, and the pair falls freely at once.
     solver.cut(0).unwrap();
     let before = position(&solver, 3)[1];
     step(&mut solver, 6);
     let fallen = before - position(&solver, 3)[1];
     let (m, h) = (24.0, 1.0 / 240.0);
     assert_near("free fall after the cut", 9.81 * h * h * m * (m + 1.0) / 2.0, fallen, 1e-3);
-    // A pin recomputes: the middle particle is the root of the lower one from now on.
+    // A pin recomputes the tethers: the middle particle becomes the root of the lower one.
     solver.pin(2).unwrap();
     step(&mut solver, 60);
     assert_near("hangs from the new root", 0.3, distance(&solver, 2, 3), 1e-4);
 }
 
 #[test]
-fn what_is_in_a_hand_is_no_root_until_it_is_let_go() {
+fn a_grabbed_particle_is_not_a_root_until_it_is_released() {
     let mut solver = solver(&rope(10, true));
     solver.grab(1, sim_solver::Grip { particle: 0, target: [0.0; 3], over_s: 0.0 }).unwrap();
     step(&mut solver, 60);
     let sag = distance(&solver, 0, 10) - 0.5;
-    assert!(sag > 1e-3, "no tether holds the end, so the rope stretches: {sag}");
+    assert!(sag > 1e-3, "the end has no tether, so the rope stretches: {sag}");
     solver.release(1, 0).unwrap();
     step(&mut solver, 60);
-    assert_at_most("tied again", 0.5 + 1e-5, distance(&solver, 0, 10));
+    assert_at_most("tethered again", 0.5 + 1e-5, distance(&solver, 0, 10));
 }
 
 #[test]
-fn bends_compliant_and_torn_constraints_make_no_path() {
-    // Only soft or bend links lead to the root: the particle sags as far as the spring lets it.
+fn bends_and_compliant_or_torn_constraints_form_no_path() {
+    // Only a soft link leads to the root, so the particle sags as far as the spring allows.
     let text = "[solver]\nrate_hz = 60\nsubsteps = 4\ndamping = 4\ntethers = true\n\
          [[particle]]\nposition = [0, 0, 0]\npinned = true\n[[particle]]\nposition = [0, -1, 0]\n\
          [[constraint]]\nparticles = [0, 1]\ncompliance = 0.01\n";
     assert_near("sag", 1.0 + 0.0981, distance(&stepped(text, 1200), 0, 1), 1e-3);
-    // One bend, or one link that is cut before the tethers are worked out anew by a pin elsewhere.
+    // A bend, or a link that is cut before a pin elsewhere recomputes the tethers.
     let falls = |kind: &str, is_cut: bool| {
         let text = format!(
             "[solver]\nrate_hz = 60\nsubsteps = 4\niterations = 1\ntethers = true\n\
@@ -127,8 +127,8 @@ fn bends_compliant_and_torn_constraints_make_no_path() {
         -position(&solver, 3)[1] - 2.0
     };
     assert_near("a rigid link holds", 0.0, falls("structural", false), 1e-5);
-    assert!(falls("bend", false) > 1e-5, "a bend makes no path: the chain stretches a little");
-    assert!(falls("structural", true) > 4.0, "a torn link makes none: it falls");
+    assert!(falls("bend", false) > 1e-5, "a bend forms no path, so the chain stretches a little");
+    assert!(falls("structural", true) > 4.0, "a torn link forms no path, so the particle falls");
     let mut stiff = solver(text);
     step(&mut stiff, 1200);
     stiff.set("compliance", sim_solver::ParameterValue::Number(0.0), None).unwrap();
@@ -137,7 +137,7 @@ fn bends_compliant_and_torn_constraints_make_no_path() {
 }
 
 #[test]
-fn a_tethered_state_goes_on_bit_for_bit_from_a_keyframe() {
+fn a_tethered_state_continues_bit_for_bit_from_a_keyframe() {
     let scene = format!("version = 1\n{}", rope(30, true));
     let scene = sim_solver::Scene::from_toml(&scene, "test").unwrap();
     let mut solver = Solver::new(&scene);

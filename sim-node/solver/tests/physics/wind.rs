@@ -1,8 +1,8 @@
-//! Wind: its force on a triangle, on both faces, and that it never overshoots.
+//! Wind: its force on both sides of a triangle, which never exceeds the relative momentum.
 
 use super::{assert_at_most, assert_close, assert_near, solver, step, stepped, velocity};
 
-/// One triangle of 0.5 m^2 and 3 kg in the plane of x and y, in a wind.
+/// Returns a square of 1 m^2 in the xy plane, in a wind.
 fn triangle(wind: &str, rate: u32) -> String {
     // A cloth of 2 x 2 has two triangles.
     format!(
@@ -13,7 +13,7 @@ fn triangle(wind: &str, rate: u32) -> String {
 
 #[test]
 fn a_sheet_gains_drag_area_speed_squared_over_mass_from_either_side() {
-    // Area 1 m^2, 12 kg: F = drag v^2; the corners of the diagonal take two thirds of it.
+    // Area 1 m^2, 12 kg: F = drag v^2. The corners on the diagonal take two thirds of it.
     for wind in [4.0, -4.0] {
         let h = 1e-3;
         let solver = stepped(&triangle(&format!("velocity = [0, 0, {wind}]\ndrag = 0.6"), 1000), 1);
@@ -24,7 +24,7 @@ fn a_sheet_gains_drag_area_speed_squared_over_mass_from_either_side() {
 }
 
 #[test]
-fn a_slanting_wind_pushes_along_itself_by_the_share_that_meets_the_face() {
+fn an_oblique_wind_pushes_in_its_own_direction_by_its_normal_component() {
     let solver = stepped(&triangle("velocity = [3, 0, 4]\ndrag = 0.5", 1000), 1);
     // F = drag A |u n| u with |u n| = 4.
     let sum = |axis: usize| (0..4).map(|index| 3.0 * velocity(&solver, index)[axis]).sum::<f64>();
@@ -33,7 +33,7 @@ fn a_slanting_wind_pushes_along_itself_by_the_share_that_meets_the_face() {
 }
 
 #[test]
-fn an_edge_in_the_wind_feels_nothing() {
+fn a_wind_parallel_to_a_sheet_has_no_effect() {
     let solver = stepped(&triangle("velocity = [5, 2, 0]\ndrag = 1", 100), 10);
     for index in 0..4 {
         assert_near("speed", 0.0, velocity(&solver, index)[0].abs(), 1e-9);
@@ -41,7 +41,7 @@ fn an_edge_in_the_wind_feels_nothing() {
 }
 
 #[test]
-fn however_strong_it_never_drives_a_sheet_faster_than_itself() {
+fn no_wind_accelerates_a_sheet_beyond_its_own_speed() {
     let mut solver = solver(&triangle("velocity = [0, 0, 20]\ndrag = 1e6", 60));
     for _ in 0..120 {
         step(&mut solver, 1);
@@ -49,11 +49,11 @@ fn however_strong_it_never_drives_a_sheet_faster_than_itself() {
             assert_at_most("speed", 20.0 * (1.0 + 1e-5), velocity(&solver, index)[2]);
         }
     }
-    assert_close("speed in the end", 20.0, velocity(&solver, 0)[2], 1e-3);
+    assert_close("final speed", 20.0, velocity(&solver, 0)[2], 1e-3);
 }
 
 #[test]
-fn a_force_beyond_all_numbers_still_only_carries_along() {
+fn an_infinite_force_accelerates_a_sheet_to_the_speed_of_the_wind() {
     for drag in ["1e30", "3e38"] {
         let text = triangle(&format!("velocity = [0, 0, 10]\ndrag = {drag}"), 60);
         let solver = stepped(&text, 1);
@@ -64,7 +64,7 @@ fn a_force_beyond_all_numbers_still_only_carries_along() {
 }
 
 #[test]
-fn still_air_brakes_a_falling_sheet_to_its_terminal_speed() {
+fn still_air_slows_a_falling_sheet_to_its_terminal_speed() {
     // m g = drag A v^2: 12 kg on 1 m^2.
     let text =
         triangle("drag = 0.6", 240).replace("gravity = [0, 0, 0]", "gravity = [0, 0, -9.81]");
@@ -73,8 +73,8 @@ fn still_air_brakes_a_falling_sheet_to_its_terminal_speed() {
 }
 
 #[test]
-fn a_gust_swells_and_ebbs_with_its_period() {
-    // At a quarter of the period the wind is 1 + gust as fast: its force is the square of that.
+fn the_force_of_gusts_varies_with_their_period() {
+    // At a quarter of the period the wind is 1 + gust times as fast. Its force is the square of that.
     let text = triangle("velocity = [0, 0, 1]\ndrag = 1e-3\ngust = 0.5\ngust_period = 4", 100);
     let mut solver = solver(&text);
     let mut speeds = vec![0.0];
@@ -88,7 +88,7 @@ fn a_gust_swells_and_ebbs_with_its_period() {
 }
 
 #[test]
-fn a_scene_without_wind_feels_no_air() {
+fn a_scene_without_wind_has_no_air() {
     let text = "gravity = [0, 0, 0]\n[solver]\nsubsteps = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 2\nrows = 2\n\
          spacing = 1\npinned = \"none\"\n";
     let mut calm = solver(text);

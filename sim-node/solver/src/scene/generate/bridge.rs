@@ -2,13 +2,15 @@
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
-
-use super::rope::is_end_pinned;
-use super::{Builder, Pinned, between, decimal, round};
 use sim_types::ConstraintKind;
 
-/// Planks across a way, each from its left to its right end: particles 2 i and 2 i + 1. Constraints
-/// plank by plank: the plank, then to the next one left, right, and both diagonals.
+use super::builder::{Builder, interpolate, round};
+use super::pinned::is_pinned_end;
+use crate::scene::definition::decimal;
+
+/// Planks across the line between two points. Plank i joins the particles 2 i (left) and 2 i + 1
+/// (right). The constraints follow plank by plank: the plank, then to the next plank left, right
+/// and both diagonals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bridge {
     /// Middle of the first plank.
@@ -17,9 +19,9 @@ pub struct Bridge {
     /// Middle of the last plank.
     #[serde(with = "decimal::vector")]
     pub to: [f32; 3],
-    /// At least 2.
+    /// Number of planks, at least 2.
     pub planks: u32,
-    /// Length of a plank, > 0: level, across the way.
+    /// Length of a plank, > 0. Planks are level and perpendicular to the bridge.
     #[serde(with = "decimal::number")]
     pub width: f32,
 }
@@ -37,10 +39,10 @@ impl Bridge {
         let side = self.side(builder.up());
         for plank in 0..self.planks {
             let share = f64::from(plank) / f64::from(self.planks - 1);
-            let middle = Vec3::from_array(between(self.from, self.to, share)).as_dvec3();
-            for (index, arm) in [(2 * plank, -side), (2 * plank + 1, side)] {
-                let is_pinned = self.is_pinned(builder.pinned(), plank, index);
-                builder.particle((middle + arm).to_array().map(round), is_pinned);
+            let middle = Vec3::from_array(interpolate(self.from, self.to, share)).as_dvec3();
+            for arm in [-side, side] {
+                let position = (middle + arm).to_array().map(round);
+                builder.particle(position, |word| is_pinned_end(word, plank, self.planks));
             }
         }
         for plank in 0..self.planks {
@@ -58,18 +60,12 @@ impl Bridge {
         }
     }
 
-    /// Half a plank, to the right; a bridge straight up has its planks along x.
+    /// Returns the vector from the middle of a plank to its right end. The planks of a vertical
+    /// bridge lie along x.
     fn side(&self, up: DVec3) -> DVec3 {
         let vector = |axes: [f32; 3]| Vec3::from_array(axes).as_dvec3();
         let across = (vector(self.to) - vector(self.from)).cross(up);
         let across = if across.dot(across) > 0.0 { across.normalize() } else { DVec3::X };
         across * (f64::from(self.width) / 2.0)
-    }
-
-    fn is_pinned(&self, pinned: &Pinned, plank: u32, index: u32) -> bool {
-        match pinned {
-            Pinned::List(list) => list.binary_search(&index).is_ok(),
-            Pinned::Word(_) => is_end_pinned(pinned, plank, self.planks),
-        }
     }
 }

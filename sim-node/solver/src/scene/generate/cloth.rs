@@ -1,41 +1,42 @@
 //! A sheet of particles.
 
 use serde::Serialize;
-
-use super::{Builder, Pinned, decimal, round};
-use crate::families::Family;
 use sim_types::ConstraintKind;
 
-/// A sheet of columns x rows particles; particle (c, r) has index r columns + c.
+use super::builder::{Builder, round};
+use crate::families::Family;
+use crate::scene::definition::decimal;
+
+/// A sheet of columns x rows particles. Particle (c, r) has index r columns + c.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cloth {
-    /// At least 1.
+    /// Number of columns, at least 1.
     pub columns: u32,
-    /// At least 1.
+    /// Number of rows, at least 1.
     pub rows: u32,
-    /// Distance between neighbours.
+    /// Distance between neighbours, > 0.
     #[serde(with = "decimal::number")]
     pub spacing: f32,
     /// Position of particle (0, 0).
     #[serde(with = "decimal::vector")]
     pub origin: [f32; 3],
-    /// From column to column, times the spacing.
+    /// Vector from one column to the next, in multiples of the spacing.
     #[serde(with = "decimal::vector")]
     pub right: [f32; 3],
-    /// From row to row, times the spacing.
+    /// Vector from one row to the next, in multiples of the spacing.
     #[serde(with = "decimal::vector")]
     pub down: [f32; 3],
-    /// Which kinds of constraints it has.
+    /// Kinds of constraints to create.
     pub links: Vec<ConstraintKind>,
-    /// Diagonals of a cell with shear constraints.
+    /// Diagonals of each cell that have a shear constraint.
     pub diagonals: Diagonals,
 }
 
-/// How many diagonals of a cell have a shear constraint.
+/// Diagonals of a cell that have a shear constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(into = "u32")]
 pub enum Diagonals {
-    /// Only down-right.
+    /// Only the one from upper left to lower right.
     One,
     /// Both.
     Two,
@@ -50,8 +51,8 @@ impl From<Diagonals> for u32 {
     }
 }
 
-/// The words for pinned particles of a sheet.
-pub(crate) const PINS: [&str; 4] = ["top", "top-even", "corners", "none"];
+/// Words for the pinned particles; the default of a cloth is the first.
+pub(crate) const PIN_WORDS: [&str; 4] = ["top", "top-even", "corners", "none"];
 
 /// A constraint with the family that it declares for the order of projection.
 struct Link {
@@ -70,20 +71,20 @@ impl Cloth {
         self.links.iter().map(|kind| self.link_count(*kind)).sum()
     }
 
-    /// Particles, constraints particle by particle, two triangles a cell.
+    /// Appends particles, constraints particle by particle, and two triangles per cell.
     pub(super) fn build(&self, builder: &mut Builder<'_>) {
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let index = row * self.columns + column;
-                let is_pinned = self.is_pinned(builder.pinned(), index);
-                builder.particle(self.position(column, row), is_pinned);
+                let position = self.position(column, row);
+                builder.particle(position, |word| self.is_pinned(word, index));
             }
         }
         builder.sheet(self.columns, self.rows);
         for row in 0..self.rows {
             for column in 0..self.columns {
-                for link in self.links_of(column, row) {
-                    builder.family_link([link.a, link.b], link.kind, Some(link.family));
+                for link in self.links_at(column, row) {
+                    builder.family_link([link.a, link.b], link.kind, link.family);
                 }
             }
         }
@@ -97,14 +98,13 @@ impl Cloth {
         }
     }
 
-    fn is_pinned(&self, pinned: &Pinned, index: u32) -> bool {
+    fn is_pinned(&self, word: &str, index: u32) -> bool {
         let is_top = index < self.columns;
-        match pinned {
-            Pinned::Word("top") => is_top,
-            Pinned::Word("top-even") => is_top && index.is_multiple_of(2),
-            Pinned::Word("corners") => index == 0 || index == self.columns - 1,
-            Pinned::Word(_) => false,
-            Pinned::List(list) => list.binary_search(&index).is_ok(),
+        match word {
+            "top" => is_top,
+            "top-even" => is_top && index.is_multiple_of(2),
+            "corners" => index == 0 || index == self.columns - 1,
+            _ => false,
         }
     }
 
@@ -132,9 +132,9 @@ impl Cloth {
         [along(0), along(1), along(2)]
     }
 
-    /// The constraints that start at a particle: right, down, down-right, then from its right
-    /// neighbour down-left, two right, two down.
-    fn links_of(&self, column: u32, row: u32) -> impl Iterator<Item = Link> {
+    /// Returns the constraints that start at a particle: right, down, down-right, then from its
+    /// right neighbour down-left, two right, two down.
+    fn links_at(&self, column: u32, row: u32) -> impl Iterator<Item = Link> {
         use ConstraintKind::{Bend, Shear, Structural};
         let index = move |c: u32, r: u32| r * self.columns + c;
         let (c, r) = (column, row);

@@ -1,26 +1,27 @@
-//! A figure of 15 particles and 20 sticks.
+//! A human figure of 15 particles and 20 sticks.
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
-
-use super::{Builder, Pinned, decimal, round};
 use sim_types::ConstraintKind;
 
-/// A standing figure.
+use super::builder::{Builder, round};
+use crate::scene::definition::decimal;
+
+/// A standing human figure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Ragdoll {
-    /// Between its feet.
+    /// Point between the feet.
     #[serde(with = "decimal::vector")]
     pub origin: [f32; 3],
-    /// From its feet to the top of its head, > 0.
+    /// Height from the feet to the top of the head, > 0.
     #[serde(with = "decimal::number")]
     pub height: f32,
 }
 
-/// The words for pinned particles of a figure.
-pub(crate) const PINS: [&str; 3] = ["none", "head", "hands"];
+/// Words for the pinned particles, the default first.
+pub(crate) const PIN_WORDS: [&str; 3] = ["none", "head", "hands"];
 
-/// The particles: to the side and up, in heights. Left is towards -x.
+/// Positions of the particles, sideways and up, as fractions of the height. Left is towards -x.
 const PLACES: [(f64, f64); 15] = [
     (0.0, 1.0),    // 0 head
     (0.0, 0.85),   // 1 neck
@@ -39,7 +40,7 @@ const PLACES: [(f64, f64); 15] = [
     (0.09, 0.0),   // 14 right foot
 ];
 
-/// The bones.
+/// Pairs of particles that a bone joins.
 const BONES: [[u32; 2]; 14] = [
     [0, 1],
     [1, 2],
@@ -57,7 +58,7 @@ const BONES: [[u32; 2]; 14] = [
     [12, 14],
 ];
 
-/// What keeps its body and its head in shape.
+/// Braces that keep the trunk and the head in shape.
 const BRACES: [[u32; 2]; 6] = [[2, 3], [9, 10], [2, 9], [3, 10], [0, 2], [0, 3]];
 
 impl Ragdoll {
@@ -74,13 +75,11 @@ impl Ragdoll {
         let up = builder.up();
         for (index, (side, height)) in (0_u32..).zip(PLACES) {
             let place = origin + (DVec3::X * side + up * height) * f64::from(self.height);
-            let is_pinned = match builder.pinned() {
-                Pinned::Word("head") => index == 0,
-                Pinned::Word("hands") => index == 6 || index == 7,
-                Pinned::Word(_) => false,
-                Pinned::List(list) => list.binary_search(&index).is_ok(),
-            };
-            builder.particle(place.to_array().map(round), is_pinned);
+            builder.particle(place.to_array().map(round), |word| match word {
+                "head" => index == 0,
+                "hands" => index == 6 || index == 7,
+                _ => false,
+            });
         }
         for bone in BONES {
             builder.link(bone, ConstraintKind::Structural);

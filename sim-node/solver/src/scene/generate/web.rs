@@ -2,33 +2,35 @@
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
-
-use super::{Builder, Pinned, decimal, round};
-use crate::frame::rotation_about;
 use sim_types::ConstraintKind;
 
-/// A web: the hub is particle 0, then come the rings from the inside, each spoke by spoke.
-/// Constraints ring by ring and spoke by spoke: along the spoke from the ring within, then along
-/// the ring to the next spoke.
+use super::builder::{Builder, round};
+use crate::frame::rotation_about;
+use crate::scene::definition::decimal;
+
+/// A web. The hub is particle 0, followed by the rings from the inside outwards, each spoke by
+/// spoke. The constraints follow in the same order, two each: along the spoke from the inner ring,
+/// then along the ring to the next spoke.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Web {
     /// Position of the hub.
     #[serde(with = "decimal::vector")]
     pub center: [f32; 3],
-    /// Of the outermost ring, > 0.
+    /// Radius of the outermost ring, > 0.
     #[serde(with = "decimal::number")]
     pub radius: f32,
-    /// At least 3.
+    /// Number of spokes, at least 3.
     pub spokes: u32,
-    /// At least 1.
+    /// Number of rings, at least 1.
     pub rings: u32,
-    /// Of the plane that it lies in; the first spoke is towards x, or z for a web across x.
+    /// Normal of the web's plane. The first spoke points towards x, or towards z if the normal is
+    /// nearly parallel to x.
     #[serde(with = "decimal::vector")]
     pub normal: [f32; 3],
 }
 
-/// The words for pinned particles of a web.
-pub(crate) const PINS: [&str; 3] = ["rim", "hub", "none"];
+/// Words for the pinned particles, the default first.
+pub(crate) const PIN_WORDS: [&str; 3] = ["rim", "hub", "none"];
 
 impl Web {
     pub(super) fn particle_count(&self) -> u64 {
@@ -40,11 +42,11 @@ impl Web {
     }
 
     pub(super) fn build(&self, builder: &mut Builder<'_>) {
-        builder.particle(self.center, self.is_pinned(builder.pinned(), 0));
+        builder.particle(self.center, |word| word == "hub");
         for ring in 1..=self.rings {
             for spoke in 0..self.spokes {
-                let is_pinned = self.is_pinned(builder.pinned(), self.index(ring, spoke));
-                builder.particle(self.position(ring, spoke), is_pinned);
+                let position = self.position(ring, spoke);
+                builder.particle(position, |word| word == "rim" && ring == self.rings);
             }
         }
         for ring in 1..=self.rings {
@@ -70,14 +72,5 @@ impl Web {
         let radius = f64::from(self.radius) * f64::from(ring) / f64::from(self.rings);
         let arm = rotation_about(normal, angle) * (first * radius);
         (vector(self.center) + arm).to_array().map(round)
-    }
-
-    fn is_pinned(&self, pinned: &Pinned, index: u32) -> bool {
-        match pinned {
-            Pinned::Word("rim") => index > (self.rings - 1) * self.spokes,
-            Pinned::Word("hub") => index == 0,
-            Pinned::Word(_) => false,
-            Pinned::List(list) => list.binary_search(&index).is_ok(),
-        }
     }
 }

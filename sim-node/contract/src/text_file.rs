@@ -1,0 +1,133 @@
+//! Text files that people name, such as scenes and meshes: bounded, and read without waiting.
+
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, Read};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::Path;
+
+use rustix::fs::OFlags;
+use thiserror::Error;
+
+use crate::SCENE_SIZE_BYTES_MAX;
+
+/// A text file that cannot be read.
+#[derive(Debug, Error)]
+pub enum TextFileError {
+    /// The system refuses to open or read the file.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The path names something that has no end, or that a reader would wait for.
+    #[error("it is {0}, not a regular file")]
+    NotRegular(&'static str),
+    /// The file is longer than a scene may be.
+    #[error("it is longer than {SCENE_SIZE_BYTES_MAX} bytes")]
+    TooLong,
+    /// The file is not UTF-8.
+    #[error("it is not text in UTF-8")]
+    NotText,
+}
+
+/// Reads a scene, or a mesh that a scene names.
+///
+/// It never waits: FIFOs and devices are refused. It reads at most [`SCENE_SIZE_BYTES_MAX`] bytes.
+///
+/// # Errors
+/// The file cannot be opened or read, is not a regular file, is too long or is not text.
+pub fn read_scene_file(path: impl AsRef<Path>) -> Result<String, TextFileError> {
+    let path = path.as_ref();
+    // Opening a device may have effects, so its type is checked first.
+    check_regular(&std::fs::metadata(path)?)?;
+    // The path may name another file by now. With this flag, opening a FIFO does not wait either.
+    let flags = OFlags::NONBLOCK.bits().cast_signed();
+    let file = OpenOptions::new().read(true).custom_flags(flags).open(path)?;
+    check_regular(&file.metadata()?)?;
+    read_bounded(file)
+}
+
+fn check_regular(metadata: &Metadata) -> Result<(), TextFileError> {
+    let kind = metadata.file_type();
+    if kind.is_file() {
+        return Ok(());
+    }
+    Err(TextFileError::NotRegular(match () {
+        () if kind.is_dir() => "a directory",
+        () if kind.is_fifo() => "a FIFO",
+        () if kind.is_socket() => "a socket",
+        () => "a device",
+    }))
+}
+
+fn read_bounded(file: File) -> Result<String, TextFileError> {
+    let mut bytes = Vec::new();
+    let length = file.take(SCENE_SIZE_BYTES_MAX as u64 + 1).read_to_end(&mut bytes)?;
+    if length > SCENE_SIZE_BYTES_MAX {
+        return Err(TextFileError::TooLong);
+    }
+    String::from_utf8(bytes).map_err(|_| TextFileError::NotText)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+
+    use super::*;
+
+    /// A path in the folder for temporary files that is removed with the test.
+    struct TemporaryPath(PathBuf);
+
+    impl TemporaryPath {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
+            Self(path)
+        }
+    }
+
+    impl Drop for TemporaryPath {
+        fn drop(&mut self) {
+            let _missing = std::fs::remove_file(&self.0);
+        }
+    }
+
+    fn error(path: &Path) -> String {
+        read_scene_file(path).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_regular_file_is_read() {
+        let file = TemporaryPath::new("regular.toml");
+        std::fs::write(&file.0, "version = 1\n").unwrap();
+        assert_eq!(read_scene_file(&file.0).unwrap(), "version = 1\n");
+    }
+
+    #[test]
+    fn a_fifo_is_refused_without_waiting_for_a_writer() {
+        let fifo = TemporaryPath::new("fifo.toml");
+        mknodat(CWD, &fifo.0, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        assert_eq!(error(&fifo.0), "it is a FIFO, not a regular file");
+    }
+
+    #[test]
+    fn directories_and_devices_are_refused() {
+        assert_eq!(error(&std::env::temp_dir()), "it is a directory, not a regular file");
+        assert_eq!(error(Path::new("/dev/zero")), "it is a device, not a regular file");
+    }
+
+    #[test]
+    fn a_file_that_is_too_long_or_not_text_is_refused() {
+        let file = TemporaryPath::new("long.toml");
+        let handle = File::create(&file.0).unwrap();
+        handle.set_len(SCENE_SIZE_BYTES_MAX as u64 + 1).unwrap();
+        assert_eq!(error(&file.0), "it is longer than 16777216 bytes");
+        handle.set_len(SCENE_SIZE_BYTES_MAX as u64).unwrap();
+        assert_eq!(read_scene_file(&file.0).unwrap().len(), SCENE_SIZE_BYTES_MAX);
+        std::fs::write(&file.0, [0xff, 0xfe]).unwrap();
+        assert_eq!(error(&file.0), "it is not text in UTF-8");
+    }
+
+    #[test]
+    fn a_missing_file_has_the_error_of_the_system() {
+        assert_eq!(error(Path::new("/no/such.toml")), "No such file or directory (os error 2)");
+    }
+}

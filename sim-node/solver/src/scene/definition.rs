@@ -1,0 +1,149 @@
+//! The checked scene, with every default filled in.
+
+pub(super) mod anchor;
+pub(super) mod collider;
+pub(super) mod decimal;
+pub(super) mod element;
+pub(super) mod limits;
+pub(super) mod settings;
+pub(super) mod softness;
+pub(super) mod wind;
+
+use serde::Serialize;
+
+use super::generate::Generator;
+use super::model::Model;
+use anchor::SceneAnchor;
+use collider::SceneCollider;
+use element::{SceneConstraint, SceneParticle};
+use settings::{PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
+use wind::Wind;
+
+/// Largest number of particles, and of constraints, in a scene. All indices are exact in f32.
+pub const ELEMENTS_MAX: u32 = 1 << 24;
+
+/// Version of the scene format.
+pub const SCENE_VERSION: u32 = 1;
+
+/// A checked scene with every default filled in.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scene {
+    /// [`SCENE_VERSION`].
+    pub version: u32,
+    /// Name; by default the stem of the file's name.
+    pub name: String,
+    /// Origin of all positions, in `unit`.
+    pub origin: [f64; 3],
+    /// 2 or 3. In 2-D, z stays 0 bit for bit.
+    pub dimensions: u32,
+    /// Axis that points up. It affects only the drawing and some shapes, not gravity.
+    pub up: Up,
+    /// Unit of length. It affects only labels.
+    pub unit: String,
+    /// Acceleration in unit/s^2.
+    #[serde(with = "decimal::vector")]
+    pub gravity: [f32; 3],
+    /// Rate, substeps and other settings of the solver.
+    pub solver: SolverSettings,
+    /// The air, if the scene has any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wind: Option<Wind>,
+    /// Explicit particles. They have the first indices.
+    #[serde(rename = "particle")]
+    pub particles: Vec<SceneParticle>,
+    /// Explicit constraints. They have the first indices and may join generated particles.
+    #[serde(rename = "constraint")]
+    pub constraints: Vec<SceneConstraint>,
+    /// Colliders, in the order in which they act.
+    #[serde(rename = "collider")]
+    pub colliders: Vec<SceneCollider>,
+    /// Particles that follow moving frames.
+    #[serde(rename = "anchor")]
+    pub anchors: Vec<SceneAnchor>,
+    /// Generators of further particles and constraints, in order.
+    #[serde(rename = "generate")]
+    pub generators: Vec<Generator>,
+    /// Warnings from reading the scene and the files that it names, one sentence each.
+    #[serde(skip)]
+    pub read_warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Returns the complete scene as TOML, with every default written out. Reading this text gives
+    /// an equal scene.
+    ///
+    /// # Panics
+    /// Never: every checked scene has a TOML form.
+    #[allow(clippy::expect_used, reason = "numbers, names and lists always have a TOML form")]
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a scene has a TOML form")
+    }
+
+    /// Replaces the scene's rate and number of substeps where a value is given.
+    ///
+    /// # Errors
+    /// A value is out of range. The text names the field and the range.
+    pub fn override_solver(
+        &mut self,
+        rate_hz: Option<u32>,
+        substeps: Option<u32>,
+    ) -> Result<(), String> {
+        let check = |name, value, max| {
+            if (1..=max).contains(&value) {
+                Ok(value)
+            } else {
+                Err(format!("{name}: {value} is out of range (allowed: 1 to {max})"))
+            }
+        };
+        if let Some(rate_hz) = rate_hz {
+            self.solver.rate_hz = check("rate", rate_hz, RATE_HZ_MAX)?;
+        }
+        if let Some(substeps) = substeps {
+            self.solver.substeps = check("substeps", substeps, PASSES_MAX)?;
+        }
+        Ok(())
+    }
+
+    /// Counts particles, constraints and pinned particles, including the generated ones.
+    pub fn counts(&self) -> SceneCounts {
+        let model = self.model();
+        SceneCounts {
+            particles: model.particles.len(),
+            constraints: model.constraints.len(),
+            pins: model.particles.iter().filter(|particle| particle.pinned).count(),
+            triangles: model.triangles.len(),
+            colliders: self.colliders.len(),
+            anchors: self.anchors.len(),
+        }
+    }
+
+    /// Expands the scene: explicit particles first, then those of each generator, and constraints
+    /// likewise.
+    pub(crate) fn model(&self) -> Model {
+        let mut model = Model::new(self.solver.method, self.particles.clone());
+        for constraint in &self.constraints {
+            model.push_explicit(constraint);
+        }
+        for generator in &self.generators {
+            generator.build(self.up, &mut model);
+        }
+        model
+    }
+}
+
+/// Size of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct SceneCounts {
+    /// Particles.
+    pub particles: usize,
+    /// Constraints.
+    pub constraints: usize,
+    /// Pinned particles.
+    pub pins: usize,
+    /// Triangles of the surface.
+    pub triangles: usize,
+    /// Colliders.
+    pub colliders: usize,
+    /// Anchors.
+    pub anchors: usize,
+}

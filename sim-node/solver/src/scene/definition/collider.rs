@@ -1,0 +1,87 @@
+//! Colliders: solids that particles bounce off and slide along.
+
+use serde::Serialize;
+
+use super::decimal;
+
+/// A solid that particles bounce off and slide along.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SceneCollider {
+    /// Shape, size and pose at load.
+    #[serde(flatten)]
+    pub shape: ColliderGeometry,
+    /// Fraction of the approach speed that a particle keeps, 0..=1.
+    #[serde(with = "decimal::number")]
+    pub restitution: f32,
+    /// Coulomb's coefficient, >= 0.
+    #[serde(with = "decimal::number")]
+    pub friction: f32,
+    /// In unit/s.
+    #[serde(with = "decimal::vector")]
+    pub velocity: [f32; 3],
+    /// About the center of a box, in rad/s; 0 for all other shapes.
+    #[serde(with = "decimal::vector", skip_serializing_if = "is_zero")]
+    pub angular_velocity: [f32; 3],
+}
+
+/// Decides whether to write the key, which only boxes accept.
+fn is_zero(vector: &[f32; 3]) -> bool {
+    *vector == [0.0; 3]
+}
+
+/// Shape, size and pose of a collider.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "shape", rename_all = "lowercase")]
+pub enum ColliderGeometry {
+    /// A half-space.
+    Plane {
+        /// Points out of the solid. It is normalised on use.
+        #[serde(with = "decimal::vector")]
+        normal: [f32; 3],
+        /// Particles are free where normal x >= offset.
+        #[serde(with = "decimal::number")]
+        offset: f32,
+    },
+    /// A solid box. A particle inside leaves it through the nearest face.
+    Box {
+        /// Center.
+        #[serde(with = "decimal::vector")]
+        center: [f32; 3],
+        /// Half of the edge lengths along the box's own axes, > 0; in 2-D the z component is 0.
+        #[serde(with = "decimal::vector")]
+        half_extents: [f32; 3],
+        /// Quaternion x, y, z, w. It is normalised on use.
+        #[serde(with = "decimal::quaternion")]
+        rotation: [f32; 4],
+    },
+    /// A solid sphere.
+    Sphere {
+        /// Center.
+        #[serde(with = "decimal::vector")]
+        center: [f32; 3],
+        /// > 0.
+        #[serde(with = "decimal::number")]
+        radius: f32,
+    },
+    /// All points within `radius` of a segment.
+    Capsule {
+        /// First end of the segment.
+        #[serde(with = "decimal::vector")]
+        a: [f32; 3],
+        /// Second end of the segment.
+        #[serde(with = "decimal::vector")]
+        b: [f32; 3],
+        /// > 0.
+        #[serde(with = "decimal::number")]
+        radius: f32,
+    },
+    /// A box that particles stay inside.
+    Bounds {
+        /// Lowest coordinates.
+        #[serde(with = "decimal::vector")]
+        min: [f32; 3],
+        /// Highest coordinates, above the lowest on each axis except z in 2-D.
+        #[serde(with = "decimal::vector")]
+        max: [f32; 3],
+    },
+}

@@ -1,0 +1,85 @@
+//! The builder that shapes append their particles and constraints to.
+
+use glam::DVec3;
+use sim_types::ConstraintKind;
+
+use super::pinned::Pinned;
+use crate::constraints::Constraint;
+use crate::families::Sheet;
+use crate::scene::definition::element::SceneParticle;
+use crate::scene::definition::settings::Up;
+use crate::scene::definition::softness::KindSoftness;
+use crate::scene::model::Model;
+
+/// Appends the parts of one shape to a model. All indices count from the shape's first particle.
+pub(super) struct Builder<'a> {
+    pub(super) pinned: &'a Pinned,
+    /// Mass of each particle, unless the shape gives another one, in kg.
+    pub(super) mass: f32,
+    pub(super) softness: KindSoftness,
+    pub(super) up: Up,
+    /// Index of the shape's first particle in the scene.
+    pub(super) first: u32,
+    pub(super) model: &'a mut Model,
+}
+
+impl Builder<'_> {
+    /// Returns the unit vector that points up.
+    pub(super) fn up(&self) -> DVec3 {
+        match self.up {
+            Up::Y => DVec3::Y,
+            Up::MinusY => -DVec3::Y,
+            Up::Z => DVec3::Z,
+        }
+    }
+
+    /// Appends a particle. `is_pinned_by` decides whether a word of the shape pins it.
+    pub(super) fn particle(&mut self, position: [f32; 3], is_pinned_by: impl FnOnce(&str) -> bool) {
+        let index = self.model.particle_count() - self.first;
+        let pinned = self.pinned.contains(index, is_pinned_by);
+        let (mass, velocity) = (self.mass, [0.0; 3]);
+        self.model.particles.push(SceneParticle { position, mass, pinned, velocity });
+    }
+
+    /// Appends a constraint whose rest length is the distance of its particles.
+    pub(super) fn link(&mut self, pair: [u32; 2], kind: ConstraintKind) {
+        self.push_link(pair, kind, None);
+    }
+
+    /// Appends a constraint of a family of independent constraints.
+    pub(super) fn family_link(&mut self, pair: [u32; 2], kind: ConstraintKind, family: u32) {
+        self.push_link(pair, kind, Some(family));
+    }
+
+    fn push_link(&mut self, pair: [u32; 2], kind: ConstraintKind, family: Option<u32>) {
+        let [a, b] = pair.map(|index| self.first + index);
+        let rest_length = self.model.distance(a, b);
+        let compliance = self.softness.value(kind);
+        self.model.push(Constraint { a, b, rest_length, compliance, kind }, family);
+    }
+
+    /// Declares the shape a sheet. All of its links must be family links.
+    pub(super) fn sheet(&mut self, columns: u32, rows: u32) {
+        self.model.sheets.push(Sheet { first: self.first, columns, rows });
+    }
+
+    /// Appends a triangle of the surface.
+    pub(super) fn triangle(&mut self, corners: [u32; 3]) {
+        self.model.triangles.push(corners.map(|corner| self.first + corner));
+    }
+}
+
+/// Interpolates linearly between two points and rounds once.
+pub(super) fn interpolate(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
+    let along = |axis: usize| {
+        let (from, to) = (f64::from(from[axis]), f64::from(to[axis]));
+        round(from + (to - from) * share)
+    };
+    [along(0), along(1), along(2)]
+}
+
+/// Rounds to the scene's f32.
+#[allow(clippy::cast_possible_truncation, reason = "the one rounding to the scene's f32")]
+pub(super) fn round(value: f64) -> f32 {
+    value as f32
+}

@@ -1,0 +1,111 @@
+//! The table `[[anchor]]`.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::reader::Reader;
+use super::value::{Number, Quaternion, Table, TableKeys, Tables, Vector, Whole};
+use crate::scene::definition::anchor::{SceneAnchor, Waypoint};
+use crate::scene::error::SceneError;
+use crate::scene::model::Model;
+
+/// Largest time of a waypoint in seconds (30 years). In f64 it still resolves microseconds.
+const TIME_MAX: f64 = 1e9;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FileAnchor {
+    particles: Option<Spanned<Vec<Whole>>>,
+    origin: Option<Vector>,
+    #[serde(default)]
+    path: Tables<FileWaypoint>,
+    repeat: Option<Spanned<bool>>,
+}
+
+impl TableKeys for FileAnchor {}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileWaypoint {
+    time: Option<Number>,
+    translation: Option<Vector>,
+    rotation: Option<Quaternion>,
+}
+
+impl TableKeys for FileWaypoint {
+    const FORM: &'static str = "a table of time, translation and rotation";
+}
+
+impl Reader<'_> {
+    /// Checks a table `[[anchor]]`. `is_anchored` marks the particles of the anchors before it, and
+    /// is updated.
+    pub(super) fn anchor(
+        &self,
+        index: usize,
+        table: &Spanned<Table<FileAnchor>>,
+        model: &Model,
+        is_anchored: &mut [bool],
+    ) -> Result<SceneAnchor, SceneError> {
+        let field = |key: &str| format!("anchor[{index}].{key}");
+        let file = table.get_ref();
+        let list = file.particles.as_ref();
+        let list = self.required(list, table.span(), &field("particles"), "a list of indices")?;
+        let mut particles = Vec::with_capacity(list.get_ref().len());
+        for particle in list.get_ref() {
+            let anchored = self.particle_index(&field("particles"), particle, model)?;
+            if std::mem::replace(&mut is_anchored[anchored as usize], true) {
+                let problem =
+                    format!("particle {anchored} occurs in an anchor twice (allowed: once)");
+                return self.error(particle.span(), &field("particles"), problem);
+            }
+            particles.push(anchored);
+        }
+        particles.sort_unstable();
+        let path = self.path(&field("path"), &file.path)?;
+        let repeat = file.repeat.as_ref().is_some_and(|repeat| *repeat.get_ref());
+        if let Some(given) = file.repeat.as_ref().filter(|_| repeat && path.len() < 2) {
+            let problem = "a path of fewer than two points cannot repeat (allowed: false)";
+            return self.error(given.span(), &field("repeat"), problem);
+        }
+        let origin = self.vector_or(&field("origin"), file.origin.as_ref(), [0.0; 3])?;
+        Ok(SceneAnchor { particles, origin, repeat, path })
+    }
+
+    fn path(&self, field: &str, file: &Tables<FileWaypoint>) -> Result<Vec<Waypoint>, SceneError> {
+        let mut path: Vec<Waypoint> = Vec::with_capacity(file.len());
+        for (index, table) in file.iter().enumerate() {
+            let field = format!("{field}[{index}]");
+            let waypoint = self.waypoint(&field, table)?;
+            if let Some(previous) = path.last().filter(|previous| previous.time >= waypoint.time) {
+                let problem = format!(
+                    "{} is not after {} (allowed: ascending times)",
+                    waypoint.time, previous.time
+                );
+                let span = table.get_ref().time.as_ref().map_or(table.span(), Spanned::span);
+                return self.error(span, &format!("{field}.time"), problem);
+            }
+            path.push(waypoint);
+        }
+        Ok(path)
+    }
+
+    fn waypoint(
+        &self,
+        field: &str,
+        table: &Spanned<Table<FileWaypoint>>,
+    ) -> Result<Waypoint, SceneError> {
+        let field = |key: &str| format!("{field}.{key}");
+        let file = table.get_ref();
+        let allowed = format!("0 to {TIME_MAX:e} s");
+        let number = self.required(file.time.as_ref(), table.span(), &field("time"), &allowed)?;
+        let time = *number.get_ref();
+        if !(0.0..=TIME_MAX).contains(&time) {
+            let problem = format!("{time} is out of range (allowed: {allowed})");
+            return self.error(number.span(), &field("time"), problem);
+        }
+        let translation = file.translation.as_ref();
+        let translation = self.vector_or(&field("translation"), translation, [0.0; 3])?;
+        let rotation = self.rotation(&field("rotation"), file.rotation.as_ref())?;
+        Ok(Waypoint { time, translation, rotation })
+    }
+}

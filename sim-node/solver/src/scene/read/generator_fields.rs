@@ -1,0 +1,138 @@
+//! Checks of single keys of a generator.
+
+use std::ops::Range;
+
+use sim_types::{NumberRange, Parameter};
+
+use super::generator_file::{FileGenerator, FilePinned, FileSoftness};
+use super::reader::{Reader, SIZE};
+use super::value::{Number, Vector, Whole};
+use crate::scene::definition::ELEMENTS_MAX;
+use crate::scene::definition::softness::{KindSoftness, Softness, SoftnessValues};
+use crate::scene::error::SceneError;
+use crate::scene::generate::pinned::Pinned;
+
+/// The keys of one generator.
+pub(super) struct GeneratorFields<'r, 't> {
+    pub(super) reader: &'r Reader<'t>,
+    pub(super) file: &'r FileGenerator,
+    pub(super) index: usize,
+    /// Place of the table in the text.
+    pub(super) span: Range<usize>,
+}
+
+impl GeneratorFields<'_, '_> {
+    /// Returns the path of a key.
+    pub(super) fn name(&self, key: &str) -> String {
+        format!("generate[{}].{key}", self.index)
+    }
+
+    pub(super) fn required<'f, T>(
+        &self,
+        key: &str,
+        value: Option<&'f T>,
+        allowed: &str,
+    ) -> Result<&'f T, SceneError> {
+        self.reader.required(value, self.span.clone(), &self.name(key), allowed)
+    }
+
+    /// Returns a required number in a range.
+    pub(super) fn number(
+        &self,
+        key: &str,
+        value: Option<&Number>,
+        range: NumberRange,
+    ) -> Result<f32, SceneError> {
+        self.reader.ranged(&self.name(key), self.required(key, value, range.text)?, range)
+    }
+
+    /// Returns a required size.
+    pub(super) fn size(&self, key: &str, value: Option<&Number>) -> Result<f32, SceneError> {
+        self.number(key, value, SIZE)
+    }
+
+    /// Returns a required count of at least `min`.
+    pub(super) fn count(
+        &self,
+        key: &str,
+        value: Option<&Whole>,
+        min: u32,
+    ) -> Result<u32, SceneError> {
+        let value = self.required(key, value, &format!("a whole number >= {min}"))?;
+        self.reader.whole(&self.name(key), value, min..=ELEMENTS_MAX)
+    }
+
+    /// Returns a required vector.
+    pub(super) fn vector(&self, key: &str, value: Option<&Vector>) -> Result<[f32; 3], SceneError> {
+        let value = self.required(key, value, "three numbers")?;
+        self.reader.vector(&self.name(key), value)
+    }
+
+    pub(super) fn vector_or(
+        &self,
+        key: &str,
+        value: Option<&Vector>,
+        default: [f32; 3],
+    ) -> Result<[f32; 3], SceneError> {
+        self.reader.vector_or(&self.name(key), value, default)
+    }
+
+    pub(super) fn mass(&self) -> Result<f32, SceneError> {
+        self.reader.mass(&self.name("mass"), self.file.mass.as_ref())
+    }
+
+    pub(super) fn tear_stretch(&self) -> Result<Option<f32>, SceneError> {
+        let Some(number) = &self.file.tear_stretch else { return Ok(None) };
+        let field = self.name("tear_stretch");
+        self.reader.limit(&field, number, Parameter::TearStretch).map(Some)
+    }
+
+    pub(super) fn softness(&self) -> Result<KindSoftness, SceneError> {
+        let reader = self.reader;
+        let (compliance, stiffness) = (self.file.compliance.as_ref(), self.file.stiffness.as_ref());
+        let key = reader.softness_key(|key| self.name(key), compliance, stiffness)?;
+        let Some((name, table)) = key else { return Ok(KindSoftness::rigid(reader.method)) };
+        let FileSoftness { structural, shear, bend } = &**table.get_ref();
+        let value = |kind: &str, number: &Option<Number>| match number {
+            Some(number) => reader.softness(&self.name(&format!("{name}.{kind}")), number),
+            None => Ok(Softness::rigid(reader.method).value()),
+        };
+        let values = SoftnessValues {
+            structural: value("structural", structural)?,
+            shear: value("shear", shear)?,
+            bend: value("bend", bend)?,
+        };
+        Ok(KindSoftness::new(reader.method, values))
+    }
+
+    /// Returns the pinned particles of a shape of `count` particles. The first word is the default.
+    pub(super) fn pinned(&self, words: &[&'static str], count: u64) -> Result<Pinned, SceneError> {
+        let Some(pinned) = &self.file.pinned else { return Ok(Pinned::Word(words[0])) };
+        let problem = match pinned.get_ref() {
+            FilePinned::Word(word) => match words.iter().find(|known| *known == word) {
+                Some(known) => return Ok(Pinned::Word(known)),
+                None => format!(
+                    "\"{word}\" is unknown (allowed: {} or a list of indices)",
+                    words.join(", ")
+                ),
+            },
+            FilePinned::List(list) => match indices_below(list, count) {
+                Ok(list) => return Ok(Pinned::List(list)),
+                Err(index) => format!("{index} is out of range (allowed: 0 to {})", count - 1),
+            },
+        };
+        self.reader.error(pinned.span(), &self.name("pinned"), problem)
+    }
+}
+
+/// Returns the indices ascending and without duplicates, or the first that is not below `count`.
+fn indices_below(list: &[i64], count: u64) -> Result<Vec<u32>, i64> {
+    let index = |index: &i64| match u32::try_from(*index) {
+        Ok(small) if u64::from(small) < count => Ok(small),
+        _ => Err(*index),
+    };
+    let mut list = list.iter().map(index).collect::<Result<Vec<_>, _>>()?;
+    list.sort_unstable();
+    list.dedup();
+    Ok(list)
+}

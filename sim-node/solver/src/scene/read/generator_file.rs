@@ -1,0 +1,104 @@
+//! The keys of `[[generate]]`, before any check.
+
+use std::ops::Range;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::value::{Number, Table, TableKeys, Vector, Whole, Word};
+
+/// The keys of all shapes. The keys of each shape are checked later.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FileGenerator {
+    pub(super) shape: Option<Word>,
+    pub(super) mass: Option<Number>,
+    pub(super) compliance: Option<Spanned<Table<FileSoftness>>>,
+    pub(super) stiffness: Option<Spanned<Table<FileSoftness>>>,
+    pub(super) tear_stretch: Option<Number>,
+    pub(super) pinned: Option<Spanned<FilePinned>>,
+    pub(super) columns: Option<Whole>,
+    pub(super) rows: Option<Whole>,
+    pub(super) spacing: Option<Number>,
+    pub(super) origin: Option<Vector>,
+    pub(super) right: Option<Vector>,
+    pub(super) down: Option<Vector>,
+    pub(super) links: Option<Spanned<Vec<Word>>>,
+    pub(super) diagonals: Option<Whole>,
+    pub(super) count: Option<Whole>,
+    pub(super) from: Option<Vector>,
+    pub(super) to: Option<Vector>,
+    pub(super) center: Option<Vector>,
+    pub(super) radius: Option<Number>,
+    pub(super) spokes: Option<Whole>,
+    pub(super) rings: Option<Whole>,
+    pub(super) normal: Option<Vector>,
+    pub(super) planks: Option<Whole>,
+    pub(super) width: Option<Number>,
+    pub(super) height: Option<Number>,
+    pub(super) path: Option<Word>,
+    pub(super) density: Option<Number>,
+    pub(super) vertices: Option<Spanned<Vec<Vector>>>,
+    pub(super) faces: Option<Spanned<Vec<Vec<i64>>>>,
+}
+
+impl TableKeys for FileGenerator {}
+
+/// A softness for each kind of constraint.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FileSoftness {
+    pub(super) structural: Option<Number>,
+    pub(super) shear: Option<Number>,
+    pub(super) bend: Option<Number>,
+}
+
+impl TableKeys for FileSoftness {
+    const FORM: &'static str = "a table { structural, shear, bend }";
+}
+
+/// The pinned particles of a shape: a word, or a list of indices within the shape.
+#[derive(Debug, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "is neither a word nor a list of whole numbers (allowed: a word in quotes or a \
+                 list of indices)"
+)]
+pub(super) enum FilePinned {
+    Word(String),
+    List(Vec<i64>),
+}
+
+impl FileGenerator {
+    /// Returns the places of the keys that belong to single shapes.
+    pub(super) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 23] {
+        fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
+            value.map(Spanned::span)
+        }
+        [
+            ("columns", span(self.columns.as_ref())),
+            ("rows", span(self.rows.as_ref())),
+            ("spacing", span(self.spacing.as_ref())),
+            ("origin", span(self.origin.as_ref())),
+            ("right", span(self.right.as_ref())),
+            ("down", span(self.down.as_ref())),
+            ("links", span(self.links.as_ref())),
+            ("diagonals", span(self.diagonals.as_ref())),
+            ("count", span(self.count.as_ref())),
+            ("from", span(self.from.as_ref())),
+            ("to", span(self.to.as_ref())),
+            ("center", span(self.center.as_ref())),
+            ("radius", span(self.radius.as_ref())),
+            ("spokes", span(self.spokes.as_ref())),
+            ("rings", span(self.rings.as_ref())),
+            ("normal", span(self.normal.as_ref())),
+            ("planks", span(self.planks.as_ref())),
+            ("width", span(self.width.as_ref())),
+            ("height", span(self.height.as_ref())),
+            ("path", span(self.path.as_ref())),
+            ("density", span(self.density.as_ref())),
+            ("vertices", span(self.vertices.as_ref())),
+            ("faces", span(self.faces.as_ref())),
+        ]
+    }
+}

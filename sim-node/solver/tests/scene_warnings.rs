@@ -1,0 +1,128 @@
+//! Warnings about scenes that work, but probably not as intended.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use sim_solver::Scene;
+
+/// Two particles, 1 m apart, with a rigid constraint.
+const PAIR: &str = "[[particle]]\nposition = [0, 0, 0]\n[[particle]]\nposition = [1, 0, 0]\n\
+     [[constraint]]\nparticles = [0, 1]\n";
+
+fn warnings(text: &str) -> Vec<String> {
+    Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap().warnings()
+}
+
+/// Asserts that a scene has one warning, which begins with these words.
+#[track_caller]
+fn assert_warns(text: &str, expected: &str) {
+    let warnings = warnings(text);
+    assert_eq!(warnings.len(), 1, "{text}\n{warnings:?}");
+    assert!(warnings[0].starts_with(expected), "{}\n  instead of\n{expected}", warnings[0]);
+}
+
+#[test]
+fn constraints_that_tear_by_the_errors_of_the_solver_cause_a_warning() {
+    let rigid = "constraint 0 is rigid and tears by stretch";
+    assert_warns(&format!("{PAIR}tear_stretch = 1.5\n"), rigid);
+    assert_warns(
+        &format!("{PAIR}compliance = 1e-3\ntear_stretch = 1.5\nmax_stretch = 1.2\n"),
+        "constraint 0 is kept within a max_stretch that is not above its tear_stretch",
+    );
+    assert_warns(
+        &format!("[solver]\nrate_hz = 1000\nsubsteps = 20\n{PAIR}tear_force = 50\n"),
+        "constraint 0 is rigid and tears at 50 N, but the rounding",
+    );
+    let none = format!("{PAIR}tear_force = 10\nmax_stretch = 1.2\ntear_stretch = inf\n");
+    assert!(warnings(&none).is_empty());
+}
+
+#[test]
+fn constraints_without_direction_and_duplicates_cause_a_warning() {
+    assert_warns(
+        &format!("{}rest_length = 1\n", PAIR.replace("[1, 0, 0]", "[0, 0, 0]")),
+        "particles 0 and 1 coincide",
+    );
+    assert_warns(
+        &format!("{PAIR}[[constraint]]\nparticles = [1, 0]\n"),
+        "two constraints join particles 1 and 0",
+    );
+}
+
+#[test]
+fn settings_without_effect_cause_a_warning() {
+    assert_warns(&format!("[solver]\ntethers = true\n{PAIR}"), "tethers = true has no effect");
+    assert_warns(&format!("[wind]\nvelocity = [1, 0, 0]\n{PAIR}"), "the wind has no effect");
+    assert_warns(&format!("up = \"-y\"\n{PAIR}"), "up is \"-y\", but gravity points up, too");
+    assert_warns(
+        &format!("[solver]\norder = \"listed\"\n{PAIR}"),
+        "order = \"listed\" with one iteration gains energy",
+    );
+    let pinned = PAIR.replace("[1, 0, 0]", "[1, 0, 0]\npinned = true");
+    assert_warns(
+        &format!("[[anchor]]\nparticles = [1]\n{pinned}"),
+        "particle 1 is pinned and follows an anchor: the pin has no effect",
+    );
+}
+
+#[test]
+fn great_distances_and_mass_ratios_cause_a_warning() {
+    assert_warns(
+        &PAIR.replace("[1, 0, 0]", "[101, 0, 0]"),
+        "a coordinate reaches 101 m from the origin",
+    );
+    assert_warns(
+        &PAIR.replace("[1, 0, 0]", "[1, 0, 0]\nmass = 2000"),
+        "masses range from 1 to 2000 kg",
+    );
+}
+
+/// A sphere of 0.5 m about the origin.
+const SPHERE: &str = "[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 0.5\n";
+
+#[test]
+fn a_particle_inside_a_collider_causes_a_warning() {
+    assert_warns(
+        &format!("{PAIR}{SPHERE}"),
+        "1 particle starts inside a collider, the deepest is particle 0, 0.5 m inside collider 0",
+    );
+}
+
+#[test]
+fn the_deepest_particle_of_a_collider_is_named_and_not_the_first() {
+    let particle = |x: f32| format!("[[particle]]\nposition = [{x}, 0, 0]\n");
+    let row: String = [0.375, 0.125, 0.25, 2.0].map(particle).concat();
+    assert_warns(
+        &format!("{row}{SPHERE}"),
+        "3 particles start inside a collider, the deepest is particle 1, 0.375 m inside collider 0",
+    );
+    // Particle 0 is 1/8 m inside the sphere, and 3/8 m inside the floor.
+    let floor = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0.375\n";
+    assert_warns(
+        &format!("{}{SPHERE}{floor}", particle(0.375)),
+        "1 particle starts inside a collider, the deepest is particle 0, 0.375 m inside collider 1",
+    );
+}
+
+#[test]
+fn an_empty_scene_causes_a_warning() {
+    assert_warns("", "the scene has no particles");
+}
+
+#[test]
+fn a_rope_of_zero_length_causes_a_warning() {
+    let rope = "[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 1, 0]\nto = [0, 1, 0]\n";
+    assert_warns(rope, "generate[0]: the rope has no length, because from and to are equal");
+    let bridge = rope.replace("rope", "bridge").replace("count", "width = 1\nplanks");
+    assert_warns(&bridge, "generate[0]: the bridge has no length");
+}
+
+#[test]
+fn pins_that_match_no_particle_cause_a_warning() {
+    let rope = "[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 1, 0]\nto = [1, 1, 0]\n";
+    assert_warns(&format!("{rope}pinned = []\n"), "generate[0].pinned matches no particle");
+    assert!(warnings(&format!("{rope}pinned = \"none\"\n")).is_empty());
+    let mesh = "[[generate]]\nshape = \"obj\"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n\
+         faces = [[0, 1, 2]]\n";
+    assert_warns(&format!("{mesh}pinned = \"y > 1.5\"\n"), "generate[0].pinned matches no");
+    assert!(warnings(&format!("{mesh}pinned = \"y > 0.5\"\n")).is_empty());
+    assert_warns(&format!("[[anchor]]\nparticles = []\n{PAIR}"), "anchor[0].particles is empty");
+}

@@ -1,0 +1,309 @@
+//! Publishes the state of the solver to other processes.
+
+mod load;
+mod status;
+
+use anyhow::Context;
+use bytemuck::cast;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{
+    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus, Outcome,
+    Owner, OwnerError, ParameterValues, ParticleState, Reason, SnapshotFlags, SnapshotHeader,
+    TearsHeader, TornConstraint, Wake,
+};
+use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
+
+use load::{LoadPlace, count, to_collider_state, with_load};
+
+/// Solver time and lateness of a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct StepTimes {
+    pub(crate) wake_late_ns: u64,
+    pub(crate) solve_ns: u64,
+}
+
+/// Position of the run and state of the loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Position {
+    pub(crate) step: u64,
+    pub(crate) is_paused: bool,
+    /// Simulated time per wall-clock time.
+    pub(crate) time_scale: f64,
+    /// No further step follows for now, so late subscribers need this one.
+    pub(crate) is_last: bool,
+}
+
+/// Writes snapshots, keyframes, outcomes and status.
+#[derive(Debug)]
+pub(crate) struct Publisher {
+    owner: Owner,
+    run_id: u64,
+    rate_hz: u32,
+    /// Loads of this run after the first one.
+    topology_revision: u32,
+    /// Number of steps between published snapshots. The last one before a pause is always published.
+    every: u64,
+    /// Header of the newest published snapshot.
+    last: SnapshotHeader,
+    /// The next snapshot needs a keyframe.
+    is_keyframe_due: bool,
+    keyframe_step: u64,
+    keyframe_readers: usize,
+    /// Outcomes of the waiting boundary that are not published yet.
+    outcomes: Vec<Outcome>,
+    outcome_count: u64,
+    rejected_count: u64,
+    /// Last published parameters.
+    parameters: ParameterValues,
+    /// Number of torn constraints, and the colliders, as last published.
+    torn_count: usize,
+    colliders: Vec<PlacedCollider>,
+}
+
+impl Publisher {
+    /// Takes the name and publishes the scene.
+    pub(crate) fn new(
+        endpoint: &Endpoint,
+        scene: &Scene,
+        solver: &Solver,
+        every: u64,
+    ) -> anyhow::Result<Self> {
+        let run_id = getrandom::u64().context("no random number for the run")?;
+        let parameters = parameter_values(solver, 1.0);
+        let place = LoadPlace { run_id, step: 0, topology_revision: 0, parameters };
+        let owner = with_load(scene, solver, place, |load| Owner::create(endpoint, load))?;
+        Ok(Self {
+            owner,
+            run_id,
+            rate_hz: scene.solver.rate_hz,
+            topology_revision: 0,
+            every,
+            last: SnapshotHeader::default(),
+            is_keyframe_due: true,
+            keyframe_step: 0,
+            keyframe_readers: 0,
+            outcomes: Vec::new(),
+            outcome_count: 0,
+            rejected_count: 0,
+            parameters,
+            torn_count: 0,
+            colliders: Vec::new(),
+        })
+    }
+
+    /// Publishes another scene; `step` is the first step that shows it.
+    ///
+    /// # Errors
+    /// The scene exceeds a limit of the contract or of shared memory; the old one stays published.
+    pub(crate) fn load(
+        &mut self,
+        scene: &Scene,
+        solver: &Solver,
+        step: u64,
+        time_scale: f64,
+    ) -> Result<(), OwnerError> {
+        let topology_revision = self.topology_revision + 1;
+        let parameters = parameter_values(solver, time_scale);
+        let place = LoadPlace { run_id: self.run_id, step, topology_revision, parameters };
+        with_load(scene, solver, place, |load| self.owner.load(load))?;
+        self.parameters = parameters;
+        self.topology_revision = topology_revision;
+        self.torn_count = 0;
+        self.colliders.clear();
+        Ok(())
+    }
+
+    /// Appends the commands that have arrived.
+    pub(crate) fn receive_commands(&self, commands: &mut Vec<Command>) {
+        self.owner.receive_commands(commands);
+    }
+
+    /// Logs the result of a command at the boundary before `step`.
+    pub(crate) fn add_outcome(
+        &mut self,
+        step: u64,
+        command: Command,
+        result: Result<Applied, Reason>,
+    ) {
+        let outcome = Outcome::new(self.outcome_count, step, command, result.map(|_| ()));
+        self.outcomes.push(Outcome { run_id: self.run_id, ..outcome });
+        self.outcome_count += 1;
+        self.rejected_count += u64::from(result.is_err());
+        self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
+    }
+
+    /// Publishes everything that belongs to a step, the particles last, and wakes the readers.
+    pub(crate) fn publish_step(
+        &mut self,
+        solver: &Solver,
+        position: Position,
+        times: StepTimes,
+    ) -> anyhow::Result<()> {
+        self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
+        self.publish_colliders(solver, position.step)?;
+        self.publish_tears(solver, position.step)?;
+        if !(position.step.is_multiple_of(self.every) || position.is_last) {
+            return self.publish_outcomes();
+        }
+        self.watch_keyframe_readers();
+        if self.is_keyframe_due {
+            self.publish_keyframe(solver, position)?;
+        }
+        self.publish_outcomes()?;
+        self.last = self.header(solver, position, times);
+        let particle = |index| cast::<_, ParticleState>(solver.particle(index));
+        self.owner.publish_particles(&self.last, particle)?;
+        self.owner.wake(Wake::Frame);
+        Ok(())
+    }
+
+    /// Publishes the colliders if they differ from the last published ones.
+    fn publish_colliders(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
+        if solver.colliders().eq(self.colliders.iter().copied()) {
+            return Ok(());
+        }
+        self.colliders.clear();
+        self.colliders.extend(solver.colliders());
+        let states: Vec<_> = self.colliders.iter().map(to_collider_state).collect();
+        let header = CollidersHeader { run_id: self.run_id, step, ..CollidersHeader::default() };
+        Ok(self.owner.publish_colliders(header, &states)?)
+    }
+
+    /// Publishes all torn constraints if a constraint tore or was restored in this step.
+    fn publish_tears(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
+        let (torn, new_count) = (solver.torn(), solver.new_torn_count());
+        if new_count == 0 && torn.len() == self.torn_count {
+            return Ok(());
+        }
+        self.torn_count = torn.len();
+        let header = TearsHeader {
+            run_id: self.run_id,
+            step,
+            since_step: step - solver.scene_step(),
+            new_count: count(new_count),
+            ..TearsHeader::default()
+        };
+        let torn: Vec<_> = torn
+            .iter()
+            .zip(solver.tear_causes())
+            .map(|(constraint, cause)| TornConstraint::new(*constraint, Some(*cause)))
+            .collect();
+        self.owner.publish_tears(header, &torn)?;
+        self.owner.wake(Wake::Tears);
+        Ok(())
+    }
+
+    /// Publishes the parameters if they differ from the ones published last. `step` is the first
+    /// step that they apply to.
+    pub(crate) fn publish_parameters(
+        &mut self,
+        solver: &Solver,
+        step: u64,
+        time_scale: f64,
+    ) -> anyhow::Result<()> {
+        let values = parameter_values(solver, time_scale);
+        if values == self.parameters {
+            return Ok(());
+        }
+        self.parameters = values;
+        Ok(self.owner.publish_parameters(self.run_id, step, &values)?)
+    }
+
+    /// Publishes outcomes while the node waits, and a keyframe of the last snapshot for a reader that
+    /// has joined since. A command that has changed the waiting state makes that keyframe
+    /// impossible; the reader then receives the one of the next snapshot.
+    pub(crate) fn publish_between(
+        &mut self,
+        solver: &Solver,
+        position: Position,
+    ) -> anyhow::Result<()> {
+        self.watch_keyframe_readers();
+        let is_untouched =
+            self.last.step == position.step && self.last.outcome_count == self.outcome_count;
+        if self.is_keyframe_due && is_untouched {
+            self.publish_keyframe(solver, position)?;
+            self.owner.wake(Wake::Frame);
+        }
+        self.publish_outcomes()
+    }
+
+    fn publish_outcomes(&mut self) -> anyhow::Result<()> {
+        if self.outcomes.is_empty() {
+            return Ok(());
+        }
+        for outcome in self.outcomes.drain(..) {
+            self.owner.publish_outcome(&outcome)?;
+        }
+        self.owner.wake(Wake::Outcome);
+        Ok(())
+    }
+
+    fn watch_keyframe_readers(&mut self) {
+        let readers = self.owner.keyframe_reader_count();
+        self.is_keyframe_due |= readers > self.keyframe_readers;
+        self.keyframe_readers = readers;
+    }
+
+    fn publish_keyframe(&mut self, solver: &Solver, position: Position) -> anyhow::Result<()> {
+        let mut keyframe = solver.keyframe();
+        keyframe.paused = position.is_paused;
+        let bytes = keyframe.encode();
+        let header = KeyframeHeader {
+            run_id: self.run_id,
+            step: position.step,
+            size_bytes: bytes.len() as u64,
+        };
+        self.owner.publish_keyframe(header, &bytes)?;
+        self.is_keyframe_due = false;
+        self.keyframe_step = position.step;
+        Ok(())
+    }
+
+    fn header(&self, solver: &Solver, position: Position, times: StepTimes) -> SnapshotHeader {
+        SnapshotHeader {
+            contract_version: CONTRACT_VERSION,
+            solver_version: SOLVER_VERSION,
+            run_id: self.run_id,
+            step: position.step,
+            scene_step: solver.scene_step(),
+            keyframe_step: self.keyframe_step,
+            sim_time_ns: time_of_step_ns(position.step, self.rate_hz),
+            publish_monotonic_ns: monotonic_ns(),
+            state_hash: solver.state_hash(),
+            outcome_count: self.outcome_count,
+            wake_late_ns: times.wake_late_ns,
+            solve_ns: times.solve_ns,
+            topology_revision: self.topology_revision,
+            torn_count: count(solver.torn().len()),
+            particle_count: count(solver.particle_count()),
+            flags: if position.is_paused { SnapshotFlags::PAUSED } else { 0 },
+            stride: u32::try_from(self.every).unwrap_or(u32::MAX),
+            spare: 0,
+        }
+    }
+
+    /// Gives late subscribers the latest message of each service that is seldom written.
+    pub(crate) fn refresh(&self) {
+        self.owner.refresh();
+    }
+
+    pub(crate) fn publish_status(&self, status: &NodeStatus) -> anyhow::Result<()> {
+        self.owner.publish_status(status)?;
+        self.owner.wake(Wake::Status);
+        Ok(())
+    }
+}
+
+/// Parameters of a solver with the time scale of the node.
+fn parameter_values(solver: &Solver, time_scale: f64) -> ParameterValues {
+    #[allow(clippy::cast_possible_truncation, reason = "it came from an f32")]
+    let time_scale = time_scale as f32;
+    ParameterValues { time_scale, ..solver.parameter_values() }
+}
+
+/// step / rate in nanoseconds, rounded down. Whole seconds apart from the rest, so that nothing
+/// overflows.
+fn time_of_step_ns(step: u64, rate_hz: u32) -> u64 {
+    let rate_hz = u64::from(rate_hz);
+    step / rate_hz * SECOND_NS + step % rate_hz * SECOND_NS / rate_hz
+}

@@ -1,0 +1,66 @@
+//! Number of threads of the solver. It changes no bit.
+
+use std::num::NonZero;
+use std::thread::available_parallelism;
+
+use sim_solver::{Solver, THREADS_MAX};
+
+/// Number of particles from which on the default is more than one thread. The solver does not divide
+/// smaller scenes.
+const SHARED_MIN: usize = 4000;
+
+/// Starts the threads of a new solver: the requested number, or the default of its scene. No step
+/// starts a thread.
+pub(crate) fn with_threads(mut solver: Solver, requested: Option<u8>) -> Solver {
+    let by_default = || {
+        // One core, if the system does not tell their number.
+        let core_count = available_parallelism().map_or(1, NonZero::get);
+        default_count(solver.particle_count(), core_count)
+    };
+    let count = requested.map_or_else(by_default, usize::from);
+    solver.set_threads(count);
+    solver
+}
+
+/// Default number of threads: 1 for a small scene, else one less than the cores available to this
+/// process, at least 1 and at most [`THREADS_MAX`]. Threads wait for each other several times per
+/// substep, so a thread that shares its core delays all of them.
+fn default_count(particle_count: usize, core_count: usize) -> usize {
+    if particle_count < SHARED_MIN {
+        return 1;
+    }
+    core_count.saturating_sub(1).clamp(1, usize::from(THREADS_MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    //! Checks the rule, and that requested and default numbers reach the solver.
+    use sim_solver::Scene;
+
+    use super::*;
+
+    #[test]
+    fn a_small_scene_has_one_thread_and_a_large_one_all_cores_but_one() {
+        for (particle_count, core_count, expected) in [
+            (0, 16, 1),
+            (3999, 16, 1),
+            (4000, 1, 1),
+            (4000, 2, 1),
+            (4000, 3, 2),
+            (1 << 24, 16, 15),
+            (1 << 24, 65, 64),
+            (1 << 24, 1024, 64),
+        ] {
+            let count = default_count(particle_count, core_count);
+            assert_eq!(count, expected, "{particle_count} particles, {core_count} cores");
+        }
+    }
+
+    #[test]
+    fn a_solver_has_the_requested_threads_or_the_default_of_its_scene() {
+        let empty = || Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
+        assert_eq!(with_threads(empty(), Some(3)).threads(), 3);
+        assert_eq!(with_threads(empty(), Some(1)).threads(), 1);
+        assert_eq!(with_threads(empty(), None).threads(), 1);
+    }
+}
