@@ -136,7 +136,7 @@ fn commands_that_cannot_apply_are_refused_and_nothing_is_written() {
 }
 
 #[test]
-fn a_named_pipe_is_refused_without_waiting_for_a_writer() {
+fn a_fifo_is_refused_without_waiting_for_a_writer() {
     let sandbox = Sandbox::new();
     for (name, make) in [
         ("pipe.toml", ["simulate", "--steps", "1"].as_slice()),
@@ -153,7 +153,7 @@ fn a_named_pipe_is_refused_without_waiting_for_a_writer() {
         )
         .unwrap();
         let args: Vec<_> = make.iter().copied().chain([pipe.as_str()]).collect();
-        assert_refused(&recorder(&sandbox, &args), &[&pipe, "named pipe"]);
+        assert_refused(&recorder(&sandbox, &args), &[&pipe, "FIFO"]);
     }
 }
 

@@ -50,7 +50,7 @@ mod tests {
         mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
         let path = path.to_str().unwrap();
         let error = load_scene(path).unwrap_err().to_string();
-        fs::remove_file(path).unwrap();
+        std::fs::remove_file(path).unwrap();
         assert_eq!(
             error,
             format!("{path}: cannot read the scene: it is a FIFO, not a regular file")

@@ -9,7 +9,7 @@ use rustix::fs::OFlags;
 
 /// Opens a regular file for reading.
 ///
-/// A named pipe is refused, because opening it would block until another process writes to it.
+/// A FIFO (named pipe) is refused, because opening it would block until another process writes to it.
 ///
 /// # Errors
 /// If the path is not a regular file or the operating system reports an error.
@@ -26,7 +26,7 @@ fn check_type(file_type: FileType) -> io::Result<()> {
     let name = match file_type {
         _ if file_type.is_file() => return Ok(()),
         _ if file_type.is_dir() => "a directory",
-        _ if file_type.is_fifo() => "a named pipe",
+        _ if file_type.is_fifo() => "a FIFO",
         _ if file_type.is_socket() => "a socket",
         _ => "a device",
     };
@@ -42,13 +42,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_named_pipe_a_directory_and_a_device_are_refused_without_blocking() {
+    fn a_fifo_a_directory_and_a_device_are_refused_without_blocking() {
         let pipe = std::env::temp_dir().join(format!("open-regular-file-{}", process::id()));
         mknodat(CWD, &pipe, NodeType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
         let error_text = |path: &Path| open_regular_file(path).unwrap_err().to_string();
         let pipe_error = error_text(&pipe);
         fs::remove_file(&pipe).unwrap();
-        assert_eq!(pipe_error, "it is a named pipe, not a regular file");
+        assert_eq!(pipe_error, "it is a FIFO, not a regular file");
         let folder = error_text(&std::env::temp_dir());
         assert_eq!(folder, "it is a directory, not a regular file");
         let device = error_text(Path::new("/dev/null"));
