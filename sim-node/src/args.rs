@@ -7,6 +7,7 @@ mod lesson;
 mod refusal;
 mod run;
 mod scene;
+mod value;
 
 use std::ffi::OsString;
 
@@ -194,7 +195,6 @@ mod tests {
     fn unknown_options_and_stray_numbers_are_refused_without_advice_to_escape_them() {
         for (line, problem) in [
             ("sim-node ctl pin -1", "the negative number '-1' is not allowed here"),
-            ("sim-node run --steps -5", "the negative number '-5' is not allowed here"),
             ("sim-node ctl status -3", "the negative number '-3' is not allowed here"),
             ("sim-node ctl grab 3 -1 -2 0 --fast", "there is no option '--fast' here"),
             ("sim-node run --spee 3", "there is no option '--spee' here"),

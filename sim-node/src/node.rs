@@ -24,11 +24,11 @@ use warnings::Warnings;
 
 /// Time between two status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
-/// Time between two looks for commands while the next step is far away: an answer comes within it,
-/// and a rate of 50 Hz or more in real time costs no further wake-ups.
+/// Polling interval for commands while the next step is far away. It bounds the wait for an outcome,
+/// and adds no wake-ups at 50 Hz or more in real time.
 const WAITING_POLL_NS: u64 = SECOND_NS / 50;
-/// Time between two looks for commands while paused: shorter, because the first step of `ctl step`
-/// or `resume` follows at once.
+/// Polling interval for commands while paused. It is shorter, because the first step after `step` or
+/// `resume` follows at once.
 const PAUSED_POLL_NS: u64 = SECOND_NS / 500;
 
 /// Options of a run.
@@ -130,8 +130,8 @@ impl Node {
         self.options.steps.is_some_and(|steps| self.step >= steps)
     }
 
-    /// Waits for the deadline of the next step, or until commands should be looked for again.
-    /// Returns how late the step is; `None` if it is not due yet.
+    /// Waits for the deadline of the next step, at most one polling interval. Returns the lateness of
+    /// the step; `None` if it is not due yet.
     ///
     /// A paused node has no deadline: a command that lets it step makes the step due at once.
     fn wait(&mut self) -> Option<u64> {

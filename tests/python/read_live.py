@@ -1,4 +1,4 @@
-"""Reads a snapshot of a running node with the iceoryx2 package, and prints it as JSON.
+"""Reads the latched services of a running node with the iceoryx2 package, and prints them as JSON.
 
 usage: read_live.py PREFIX ROOT
 """
@@ -9,52 +9,48 @@ import sys
 
 import iceoryx2 as iox2
 
-
-class ParticleState(ctypes.Structure):
-    _fields_ = [
-        ("position", ctypes.c_float * 3),
-        ("inverse_mass", ctypes.c_float),
-        ("velocity", ctypes.c_float * 3),
-        ("flags", ctypes.c_uint32),
-    ]
-
-    @staticmethod
-    def type_name():
-        return "catenary.ParticleState"
+UINT32, UINT64, FLOAT32 = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_float
 
 
-class SnapshotHeader(ctypes.Structure):
-    _fields_ = (
-        [("contract_version", ctypes.c_uint32), ("solver_version", ctypes.c_uint32)]
-        + [
-            (name, ctypes.c_uint64)
-            for name in (
-                "run_id step scene_step keyframe_step sim_time_ns publish_monotonic_ns state_hash "
-                "outcome_count wake_late_ns solve_ns"
-            ).split()
-        ]
-        + [
-            (name, ctypes.c_uint32)
-            for name in (
-                "topology_revision torn_count particle_count flags stride spare"
-            ).split()
-        ]
-    )
-
-    @staticmethod
-    def type_name():
-        return "catenary.SnapshotHeader"
+def struct(name, *fields):
+    """A structure of the contract. Each group of fields is a type and names separated by spaces."""
+    flat = [(field, kind) for kind, names in fields for field in names.split()]
+    functions = {"type_name": staticmethod(lambda: f"catenary.{name}")}
+    return type(name, (ctypes.Structure,), {"_fields_": flat, **functions})
 
 
-def main(prefix, root):
-    config = iox2.Config.default() if hasattr(iox2, "Config") else iox2.config.default()
-    config.global_cfg.prefix = iox2.FileName.new(prefix)
-    config.global_cfg.root_path = iox2.Path.new(root)
-    node = iox2.NodeBuilder.new().config(config).create(iox2.ServiceType.Ipc)
+ParticleState = struct(
+    "ParticleState",
+    (FLOAT32 * 3, "position"),
+    (FLOAT32, "inverse_mass"),
+    (FLOAT32 * 3, "velocity"),
+    (UINT32, "flags"),
+)
+SnapshotHeader = struct(
+    "SnapshotHeader",
+    (UINT32, "contract_version solver_version"),
+    (UINT64, "run_id step scene_step keyframe_step sim_time_ns publish_monotonic_ns state_hash"),
+    (UINT64, "outcome_count wake_late_ns solve_ns"),
+    (UINT32, "topology_revision torn_count particle_count flags stride spare"),
+)
+TornConstraint = struct("TornConstraint", (UINT32, "constraint cause"))
+TearsHeader = struct(
+    "TearsHeader", (UINT64, "run_id step since_step"), (UINT32, "new_count count")
+)
+ParameterState = struct(
+    "ParameterState", (UINT32, "parameter constraint_kind form"), (FLOAT32 * 3, "value")
+)
+ParametersHeader = struct(
+    "ParametersHeader", (UINT64, "run_id step"), (UINT32, "count spare")
+)
+
+
+def receive(node, name, element, header):
+    """Waits for the latest message of a service, and returns its header and elements."""
     service = (
-        node.service_builder(iox2.ServiceName.new("sim/particles"))
-        .publish_subscribe(iox2.Slice[ParticleState])
-        .user_header(SnapshotHeader)
+        node.service_builder(iox2.ServiceName.new(name))
+        .publish_subscribe(iox2.Slice[element])
+        .user_header(header)
         .open()
     )
     subscriber = service.subscriber_builder().create()
@@ -62,13 +58,36 @@ def main(prefix, root):
     while sample is None:
         node.wait(iox2.Duration.from_millis(5))
         sample = subscriber.receive()
-    header = sample.user_header().contents
-    floats = ctypes.cast(sample.payload().as_ptr(), ctypes.POINTER(ParticleState))
-    count = header.particle_count
-    first = [list(floats[index].position) for index in range(min(count, 3))]
-    print(json.dumps({"step": header.step, "particle_count": count, "first": first}))
-    # Destroyed in any other order at exit, the ports leave a dead node behind.
-    del sample, subscriber, service, node
+    payload = sample.payload()
+    count = payload.len()
+    elements = (element * count).from_buffer_copy(payload.as_memory_view()) if count else []
+    copied = header.from_buffer_copy(sample.user_header().contents)
+    # Destroyed in any other order, the ports leave a dead node behind.
+    del payload, sample, subscriber, service
+    return copied, list(elements)
+
+
+def main(prefix, root):
+    config = iox2.Config.default() if hasattr(iox2, "Config") else iox2.config.default()
+    config.global_cfg.prefix = iox2.FileName.new(prefix)
+    config.global_cfg.root_path = iox2.Path.new(root)
+    node = iox2.NodeBuilder.new().config(config).create(iox2.ServiceType.Ipc)
+    snapshot, particles = receive(node, "sim/particles", ParticleState, SnapshotHeader)
+    tears, torn = receive(node, "sim/tears", TornConstraint, TearsHeader)
+    _, parameters = receive(node, "sim/parameters", ParameterState, ParametersHeader)
+    report = {
+        "contract_version": snapshot.contract_version,
+        "step": snapshot.step,
+        "particle_count": snapshot.particle_count,
+        "first": [list(particle.position) for particle in particles[:3]],
+        "torn": [[one.constraint, one.cause] for one in torn],
+        "new_tears": tears.new_count,
+        "parameters": [
+            [one.parameter, one.constraint_kind, one.form, list(one.value)] for one in parameters
+        ],
+    }
+    print(json.dumps(report))
+    del node
 
 
 main(*sys.argv[1:])

@@ -64,8 +64,16 @@ fn invalid_options_exit_with_2_and_invalid_rates_name_the_range() {
         let finished = run(&sandbox, &["run", "--rate", rate]);
         assert_refused(&finished, 2, &["--rate", rate]);
     }
-    assert_refused(&run(&sandbox, &["run", "--rate", "0"]), 2, &["1..=100000"]);
-    assert_refused(&run(&sandbox, &["run", "--substeps", "0"]), 2, &["1..=1000"]);
+    assert_refused(
+        &run(&sandbox, &["run", "--rate", "0"]),
+        2,
+        &["a whole number from 1 to 100000"],
+    );
+    assert_refused(
+        &run(&sandbox, &["run", "--substeps", "0"]),
+        2,
+        &["a whole number from 1 to 1000"],
+    );
     assert_refused(&run(&sandbox, &["run", "--name", "a/b"]), 2, &["a/b"]);
     assert_refused(&run(&sandbox, &["run", "--domain", "Big Domain"]), 2, &["Big Domain"]);
 }

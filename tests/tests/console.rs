@@ -148,3 +148,15 @@ fn import_names_the_option_that_replaces_an_existing_file() {
     );
     run(&sandbox, &format!("import {mesh} -o {scene} --overwrite")).success();
 }
+
+#[test]
+fn import_names_a_broken_mesh_once() {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.write("mesh.obj", "v 0 0\nf 1 2 3\n");
+    let refused = run(&sandbox, &format!("import {mesh}"));
+    assert_eq!(refused.code, Some(1));
+    assert_eq!(refused.stderr.matches("mesh.obj").count(), 1, "{}", refused.stderr);
+    let refused = run(&sandbox, &format!("import {mesh} --bend nan"));
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.stderr.contains("it must be a number from 0 to 1e20"), "{}", refused.stderr);
+}

@@ -5,9 +5,9 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox};
-use serde_json::Value;
-use sim_contract::Client;
+use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
+use serde_json::{Value, json};
+use sim_contract::{CONTRACT_VERSION, Client, TearCause};
 
 /// Runs a script of `tests/python`, and returns its report.
 fn python(sandbox: &Sandbox, script: &str, args: &[&str]) -> Value {
@@ -26,11 +26,8 @@ fn the_stock_python_reader_finds_the_published_bits() {
     let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let mut published = String::new();
-    let ctl = |args: &[&str]| {
-        Process::run(Program::SimNode, &sandbox, &[&["ctl"], args].concat()).success()
-    };
-    ctl(&["grab", "90", "0.5", "0.2", "0.3"]);
-    ctl(&["step", "60"]);
+    ctl(&sandbox, &["grab", "90", "0.5", "0.2", "0.3"]);
+    ctl(&sandbox, &["step", "60"]);
     while let Some(snapshot) = client.next_snapshot(DEADLINE).unwrap() {
         let step = snapshot.header().step;
         write!(published, "{step} ").unwrap();
@@ -50,13 +47,23 @@ fn the_stock_python_reader_finds_the_published_bits() {
 
 #[test]
 #[ignore = "needs Python"]
-fn the_iceoryx2_python_package_reads_a_running_node() {
+fn the_iceoryx2_python_package_reads_particles_tears_and_parameters() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
+    ctl(&sandbox, &["cut", "40"]);
+    ctl(&sandbox, &["set", "gravity", "0", "-1.5", "0"]);
+    ctl(&sandbox, &["step"]);
     let prefix = format!("{}_", sandbox.domain());
     let root = format!("/tmp/catenary-{}-{}", rustix::process::getuid().as_raw(), sandbox.domain());
     let read = python(&sandbox, "read_live.py", &[&prefix, &root]);
-    assert_eq!((&read["step"], &read["particle_count"]), (&0.into(), &168.into()));
+    assert_eq!(read["contract_version"], CONTRACT_VERSION);
+    assert_eq!((&read["step"], &read["particle_count"]), (&1.into(), &168.into()));
+    assert_eq!(read["torn"], json!([[40, TearCause::Cut as u32]]));
+    assert_eq!(read["new_tears"], 1);
+    // Gravity is the first parameter, and a vector has form 2.
+    assert_eq!(read["parameters"][0], json!([0, 0, 2, [0.0, -1.5, 0.0]]));
+    // 13 parameters have one value, and two have one for each of the four constraint kinds.
+    assert_eq!(read["parameters"].as_array().map(Vec::len), Some(13 + 2 * 4));
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
     for (index, position) in read["first"].as_array().unwrap().iter().enumerate() {

@@ -1,5 +1,7 @@
-//! What third parties use: reading snapshots and sending commands.
+//! The client API: reads snapshots and sends commands.
 
+pub(crate) mod change;
+pub(crate) mod loaded_scene;
 pub(crate) mod request;
 pub(crate) mod state;
 pub(crate) mod tap;
@@ -32,12 +34,12 @@ use sim_types::Action;
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
 ///
-/// Each method takes its place at the services when it is first called: a program that only
-/// watches takes none of those who command, and the other way round. A client survives the owner:
-/// when a new one takes the name, reading goes on, with another `run_id` in the headers.
+/// Each method connects to its services when it is first called, so a program that only reads takes
+/// no place from the clients that send commands, and vice versa. A client outlives the owner: when a
+/// new owner claims the name, reading continues, with another `run_id` in the headers.
 ///
-/// Timeouts are upper limits. A method that waits returns earlier, with `None`, if the owner goes
-/// meanwhile; [`Client::is_owner_alive`] tells that from silence.
+/// Timeouts are upper limits. A method that waits returns `None` early if the owner goes meanwhile;
+/// [`Client::is_owner_alive`] distinguishes that from silence.
 #[derive(Debug)]
 pub struct Client {
     id: u64,
@@ -51,30 +53,31 @@ pub struct Client {
     colliders: Option<Latch<ColliderState, CollidersHeader>>,
     status: Option<ValueReader<NodeStatus>>,
     commander: Option<Commander>,
-    // Services and node go last.
+    // Dropped last: the ports belong to its services and its node.
     attachment: Attachment,
 }
 
-/// How long dropping a client waits for the outcomes of what it sent.
-const FAREWELL_TIMEOUT: Duration = Duration::from_millis(200);
+/// Longest wait of a dropped client for the outcomes of its commands.
+const DROP_TIMEOUT: Duration = Duration::from_millis(200);
 
 impl Client {
-    /// Attaches to a running simulation as a client of its own, with a random id.
+    /// Attaches to a running simulation with a random client id.
     ///
     /// # Errors
-    /// No simulation runs there, or one of another version of the contract.
+    /// No simulation runs there, or it has another version of the contract.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
         let random = getrandom::u64()
             .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
-        // Below 2^53 it is exact in JSON.
+        // Ids below 2^53 are exact in JSON.
         Self::attach_as(endpoint, (random >> 11).max(CONSOLE_CLIENT_ID + 1))
     }
 
-    /// Attaches as the client `client_id`, below 2^53: what it grabs, only a client of that id can
-    /// move. [`CONSOLE_CLIENT_ID`] may be used by several processes, any other by one at a time.
+    /// Attaches as the client `client_id`, below 2^53. Only clients with this id can move the particles
+    /// that it grabs. Several processes may use [`CONSOLE_CLIENT_ID`]; any other id belongs to one
+    /// process at a time.
     ///
     /// # Errors
-    /// As [`Client::attach`].
+    /// Same as [`Client::attach`].
     pub fn attach_as(endpoint: &Endpoint, client_id: u64) -> Result<Self, AttachError> {
         let attachment = Attachment::open(Session::join(endpoint)?)?;
         Ok(Self {
@@ -93,39 +96,40 @@ impl Client {
         })
     }
 
-    /// The id that this client's commands carry.
+    /// Returns the id in this client's commands.
     pub fn client_id(&self) -> u64 {
         self.id
     }
 
-    /// The oldest snapshot that was not read yet, or the next one. The first call gives the latest
-    /// one that was published. Whoever is more than [`crate::SNAPSHOTS_BUFFERED`] behind misses
-    /// some: the step in the header tells.
+    /// Returns the oldest unread snapshot, or waits for the next one. The first call returns the
+    /// latest published snapshot. A reader more than [`crate::SNAPSHOTS_BUFFERED`] snapshots behind
+    /// misses some; the step in the header shows it.
     ///
     /// # Errors
-    /// More than [`crate::BORROWED_SAMPLES_MAX`] snapshots are held, or a malformed one came.
+    /// The program already holds [`crate::BORROWED_SAMPLES_MAX`] snapshots, or a malformed one
+    /// arrived.
     pub fn next_snapshot(&mut self, timeout: Duration) -> Result<Option<Snapshot>, ReadError> {
         let reader = open_particles(&mut self.particles, &self.attachment)?;
         self.watch.wait_for(&self.attachment, timeout, || Ok(reader.next()?.map(Snapshot)))
     }
 
-    /// The newest snapshot, those before it are skipped; waits for the next one if all were read.
+    /// Returns the newest unread snapshot and skips those before it, or waits for the next one.
     ///
     /// # Errors
-    /// As [`Client::next_snapshot`].
+    /// Same as [`Client::next_snapshot`].
     pub fn latest_snapshot(&mut self, timeout: Duration) -> Result<Option<Snapshot>, ReadError> {
         let reader = open_particles(&mut self.particles, &self.attachment)?;
         self.watch.wait_for(&self.attachment, timeout, || Ok(reader.newest()?.map(Snapshot)))
     }
 
-    /// The newest topology; waits only if there has been none. It belongs to the snapshots with
-    /// its `run_id` and `topology_revision`.
+    /// Returns the newest topology. Waits only if none was published yet. It belongs to the snapshots
+    /// with the same `run_id` and `topology_revision`.
     ///
     /// # Errors
-    /// A malformed message, or no place at the service.
+    /// A malformed message arrived, or the service has no place for another reader.
     pub fn topology(&mut self, timeout: Duration) -> Result<Option<Topology>, ReadError> {
         let service = &self.attachment.services.topology;
-        let latch = lazily(&mut self.topology, || Latch::create(service, &TOPOLOGY))?;
+        let latch = get_or_create(&mut self.topology, || Latch::create(service, &TOPOLOGY))?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| Topology {
                 header: *sample.user_header(),
@@ -134,13 +138,14 @@ impl Client {
         })
     }
 
-    /// The newest surface, as [`Client::topology`]. A scene without triangles has an empty one.
+    /// Returns the newest surface, like [`Client::topology`]. A scene without triangles has an empty
+    /// surface.
     ///
     /// # Errors
-    /// As [`Client::topology`].
+    /// Same as [`Client::topology`].
     pub fn surface(&mut self, timeout: Duration) -> Result<Option<Surface>, ReadError> {
         let service = &self.attachment.services.surface;
-        let latch = lazily(&mut self.surface, || Latch::create(service, &SURFACE))?;
+        let latch = get_or_create(&mut self.surface, || Latch::create(service, &SURFACE))?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| Surface {
                 header: *sample.user_header(),
@@ -149,13 +154,13 @@ impl Client {
         })
     }
 
-    /// The newest scene as TOML, as [`Client::topology`].
+    /// Returns the newest scene as TOML, like [`Client::topology`].
     ///
     /// # Errors
-    /// As [`Client::topology`]; also text that is not UTF-8.
+    /// Same as [`Client::topology`], or the text is not UTF-8.
     pub fn scene(&mut self, timeout: Duration) -> Result<Option<String>, ReadError> {
         let service = &self.attachment.services.scene;
-        let latch = lazily(&mut self.scene, || Latch::create(service, &SCENE))?;
+        let latch = get_or_create(&mut self.scene, || Latch::create(service, &SCENE))?;
         let bytes = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| sample.payload().to_vec()))
         })?;
@@ -165,15 +170,15 @@ impl Client {
         })
     }
 
-    /// All constraints torn since the load, with their causes, however late this client came. Waits
-    /// only if there has been no list at all: an owner publishes the first one, an empty one, with
-    /// the load. Empty if none came within `timeout`.
+    /// Returns all constraints torn since the load or the last reset, with their causes. Waits only if
+    /// no list was published yet; an owner publishes an empty list with the load. Returns an empty
+    /// list after `timeout`.
     ///
     /// # Errors
-    /// As [`Client::topology`].
+    /// Same as [`Client::topology`].
     pub fn torn(&mut self, timeout: Duration) -> Result<Torn, ReadError> {
         let service = &self.attachment.services.tears;
-        let latch = lazily(&mut self.tears, || Latch::create(service, &TEARS))?;
+        let latch = get_or_create(&mut self.tears, || Latch::create(service, &TEARS))?;
         let torn = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| Torn {
                 header: *sample.user_header(),
@@ -186,10 +191,10 @@ impl Client {
     /// Returns the newest values of all parameters. Waits only if none were published yet.
     ///
     /// # Errors
-    /// As [`Client::topology`].
+    /// Same as [`Client::topology`].
     pub fn parameters(&mut self, timeout: Duration) -> Result<Option<Parameters>, ReadError> {
         let service = &self.attachment.services.parameters;
-        let latch = lazily(&mut self.parameters, || Latch::create(service, &PARAMETERS))?;
+        let latch = get_or_create(&mut self.parameters, || Latch::create(service, &PARAMETERS))?;
         self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| Parameters {
                 header: *sample.user_header(),
@@ -198,14 +203,14 @@ impl Client {
         })
     }
 
-    /// The colliders as they stand, each in its newest pose; waits only if they have never been
-    /// published. Empty if they were not within `timeout`.
+    /// Returns the colliders in their newest poses. Waits only if none were published yet. Returns an
+    /// empty list after `timeout`.
     ///
     /// # Errors
-    /// As [`Client::topology`].
+    /// Same as [`Client::topology`].
     pub fn colliders(&mut self, timeout: Duration) -> Result<Colliders, ReadError> {
         let service = &self.attachment.services.colliders;
-        let latch = lazily(&mut self.colliders, || Latch::create(service, &COLLIDERS))?;
+        let latch = get_or_create(&mut self.colliders, || Latch::create(service, &COLLIDERS))?;
         let colliders = self.watch.wait_for(&self.attachment, timeout, || {
             Ok(latch.newest()?.map(|sample| Colliders {
                 header: *sample.user_header(),
@@ -215,73 +220,73 @@ impl Client {
         Ok(colliders.unwrap_or_default())
     }
 
-    /// The newest status that was not read yet, or the next one.
+    /// Returns the newest unread status, or waits for the next one.
     ///
     /// # Errors
-    /// No place at the service.
+    /// The service has no place for another reader.
     pub fn status(&mut self, timeout: Duration) -> Result<Option<NodeStatus>, ReadError> {
         let service = &self.attachment.status;
-        let reader = lazily(&mut self.status, || ValueReader::create(service, &STATUS))?;
+        let reader = get_or_create(&mut self.status, || ValueReader::create(service, &STATUS))?;
         self.watch.wait_for(&self.attachment, timeout, || reader.newest())
     }
 
-    /// Sends a command without waiting for its outcome, and returns its sequence number. That it
-    /// was sent proves nothing: only its outcome does, see [`Client::next_outcome`].
+    /// Sends a command without waiting for its outcome. Returns its sequence number. Only the outcome
+    /// proves that the command took effect; see [`Client::next_outcome`].
     ///
     /// # Errors
-    /// Nobody takes commands, or this client has [`crate::COMMANDS_BUFFERED`] waiting already.
+    /// No owner receives commands, or [`crate::COMMANDS_BUFFERED`] commands of this client are waiting.
     pub fn send(&mut self, action: Action) -> Result<u64, RequestError> {
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         commander.send(&self.attachment, action)
     }
 
-    /// Sends a command and waits for its outcome, which may be that it was rejected.
+    /// Sends a command and waits for its outcome, applied or rejected.
     ///
     /// # Errors
-    /// As [`Client::send`], or no outcome within `timeout`: then what became of the command is not
-    /// known, and the error says whether the owner is alive.
+    /// Same as [`Client::send`], or no outcome arrived within `timeout`. Then the effect of the command
+    /// is unknown, and the error states whether the owner is alive.
     pub fn request(&mut self, action: Action, timeout: Duration) -> Result<Outcome, RequestError> {
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         let sequence = commander.send(&self.attachment, action)?;
-        let poll = || commander.take_outcome_of(sequence);
+        let poll = || commander.outcome_for(sequence);
         if let Some(outcome) = self.watch.wait_for(&self.attachment, timeout, poll)? {
             return Ok(outcome);
         }
-        commander.give_up(sequence);
+        commander.forget(sequence);
         Err(RequestError::timeout(&self.attachment, sequence, timeout))
     }
 
-    /// The next outcome of a command that this client sent and has not been told the outcome of,
-    /// in the order of application.
+    /// Returns the next outcome of this client's commands, in the order of application. Outcomes that
+    /// [`Client::request`] returned are left out. A client that has sent no command waits in vain.
     ///
     /// # Errors
-    /// No place at the service.
+    /// The service has no place for another reader.
     pub fn next_outcome(&mut self, timeout: Duration) -> Result<Option<Outcome>, ReadError> {
         let commander = &mut self.commander;
         self.watch.wait_for(&self.attachment, timeout, || match commander {
-            Some(commander) => commander.take_outcome(),
+            Some(commander) => commander.next_outcome(),
             None => Ok(None),
         })
     }
 
-    /// Whether the process that owns the name is alive. Looks into the file system: meant for a
-    /// few calls per second.
+    /// Returns `true` if the process that owns the name is alive. Reads the file system: call it a few
+    /// times per second at most.
     pub fn is_owner_alive(&self) -> bool {
         self.attachment.owner().is_some()
     }
 }
 
 impl Drop for Client {
-    /// Waits a moment for the outcomes of what was sent: a client that goes at once takes its
-    /// commands with it.
+    /// Waits briefly for the outcomes of sent commands, because commands that the owner has not received
+    /// vanish with their client.
     fn drop(&mut self) {
         let Some(commander) = &mut self.commander else {
             return;
         };
         if commander.awaits_outcomes() && self.attachment.owner().is_some() {
-            // Whatever it ends with, nothing more can be done for these commands.
-            let _ = self.watch.wait_for(&self.attachment, FAREWELL_TIMEOUT, || {
-                commander.collect()?;
+            // On a timeout or an error, these commands are lost either way.
+            let _ = self.watch.wait_for(&self.attachment, DROP_TIMEOUT, || {
+                commander.receive_outcomes()?;
                 Ok((!commander.awaits_outcomes()).then_some(()))
             });
         }
@@ -292,7 +297,7 @@ fn open_particles<'a>(
     reader: &'a mut Option<SliceReader<ParticleState, SnapshotHeader>>,
     attachment: &Attachment,
 ) -> Result<&'a mut SliceReader<ParticleState, SnapshotHeader>, ServiceError> {
-    lazily(reader, || SliceReader::create(&attachment.services.particles, &PARTICLES))
+    get_or_create(reader, || SliceReader::create(&attachment.services.particles, &PARTICLES))
 }
 
 fn open_commander<'a>(
@@ -300,13 +305,16 @@ fn open_commander<'a>(
     attachment: &Attachment,
     client_id: u64,
 ) -> Result<&'a mut Commander, ServiceError> {
-    lazily(commander, || Commander::create(attachment, client_id))
+    get_or_create(commander, || Commander::create(attachment, client_id))
 }
 
-/// What is in `place`, created if there is nothing.
-fn lazily<T, E>(place: &mut Option<T>, create: impl FnOnce() -> Result<T, E>) -> Result<&mut T, E> {
-    match place {
-        Some(present) => Ok(present),
-        None => Ok(place.insert(create()?)),
+/// Returns the value in `slot`, created on first use.
+fn get_or_create<T, E>(
+    slot: &mut Option<T>,
+    create: impl FnOnce() -> Result<T, E>,
+) -> Result<&mut T, E> {
+    match slot {
+        Some(value) => Ok(value),
+        None => Ok(slot.insert(create()?)),
     }
 }

@@ -1,4 +1,4 @@
-//! The clock of the headers, and the only place where a program around a simulation reads one.
+//! The clocks. Outside the node, programs of this workspace read a clock only through this module.
 
 use std::time::{Duration, Instant};
 
@@ -18,15 +18,15 @@ pub fn realtime_ns() -> u64 {
     nanoseconds(clock_gettime(ClockId::Realtime))
 }
 
-/// Sleeps until CLOCK_MONOTONIC reaches `deadline_ns`; a signal ends the sleep early. The deadline
-/// is absolute, so that lateness does not add up over the steps.
+/// Sleeps until CLOCK_MONOTONIC reaches `deadline_ns`. A signal ends the sleep early. The deadline
+/// is absolute, so that lateness does not accumulate over the steps.
 pub fn sleep_until(deadline_ns: u64) {
     #[allow(clippy::cast_possible_wrap, reason = "centuries since boot fit into i64")]
     let deadline = Timespec {
         tv_sec: (deadline_ns / SECOND_NS) as i64,
         tv_nsec: (deadline_ns % SECOND_NS) as i64,
     };
-    // The caller looks at the clock and at its stop flag, whatever ended the sleep.
+    // The caller checks the clock and its stop flag after every sleep, interrupted or not.
     let _ended = clock_nanosleep_absolute(ClockId::Monotonic, &deadline);
 }
 
@@ -38,18 +38,18 @@ fn nanoseconds(time: Timespec) -> u64 {
 /// The end of a wait, on the monotonic clock.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Deadline {
-    /// Absent: further away than the clock can tell.
+    /// `None` if the deadline lies beyond the range of the clock.
     end: Option<Instant>,
 }
 
 impl Deadline {
-    /// The deadline that is `timeout` from now.
+    /// Returns the deadline `timeout` from now.
     #[allow(clippy::disallowed_methods, reason = "clocks are read here")]
     pub(crate) fn after(timeout: Duration) -> Self {
         Self { end: Instant::now().checked_add(timeout) }
     }
 
-    /// What is left until it; zero once it has passed.
+    /// Returns the time until the deadline; zero once it has passed.
     #[allow(clippy::disallowed_methods, reason = "clocks are read here")]
     pub(crate) fn remaining(self) -> Duration {
         self.end.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()))

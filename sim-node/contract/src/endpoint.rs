@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// Default name of a simulation.
 pub const NAME_DEFAULT: &str = "sim";
-/// Environment variable that stands for an absent `--domain`.
+/// Environment variable that replaces an absent `--domain`.
 pub const DOMAIN_VARIABLE: &str = "CATENARY_DOMAIN";
 
 /// Longest name of a domain, in characters: it is part of a socket path of at most 107 bytes.
@@ -37,7 +37,8 @@ pub enum EndpointError {
         /// The refused domain.
         domain: String,
     },
-    /// The environment variable [`DOMAIN_VARIABLE`] holds such a domain, and no option replaces it.
+    /// The environment variable [`DOMAIN_VARIABLE`] holds an invalid domain, and no option overrides
+    /// it.
     #[error(
         "the environment variable {DOMAIN_VARIABLE} is '{domain}', which is not a valid domain \
          (allowed: 1 to {DOMAIN_LENGTH_MAX} of a-z, 0-9, '_', '-')"
@@ -80,10 +81,10 @@ impl fmt::Display for Endpoint {
 }
 
 impl Endpoint {
-    /// The simulation `name` in `domain`; `None` is iceoryx2's own domain.
+    /// Returns the endpoint of the simulation `name` in `domain`; `None` is iceoryx2's own domain.
     ///
     /// # Errors
-    /// A domain that is not 1 to 24 of `a-z 0-9 _ -`, a name that is not 1 to 64 of
+    /// The domain is not 1 to 24 characters of `a-z 0-9 _ -`, or the name is not 1 to 64 characters of
     /// `A-Z a-z 0-9 _ - .`.
     pub fn new(domain: Option<&str>, name: &str) -> Result<Self, EndpointError> {
         if let Some(domain) = domain
@@ -97,12 +98,12 @@ impl Endpoint {
         Ok(Self { domain: domain.map(str::to_owned), name: name.to_owned() })
     }
 
-    /// Endpoint from the options `--domain` and `--name` of a program. Without `--domain`, the
+    /// Returns the endpoint for the options `--domain` and `--name` of a program. Without `--domain`, the
     /// environment variable [`DOMAIN_VARIABLE`] gives the domain. An empty domain stands for
     /// iceoryx2's own.
     ///
     /// # Errors
-    /// As [`Endpoint::new`]; a variable that is not a valid domain is an error of its own.
+    /// Same as [`Endpoint::new`], or the environment variable is not a valid domain.
     pub fn from_options(domain: Option<&str>, name: Option<&str>) -> Result<Self, EndpointError> {
         Self::resolve(domain, domain_variable().as_deref(), name)
     }
@@ -124,7 +125,7 @@ impl Endpoint {
     /// Parses the value of an option `--domain`, which may be empty.
     ///
     /// # Errors
-    /// As [`Endpoint::new`].
+    /// Same as [`Endpoint::new`].
     pub fn parse_domain(text: &str) -> Result<String, EndpointError> {
         Self::resolve(Some(text), None, None).map(|_| text.to_owned())
     }
@@ -132,7 +133,7 @@ impl Endpoint {
     /// Parses the value of an option `--name`.
     ///
     /// # Errors
-    /// As [`Endpoint::new`].
+    /// Same as [`Endpoint::new`].
     pub fn parse_name(text: &str) -> Result<String, EndpointError> {
         Self::new(None, text).map(|_| text.to_owned())
     }
@@ -142,7 +143,7 @@ impl Endpoint {
     /// name. For programs too small for an argument parser.
     ///
     /// # Errors
-    /// As [`Endpoint::from_options`], or an option without its value.
+    /// Same as [`Endpoint::from_options`], or an option without its value.
     pub fn from_env_and_args() -> Result<(Self, Vec<String>), EndpointError> {
         Self::parse(domain_variable().as_deref(), std::env::args().skip(1))
     }
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn an_invalid_variable_is_blamed_by_its_name_unless_an_option_replaces_it() {
+    fn an_invalid_variable_is_an_error_that_names_it_unless_an_option_overrides_it() {
         assert_eq!(
             parse(Some("Big Lab"), &[]).unwrap_err().to_string(),
             "the environment variable CATENARY_DOMAIN is 'Big Lab', which is not a valid domain \

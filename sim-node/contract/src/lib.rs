@@ -1,8 +1,12 @@
 //! The messages, services and client API shared by `sim-node` and every process beside it.
 //!
-//! A node publishes each state as one [`SnapshotHeader`] and a slice of [`ParticleState`] in
-//! shared memory; any process reads it without a copy and sends [`Action`]s back. Sending is not
-//! delivery: only the [`Outcome`] proves that a command took effect, and at which step.
+//! A node publishes each state in shared memory, as one [`SnapshotHeader`] and a slice of
+//! [`ParticleState`]s. Any process reads them without a copy and sends [`Action`]s back. Sending is
+//! not delivery: only the [`Outcome`] proves that a command took effect, and at which step.
+//!
+//! - [`Client`] reads snapshots and sends commands.
+//! - [`Tap`] reads everything, as a sequence of coherent [`State`]s.
+//! - [`Owner`] publishes everything and receives the commands: the node, or a replay.
 //!
 //! ```no_run
 //! use std::time::Duration;
@@ -18,23 +22,23 @@
 //! ```
 //!
 //! # Services
-//! Their names begin with that of the simulation, as `sim/particles`. All but commands, outcomes
-//! and wake are latched: who comes late is given the newest message.
+//! The name of a service begins with the name of the simulation, as in `sim/particles`. Late
+//! subscribers receive the latest message of every service except commands, outcomes and wake.
 //!
-//! | service | payload, header | written |
+//! | service | payload; header | written |
 //! |---|---|---|
-//! | particles | [`ParticleState`]s, [`SnapshotHeader`] | every step |
-//! | keyframe | bytes, [`KeyframeHeader`] | now and then: what particles lack of the state |
-//! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s, [`LoadHeader`] | once per load |
-//! | colliders | [`ColliderState`]s, [`CollidersHeader`] | per load, on change, each step while one moves |
-//! | tears | [`TornConstraint`]s, [`TearsHeader`] | per load and on a tear: all since the load |
-//! | parameters | [`ParameterState`]s, [`ParametersHeader`] | per load and on a change: all values |
+//! | particles | [`ParticleState`]s; [`SnapshotHeader`] | after every step, or every n-th with `--every n` |
+//! | keyframe | bytes; [`KeyframeHeader`] | per load, when a reader joins, after commands except `move`, and every second: the state that particles lack |
+//! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s; [`LoadHeader`] | once per load |
+//! | colliders | [`ColliderState`]s; [`CollidersHeader`] | per load, on a change, and each step while one moves |
+//! | tears | [`TornConstraint`]s; [`TearsHeader`] | per load, on a tear and on a reset: all constraints torn since |
+//! | parameters | [`ParameterState`]s; [`ParametersHeader`] | per load and on a change: all values |
 //! | commands | [`Command`] | by clients |
 //! | outcomes | [`Outcome`] | for every command |
 //! | status | [`NodeStatus`] | ten times a second |
-//! | wake | [`Wake`] events | with each of the above |
+//! | wake | [`Wake`] events | after a snapshot, load, tear, outcome or status, and when the owner goes |
 //!
-//! There is no solver here, and no iceoryx2 outside of this crate.
+//! This crate knows no solver, and no other crate knows iceoryx2.
 #![forbid(unsafe_code)]
 
 mod client;
@@ -49,8 +53,10 @@ pub mod testing;
 mod text_file;
 
 pub use client::Client;
+pub use client::change::Change;
+pub use client::loaded_scene::LoadedScene;
 pub use client::request::{OwnerState, RequestError};
-pub use client::state::{Change, LoadedScene, State};
+pub use client::state::State;
 pub use client::tap::Tap;
 pub use client::views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
 pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
@@ -81,7 +87,7 @@ pub use sim_types::{
 pub use stop::Stop;
 pub use text_file::{TextFileError, read_scene_file};
 
-/// The README's programs compile.
+/// Compiles the programs in the README.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct ReadmeDoctests;

@@ -1,4 +1,4 @@
-//! The messages in shared memory: plain data of fixed layout.
+//! The messages in shared memory: plain data with a fixed layout.
 
 pub(crate) mod collider;
 pub(crate) mod command;

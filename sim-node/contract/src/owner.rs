@@ -1,4 +1,4 @@
-//! The owner of a name: the node or replay that publishes everything and takes the commands.
+//! The owner of a name: the node or replay that publishes everything and receives the commands.
 
 pub(crate) mod error;
 pub(crate) mod load;
@@ -20,7 +20,7 @@ use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::KeyframeHeader;
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_shared_memory};
-use crate::ports::port::{Places, create_port, reader_count};
+use crate::ports::port::{PortLimit, create_port, reader_count};
 use crate::ports::reader::subscribe;
 use crate::ports::service::{OUTCOMES, STATUS, ServiceError, WAKE};
 use crate::ports::services::{Services, owner};
@@ -30,42 +30,43 @@ use crate::ports::writer::PublishError;
 use crate::ports::writer::ValueWriter;
 use sim_types::ParameterValues;
 
-/// The process that owns a name: it publishes everything and takes the commands.
+/// The process that owns a name: it publishes everything and receives the commands.
 ///
-/// Nothing here ever waits for a reader. Per step publish colliders, tears, keyframe, outcomes, and
-/// the particles last; then [`Owner::wake`] the readers and [`Owner::refresh`] the latched messages.
-/// Dropping it frees the name and wakes everyone with [`Wake::OwnerGone`].
+/// No method waits for a reader. For each step, publish colliders, tears, parameters, keyframe and
+/// outcomes, and the particles last. Then call [`Owner::wake`] and [`Owner::refresh`]. Dropping the
+/// owner frees the name and wakes all waiting processes with [`Wake::OwnerGone`].
 #[derive(Debug)]
 pub struct Owner {
-    // Dropped in this order: readers first lose what they read, then the name is free, and only
-    // then are they woken to find that out.
+    // Dropped in this order: the writers go first, then the name is free, and then the readers wake
+    // and notice it.
     writers: LoadWriters,
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc::Service, Command, ()>,
     status: ValueWriter<NodeStatus>,
     wake: WakeSender,
-    /// Readers at the last refresh, to notice new ones.
-    readers_seen: Cell<usize>,
-    /// Refreshes to come that wake the readers.
+    /// Number of readers at the last refresh, to notice new readers.
+    last_reader_count: Cell<usize>,
+    /// Number of the next refreshes that wake the readers.
     wakes_due: Cell<u32>,
     services: Services,
     status_service: Values<NodeStatus>,
-    // The node goes last.
+    // Dropped last: the services belong to its node.
     _session: Session,
 }
 
-/// Refreshes that wake a new reader. It is counted a moment before it can be given anything: the
-/// first may come too early. One that is held up longer finds what it was given with a later wake.
+/// Number of refreshes that wake a new reader. A reader is counted shortly before it can receive a
+/// message, so the first wake may be too early. A reader that takes longer finds its messages at a
+/// later wake.
 const WAKES_PER_READER: u32 = 2;
-/// Most commands that are taken at once: those that all clients together can have waiting.
-const COMMANDS_TAKEN_MAX: usize = CLIENTS_MAX * COMMANDS_BUFFERED;
+/// Most commands received at once: all that the clients together can have waiting.
+const COMMANDS_RECEIVED_MAX: usize = CLIENTS_MAX * COMMANDS_BUFFERED;
 
 impl Owner {
-    /// Takes the name, creates its services and publishes scene, topology and surface, and that
-    /// nothing is torn; for a scene without colliders also that it has none.
+    /// Claims the name, creates its services and publishes scene, topology, surface, parameters and an
+    /// empty list of tears. For a scene without colliders, also publishes an empty list of colliders.
     ///
     /// # Errors
-    /// The name is taken, the load is beyond a limit of the contract or of shared memory, or a
+    /// Another process owns the name, the load exceeds a limit of the contract or of shared memory, or a
     /// service could not be created.
     pub fn create(endpoint: &Endpoint, load: &Load<'_>) -> Result<Self, OwnerError> {
         check_limits(load)?;
@@ -74,8 +75,8 @@ impl Owner {
 
     pub(crate) fn create_in(session: Session, load: &Load<'_>) -> Result<Self, OwnerError> {
         let status_service = session.values(&STATUS, Access::Create)?;
-        let status = take_name(&session, &status_service)?;
-        // By now the memory of a killed predecessor is free again.
+        let status = claim_name(&session, &status_service)?;
+        // Now the memory of a killed predecessor is free.
         check_shared_memory(load)?;
         let services = Services::access(&session, Access::Create)?;
         let owner = Self {
@@ -84,7 +85,7 @@ impl Owner {
             outcomes: ValueWriter::create(&services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
-            readers_seen: Cell::new(0),
+            last_reader_count: Cell::new(0),
             wakes_due: Cell::new(0),
             services,
             status_service,
@@ -95,21 +96,21 @@ impl Owner {
         Ok(owner)
     }
 
-    /// Publishes another scene under the same name, as [`Owner::create`] does. Readers stay
-    /// connected: after what they have not read of the old load, they are given the new one, and
-    /// who comes later meets nothing else. Publish its colliders and its first snapshot next. The
-    /// old load keeps its memory until this returns, and longer where a reader holds a snapshot.
+    /// Publishes another scene under the same name, like [`Owner::create`]. Readers stay connected:
+    /// they receive the unread messages of the old load, then the new load. Later readers receive
+    /// only the new load. Publish its colliders and its first snapshot next. The old load occupies
+    /// its memory until this returns, and longer while a reader holds a snapshot.
     ///
     /// # Errors
-    /// As [`Owner::create`]: the load is beyond a limit of the contract or of shared memory, or a
-    /// writer could not be created. Then nothing has changed, and the old load can go on. Only after
-    /// [`OwnerError::Publish`] it cannot: its writers have gone.
+    /// The load exceeds a limit of the contract or of shared memory, or a writer could not be created:
+    /// nothing has changed, and the old load can continue. After [`OwnerError::Publish`] it
+    /// cannot continue, because its writers are gone.
     pub fn load(&mut self, load: &Load<'_>) -> Result<(), OwnerError> {
         check_limits(load)?;
         check_shared_memory(load)?;
-        // All of them are created before one of the old ones goes, and the old ones go before one
-        // of these says anything: an error leaves the old load as it was, and readers, who empty
-        // the buffers of writers that have gone first, never see the new load before the old.
+        // All new writers exist before the old ones are dropped, so an error leaves the old load as
+        // it was. The old ones are dropped before the new ones publish: readers empty the buffers of
+        // dropped writers first, so they never see the new load before the old.
         self.writers = LoadWriters::create(&self.services, load)?;
         self.writers.publish(load)?;
         self.wake(Wake::Load);
@@ -117,10 +118,10 @@ impl Owner {
     }
 
     /// Publishes a snapshot of `header.particle_count` particles: `particle(0)`, `particle(1)`, ...
-    /// are written straight into shared memory, once.
+    /// Each is written once, straight into shared memory.
     ///
     /// # Errors
-    /// More particles than loaded, or no memory.
+    /// More particles than announced at load, or no memory.
     pub fn publish_particles(
         &self,
         header: &SnapshotHeader,
@@ -129,7 +130,7 @@ impl Owner {
         self.writers.particles.write(*header, particle)
     }
 
-    /// Publishes the keyframe that completes a published snapshot; `size_bytes` is filled in.
+    /// Publishes the keyframe that completes a published snapshot. Sets `size_bytes`.
     ///
     /// # Errors
     /// A keyframe longer than announced at load, or no memory.
@@ -143,7 +144,7 @@ impl Owner {
     }
 
     /// Publishes all constraints torn since the load or the last reset, in the order of tearing.
-    /// `count` is filled in.
+    /// Sets `count`.
     ///
     /// # Errors
     /// More torn constraints than the load has, or no memory.
@@ -155,7 +156,7 @@ impl Owner {
         self.writers.publish_tears(header, torn)
     }
 
-    /// Publishes the values of all parameters, from `step` on. A load publishes its own.
+    /// Publishes the values of all parameters from `step` on. A load publishes its own values.
     ///
     /// # Errors
     /// No memory.
@@ -168,11 +169,11 @@ impl Owner {
         self.writers.publish_parameters(run_id, step, values)
     }
 
-    /// Publishes all colliders in their poses at the end of a step, by index; `count` is filled in.
-    /// To be called after a load with colliders, when one changes, and each step while one moves.
+    /// Publishes all colliders, by index, in their poses at the end of a step. Sets `count`. Call it
+    /// after a load with colliders, when a collider changes, and each step while a collider moves.
     ///
     /// # Errors
-    /// More than announced at load, or no memory.
+    /// More colliders than announced at load, or no memory.
     pub fn publish_colliders(
         &self,
         header: CollidersHeader,
@@ -181,7 +182,7 @@ impl Owner {
         self.writers.publish_colliders(header, colliders)
     }
 
-    /// Publishes what became of a command.
+    /// Publishes the outcome of a command.
     ///
     /// # Errors
     /// No memory.
@@ -189,7 +190,7 @@ impl Owner {
         self.outcomes.write(*outcome).map(|_| ())
     }
 
-    /// Publishes how the node is doing.
+    /// Publishes the status of the node.
     ///
     /// # Errors
     /// No memory.
@@ -197,12 +198,12 @@ impl Owner {
         self.status.write(*status).map(|_| ())
     }
 
-    /// Appends all commands that have arrived, each client's in the order of sending; returns how
-    /// many. A client whose connection is broken is passed over: nothing from outside stops the
-    /// owner.
+    /// Appends all commands that have arrived, those of each client in the order of sending. Returns
+    /// their number. Ends early at a client with a broken connection, and returns no error: no other
+    /// process can stop the owner.
     pub fn receive_commands(&self, commands: &mut Vec<Command>) -> usize {
         let before = commands.len();
-        while commands.len() - before < COMMANDS_TAKEN_MAX {
+        while commands.len() - before < COMMANDS_RECEIVED_MAX {
             match self.commands.receive() {
                 Ok(Some(command)) => commands.push(*command),
                 Ok(None) | Err(_) => break,
@@ -211,21 +212,21 @@ impl Owner {
         commands.len() - before
     }
 
-    /// Readers of `particles`, killed ones included until their places are freed.
+    /// Returns the number of readers of `particles`. Killed readers count until their places are freed.
     pub fn reader_count(&self) -> usize {
         reader_count(&self.services.particles)
     }
 
-    /// Readers of `keyframe`, counted like [`Owner::reader_count`].
+    /// Returns the number of readers of `keyframe`, counted like [`Owner::reader_count`].
     pub fn keyframe_reader_count(&self) -> usize {
         reader_count(&self.services.keyframe)
     }
 
-    /// Gives readers that have come since the last call what is latched, and wakes them. Cheap:
+    /// Sends the latched messages to readers that joined since the last call, and wakes them. Cheap:
     /// call it every step, and while paused.
     pub fn refresh(&self) {
-        let readers = self.all_reader_count();
-        if readers != self.readers_seen.replace(readers) {
+        let reader_count = self.total_reader_count();
+        if reader_count != self.last_reader_count.replace(reader_count) {
             self.wakes_due.set(WAKES_PER_READER);
         }
         self.outcomes.refresh();
@@ -237,12 +238,12 @@ impl Owner {
         }
     }
 
-    /// Wakes everyone who waits. Costs a system call per waiting process, nothing for others.
-    pub fn wake(&self, what: Wake) {
-        self.wake.wake(what);
+    /// Wakes all waiting processes, with one system call for each of them.
+    pub fn wake(&self, event: Wake) {
+        self.wake.wake(event);
     }
 
-    fn all_reader_count(&self) -> usize {
+    fn total_reader_count(&self) -> usize {
         let services = &self.services;
         reader_count(&services.particles)
             + reader_count(&services.keyframe)
@@ -257,8 +258,8 @@ impl Owner {
     }
 }
 
-/// The status publisher is the lock: there can be only one.
-fn take_name(
+/// Claims the name by creating the one possible publisher of `status`.
+fn claim_name(
     session: &Session,
     service: &Values<NodeStatus>,
 ) -> Result<ValueWriter<NodeStatus>, OwnerError> {
@@ -273,13 +274,15 @@ fn take_name(
 
 fn wake_sender(service: &Events) -> Result<WakeSender, ServiceError> {
     let full = NotifierCreateError::ExceedsMaxSupportedNotifiers;
-    let places = Places { what: "notifiers", max: WAKE.publishers_max };
-    let notifier = create_port(service, &full, places, || service.notifier_builder().create())?;
+    let limit = PortLimit { ports: "notifiers", max: WAKE.publishers_max };
+    let notifier = create_port(service, &full, limit, || service.notifier_builder().create())?;
     Ok(WakeSender::new(notifier))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::client::Client;
     use crate::limits::OWNER_PUBLISHERS_MAX;
@@ -288,7 +291,8 @@ mod tests {
     use crate::ports::session::Slices;
     use crate::testing::TestDomain;
 
-    const SOON: std::time::Duration = std::time::Duration::from_secs(10);
+    /// Longer than any step of the test takes.
+    const DEADLINE: Duration = Duration::from_secs(10);
 
     fn load(topology_revision: u32) -> Load<'static> {
         Load {
@@ -303,13 +307,13 @@ mod tests {
     }
 
     #[test]
-    fn a_load_without_a_place_for_one_of_its_writers_leaves_the_old_one_as_it_was() {
+    fn a_load_without_a_place_for_one_of_its_writers_leaves_the_old_load_as_it_was() {
         let domain = TestDomain::new();
         let mut owner = Owner::create(&domain.endpoint(), &load(1)).unwrap();
         let session = Session::join(&domain.endpoint()).unwrap();
         let service: Slices<Triangle, LoadHeader> = session.slices(&SURFACE, Access::Open).unwrap();
-        // A tunnel has the spare place; something else the one that a load needs.
-        let strangers: Vec<_> = (1..OWNER_PUBLISHERS_MAX)
+        // A tunnel has the spare place; another program has the place that a load needs.
+        let other_publishers: Vec<_> = (1..OWNER_PUBLISHERS_MAX)
             .map(|_| service.publisher_builder().create().unwrap())
             .collect();
         let error = owner.load(&load(2)).unwrap_err();
@@ -317,16 +321,16 @@ mod tests {
 
         let mut client = Client::attach(&domain.endpoint()).unwrap();
         let revision = |client: &mut Client| {
-            let topology = client.topology(SOON).unwrap();
+            let topology = client.topology(DEADLINE).unwrap();
             topology.map(|topology| topology.header.topology_revision)
         };
-        assert!(client.topology(std::time::Duration::ZERO).unwrap().is_none());
+        assert!(client.topology(Duration::ZERO).unwrap().is_none());
         owner.refresh();
         assert_eq!(revision(&mut client), Some(1));
         owner.publish_particles(&SnapshotHeader::default(), |_| unreachable!()).unwrap();
         owner.publish_keyframe(KeyframeHeader::default(), &[0; 8]).unwrap();
 
-        drop(strangers);
+        drop(other_publishers);
         owner.load(&load(2)).unwrap();
         assert_eq!(revision(&mut client), Some(2));
     }

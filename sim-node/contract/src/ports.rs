@@ -1,4 +1,5 @@
-//! Services and their reading and writing ends: the only files that name iceoryx2 beside the messages.
+//! Services, readers and writers. Beside the derives of the messages, only these files, `owner.rs`
+//! and `client/watch.rs` name iceoryx2.
 
 pub(crate) mod domain;
 pub(crate) mod latch;

@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM, for every program around a simulation: the first one asks for a clean end
-//! (ports dropped, files finished), a second one exits at once.
+//! Handling of Ctrl-C and SIGTERM. The first signal requests a clean end (ports dropped, files
+//! finished); a second signal exits at once.
 
 use std::io;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Whether the user asked the program to end.
+/// Flag that SIGINT and SIGTERM set.
 #[derive(Debug, Clone)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -19,18 +19,18 @@ impl Stop {
     /// Installs the handlers of SIGINT and SIGTERM, once per process.
     ///
     /// # Errors
-    /// The operating system refuses the handlers.
+    /// The operating system refused the handlers.
     pub fn install() -> io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            // Registered first, so that it sees the flag as the signal before left it.
+            // Handlers run in order of registration: this one reads the flag before the next sets it.
             flag::register_conditional_shutdown(signal, ABRUPT_EXIT, Arc::clone(&stop))
                 .and_then(|_| flag::register(signal, Arc::clone(&stop)))?;
         }
         Ok(Self(stop))
     }
 
-    /// Whether a signal has come.
+    /// Returns `true` once a signal has arrived.
     pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

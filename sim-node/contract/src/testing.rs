@@ -7,33 +7,33 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::endpoint::{Endpoint, NAME_DEFAULT};
 use crate::ports::domain;
 
-/// A domain that no other test has, and whose files are removed when it is dropped. Drop it after
-/// everything that is in it.
+/// A domain of one test. Its files are removed when it is dropped, so drop it after everything that
+/// uses it.
 #[derive(Debug)]
 pub struct TestDomain {
     name: String,
 }
 
 impl TestDomain {
-    /// A new domain, called after this process.
+    /// Creates a domain with a unique name, made of the process id and a counter.
     pub fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         Self { name: format!("test-{}-{count}", process::id()) }
     }
 
-    /// Its name, for `--domain`.
+    /// Name of the domain, for `--domain`.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The simulation of the default name in it.
+    /// Endpoint of the default simulation in this domain.
     ///
     /// # Panics
-    /// Never: its name is one of those allowed.
-    #[allow(clippy::expect_used, reason = "the name is made of what is allowed")]
+    /// Never: the name consists of allowed characters.
+    #[allow(clippy::expect_used, reason = "the name consists of allowed characters")]
     pub fn endpoint(&self) -> Endpoint {
-        Endpoint::new(Some(&self.name), NAME_DEFAULT).expect("the name of a test domain is allowed")
+        Endpoint::new(Some(&self.name), NAME_DEFAULT).expect("a test domain has a valid name")
     }
 }
 
@@ -48,7 +48,7 @@ impl Drop for TestDomain {
         let prefix = domain::prefix(&self.name);
         for entry in fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
             if entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
-                // What another process of the domain removes meanwhile is gone as well.
+                // Another process of the domain may have removed the file first.
                 let _ = fs::remove_file(entry.path());
             }
         }

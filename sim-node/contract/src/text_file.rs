@@ -1,4 +1,4 @@
-//! Text files that people name, such as scenes and meshes: bounded, and read without waiting.
+//! Reading of text files that a user names, such as scenes and meshes. Size and time are bounded.
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read};
@@ -8,15 +8,15 @@ use std::path::Path;
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-use crate::SCENE_SIZE_BYTES_MAX;
+use crate::limits::SCENE_SIZE_BYTES_MAX;
 
-/// A text file that cannot be read.
+/// Error of reading a text file.
 #[derive(Debug, Error)]
 pub enum TextFileError {
-    /// The system refuses to open or read the file.
+    /// The system refused to open or read the file.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// The path names something that has no end, or that a reader would wait for.
+    /// The path names a directory, FIFO, socket or device. Reading it could wait or never end.
     #[error("it is {0}, not a regular file")]
     NotRegular(&'static str),
     /// The file is longer than a scene may be.
@@ -27,17 +27,17 @@ pub enum TextFileError {
     NotText,
 }
 
-/// Reads a scene, or a mesh that a scene names.
-///
-/// It never waits: FIFOs and devices are refused. It reads at most [`SCENE_SIZE_BYTES_MAX`] bytes.
+/// Reads a scene, or a mesh that a scene names. Never waits, because it refuses FIFOs and devices.
+/// Reads at most [`SCENE_SIZE_BYTES_MAX`] bytes.
 ///
 /// # Errors
 /// The file cannot be opened or read, is not a regular file, is too long or is not text.
 pub fn read_scene_file(path: impl AsRef<Path>) -> Result<String, TextFileError> {
     let path = path.as_ref();
-    // Opening a device may have effects, so its type is checked first.
+    // Opening a device can have side effects, so the type is checked first.
     check_regular(&std::fs::metadata(path)?)?;
-    // The path may name another file by now. With this flag, opening a FIFO does not wait either.
+    // The path may name another file now, so the type is checked again below. With this flag, opening
+    // a FIFO does not wait.
     let flags = OFlags::NONBLOCK.bits().cast_signed();
     let file = OpenOptions::new().read(true).custom_flags(flags).open(path)?;
     check_regular(&file.metadata()?)?;
@@ -74,7 +74,7 @@ mod tests {
 
     use super::*;
 
-    /// A path in the folder for temporary files that is removed with the test.
+    /// A path for a temporary file. Removes the file when it is dropped.
     struct TemporaryPath(PathBuf);
 
     impl TemporaryPath {

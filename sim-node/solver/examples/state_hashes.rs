@@ -10,7 +10,7 @@ use std::error::Error;
 use std::thread;
 
 use sim_solver::{
-    Ball, Grip, ParameterValue, Pose, Push, SOLVER_VERSION, Scene, Solver, Sweep, builtin,
+    Ball, Grab, ParameterValue, Pose, Push, SOLVER_VERSION, Scene, Solver, Sweep, builtin,
 };
 
 /// The test scenes.
@@ -63,7 +63,7 @@ fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Reason> {
     let ball = Ball { center: [x, y, 0.0], radius: 0.3 };
     let pose = Pose { translation: [0.1, 0.05, 0.0], rotation: [0.0, 0.0, 0.3, 1.0] };
     match step {
-        100 => solver.grab(1, Grip { particle: 20, target: [0.3, 0.7, 0.0], over_s: 0.2 }),
+        100 => solver.grab(1, Grab { particle: 20, target: [0.3, 0.7, 0.0], over_s: 0.2 }),
         300 => solver.pin(15),
         500 => solver.release(1, 20),
         700 => solver.push(Push { ball, delta: [0.01, 0.02, 0.0], limit: Some(0.015) }),

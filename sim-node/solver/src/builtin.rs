@@ -1,4 +1,4 @@
-//! The scenes that come with the programs.
+//! The built-in scenes.
 
 const SCENES: [(&str, &str); 14] = [
     ("curtain", include_str!("../../scenes/curtain.toml")),
@@ -17,17 +17,17 @@ const SCENES: [(&str, &str); 14] = [
     ("free-fall", include_str!("../../scenes/free-fall.toml")),
 ];
 
-/// The names of the built-in scenes, in the order in which they are listed.
+/// Returns the names of the built-in scenes, in the order of listings.
 pub fn names() -> impl Iterator<Item = &'static str> {
     SCENES.iter().map(|(name, _)| *name)
 }
 
-/// The TOML text of a built-in scene.
+/// Returns the TOML text of a built-in scene.
 pub fn text(name: &str) -> Option<&'static str> {
     SCENES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
-/// What a built-in scene is, in one line: the first comment line of its text.
+/// Returns a description of a built-in scene in one line: the first comment line of its text.
 pub fn summary(name: &str) -> Option<&'static str> {
     text(name)?.lines().next().map(|line| line.trim_start_matches(['#', ' ']))
 }

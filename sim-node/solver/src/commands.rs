@@ -1,61 +1,53 @@
-//! What can be done to the state at the boundary before a step. A rejected command changes nothing.
+//! Commands that change the state at the boundary before a step. A rejected command changes nothing.
+
+pub(crate) mod apply;
+pub(crate) mod cut;
 
 use glam::Vec3;
-use sim_types::{COORDINATE_MAX, ConstraintKind, ParameterValue, ParticleFlags, Reason};
+use sim_types::{ConstraintKind, ParameterValue, ParticleFlags, Reason};
 
-use crate::Solver;
-use crate::cut::Ball;
-use crate::drive::Grab;
+use crate::checks::{check_finite, is_near};
 use crate::frame::{Frame, Pose};
-use crate::parameters::{Affected, Context};
+use crate::parameters::Affected;
+use crate::solver::Solver;
+use crate::step::drive::{ActiveGrab, GRAB_OVER_S_MAX};
+use cut::Ball;
 
-/// Longest time, in seconds, that a grabbed particle may take to its target.
-pub const GRAB_OVER_S_MAX: f32 = 0.25;
-
-/// Whether all are within [`COORDINATE_MAX`].
-pub(crate) fn is_near(numbers: &[f32]) -> bool {
-    numbers.iter().all(|number| number.abs() <= COORDINATE_MAX)
-}
-
-pub(crate) fn check_finite(numbers: &[f32]) -> Result<(), Reason> {
-    let is_finite = numbers.iter().all(|number| number.is_finite());
-    if is_finite { Ok(()) } else { Err(Reason::NonFinite) }
-}
-
-/// A wish to drive a particle somewhere.
+/// A request to drive a particle to a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grip {
+pub struct Grab {
     /// Index of the particle.
     pub particle: u32,
-    /// Where to, relative to the scene's origin; each coordinate within [`COORDINATE_MAX`].
+    /// Target relative to the scene's origin. No coordinate exceeds [`crate::COORDINATE_MAX`].
     pub target: [f32; 3],
-    /// Seconds to get there, 0..=[`GRAB_OVER_S_MAX`], rounded up to whole steps, at least one.
+    /// Time to reach the target in seconds, 0..=[`GRAB_OVER_S_MAX`], rounded up to whole steps, at
+    /// least one.
     pub over_s: f32,
 }
 
 /// A stroke of a brush.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Push {
-    /// What it touches.
+    /// Region of the brush.
     pub ball: Ball,
-    /// How far the brush moved in a step.
+    /// Displacement of the brush in one step.
     pub delta: [f32; 3],
-    /// Largest size of each component of `delta`, >= 0, if there is one.
+    /// Limit of each component of `delta`, >= 0. None for no limit.
     pub limit: Option<f32>,
 }
 
 impl Solver {
-    /// Holds a particle where it stands, until [`Self::unpin`]. Pinning a pinned one is fine.
+    /// Holds a particle in place until [`Self::unpin`]. Pinning a pinned particle has no effect.
     ///
     /// # Errors
-    /// Unknown or frozen particle.
+    /// The particle is unknown or frozen.
     pub fn pin(&mut self, particle: u32) -> Result<(), Reason> {
-        let index = self.living_particle(particle)?;
+        let index = self.find_unfrozen(particle)?;
         if self.has_flag(index, ParticleFlags::PINNED) {
             return Ok(());
         }
         self.particles.change_flags(index, ParticleFlags::PINNED, 0);
-        // A grabbed one goes on with the hand that holds it, and stands where it is let go.
+        // A grabbed particle follows its grab, and stops where it is released.
         if !self.has_flag(index, ParticleFlags::GRABBED) {
             self.particles.stop(index);
         }
@@ -63,12 +55,13 @@ impl Solver {
         Ok(())
     }
 
-    /// Frees a pinned particle, from rest; one that has an anchor goes back to it. Unpinning a free one is fine.
+    /// Frees a pinned particle, from rest. A particle with an anchor returns to it. Unpinning a free
+    /// particle has no effect.
     ///
     /// # Errors
-    /// Unknown or frozen particle.
+    /// The particle is unknown or frozen.
     pub fn unpin(&mut self, particle: u32) -> Result<(), Reason> {
-        let index = self.living_particle(particle)?;
+        let index = self.find_unfrozen(particle)?;
         if self.has_flag(index, ParticleFlags::PINNED) {
             self.particles.change_flags(index, 0, ParticleFlags::PINNED);
             self.due.tethers = true;
@@ -76,67 +69,71 @@ impl Solver {
         Ok(())
     }
 
-    /// Drives a particle to a target until [`Self::release`]. Grabbing again is a new target.
+    /// Drives a particle to a target until [`Self::release`]. Another grab by the same client sets a
+    /// new target.
     ///
     /// # Errors
-    /// Bad target or time, unknown or frozen particle, or another client holds it.
-    pub fn grab(&mut self, client_id: u64, grip: Grip) -> Result<(), Reason> {
-        self.check_target(&grip)?;
-        let index = self.living_particle(grip.particle)?;
-        let steps_left = self.steps_of(grip.over_s);
-        let Grip { particle, target, .. } = grip;
-        let grab = Grab { particle, client_id, target, steps_left };
+    /// The target or time is out of range, the particle is unknown or frozen, or another client has
+    /// grabbed it.
+    pub fn grab(&mut self, client_id: u64, grab: Grab) -> Result<(), Reason> {
+        self.check_target(&grab)?;
+        let index = self.find_unfrozen(grab.particle)?;
+        let steps_left = self.grab_steps(grab.over_s);
+        let Grab { particle, target, .. } = grab;
+        let active = ActiveGrab { particle, client_id, target, steps_left };
         match self.find_grab(particle) {
             Ok(place) if self.grabs[place].client_id != client_id => {
                 return Err(Reason::GrabbedByOther);
             }
-            Ok(place) => self.grabs[place] = grab,
-            Err(place) => self.grabs.insert(place, grab),
+            Ok(place) => self.grabs[place] = active,
+            Err(place) => self.grabs.insert(place, active),
         }
         self.particles.change_flags(index, ParticleFlags::GRABBED, 0);
-        self.tie_if_root(index);
+        self.update_root(index);
         Ok(())
     }
 
-    /// Gives a particle that this client grabbed a new target.
+    /// Sets a new target for a particle that this client has grabbed.
     ///
     /// # Errors
-    /// Bad target or time, unknown particle, or this client does not hold it.
-    pub fn move_grabbed(&mut self, client_id: u64, grip: Grip) -> Result<(), Reason> {
-        self.check_target(&grip)?;
-        self.living_particle(grip.particle)?;
-        let place = self.find_own_grab(client_id, grip.particle)?;
-        self.grabs[place].target = grip.target;
-        self.grabs[place].steps_left = self.steps_of(grip.over_s);
+    /// The target or time is out of range, the particle is unknown or frozen, or this client has not
+    /// grabbed it.
+    pub fn move_grabbed(&mut self, client_id: u64, grab: Grab) -> Result<(), Reason> {
+        self.check_target(&grab)?;
+        self.find_unfrozen(grab.particle)?;
+        let place = self.find_own_grab(client_id, grab.particle)?;
+        self.grabs[place].target = grab.target;
+        self.grabs[place].steps_left = self.grab_steps(grab.over_s);
         Ok(())
     }
 
-    /// Lets a grabbed particle go with the velocity of its last motion; a pinned one stays where
-    /// it is, an anchored one goes back to its anchor.
+    /// Releases a grabbed particle with the velocity of its last step. A pinned particle stays in
+    /// place; an anchored one returns to its anchor.
     ///
     /// # Errors
-    /// Unknown particle, or this client does not hold it.
+    /// The particle is unknown or frozen, or this client has not grabbed it.
     pub fn release(&mut self, client_id: u64, particle: u32) -> Result<(), Reason> {
-        let index = self.living_particle(particle)?;
+        let index = self.find_unfrozen(particle)?;
         let place = self.find_own_grab(client_id, particle)?;
         self.grabs.remove(place);
         self.particles.change_flags(index, 0, ParticleFlags::GRABBED);
         if self.has_flag(index, ParticleFlags::PINNED) {
             self.particles.stop(index);
         }
-        self.tie_if_root(index);
+        self.update_root(index);
         Ok(())
     }
 
-    /// What is in a hand is no root of tethers.
-    fn tie_if_root(&mut self, index: usize) {
+    /// Marks the tethers as out of date if a particle starts or stops being a root: a grabbed
+    /// particle is none.
+    fn update_root(&mut self, index: usize) {
         self.due.tethers |= self.has_flag(index, ParticleFlags::PINNED | ParticleFlags::ANCHORED);
     }
 
-    /// Gives every free particle strictly within a ball the velocity of a brush.
+    /// Sets the velocity of every free particle strictly inside a ball to that of a brush.
     ///
     /// # Errors
-    /// A wrong number.
+    /// A number is not finite or out of range.
     pub fn push(&mut self, push: Push) -> Result<(), Reason> {
         self.check_ball(&push.ball)?;
         check_finite(&push.delta)?;
@@ -152,17 +149,17 @@ impl Solver {
         }
         let [x, y, z] = delta.map(|axis| axis * self.settings.rate_hz as f32);
         for state in &mut self.particles.states {
-            if state.inverse_mass != 0.0 && push.ball.has(Vec3::from_array(state.position)) {
+            if state.inverse_mass != 0.0 && push.ball.contains(Vec3::from_array(state.position)) {
                 state.velocity = [x, y, z];
             }
         }
         Ok(())
     }
 
-    /// Brings the frame of an anchor to a pose by the end of the next step; from then on it stands.
+    /// Moves the frame of an anchor to a pose by the end of the next step, where it stays.
     ///
     /// # Errors
-    /// Unknown anchor, or a wrong number.
+    /// The anchor is unknown, or a number is not finite or out of range.
     pub fn move_anchor(&mut self, anchor: u32, pose: Pose) -> Result<(), Reason> {
         let frame = Frame::check(&pose, self.context())?;
         let moved = self.anchors.moved.get_mut(anchor as usize);
@@ -170,26 +167,26 @@ impl Solver {
         Ok(())
     }
 
-    /// Brings a collider to a pose, against where it was at load, by the end of the next step, with
-    /// the velocity that this implies; from then on it stands. It turns about its own middle;
-    /// bounds do not turn.
+    /// Moves a collider to a pose relative to its pose at load, by the end of the next step and with
+    /// the velocity that this implies. There it stays. It rotates about its own center; bounds do
+    /// not rotate.
     ///
     /// # Errors
-    /// Unknown collider, or a wrong number.
+    /// The collider is unknown, or a number is not finite or out of range.
     pub fn move_collider(&mut self, collider: u32, pose: Pose) -> Result<(), Reason> {
         let frame = Frame::check(&pose, self.context())?;
         let moved = self.colliders.get_mut(collider as usize);
         moved.ok_or(Reason::UnknownCollider)?.move_to(frame)
     }
 
-    /// Sets a parameter, one of [`crate::PARAMETERS`], from the next step on; `kind` chooses the
-    /// constraints that `compliance` or `stiffness` is meant for, none is all of them.
+    /// Sets a parameter, one of [`crate::PARAMETERS`], from the next step on. `kind` selects the
+    /// constraints for which `compliance` or `stiffness` is meant; None selects all.
     ///
-    /// The state keeps every bit: nothing jumps, only the forces are other ones from now on.
+    /// The state keeps every bit: no particle jumps, only the forces change.
     ///
     /// # Errors
-    /// Unknown parameter, a value of another form or outside of its range, or a softness that is
-    /// not the method's.
+    /// The parameter is unknown, the value has another form or is out of range, or the softness
+    /// belongs to the other method.
     pub fn set(
         &mut self,
         name: &str,
@@ -197,16 +194,16 @@ impl Solver {
         kind: Option<ConstraintKind>,
     ) -> Result<(), Reason> {
         let affected = self.parameters.set(name, value, kind, self.context())?;
-        self.due.constraints |= affected != Affected::Nothing;
-        self.due.tethers |= affected == Affected::RigidPaths;
+        match affected {
+            Affected::Nothing => {}
+            Affected::Limits => self.due.limits = true,
+            Affected::Constraints => self.due.constraints = true,
+            Affected::RigidPaths => (self.due.constraints, self.due.tethers) = (true, true),
+        }
         Ok(())
     }
 
-    pub(crate) fn context(&self) -> Context {
-        Context { method: self.settings.method, is_planar: self.is_planar }
-    }
-
-    fn living_particle(&self, particle: u32) -> Result<usize, Reason> {
+    fn find_unfrozen(&self, particle: u32) -> Result<usize, Reason> {
         let index = particle as usize;
         if index >= self.particle_count() {
             return Err(Reason::UnknownParticle);
@@ -222,29 +219,16 @@ impl Solver {
         self.particles.states[index].flags & flag != 0
     }
 
-    fn check_target(&self, grip: &Grip) -> Result<(), Reason> {
-        check_finite(&grip.target)?;
-        check_finite(&[grip.over_s])?;
-        let is_near = is_near(&grip.target);
-        let is_in_plane = !self.is_planar || grip.target[2] == 0.0;
-        let is_timely = (0.0..=GRAB_OVER_S_MAX).contains(&grip.over_s);
+    fn check_target(&self, grab: &Grab) -> Result<(), Reason> {
+        check_finite(&grab.target)?;
+        check_finite(&[grab.over_s])?;
+        let is_near = is_near(&grab.target);
+        let is_in_plane = !self.is_planar || grab.target[2] == 0.0;
+        let is_timely = (0.0..=GRAB_OVER_S_MAX).contains(&grab.over_s);
         if is_near && is_in_plane && is_timely { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
-    /// Whole steps in `over_s`, rounded up, at least one. A time that is a whole number of steps but
-    /// for its rounding to f32 is taken as that number: 1/60 s at 240 Hz is 4 steps, not 5.
-    pub(crate) fn steps_of(&self, over_s: f32) -> u32 {
-        let steps = f64::from(over_s) * f64::from(self.settings.rate_hz) * (1.0 - 1e-7);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "0 <= over_s <= 0.25 and rate <= 1e5: at most 25,000"
-        )]
-        let steps = steps.ceil() as u32;
-        steps.max(1)
-    }
-
-    /// The place of a particle's grab in the list, or where it would go: ascending by particle.
+    /// Position of a particle's grab in the list, or the position where it belongs. The list ascends by particle.
     fn find_grab(&self, particle: u32) -> Result<usize, usize> {
         self.grabs.binary_search_by_key(&particle, |grab| grab.particle)
     }

@@ -1,44 +1,43 @@
-//! Moving frames: where anchors and colliders are, against where they were at load.
+//! Moving frames: the motion of anchors and colliders relative to their poses at load.
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use crate::parameters::Context;
 use sim_types::Reason;
 
-use crate::{check_finite, is_near};
+use crate::checks::{Context, check_finite, is_near};
 
-/// Where a frame is to be, against where it was at load.
+/// A frame relative to its pose at load, as a client gives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// In the scene's unit.
+    /// Translation in the scene's unit.
     pub translation: [f32; 3],
-    /// Quaternion x, y, z, w of any length but 0.
+    /// Quaternion x, y, z, w of any length except 0.
     pub rotation: [f32; 4],
 }
 
-/// A checked pose.
+/// A checked frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Frame {
     pub(crate) translation: Vec3,
-    /// Of length 1.
+    /// A unit quaternion.
     pub(crate) rotation: Quat,
 }
 
 impl Frame {
     pub(crate) const AT_LOAD: Self = Self { translation: Vec3::ZERO, rotation: Quat::IDENTITY };
 
-    /// From translation and rotation in f64, rounded once.
+    /// From a translation and a rotation in f64, each rounded once.
     pub(crate) fn new(translation: DVec3, rotation: DQuat) -> Self {
         Self { translation: translation.as_vec3(), rotation: unit(rotation) }
     }
 
-    /// From a pose whose rotation is known not to be 0.
+    /// From a pose whose rotation is not 0.
     pub(crate) fn from_pose(pose: &Pose) -> Self {
         let rotation = DQuat::from_array(pose.rotation.map(f64::from));
         Self { translation: Vec3::from_array(pose.translation), rotation: unit(rotation) }
     }
 
-    /// From what a client asks for; in 2-D a frame stays in the plane.
+    /// From a pose that a client sent. In 2-D a frame must stay in the plane.
     pub(crate) fn check(pose: &Pose, context: Context) -> Result<Self, Reason> {
         check_finite(&pose.translation)?;
         check_finite(&pose.rotation)?;
@@ -51,17 +50,17 @@ impl Frame {
         Ok(Self::from_pose(pose))
     }
 
-    /// Whether its rotation has length 1, but for its rounding.
+    /// True if the rotation is a unit quaternion, up to rounding.
     pub(crate) fn is_unit(&self) -> bool {
         (self.rotation.dot(self.rotation) - 1.0).abs() < 1e-5
     }
 
-    /// The numbers of this frame, for a keyframe.
+    /// The frame as a pose, for a keyframe.
     pub(crate) fn to_pose(self) -> Pose {
         Pose { translation: self.translation.to_array(), rotation: self.rotation.to_array() }
     }
 
-    /// Part of the way to another frame: linear, and normalised-linear for the rotation.
+    /// Interpolates towards another frame: linearly, and normalised-linearly for the rotation.
     pub(crate) fn towards(&self, end: &Self, share: f32) -> Self {
         let same_side = if self.rotation.dot(end.rotation) < 0.0 { -1.0 } else { 1.0 };
         let from = self.rotation * (same_side * (1.0 - share));
@@ -72,22 +71,22 @@ impl Frame {
     }
 }
 
-/// Rounded to f32 after it was brought to length 1; of the two signs, that with w >= 0.
+/// Normalises a rotation in f64 and rounds it to f32, with the sign for which w >= 0.
 fn unit(rotation: DQuat) -> Quat {
     let sign = if rotation.w < 0.0 { -1.0 } else { 1.0 };
     (rotation * (sign / rotation.dot(rotation).sqrt())).as_quat()
 }
 
-/// The rotation by an angle in radians about an axis of length 1.
+/// The rotation by an angle in radians about a unit vector.
 pub(crate) fn rotation_about(axis: DVec3, angle: f64) -> DQuat {
     let (sine, cosine) = sin_cos_of_half_turn(angle / 2.0);
     DQuat::from_xyzw(axis.x * sine, axis.y * sine, axis.z * sine, cosine)
 }
 
-/// Sine and cosine, but for their common sign, which a rotation does not notice.
+/// Sine and cosine up to a common sign, which does not affect a rotation.
 ///
-/// The standard library's may differ between machines; these are sums and products only: the
-/// angle is brought to [-pi/2, pi/2], where 12 terms of the Taylor series reach the last bit.
+/// Those of the standard library may differ between machines; these are sums and products only. The
+/// angle is reduced to [-pi/2, pi/2], where 12 terms of the Taylor series reach the last bit.
 fn sin_cos_of_half_turn(angle: f64) -> (f64, f64) {
     use std::f64::consts::PI;
     let x = angle - (angle / PI).round() * PI;
@@ -105,10 +104,10 @@ fn sin_cos_of_half_turn(angle: f64) -> (f64, f64) {
     (sine, cosine)
 }
 
-/// The angular velocity that turns one rotation into another in `dt` seconds, in rad/s.
+/// The angular velocity from one rotation to another in `dt` seconds, in rad/s.
 ///
-/// With s = |vector part| = sin(angle / 2), the angle is 2 asin(s); its series is exact to 1e-7 up
-/// to a quarter turn in a step, beyond which "velocity" means little.
+/// With s = |vector part| = sin(angle / 2), the angle is 2 asin(s). The series is exact to 1e-7 up to
+/// a quarter turn per step; faster rotations have no meaningful velocity.
 pub(crate) fn angular_velocity(from: Quat, to: Quat, dt: f32) -> Vec3 {
     let turn = to * from.conjugate();
     let vector = Vec3::new(turn.x, turn.y, turn.z) * if turn.w < 0.0 { -1.0 } else { 1.0 };
@@ -124,7 +123,7 @@ pub(crate) fn angular_velocity(from: Quat, to: Quat, dt: f32) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
-    //! Rotations against the standard library's functions.
+    //! Rotations against the functions of the standard library.
     use super::*;
 
     #[test]

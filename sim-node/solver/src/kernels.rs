@@ -1,35 +1,36 @@
-//! The same arithmetic, one number or eight at a time, chosen when the program starts.
+//! The arithmetic of the step, for one number or eight at a time, selected when the program starts.
 //!
-//! A piece of [`Work`] is written once, over [`Lanes`]. Each lane goes through the operations of the
-//! scalar program in their order, and +, -, x, / and the square root are exact in every width, so
-//! all kernels give the same bits.
+//! Each lane performs the operations of the scalar program in the same order, and +, -, x, / and
+//! the square root are exact in every width, so all kernels produce the same bits.
 
 mod avx2;
-mod lanes;
+pub(crate) mod huge_pages;
+pub(crate) mod lanes;
 mod portable;
 mod scalar;
+pub(crate) mod worker_pool;
 
-pub(crate) use lanes::{Body, Eight, Lanes, Wide, axes, each, eights, eights_mut};
-pub(crate) use portable::Portable;
+use lanes::LaneWork;
+use portable::Portable;
 
-/// Which program makes the steps. All of them give the same bits.
+/// Implementation of the step's arithmetic. All of them produce the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kernels {
-    /// One constraint after the other, without structure: what the others are compared with.
+    /// One constraint after the other, without structure: the oracle for the others.
     Reference,
-    /// Eight at a time, on any processor.
+    /// Eight lanes in plain arrays, for any processor.
     Portable,
-    /// Eight at a time by AVX2.
+    /// Eight lanes in AVX2 registers.
     Avx2,
 }
 
 impl Kernels {
-    /// The fastest for this processor.
+    /// Returns the fastest kernels for this processor.
     pub fn best() -> Self {
         if Self::has_avx2() { Self::Avx2 } else { Self::Portable }
     }
 
-    /// Those that this processor has.
+    /// Returns the kernels that this processor supports.
     pub fn available() -> impl Iterator<Item = Self> {
         let all = [Self::Reference, Self::Portable, Self::Avx2];
         all.into_iter().filter(|kernels| *kernels != Self::Avx2 || Self::has_avx2())
@@ -45,23 +46,13 @@ impl Kernels {
         false
     }
 
-    /// Does some work, eight numbers at a time.
+    /// Runs work on eight lanes.
     #[inline]
-    pub(crate) fn run<T: Work>(self, work: T) -> T::Output {
+    pub(crate) fn run<T: LaneWork>(self, work: T) -> T::Output {
         match self {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 if Self::has_avx2() => avx2::run(work),
             _ => work.run::<Portable>(),
         }
     }
-}
-
-/// A loop that is compiled for each width. Everything in it is inlined, or it would be compiled for
-/// the oldest processor.
-pub(crate) trait Work {
-    /// What it gives back.
-    type Output;
-
-    /// Does it.
-    fn run<W: Wide>(self) -> Self::Output;
 }

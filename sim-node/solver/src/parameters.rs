@@ -6,10 +6,12 @@ use sim_types::{
     PerKind, Reason, ValueForm,
 };
 
-use crate::is_near;
-use crate::scene::{Limits, Scene, Wind};
+use crate::checks::{Context, is_near};
+use crate::scene::definition::Scene;
+use crate::scene::definition::limits::Limits;
+use crate::scene::definition::wind::Wind;
 
-/// What can be changed while a scene runs. Part of the state: a keyframe holds it.
+/// Values that can change while a scene runs. Part of the state, and of a keyframe.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Parameters {
     pub(crate) gravity: [f32; 3],
@@ -24,25 +26,20 @@ pub(crate) struct Parameters {
     tear_stretch: Option<f32>,
     tear_distance: Option<f32>,
     tear_force: Option<f32>,
-    /// By kind: the softness that all constraints of that kind have instead of their own.
+    /// By kind: softness that replaces that of every constraint of the kind.
     softness: [Option<f32>; 4],
 }
 
-/// What a value is checked against.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Context {
-    pub(crate) method: Method,
-    pub(crate) is_planar: bool,
-}
-
-/// What has to be worked out again after a parameter was set.
+/// Derived state that a parameter affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Affected {
-    /// Nothing: the step reads it as it is.
+    /// None: the step reads the parameter itself.
     Nothing,
-    /// What constraints derive from it.
+    /// The limits of constraints.
+    Limits,
+    /// All parameters of constraints.
     Constraints,
-    /// That, and which paths are rigid.
+    /// All parameters of constraints, and the tethers, whose paths consist of rigid constraints.
     RigidPaths,
 }
 
@@ -50,7 +47,7 @@ impl Parameters {
     pub(crate) fn new(scene: &Scene) -> Self {
         let solver = &scene.solver;
         let limits = solver.limits;
-        // Without a block of its own, air is not felt.
+        // A scene without a wind block has no air drag.
         let wind = scene.wind.unwrap_or(Wind { drag: 0.0, ..Wind::default() });
         Self {
             gravity: scene.gravity,
@@ -69,13 +66,13 @@ impl Parameters {
         }
     }
 
-    /// The scene's limits as they are now.
+    /// Current limits of constraints without limits of their own.
     pub(crate) fn limits(&self) -> Limits {
         let Self { max_stretch, tear_stretch, tear_distance, tear_force, .. } = *self;
         Limits { max_stretch, tear_stretch, tear_distance, tear_force }
     }
 
-    /// The softness of a constraint of that kind whose own is `own`.
+    /// Softness of a constraint of a kind, where `own` is its softness in the scene.
     pub(crate) fn softness(&self, kind: ConstraintKind, own: f32) -> f32 {
         self.softness[kind as usize].unwrap_or(own)
     }
@@ -106,7 +103,14 @@ impl Parameters {
             | Parameter::WindVelocity
             | Parameter::MaxSpeed
             | Parameter::TimeScale => Affected::Nothing,
-            _ => Affected::Constraints,
+            Parameter::MaxStretch
+            | Parameter::TearStretch
+            | Parameter::TearDistance
+            | Parameter::TearForce => Affected::Limits,
+            Parameter::Substeps
+            | Parameter::Iterations
+            | Parameter::Relaxation
+            | Parameter::WindDrag => Affected::Constraints,
         })
     }
 

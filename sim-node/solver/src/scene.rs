@@ -6,11 +6,11 @@
 //! The folders, from the bottom: `definition` has the values, `generate` the shapes that expand to
 //! many particles, `read` the way from TOML text to a checked scene.
 
-mod definition;
+pub(crate) mod definition;
 mod error;
 mod generate;
 mod mesh;
-mod model;
+pub(crate) mod model;
 mod read;
 mod source;
 mod warnings;
@@ -19,7 +19,6 @@ pub use definition::anchor::{SceneAnchor, Waypoint};
 pub use definition::collider::{ColliderGeometry, SceneCollider};
 pub use definition::element::{SceneConstraint, SceneParticle};
 pub use definition::limits::Limits;
-pub(crate) use definition::settings::substep_length;
 pub use definition::settings::{ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
 pub use definition::softness::{KindSoftness, Softness, SoftnessValues};
 pub use definition::wind::Wind;
@@ -34,5 +33,4 @@ pub use generate::rope::Rope;
 pub use generate::web::Web;
 pub use generate::{Generator, Shape};
 pub use mesh::{Mesh, ParsedMesh};
-pub(crate) use model::Model;
 pub use source::{LoadError, is_path};

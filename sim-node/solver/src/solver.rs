@@ -2,87 +2,96 @@
 
 use sim_types::{ParameterValues, TearCause};
 
-use crate::anchors::Anchors;
-use crate::bodies::{Bodies, Extras};
-use crate::colliders::{Collider, PlacedCollider};
-use crate::constraints::{Constraint, Recipe, Setup};
-use crate::contact::{OBSTACLES_PER_COLLIDER, Obstacle};
-use crate::drive::Grab;
-use crate::hash::state_hash;
+use crate::checks::Context;
+use crate::constraints::Constraint;
+use crate::constraints::builder::{ConstraintBuilder, Setup};
+use crate::constraints::order::ProjectionOrder;
+use crate::constraints::tethers::Tethers;
+use crate::contacts::colliders::{Collider, PlacedCollider};
+use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
 use crate::kernels::Kernels;
-use crate::order::Order;
 use crate::parameters::Parameters;
-use crate::particles::{Particle, Particles};
-use crate::scene::{Model, Scene, SceneAnchor, SolverSettings, substep_length};
-use crate::tear::Torn;
-use crate::tethers::Tethers;
-use crate::wind::Air;
+use crate::scene::definition::Scene;
+use crate::scene::definition::anchor::SceneAnchor;
+use crate::scene::definition::settings::{SolverSettings, substep_length};
+use crate::scene::model::Model;
+use crate::state::hash::state_hash;
+use crate::state::particles::{Particle, Particles};
+use crate::state::tear::Torn;
+use crate::step::anchors::Anchors;
+use crate::step::drive::ActiveGrab;
+use crate::step::wind::Air;
+use crate::store::{Configured, ParticleStore, SceneFields};
 
-/// A scene that runs. Made once per load; [`Self::step`] allocates nothing afterwards, except where
-/// a command before it has changed parameters or, with tethers, what is held.
+/// A running scene.
+///
+/// [`Self::step`] allocates nothing, except after commands that change parameters or, in scenes with
+/// tethers, what holds a particle.
 #[derive(Debug, Clone)]
 pub struct Solver {
-    /// Immutable from load to load: particles as loaded, constraints by index, triangles.
+    /// Particles as loaded, constraints by index, triangles. Immutable until the next load.
     pub(crate) model: Model,
-    /// What does not change: rate, method, order, whether there are tethers.
+    /// Rate, method, order and tethers, which never change.
     pub(crate) settings: SolverSettings,
-    /// What a client can change, and its values at load.
+    /// Values that clients can change.
     pub(crate) parameters: Parameters,
     initial_parameters: Parameters,
-    /// z is 0 bit for bit.
+    /// True in a scene of 2 dimensions, where z is exactly 0.
     pub(crate) is_planar: bool,
-    /// Between two steps.
+    /// The state between two steps.
     pub(crate) particles: Particles,
-    /// Within a step.
-    pub(crate) bodies: Bodies,
+    /// The state within a step.
+    pub(crate) store: ParticleStore,
     pub(crate) torn: Torn,
     pub(crate) tethers: Tethers,
-    /// In the order of the scene, which is that of contacts.
+    /// In the order of the scene, which is the order of contacts.
     pub(crate) colliders: Vec<Collider>,
-    /// The colliders as the running substep meets them.
+    /// The colliders in the running substep.
     pub(crate) obstacles: Vec<Obstacle>,
     pub(crate) anchors: Anchors,
     scene_anchors: Vec<SceneAnchor>,
     pub(crate) air: Air,
     /// Ascending by particle.
-    pub(crate) grabs: Vec<Grab>,
+    pub(crate) grabs: Vec<ActiveGrab>,
     pub(crate) scene_step: u64,
-    /// What commands of this boundary have left to be worked out before the step.
+    /// Derived state that commands of this boundary have made out of date.
     pub(crate) due: Due,
-    /// The state was put in place since the last step: the next step shows it, and integrates
-    /// nothing.
+    /// True if the state was replaced since the last step. The next step publishes it, and
+    /// integrates nothing.
     pub(crate) is_restored: bool,
-    /// Particles frozen since this solver was made: for messages, not part of the state.
+    /// Particles frozen since this solver was made. For messages; not part of the state.
     pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
 }
 
-/// What follows from the parameters or from what is held, and has to be worked out again: once for
-/// a boundary, however many commands ask for it.
+/// Derived state that is out of date. It is updated once per boundary, however many commands
+/// require it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
     pub(crate) constraints: bool,
+    /// Only the limits of constraints.
+    pub(crate) limits: bool,
     pub(crate) tethers: bool,
 }
 
 impl Solver {
-    /// Makes the state at step 0: the particles as given, nothing projected.
+    /// Makes the state at step 0: the particles of the scene, before any projection.
     pub fn new(scene: &Scene) -> Self {
         Self::with_kernels(scene, Kernels::best())
     }
 
-    /// As [`Self::new`], with other kernels than the best ones: for tests and comparisons. All give
-    /// the same bits.
+    /// Like [`Self::new`], with the given kernels, for tests and comparisons. All kernels produce the
+    /// same bits.
     pub fn with_kernels(scene: &Scene, kernels: Kernels) -> Self {
         let model = scene.model();
         let settings = scene.solver;
-        let order = Order::new(&model, settings.order);
+        let order = ProjectionOrder::new(&model, settings.order);
         let particles = new_particles(&model, &scene.anchors);
         let (particle_count, constraint_count) = (model.particles.len(), model.constraints.len());
         let parameters = Parameters::new(scene);
         let mut solver = Self {
             state_hash: state_hash(&particles.states, 0),
-            bodies: Bodies::new(&model, &order, kernels),
+            store: ParticleStore::new(&model, &order, kernels),
             torn: Torn::new(constraint_count),
             tethers: Tethers::default(),
             colliders: scene.colliders.iter().map(Collider::new).collect(),
@@ -95,10 +104,10 @@ impl Solver {
             parameters,
             initial_parameters: parameters,
             particles,
-            // Room for every particle, so that a grab allocates nothing.
+            // Room for every particle, so that a grab does not allocate.
             grabs: Vec::with_capacity(particle_count),
             scene_step: 0,
-            due: Due { constraints: true, tethers: true },
+            due: Due { constraints: true, tethers: true, ..Due::default() },
             is_restored: false,
             frozen_count: 0,
             model,
@@ -107,28 +116,30 @@ impl Solver {
         solver
     }
 
-    /// As [`Self::new`], in a run that goes on: the next step shows the initial state, as after a
-    /// reset.
+    /// Like [`Self::new`], for a run that continues: the next step publishes the initial state, as
+    /// after a reset.
     pub fn new_in_run(scene: &Scene) -> Self {
         Self { is_restored: true, ..Self::new(scene) }
     }
 
-    /// Steps with so many threads from now on, this one included; 1 is how it begins, [`THREADS_MAX`](crate::THREADS_MAX) the most.
-    /// They change no bit. Small scenes are stepped by one, whatever is set. Threads that the system
-    /// does not give are not there: see [`Self::threads`].
+    /// Sets the number of threads that step the scene, the calling one included: 1 initially, at most
+    /// [`THREADS_MAX`](crate::kernels::worker_pool::THREADS_MAX).
+    ///
+    /// The number changes no bit. A small scene uses a single thread. The system may grant fewer
+    /// threads; see [`Self::threads`].
     pub fn set_threads(&mut self, threads: usize) {
-        if threads != self.bodies.threads() {
-            self.bodies.set_threads(threads);
+        if threads != self.store.thread_count() {
+            self.store.set_threads(threads);
         }
     }
 
-    /// Threads that step it, this one included.
+    /// Returns the number of threads, the calling one included.
     pub fn threads(&self) -> usize {
-        self.bodies.threads()
+        self.store.thread_count()
     }
 
-    /// Makes the next step's state the initial one: particles, parameters, colliders and anchors
-    /// as loaded, nothing grabbed, nothing torn.
+    /// Makes the next step publish the initial state: particles, parameters, colliders and anchors as
+    /// loaded, nothing grabbed, nothing torn.
     pub fn reset(&mut self) {
         self.particles = new_particles(&self.model, &self.scene_anchors);
         self.parameters = self.initial_parameters;
@@ -139,56 +150,77 @@ impl Solver {
             collider.moved = None;
             collider.place(0.0);
         }
-        self.due = Due { constraints: true, tethers: true };
+        self.due = Due { constraints: true, tethers: true, ..Due::default() };
         self.is_restored = true;
     }
 
-    /// Works out what the commands of a boundary have changed: once, however many they were. Whoever
-    /// steps in real time calls it after them; else the next step does, and then may allocate.
+    /// Updates derived state after the commands of a boundary, once for all of them. A caller that
+    /// steps in real time calls it after the commands; otherwise the next step does, and then may
+    /// allocate.
     pub fn finish_boundary(&mut self) {
-        let Due { constraints, tethers } = std::mem::take(&mut self.due);
+        let Due { constraints, limits, tethers } = std::mem::take(&mut self.due);
         if constraints {
             self.configure();
+        } else if limits {
+            self.configure_limits();
         }
         if tethers {
-            self.work_out_tethers();
+            self.derive_tethers();
         }
     }
 
-    /// Works out what constraints derive from the parameters, and makes room for it.
+    /// Derives the constraints from the parameters.
     pub(crate) fn configure(&mut self) {
-        let recipe = Recipe::new(&self.model, &self.parameters, self.setup());
-        let extras = Extras {
+        let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
+        let configured = self.store.configure(&builder, self.scene_fields(), self.torn.all());
+        self.follow_particles(configured);
+    }
+
+    /// Derives the limits of the constraints from the parameters.
+    fn configure_limits(&mut self) {
+        let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
+        let configured =
+            self.store.configure_limits(&builder, self.scene_fields(), self.torn.all());
+        self.follow_particles(configured);
+    }
+
+    fn scene_fields(&self) -> SceneFields {
+        SceneFields {
             colliders: !self.colliders.is_empty(),
             wind: self.air.has_surface() && self.parameters.wind_drag > 0.0,
             tethers: self.settings.tethers,
-        };
-        self.bodies.configure(&recipe, extras, self.torn.all());
-        if extras.wind {
-            self.air.find_corners(&self.bodies);
         }
-        self.tethers.tie(&mut self.bodies, &self.particles);
+    }
+
+    /// Updates the locations of particles after a change of the layout.
+    fn follow_particles(&mut self, configured: Configured) {
+        if configured == Configured::Moved {
+            if self.scene_fields().wind || self.air.is_located() {
+                self.air.locate_corners(&self.store);
+            }
+            self.tethers.attach(&mut self.store, &self.particles);
+        }
     }
 
     pub(crate) fn setup(&self) -> Setup {
         Setup { method: self.settings.method, h: self.h() }
     }
 
-    /// Works out the tethers of the state as it is, where the scene has any.
-    fn work_out_tethers(&mut self) {
+    /// Derives the tethers from the current state, if the scene has any.
+    fn derive_tethers(&mut self) {
         if !self.settings.tethers {
             return;
         }
-        self.tethers.untie(&mut self.bodies);
+        self.tethers.detach(&mut self.store);
         let (model, parameters) = (&self.model, &self.parameters);
-        self.tethers = Tethers::of_state(model, parameters, &self.particles, self.torn.order());
-        self.tethers.tie(&mut self.bodies, &self.particles);
+        self.tethers = Tethers::from_state(model, parameters, &self.particles, self.torn.order());
+        self.tethers.attach(&mut self.store, &self.particles);
     }
 
-    /// Takes a constraint out for good, unless it is torn already.
+    /// Tears a constraint, unless it is torn already.
     pub(crate) fn tear(&mut self, constraint: u32, cause: TearCause) {
         self.torn.tear(constraint, cause);
-        self.bodies.tear(constraint);
+        self.store.tear(constraint);
     }
 
     /// Length of a substep in seconds.
@@ -196,102 +228,122 @@ impl Solver {
         substep_length(self.settings.rate_hz, self.parameters.substeps)
     }
 
+    /// Properties against which parameters and poses are checked.
+    pub(crate) fn context(&self) -> Context {
+        Context { method: self.settings.method, is_planar: self.is_planar }
+    }
+
+    /// Number of steps that a grab of `over_s` seconds takes, rounded up, at least one. A time that
+    /// differs from whole steps only by its rounding to f32 counts as those: 1/60 s at 240 Hz is 4
+    /// steps, not 5.
+    pub(crate) fn grab_steps(&self, over_s: f32) -> u32 {
+        let steps = f64::from(over_s) * f64::from(self.settings.rate_hz) * (1.0 - 1e-7);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 <= over_s <= 0.25 and rate <= 1e5: at most 25,000"
+        )]
+        let steps = steps.ceil() as u32;
+        steps.max(1)
+    }
+
     /// Length of a step in seconds.
     pub(crate) fn step_length(&self) -> f32 {
         substep_length(self.settings.rate_hz, 1)
     }
 
-    /// Seconds of the scene after `scene_step`.
+    /// Time of the scene at `scene_step`, in seconds.
     pub(crate) fn scene_time_s(&self) -> f64 {
         self.scene_step as f64 / f64::from(self.settings.rate_hz)
     }
 
-    /// Steps since the scene was loaded or reset.
+    /// Returns the number of steps since the scene was loaded or reset.
     pub fn scene_step(&self) -> u64 {
         self.scene_step
     }
 
-    /// Hash of the state after the last step; the same state has the same hash on every machine.
+    /// Returns the hash of the state after the last step. Equal states have equal hashes on every
+    /// machine.
     pub fn state_hash(&self) -> u64 {
         self.state_hash
     }
 
-    /// Particles that were frozen since this solver was made, because their state was no longer
-    /// finite. Such a particle stands for good, until a reset.
+    /// Returns the number of particles that froze since this solver was made, because their state was
+    /// not finite. A frozen particle stays in place until a reset.
     pub fn frozen_count(&self) -> u64 {
         self.frozen_count
     }
 
-    /// Number of particles.
+    /// Returns the number of particles.
     pub fn particle_count(&self) -> usize {
         self.particles.states.len()
     }
 
-    /// The particles after the last step, as they are published and hashed.
+    /// Returns the particles after the last step, as they are published and hashed.
     pub fn particles(&self) -> &[Particle] {
         &self.particles.states
     }
 
-    /// One particle after the last step.
+    /// Returns a particle after the last step.
     ///
     /// # Panics
-    /// If there is no particle `index`.
+    /// If `index` is out of range.
     pub fn particle(&self, index: usize) -> Particle {
         self.particles.states[index]
     }
 
-    /// Number of constraints.
+    /// Returns the number of constraints.
     pub fn constraint_count(&self) -> usize {
         self.model.constraints.len()
     }
 
-    /// The constraints by index, as loaded.
+    /// Returns the constraints by index, as loaded.
     pub fn constraints(&self) -> impl Iterator<Item = Constraint> + '_ {
         self.model.constraints.iter().copied()
     }
 
-    /// The triangles of the surface, three particle indices each.
+    /// Returns the triangles of the surface, three particle indices each.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.model.triangles
     }
 
-    /// The constraints torn since the load, by step and then by index.
+    /// Returns the constraints torn since the load, by step and then by index.
     pub fn torn(&self) -> &[u32] {
         self.torn.order()
     }
 
-    /// Why each of [`Self::torn`] tore.
+    /// Returns the cause of each tear in [`Self::torn`].
     pub fn tear_causes(&self) -> &[TearCause] {
         self.torn.causes()
     }
 
-    /// How many at the end of [`Self::torn`] are new in the last step.
+    /// Returns the number of entries at the end of [`Self::torn`] that the last step added.
     pub fn new_torn_count(&self) -> usize {
         self.torn.new_count()
     }
 
-    /// The parameters as they are now. The time scale is that of a node at real time: the pace
-    /// belongs to the node.
+    /// Returns the current parameters. The pace belongs to the node, so the time scale is always that
+    /// of real time.
     pub fn parameter_values(&self) -> ParameterValues {
         self.parameters.values(self.settings.method)
     }
 
-    /// Number of colliders.
+    /// Returns the number of colliders.
     pub fn collider_count(&self) -> usize {
         self.colliders.len()
     }
 
-    /// Number of anchors.
+    /// Returns the number of anchors.
     pub fn anchor_count(&self) -> usize {
         self.anchors.moved.len()
     }
 
-    /// The colliders where they are after the last step, in the order of the scene.
+    /// Returns the colliders at their poses after the last step, in the order of the scene.
     pub fn colliders(&self) -> impl Iterator<Item = PlacedCollider> + '_ {
         self.colliders.iter().map(Collider::placed)
     }
 
-    /// Whether a collider is anywhere else than before the last step.
+    /// Returns true if the last step moved a collider.
     pub fn has_moving_colliders(&self) -> bool {
         self.colliders.iter().any(Collider::is_moving)
     }

@@ -1,22 +1,33 @@
-//! One step, as a list of its stages. Only + - * / and sqrt, in a fixed order; nothing is
-//! allocated, locked, read from a clock or printed. (What commands left to be worked out at the
-//! boundary before it may allocate, once: `finish_boundary`.)
+//! One step, as the list of its stages. The arithmetic is + - * / and sqrt in a fixed order. A step
+//! allocates nothing, takes no lock, reads no clock and prints nothing.
 
-use sim_types::{ParticleFlags, TearCause};
+pub(crate) mod anchors;
+pub(crate) mod drive;
+pub(crate) mod particle_block;
+pub(crate) mod particle_stages;
+pub(crate) mod prediction;
+pub(crate) mod schedule;
+pub(crate) mod stage;
+pub(crate) mod substep;
+pub(crate) mod wind;
 
-use crate::Solver;
-use crate::bodies::{Fall, Motion};
-use crate::colliders::Moments;
-use crate::constraints::Recipe;
-use crate::contact::{ContactStep, place_obstacles};
-use crate::drive::{Substep, count_step, drive_grabbed};
-use crate::hash::state_hash;
-use crate::project::BY_LENGTH;
-use crate::wind::Breeze;
+use sim_types::ParticleFlags;
+
+use drive::{count_step, drive_grabbed};
+use prediction::Prediction;
+use stage::Stage;
+use substep::{Substep, SubstepInputs};
+use wind::WindStep;
+
+use crate::constraints::builder::ConstraintBuilder;
+use crate::contacts::contact_substep::{ContactSubstep, Interval};
+use crate::contacts::obstacle::place_obstacles;
+use crate::solver::Solver;
+use crate::state::hash::state_hash;
 
 impl Solver {
-    /// Makes one step of 1/rate seconds; right after a reset it shows the state put in place
-    /// instead, and integrates nothing.
+    /// Makes one step of 1/rate seconds. Right after a reset or a restart, it publishes the state
+    /// that was put in place instead.
     ///
     /// Position based dynamics in small steps (Macklin et al. 2019) on positions and explicit
     /// velocities: a substep works on the displacement d = h v beside the position, so that
@@ -24,30 +35,44 @@ impl Solver {
     pub fn step(&mut self) {
         self.finish_boundary();
         if self.is_restored {
-            self.is_restored = false;
-            self.scene_step = 0;
-            for collider in &mut self.colliders {
-                collider.place(0.0);
-            }
-            self.particles.make_zeros_canonical();
-        } else {
-            self.begin_step();
-            let mut is_any_marked = false;
-            for index in 0..self.parameters.substeps {
-                is_any_marked |= self.substep(Substep { index, count: self.parameters.substeps });
-            }
-            self.end_step(is_any_marked);
+            self.publish_restored();
+            return;
         }
-        if self.torn.end_step() {
-            self.tethers.drop_torn(&self.torn, &mut self.bodies);
+        self.begin_step();
+        let mut is_marked = false;
+        for substep in Substep::all(self.parameters.substeps) {
+            // The swept stages form one run; each of the others is a run of its own.
+            for stages in Stage::OF_SUBSTEP.chunk_by(|a, b| a.is_swept() && b.is_swept()) {
+                match stages {
+                    [Stage::Drive] => self.drive(substep),
+                    [Stage::Wind] => self.blow(substep),
+                    _ => is_marked |= self.sweep(substep),
+                }
+            }
         }
-        self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());
+        for stage in Stage::AFTER_SUBSTEPS {
+            match stage {
+                Stage::Tear => self.tear_marked(is_marked),
+                Stage::Freeze => self.freeze(),
+                _ => self.hash(),
+            }
+        }
     }
 
-    /// Takes over the state, and works out where everything that moves by itself is to be at the
-    /// end of the step.
+    fn publish_restored(&mut self) {
+        self.is_restored = false;
+        self.scene_step = 0;
+        for collider in &mut self.colliders {
+            collider.place(0.0);
+        }
+        self.particles.make_zeros_canonical();
+        self.finish_tears();
+        self.hash();
+    }
+
+    /// Unpacks the state, and computes the targets of anchors and colliders for the end of the step.
     fn begin_step(&mut self) {
-        self.bodies.unpack(&self.particles.states);
+        self.store.unpack(&self.particles.states);
         self.scene_step += 1;
         let (time_s, dt) = (self.scene_time_s(), self.step_length());
         self.anchors.begin_step(time_s);
@@ -56,28 +81,16 @@ impl Solver {
         }
     }
 
-    /// What is held goes its way, the wind blows; then everything falls, is brought back by its
-    /// constraints, and by its tethers, and is pushed out of the colliders. Whether anything tears
-    /// at the end of the step.
-    fn substep(&mut self, substep: Substep) -> bool {
-        self.drive(substep);
-        self.blow(substep);
-        let contact_step = self.contact_step(substep);
-        place_obstacles(&mut self.obstacles, &self.colliders, &contact_step);
-        let motion = Motion { fall: self.fall(substep), obstacles: &self.obstacles };
-        self.bodies.substep(&motion, self.parameters.iterations)
-    }
-
-    /// Anchored and grabbed particles go their own way; a hand is stronger than an anchor. Tethers
-    /// follow.
+    /// [`Stage::Drive`]. A grab overrides an anchor. Moving roots of tethers are updated.
     fn drive(&mut self, substep: Substep) {
         let reach = self.parameters.max_speed * self.h();
-        let Self { bodies, particles, anchors, grabs, tethers, .. } = self;
-        anchors.drive(bodies, particles, (substep.left(), reach));
-        drive_grabbed(bodies, grabs, substep, reach);
-        tethers.follow_roots(bodies);
+        let Self { store, particles, anchors, grabs, tethers, .. } = self;
+        anchors.drive(store, particles, substep.left(), reach);
+        drive_grabbed(store, grabs, substep, reach);
+        tethers.update_roots(store);
     }
 
+    /// [`Stage::Wind`].
     fn blow(&mut self, substep: Substep) {
         let drag = self.parameters.wind_drag;
         if !self.air.has_surface() || drag == 0.0 {
@@ -85,28 +98,38 @@ impl Solver {
         }
         let strength = self.air.strength(self.scene_step);
         let velocity = self.parameters.wind_velocity.map(|axis| strength * axis);
-        let breeze = Breeze { velocity, drag, h: self.h(), is_first: substep.is_first() };
-        self.air.blow(&mut self.bodies, &self.model.triangles, &breeze);
+        let wind = WindStep { velocity, drag, h: self.h(), is_first: substep.is_first() };
+        self.air.blow(&mut self.store, &self.model.triangles, &wind);
     }
 
-    fn fall(&self, substep: Substep) -> Fall {
+    /// [`Stage::Predict`] to [`Stage::Advance`], which each sheet and the graph run on their own
+    /// particles. Returns true if any constraint was marked as torn.
+    fn sweep(&mut self, substep: Substep) -> bool {
+        let contact_substep = self.contact_substep(substep);
+        place_obstacles(&mut self.obstacles, &self.colliders, &contact_substep);
+        let prediction = self.prediction(substep);
+        let inputs = SubstepInputs { prediction, obstacles: &self.obstacles };
+        self.store.run_swept_stages(&inputs, self.parameters.iterations)
+    }
+
+    fn prediction(&self, substep: Substep) -> Prediction {
         let (h, parameters) = (self.h(), &self.parameters);
-        Fall {
+        Prediction {
             h,
-            kept: kept_share(parameters.damping * h),
+            kept: kept_fraction(parameters.damping * h),
             gain: parameters.gravity.map(|axis| h * axis),
             reach: parameters.max_speed * h,
             is_first: substep.is_first(),
         }
     }
 
-    fn contact_step(&self, substep: Substep) -> ContactStep {
+    fn contact_substep(&self, substep: Substep) -> ContactSubstep {
         let (h, [x, y, z]) = (self.h(), self.parameters.gravity);
         let count = substep.count as f32;
-        ContactStep {
+        ContactSubstep {
             h,
             rest_speed: 2.0 * (x * x + y * y + z * z).sqrt() * h,
-            moments: Moments {
+            interval: Interval {
                 start: substep.index as f32 / count,
                 end: (substep.index + 1) as f32 / count,
             },
@@ -114,39 +137,49 @@ impl Solver {
         }
     }
 
-    /// Gives the state back. What is no longer finite is taken out, and with it the hands that held
-    /// it; what was marked tears.
-    fn end_step(&mut self, is_any_marked: bool) {
+    /// [`Stage::Tear`].
+    fn tear_marked(&mut self, is_any_marked: bool) {
+        if is_any_marked {
+            let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
+            let torn = &mut self.torn;
+            self.store.remove_marks(|constraint, mark| {
+                torn.tear(constraint, builder.cause(constraint, mark));
+            });
+            for constraint in self.torn.new_tears() {
+                self.store.tear(*constraint);
+            }
+        }
+        self.finish_tears();
+    }
+
+    /// Ends a step for the torn constraints, those that commands cut included.
+    fn finish_tears(&mut self) {
+        if self.torn.end_step() {
+            self.tethers.drop_torn(&self.torn, &mut self.store);
+        }
+    }
+
+    /// [`Stage::Freeze`]. Writes the state back, with v = d / h. A particle that freezes is no longer
+    /// grabbed.
+    fn freeze(&mut self) {
         count_step(&mut self.grabs);
         let h = self.h();
-        let frozen_count = self.bodies.pack(&mut self.particles.states, h);
+        let frozen_count = self.store.pack(&mut self.particles.states, h);
         if frozen_count > 0 {
             self.frozen_count += frozen_count;
             let states = &self.particles.states;
             self.grabs
                 .retain(|grab| states[grab.particle as usize].flags & ParticleFlags::GRABBED != 0);
         }
-        if is_any_marked {
-            self.tear_marked();
-        }
     }
 
-    fn tear_marked(&mut self) {
-        let setup = self.setup();
-        let recipe = Recipe::new(&self.model, &self.parameters, setup);
-        let torn = &mut self.torn;
-        self.bodies.take_marks(|constraint, mark| {
-            let is_force = mark > BY_LENGTH;
-            let cause = if is_force { TearCause::Force } else { recipe.length_cause(constraint) };
-            torn.tear(constraint, cause);
-        });
-        for constraint in self.torn.new_ones() {
-            self.bodies.tear(*constraint);
-        }
+    /// [`Stage::Hash`].
+    fn hash(&mut self) {
+        self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());
     }
 }
 
 /// max(0, 1 - c h).
-fn kept_share(damping: f32) -> f32 {
+fn kept_fraction(damping: f32) -> f32 {
     if damping < 1.0 { 1.0 - damping } else { 0.0 }
 }

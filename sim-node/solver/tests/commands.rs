@@ -1,7 +1,7 @@
 //! Effects of commands on the state. A rejected command changes no bit.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{Grip, Particle, ParticleFlags, Reason, Scene, Solver, builtin};
+use sim_solver::{Grab, Particle, ParticleFlags, Reason, Scene, Solver, builtin};
 
 const CLIENT: u64 = 7;
 
@@ -16,8 +16,8 @@ fn one_particle(extra: &str) -> Solver {
     Solver::new(&Scene::from_toml(&text, "test").unwrap())
 }
 
-fn grip(particle: u32, target: [f32; 3]) -> Grip {
-    Grip { particle, target, over_s: 1.0 / 60.0 }
+fn grip(particle: u32, target: [f32; 3]) -> Grab {
+    Grab { particle, target, over_s: 1.0 / 60.0 }
 }
 
 fn step(solver: &mut Solver, steps: u32) {
@@ -131,9 +131,9 @@ fn a_rejected_command_changes_no_bit_of_the_future() {
     solver.grab(CLIENT, grip(90, [0.1, 0.2, 0.3])).unwrap();
     step(&mut solver, 3);
     let mut untouched = solver.clone();
-    let long = Grip { over_s: 0.26, ..grip(9, [0.0; 3]) };
-    let backwards = Grip { over_s: -0.1, ..long };
-    let timeless = Grip { over_s: f32::NAN, ..long };
+    let long = Grab { over_s: 0.26, ..grip(9, [0.0; 3]) };
+    let backwards = Grab { over_s: -0.1, ..long };
+    let timeless = Grab { over_s: f32::NAN, ..long };
     let rejected = [
         (solver.pin(168), Reason::UnknownParticle),
         (solver.unpin(u32::MAX), Reason::UnknownParticle),

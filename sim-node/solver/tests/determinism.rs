@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use sim_solver::{
-    Ball, Grip, Keyframe, ParameterValue, Particle, ParticleFlags, Pose, Push, RestoreError, Scene,
+    Ball, Grab, Keyframe, ParameterValue, Particle, ParticleFlags, Pose, Push, RestoreError, Scene,
     Solver, Sweep, builtin,
 };
 
@@ -62,7 +62,7 @@ fn random_command() -> impl Strategy<Value = RandomCommand> {
 
 /// Applies a command. A rejection is a valid outcome, too.
 fn apply(solver: &mut Solver, command: &RandomCommand) {
-    let grip = |particle, target| Grip { particle, target, over_s: 0.05 };
+    let grip = |particle, target| Grab { particle, target, over_s: 0.05 };
     let _outcome = match *command {
         RandomCommand::Pin(particle) => solver.pin(particle),
         RandomCommand::Unpin(particle) => solver.unpin(particle),
@@ -159,7 +159,7 @@ fn cuts_and_a_pin_at_one_boundary_leave_the_same_tethers_in_a_copy() {
 fn keyframes_with_impossible_numbers_are_refused() {
     let scene = scene();
     let mut solver = Solver::new(&scene);
-    solver.grab(1, Grip { particle: 90, target: [0.5; 3], over_s: 0.25 }).unwrap();
+    solver.grab(1, Grab { particle: 90, target: [0.5; 3], over_s: 0.25 }).unwrap();
     solver.step();
     let bytes = solver.keyframe().encode();
     let restored = |bytes: &[u8]| {
@@ -175,9 +175,9 @@ fn keyframes_with_impossible_numbers_are_refused() {
     // 60 steps of a quarter of a second, minus the one already made.
     let place = bytes.iter().rposition(|byte| *byte == 59).unwrap();
     let slow = [&bytes[..place], &[0xff, 0xff, 0xff, 0xff, 0x0f], &bytes[place + 1..]].concat();
-    assert!(restored(&slow).unwrap_err().to_string().contains("longer than any"));
+    assert!(restored(&slow).unwrap_err().to_string().contains("exceeds the longest duration"));
     let long = [&bytes[..], &[0]].concat();
-    assert!(Keyframe::decode(&long).unwrap_err().to_string().contains("1 bytes too many"));
+    assert!(Keyframe::decode(&long).unwrap_err().to_string().contains("1 bytes follow"));
 }
 
 /// A built-in scene, and the scenes that use every mechanism.
@@ -268,7 +268,7 @@ fn minus_zero_is_never_published() {
 #[test]
 fn an_invalid_state_is_refused_and_changes_nothing() {
     let mut solver = Solver::new(&scene());
-    solver.grab(1, Grip { particle: 90, target: [0.0; 3], over_s: 0.0 }).unwrap();
+    solver.grab(1, Grab { particle: 90, target: [0.0; 3], over_s: 0.0 }).unwrap();
     solver.step();
     let (keyframe, good) = (solver.keyframe(), particles(&solver));
     let hash = solver.state_hash();

@@ -3,7 +3,7 @@
 //! that of a vector, and with every property of a constraint.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{Ball, Grip, Kernels, ParameterValue, Push, Scene, Solver, TearCause, builtin};
+use sim_solver::{Ball, Grab, Kernels, ParameterValue, Push, Scene, Solver, TearCause, builtin};
 
 /// Steps all kernels side by side with the same commands, compares every particle, and returns the
 /// reference.
@@ -37,7 +37,7 @@ fn command(solver: &mut Solver, step: u32) {
     let particle = step.wrapping_mul(7919) % count;
     let [x, y, z] = solver.particle(particle as usize).position;
     let _refused = match step % 23 {
-        3 => solver.grab(1, Grip { particle, target: [x + 0.1, y, z], over_s: 0.02 }),
+        3 => solver.grab(1, Grab { particle, target: [x + 0.1, y, z], over_s: 0.02 }),
         7 => solver.pin(particle),
         11 => solver.unpin(particle),
         13 => solver.push(Push {

@@ -4,7 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use sim_solver::{Grip, ParameterValue, Scene, Solver, builtin};
+use sim_solver::{Grab, ParameterValue, Scene, Solver, builtin};
 
 struct Counting;
 
@@ -44,7 +44,7 @@ fn neither_steps_nor_commands_allocate() {
     for round in 0..100_u8 {
         let particle = 20 + u32::from(round);
         let target = [0.0, f32::from(round) * 0.01, 0.1];
-        solver.grab(1, Grip { particle, target, over_s: 0.02 }).unwrap();
+        solver.grab(1, Grab { particle, target, over_s: 0.02 }).unwrap();
         solver.step();
         solver.release(1, particle).unwrap();
         solver.pin(particle).unwrap();
@@ -68,4 +68,34 @@ fn neither_steps_nor_commands_allocate() {
     // The counter works.
     drop(std::hint::black_box(vec![0_u8; 100]));
     assert!(allocations() > before);
+}
+
+#[test]
+fn a_change_of_a_parameter_in_use_allocates_nothing() {
+    for text in [builtin::text("tearable-cloth").unwrap(), include_str!("scenes/everything.toml")] {
+        let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
+        let changes = [
+            ("max_stretch", [ParameterValue::Number(1.2), ParameterValue::Number(1.3)]),
+            ("tear_stretch", [ParameterValue::Number(9.0), ParameterValue::Off]),
+            ("tear_distance", [ParameterValue::Number(9.0), ParameterValue::Number(8.0)]),
+            ("tear_force", [ParameterValue::Number(1e9), ParameterValue::Off]),
+            ("substeps", [ParameterValue::Number(3.0), ParameterValue::Number(2.0)]),
+            ("iterations", [ParameterValue::Number(2.0), ParameterValue::Number(3.0)]),
+            ("damping", [ParameterValue::Number(0.5), ParameterValue::Off]),
+        ];
+        // The first use of a parameter makes room for its fields.
+        for (name, [first, _]) in changes {
+            solver.set(name, first, None).unwrap();
+            solver.step();
+        }
+        let before = allocations();
+        for (name, [first, second]) in changes {
+            for value in [second, first] {
+                solver.set(name, value, None).unwrap();
+                solver.finish_boundary();
+                solver.step();
+            }
+        }
+        assert_eq!(allocations() - before, 0);
+    }
 }

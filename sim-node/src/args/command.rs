@@ -6,18 +6,22 @@ use sim_contract::{
 };
 use sim_solver::GRAB_OVER_S_MAX;
 
+use super::value::{index, number, number_in, whole};
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum CommandVerb {
     /// Hold a particle at its present position
     #[command(after_help = "Example: sim-node ctl pin 3")]
     Pin {
         /// Index of the particle
+        #[arg(value_parser = index)]
         particle: u32,
     },
     /// Free a pinned particle, from rest
     #[command(after_help = "Example: sim-node ctl unpin 3")]
     Unpin {
         /// Index of the particle
+        #[arg(value_parser = index)]
         particle: u32,
     },
     /// Grab a particle and drive it to a target
@@ -30,6 +34,7 @@ pub(crate) enum CommandVerb {
     #[command(after_help = "Example: sim-node ctl release 90")]
     Release {
         /// Index of the particle
+        #[arg(value_parser = index)]
         particle: u32,
     },
     /// Set the velocity of all free particles within a sphere, as a brush does
@@ -38,6 +43,7 @@ pub(crate) enum CommandVerb {
     #[command(after_help = "Example: sim-node ctl cut 17")]
     Cut {
         /// Index of the constraint
+        #[arg(value_parser = index)]
         constraint: u32,
     },
     /// Tear all constraints with an end within a sphere
@@ -51,6 +57,7 @@ pub(crate) enum CommandVerb {
     )]
     MoveAnchor {
         /// Index of the anchor
+        #[arg(value_parser = index)]
         anchor: u32,
         #[command(flatten)]
         pose: PoseArgs,
@@ -62,6 +69,7 @@ pub(crate) enum CommandVerb {
     )]
     MoveCollider {
         /// Index of the collider
+        #[arg(value_parser = index)]
         collider: u32,
         #[command(flatten)]
         pose: PoseArgs,
@@ -82,7 +90,7 @@ pub(crate) enum CommandVerb {
     #[command(after_help = "Example: sim-node ctl step 10")]
     Step {
         /// Number of steps, at least 1
-        #[arg(default_value_t = 1)]
+        #[arg(default_value_t = 1, value_parser = whole::<u32>(0..=u64::from(u32::MAX)))]
         count: u32,
     },
     /// Restore the initial state in the next step; the step number continues
@@ -93,10 +101,13 @@ pub(crate) enum CommandVerb {
 #[derive(Debug, Clone, Copy, ClapArgs)]
 pub(crate) struct PointArgs {
     /// Point in m, relative to the origin of the scene
+    #[arg(value_parser = number)]
     x: f32,
     /// Point in m, relative to the origin of the scene
+    #[arg(value_parser = number)]
     y: f32,
     /// Point in m, relative to the origin of the scene
+    #[arg(value_parser = number)]
     z: f32,
 }
 
@@ -110,18 +121,14 @@ impl PointArgs {
 #[command(allow_negative_numbers = true)]
 pub(crate) struct TargetArgs {
     /// Index of the particle
+    #[arg(value_parser = index)]
     pub(crate) particle: u32,
     #[command(flatten)]
     pub(crate) target: PointArgs,
     /// Time to the target in seconds, 0 to 0.25, rounded up to whole steps [default: 1/60]
     #[arg(long, value_name = "SECONDS", default_value_t = GRAB_OVER_S_DEFAULT,
-        hide_default_value = true, value_parser = over_s)]
+        hide_default_value = true, value_parser = number_in(0.0..=GRAB_OVER_S_MAX))]
     pub(crate) over: f32,
-}
-
-fn over_s(text: &str) -> Result<f32, String> {
-    let number = text.parse().ok().filter(|number| (0.0..=GRAB_OVER_S_MAX).contains(number));
-    number.ok_or_else(|| format!("it must be a number from 0 to {GRAB_OVER_S_MAX}"))
 }
 
 #[derive(Debug, ClapArgs)]
@@ -133,14 +140,14 @@ pub(crate) struct PushArgs {
     #[command(flatten)]
     pub(crate) center: PointArgs,
     /// Radius of the sphere in m; a particle at exactly this distance is outside
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", value_parser = number)]
     pub(crate) radius: f32,
     /// Displacement of the particles in the next step, in m
     #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
-        value_names = ["DX", "DY", "DZ"])]
+        value_names = ["DX", "DY", "DZ"], value_parser = number)]
     pub(crate) delta: Vec<f32>,
     /// Limit on each component of DELTA, in m [default: no limit]
-    #[arg(long, value_name = "L")]
+    #[arg(long, value_name = "L", value_parser = number)]
     pub(crate) limit: Option<f32>,
 }
 
@@ -153,7 +160,7 @@ pub(crate) struct CutRadiusArgs {
     #[command(flatten)]
     pub(crate) center: PointArgs,
     /// Radius of the sphere in m; a particle at exactly this distance is outside
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", value_parser = number)]
     pub(crate) radius: f32,
 }
 
@@ -165,15 +172,15 @@ pub(crate) struct CutRadiusArgs {
 pub(crate) struct CutSegmentArgs {
     /// Start of the segment in m, relative to the origin of the scene
     #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
-        value_names = ["X", "Y", "Z"])]
+        value_names = ["X", "Y", "Z"], value_parser = number)]
     pub(crate) from: Vec<f32>,
     /// End of the segment in m, relative to the origin of the scene
     #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
-        value_names = ["X", "Y", "Z"])]
+        value_names = ["X", "Y", "Z"], value_parser = number)]
     pub(crate) to: Vec<f32>,
     /// Direction along which the strip extends from the segment, without end on both sides
     #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "1"],
-        value_names = ["DX", "DY", "DZ"])]
+        value_names = ["DX", "DY", "DZ"], value_parser = number)]
     pub(crate) direction: Vec<f32>,
 }
 
@@ -181,14 +188,17 @@ pub(crate) struct CutSegmentArgs {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct PoseArgs {
     /// Translation from the pose at load, in m
+    #[arg(value_parser = number)]
     pub(crate) x: f32,
     /// Translation from the pose at load, in m
+    #[arg(value_parser = number)]
     pub(crate) y: f32,
     /// Translation from the pose at load, in m
+    #[arg(value_parser = number)]
     pub(crate) z: f32,
     /// Rotation from the pose at load, as a quaternion
     #[arg(long, num_args = 4, action = ArgAction::Set, default_values = ["0", "0", "0", "1"],
-        value_names = ["QX", "QY", "QZ", "QW"])]
+        value_names = ["QX", "QY", "QZ", "QW"], value_parser = number)]
     pub(crate) rotation: Vec<f32>,
 }
 

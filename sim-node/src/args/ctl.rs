@@ -7,6 +7,7 @@ use sim_contract::{PARAMETERS, Parameter};
 
 use super::command::{CommandVerb, PointArgs};
 use super::endpoint::EndpointArgs;
+use super::value::{index, time};
 
 #[derive(Debug, ClapArgs)]
 #[command(
@@ -36,7 +37,7 @@ pub(crate) struct CtlArgs {
     pub(crate) verb: CtlVerb,
     /// Wait this long for the answer of the node
     #[arg(long, value_name = "TIME", default_value = "5s",
-        value_parser = humantime::parse_duration)]
+        value_parser = time)]
     pub(crate) timeout: Duration,
     /// Print one JSON object on stdout
     #[arg(long)]
@@ -74,6 +75,7 @@ pub(crate) enum QueryVerb {
         sim-node ctl particles --json    print all particles for a program")]
     Particles {
         /// Indices of the particles [default: all]
+        #[arg(value_parser = index)]
         indices: Vec<u32>,
     },
     /// Print the particle nearest to a point

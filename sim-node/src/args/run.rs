@@ -6,6 +6,7 @@ use clap::Args as ClapArgs;
 use sim_solver::THREADS_MAX;
 
 use super::endpoint::EndpointArgs;
+use super::value::{time, whole};
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
@@ -19,17 +20,18 @@ pub(crate) struct RunArgs {
     pub(crate) scene: String,
     /// Steps per second, 1 to 100000 [default: the rate of the scene]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        value_parser = whole::<u32>(1..=100_000))]
     pub(crate) rate: Option<u32>,
     /// Substeps per step, 1 to 1000 [default: the substeps of the scene]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u32).range(1..=1000))]
+        value_parser = whole::<u32>(1..=1000))]
     pub(crate) substeps: Option<u32>,
     /// Exit after N steps [default: run until Ctrl-C]
-    #[arg(long, value_name = "N", conflicts_with = "duration")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "duration",
+        value_parser = whole::<u64>(0..=u64::MAX))]
     pub(crate) steps: Option<u64>,
     /// Exit after this much simulated time, such as 10s or 2min [default: run until Ctrl-C]
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "TIME", value_parser = time)]
     pub(crate) duration: Option<Duration>,
     /// Start paused: wait at step 0 for `ctl resume` or `ctl step`
     #[arg(long)]
@@ -40,11 +42,11 @@ pub(crate) struct RunArgs {
     /// Threads of the solver, 1 to 64; their number changes no bit [default: 1 for scenes with fewer
     /// than 4000 particles, else one less than the cores available to this process]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = clap::value_parser!(u8).range(1..=i64::from(THREADS_MAX)))]
+        value_parser = whole::<u8>(1..=u64::from(THREADS_MAX)))]
     pub(crate) threads: Option<u8>,
     /// Publish only every K-th snapshot, and the last one before a pause
-    #[arg(long, value_name = "K", default_value_t = 1,
-        value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "K", allow_negative_numbers = true, default_value_t = 1,
+        value_parser = whole::<u64>(1..=1_000_000))]
     pub(crate) every: u64,
     /// Print a summary as one JSON object on stdout at the end
     #[arg(long)]

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
+use super::value::number_in;
+
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
     sim-node scenes           list the built-in scenes with their rate and size\n  \
@@ -55,18 +57,22 @@ pub(crate) struct ImportArgs {
     #[arg(long)]
     pub(crate) overwrite: bool,
     /// Mass per area, in kg per square unit
-    #[arg(long, value_name = "KG", default_value_t = 0.2)]
+    #[arg(long, value_name = "KG", default_value_t = 0.2, allow_negative_numbers = true,
+        value_parser = number_in(0.0..=f32::MAX))]
     pub(crate) density: f32,
     /// Vertices to pin: 'y > 1.9', 'x < 0 and z >= 1', 'group NAME', or none
     #[arg(long, value_name = "CHOICE", default_value = "none")]
     pub(crate) pin: String,
     /// Compliance of structural constraints, in m/N
-    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
+    #[arg(long, value_name = "M/N", default_value_t = 0.0, allow_negative_numbers = true,
+        value_parser = number_in(0.0..=1e20))]
     pub(crate) structural: f32,
     /// Compliance of shear constraints, in m/N
-    #[arg(long, value_name = "M/N", default_value_t = 0.0)]
+    #[arg(long, value_name = "M/N", default_value_t = 0.0, allow_negative_numbers = true,
+        value_parser = number_in(0.0..=1e20))]
     pub(crate) shear: f32,
     /// Compliance of bend constraints, in m/N
-    #[arg(long, value_name = "M/N", default_value_t = 1e-2)]
+    #[arg(long, value_name = "M/N", default_value_t = 1e-2, allow_negative_numbers = true,
+        value_parser = number_in(0.0..=1e20))]
     pub(crate) bend: f32,
 }

@@ -17,12 +17,12 @@ pub enum Action {
         /// Index of the particle.
         particle: u32,
     },
-    /// Frees a pinned particle, from rest.
+    /// Frees a pinned particle. Its velocity is 0.
     Unpin {
         /// Index of the particle.
         particle: u32,
     },
-    /// Drives a particle to a target, along a straight line.
+    /// Grabs a particle and moves it along a straight line to a target.
     Grab {
         /// Index of the particle.
         particle: u32,
@@ -55,23 +55,23 @@ pub enum Action {
     Resume,
     /// Makes a paused node perform `count` steps.
     Step {
-        /// Number of steps, at least 1.
+        /// Number of steps, 1 or more.
         count: u32,
     },
-    /// Restores the initial state as the state of the next step. The step number goes on.
+    /// Restores the initial state as the state of the next step. The step number continues.
     Reset,
-    /// Sets the velocity of every free particle inside a ball to `delta` times the rate.
+    /// Sets the velocity of each free particle inside a ball to `delta` times the rate.
     Push {
-        /// Centre of the ball, in m, relative to the scene's origin.
+        /// Centre of the ball in m, relative to the scene's origin.
         #[serde(with = "vector")]
         center: [f32; 3],
-        /// Radius of the ball in m; a particle at this distance is outside.
+        /// Radius of the ball in m. A particle at exactly this distance is outside.
         #[serde(with = "number")]
         radius: f32,
         /// Displacement of the particles in the next step, in m.
         #[serde(with = "vector")]
         delta: [f32; 3],
-        /// Largest magnitude of each component of `delta`, in m; `None` is no limit.
+        /// Largest magnitude of each component of `delta` in m. `None` means no limit.
         #[serde(default, with = "optional_number", skip_serializing_if = "Option::is_none")]
         limit: Option<f32>,
     },
@@ -82,26 +82,27 @@ pub enum Action {
     },
     /// Tears every constraint with an end inside a ball.
     CutRadius {
-        /// Centre of the ball, in m, relative to the scene's origin.
+        /// Centre of the ball in m, relative to the scene's origin.
         #[serde(with = "vector")]
         center: [f32; 3],
-        /// Radius of the ball in m; an end at this distance is outside.
+        /// Radius of the ball in m. An end at exactly this distance is outside.
         #[serde(with = "number")]
         radius: f32,
     },
-    /// Tears every constraint that crosses a strip: a segment, extended in both directions.
+    /// Tears every constraint that crosses a strip: a segment extended to both sides.
     CutSegment {
-        /// Start of the segment, in m, relative to the scene's origin.
+        /// Start of the segment in m, relative to the scene's origin.
         #[serde(with = "vector")]
         from: [f32; 3],
-        /// End of the segment, in m, relative to the scene's origin.
+        /// End of the segment in m, relative to the scene's origin.
         #[serde(with = "vector")]
         to: [f32; 3],
-        /// Direction along which the segment is extended without limit; [0, 0, 1] in a planar scene.
+        /// Direction in which the segment extends to both sides without limit; [0, 0, 1] for a planar
+        /// scene.
         #[serde(with = "vector")]
         direction: [f32; 3],
     },
-    /// Replaces an anchor's path: the anchor reaches this pose at the end of the next step and stays.
+    /// Replaces an anchor's path. The anchor reaches this pose at the end of the next step and stays.
     MoveAnchor {
         /// Index of the anchor.
         anchor: u32,
@@ -112,7 +113,7 @@ pub enum Action {
         #[serde(default = "identity", with = "rotation")]
         rotation: [f32; 4],
     },
-    /// Moves a collider during the next step, with the velocity that this implies.
+    /// Moves a collider to a pose during the next step, with the velocity that the motion implies.
     MoveCollider {
         /// Index of the collider.
         collider: u32,
@@ -127,9 +128,9 @@ pub enum Action {
     Set {
         /// Name of the parameter. An unknown name is rejected.
         parameter: Text,
-        /// New value; null in JSON is off.
+        /// New value. null in JSON means off.
         value: ParameterValue,
-        /// Kind of the affected constraints, for `compliance` and `stiffness`; `None` is all kinds.
+        /// Kind of the affected constraints, for `compliance` and `stiffness`. `None` means all kinds.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         constraint_kind: Option<KindFilter>,
     },
@@ -154,13 +155,13 @@ fn identity() -> [f32; 4] {
     [0.0, 0.0, 0.0, 1.0]
 }
 
-/// The kinds of constraints that a `set` addresses. Its JSON form is the name of a kind.
+/// The kind of constraints that a `set` addresses. Its JSON form is the name of the kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KindFilter {
     /// The constraints of one kind.
     Known(ConstraintKind),
-    /// A kind that this version does not know. The command is rejected like any wrong value. The
-    /// name is not kept; it is written as "unknown".
+    /// A kind that this version does not know. The command is rejected like any wrong value. The name
+    /// is not kept: it is written as "unknown".
     Unknown,
 }
 
@@ -175,7 +176,7 @@ impl KindFilter {
         ConstraintKind::from_number(number).map_or(Self::Unknown, Self::Known)
     }
 
-    /// Number on the wire; `u32::MAX`, which no version will assign, for an unknown kind.
+    /// Number on the wire. An unknown kind has `u32::MAX`, which no version will assign.
     pub fn number(self) -> u32 {
         match self {
             Self::Known(kind) => kind as u32,
@@ -205,11 +206,11 @@ impl<'de> Deserialize<'de> for KindFilter {
 }
 
 impl Action {
-    /// One action of each kind, and those with options more than once: for tests of formats.
+    /// Samples for tests of formats: one action of each kind, or several if it has options.
     #[doc(hidden)]
     pub fn samples() -> Vec<Self> {
         let target = [0.1, -2.0, 3.5];
-        let other = [0.0, -0.0, 1e-9];
+        let delta = [0.0, -0.0, 1e-9];
         let rotation = [0.0, 0.6, 0.0, 0.8];
         let set = |name: &str, value, constraint_kind| Self::Set {
             parameter: Text::cut(name),
@@ -227,11 +228,11 @@ impl Action {
             Self::Resume,
             Self::Step { count: 7 },
             Self::Reset,
-            Self::Push { center: target, radius: 0.5, delta: other, limit: None },
-            Self::Push { center: target, radius: 0.5, delta: other, limit: Some(0.0) },
+            Self::Push { center: target, radius: 0.5, delta, limit: None },
+            Self::Push { center: target, radius: 0.5, delta, limit: Some(0.0) },
             Self::Cut { constraint: 6 },
             Self::CutRadius { center: target, radius: 0.25 },
-            Self::CutSegment { from: target, to: other, direction: [0.0, 0.0, 1.0] },
+            Self::CutSegment { from: target, to: delta, direction: [0.0, 0.0, 1.0] },
             Self::MoveAnchor { anchor: 1, translation: target, rotation },
             Self::MoveCollider { collider: 2, translation: target, rotation: identity() },
             set("damping", ParameterValue::Number(0.5), None),
@@ -295,7 +296,7 @@ mod tests {
         assert_eq!(serde_json::to_string(&read(text)).unwrap(), text);
         let text = r#"{"kind":"set","parameter":"gravity","value":[0,"-inf","nan"]}"#;
         let Action::Set { value: ParameterValue::Vector(value), .. } = read(text) else {
-            panic!("no vector: {text}");
+            panic!("not a vector: {text}");
         };
         assert!(value[1] == f32::NEG_INFINITY && value[2].is_nan());
         let text = r#"{"kind":"push","center":[0,0,0],"radius":1,"delta":[0,0,0],"limit":"inf"}"#;
@@ -308,10 +309,16 @@ mod tests {
         assert_eq!(read(r#"{"kind":"grab","particle":1,"target":[0,1,2]}"#), grab);
         let push = r#"{"kind":"push","center":[0,0,0],"radius":1,"delta":[0,0,0]}"#;
         assert!(matches!(read(push), Action::Push { limit: None, .. }));
-        let moved = r#"{"kind":"move_anchor","anchor":1,"translation":[0,0,0]}"#;
-        assert!(matches!(read(moved), Action::MoveAnchor { rotation: [0., 0., 0., 1.], .. }));
-        let moved = r#"{"kind":"move_collider","collider":1,"translation":[0,0,0]}"#;
-        assert!(matches!(read(moved), Action::MoveCollider { rotation: [0., 0., 0., 1.], .. }));
+        let move_command = r#"{"kind":"move_anchor","anchor":1,"translation":[0,0,0]}"#;
+        assert!(matches!(
+            read(move_command),
+            Action::MoveAnchor { rotation: [0., 0., 0., 1.], .. }
+        ));
+        let move_command = r#"{"kind":"move_collider","collider":1,"translation":[0,0,0]}"#;
+        assert!(matches!(
+            read(move_command),
+            Action::MoveCollider { rotation: [0., 0., 0., 1.], .. }
+        ));
     }
 
     #[test]
@@ -336,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_field_or_kind_is_an_error() {
+    fn an_unknown_kind_or_a_wrong_field_is_an_error() {
         for text in [
             r#"{"kind":"pin","particle":1,"colour":2}"#,
             r#"{"kind":"dance"}"#,

@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum ColliderShape {
-    /// A half space.
+    /// A solid half space.
     Plane = 0,
     /// A solid box.
     Box = 1,

@@ -1,14 +1,14 @@
-//! Numbers in JSON that may be non-finite: "nan", "inf" and "-inf" stand where a number stands.
+//! Numbers in JSON that may be non-finite: the strings "nan", "inf" and "-inf" replace a number.
 
 use std::fmt;
 
 use serde::de::{self, Deserializer, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
-/// An f32 that survives JSON bit for bit (any NaN becomes the one NaN).
+/// An f32 that JSON preserves bit for bit, except that any NaN becomes `f32::NAN`.
 ///
 /// A finite value is written with the fewest digits that read back as the same f32, a non-finite
-/// one as the string "nan", "inf" or "-inf".
+/// value as the string "nan", "inf" or "-inf".
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlainF32(pub f32);
 
@@ -21,10 +21,11 @@ impl Serialize for PlainF32 {
         if value.is_infinite() {
             return serializer.serialize_str(if value > 0.0 { "inf" } else { "-inf" });
         }
-        // Readers parse to f64 and round to f32 after it. Where that double rounding would miss,
+        // Readers parse f64 and then round to f32. If this double rounding would change the value,
         // the exact f64 is written instead of the shortest f32.
         let exact = f64::from(value);
-        let is_shortest_safe = value.to_string().parse::<f64>().is_ok_and(|read| same(read, value));
+        let is_shortest_safe =
+            value.to_string().parse::<f64>().is_ok_and(|parsed| rounds_to(parsed, value));
         if is_shortest_safe {
             serializer.serialize_f32(value)
         } else {
@@ -33,8 +34,8 @@ impl Serialize for PlainF32 {
     }
 }
 
-fn same(read: f64, value: f32) -> bool {
-    to_f32(read).to_bits() == value.to_bits()
+fn rounds_to(parsed: f64, value: f32) -> bool {
+    to_f32(parsed).to_bits() == value.to_bits()
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "this is the one rounding to f32")]
@@ -83,7 +84,7 @@ impl Visitor<'_> for PlainVisitor {
 pub(crate) mod number {
     use super::{Deserialize, Deserializer, PlainF32, Serialize, Serializer};
 
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
     pub(crate) fn serialize<S: Serializer>(value: &f32, serializer: S) -> Result<S::Ok, S::Error> {
         PlainF32(*value).serialize(serializer)
     }
@@ -118,7 +119,7 @@ pub(crate) mod optional_number {
     #[allow(
         clippy::ref_option,
         clippy::trivially_copy_pass_by_ref,
-        reason = "the signature that serde asks for"
+        reason = "the signature that serde requires"
     )]
     pub(crate) fn serialize<S: Serializer>(
         value: &Option<f32>,

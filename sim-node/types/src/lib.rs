@@ -1,6 +1,6 @@
-//! The words that every program of this project shares, as plain data: actions and the reasons for
-//! rejecting them, kinds of constraints, causes of tears, shapes of colliders, particle flags, and
-//! the one table of parameters.
+//! Plain data shared by all programs of this project: actions and the reasons for rejecting them,
+//! kinds of constraints, causes of tears, shapes of colliders, particle flags, and the one table of
+//! parameters.
 //!
 //! ```
 //! use sim_types::{Action, PARAMETERS, Parameter};
@@ -13,7 +13,7 @@
 //! # Ok::<(), serde_json::Error>(())
 //! ```
 //!
-//! There is no behaviour here: no solver, no shared memory, no file format.
+//! This crate has no behaviour: no solver, no shared memory, no file format.
 #![forbid(unsafe_code)]
 
 mod action;
@@ -44,13 +44,16 @@ pub use text::{Text, TextError};
 
 #[cfg(test)]
 mod tests {
-    /// Checks that names and numbers of an enum lead back to its variants.
+    /// Checks that each name and number of an enum converts back to its variant.
     macro_rules! assert_names_and_numbers {
         ($type:ty, $number:ty) => {
-            for (number, one) in <$type>::ALL.into_iter().enumerate() {
-                assert_eq!(one as usize, number);
-                assert_eq!(<$type>::from_number(<$number>::try_from(number).unwrap()), Some(one));
-                assert_eq!(<$type>::from_name(one.name()), Some(one));
+            for (number, variant) in <$type>::ALL.into_iter().enumerate() {
+                assert_eq!(variant as usize, number);
+                assert_eq!(
+                    <$type>::from_number(<$number>::try_from(number).unwrap()),
+                    Some(variant)
+                );
+                assert_eq!(<$type>::from_name(variant.name()), Some(variant));
             }
             assert_eq!(<$type>::from_number(<$number>::MAX), None);
             assert_eq!(<$type>::from_name("nonsense"), None);
@@ -58,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn every_word_has_one_name_and_one_number() {
+    fn every_variant_has_one_name_and_one_number() {
         assert_names_and_numbers!(super::ConstraintKind, u32);
         assert_names_and_numbers!(super::ColliderShape, u32);
         assert_names_and_numbers!(super::Method, u32);

@@ -2,16 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Meaning of a constraint's softness.
+/// Method of solving constraints. It determines the meaning of a constraint's softness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[repr(u32)]
 pub enum Method {
-    /// Compliance in m/N: the stretch is the same at every rate (Macklin, Mueller, Chentanez 2016).
+    /// XPBD, with compliance in m/N: the stretch is the same at every rate (Macklin, Mueller, Chentanez
+    /// 2016).
     #[default]
     Xpbd = 0,
-    /// Stiffness 0..=1: the share of the error that the iterations of a substep remove (Mueller et
-    /// al. 2007).
+    /// PBD, with stiffness 0..=1: the share of the error that the iterations of a substep remove
+    /// (Mueller et al. 2007).
     Pbd = 1,
 }
 

@@ -31,9 +31,9 @@ pub enum Parameter {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number, three numbers or null")]
 pub enum ParameterValue {
-    /// In the parameter's unit.
+    /// A number in the parameter's unit.
     Number(#[serde(with = "number")] f32),
-    /// In the parameter's unit.
+    /// Three numbers in the parameter's unit.
     Vector(#[serde(with = "vector")] [f32; 3]),
     /// The parameter is off; see [`OffMeaning`].
     Off,
@@ -54,13 +54,13 @@ pub enum ValueForm {
 /// The meaning of [`ParameterValue::Off`] for a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OffMeaning {
-    /// The parameter has no off.
+    /// The parameter cannot be off.
     NotAllowed,
-    /// Off is 0.
+    /// Off means 0.
     Zero,
-    /// Off is no limit.
+    /// Off means no limit.
     NoLimit,
-    /// Off is a value of its own for each constraint: the state at load. `set` does not accept it.
+    /// Off means that each constraint has its own value, as after a load. `set` does not accept it.
     OwnOfEach,
 }
 
@@ -71,7 +71,7 @@ pub struct ParameterInfo {
     pub parameter: Parameter,
     /// Name in scenes, commands and logs.
     pub name: &'static str,
-    /// Unit of the value, empty for a plain number.
+    /// Unit of the value; empty for a plain number.
     pub unit: &'static str,
     /// Form of the value.
     pub form: ValueForm,
@@ -113,7 +113,7 @@ const SOFTNESS: ParameterInfo = ParameterInfo {
     ..NUMBER
 };
 
-/// All parameters; the number of a [`Parameter`] is its place here.
+/// The table of parameters. The number of a [`Parameter`] is its index here.
 pub const PARAMETERS: [ParameterInfo; 15] = [
     ParameterInfo {
         parameter: Parameter::Gravity,
@@ -241,7 +241,7 @@ impl Parameter {
         Self::ALL.into_iter().find(|parameter| parameter.name() == name)
     }
 
-    /// Row of the table.
+    /// Returns the parameter's row of the table.
     pub const fn info(self) -> &'static ParameterInfo {
         &PARAMETERS[self as usize]
     }
@@ -257,7 +257,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_place_of_a_row_is_the_number_of_its_parameter() {
+    fn the_index_of_a_row_is_the_number_of_its_parameter() {
         for (parameter, row) in Parameter::ALL.into_iter().zip(PARAMETERS) {
             assert_eq!(row.parameter, parameter);
             assert!(!row.name.is_empty());

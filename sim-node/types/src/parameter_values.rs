@@ -5,22 +5,22 @@ use serde::{Deserialize, Serialize};
 use crate::json_number::{number, optional_number, vector};
 use crate::{ConstraintKind, Parameter, ParameterValue};
 
-/// One parameter with its value; `compliance` and `stiffness` have one for each kind of constraint.
+/// A parameter with a value. `compliance` and `stiffness` have a value for each kind of constraint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// The parameter.
     pub parameter: Parameter,
-    /// The kind of constraint, for a parameter that has a value for each.
+    /// Kind of constraint, for a parameter with a value for each kind.
     pub constraint_kind: Option<ConstraintKind>,
     /// The value.
     pub value: ParameterValue,
 }
 
-/// Number of [`Setting`]s in [`ParameterValues`]: 13 parameters, and two with one value for each of
-/// four kinds of constraints.
+/// Number of [`Setting`]s in [`ParameterValues`]: 13 parameters have one value, and two have a value
+/// for each of the four kinds of constraints.
 pub const SETTINGS_COUNT: usize = 21;
 
-/// The values of all parameters, named as in commands. `None` is off.
+/// The values of all parameters, named as in commands. `None` means off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "described in the table of parameters")]
 pub struct ParameterValues {
@@ -52,7 +52,7 @@ pub struct ParameterValues {
     pub stiffness: PerKind,
 }
 
-/// A softness for each kind of constraint; `None` where each constraint has its own.
+/// A softness for each kind of constraint. `None` means that each constraint has its own softness.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "the kinds of constraints")]
 pub struct PerKind {
@@ -67,7 +67,7 @@ pub struct PerKind {
 }
 
 impl PerKind {
-    /// The value for a kind.
+    /// Returns the value for a kind.
     pub fn get(&self, kind: ConstraintKind) -> Option<f32> {
         match kind {
             ConstraintKind::Structural => self.structural,
@@ -119,7 +119,7 @@ impl ParameterValues {
         stiffness: PerKind::OWN_OF_EACH,
     };
 
-    /// All values, by parameter and then by kind.
+    /// Returns all values, by parameter and then by kind.
     pub fn settings(&self) -> [Setting; SETTINGS_COUNT] {
         let mut settings = [Setting {
             parameter: Parameter::Gravity,
@@ -138,8 +138,8 @@ impl ParameterValues {
         settings
     }
 
-    /// The value of a parameter; of one kind of constraint where it has several. Without a kind,
-    /// such a parameter is off.
+    /// Returns the value of a parameter. `kind` selects the value of a parameter with a value for each
+    /// kind; without it, such a parameter is off.
     pub fn get(&self, parameter: Parameter, kind: Option<ConstraintKind>) -> ParameterValue {
         use ParameterValue::{Number, Vector};
         let optional = |value: Option<f32>| value.map_or(ParameterValue::Off, Number);
@@ -162,8 +162,9 @@ impl ParameterValues {
         }
     }
 
-    /// Stores a value. Off is 0 where the parameter has no off, and a value of the wrong form has
-    /// no effect: what the node publishes has passed its checks.
+    /// Stores a value without checks, because the node has checked the values that it publishes. For a
+    /// parameter that cannot be off, off means 0. A number does not change a vector, and a vector means
+    /// off for a number.
     pub fn set(&mut self, setting: Setting) {
         let Setting { parameter, constraint_kind, value } = setting;
         let (number, vector) = match value {
@@ -199,7 +200,7 @@ const KINDS: [Option<ConstraintKind>; 4] = [
     Some(ConstraintKind::Tether),
 ];
 
-/// Sets the value for one kind, or for all.
+/// Sets the value for one kind, or for all kinds.
 fn set_kinds(values: &mut PerKind, kind: Option<ConstraintKind>, value: Option<f32>) {
     match kind {
         Some(kind) => values.set(kind, value),
@@ -210,7 +211,7 @@ fn set_kinds(values: &mut PerKind, kind: Option<ConstraintKind>, value: Option<f
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "a count of passes is at most 1000, and a negative one becomes 0"
+    reason = "a count of passes is at most 1000, and a negative count becomes 0"
 )]
 fn to_count(number: f32) -> u32 {
     number as u32
@@ -222,7 +223,7 @@ mod tests {
     use crate::{OffMeaning, PARAMETERS, ValueForm};
 
     #[test]
-    fn the_defaults_are_those_of_the_table() {
+    fn the_defaults_match_the_table() {
         for info in PARAMETERS {
             assert_eq!(
                 ParameterValues::default().get(info.parameter, Some(ConstraintKind::Shear)),
@@ -269,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_softness_without_a_kind_is_for_all_kinds() {
+    fn a_softness_without_a_kind_applies_to_all_kinds() {
         let mut values = ParameterValues::default();
         let value = ParameterValue::Number(1e-3);
         values.set(Setting { parameter: Parameter::Compliance, constraint_kind: None, value });

@@ -7,13 +7,13 @@ pub struct ParticleFlags;
 impl ParticleFlags {
     /// Held in place.
     pub const PINNED: u32 = 1;
-    /// Driven to a client's target.
+    /// Moved to a client's target.
     pub const GRABBED: u32 = 1 << 1;
-    /// Driven by an anchor's motion.
+    /// Moved by an anchor.
     pub const ANCHORED: u32 = 1 << 2;
-    /// Taken out of the simulation because its state was not finite.
+    /// Excluded from the simulation because its state was not finite.
     pub const FROZEN: u32 = 1 << 3;
-    /// Every flag of this version. With any of them, the step uses inverse mass 0.
+    /// All flags. A particle with any of them has inverse mass 0 in the step.
     pub const ALL: u32 = Self::PINNED | Self::GRABBED | Self::ANCHORED | Self::FROZEN;
 
     /// Name of each flag, by ascending bit.

@@ -1,6 +1,6 @@
-//! Ranges of numbers, with the words for error messages.
+//! Ranges of numbers, with their text for error messages.
 
-/// Largest coordinate that a scene or command may name, in m: f32 resolves 1 m there.
+/// Largest coordinate in a scene or command, in m. f32 resolves 1 m at this distance.
 pub const COORDINATE_MAX: f32 = 1e7;
 
 /// A range of finite numbers.
@@ -8,35 +8,35 @@ pub const COORDINATE_MAX: f32 = 1e7;
 pub struct NumberRange {
     /// Lower end.
     pub min: f32,
-    /// Upper end; `f32::MAX` where there is no limit.
+    /// Upper end; `f32::MAX` means no limit.
     pub max: f32,
-    /// The lower end itself is not allowed.
+    /// The lower end itself lies outside.
     pub excludes_min: bool,
-    /// The upper end itself is not allowed.
+    /// The upper end itself lies outside.
     pub excludes_max: bool,
-    /// The range in words, for error messages.
+    /// Text of the range for error messages.
     pub text: &'static str,
 }
 
 impl NumberRange {
-    /// From 0, without an upper limit.
+    /// 0 or more.
     pub const AT_LEAST_ZERO: Self = Self::closed(0.0, f32::MAX, "a number >= 0");
-    /// Above 0, without an upper limit.
+    /// More than 0.
     pub const POSITIVE: Self =
         Self { excludes_min: true, ..Self::closed(0.0, f32::MAX, "a number > 0") };
     /// A coordinate, or a component of a velocity or acceleration.
     pub const COORDINATE: Self = Self::closed(-COORDINATE_MAX, COORDINATE_MAX, "-1e7 to 1e7");
-    /// Compliance in m/N. compliance / h^2 stays finite in f32 at the smallest h of 10 ns.
+    /// Compliance in m/N. At the smallest substep h of 10 ns, compliance / h² is still finite in f32.
     pub const COMPLIANCE: Self = Self::closed(0.0, 1e20, "0 to 1e20 m/N");
     /// A share, such as a stiffness.
     pub const SHARE: Self = Self::closed(0.0, 1.0, "0 to 1");
-    /// Over-relaxation factor: the projections diverge from 2 on.
+    /// Over-relaxation factor. From 2 on, the projections diverge.
     pub const RELAXATION: Self = Self {
         excludes_min: true,
         excludes_max: true,
         ..Self::closed(0.0, 2.0, "more than 0 and less than 2; 1 is no relaxation")
     };
-    /// A length divided by a rest length, as a limit.
+    /// Limit of a length divided by its rest length.
     pub const RATIO: Self =
         Self { excludes_min: true, ..Self::closed(1.0, f32::MAX, "more than 1") };
     /// Counts of substeps and iterations.
@@ -48,11 +48,11 @@ impl NumberRange {
         Self { min, max, excludes_min: false, excludes_max: false, text }
     }
 
-    /// Returns `true` if the number lies in the range. NaN lies in none.
+    /// Returns `true` if the number lies in the range. NaN lies in no range.
     pub fn contains(&self, number: f32) -> bool {
-        let is_above = if self.excludes_min { number > self.min } else { number >= self.min };
-        let is_below = if self.excludes_max { number < self.max } else { number <= self.max };
-        is_above && is_below
+        let is_above_min = if self.excludes_min { number > self.min } else { number >= self.min };
+        let is_below_max = if self.excludes_max { number < self.max } else { number <= self.max };
+        is_above_min && is_below_max
     }
 }
 

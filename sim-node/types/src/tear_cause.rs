@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 pub enum TearCause {
     /// The constraint's force exceeded `tear_force`.
     Force = 0,
-    /// Its length exceeded `tear_stretch` times its rest length.
+    /// The constraint's length exceeded `tear_stretch` times its rest length.
     Stretch = 1,
-    /// Its length exceeded its rest length by more than `tear_distance`.
+    /// The constraint's length exceeded its rest length by more than `tear_distance`.
     Distance = 2,
-    /// A command cut it.
+    /// A command cut the constraint.
     Cut = 3,
 }
 

@@ -13,12 +13,12 @@ pub struct Text([u8; Text::SIZE_BYTES_MAX]);
 /// Reason why a string is not a [`Text`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TextError {
-    /// It is longer than [`Text::SIZE_BYTES_MAX`].
+    /// The string is longer than [`Text::SIZE_BYTES_MAX`].
     TooLong {
         /// Length in bytes.
         size_bytes: usize,
     },
-    /// It contains a zero byte.
+    /// The string contains a zero byte.
     HasZero,
 }
 
@@ -38,7 +38,7 @@ impl fmt::Display for TextError {
 impl Error for TextError {}
 
 impl Text {
-    /// Longest text, in bytes.
+    /// Size of the longest text, in bytes.
     pub const SIZE_BYTES_MAX: usize = 160;
 
     /// Copies a string.
@@ -52,8 +52,8 @@ impl Text {
         if text.contains('\0') { Err(TextError::HasZero) } else { Ok(Self::cut(text)) }
     }
 
-    /// Copies as much of a string as fits, up to its first zero byte, in whole characters. Only for
-    /// text in which nothing depends on the end, such as a name to display.
+    /// Copies as many whole characters of a string as fit, up to its first zero byte. Use it only for
+    /// text whose end may be lost, such as a name for display.
     pub fn cut(text: &str) -> Self {
         let text = text.split('\0').next().unwrap_or_default();
         let size = text.floor_char_boundary(Self::SIZE_BYTES_MAX);
@@ -62,18 +62,18 @@ impl Text {
         Self(bytes)
     }
 
-    /// Reads bytes that another process wrote, up to the first that is zero or not UTF-8.
+    /// Reads bytes that another process wrote, up to the first byte that is zero or not UTF-8.
     pub fn from_wire(bytes: &[u8; Self::SIZE_BYTES_MAX]) -> Self {
         Self::cut(bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid()))
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn as_str(&self) -> &str {
         let valid = self.0.utf8_chunks().next().map_or("", |chunk| chunk.valid());
         valid.trim_end_matches('\0')
     }
 
-    /// The bytes in shared memory, with zeros behind the text.
+    /// Returns the bytes for shared memory: the text, padded with zeros.
     pub fn to_wire(self) -> [u8; Self::SIZE_BYTES_MAX] {
         self.0
     }
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_text_is_refused_and_one_that_fits_is_kept() {
+    fn text_that_fits_is_kept_and_longer_text_is_refused() {
         let longest = "ü".repeat(80);
         assert_eq!(Text::new(&longest).unwrap().as_str(), longest);
         assert_eq!(Text::new("").unwrap().as_str(), "");
@@ -121,14 +121,14 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_text_ends_with_a_whole_character() {
+    fn cut_text_ends_with_a_whole_character() {
         let long = format!("{}ü and more", "x".repeat(159));
         assert_eq!(Text::cut(&long).as_str(), "x".repeat(159));
         assert_eq!(Text::cut("grav\0ity").as_str(), "grav");
     }
 
     #[test]
-    fn bytes_from_the_wire_are_read_as_far_as_they_are_text() {
+    fn text_from_the_wire_ends_at_the_first_byte_that_is_zero_or_not_utf8() {
         let mut bytes = Text::cut("gravity and rubbish").to_wire();
         bytes[7] = 0;
         assert_eq!(Text::from_wire(&bytes), Text::cut("gravity"));

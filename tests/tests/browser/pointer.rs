@@ -60,8 +60,8 @@ fn a_grabbed_particle_follows_the_mouse() {
 
     wait_for("the mark of the grab in the picture, under the mouse", || {
         let picture = rig.tab.drawn(Area::around(to, 30.0));
-        let seen = picture.middle_of(to, 30.0, is_grab_mark)?;
-        (distance(seen, to) <= 2.0).then_some(())
+        let drawn = picture.middle_of(to, 30.0, is_grab_mark)?;
+        (distance(drawn, to) <= 2.0).then_some(())
     });
     assert_eq!(rig.tab.drawn(Area::around(from, 12.0)).middle_of(from, 12.0, is_grab_mark), None);
     rig.tab.release(to);

@@ -154,7 +154,8 @@ pub struct Node {
 /// The parameters of the scene; `None` without a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParametersText {
-    /// Every command that changed a parameter has been seen.
+    /// The values are certain. Those of a recording are not until it has been read, or if it lost
+    /// commands.
     pub is_complete: bool,
     /// Present values.
     pub values: Option<ParameterValues>,

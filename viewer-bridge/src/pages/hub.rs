@@ -63,7 +63,7 @@ struct Page {
 }
 
 impl HubState {
-    /// Queues a message for every page. Removes a page whose queue is full: its task sees the end of
+    /// Queues a message for each page. Removes a page whose queue is full: its task sees the end of
     /// the queue and closes the connection.
     fn queue(&mut self, message: &Message) {
         self.pages.retain(|_, page| page.queue.try_send(message.clone()).is_ok());
@@ -74,7 +74,7 @@ impl HubState {
         self.queue(&count);
     }
 
-    /// Queues a message for every page and keeps it for later ones.
+    /// Queues a message for each page and keeps it for later ones.
     fn latch(&mut self, slot: Slot, message: Message) {
         self.queue(&message);
         if slot == Slot::Scene {

@@ -41,7 +41,7 @@ fn a_late_page_receives_the_state_in_order() {
     assert_eq!((scene.stamp.epoch, scene.positions.len()), (1, 2));
     let Message::Tear(tear) = page.binary() else { panic!("no tear") };
     assert_eq!((tear.first, tear.constraints), (0, vec![3, 1, 2]));
-    assert_eq!(page.text_of("clients")["count"], 1);
+    assert_eq!(page.text_with_type("clients")["count"], 1);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn a_page_receives_two_frames_and_then_the_newest_after_an_acknowledgement() {
     for step in 3..50 {
         site.show(step, 1);
     }
-    page.say(&ack(first.1));
+    page.send(&ack(first.1));
     // The page has credit again: the source learns of the demand, and shows its newest frame.
     wait_for("demand", || site.hub.awaited_formats(1).is_any().then_some(()));
     site.show(50, 1);
@@ -97,7 +97,7 @@ fn a_page_with_the_newest_frame_does_not_request_another() {
         site.show(step.into(), 1);
         assert_eq!(page.frame().1, step);
     }
-    page.say(&ack(FRAMES_UNACKNOWLEDGED_MAX));
+    page.send(&ack(FRAMES_UNACKNOWLEDGED_MAX));
     assert_eq!(
         site.requests.next(REQUEST_TIMEOUT),
         Some(Request { client: PAGE, kind: RequestKind::Credit })
@@ -112,8 +112,8 @@ fn a_page_with_the_newest_frame_does_not_request_another() {
 fn a_page_that_missed_the_newest_frame_requests_it() {
     let mut site = Site::start();
     let mut slow = site.silent_page();
-    slow.say(r#"{"type":"hello","protocol":2,"format":"u16"}"#);
-    slow.text_of("hello");
+    slow.send(r#"{"type":"hello","protocol":2,"format":"u16"}"#);
+    slow.text_with_type("hello");
     site.begin(1);
     for step in 1..=2 {
         site.show(step, 1);
@@ -124,7 +124,7 @@ fn a_page_that_missed_the_newest_frame_requests_it() {
     // No page waits for u16 frames.
     site.show(3, 1);
     while site.requests.next(Duration::ZERO).is_some() {}
-    slow.say(&ack(2));
+    slow.send(&ack(2));
     assert_eq!(
         site.requests.next(REQUEST_TIMEOUT),
         Some(Request { client: PAGE, kind: RequestKind::Credit })
@@ -151,7 +151,7 @@ fn a_slow_page_is_never_more_than_three_frames_behind() {
         }
         let (shown, number) = page.frame();
         assert!(step - shown <= 15, "step {shown} is shown at step {step}");
-        page.say(&ack(number));
+        page.send(&ack(number));
         wait_for("credit", || site.hub.awaited_formats(1).is_any().then_some(()));
     }
 }
@@ -172,7 +172,7 @@ fn a_frame_never_precedes_its_scene() {
                     Ok(Message::Scene(scene)) => epoch = scene.stamp.epoch,
                     Ok(Message::Frame(frame)) => {
                         assert!(frame.head.stamp.epoch <= epoch, "frame before scene");
-                        page.say(&ack(frame.head.number));
+                        page.send(&ack(frame.head.number));
                     }
                     _ => {}
                 },
@@ -190,7 +190,7 @@ fn each_page_receives_its_requested_format() {
     let mut pages = Vec::new();
     for format in ["auto", "f32", "u16"] {
         let mut page = site.silent_page();
-        page.say(&format!(r#"{{"type":"hello","protocol":2,"format":"{format}"}}"#));
+        page.send(&format!(r#"{{"type":"hello","protocol":2,"format":"{format}"}}"#));
         assert_eq!(page.text()["format"], format);
         pages.push(page);
     }
@@ -201,7 +201,7 @@ fn each_page_receives_its_requested_format() {
             loop {
                 if let Message::Frame(frame) = page.binary() {
                     kinds.push(frame.format);
-                    page.say(&ack(frame.head.number));
+                    page.send(&ack(frame.head.number));
                     break;
                 }
             }

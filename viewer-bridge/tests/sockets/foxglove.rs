@@ -255,11 +255,11 @@ fn a_client_cannot_change_anything_without_permission() {
     client.publish(1, &json!({ "kind": "pause" }));
     assert_eq!(client.text("status")["level"], 2);
     let set = json!([{ "name": "damping", "value": 3.5 }]);
-    client.say(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
+    client.send(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
     assert!(client.text("status")["message"].as_str().unwrap().contains("--allow-commands"));
     let values = client.text("parameterValues");
     assert_eq!((&values["id"], parameter(&values, "damping")), (&json!("set"), json!(0.0)));
-    client.say(&json!({ "op": "getParameters", "parameterNames": [], "id": "get" }));
+    client.send(&json!({ "op": "getParameters", "parameterNames": [], "id": "get" }));
     assert_eq!(parameter(&client.text("parameterValues"), "substeps"), json!(4));
     assert_eq!(site.requests.next(Duration::ZERO), None);
 }
@@ -270,11 +270,11 @@ fn a_client_can_read_set_and_subscribe_to_parameters() {
     site.set_parameters(ParameterValues::default());
     let (mut client, _) = Client::start(&site.url);
     let (mut other, _) = Client::start(&site.url);
-    other.say(&json!({ "op": "subscribeParameterUpdates", "parameterNames": ["damping"] }));
-    other.say(&json!({ "op": "getParameters", "parameterNames": ["damping"], "id": "get" }));
+    other.send(&json!({ "op": "subscribeParameterUpdates", "parameterNames": ["damping"] }));
+    other.send(&json!({ "op": "getParameters", "parameterNames": ["damping"], "id": "get" }));
     assert_eq!(other.text("parameterValues")["parameters"].as_array().unwrap().len(), 1);
     let set = json!([{ "name": "damping", "value": 3.5 }, { "name": "dance", "value": 1 }]);
-    client.say(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
+    client.send(&json!({ "op": "setParameters", "parameters": set, "id": "set" }));
     let (sender, id, command) = site.command();
     assert!(matches!(&command, Command::Set { parameter, .. } if parameter == "damping"));
     site.apply(sender, id, "set");

@@ -78,11 +78,11 @@ impl Client {
         self.channels.iter().map(|channel| channel["topic"].as_str().unwrap()).collect()
     }
 
-    pub(crate) fn say(&mut self, message: &Value) {
+    pub(crate) fn send(&mut self, message: &Value) {
         self.socket.send(Message::text(message.to_string())).unwrap();
     }
 
-    pub(crate) fn say_bytes(&mut self, bytes: Vec<u8>) {
+    pub(crate) fn send_bytes(&mut self, bytes: Vec<u8>) {
         self.socket.send(Message::binary(bytes)).unwrap();
     }
 
@@ -90,11 +90,11 @@ impl Client {
     pub(crate) fn subscribe(&mut self, subscription: u32, topic: &str) {
         let channel = self.channel(topic)["id"].clone();
         let subscriptions = json!([{ "id": subscription, "channelId": channel }]);
-        self.say(&json!({ "op": "subscribe", "subscriptions": subscriptions }));
+        self.send(&json!({ "op": "subscribe", "subscriptions": subscriptions }));
     }
 
     pub(crate) fn unsubscribe(&mut self, subscription: u32) {
-        self.say(&json!({ "op": "unsubscribe", "subscriptionIds": [subscription] }));
+        self.send(&json!({ "op": "unsubscribe", "subscriptionIds": [subscription] }));
     }
 
     /// Advertises a topic with a channel id.
@@ -102,18 +102,18 @@ impl Client {
         let channels = json!([
             { "id": channel, "topic": topic, "encoding": "json", "schemaName": "catenary.Command" }
         ]);
-        self.say(&json!({ "op": "advertise", "channels": channels }));
+        self.send(&json!({ "op": "advertise", "channels": channels }));
     }
 
     pub(crate) fn unadvertise(&mut self, channel: u32) {
-        self.say(&json!({ "op": "unadvertise", "channelIds": [channel] }));
+        self.send(&json!({ "op": "unadvertise", "channelIds": [channel] }));
     }
 
     pub(crate) fn publish(&mut self, channel: u32, message: &Value) {
         let mut bytes = vec![1];
         bytes.extend(channel.to_le_bytes());
         bytes.extend(message.to_string().into_bytes());
-        self.say_bytes(bytes);
+        self.send_bytes(bytes);
     }
 
     /// Calls a service without waiting for the response.
@@ -124,7 +124,7 @@ impl Client {
         bytes.extend(4_u32.to_le_bytes());
         bytes.extend(b"json");
         bytes.extend(request.to_string().into_bytes());
-        self.say_bytes(bytes);
+        self.send_bytes(bytes);
     }
 
     /// Controls playback. `command` is 0 to play, 1 to pause.
@@ -135,7 +135,7 @@ impl Client {
         bytes.extend(seek_ns.unwrap_or(0).to_le_bytes());
         bytes.extend(u32::try_from(request.len()).unwrap().to_le_bytes());
         bytes.extend(request.as_bytes());
-        self.say_bytes(bytes);
+        self.send_bytes(bytes);
     }
 
     /// Reads one message into the queues. Returns false at the end of the connection.

@@ -67,11 +67,11 @@ fn the_token_is_required_on_other_addresses_than_loopback() {
         format!(r#"{{"type":"hello","protocol":2,"token":"{}"}}"#, &token[..31]),
     ] {
         let mut page = site.silent_page();
-        page.say(&hello);
+        page.send(&hello);
         assert_eq!(page.close_code(), Some(4401), "{hello}");
     }
     let mut page = site.silent_page();
-    page.say(&format!(r#"{{"type":"hello","protocol":2,"token":"{token}"}}"#));
+    page.send(&format!(r#"{{"type":"hello","protocol":2,"token":"{token}"}}"#));
     assert_eq!(page.text()["type"], "hello");
 }
 

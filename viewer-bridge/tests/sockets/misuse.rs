@@ -24,7 +24,7 @@ fn a_first_message_other_than_hello_ends_the_connection() {
         (r#"{"type":"hello","protocol":1}"#, 4426),
     ] {
         let mut page = site.silent_page();
-        page.say(text);
+        page.send(text);
         assert_eq!(page.close_code(), Some(code), "{text}");
     }
     assert_eq!(site.hub.client_count(), 0);
@@ -42,7 +42,7 @@ fn a_malformed_message_ends_the_connection() {
         r#"{"type":"hello","protocol":2}"#,
     ] {
         let mut page = site.page();
-        page.say(text);
+        page.send(text);
         assert_eq!(page.close_code(), Some(4400), "{text}");
     }
     let mut page = site.page();
@@ -63,7 +63,7 @@ fn a_message_that_is_too_long_ends_the_connection() {
     assert!(code.is_none_or(|code| code == 1009), "{code:?}");
     site.wait_for_clients(1);
     site.publish(&Update::Reset { step: 1 });
-    assert_eq!(other.text_of("reset")["step"], 1);
+    assert_eq!(other.text_with_type("reset")["step"], 1);
 }
 
 #[test]
@@ -84,8 +84,8 @@ fn a_flood_ends_the_connection() {
 fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
     let site = Site::start();
     let mut page = site.page();
-    page.say(r#"{"type":"grab","particle":1,"target":[0,1e8,0],"id":5}"#);
-    let outcome = page.text_of("outcome");
+    page.send(r#"{"type":"grab","particle":1,"target":[0,1e8,0],"id":5}"#);
+    let outcome = page.text_with_type("outcome");
     assert_eq!(
         outcome,
         json!({
@@ -94,7 +94,7 @@ fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
             "text": "a value is out of range",
         })
     );
-    page.say(r#"{"type":"pin","particle":1,"id":6}"#);
+    page.send(r#"{"type":"pin","particle":1,"id":6}"#);
     wait_for("the command", || {
         let request = site.requests.next(Duration::ZERO)?;
         matches!(request.kind, RequestKind::Command { id: Some(6), .. }).then_some(())
@@ -125,7 +125,7 @@ fn a_page_that_leaves_reliable_messages_unread_is_disconnected_and_others_receiv
     let text = "x".repeat(64 << 10);
     for _ in 0..1000 {
         site.publish(&Update::Notice { level: Level::Info, text: &text });
-        assert_eq!(reader.text_of("notice")["text"], text);
+        assert_eq!(reader.text_with_type("notice")["text"], text);
     }
     assert_eq!(site.hub.client_count(), 1);
 }

@@ -93,7 +93,7 @@ impl Site {
     /// Opens a page, and reads the server's `hello`.
     pub(crate) fn page(&self) -> Page {
         let mut page = self.silent_page();
-        page.say(r#"{"type":"hello","protocol":2}"#);
+        page.send(r#"{"type":"hello","protocol":2}"#);
         assert_eq!(page.text()["type"], "hello");
         page
     }
@@ -154,7 +154,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    pub(crate) fn say(&mut self, text: &str) {
+    pub(crate) fn send(&mut self, text: &str) {
         self.socket.send(Message::text(text)).unwrap();
     }
 
@@ -198,7 +198,7 @@ impl Page {
     }
 
     /// Waits for the next text of a type.
-    pub(crate) fn text_of(&mut self, kind: &str) -> Value {
+    pub(crate) fn text_with_type(&mut self, kind: &str) -> Value {
         loop {
             let text = match self.next().unwrap() {
                 Message::Text(text) => serde_json::from_str::<Value>(&text).unwrap(),

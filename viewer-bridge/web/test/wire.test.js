@@ -20,7 +20,7 @@ const readers = {
     positions: triples(m.positions), rest_lengths: [...m.restLengths], triangles: triples(m.triangles), kinds: [...m.constraintKinds],
     ends: Array.from({ length: m.constraintCount }, (_, i) => [m.ends[2 * i], m.ends[2 * i + 1]]),
     min: m.min, max: m.max, origin: m.origin, rate_hz: m.rateHz,
-    flags: (m.isPlanar ? 1 : 0) | (m.canTear ? 2 : 0) | (m.hasTethers ? 4 : 0) | (m.isPbd ? 8 : 0),
+    flags: m.isPlanar ? 1 : 0,
     text: { name: m.name, unit: m.unit, up: m.up, run_id: m.runId },
   }),
   frame: (m) => ({

@@ -1,4 +1,4 @@
-//! Commands and their outcomes, seen from the client that sends them.
+//! Sending of commands and matching of their outcomes.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -19,64 +19,64 @@ use crate::ports::services::{Attachment, OwnerProcess};
 use crate::ports::writer::{PublishError, ValueWriter};
 use sim_types::Action;
 
-/// Why a command has no outcome.
+/// Error of a request: the command has no outcome.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RequestError {
-    /// The command was sent, and no outcome came in time: what became of it is not known.
-    #[error("command {sequence} has no outcome after at most {timeout:?}: {owner}")]
+    /// The command was sent, but no outcome arrived in time. Its effect is unknown.
+    #[error("no outcome of command {sequence} after at most {timeout:?}: {owner}")]
     Timeout {
-        /// The command's sequence number.
+        /// Sequence number of the command.
         sequence: u64,
-        /// How long it was waited for, or less if the owner went meanwhile.
+        /// Longest wait. It was shorter if the owner went meanwhile.
         timeout: Duration,
-        /// Whether anybody could have answered.
+        /// State of the owner after the wait.
         owner: OwnerState,
     },
-    /// The owner has not taken the commands before this one; it was not sent.
+    /// The command was not sent, because the owner has not received the commands before it.
     #[error(
-        "{COMMANDS_BUFFERED} commands of this client wait already, and this one was not sent: {owner}"
+        "the command was not sent, because {COMMANDS_BUFFERED} commands of this client are waiting: {owner}"
     )]
     QueueFull {
-        /// Whether anybody could have taken them.
+        /// State of the owner.
         owner: OwnerState,
     },
-    /// Nobody takes commands; it was not sent.
+    /// The command was not sent, because no owner receives commands.
     #[error("the command was not sent: {owner}")]
     NoReceiver {
-        /// Whether the owner is alive.
+        /// State of the owner.
         owner: OwnerState,
     },
-    /// The command could not be put into shared memory; it was not sent.
+    /// The command was not sent, because it could not be written into shared memory.
     #[error(transparent)]
     Publish(#[from] PublishError),
     /// The outcomes could not be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// There was no place at the services of commands and outcomes.
+    /// The services of commands and outcomes have no place for another client.
     #[error(transparent)]
     Service(#[from] ServiceError),
 }
 
-/// Whether the owner was alive when a command went unanswered.
+/// State of the owner when a command remained unanswered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum OwnerState {
-    /// It was, and said nothing.
+    /// The owner was alive, but did not answer.
     Alive {
-        /// Its process id, where it is known.
+        /// Process id of the owner, if it is known.
         process_id: Option<u32>,
-        /// The name that it owns.
+        /// Name of the owner.
         endpoint: Endpoint,
     },
-    /// There was none.
+    /// There was no owner.
     Gone {
-        /// The name that nobody owns.
+        /// Name without an owner.
         endpoint: Endpoint,
     },
 }
 
 impl OwnerState {
-    fn look(attachment: &Attachment) -> Self {
+    fn query(attachment: &Attachment) -> Self {
         let endpoint = attachment.session.endpoint.clone();
         match attachment.owner() {
             Some(OwnerProcess { id }) => Self::Alive { process_id: id, endpoint },
@@ -90,15 +90,15 @@ impl fmt::Display for OwnerState {
         match self {
             Self::Alive { process_id: Some(id), endpoint } => write!(
                 formatter,
-                "no node answers, although process {id} runs as {endpoint} (is it stopped, or overloaded?)"
+                "process {id} runs as {endpoint}, but does not answer (is it stopped, or overloaded?)"
             ),
             Self::Alive { process_id: None, endpoint } => write!(
                 formatter,
-                "no node answers, although one runs as {endpoint} (is it stopped, or overloaded?)"
+                "a node runs as {endpoint}, but does not answer (is it stopped, or overloaded?)"
             ),
             Self::Gone { endpoint } => write!(
                 formatter,
-                "no node answers, none runs as {endpoint} any more (start one with `sim-node run{}`)",
+                "no node runs as {endpoint} now (start one with `sim-node run{}`)",
                 endpoint.options()
             ),
         }
@@ -107,26 +107,27 @@ impl fmt::Display for OwnerState {
 
 impl RequestError {
     pub(crate) fn timeout(attachment: &Attachment, sequence: u64, timeout: Duration) -> Self {
-        Self::Timeout { sequence, timeout, owner: OwnerState::look(attachment) }
+        Self::Timeout { sequence, timeout, owner: OwnerState::query(attachment) }
     }
 }
 
-/// Sends commands of one client and sorts out their outcomes.
+/// Sends the commands of one client and matches their outcomes.
 #[derive(Debug)]
 pub(crate) struct Commander {
     client_id: u64,
-    /// The sequence number of the last command.
+    /// Sequence number of the last command.
     sequence: u64,
-    /// Commands without an outcome, ascending by number; at most as many as outcomes can wait.
+    /// Commands without an outcome, by ascending number; at most [`OUTCOMES_BUFFERED`].
     unanswered: VecDeque<Command>,
-    /// Outcomes that came while another one was waited for, in order; at most as many as above.
+    /// Outcomes that arrived while the client waited for another, in the order of application; at most
+    /// [`OUTCOMES_BUFFERED`].
     answered: VecDeque<Outcome>,
     commands: ValueWriter<Command>,
     outcomes: ValueReader<Outcome>,
 }
 
 impl Commander {
-    /// Subscribes to the outcomes first: none of a command that is sent can be missed.
+    /// Connects to the services. Subscribes to the outcomes first, so that it misses none.
     pub(crate) fn create(attachment: &Attachment, client_id: u64) -> Result<Self, ServiceError> {
         let services = &attachment.services;
         Ok(Self {
@@ -144,13 +145,13 @@ impl Commander {
         attachment: &Attachment,
         action: Action,
     ) -> Result<u64, RequestError> {
-        // Outcomes of other clients must not crowd out those of this one.
-        self.collect()?;
+        // Outcomes of other clients must not push this client's out of the buffer.
+        self.receive_outcomes()?;
         let sequence = self.next_sequence();
         let command = Command::new(self.client_id, sequence, action);
-        let taken = self.commands.write(command)?;
-        if taken == 0 {
-            let owner = OwnerState::look(attachment);
+        let receiver_count = self.commands.write(command)?;
+        if receiver_count == 0 {
+            let owner = OwnerState::query(attachment);
             return Err(match reader_count(&attachment.services.commands) {
                 0 => RequestError::NoReceiver { owner },
                 _ => RequestError::QueueFull { owner },
@@ -164,15 +165,15 @@ impl Commander {
         Ok(sequence)
     }
 
-    /// Takes in all outcomes that have come, and keeps those of unanswered commands.
-    pub(crate) fn collect(&mut self) -> Result<(), ReadError> {
+    /// Receives all outcomes, and keeps those of unanswered commands.
+    pub(crate) fn receive_outcomes(&mut self) -> Result<(), ReadError> {
         let mut drained = Drained::default();
         self.outcomes.drain(&mut drained, |outcome| {
-            // The console's other processes have this client id too, and once in a while the same
-            // number: only the whole command tells whose it was. NaN is compared as its bits.
-            let is_of = |command: &Command| bytes_of(command) == bytes_of(&outcome.command);
-            if let Some(place) = self.unanswered.iter().position(is_of) {
-                self.unanswered.remove(place);
+            // Processes that share the console's client id may use the same number, so the whole
+            // commands are compared, as bytes because of NaN.
+            let is_answered = |command: &Command| bytes_of(command) == bytes_of(&outcome.command);
+            if let Some(index) = self.unanswered.iter().position(is_answered) {
+                self.unanswered.remove(index);
                 self.answered.push_back(*outcome);
             }
         });
@@ -185,25 +186,25 @@ impl Commander {
         Ok(())
     }
 
-    /// The oldest outcome that was not taken.
-    pub(crate) fn take_outcome(&mut self) -> Result<Option<Outcome>, ReadError> {
-        self.collect()?;
+    /// Returns the oldest unread outcome.
+    pub(crate) fn next_outcome(&mut self) -> Result<Option<Outcome>, ReadError> {
+        self.receive_outcomes()?;
         Ok(self.answered.pop_front())
     }
 
-    /// The outcome of one command; others stay.
-    pub(crate) fn take_outcome_of(&mut self, sequence: u64) -> Result<Option<Outcome>, ReadError> {
-        self.collect()?;
-        let place = self.answered.iter().position(|outcome| outcome.command.sequence == sequence);
-        Ok(place.and_then(|place| self.answered.remove(place)))
+    /// Returns the outcome of one command, and keeps the others.
+    pub(crate) fn outcome_for(&mut self, sequence: u64) -> Result<Option<Outcome>, ReadError> {
+        self.receive_outcomes()?;
+        let index = self.answered.iter().position(|outcome| outcome.command.sequence == sequence);
+        Ok(index.and_then(|index| self.answered.remove(index)))
     }
 
-    /// Expects no outcome of that command any more.
-    pub(crate) fn give_up(&mut self, sequence: u64) {
-        if let Ok(place) =
+    /// Stops waiting for the outcome of a command.
+    pub(crate) fn forget(&mut self, sequence: u64) {
+        if let Ok(index) =
             self.unanswered.binary_search_by_key(&sequence, |command| command.sequence)
         {
-            self.unanswered.remove(place);
+            self.unanswered.remove(index);
         }
     }
 
@@ -211,8 +212,8 @@ impl Commander {
         !self.unanswered.is_empty()
     }
 
-    /// One more than the last; for the console at least the microsecond of the day, so that the
-    /// processes that share it number their commands apart, and later ones higher.
+    /// Returns the last number plus 1. For the console it is at least the microseconds since 1970, so
+    /// that the processes that share the console use different, ascending numbers.
     fn next_sequence(&self) -> u64 {
         let next = self.sequence + 1;
         if self.client_id == CONSOLE_CLIENT_ID { next.max(epoch_microseconds()) } else { next }

@@ -1,19 +1,15 @@
-//! Published states, each put together from the messages of all services.
+//! Coherent states, assembled from the messages of all services.
 
-use std::collections::VecDeque;
-
-use sim_types::ParameterValues;
-
+use crate::client::change::{Change, PendingChanges};
+use crate::client::loaded_scene::{LoadedScene, PendingLoads};
 use crate::client::views::Parameters;
-use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome};
-use crate::messages::parameters::ParametersHeader;
+use crate::messages::collider::ColliderState;
+use crate::messages::outcome::OUTCOME_FLAG_CONTROL;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::messages::update::Update;
 
-/// A published state with everything that belongs to it, as of the end of its step.
+/// A published state with everything that belongs to it, at the end of its step.
 #[derive(Debug, Clone, Copy)]
 pub struct State<'a> {
     /// Header of the snapshot.
@@ -22,155 +18,74 @@ pub struct State<'a> {
     pub particles: &'a [ParticleState],
     /// The load that the state belongs to.
     pub load: &'a LoadedScene,
-    /// Constraints torn since the load or the last reset, in the order of tearing;
-    /// `header.torn_count` of them, unless a message was lost.
+    /// The `header.torn_count` constraints torn since the load or the last reset, in the order of
+    /// tearing. Shorter if a message was lost.
     pub torn: &'a [TornConstraint],
     /// The colliders, by index.
     pub colliders: &'a [ColliderState],
-    /// The parameters. For the first state after attaching to a paused node, they may be those of
-    /// the step after it: their header names the step.
+    /// The parameters. In the first state after attaching to a paused node, they may be those of the
+    /// next step; their header states the step.
     pub parameters: &'a Parameters,
-    /// Everything that changed since the state before, in the order of publication.
+    /// All changes since the state before, in the order of publication.
     pub changes: &'a [Change],
 }
 
-/// A scene with everything that stays the same until the next load.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct LoadedScene {
-    /// Identity of the load.
-    pub header: LoadHeader,
-    /// The scene as TOML.
-    pub scene: Vec<u8>,
-    /// The constraints, by index.
-    pub constraints: Vec<ConstraintState>,
-    /// The surface; may be empty.
-    pub triangles: Vec<Triangle>,
-}
-
-/// A change between two states.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Change {
-    /// The state is the first of another load.
-    Load,
-    /// The colliders at the end of a step.
-    Colliders(CollidersHeader, Vec<ColliderState>),
-    /// Tears that no earlier state has shown, or a reset. `header.count` counts all torn
-    /// constraints.
-    Tears(TearsHeader, Vec<TornConstraint>),
-    /// The parameters from a step on.
-    Parameters(ParametersHeader, ParameterValues),
-    /// The keyframe of a step.
-    Keyframe(KeyframeHeader, Vec<u8>),
-    /// An outcome. Answers to commands that control a replay are not among the changes.
-    Outcome(Outcome),
-}
-
-/// Most changes that wait for their state. A node that publishes every 1,000th step moves its
-/// colliders in between; beyond the limit the oldest change is dropped and counted.
-const WAITING_MAX: usize = 4096;
-/// Most loads that wait for their first state.
-const LOADS_WAITING_MAX: usize = 4;
-
-/// Puts states together.
+/// Assembles states.
 #[derive(Debug, Default)]
 pub(crate) struct StateAssembler {
     run_id: u64,
     load: Option<LoadedScene>,
     torn: Vec<TornConstraint>,
-    /// As in the newest list that was shown.
+    /// `since_step` of the last list of tears.
     since_step: u64,
     colliders: Vec<ColliderState>,
     parameters: Parameters,
     /// Changes since the state before.
     changes: Vec<Change>,
-    loads_waiting: VecDeque<PartialLoad>,
-    waiting: VecDeque<Waiting>,
-    lost_count: u64,
-}
-
-/// The parts of a load that have arrived.
-#[derive(Debug, Default)]
-struct PartialLoad {
-    run_id: u64,
-    topology_revision: u32,
-    scene: Option<Vec<u8>>,
-    constraints: Option<(LoadHeader, Vec<ConstraintState>)>,
-    triangles: Option<Vec<Triangle>>,
-}
-
-/// A change that waits for a state of its step or of a later one.
-#[derive(Debug)]
-struct Waiting {
-    run_id: u64,
-    step: u64,
-    change: Change,
+    pending_loads: PendingLoads,
+    pending_changes: PendingChanges,
 }
 
 impl StateAssembler {
     /// Keeps a message until its state arrives.
     pub(crate) fn add(&mut self, update: &Update<'_>) {
+        let (loads, changes) = (&mut self.pending_loads, &mut self.pending_changes);
         match *update {
             Update::Scene(header, text) => {
-                self.partial_load(header).scene = Some(text.to_vec());
+                loads.get_or_insert(header).scene = Some(text.to_vec());
             }
             Update::Topology(header, constraints) => {
-                self.partial_load(header).constraints = Some((*header, constraints.to_vec()));
+                loads.get_or_insert(header).topology = Some((*header, constraints.to_vec()));
             }
             Update::Surface(header, triangles) => {
-                self.partial_load(header).triangles = Some(triangles.to_vec());
+                loads.get_or_insert(header).triangles = Some(triangles.to_vec());
             }
             Update::Colliders(header, list) => {
-                let change = Change::Colliders(*header, list.to_vec());
-                self.wait(header.run_id, header.step, change);
+                changes.push(header.run_id, header.step, Change::Colliders(*header, list.to_vec()));
             }
             Update::Tears(header, list) => {
-                let change = Change::Tears(*header, list.to_vec());
-                self.wait(header.run_id, header.step, change);
+                changes.push(header.run_id, header.step, Change::Tears(*header, list.to_vec()));
             }
             Update::Parameters(header, values) => {
-                self.wait(header.run_id, header.step, Change::Parameters(*header, *values));
+                changes.push(header.run_id, header.step, Change::Parameters(*header, *values));
             }
             Update::Keyframe(header, bytes) => {
-                let change = Change::Keyframe(*header, bytes.to_vec());
-                self.wait(header.run_id, header.step, change);
+                changes.push(header.run_id, header.step, Change::Keyframe(*header, bytes.to_vec()));
             }
             Update::Outcome(outcome) if outcome.flags & OUTCOME_FLAG_CONTROL == 0 => {
-                self.wait(outcome.run_id, outcome.step, Change::Outcome(*outcome));
+                changes.push(outcome.run_id, outcome.step, Change::Outcome(*outcome));
             }
             Update::Outcome(_) | Update::Status(_) => {}
         }
     }
 
-    fn partial_load(&mut self, header: &LoadHeader) -> &mut PartialLoad {
-        let LoadHeader { run_id, topology_revision, .. } = *header;
-        let key = (run_id, topology_revision);
-        let is_same = |one: &PartialLoad| (one.run_id, one.topology_revision) == key;
-        let place = self.loads_waiting.iter().position(is_same).unwrap_or_else(|| {
-            if self.loads_waiting.len() == LOADS_WAITING_MAX {
-                self.loads_waiting.pop_front();
-            }
-            let load = PartialLoad { run_id, topology_revision, ..PartialLoad::default() };
-            self.loads_waiting.push_back(load);
-            self.loads_waiting.len() - 1
-        });
-        &mut self.loads_waiting[place]
-    }
-
-    fn wait(&mut self, run_id: u64, step: u64, change: Change) {
-        if self.waiting.len() == WAITING_MAX {
-            self.waiting.pop_front();
-            self.lost_count += 1;
-        }
-        self.waiting.push_back(Waiting { run_id, step, change });
-    }
-
-    /// Changes that were dropped because their state did not come.
+    /// Returns the number of changes that were dropped because their state did not arrive.
     pub(crate) fn lost_count(&self) -> u64 {
-        self.lost_count
+        self.pending_changes.lost_count()
     }
 
-    /// Puts together the state of a snapshot. Returns `None` if its load has not arrived, as right
-    /// after attaching: then a later snapshot brings everything.
+    /// Assembles the state of a snapshot. Returns `None` if its load has not arrived, for example
+    /// right after attaching; a later snapshot then contains all changes.
     pub(crate) fn assemble<'a>(
         &'a mut self,
         header: &'a SnapshotHeader,
@@ -179,11 +94,12 @@ impl StateAssembler {
         self.changes.clear();
         self.begin_run(header.run_id);
         self.begin_load(header);
-        for change in self.due_changes(header) {
+        for change in self.pending_changes.drain_due(header) {
             self.apply(change);
         }
         self.complete_torn(header);
-        let load = self.load.as_ref().filter(|load| load.is_of(header))?;
+        self.complete_parameters(header);
+        let load = self.load.as_ref().filter(|load| load.has_snapshot(header))?;
         Some(State {
             header,
             particles,
@@ -195,18 +111,15 @@ impl StateAssembler {
         })
     }
 
-    /// Changes that no state has shown, in the order of publication.
-    pub(crate) fn take_waiting(&mut self) -> Vec<Change> {
-        let (run_id, mut rest) = (self.run_id, std::mem::take(&mut self.waiting));
-        rest.retain(|waiting| waiting.run_id == run_id);
-        rest.into_iter().map(|waiting| waiting.change).collect()
+    /// Removes and returns the changes of this run that belong to no state yet.
+    pub(crate) fn drain_pending(&mut self) -> Vec<Change> {
+        self.pending_changes.drain_run(self.run_id)
     }
 
-    /// With the first snapshot of another run, what waits of the old one is out of date.
+    /// Drops everything of the old run with the first snapshot of another run.
     fn begin_run(&mut self, run_id: u64) {
         if run_id != self.run_id {
-            let old = self.run_id;
-            self.waiting.retain(|waiting| waiting.run_id != old);
+            self.pending_changes.drain_run(self.run_id);
             self.run_id = run_id;
             (self.load, self.since_step) = (None, 0);
             self.torn.clear();
@@ -216,31 +129,13 @@ impl StateAssembler {
     }
 
     fn begin_load(&mut self, header: &SnapshotHeader) {
-        if self.load.as_ref().is_some_and(|load| load.is_of(header)) {
+        if self.load.as_ref().is_some_and(|load| load.has_snapshot(header)) {
             return;
         }
-        let key = (header.run_id, header.topology_revision);
-        let place = self
-            .loads_waiting
-            .iter()
-            .position(|one| (one.run_id, one.topology_revision) == key && one.is_complete());
-        let Some(place) = place else { return };
-        // The loads before it have no more states.
-        self.loads_waiting.drain(..place);
-        self.load = self.loads_waiting.pop_front().and_then(PartialLoad::complete);
-        self.changes.push(Change::Load);
-    }
-
-    /// Takes out the changes up to a snapshot, in the order of publication.
-    fn due_changes(&mut self, header: &SnapshotHeader) -> Vec<Change> {
-        let is_due = |one: &Waiting| one.run_id == header.run_id && one.step <= header.step;
-        let (mut due, mut rest) = (Vec::new(), VecDeque::with_capacity(self.waiting.len()));
-        for waiting in self.waiting.drain(..) {
-            if is_due(&waiting) { due.push(waiting) } else { rest.push_back(waiting) }
+        if let Some(load) = self.pending_loads.remove(header) {
+            self.load = Some(load);
+            self.changes.push(Change::Load);
         }
-        self.waiting = rest;
-        due.sort_by_key(|one| (one.step, one.change.place()));
-        due.into_iter().map(|one| one.change).collect()
     }
 
     fn apply(&mut self, change: Change) {
@@ -259,105 +154,54 @@ impl StateAssembler {
         self.changes.push(change);
     }
 
-    /// Replaces the list of torn constraints. Returns those that the list before it lacks.
+    /// Replaces the list of torn constraints. Returns the constraints that the old list lacks.
     fn replace_torn(
         &mut self,
         header: &TearsHeader,
         list: &[TornConstraint],
     ) -> Vec<TornConstraint> {
-        let continues = header.since_step == self.since_step;
-        let known_count = if continues { self.torn.len().min(list.len()) } else { 0 };
+        let is_continuation = header.since_step == self.since_step;
+        let known_count = if is_continuation { self.torn.len().min(list.len()) } else { 0 };
         self.since_step = header.since_step;
         self.torn.clear();
         self.torn.extend_from_slice(list);
         list[known_count..].to_vec()
     }
 
-    /// Where the list of a snapshot was overwritten before it was read, a later list begins with it.
+    /// Replaces a list of tears that was overwritten before it was read. A later list begins with it.
     fn complete_torn(&mut self, header: &SnapshotHeader) {
         let count = header.torn_count as usize;
-        if self.parameters_are_unknown(header)
-            && let Some(parameters) = self.waiting.iter().find_map(|one| one.parameters(header))
-        {
-            self.parameters = parameters;
-        }
         if self.torn.len() == count {
             return;
         }
-        let longer = self.waiting.iter().find_map(|one| match &one.change {
-            Change::Tears(later, list)
-                if one.run_id == header.run_id
-                    && later.since_step <= header.step
-                    && list.len() >= count =>
-            {
-                Some((*later, list[..count].to_vec()))
-            }
-            _ => None,
-        });
-        if let Some((later, list)) = longer {
-            let shown = TearsHeader { step: header.step, count: header.torn_count, ..later };
-            let new = self.replace_torn(&shown, &list);
-            let new_count = u32::try_from(new.len()).unwrap_or(u32::MAX);
-            self.changes.push(Change::Tears(TearsHeader { new_count, ..shown }, new));
-        }
+        let Some((later, list)) = self.pending_changes.tears(header) else { return };
+        let (later, list) = (*later, list[..count].to_vec());
+        let new = self.replace_torn(&later, &list);
+        let new_count = u32::try_from(new.len()).unwrap_or(u32::MAX);
+        let (step, count) = (header.step, header.torn_count);
+        self.changes.push(Change::Tears(TearsHeader { step, new_count, count, ..later }, new));
     }
 
-    fn parameters_are_unknown(&self, header: &SnapshotHeader) -> bool {
-        self.parameters.header.run_id != header.run_id
-    }
-}
-
-impl LoadedScene {
-    /// Returns `true` if a snapshot belongs to this load.
-    fn is_of(&self, snapshot: &SnapshotHeader) -> bool {
-        (self.header.run_id, self.header.topology_revision)
-            == (snapshot.run_id, snapshot.topology_revision)
-    }
-}
-
-impl Waiting {
-    /// The parameters, if the message holds those of a snapshot's run.
-    fn parameters(&self, header: &SnapshotHeader) -> Option<Parameters> {
-        match &self.change {
-            Change::Parameters(own, values) if self.run_id == header.run_id => {
-                Some(Parameters { header: *own, values: *values })
-            }
-            _ => None,
-        }
-    }
-}
-
-impl PartialLoad {
-    fn is_complete(&self) -> bool {
-        self.scene.is_some() && self.constraints.is_some() && self.triangles.is_some()
-    }
-
-    fn complete(self) -> Option<LoadedScene> {
-        let (header, constraints) = self.constraints?;
-        Some(LoadedScene { header, scene: self.scene?, constraints, triangles: self.triangles? })
-    }
-}
-
-impl Change {
-    /// Place in the order of publication within a step.
-    fn place(&self) -> u32 {
-        match self {
-            Self::Load => 0,
-            Self::Colliders(..) => 1,
-            Self::Tears(..) => 2,
-            Self::Parameters(..) => 3,
-            Self::Keyframe(..) => 4,
-            Self::Outcome(_) => 5,
+    /// Reads pending parameters if none of this run have arrived in time, as after attaching to a
+    /// paused node.
+    fn complete_parameters(&mut self, header: &SnapshotHeader) {
+        if self.parameters.header.run_id != header.run_id
+            && let Some(parameters) = self.pending_changes.parameters(header.run_id)
+        {
+            self.parameters = parameters;
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use sim_types::{Action, TearCause};
+    use sim_types::{Action, ParameterValues, TearCause};
 
     use super::*;
     use crate::messages::command::Command;
+    use crate::messages::outcome::Outcome;
+    use crate::messages::parameters::ParametersHeader;
+    use crate::messages::topology::LoadHeader;
 
     const RUN_ID: u64 = 7;
 
@@ -368,7 +212,7 @@ mod tests {
     fn assembler() -> StateAssembler {
         let mut assembler = StateAssembler::default();
         add_load(&mut assembler, 0);
-        add_tears(&mut assembler, (0, 0), &[]);
+        add_tears(&mut assembler, Interval { since_step: 0, step: 0 }, &[]);
         assembler
     }
 
@@ -379,7 +223,15 @@ mod tests {
         assembler.add(&Update::Surface(&header, &[]));
     }
 
-    fn add_tears(assembler: &mut StateAssembler, (step, since_step): (u64, u64), torn: &[u32]) {
+    /// Steps that a list of tears covers.
+    #[derive(Clone, Copy)]
+    struct Interval {
+        since_step: u64,
+        step: u64,
+    }
+
+    fn add_tears(assembler: &mut StateAssembler, interval: Interval, torn: &[u32]) {
+        let Interval { since_step, step } = interval;
         let header = TearsHeader {
             run_id: RUN_ID,
             step,
@@ -405,19 +257,29 @@ mod tests {
         torn.iter().map(|index| TornConstraint::new(*index, Some(TearCause::Cut))).collect()
     }
 
-    /// What is torn at a snapshot, and what is new.
-    fn torn_at(assembler: &mut StateAssembler, header: &SnapshotHeader) -> (Vec<u32>, Vec<u32>) {
-        let indices = |list: &[TornConstraint]| list.iter().map(|one| one.constraint).collect();
+    /// Indices of the torn constraints in a state.
+    #[derive(Debug, PartialEq)]
+    struct TornIndices {
+        all: Vec<u32>,
+        new: Vec<u32>,
+    }
+
+    fn torn(all: &[u32], new: &[u32]) -> TornIndices {
+        TornIndices { all: all.to_vec(), new: new.to_vec() }
+    }
+
+    fn torn_at(assembler: &mut StateAssembler, header: &SnapshotHeader) -> TornIndices {
+        let indices = |list: &[TornConstraint]| list.iter().map(|torn| torn.constraint).collect();
         let state = assembler.assemble(header, &[]).unwrap();
         let new = state.changes.iter().filter_map(|change| match change {
             Change::Tears(_, new) => Some(indices(new)),
             _ => None,
         });
-        (indices(state.torn), new.flat_map(|list: Vec<u32>| list).collect())
+        TornIndices { all: indices(state.torn), new: new.flat_map(|list: Vec<u32>| list).collect() }
     }
 
     #[test]
-    fn a_change_is_part_of_the_first_state_of_its_step_or_later() {
+    fn a_change_belongs_to_the_first_state_at_or_after_its_step() {
         let mut assembler = assembler();
         add_damping(&mut assembler, 0, 0.0);
         add_damping(&mut assembler, 3, 3.0);
@@ -435,42 +297,42 @@ mod tests {
     }
 
     #[test]
-    fn only_new_tears_are_changes_and_a_reset_begins_anew() {
+    fn only_new_tears_are_changes_and_a_reset_starts_a_new_list() {
         let mut assembler = assembler();
-        add_tears(&mut assembler, (2, 0), &[5]);
-        add_tears(&mut assembler, (4, 0), &[5, 1]);
-        assert_eq!(torn_at(&mut assembler, &snapshot(1, 0)), (vec![], vec![]));
-        assert_eq!(torn_at(&mut assembler, &snapshot(2, 1)), (vec![5], vec![5]));
-        assert_eq!(torn_at(&mut assembler, &snapshot(4, 2)), (vec![5, 1], vec![1]));
+        add_tears(&mut assembler, Interval { since_step: 0, step: 2 }, &[5]);
+        add_tears(&mut assembler, Interval { since_step: 0, step: 4 }, &[5, 1]);
+        assert_eq!(torn_at(&mut assembler, &snapshot(1, 0)), torn(&[], &[]));
+        assert_eq!(torn_at(&mut assembler, &snapshot(2, 1)), torn(&[5], &[5]));
+        assert_eq!(torn_at(&mut assembler, &snapshot(4, 2)), torn(&[5, 1], &[1]));
         // After the reset, the same constraints tear in the same order.
-        add_tears(&mut assembler, (9, 6), &[5, 1]);
-        assert_eq!(torn_at(&mut assembler, &snapshot(9, 2)), (vec![5, 1], vec![5, 1]));
+        add_tears(&mut assembler, Interval { since_step: 6, step: 9 }, &[5, 1]);
+        assert_eq!(torn_at(&mut assembler, &snapshot(9, 2)), torn(&[5, 1], &[5, 1]));
     }
 
     #[test]
-    fn a_later_list_stands_in_for_one_that_was_overwritten() {
+    fn a_later_list_replaces_an_overwritten_one() {
         let mut assembler = assembler();
-        add_tears(&mut assembler, (4, 0), &[5, 1, 2]);
-        assert_eq!(torn_at(&mut assembler, &snapshot(3, 2)), (vec![5, 1], vec![5, 1]));
-        assert_eq!(torn_at(&mut assembler, &snapshot(4, 3)), (vec![5, 1, 2], vec![2]));
+        add_tears(&mut assembler, Interval { since_step: 0, step: 4 }, &[5, 1, 2]);
+        assert_eq!(torn_at(&mut assembler, &snapshot(3, 2)), torn(&[5, 1], &[5, 1]));
+        assert_eq!(torn_at(&mut assembler, &snapshot(4, 3)), torn(&[5, 1, 2], &[2]));
     }
 
     #[test]
-    fn a_state_without_its_load_is_not_shown_and_a_load_begins_with_its_own_lists() {
+    fn a_snapshot_without_its_load_yields_no_state_and_a_load_starts_with_its_own_lists() {
         let mut assembler = assembler();
-        add_tears(&mut assembler, (2, 0), &[5]);
-        assert_eq!(torn_at(&mut assembler, &snapshot(2, 1)).0, [5]);
+        add_tears(&mut assembler, Interval { since_step: 0, step: 2 }, &[5]);
+        assert_eq!(torn_at(&mut assembler, &snapshot(2, 1)).all, [5]);
         let second = SnapshotHeader { topology_revision: 1, ..snapshot(3, 0) };
         assert!(assembler.assemble(&second, &[]).is_none());
         add_load(&mut assembler, 1);
-        add_tears(&mut assembler, (3, 3), &[]);
+        add_tears(&mut assembler, Interval { since_step: 3, step: 3 }, &[]);
         let state = assembler.assemble(&second, &[]).unwrap();
         assert_eq!((state.load.header.topology_revision, state.torn.len()), (1, 0));
         assert_eq!(state.changes[0], Change::Load);
     }
 
     #[test]
-    fn the_rest_of_an_old_run_is_dropped_with_the_first_state_of_a_new_one() {
+    fn the_first_state_of_a_run_drops_pending_changes_of_the_old_run() {
         let mut assembler = assembler();
         let first = snapshot(1, 0);
         assembler.assemble(&first, &[]).unwrap();
@@ -484,15 +346,15 @@ mod tests {
         let state = assembler.assemble(&other, &[]).unwrap();
         let expected = Outcome { run_id: 8, ..outcome(0, 1) };
         assert_eq!(state.changes, [Change::Load, Change::Outcome(expected)]);
-        assert!(assembler.take_waiting().is_empty());
+        assert!(assembler.drain_pending().is_empty());
     }
 
     #[test]
-    fn changes_that_wait_too_long_are_dropped_and_counted() {
-        let mut assembler = StateAssembler::default();
-        for index in 0..WAITING_MAX as u64 + 3 {
-            assembler.add(&Update::Outcome(&outcome(index, 100)));
-        }
-        assert_eq!(assembler.lost_count(), 3);
+    fn parameters_that_arrive_with_a_later_step_complete_the_first_state() {
+        let mut assembler = assembler();
+        add_damping(&mut assembler, 2, 3.0);
+        let header = snapshot(1, 0);
+        let state = assembler.assemble(&header, &[]).unwrap();
+        assert_eq!((state.parameters.header.step, state.parameters.values.damping), (2, 3.0));
     }
 }

@@ -1,9 +1,9 @@
-//! Everything that an owner publishes, for a recorder.
+//! The tap: reads everything that an owner publishes.
 
 use std::time::Duration;
 
-use crate::client::state::{Change, State, StateAssembler};
-use crate::client::views::Snapshot;
+use crate::client::change::Change;
+use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -24,10 +24,11 @@ use crate::ports::services::{AttachError, Attachment};
 use crate::ports::session::Session;
 use crate::ports::wake::WakeListener;
 
-/// Times that every service is read for one state: each read takes at most one buffer.
+/// Most reads of every service for one state. Each read receives at most one buffer.
 const READS_MAX: usize = 8;
 
-/// Reads everything that an owner publishes. The particles are not copied.
+/// Reads everything that an owner publishes, as a sequence of coherent states. The particles are not
+/// copied.
 #[derive(Debug)]
 pub struct Tap {
     listener: WakeListener,
@@ -45,16 +46,17 @@ pub struct Tap {
     /// The snapshot of the newest state.
     held: Option<SliceSample<ParticleState, SnapshotHeader>>,
     errors: Vec<ReadError>,
-    // Services and node go last.
+    // Dropped last: the ports belong to its services and its node.
     attachment: Attachment,
 }
 
 impl Tap {
-    /// Attaches to a running simulation. It subscribes to the outcomes first and to the particles
-    /// last, so that nothing which a snapshot builds on is missed.
+    /// Attaches to a running simulation. Subscribes to the outcomes first and to the particles last, so
+    /// that it misses no message that belongs to a snapshot.
     ///
     /// # Errors
-    /// No simulation runs there, one of another version of the contract, or no place is left.
+    /// No simulation runs there, it has another version of the contract, or a service has no place for
+    /// another reader.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
         let attachment = Attachment::open(Session::join(endpoint)?)?;
         Ok(Self::subscribe(attachment)?)
@@ -82,25 +84,26 @@ impl Tap {
         })
     }
 
-    /// Returns the oldest state that was not read, with everything that belongs to it; `None` if all
-    /// were read. A reader more than [`crate::SNAPSHOTS_BUFFERED`] states behind misses some.
+    /// Returns the oldest unread state with everything that belongs to it; `None` if all were read. A
+    /// reader more than [`crate::SNAPSHOTS_BUFFERED`] states behind misses some.
     ///
-    /// `on_message` receives every other message as it arrives, before its state if that has not
-    /// been published: outcomes and statuses of a paused node, for example.
+    /// `on_message` receives every other message as it arrives. A message can arrive before its state
+    /// is published, such as an outcome of a paused node.
     pub fn next_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
         let arrived = self.particles.next();
         self.assemble(arrived, on_message)
     }
 
-    /// Returns the newest state and skips those before it; `None` if all were read. The changes are
-    /// those since the last state that was returned. `on_message` as in [`Tap::next_state`].
+    /// Returns the newest unread state and skips those before it; `None` if all were read. Its changes
+    /// are all changes since the last returned state. `on_message` is the same as in
+    /// [`Tap::next_state`].
     pub fn latest_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
         let arrived = self.particles.newest();
         self.assemble(arrived, on_message)
     }
 
-    /// An owner publishes the particles of a step last. So once a snapshot is there, the messages
-    /// that belong to it can be read.
+    /// Reads the messages up to a snapshot and assembles its state. An owner publishes the particles of
+    /// a step last, so the messages that belong to a snapshot have arrived before it.
     fn assemble(
         &mut self,
         arrived: Result<Option<SliceSample<ParticleState, SnapshotHeader>>, ReadError>,
@@ -129,24 +132,23 @@ impl Tap {
         self.assembler.assemble(sample.user_header(), sample.payload())
     }
 
-    /// Changes that have arrived and belong to no state yet, such as those of a paused node. They
-    /// are not returned again.
+    /// Removes and returns the changes that belong to no state yet, such as those of a paused node.
     pub fn drain_pending_changes(&mut self) -> Vec<Change> {
-        self.assembler.take_waiting()
+        self.assembler.drain_pending()
     }
 
-    /// Errors of messages that were dropped since the last call.
+    /// Removes and returns the errors of messages that could not be read.
     pub fn drain_errors(&mut self) -> Vec<ReadError> {
         std::mem::take(&mut self.errors)
     }
 
-    /// Number of changes that were dropped because their state did not arrive.
+    /// Returns the number of changes that were dropped because their state did not arrive.
     pub fn lost_change_count(&self) -> u64 {
         self.assembler.lost_count()
     }
 
-    /// Shows the snapshots that have come to `sink`, oldest first, at most
-    /// [`crate::SNAPSHOTS_BUFFERED`]. A malformed one is dropped, and named in the result.
+    /// Passes at most [`crate::SNAPSHOTS_BUFFERED`] unread snapshots to `sink`, oldest first. Drops
+    /// malformed snapshots and returns their errors.
     pub fn drain_particles(
         &mut self,
         sink: impl FnMut(&SnapshotHeader, &[ParticleState]),
@@ -156,43 +158,33 @@ impl Tap {
         drained
     }
 
-    /// The newest snapshot that has come, if any has since the last call; those before it are
-    /// skipped. For those who cannot use every one; beside [`Tap::drain_particles`], each snapshot
-    /// goes to the one that is called first.
-    ///
-    /// # Errors
-    /// More than [`crate::BORROWED_SAMPLES_MAX`] snapshots are held, or a malformed one came.
-    pub fn latest_snapshot(&mut self) -> Result<Option<Snapshot>, ReadError> {
-        Ok(self.particles.newest()?.map(Snapshot))
-    }
-
-    /// Shows everything else that has come to `sink`, each kind oldest first and at most one buffer
-    /// of it. Malformed messages are dropped, and named in the result.
+    /// Passes the unread messages of all other services to `sink`: at most one buffer of each service,
+    /// oldest first. Drops malformed messages and returns their errors.
     pub fn drain_updates(&mut self, mut sink: impl FnMut(Update<'_>)) -> Drained {
         let mut drained = Drained::default();
-        let all = &mut drained;
-        self.scene.drain(all, |header, bytes| sink(Update::Scene(header, bytes)));
-        self.topology.drain(all, |header, items| sink(Update::Topology(header, items)));
-        self.surface.drain(all, |header, items| sink(Update::Surface(header, items)));
-        self.colliders.drain(all, |header, items| sink(Update::Colliders(header, items)));
-        self.tears.drain(all, |header, items| sink(Update::Tears(header, items)));
-        self.parameters.drain(all, |header, states| {
+        let result = &mut drained;
+        self.scene.drain(result, |header, bytes| sink(Update::Scene(header, bytes)));
+        self.topology.drain(result, |header, items| sink(Update::Topology(header, items)));
+        self.surface.drain(result, |header, items| sink(Update::Surface(header, items)));
+        self.colliders.drain(result, |header, items| sink(Update::Colliders(header, items)));
+        self.tears.drain(result, |header, items| sink(Update::Tears(header, items)));
+        self.parameters.drain(result, |header, states| {
             sink(Update::Parameters(header, &to_values(states)));
         });
-        self.keyframe.drain(all, |header, bytes| sink(Update::Keyframe(header, bytes)));
-        self.outcomes.drain(all, |outcome| sink(Update::Outcome(outcome)));
-        self.status.drain(all, |status| sink(Update::Status(status)));
+        self.keyframe.drain(result, |header, bytes| sink(Update::Keyframe(header, bytes)));
+        self.outcomes.drain(result, |outcome| sink(Update::Outcome(outcome)));
+        self.status.drain(result, |status| sink(Update::Status(status)));
         drained
     }
 
-    /// Waits until the owner wakes its readers, a signal comes, or `timeout` has passed. What
-    /// happened since the last wait ends it at once.
+    /// Waits until the owner wakes its readers, a signal arrives, or `timeout` has passed. An event since
+    /// the last wait ends it at once.
     pub fn wait(&self, timeout: Duration) {
         self.listener.wait(timeout);
     }
 
-    /// Whether the process that owns the name is alive. Looks into the file system: meant for a
-    /// few calls per second.
+    /// Returns `true` if the process that owns the name is alive. Reads the file system: call it a few
+    /// times per second at most.
     pub fn is_owner_alive(&self) -> bool {
         self.attachment.owner().is_some()
     }

@@ -1,4 +1,4 @@
-//! What a client reads.
+//! The data that a client reads.
 
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::parameters::ParametersHeader;
@@ -13,12 +13,12 @@ use sim_types::ParameterValues;
 pub struct Snapshot(pub(crate) SliceSample<ParticleState, SnapshotHeader>);
 
 impl Snapshot {
-    /// When and of what it is.
+    /// Returns the header.
     pub fn header(&self) -> &SnapshotHeader {
         self.0.user_header()
     }
 
-    /// The particles, `header().particle_count` of them, by index.
+    /// Returns the `header().particle_count` particles, by index.
     pub fn particles(&self) -> &[ParticleState] {
         self.0.payload()
     }
@@ -27,44 +27,45 @@ impl Snapshot {
 /// The constraints of a load.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Topology {
-    /// Which load it is.
+    /// Header of the load.
     pub header: LoadHeader,
-    /// The constraints, `header.count` of them, by index.
+    /// The `header.count` constraints, by index.
     pub constraints: Vec<ConstraintState>,
 }
 
 /// The triangles of a load.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    /// Which load it is.
+    /// Header of the load.
     pub header: LoadHeader,
-    /// The triangles, `header.count` of them; none if the scene has no surface.
+    /// The `header.count` triangles; empty if the scene has no surface.
     pub triangles: Vec<Triangle>,
 }
 
 /// The constraints torn since the load or the last reset. Empty if nothing tore.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Torn {
-    /// Step of the newest tear, and number of tears in it.
+    /// Header of the list: the step of the newest tear, and the number of tears in that step.
     pub header: TearsHeader,
-    /// The constraints, `header.count` of them, in the order of tearing.
+    /// The `header.count` constraints, in the order of tearing.
     pub constraints: Vec<TornConstraint>,
 }
 
 /// The values of all parameters.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Parameters {
-    /// First step that the values apply to.
+    /// Header of the values: the first step that they apply to.
     pub header: ParametersHeader,
     /// The values.
     pub values: ParameterValues,
 }
 
-/// The colliders at the end of a step. Empty where the scene has none.
+/// The colliders at the end of a step. Empty if the scene has none.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Colliders {
-    /// The step at whose end they stood so: they have not changed since, if it is an older one.
+    /// Header of the list: the step at whose end the colliders had these poses. They have not changed
+    /// since.
     pub header: CollidersHeader,
-    /// The colliders, `header.count` of them, by index.
+    /// The `header.count` colliders, by index.
     pub colliders: Vec<ColliderState>,
 }

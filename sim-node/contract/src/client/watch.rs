@@ -5,27 +5,27 @@ use std::time::Duration;
 use iceoryx2::port::listener::ListenerCreateError;
 
 use crate::clock::Deadline;
-use crate::ports::port::{Places, create_port};
+use crate::ports::port::{PortLimit, create_port};
 use crate::ports::reader::ReadError;
 use crate::ports::service::{ServiceError, WAKE};
 use crate::ports::services::Attachment;
 use crate::ports::session::Events;
-use crate::ports::wake::{Heard, WakeListener};
+use crate::ports::wake::{WakeCause, WakeListener};
 
-/// How long to believe in an owner that says nothing. A killed one cannot say that it has gone.
+/// Longest silence before checking that the owner is alive. A killed owner sends no event.
 const SILENCE_MAX: Duration = Duration::from_millis(500);
 
-/// The waiting of one reader. It takes a place at the wake service with the first wait.
+/// Waits for messages. Connects to the wake service with the first wait.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     listener: Option<WakeListener>,
-    /// An owner has gone, and no sign of a new one has come since.
+    /// The owner is gone, and no message of a new owner has arrived since.
     is_abandoned: bool,
 }
 
 impl Watch {
-    /// Polls until there is something, at most for `timeout`. Nothing comes of it earlier if the
-    /// owner goes meanwhile; a later call then waits for a new owner.
+    /// Polls until there is a message, at most for `timeout`. Returns `None` early if the owner goes
+    /// meanwhile; a later call then waits for a new owner.
     pub(crate) fn wait_for<T>(
         &mut self,
         attachment: &Attachment,
@@ -35,23 +35,23 @@ impl Watch {
         let deadline = Deadline::after(timeout);
         let mut silence = Deadline::after(SILENCE_MAX);
         loop {
-            if let Some(found) = poll()? {
+            if let Some(message) = poll()? {
                 self.is_abandoned = false;
-                return Ok(Some(found));
+                return Ok(Some(message));
             }
             let remaining = deadline.remaining();
             if remaining.is_zero() {
                 return Ok(None);
             }
             let Some(listener) = &self.listener else {
-                // What happened before the first listening has woken nobody: poll again.
+                // Events before this connection are lost: poll again.
                 self.listener = Some(listen(&attachment.services.wake)?);
                 continue;
             };
             match listener.wait(remaining.min(SILENCE_MAX)) {
-                Heard::Owner => silence = Deadline::after(SILENCE_MAX),
-                Heard::Nothing if !silence.remaining().is_zero() => {}
-                Heard::Nothing | Heard::Farewell => {
+                WakeCause::Event => silence = Deadline::after(SILENCE_MAX),
+                WakeCause::Timeout if !silence.remaining().is_zero() => {}
+                WakeCause::Timeout | WakeCause::OwnerGone => {
                     silence = Deadline::after(SILENCE_MAX);
                     if !self.is_abandoned && attachment.owner().is_none() {
                         let last = poll()?;
@@ -64,10 +64,10 @@ impl Watch {
     }
 }
 
-/// Takes a place at the wake service.
+/// Connects to the wake service.
 pub(crate) fn listen(service: &Events) -> Result<WakeListener, ServiceError> {
     let full = ListenerCreateError::ExceedsMaxSupportedListeners;
-    let places = Places { what: "waiting processes", max: WAKE.readers_max };
-    let listener = create_port(service, &full, places, || service.listener_builder().create())?;
+    let limit = PortLimit { ports: "waiting processes", max: WAKE.readers_max };
+    let listener = create_port(service, &full, limit, || service.listener_builder().create())?;
     Ok(WakeListener::new(listener))
 }

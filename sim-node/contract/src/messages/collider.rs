@@ -1,36 +1,36 @@
-//! What particles collide with, as readers see it.
+//! The messages of the service `colliders`.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// One collider in its pose at the end of a step: 120 bytes, alignment 4. Its place in `colliders`
-/// is its index everywhere. Written on change, and each step while any of them moves; what a shape
-/// does not use is 0. Lengths are in m, relative to the scene's origin, velocities in m/s.
+/// A collider in its pose at the end of a step: 120 bytes, alignment 4. Its position in `colliders`
+/// is its index everywhere. Fields that a shape does not use are 0. Lengths are in m, relative to
+/// the scene's origin; velocities are in m/s.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.ColliderState")]
 pub struct ColliderState {
     /// A [`ColliderShape`](crate::ColliderShape) as a number.
     pub shape: u32,
-    /// Part of the approach speed that is given back, 0..=1.
+    /// Ratio of the rebound speed to the approach speed, 0..=1.
     pub restitution: f32,
     /// Coefficient of friction.
     pub friction: f32,
     /// Radius of a sphere or capsule.
     pub radius: f32,
-    /// Of a plane: free where `normal` · x >= `offset`.
+    /// Offset of a plane: the side where `normal` · x >= `offset` is free.
     pub offset: f32,
-    /// Unit normal of a plane, towards the free side.
+    /// Unit normal of a plane; points to the free side.
     pub normal: [f32; 3],
     /// Centre of a box or sphere.
     pub center: [f32; 3],
-    /// Half the edges of a box, along its own axes.
+    /// Half the edge lengths of a box, along its own axes.
     pub half_extents: [f32; 3],
     /// Rotation of a box, as the quaternion x, y, z, w.
     pub rotation: [f32; 4],
-    /// One end of a capsule's axis; the least corner of bounds.
+    /// First end of a capsule's axis; the lowest corner of bounds.
     pub a: [f32; 3],
-    /// The other end of a capsule's axis; the greatest corner of bounds.
+    /// Second end of a capsule's axis; the highest corner of bounds.
     pub b: [f32; 3],
     /// Velocity of the collider.
     pub velocity: [f32; 3],
@@ -40,14 +40,15 @@ pub struct ColliderState {
 
 const _: () = assert!(size_of::<ColliderState>() == 120 && align_of::<ColliderState>() == 4);
 
-/// The header of `colliders`: 24 bytes, alignment 8.
+/// Header of `colliders`: 24 bytes, alignment 8. Written per load, on a change, and each step while
+/// a collider moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.CollidersHeader")]
 pub struct CollidersHeader {
-    /// As in [`crate::SnapshotHeader`].
+    /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// The step at whose end they stood so.
+    /// Step at whose end the colliders had these poses.
     pub step: u64,
     /// Length of the payload.
     pub count: u32,

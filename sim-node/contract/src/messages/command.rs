@@ -1,19 +1,21 @@
-//! [`Action`] on the wire.
+//! The messages of the service `commands`: [`Action`]s in a fixed layout.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use sim_types::{Action, KindFilter, ParameterValue, Text};
 
-/// Client that every `sim-node ctl` sends as: what one call grabs, a later call releases.
+/// Client id of every `sim-node ctl`, so that one call can release a particle that
+/// another call grabbed.
 pub const CONSOLE_CLIENT_ID: u64 = 0;
 
-/// A command on the wire: 256 bytes, alignment 8. Written by clients, read by the owner of the
-/// name; also the last part of an [`crate::Outcome`].
+/// A command: 256 bytes, alignment 8. Written by clients, read by the owner of the name; also part
+/// of an [`crate::Outcome`].
 ///
-/// What a kind does not use is 0. Lengths are in m and relative to the scene's origin, times in s.
+/// Fields that a kind does not use are 0. Lengths are in m, relative to the scene's origin; times
+/// are in s.
 ///
-/// | kind | `index` | `vectors` | others |
+/// | kind | `index` | `vectors` | other fields |
 /// |---|---|---|---|
 /// | 1 pin, 2 unpin, 5 release | particle | | |
 /// | 3 grab, 4 move | particle | target | `number` over_s |
@@ -31,27 +33,28 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 #[repr(C)]
 #[type_name("catenary.Command")]
 pub struct Command {
-    /// Which action it is, by the numbers above.
+    /// Number of the action in the table above.
     pub kind: u32,
-    /// The particle, constraint, anchor or collider.
+    /// Index of the particle, constraint, anchor or collider.
     pub index: u32,
-    /// Random number of the sender, below 2^53 (exact in JSON); 0 is the console.
+    /// Random number of the sender, below 2^53 (exact in JSON); [`CONSOLE_CLIENT_ID`] is the console.
     pub client_id: u64,
-    /// Number of the command within its client, ascending, below 2^53.
+    /// Number of the command among those of its client, ascending, below 2^53.
     pub sequence: u64,
     /// Points, offsets and directions, in the order of the table.
     pub vectors: [[f32; 3]; 3],
     /// Quaternion x, y, z, w.
     pub rotation: [f32; 4],
-    /// Seconds of grab and move, radius of push and `cut_radius`, value of set.
+    /// Time of grab and move in seconds, radius of push and `cut_radius`, value of set.
     pub number: f32,
     /// Limit of push, if [`CommandOptions::LIMIT`] is set.
     pub limit: f32,
-    /// Steps of step; [`crate::ConstraintKind`] of set, if [`CommandOptions::CONSTRAINT_KIND`] is.
+    /// Number of steps of step; [`crate::ConstraintKind`] of set, if
+    /// [`CommandOptions::CONSTRAINT_KIND`] is set.
     pub count: u32,
     /// [`CommandOptions`] bits.
     pub options: u32,
-    /// UTF-8, zeros behind it.
+    /// UTF-8 text, padded with zeros.
     pub text: [u8; Text::SIZE_BYTES_MAX],
     /// Always 0.
     pub spare: u32,
@@ -65,7 +68,7 @@ impl Default for Command {
     }
 }
 
-/// The bits of [`Command::options`]; all others are 0. A set has exactly one bit for its value.
+/// The bits of [`Command::options`]; all others are 0. A set has exactly one of the value bits.
 #[derive(Debug)]
 pub struct CommandOptions;
 
@@ -78,7 +81,7 @@ impl CommandOptions {
     pub const VALUE_VECTOR: u32 = 1 << 2;
     /// A set switches its parameter off.
     pub const VALUE_OFF: u32 = 1 << 3;
-    /// A set is for one kind of constraints.
+    /// A set addresses the constraints of one kind.
     pub const CONSTRAINT_KIND: u32 = 1 << 4;
 
     const VALUE_ANY: u32 = Self::VALUE_NUMBER | Self::VALUE_VECTOR | Self::VALUE_OFF;
@@ -107,70 +110,74 @@ mod kind {
 const ZERO: [f32; 3] = [0.0; 3];
 
 impl Command {
-    /// Puts an action on the wire. `client_id` and `sequence` as in the fields of that name.
+    /// Encodes an action as the command `sequence` of the client `client_id`.
     pub fn new(client_id: u64, sequence: u64, action: Action) -> Self {
-        Self { client_id, sequence, ..Self::unsent(action) }
+        Self { client_id, sequence, ..Self::from_action(action) }
     }
 
-    /// The action, without a sender.
-    fn unsent(action: Action) -> Self {
+    /// Encodes an action; the sender is 0.
+    fn from_action(action: Action) -> Self {
         match action {
-            Action::Pin { particle } => Self::of(kind::PIN, particle),
-            Action::Unpin { particle } => Self::of(kind::UNPIN, particle),
+            Action::Pin { particle } => Self::with_kind(kind::PIN, particle),
+            Action::Unpin { particle } => Self::with_kind(kind::UNPIN, particle),
             Action::Grab { particle, target, over_s } => {
-                Self::of(kind::GRAB, particle).at(target, over_s)
+                Self::with_kind(kind::GRAB, particle).with_vector(target, over_s)
             }
             Action::Move { particle, target, over_s } => {
-                Self::of(kind::MOVE, particle).at(target, over_s)
+                Self::with_kind(kind::MOVE, particle).with_vector(target, over_s)
             }
-            Action::Release { particle } => Self::of(kind::RELEASE, particle),
-            Action::Pause => Self::of(kind::PAUSE, 0),
-            Action::Resume => Self::of(kind::RESUME, 0),
-            Action::Step { count } => Self { count, ..Self::of(kind::STEP, 0) },
-            Action::Reset => Self::of(kind::RESET, 0),
+            Action::Release { particle } => Self::with_kind(kind::RELEASE, particle),
+            Action::Pause => Self::with_kind(kind::PAUSE, 0),
+            Action::Resume => Self::with_kind(kind::RESUME, 0),
+            Action::Step { count } => Self { count, ..Self::with_kind(kind::STEP, 0) },
+            Action::Reset => Self::with_kind(kind::RESET, 0),
             Action::Push { center, radius, delta, limit } => Self {
                 vectors: [center, delta, ZERO],
                 limit: limit.unwrap_or_default(),
                 options: if limit.is_some() { CommandOptions::LIMIT } else { 0 },
-                ..Self::of(kind::PUSH, 0).at(center, radius)
+                ..Self::with_kind(kind::PUSH, 0).with_vector(center, radius)
             },
-            Action::Cut { constraint } => Self::of(kind::CUT, constraint),
+            Action::Cut { constraint } => Self::with_kind(kind::CUT, constraint),
             Action::CutRadius { center, radius } => {
-                Self::of(kind::CUT_RADIUS, 0).at(center, radius)
+                Self::with_kind(kind::CUT_RADIUS, 0).with_vector(center, radius)
             }
             Action::CutSegment { from, to, direction } => {
-                Self { vectors: [from, to, direction], ..Self::of(kind::CUT_SEGMENT, 0) }
+                Self { vectors: [from, to, direction], ..Self::with_kind(kind::CUT_SEGMENT, 0) }
             }
-            Action::MoveAnchor { anchor, translation, rotation } => {
-                Self { rotation, ..Self::of(kind::MOVE_ANCHOR, anchor).at(translation, 0.0) }
-            }
-            Action::MoveCollider { collider, translation, rotation } => {
-                Self { rotation, ..Self::of(kind::MOVE_COLLIDER, collider).at(translation, 0.0) }
-            }
+            Action::MoveAnchor { anchor, translation, rotation } => Self {
+                rotation,
+                ..Self::with_kind(kind::MOVE_ANCHOR, anchor).with_vector(translation, 0.0)
+            },
+            Action::MoveCollider { collider, translation, rotation } => Self {
+                rotation,
+                ..Self::with_kind(kind::MOVE_COLLIDER, collider).with_vector(translation, 0.0)
+            },
             Action::Set { parameter, value, constraint_kind } => {
-                Self { text: parameter.to_wire(), ..Self::setting(value, constraint_kind) }
+                Self { text: parameter.to_wire(), ..Self::from_value(value, constraint_kind) }
             }
-            Action::Load { scene } => Self { text: scene.to_wire(), ..Self::of(kind::LOAD, 0) },
-            Action::Unknown { number } => Self::of(number, 0),
+            Action::Load { scene } => {
+                Self { text: scene.to_wire(), ..Self::with_kind(kind::LOAD, 0) }
+            }
+            Action::Unknown { number } => Self::with_kind(number, 0),
         }
     }
 
-    fn of(kind: u32, index: u32) -> Self {
+    fn with_kind(kind: u32, index: u32) -> Self {
         Self { kind, index, ..Self::zeroed() }
     }
 
-    fn at(self, point: [f32; 3], number: f32) -> Self {
-        Self { vectors: [point, ZERO, ZERO], number, ..self }
+    fn with_vector(self, vector: [f32; 3], number: f32) -> Self {
+        Self { vectors: [vector, ZERO, ZERO], number, ..self }
     }
 
-    fn setting(value: ParameterValue, constraint_kind: Option<KindFilter>) -> Self {
-        let empty = Self::of(kind::SET, 0);
+    fn from_value(value: ParameterValue, constraint_kind: Option<KindFilter>) -> Self {
+        let empty = Self::with_kind(kind::SET, 0);
         let mut command = match value {
             ParameterValue::Number(number) => {
                 Self { number, options: CommandOptions::VALUE_NUMBER, ..empty }
             }
             ParameterValue::Vector(vector) => {
-                Self { options: CommandOptions::VALUE_VECTOR, ..empty.at(vector, 0.0) }
+                Self { options: CommandOptions::VALUE_VECTOR, ..empty.with_vector(vector, 0.0) }
             }
             ParameterValue::Off => Self { options: CommandOptions::VALUE_OFF, ..empty },
         };
@@ -181,9 +188,9 @@ impl Command {
         command
     }
 
-    /// Reads the action; a kind that this version does not know, and a set without a value, is
-    /// [`Action::Unknown`]. Nothing else is checked here: the solver refuses wrong values with a
-    /// reason.
+    /// Decodes the action. A kind that this version does not know, or a set without exactly one value,
+    /// becomes [`Action::Unknown`]. Nothing else is checked here: the solver rejects wrong values
+    /// with a reason.
     pub fn action(&self) -> Action {
         let Self { index, number, rotation, count, .. } = *self;
         let [first, second, third] = self.vectors;
@@ -210,8 +217,8 @@ impl Command {
             kind::MOVE_COLLIDER => {
                 Action::MoveCollider { collider: index, translation: first, rotation }
             }
-            kind::SET => match self.value() {
-                Some(value) => self.set(value),
+            kind::SET => match self.set_value() {
+                Some(value) => self.set_action(value),
                 None => Action::Unknown { number: kind::SET },
             },
             kind::LOAD => Action::Load { scene: Text::from_wire(&self.text) },
@@ -223,16 +230,16 @@ impl Command {
         self.options & option != 0
     }
 
-    fn set(&self, value: ParameterValue) -> Action {
-        let is_for_one_kind = self.has(CommandOptions::CONSTRAINT_KIND);
+    fn set_action(&self, value: ParameterValue) -> Action {
+        let has_kind = self.has(CommandOptions::CONSTRAINT_KIND);
         Action::Set {
             parameter: Text::from_wire(&self.text),
             value,
-            constraint_kind: is_for_one_kind.then(|| KindFilter::from_number(self.count)),
+            constraint_kind: has_kind.then(|| KindFilter::from_number(self.count)),
         }
     }
 
-    fn value(&self) -> Option<ParameterValue> {
+    fn set_value(&self) -> Option<ParameterValue> {
         match self.options & CommandOptions::VALUE_ANY {
             CommandOptions::VALUE_NUMBER => Some(ParameterValue::Number(self.number)),
             CommandOptions::VALUE_VECTOR => Some(ParameterValue::Vector(self.vectors[0])),
@@ -256,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_have_their_numbers_in_the_order_of_the_actions() {
+    fn kinds_are_numbered_in_the_order_of_the_actions() {
         let mut numbers: Vec<_> =
             Action::samples().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
         numbers.dedup();
@@ -265,18 +272,18 @@ mod tests {
     }
 
     #[test]
-    fn a_set_with_no_value_or_with_two_is_unknown() {
+    fn a_set_without_a_value_or_with_two_values_is_unknown() {
         let value = ParameterValue::Number(1.0);
         let action = Action::Set { parameter: Text::cut("damping"), value, constraint_kind: None };
-        let good = Command::new(0, 0, action);
+        let valid = Command::new(0, 0, action);
         for options in [0, CommandOptions::VALUE_NUMBER | CommandOptions::VALUE_OFF] {
-            let command = Command { options, ..good };
+            let command = Command { options, ..valid };
             assert_eq!(command.action(), Action::Unknown { number: kind::SET });
         }
     }
 
     #[test]
-    fn a_kind_of_constraints_from_another_version_is_unknown() {
+    fn a_constraint_kind_of_another_version_is_unknown() {
         let value = ParameterValue::Number(1.0);
         let constraint_kind = Some(KindFilter::Unknown);
         let action = Action::Set { parameter: Text::cut("compliance"), value, constraint_kind };
@@ -285,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_is_no_utf8_is_read_as_far_as_it_is() {
+    fn text_ends_at_the_first_byte_that_is_not_utf8() {
         let mut command = Command::new(0, 0, Action::Load { scene: Text::cut("curtain") });
         command.text[3] = 0x80;
         assert_eq!(command.action(), Action::Load { scene: Text::cut("cur") });

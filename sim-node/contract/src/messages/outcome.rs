@@ -1,4 +1,4 @@
-//! What became of a command: acknowledgement and replay log in one.
+//! The messages of the service `outcomes`: acknowledgement and replay log in one.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
@@ -6,17 +6,17 @@ use iceoryx2::prelude::ZeroCopySend;
 use crate::messages::command::Command;
 use sim_types::Reason;
 
-/// Outcome of a command: 296 bytes, alignment 8. Written by the owner of the name for every
-/// command that it takes, in the order of application, which a re-simulation follows.
+/// Outcome of a command: 296 bytes, alignment 8. The owner of the name writes one for every command
+/// that it receives, in the order of application. Re-simulation follows that order.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Outcome")]
 pub struct Outcome {
     /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// Place in the run's log, from 0, without gaps.
+    /// Position in the run's log, from 0, without gaps.
     pub index: u64,
-    /// The first step that shows the effect.
+    /// First step that shows the effect.
     pub step: u64,
     /// An [`OutcomeStatus`] as a number.
     pub status: u32,
@@ -32,23 +32,24 @@ pub struct Outcome {
 
 const _: () = assert!(size_of::<Outcome>() == 296 && align_of::<Outcome>() == 8);
 
-/// Bit of [`Outcome::flags`]: answers a command to a replay (pause, step, ...); it is not part of
-/// the replayed run's log, and its index is the number of outcomes replayed so far.
+/// Bit of [`Outcome::flags`]: the outcome answers a command that controls a replay (pause, step,
+/// ...). It is not part of the replayed run's log; its index is the number of outcomes replayed so
+/// far.
 pub const OUTCOME_FLAG_CONTROL: u32 = 1;
 
-/// Whether a command took effect.
+/// Effect of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum OutcomeStatus {
-    /// It did, in the step that the outcome names.
+    /// It took effect, in the step that the outcome names.
     Applied = 0,
-    /// It did not, and changed no bit of the state.
+    /// It changed no bit of the state.
     Rejected = 1,
 }
 
 impl Outcome {
-    /// Outcome of `command`, of no run yet: `Ok` is applied, `Err` rejected. `index` and `step` as in
-    /// the fields of that name.
+    /// Creates the outcome of a command: `Ok` is applied, `Err` rejected. `run_id` is 0; the owner
+    /// sets it.
     pub fn new(index: u64, step: u64, command: Command, result: Result<(), Reason>) -> Self {
         let (status, reason) = match result {
             Ok(()) => (OutcomeStatus::Applied, 0),
@@ -57,13 +58,13 @@ impl Outcome {
         Self { index, step, status: status as u32, reason, command, ..Self::default() }
     }
 
-    /// Whether the command took effect.
+    /// Returns `true` if the command took effect.
     pub fn is_applied(&self) -> bool {
         self.status == OutcomeStatus::Applied as u32
     }
 
-    /// Why it was rejected, as a word; "" if it was applied, "unknown" for a number of another
-    /// version.
+    /// Name of the [`Reason`]: "" if the command was applied, "unknown" for a number that this version
+    /// does not know.
     pub fn reason_name(&self) -> &'static str {
         match Reason::from_number(self.reason) {
             Some(reason) => reason.name(),

@@ -21,19 +21,19 @@ pub struct ParametersHeader {
 
 const _: () = assert!(size_of::<ParametersHeader>() == 24 && align_of::<ParametersHeader>() == 8);
 
-/// The value of one parameter: 24 bytes, alignment 4; an element of `parameters`. Parameters that
-/// have a value for each kind of constraint have one element for each.
+/// The value of one parameter: 24 bytes, alignment 4; an element of `parameters`. A parameter with a
+/// value for each kind of constraint has one element for each kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.ParameterState")]
 pub struct ParameterState {
     /// A [`Parameter`] as a number.
     pub parameter: u32,
-    /// A [`ConstraintKind`] as a number, for a parameter that has a value for each kind; else 0.
+    /// A [`ConstraintKind`] as a number, for a parameter with a value for each kind; else 0.
     pub constraint_kind: u32,
-    /// Form of the value: 0 off, 1 a number, 2 three numbers.
+    /// Form of the value: 0 is off, 1 a number, 2 three numbers.
     pub form: u32,
-    /// The number, or the three numbers; the rest is 0.
+    /// The number, or the three numbers. Unused components are 0.
     pub value: [f32; 3],
 }
 
@@ -56,7 +56,7 @@ impl From<Setting> for ParameterState {
 }
 
 impl ParameterState {
-    /// The parameter and its value; `None` for a parameter, kind or form of another version.
+    /// Returns the parameter and its value; `None` for a parameter, kind or form of another version.
     pub fn setting(&self) -> Option<Setting> {
         let parameter = Parameter::from_number(self.parameter)?;
         let constraint_kind = if parameter.info().is_per_kind {
@@ -74,7 +74,7 @@ impl ParameterState {
     }
 }
 
-/// Collects the values of a message. Parameters that it lacks have their defaults.
+/// Collects the values of a message. Parameters that the message lacks have their defaults.
 pub(crate) fn to_values(states: &[ParameterState]) -> ParameterValues {
     let mut values = ParameterValues::default();
     for setting in states.iter().filter_map(ParameterState::setting) {
@@ -105,15 +105,15 @@ mod tests {
 
     #[test]
     fn an_element_of_another_version_is_skipped() {
-        let good =
+        let valid =
             ParameterState { parameter: Parameter::Damping as u32, form: 1, ..Default::default() };
-        for wrong in [
-            ParameterState { parameter: 99, ..good },
-            ParameterState { form: 3, ..good },
-            ParameterState { parameter: Parameter::Stiffness as u32, constraint_kind: 4, ..good },
+        for unknown in [
+            ParameterState { parameter: 99, ..valid },
+            ParameterState { form: 3, ..valid },
+            ParameterState { parameter: Parameter::Stiffness as u32, constraint_kind: 4, ..valid },
         ] {
-            assert_eq!(wrong.setting(), None);
-            assert_eq!(to_values(&[wrong]), ParameterValues::default());
+            assert_eq!(unknown.setting(), None);
+            assert_eq!(to_values(&[unknown]), ParameterValues::default());
         }
     }
 }

@@ -5,7 +5,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use sim_types::TearCause;
 
 /// Header of `tears`: 32 bytes, alignment 8. The payload lists every constraint torn since the load
-/// or the last reset, in the order of tearing. A list repeats the ones before it, so a reader that
+/// or the last reset, in the order of tearing. A list repeats the lists before it, so a reader that
 /// misses a message loses nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -13,7 +13,7 @@ use sim_types::TearCause;
 pub struct TearsHeader {
     /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// Step that the list belongs to: the newest tear, or the load or reset that emptied it.
+    /// Step of the newest tear, or of the load or reset that emptied the list.
     pub step: u64,
     /// Step of the load or reset that the list begins after. Lists with the same `since_step`
     /// continue each other.
@@ -41,12 +41,12 @@ pub struct TornConstraint {
 const _: () = assert!(size_of::<TornConstraint>() == 8 && align_of::<TornConstraint>() == 4);
 
 impl TornConstraint {
-    /// A constraint that tore for a cause, or for an unknown one.
+    /// Creates an element for a constraint and the cause of its tear; `None` is an unknown cause.
     pub fn new(constraint: u32, cause: Option<TearCause>) -> Self {
         Self { constraint, cause: cause.map_or(u32::MAX, |cause| cause as u32) }
     }
 
-    /// Cause of the tear, if it is known.
+    /// Returns the cause of the tear, if it is known.
     pub fn cause(&self) -> Option<TearCause> {
         TearCause::from_number(self.cause)
     }

@@ -1,10 +1,10 @@
-//! What a node publishes once per load, and as keyframes.
+//! The messages of the services `topology`, `surface`, `scene` and `keyframe`.
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// One constraint: 20 bytes, alignment 4. Its place in `topology` is its index everywhere.
-/// Does not change from load to load; what is torn comes by the tears service.
+/// A constraint: 20 bytes, alignment 4. Its position in `topology` is its index everywhere. It does
+/// not change until the next load; the service `tears` lists the torn constraints.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.ConstraintState")]
@@ -23,33 +23,33 @@ pub struct ConstraintState {
 
 const _: () = assert!(size_of::<ConstraintState>() == 20 && align_of::<ConstraintState>() == 4);
 
-/// Three particle indices of one triangle of the surface: 12 bytes, alignment 4.
+/// A triangle of the surface: 12 bytes, alignment 4; an element of `surface`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Triangle")]
 pub struct Triangle {
-    /// The corners, counter-clockwise seen from the front.
+    /// Particle indices of the corners, counter-clockwise as seen from the front.
     pub corners: [u32; 3],
 }
 
 const _: () = assert!(size_of::<Triangle>() == 12 && align_of::<Triangle>() == 4);
 
-/// The header of `topology`, `surface` and `scene`: 64 bytes, alignment 8.
+/// Header of `topology`, `surface` and `scene`: 64 bytes, alignment 8. Written once per load.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.LoadHeader")]
 pub struct LoadHeader {
-    /// As in [`crate::SnapshotHeader`].
+    /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// The first step that shows this load.
+    /// First step that shows this load.
     pub step: u64,
-    /// What positions are relative to, in the scene's unit.
+    /// Origin of all positions, in the scene's unit (m).
     pub origin: [f64; 3],
-    /// As in [`crate::SnapshotHeader`].
+    /// Same as in [`crate::SnapshotHeader`].
     pub topology_revision: u32,
-    /// Elements of the payload: constraints, triangles or bytes.
+    /// Length of the payload in constraints, triangles or bytes.
     pub count: u32,
-    /// Particles of the scene.
+    /// Number of particles in the scene.
     pub particle_count: u32,
     /// Steps per second.
     pub rate_hz: u32,
@@ -61,14 +61,14 @@ pub struct LoadHeader {
 
 const _: () = assert!(size_of::<LoadHeader>() == 64 && align_of::<LoadHeader>() == 8);
 
-/// The header of `keyframe`: 24 bytes, alignment 8.
+/// Header of `keyframe`: 24 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.KeyframeHeader")]
 pub struct KeyframeHeader {
-    /// As in [`crate::SnapshotHeader`].
+    /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// The published snapshot that this completes.
+    /// Step of the published snapshot that the keyframe completes.
     pub step: u64,
     /// Length of the payload in bytes.
     pub size_bytes: u64,

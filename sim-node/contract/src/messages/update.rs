@@ -1,4 +1,4 @@
-//! A message of any service but `particles`, in shared memory.
+//! The messages of all services except `particles`.
 
 use sim_types::ParameterValues;
 
@@ -9,25 +9,25 @@ use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 
-/// A message that is not a snapshot, in shared memory.
+/// A message of any service except `particles`, in shared memory.
 #[derive(Debug, Clone, Copy)]
 pub enum Update<'a> {
     /// The scene of a load, as TOML.
     Scene(&'a LoadHeader, &'a [u8]),
     /// The constraints of a load.
     Topology(&'a LoadHeader, &'a [ConstraintState]),
-    /// The triangles of a load; may be none.
+    /// The triangles of a load; may be empty.
     Surface(&'a LoadHeader, &'a [Triangle]),
-    /// All colliders in their poses at the end of a step.
+    /// All colliders, in their poses at the end of a step.
     Colliders(&'a CollidersHeader, &'a [ColliderState]),
     /// All constraints torn since the load or the last reset.
     Tears(&'a TearsHeader, &'a [TornConstraint]),
     /// The values of all parameters.
     Parameters(&'a ParametersHeader, &'a ParameterValues),
-    /// What completes a snapshot.
+    /// The keyframe that completes a snapshot.
     Keyframe(&'a KeyframeHeader, &'a [u8]),
-    /// What became of a command.
+    /// The outcome of a command.
     Outcome(&'a Outcome),
-    /// How the node is doing.
+    /// The status of the node.
     Status(&'a NodeStatus),
 }

@@ -6,43 +6,45 @@ use crate::endpoint::Endpoint;
 use crate::ports::service::ServiceError;
 use crate::ports::writer::PublishError;
 
-/// Why a name could not be taken, or a scene not be loaded.
+/// Error of claiming a name or loading a scene.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum OwnerError {
-    /// Another process has the name.
+    /// Another process owns the name.
     #[error(
-        "{endpoint} is already running{by}: stop that one, or choose another --name or --domain",
+        "{endpoint} is already running{by}: stop that process, or choose another --name or --domain",
         by = process_id.map(|id| format!(", as process {id}")).unwrap_or_default()
     )]
     NameTaken {
-        /// Whose.
+        /// Address with this name.
         endpoint: Endpoint,
-        /// The process that has it, where it is known.
+        /// Id of the process that owns the name, if it is known.
         process_id: Option<u32>,
     },
-    /// The snapshots would not fit into shared memory.
+    /// The snapshots do not fit into shared memory.
     #[error(
-        "{particle_count} particles need {needed_mib} MiB of shared memory ({samples} snapshots for one stalled reader), but /dev/shm has {available_mib} MiB left: take a smaller scene, or enlarge it (mount -o remount,size=... /dev/shm; docker run --shm-size ...)"
+        "{particle_count} particles need {needed_mib} MiB of shared memory ({samples} snapshots for one stalled reader), but /dev/shm has only {available_mib} MiB left: choose a smaller scene, or enlarge /dev/shm (mount -o remount,size=... /dev/shm; docker run --shm-size ...)"
     )]
     NotEnoughSharedMemory {
-        /// Particles of the scene.
+        /// Number of particles in the scene.
         particle_count: u32,
-        /// Snapshots that one reader can keep from being overwritten.
+        /// Number of snapshots that one stalled reader keeps from being overwritten.
         samples: usize,
-        /// What they take, rounded up.
+        /// Size of these snapshots in MiB, rounded up.
         needed_mib: u64,
-        /// What is available, rounded down.
+        /// Available memory in MiB, rounded down.
         available_mib: u64,
     },
-    /// The load is beyond a limit of the contract.
-    #[error("the scene has {count} {what}, at most {max} are possible: take a smaller scene")]
+    /// The load exceeds a limit of the contract.
+    #[error(
+        "the scene has {count} {elements}, but at most {max} are possible: choose a smaller scene"
+    )]
     TooLarge {
-        /// What there is too much of.
-        what: &'static str,
-        /// How much.
+        /// Name of the elements, in the plural.
+        elements: &'static str,
+        /// Number of elements.
         count: usize,
-        /// The limit.
+        /// Most elements.
         max: usize,
     },
     /// A service could not be created or connected to.

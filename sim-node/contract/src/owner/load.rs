@@ -1,4 +1,4 @@
-//! What an owner publishes per load, and the writers whose sizes follow from it.
+//! The data that an owner publishes per load, and the writers whose sizes follow from it.
 
 use crate::limits::{
     BORROWED_SAMPLES_MAX, COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, SNAPSHOTS_BUFFERED,
@@ -17,18 +17,18 @@ use crate::ports::writer::PublishError;
 use crate::ports::writer::{Capacity, SliceWriter};
 use sim_types::{ParameterValues, SETTINGS_COUNT};
 
-/// What an owner publishes once per load, and what the sizes of its messages follow from.
+/// A load: the data that an owner publishes once, and the sizes of its later messages.
 #[derive(Debug, Clone, Copy)]
 pub struct Load<'a> {
-    /// The common part of the headers; `count` is filled in for each service.
+    /// Common part of the headers. The owner sets `count` for each service.
     pub header: LoadHeader,
-    /// The effective scene as TOML, at most [`SCENE_SIZE_BYTES_MAX`].
+    /// The effective scene as TOML, at most [`SCENE_SIZE_BYTES_MAX`] bytes.
     pub scene: &'a [u8],
     /// All constraints, by index.
     pub constraints: &'a [ConstraintState],
     /// The surface; may be empty.
     pub triangles: &'a [Triangle],
-    /// How many colliders there are, at most [`COLLIDERS_MAX`].
+    /// Number of colliders, at most [`COLLIDERS_MAX`].
     pub collider_count: usize,
     /// Size of the longest keyframe of this load, in bytes.
     pub keyframe_size_bytes_max: usize,
@@ -36,12 +36,12 @@ pub struct Load<'a> {
     pub parameters: ParameterValues,
 }
 
-/// The writers that a load has for itself.
+/// The writers of a load.
 #[derive(Debug)]
 pub(crate) struct LoadWriters {
     pub(crate) particles: SliceWriter<ParticleState, SnapshotHeader>,
     pub(crate) keyframe: SliceWriter<u8, KeyframeHeader>,
-    // The only message of these three is the load: exactly as long as it, and no memory beside it.
+    // These three publish only the load, so they have memory for one message of exactly its length.
     scene: SliceWriter<u8, LoadHeader>,
     topology: SliceWriter<ConstraintState, LoadHeader>,
     surface: SliceWriter<Triangle, LoadHeader>,
@@ -55,16 +55,17 @@ impl LoadWriters {
         let single = |len_max| Capacity { len_max, samples: 1 };
         let many =
             |spec: &ServiceSpec, len_max| Capacity { len_max, samples: spec.samples_in_use_max() };
-        let (particle_count, links) = (load.header.particle_count as usize, load.constraints.len());
+        let (particle_count, constraint_count) =
+            (load.header.particle_count as usize, load.constraints.len());
         let keyframe = many(&KEYFRAME, load.keyframe_size_bytes_max);
         let colliders = many(&COLLIDERS, load.collider_count);
         Ok(Self {
             particles: SliceWriter::create(&services.particles, many(&PARTICLES, particle_count))?,
             keyframe: SliceWriter::create(&services.keyframe, keyframe)?,
             scene: SliceWriter::create(&services.scene, single(load.scene.len()))?,
-            topology: SliceWriter::create(&services.topology, single(links))?,
+            topology: SliceWriter::create(&services.topology, single(constraint_count))?,
             surface: SliceWriter::create(&services.surface, single(load.triangles.len()))?,
-            tears: SliceWriter::create(&services.tears, many(&TEARS, links))?,
+            tears: SliceWriter::create(&services.tears, many(&TEARS, constraint_count))?,
             parameters: SliceWriter::create(
                 &services.parameters,
                 many(&PARAMETERS, SETTINGS_COUNT),
@@ -73,14 +74,14 @@ impl LoadWriters {
         })
     }
 
-    /// Publishes the load, and what follows from it: nothing is torn, and where there are no
-    /// colliders, none. A reader of the load before it would otherwise keep what that one had.
+    /// Publishes the load, its parameters, an empty list of tears and, for a scene without colliders,
+    /// an empty list of colliders. Without these lists, readers would keep those of the load before.
     pub(crate) fn publish(&self, load: &Load<'_>) -> Result<(), PublishError> {
         let header = |count| LoadHeader { count, ..load.header };
-        self.scene.write(header(count_of(load.scene)), |index| load.scene[index])?;
+        self.scene.write(header(payload_count(load.scene)), |index| load.scene[index])?;
         let constraints = load.constraints;
-        self.topology.write(header(count_of(constraints)), |index| constraints[index])?;
-        self.surface.write(header(count_of(load.triangles)), |index| load.triangles[index])?;
+        self.topology.write(header(payload_count(constraints)), |index| constraints[index])?;
+        self.surface.write(header(payload_count(load.triangles)), |index| load.triangles[index])?;
         let LoadHeader { run_id, step, .. } = load.header;
         if load.collider_count == 0 {
             let header = CollidersHeader { run_id, step, ..CollidersHeader::default() };
@@ -98,7 +99,7 @@ impl LoadWriters {
         header: TearsHeader,
         torn: &[TornConstraint],
     ) -> Result<(), PublishError> {
-        let header = TearsHeader { count: count_of(torn), ..header };
+        let header = TearsHeader { count: payload_count(torn), ..header };
         self.tears.write(header, |index| torn[index])
     }
 
@@ -109,7 +110,7 @@ impl LoadWriters {
         values: &ParameterValues,
     ) -> Result<(), PublishError> {
         let settings = values.settings();
-        let header = ParametersHeader { run_id, step, count: count_of(&settings), spare: 0 };
+        let header = ParametersHeader { run_id, step, count: payload_count(&settings), spare: 0 };
         self.parameters.write(header, |index| settings[index].into())
     }
 
@@ -118,12 +119,12 @@ impl LoadWriters {
         header: CollidersHeader,
         colliders: &[ColliderState],
     ) -> Result<(), PublishError> {
-        let header = CollidersHeader { count: count_of(colliders), ..header };
+        let header = CollidersHeader { count: payload_count(colliders), ..header };
         self.colliders.write(header, |index| colliders[index])
     }
 
-    /// Gives readers that have come since the last call what is latched; the particles last, as
-    /// they are published.
+    /// Sends the latched messages to readers that joined since the last call. The particles come last,
+    /// as in the order of publication.
     pub(crate) fn refresh(&self) {
         self.scene.refresh();
         self.topology.refresh();
@@ -136,8 +137,8 @@ impl LoadWriters {
     }
 }
 
-/// The length of a payload, which a limit of the contract keeps within u32.
-fn count_of<T>(payload: &[T]) -> u32 {
+/// Returns the length of a payload. The limits of the contract keep it within u32.
+fn payload_count<T>(payload: &[T]) -> u32 {
     u32::try_from(payload.len()).unwrap_or(u32::MAX)
 }
 
@@ -149,24 +150,24 @@ pub(crate) fn check_limits(load: &Load<'_>) -> Result<(), OwnerError> {
         ("bytes of text", load.scene.len(), SCENE_SIZE_BYTES_MAX),
     ];
     match limits.into_iter().find(|(_, count, max)| count > max) {
-        Some((what, count, max)) => Err(OwnerError::TooLarge { what, count, max }),
+        Some((elements, count, max)) => Err(OwnerError::TooLarge { elements, count, max }),
         None => Ok(()),
     }
 }
 
-/// Snapshots that one reader which has stalled keeps from being overwritten: its full buffer, what
-/// it holds, and beside them the latched one, the one being written and one being handed over.
+/// Number of snapshots that one stalled reader keeps from being overwritten: its full buffer and the
+/// samples it holds, beside the latched one, the one being written and the one being handed over.
 const STALLED_SNAPSHOTS: usize = SNAPSHOTS_BUFFERED + BORROWED_SAMPLES_MAX + 3;
-/// Bytes of a message before its payload, beside our header.
+/// Size of iceoryx2's own header of a message, in bytes.
 const MESSAGE_HEADER_SIZE_BYTES: usize = 48;
 
-/// Shared memory is not reserved when it is created: a writer that runs out of it is killed by
-/// SIGBUS, so whether it can happen is found out before. What the load before this one takes is
-/// not counted as free: a reader that holds one of its snapshots keeps it.
+/// Checks that the snapshots fit into shared memory. Creating shared memory does not reserve it, and
+/// SIGBUS kills a writer that runs out of it. The memory of the load before does not count as free,
+/// because a reader that holds one of its snapshots keeps it.
 pub(crate) fn check_shared_memory(load: &Load<'_>) -> Result<(), OwnerError> {
     match rustix::fs::statvfs("/dev/shm") {
         Ok(memory) => check_fits(load.header.particle_count, memory.f_bavail * memory.f_frsize),
-        // Where it cannot be asked, it may still be large enough.
+        // If the size is unknown, it may still be large enough.
         Err(_) => Ok(()),
     }
 }
@@ -192,15 +193,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scene_that_one_stalled_reader_could_fill_memory_with_is_refused_with_the_numbers() {
+    fn a_scene_whose_snapshots_could_fill_shared_memory_is_refused_with_the_numbers() {
         let docker_default = 64 << 20;
         assert_eq!(check_fits(20_000, docker_default), Ok(()));
         let error = check_fits(100_000, docker_default).unwrap_err().to_string();
         assert_eq!(
             error,
             "100000 particles need 217 MiB of shared memory (71 snapshots for one stalled \
-             reader), but /dev/shm has 64 MiB left: take a smaller scene, or enlarge it (mount \
-             -o remount,size=... /dev/shm; docker run --shm-size ...)"
+             reader), but /dev/shm has only 64 MiB left: choose a smaller scene, or enlarge \
+             /dev/shm (mount -o remount,size=... /dev/shm; docker run --shm-size ...)"
         );
     }
 }

@@ -1,17 +1,17 @@
-//! What separates one domain from another: the prefix and the directory of iceoryx2's files.
+//! Separation of domains: the prefix and the directory of iceoryx2's files.
 
 use std::path::PathBuf;
 
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString, SemanticStringError};
 
 /// Longest directory and prefix together, in bytes. A listener binds the Unix socket
-/// `<directory>/<prefix><id>.event`: at most 107 bytes, of which an id takes up to 39.
+/// `<directory>/<prefix><id>.event`. Its path has at most 107 bytes, up to 39 of them for the id.
 const DIRECTORY_AND_PREFIX_MAX: usize = 60;
 
-/// The iceoryx2 configuration of a domain; `None` is iceoryx2's own.
+/// Returns the iceoryx2 configuration of a domain; `None` is iceoryx2's own.
 ///
-/// Both the prefix and the directory differ: shared memory is told apart by the prefix, nodes and
-/// services by the directory.
+/// Each domain has its own prefix and its own directory: the prefix separates shared memory, the
+/// directory separates nodes and services.
 pub(crate) fn configuration(domain: Option<&str>) -> Result<Config, SemanticStringError> {
     let Some(domain) = domain else {
         return Ok(Config::global_config().clone());
@@ -23,12 +23,13 @@ pub(crate) fn configuration(domain: Option<&str>) -> Result<Config, SemanticStri
     Ok(config)
 }
 
-/// What the names of the domain's files in `/dev/shm` begin with.
+/// Returns the prefix of the domain's files in `/dev/shm`.
 pub(crate) fn prefix(domain: &str) -> String {
     format!("{domain}_")
 }
 
-/// The directory of the domain's other files: of this user only, and short enough for a socket.
+/// Returns the directory of the domain's other files. It belongs to this user alone, and is short
+/// enough for a socket path.
 pub(crate) fn directory(domain: &str) -> PathBuf {
     let user = rustix::process::getuid().as_raw();
     let readable = format!("/tmp/catenary-{user}-{domain}");
@@ -39,7 +40,8 @@ pub(crate) fn directory(domain: &str) -> PathBuf {
     }
 }
 
-/// FNV-1a, 32 bits: the same in every program and version, unlike the hash of the standard library.
+/// FNV-1a with 32 bits. Unlike the hash of the standard library, it is the same in every program
+/// and version.
 fn fnv1a(text: &str) -> u32 {
     text.bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }

@@ -1,31 +1,31 @@
-//! The newest message of a latched service, held so that it can be asked for again.
+//! The newest message of a latched service, kept so that it can be read again.
 
 use std::fmt::Debug;
 
 use iceoryx2::prelude::ZeroCopySend;
 
-use crate::ports::port::Counted;
+use crate::ports::port::SliceHeader;
 use crate::ports::reader::{ReadError, SliceReader, SliceSample};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::session::Slices;
 
-/// A reader that remembers its newest message.
+/// A reader that keeps its newest message.
 #[derive(Debug)]
-pub(crate) struct Latch<T: Debug + ZeroCopySend + 'static, H: Counted> {
+pub(crate) struct Latch<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
     reader: SliceReader<T, H>,
-    held: Option<SliceSample<T, H>>,
+    kept: Option<SliceSample<T, H>>,
 }
 
-impl<T: Debug + ZeroCopySend + 'static, H: Counted> Latch<T, H> {
+impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> Latch<T, H> {
     pub(crate) fn create(service: &Slices<T, H>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
-        Ok(Self { reader: SliceReader::create(service, spec)?, held: None })
+        Ok(Self { reader: SliceReader::create(service, spec)?, kept: None })
     }
 
-    /// The newest message, if there has been any.
+    /// Returns the newest message; `None` if none has arrived yet.
     pub(crate) fn newest(&mut self) -> Result<Option<&SliceSample<T, H>>, ReadError> {
         if let Some(sample) = self.reader.newest()? {
-            self.held = Some(sample);
+            self.kept = Some(sample);
         }
-        Ok(self.held.as_ref())
+        Ok(self.kept.as_ref())
     }
 }

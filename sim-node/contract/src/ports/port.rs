@@ -1,4 +1,4 @@
-//! What readers, writers and listeners have in common.
+//! Common parts of readers, writers and listeners.
 
 use std::fmt::Debug;
 
@@ -13,48 +13,48 @@ use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::ports::service::ServiceError;
 use crate::ports::session::CLEANUP_TIMEOUT;
 
-/// A header that says how long its payload is.
-pub(crate) trait Counted: Debug + Default + Copy + ZeroCopySend {
-    fn count(&self) -> u64;
+/// A header that contains the length of its payload.
+pub(crate) trait SliceHeader: Debug + Default + Copy + ZeroCopySend {
+    fn element_count(&self) -> u64;
 }
 
-impl Counted for SnapshotHeader {
-    fn count(&self) -> u64 {
+impl SliceHeader for SnapshotHeader {
+    fn element_count(&self) -> u64 {
         self.particle_count.into()
     }
 }
 
-impl Counted for LoadHeader {
-    fn count(&self) -> u64 {
+impl SliceHeader for LoadHeader {
+    fn element_count(&self) -> u64 {
         self.count.into()
     }
 }
 
-impl Counted for TearsHeader {
-    fn count(&self) -> u64 {
+impl SliceHeader for TearsHeader {
+    fn element_count(&self) -> u64 {
         self.count.into()
     }
 }
 
-impl Counted for CollidersHeader {
-    fn count(&self) -> u64 {
+impl SliceHeader for CollidersHeader {
+    fn element_count(&self) -> u64 {
         self.count.into()
     }
 }
 
-impl Counted for ParametersHeader {
-    fn count(&self) -> u64 {
+impl SliceHeader for ParametersHeader {
+    fn element_count(&self) -> u64 {
         self.count.into()
     }
 }
 
-impl Counted for KeyframeHeader {
-    fn count(&self) -> u64 {
+impl SliceHeader for KeyframeHeader {
+    fn element_count(&self) -> u64 {
         self.size_bytes
     }
 }
 
-/// Readers of a service, killed ones included until their places are freed.
+/// Returns the number of readers of a service. Killed readers count until their ports are freed.
 pub(crate) fn reader_count<P, H>(
     service: &publish_subscribe::PortFactory<ipc::Service, P, H>,
 ) -> usize
@@ -65,19 +65,19 @@ where
     service.dynamic_config().number_of_subscribers()
 }
 
-/// The places for ports of one kind at a service.
+/// Limit of the ports of one kind at a service.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Places {
-    /// Whom they are for, in the plural.
-    pub(crate) what: &'static str,
+pub(crate) struct PortLimit {
+    /// Name of the ports for error messages, in the plural.
+    pub(crate) ports: &'static str,
     pub(crate) max: usize,
 }
 
-/// Creates a port, after freeing the places of dead processes if all are taken.
+/// Creates a port. At the limit, frees the ports of dead processes and tries again.
 pub(crate) fn create_port<T, E: PartialEq + Debug>(
     service: &impl PortFactory,
     full: &E,
-    places: Places,
+    limit: PortLimit,
     create: impl Fn() -> Result<T, E>,
 ) -> Result<T, ServiceError> {
     let created = match create() {
@@ -90,7 +90,7 @@ pub(crate) fn create_port<T, E: PartialEq + Debug>(
     created.map_err(|error| {
         let name = service.name().to_string();
         if error == *full {
-            ServiceError::Full { service: name, what: places.what, max: places.max }
+            ServiceError::Full { service: name, ports: limit.ports, max: limit.max }
         } else {
             ServiceError::failed(&name, &error)
         }

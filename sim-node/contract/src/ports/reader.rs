@@ -1,4 +1,4 @@
-//! The reading ends of the publish-subscribe services: they check what they are given.
+//! Readers of the publish-subscribe services. They check each message.
 
 use std::fmt::Debug;
 
@@ -10,28 +10,28 @@ use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
 
 use crate::limits::BORROWED_SAMPLES_MAX;
-use crate::ports::port::{Counted, Places, create_port};
+use crate::ports::port::{PortLimit, SliceHeader, create_port};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::session::{Slices, Values};
 
-/// Why a message could not be read.
+/// Error of reading a message.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ReadError {
-    /// This reader holds as many messages as it may.
-    #[error("{max} messages of '{service}' are held already: drop one before taking another")]
+    /// The reader already holds the most messages that it may.
+    #[error("{max} messages of '{service}' are already held: drop one before reading another")]
     TooManyHeld {
-        /// The service's full name.
+        /// Full name of the service.
         service: String,
         /// Most messages that one reader may hold.
         max: usize,
     },
-    /// The message contradicts itself; it was dropped.
+    /// The message contradicts itself. It was dropped.
     #[error("a message of '{service}' was dropped: {detail}")]
     Malformed {
-        /// The service's full name.
+        /// Full name of the service.
         service: String,
-        /// What is wrong with it.
+        /// The contradiction.
         detail: String,
     },
     /// The reader could not be connected to the service.
@@ -39,39 +39,39 @@ pub enum ReadError {
     Service(#[from] ServiceError),
 }
 
-/// What came of reading all that there was.
+/// Result of draining services.
 #[derive(Debug, Default)]
 pub struct Drained {
-    /// Messages taken, those that could not be read included.
+    /// Number of received messages, including those that could not be read.
     pub count: usize,
-    /// Why some could not be read; each of them was dropped.
+    /// Errors of the messages that could not be read. These messages were dropped.
     pub errors: Vec<ReadError>,
 }
 
-/// A payload whose header agrees with it, in shared memory.
+/// A message in shared memory whose header agrees with its payload.
 pub(crate) type SliceSample<T, H> = Sample<ipc::Service, [T], H>;
 
-/// The reading end of a service of slices.
+/// A reader of a service of slices.
 #[derive(Debug)]
-pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: Counted> {
+pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
     subscriber: Subscriber<ipc::Service, [T], H>,
     service: String,
     buffered: usize,
 }
 
-impl<T: Debug + ZeroCopySend + 'static, H: Counted> SliceReader<T, H> {
+impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     pub(crate) fn create(service: &Slices<T, H>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
         let subscriber = subscribe(service)?;
         Ok(Self { subscriber, service: service.name().to_string(), buffered: spec.buffered })
     }
 
-    /// The next message, if there is one.
+    /// Returns the next message; `None` if all were read.
     pub(crate) fn next(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
         let received = self.subscriber.receive();
         let Some(sample) = received.map_err(|error| read_error(&self.service, error))? else {
             return Ok(None);
         };
-        let (len, count) = (sample.payload().len(), sample.user_header().count());
+        let (len, count) = (sample.payload().len(), sample.user_header().element_count());
         if len as u64 == count {
             return Ok(Some(sample));
         }
@@ -79,11 +79,11 @@ impl<T: Debug + ZeroCopySend + 'static, H: Counted> SliceReader<T, H> {
         Err(ReadError::Malformed { service: self.service.clone(), detail })
     }
 
-    /// The newest message, if there is any; older ones are dropped.
+    /// Returns the newest message and drops older ones; `None` if all were read.
     pub(crate) fn newest(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
         let mut newest = None;
-        // A writer that is faster than this loop does not keep it: the most that it takes is a
-        // buffer of the writer before the last load and one of the present writer.
+        // The loop is bounded even if the writer is faster than it: there is at most a buffer of
+        // the writer before the last load and a buffer of the present writer.
         for _ in 0..2 * self.buffered {
             match self.next()? {
                 Some(sample) => newest = Some(sample),
@@ -93,13 +93,13 @@ impl<T: Debug + ZeroCopySend + 'static, H: Counted> SliceReader<T, H> {
         Ok(newest)
     }
 
-    /// Shows at most one buffer of messages to `sink`, oldest first.
+    /// Passes at most one buffer of messages to `sink`, oldest first.
     pub(crate) fn drain(&self, drained: &mut Drained, mut sink: impl FnMut(&H, &[T])) {
         for _ in 0..self.buffered {
             match self.next() {
                 Ok(Some(sample)) => sink(sample.user_header(), sample.payload()),
                 Ok(None) => return,
-                // It was dropped; those behind it are as good as ever.
+                // Only this message was dropped; the next ones can be read.
                 Err(error) => drained.errors.push(error),
             }
             drained.count += 1;
@@ -107,7 +107,7 @@ impl<T: Debug + ZeroCopySend + 'static, H: Counted> SliceReader<T, H> {
     }
 }
 
-/// The reading end of a service of single values.
+/// A reader of a service of single values.
 #[derive(Debug)]
 pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
     subscriber: Subscriber<ipc::Service, T, ()>,
@@ -121,14 +121,14 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
         Ok(Self { subscriber, service: service.name().to_string(), buffered: spec.buffered })
     }
 
-    /// The next value, if there is one.
+    /// Returns the next value; `None` if all were read.
     pub(crate) fn next(&self) -> Result<Option<T>, ReadError> {
         let received = self.subscriber.receive();
         let sample = received.map_err(|error| read_error(&self.service, error))?;
         Ok(sample.map(|sample| *sample))
     }
 
-    /// The newest value, if there is any; older ones are dropped.
+    /// Returns the newest value and drops older ones; `None` if all were read.
     pub(crate) fn newest(&self) -> Result<Option<T>, ReadError> {
         let mut newest = None;
         for _ in 0..self.buffered {
@@ -140,7 +140,7 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
         Ok(newest)
     }
 
-    /// Shows at most one buffer of values to `sink`, oldest first.
+    /// Passes at most one buffer of values to `sink`, oldest first.
     pub(crate) fn drain(&self, drained: &mut Drained, mut sink: impl FnMut(&T)) {
         for _ in 0..self.buffered {
             match self.next() {
@@ -161,8 +161,8 @@ where
     H: Debug + ZeroCopySend,
 {
     let full = SubscriberCreateError::ExceedsMaxSupportedSubscribers;
-    let places = Places { what: "readers", max: service.static_config().max_subscribers() };
-    create_port(service, &full, places, || service.subscriber_builder().create())
+    let limit = PortLimit { ports: "readers", max: service.static_config().max_subscribers() };
+    create_port(service, &full, limit, || service.subscriber_builder().create())
 }
 
 fn read_error(service: &str, error: ReceiveError) -> ReadError {
@@ -184,15 +184,15 @@ mod tests {
     use crate::testing::TestDomain;
 
     #[test]
-    fn a_message_whose_header_lies_about_its_length_is_refused_and_the_next_one_is_read() {
+    fn a_message_with_a_wrong_length_in_its_header_is_dropped_and_the_next_one_is_read() {
         let domain = TestDomain::new();
         let session = Session::join(&domain.endpoint()).unwrap();
         let service: Slices<TornConstraint, TearsHeader> =
             session.slices(&TEARS, Access::Create).unwrap();
         let reader = SliceReader::create(&service, &TEARS).unwrap();
-        let stranger = service.publisher_builder().initial_max_slice_len(2).create().unwrap();
+        let publisher = service.publisher_builder().initial_max_slice_len(2).create().unwrap();
         for count in [3, 2] {
-            let mut sample = stranger.loan_slice(2).unwrap();
+            let mut sample = publisher.loan_slice(2).unwrap();
             sample.user_header_mut().count = count;
             sample.send().unwrap();
         }

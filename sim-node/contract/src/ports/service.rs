@@ -1,4 +1,4 @@
-//! The services of a name, their quality of service, and why one could not be had.
+//! The services of a name, their quality of service, and their errors.
 
 use iceoryx2::prelude::MessagingPattern;
 use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
@@ -17,32 +17,32 @@ use crate::limits::{
 /// The service attribute that holds the version of the contract.
 pub(crate) const VERSION_KEY: &str = "contract_version";
 
-/// What happens to a message for a reader whose buffer is full. The writer never waits.
+/// Treatment of a message for a reader with a full buffer. The writer never waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WhenFull {
     /// The reader loses its oldest message.
     DropOldest,
-    /// The writer is told that the message was not taken.
+    /// The reader does not receive the message, and the writer learns of it.
     RefuseNewest,
 }
 
-/// A service: its name behind the name of the simulation, and its quality of service.
+/// A service: the part of its name after the name of the simulation, and its quality of service.
 #[derive(Debug)]
 pub(crate) struct ServiceSpec {
     pub(crate) suffix: &'static str,
     pub(crate) pattern: MessagingPattern,
-    /// Publishers or notifiers at the same time.
+    /// Most publishers or notifiers at the same time.
     pub(crate) publishers_max: usize,
-    /// Subscribers or listeners at the same time.
+    /// Most subscribers or listeners at the same time.
     pub(crate) readers_max: usize,
-    /// Messages that a late reader is given; at most 1.
+    /// Number of messages that a late reader receives: 0 or 1.
     pub(crate) history: usize,
-    /// Messages that wait for one reader.
+    /// Most messages that wait for one reader.
     pub(crate) buffered: usize,
     pub(crate) when_full: WhenFull,
 }
 
-/// What the owner alone writes, latched: the base of the services below.
+/// A latched service that only the owner writes: the base of the services below.
 const LATCHED: ServiceSpec = ServiceSpec {
     suffix: "",
     pattern: MessagingPattern::PublishSubscribe,
@@ -60,10 +60,10 @@ pub(crate) const TOPOLOGY: ServiceSpec = ServiceSpec { suffix: "topology", ..LAT
 pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCHED };
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };
 pub(crate) const TEARS: ServiceSpec = ServiceSpec { suffix: "tears", ..LATCHED };
-/// As many as snapshots: each step can change one.
+/// Buffers as many messages as snapshots, because each step can change a parameter.
 pub(crate) const PARAMETERS: ServiceSpec =
     ServiceSpec { suffix: "parameters", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
-/// As many as snapshots: while one moves, each step has its own.
+/// Buffers as many messages as snapshots, because a moving collider has a message in each step.
 pub(crate) const COLLIDERS: ServiceSpec =
     ServiceSpec { suffix: "colliders", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
 pub(crate) const STATUS: ServiceSpec =
@@ -94,16 +94,16 @@ pub(crate) const WAKE: ServiceSpec = ServiceSpec {
 };
 
 impl ServiceSpec {
-    /// The service of the simulation `name`.
+    /// Returns the full name of the service for the simulation `name`.
     pub(crate) fn service_name(&self, name: &str) -> String {
         format!("{name}/{}", self.suffix)
     }
 
-    /// The most samples of one publisher that can be in use at the same time: those that wait,
-    /// those that readers hold, the latched one and the one being written.
+    /// Returns the most samples of one publisher that can be in use at the same time: waiting
+    /// samples, samples held by readers, the latched sample and the sample being written.
     ///
-    /// Where full buffers drop their oldest, each holds the newest samples, so all readers' buffers
-    /// share the same ones. iceoryx2 itself reserves a buffer of others for each reader.
+    /// Full buffers that drop their oldest sample all hold the newest samples, so the readers share
+    /// one buffer of samples. By default, iceoryx2 would reserve a buffer for each reader.
     pub(crate) const fn samples_in_use_max(&self) -> usize {
         let buffers = match self.when_full {
             WhenFull::DropOldest => 1,
@@ -113,92 +113,92 @@ impl ServiceSpec {
     }
 }
 
-/// Why a service could not be created, opened or connected to.
+/// Error of creating, opening or connecting to a service.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ServiceError {
-    /// This process cannot be a member of the domain.
+    /// This process cannot join the domain.
     #[error(
-        "cannot join {endpoint}: {cause} (if another user of this host has the domain, choose your own with --domain NAME on every program)"
+        "cannot join {endpoint}: {cause} (if the domain belongs to another user of this host, choose your own with --domain NAME in every program)"
     )]
     Domain {
-        /// Where to.
+        /// The simulation to join.
         endpoint: Endpoint,
-        /// What iceoryx2 says.
+        /// Error of iceoryx2.
         cause: String,
     },
-    /// There is no such service.
-    #[error("there is no service '{service}' of {endpoint}")]
+    /// The service does not exist.
+    #[error("service '{service}' of {endpoint} does not exist")]
     Missing {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// Where it was looked for.
+        /// The simulation.
         endpoint: Endpoint,
     },
-    /// The service is of another version of the contract.
+    /// The service has another version of the contract.
     #[error(
-        "service '{service}' has contract version {found}, this program has {expected}: stop every program of the other version, or start this one with another --domain"
+        "service '{service}' has contract version {actual}, but this program has {expected}: stop every program of the other version, or start this one with another --domain"
     )]
     Version {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// The version it was created with.
-        found: String,
-        /// The version of this program.
+        /// Version that the service was created with.
+        actual: String,
+        /// Version of this program.
         expected: u32,
     },
-    /// There is a service of that name that is not ours.
+    /// A foreign service has the name.
     #[error(
-        "service '{service}' exists, but is not one of this contract ({detail}): choose another --name or --domain"
+        "service '{service}' exists, but does not belong to this contract ({detail}): choose another --name or --domain"
     )]
     Incompatible {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// What iceoryx2 says.
+        /// Error of iceoryx2.
         detail: String,
     },
-    /// The service is of another version of iceoryx2.
+    /// The service was created with another version of iceoryx2.
     #[error(
         "service '{service}' was created with another version of iceoryx2: stop every program that uses it, or choose another --domain"
     )]
     OtherIceoryx {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
     },
     /// Another process has been creating or removing the service for too long.
     #[error(
-        "service '{service}' is being created or removed by another process that does not finish ({detail}): try again, and end that process if it hangs"
+        "another process is creating or removing service '{service}' and does not finish ({detail}): try again, and end that process if it hangs"
     )]
     InTransition {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// What iceoryx2 says.
+        /// Error of iceoryx2.
         detail: String,
     },
-    /// All places at the service are taken.
-    #[error("service '{service}' has all of its {max} {what} already: end one of them")]
+    /// The service has the most ports of a kind.
+    #[error("service '{service}' already has all of its {max} {ports}: end one of them")]
     Full {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// Whom there are too many of.
-        what: &'static str,
-        /// How many there can be.
+        /// Kind of the ports, in the plural.
+        ports: &'static str,
+        /// Most ports of this kind.
         max: usize,
     },
     /// The service belongs to another user.
     #[error(
-        "no permission for service '{service}', probably another user's: choose a --domain of your own"
+        "no permission for service '{service}', which probably belongs to another user: choose your own --domain"
     )]
     NoPermission {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
     },
-    /// Something that none of the above explains.
+    /// Any other error of iceoryx2.
     #[error("service '{service}' failed: {detail}")]
     Failed {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// What iceoryx2 says.
+        /// Error of iceoryx2.
         detail: String,
     },
 }
@@ -209,7 +209,7 @@ impl ServiceError {
     }
 }
 
-/// iceoryx2's many errors, by what can be done about them.
+/// Errors of iceoryx2, grouped by their remedy.
 #[derive(Debug)]
 pub(crate) enum Cause {
     Missing,
@@ -322,8 +322,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_service_names_and_their_quality_are_frozen() {
-        let all = [
+    fn the_service_names_and_qualities_of_service_are_frozen() {
+        let specs = [
             &PARTICLES,
             &KEYFRAME,
             &TOPOLOGY,
@@ -338,7 +338,7 @@ mod tests {
             &WAKE,
         ];
         let mut text = String::new();
-        for spec in all {
+        for spec in specs {
             let ServiceSpec { pattern, publishers_max, readers_max, history, .. } = spec;
             let ServiceSpec { buffered, when_full, .. } = spec;
             writeln!(

@@ -1,4 +1,4 @@
-//! All services of a name together, and who owns it.
+//! All services of a name, and the process that owns the name.
 
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory};
@@ -19,7 +19,7 @@ use crate::ports::service::{
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
 
-/// The services of a name.
+/// The services of a name, except `status`.
 #[derive(Debug)]
 pub(crate) struct Services {
     pub(crate) particles: Slices<ParticleState, SnapshotHeader>,
@@ -36,7 +36,8 @@ pub(crate) struct Services {
 }
 
 impl Services {
-    /// All but `status`, which comes first and decides whether the others may be touched.
+    /// Opens or creates the services. `status` is separate: its publisher decides who may create the
+    /// others.
     pub(crate) fn access(session: &Session, access: Access) -> Result<Self, ServiceError> {
         Ok(Self {
             particles: session.slices(&PARTICLES, access)?,
@@ -54,41 +55,41 @@ impl Services {
     }
 }
 
-/// Why a program could not attach to a simulation.
+/// Error of attaching to a simulation.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum AttachError {
-    /// Nobody owns the name.
+    /// No living process owns the name.
     #[error(
-        "no simulation runs as {endpoint}: {finding}; start one with `sim-node run{options}`, or say with --domain and --name where it runs"
+        "no simulation runs as {endpoint}: {detail}; start one with `sim-node run{options}`, or name a running one with --domain and --name"
     )]
     NoNode {
-        /// Where it was looked for.
+        /// Address without a simulation.
         endpoint: Endpoint,
-        /// What was looked for, and what was found.
-        finding: String,
-        /// The options that start one there.
+        /// The missing service or publisher.
+        detail: String,
+        /// Options that start a node at this address.
         options: String,
     },
     /// A service could not be opened or connected to.
     #[error(transparent)]
     Service(#[from] ServiceError),
-    /// The system gives no random number for the client's id.
-    #[error("the system gives no random number for a client id: {detail}")]
+    /// The system returned no random number for the client id.
+    #[error("the system returned no random number for the client id: {detail}")]
     NoRandomNumber {
-        /// What the system says.
+        /// Error of the system.
         detail: String,
     },
 }
 
-/// A process that is alive and owns the name.
+/// The living process that owns a name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct OwnerProcess {
-    /// Its process id, where iceoryx2 knows it.
+    /// Its process id, if iceoryx2 knows it.
     pub(crate) id: Option<u32>,
 }
 
-/// The process that owns the name, if one is alive: the publisher of `status`.
+/// Returns the living process that owns the name: the publisher of `status`.
 pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
     let mut publisher_nodes = Vec::new();
     status.dynamic_config().list_publishers(|publisher| {
@@ -107,32 +108,32 @@ pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
         }
         _ => CallbackProgression::Continue,
     });
-    // Where nodes cannot be told alive or dead, a publisher is taken for a living one.
+    // If iceoryx2 cannot list the nodes, the publisher counts as alive.
     if listed.is_err() { Some(OwnerProcess { id: None }) } else { owner }
 }
 
-/// A program's view of a simulation that somebody else owns.
+/// A connection to the services of a simulation that another process owns.
 #[derive(Debug)]
 pub(crate) struct Attachment {
     pub(crate) services: Services,
     pub(crate) status: Values<NodeStatus>,
-    // The node goes last.
+    // Dropped last: the services belong to its node.
     pub(crate) session: Session,
 }
 
-/// Tries to open what an owner that is just starting has not created yet.
-const TRIES_MAX: usize = 100;
+/// Most attempts to open the services of an owner that is still creating them.
+const ATTEMPTS_MAX: usize = 100;
 
 impl Attachment {
-    /// Opens everything, with an owner that is alive.
+    /// Opens all services of a living owner.
     pub(crate) fn open(session: Session) -> Result<Self, AttachError> {
         let status = match session.values(&STATUS, Access::Open) {
             Err(ServiceError::Missing { service, .. }) => {
-                return Err(no_node(&session, format!("there is no service '{service}'")));
+                return Err(no_node(&session, format!("service '{service}' does not exist")));
             }
             result => result?,
         };
-        for _ in 0..TRIES_MAX {
+        for _ in 0..ATTEMPTS_MAX {
             if owner(&status).is_none() {
                 break;
             }
@@ -150,10 +151,10 @@ impl Attachment {
     }
 }
 
-fn no_node(session: &Session, finding: String) -> AttachError {
+fn no_node(session: &Session, detail: String) -> AttachError {
     let endpoint = session.endpoint.clone();
     let options = endpoint.options();
-    AttachError::NoNode { endpoint, finding, options }
+    AttachError::NoNode { endpoint, detail, options }
 }
 
 #[cfg(test)]
@@ -192,19 +193,19 @@ mod tests {
     }
 
     #[test]
-    fn a_client_of_another_contract_version_is_refused_and_told_both() {
+    fn a_client_of_another_contract_version_is_refused_with_both_versions() {
         let domain = TestDomain::new();
         let _owner = Owner::create_in(join(&domain, CONTRACT_VERSION), &EMPTY).unwrap();
         let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "service 'sim/status' has contract version 3, this program has 4: stop every program \
-             of the other version, or start this one with another --domain"
+            "service 'sim/status' has contract version 3, but this program has 4: stop every \
+             program of the other version, or start this one with another --domain"
         );
     }
 
     #[test]
-    fn an_owner_is_refused_where_clients_keep_services_of_another_version() {
+    fn an_owner_is_refused_while_clients_keep_services_of_another_version() {
         let domain = TestDomain::new();
         let old = Owner::create_in(join(&domain, CONTRACT_VERSION), &EMPTY).unwrap();
         let client = Attachment::open(join(&domain, CONTRACT_VERSION)).unwrap();
@@ -212,25 +213,25 @@ mod tests {
         let new = Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY);
         let error = ServiceError::Version {
             service: "sim/status".to_owned(),
-            found: "3".to_owned(),
+            actual: "3".to_owned(),
             expected: 4,
         };
         assert_eq!(new.unwrap_err(), OwnerError::Service(error));
-        // With the last one gone, the name is as good as new.
+        // Without clients, the services of the other version are gone.
         drop(client);
         Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY).unwrap();
     }
 
     #[test]
-    fn a_stranger_among_the_services_is_told_from_another_version() {
+    fn a_foreign_service_is_not_mistaken_for_another_version() {
         let domain = TestDomain::new();
         let session = join(&domain, CONTRACT_VERSION);
-        let _stranger = session.values::<u64>(&STATUS, Access::Create).unwrap();
+        let _foreign = session.values::<u64>(&STATUS, Access::Create).unwrap();
         let error = Attachment::open(join(&domain, CONTRACT_VERSION)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "service 'sim/status' exists, but is not one of this contract (IncompatibleTypes): \
-             choose another --name or --domain"
+            "service 'sim/status' exists, but does not belong to this contract \
+             (IncompatibleTypes): choose another --name or --domain"
         );
     }
 }

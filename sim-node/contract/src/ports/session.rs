@@ -1,4 +1,4 @@
-//! One process's membership in a domain, and how it creates and opens the services of a name.
+//! Membership of a process in a domain: it creates and opens the services of a name.
 
 use std::error::Error;
 use std::fmt::Debug;
@@ -25,31 +25,30 @@ pub(crate) type Values<T> = port_factory::publish_subscribe::PortFactory<ipc::Se
 /// An event service.
 pub(crate) type Events = port_factory::event::PortFactory<ipc::Service>;
 
-/// Pause before another try, while another process creates or removes the same service.
+/// Pause before another attempt, while another process creates or removes the same service.
 const RETRY_PAUSE: Duration = Duration::from_millis(5);
-/// Tries before giving up: 100 ms of pauses, beside the second that iceoryx2 itself takes.
-const TRIES_MAX: usize = 20;
-/// How long to wait for another process that is clearing up after a dead one.
+/// Most attempts: 100 ms of pauses, in addition to the second that iceoryx2 itself waits.
+const ATTEMPTS_MAX: usize = 20;
+/// Longest wait for another process that cleans up after a dead process.
 pub(crate) const CLEANUP_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// An iceoryx2 node in the domain of an endpoint. It handles no signal: programs do.
+/// An iceoryx2 node in the domain of an endpoint. It handles no signals; programs do.
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) endpoint: Endpoint,
     node: Node<ipc::Service>,
-    /// The version that services are created with and asked for: [`CONTRACT_VERSION`], except in
-    /// tests.
+    /// Version of the services that are created and opened: [`CONTRACT_VERSION`], except in tests.
     contract_version: u32,
-    /// The same as an attribute.
+    /// The version as an attribute of services.
     version: AttributeVerifier,
 }
 
-/// How a process comes to a service.
+/// Mode of access to a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Access {
-    /// It must exist: the way of clients.
+    /// For clients: the service must exist.
     Open,
-    /// It is created unless clients have kept it: the way of the owner.
+    /// For the owner: the service is created, unless clients have kept it.
     Create,
 }
 
@@ -58,13 +57,13 @@ impl Session {
         Self::join_with_version(endpoint, CONTRACT_VERSION)
     }
 
-    /// [`Session::join`] as a program of another version of the contract.
+    /// Joins as a program of any version of the contract.
     pub(crate) fn join_with_version(
         endpoint: &Endpoint,
         contract_version: u32,
     ) -> Result<Self, ServiceError> {
         static LOG_LEVEL: Once = Once::new();
-        // What goes wrong is an error of ours; iceoryx2's own warnings would come on top of it.
+        // Failures are returned as errors, so iceoryx2's own warnings would repeat them.
         LOG_LEVEL.call_once(|| set_log_level_from_env_or(LogLevel::Error));
         let refused = |cause: &dyn Debug| ServiceError::Domain {
             endpoint: endpoint.clone(),
@@ -80,7 +79,7 @@ impl Session {
         Ok(Self { endpoint: endpoint.clone(), node, contract_version, version })
     }
 
-    /// A service whose messages are slices of `T` with the header `H`.
+    /// Opens or creates a service of slices of `T` with the header `H`.
     pub(crate) fn slices<T, H>(
         &self,
         spec: &ServiceSpec,
@@ -102,7 +101,7 @@ impl Session {
         })
     }
 
-    /// A service whose messages are single values.
+    /// Opens or creates a service of single values.
     pub(crate) fn values<T>(
         &self,
         spec: &ServiceSpec,
@@ -122,7 +121,7 @@ impl Session {
         })
     }
 
-    /// The event service [`WAKE`].
+    /// Opens or creates the event service [`WAKE`].
     pub(crate) fn events(&self, access: Access) -> Result<Events, ServiceError> {
         self.retry(&WAKE, |name| {
             let builder = self.node.service_builder(name).event();
@@ -133,16 +132,16 @@ impl Session {
                     .max_listeners(WAKE.readers_max)
                     .max_nodes(PARTICIPANTS_MAX)
                     .event_id_max_value(Wake::ID_MAX)
-                    // Whoever clears up after a killed owner says what it could not say itself.
+                    // The process that cleans up after a killed owner sends its last event.
                     .notifier_dead_event(Wake::OwnerGone.event_id())
                     .open_or_create_with_attributes(&self.version)?),
             }
         })
     }
 
-    /// Lets a moment pass for a process that is about to finish what it began.
+    /// Waits a moment for a process that is creating or removing a service.
     pub(crate) fn pause(&self) {
-        // A signal ends the pause: then the next try is earlier.
+        // A signal may end the pause early, so the next attempt is earlier.
         let _ = self.node.wait(RETRY_PAUSE);
     }
 
@@ -150,8 +149,8 @@ impl Session {
         spec.service_name(self.endpoint.name())
     }
 
-    /// Tries again where another process is in the middle of creating or removing the service, and
-    /// once where dead processes hold all places.
+    /// Repeats an attempt while another process creates or removes the service, and once if dead
+    /// processes occupy all places.
     fn retry<S>(
         &self,
         spec: &ServiceSpec,
@@ -161,7 +160,7 @@ impl Session {
         let name =
             ServiceName::new(&service).map_err(|error| ServiceError::failed(&service, &error))?;
         let mut has_cleaned_up = false;
-        let mut tries = 1;
+        let mut attempt_count = 1;
         loop {
             match attempt(&name) {
                 Ok(service) => return Ok(service),
@@ -169,25 +168,27 @@ impl Session {
                     has_cleaned_up = true;
                     self.node.blocking_cleanup_dead_nodes(CLEANUP_TIMEOUT);
                 }
-                Err(Cause::InTransition(_)) if tries < TRIES_MAX => {
-                    tries += 1;
+                Err(Cause::InTransition(_)) if attempt_count < ATTEMPTS_MAX => {
+                    attempt_count += 1;
                     self.pause();
                 }
-                Err(cause) => return Err(self.explain(spec, service, cause)),
+                Err(cause) => return Err(self.service_error(spec, service, cause)),
             }
         }
     }
 
-    fn explain(&self, spec: &ServiceSpec, service: String, cause: Cause) -> ServiceError {
+    fn service_error(&self, spec: &ServiceSpec, service: String, cause: Cause) -> ServiceError {
         match cause {
             Cause::Missing => ServiceError::Missing { service, endpoint: self.endpoint.clone() },
-            Cause::Full => ServiceError::Full { service, what: "processes", max: PARTICIPANTS_MAX },
+            Cause::Full => {
+                ServiceError::Full { service, ports: "processes", max: PARTICIPANTS_MAX }
+            }
             Cause::InTransition(detail) => ServiceError::InTransition { service, detail },
             Cause::NoPermission => ServiceError::NoPermission { service },
             Cause::OtherIceoryx => ServiceError::OtherIceoryx { service },
-            Cause::Incompatible(detail) => match self.version_of(spec, &service) {
-                Some(found) if found != self.contract_version.to_string() => {
-                    ServiceError::Version { service, found, expected: self.contract_version }
+            Cause::Incompatible(detail) => match self.existing_version(spec, &service) {
+                Some(actual) if actual != self.contract_version.to_string() => {
+                    ServiceError::Version { service, actual, expected: self.contract_version }
                 }
                 _ => ServiceError::Incompatible { service, detail },
             },
@@ -195,8 +196,8 @@ impl Session {
         }
     }
 
-    /// The contract version that an existing service was created with.
-    fn version_of(&self, spec: &ServiceSpec, service: &str) -> Option<String> {
+    /// Returns the contract version that an existing service was created with.
+    fn existing_version(&self, spec: &ServiceSpec, service: &str) -> Option<String> {
         let name = ServiceName::new(service).ok()?;
         let details = ipc::Service::details(&name, self.node.config(), spec.pattern).ok()??;
         let attributes = details.static_details.attributes();
@@ -204,7 +205,7 @@ impl Session {
     }
 }
 
-/// The attribute that every service of that version of the contract has.
+/// Returns the attribute of every service of a contract version.
 fn version_attribute(contract_version: u32) -> Result<AttributeVerifier, Box<dyn Error>> {
     let key = VERSION_KEY.try_into()?;
     let value = contract_version.to_string().as_str().try_into()?;

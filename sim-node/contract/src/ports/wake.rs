@@ -1,4 +1,4 @@
-//! The event that tells sleeping readers to look: one service for all that an owner does.
+//! The event service that wakes waiting processes: one for all events of an owner.
 
 use std::time::Duration;
 
@@ -6,13 +6,13 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{EventActivation, EventId, ipc};
 
-/// What happened; the ids of the event service `<name>/wake`, in this order from 0.
+/// Event of the service `<name>/wake`; the number is the event id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Wake {
     /// A snapshot was published.
     Frame = 0,
-    /// A scene was loaded, or what is latched was given to a reader that has just come.
+    /// A scene was loaded, or a new reader has received the latched messages.
     Load = 1,
     /// Constraints tore.
     Tears = 2,
@@ -20,12 +20,12 @@ pub enum Wake {
     Outcome = 3,
     /// A status was published.
     Status = 4,
-    /// The owner has gone. Comes after it has given up the name.
+    /// The owner is gone, and the name is free.
     OwnerGone = 5,
 }
 
 impl Wake {
-    /// The largest event id.
+    /// Largest event id.
     pub(crate) const ID_MAX: usize = Self::OwnerGone as usize;
 
     pub(crate) fn event_id(self) -> EventId {
@@ -33,7 +33,7 @@ impl Wake {
     }
 }
 
-/// The waking side. Says [`Wake::OwnerGone`] when dropped.
+/// Sender of wake events. Sends [`Wake::OwnerGone`] when dropped.
 #[derive(Debug)]
 pub(crate) struct WakeSender(Notifier<ipc::Service>);
 
@@ -42,10 +42,10 @@ impl WakeSender {
         Self(notifier)
     }
 
-    /// Wakes everyone who waits; a reader that cannot be reached is none of the owner's concern.
-    pub(crate) fn wake(&self, what: Wake) {
-        // The only errors are an id out of range and a missed deadline: neither can occur.
-        let _ = self.0.notify_with_custom_event_id(what.event_id());
+    /// Wakes all waiting processes. A process that cannot be reached does not concern the owner.
+    pub(crate) fn wake(&self, event: Wake) {
+        // The only errors are an id out of range and a missed deadline. Neither can occur.
+        let _ = self.0.notify_with_custom_event_id(event.event_id());
     }
 }
 
@@ -55,21 +55,21 @@ impl Drop for WakeSender {
     }
 }
 
-/// What ended a wait, the most telling last.
+/// Cause of the end of a wait, by ascending weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Heard {
-    /// Nothing happened in the time given, or a signal came.
-    Nothing,
-    /// The owner did something.
-    Owner,
-    /// An owner has gone.
-    Farewell,
+pub(crate) enum WakeCause {
+    /// The timeout passed without an event, or a signal arrived.
+    Timeout,
+    /// The owner sent an event.
+    Event,
+    /// An owner is gone.
+    OwnerGone,
 }
 
-/// The shortest wait: the system's socket timeout counts microseconds, and takes 0 for "for ever".
+/// Shortest wait: the socket timeout of the system counts microseconds, and 0 means no timeout.
 const TIMEOUT_MIN: Duration = Duration::from_micros(1);
 
-/// The waiting side.
+/// Receiver of wake events.
 #[derive(Debug)]
 pub(crate) struct WakeListener(Listener<ipc::Service>);
 
@@ -78,19 +78,19 @@ impl WakeListener {
         Self(listener)
     }
 
-    /// Waits for the next event, at most `timeout`, and takes all that have come.
-    pub(crate) fn wait(&self, timeout: Duration) -> Heard {
-        let mut heard = Heard::Nothing;
-        let take = |event: EventActivation| {
-            let is_farewell = event.id == Wake::OwnerGone.event_id();
-            heard = if is_farewell { Heard::Farewell } else { heard.max(Heard::Owner) };
+    /// Waits for the next event, at most `timeout`, and receives all pending events.
+    pub(crate) fn wait(&self, timeout: Duration) -> WakeCause {
+        let mut cause = WakeCause::Timeout;
+        let receive = |event: EventActivation| {
+            let is_last = event.id == Wake::OwnerGone.event_id();
+            cause = cause.max(if is_last { WakeCause::OwnerGone } else { WakeCause::Event });
         };
-        // An interrupted or failed wait is one in which nothing happened: the caller looks again.
+        // An interrupted or failed wait counts as a timeout: the caller polls again.
         let _ = if timeout < TIMEOUT_MIN {
-            self.0.try_wait(take)
+            self.0.try_wait(receive)
         } else {
-            self.0.timed_wait(take, timeout)
+            self.0.timed_wait(receive, timeout)
         };
-        heard
+        cause
     }
 }

@@ -1,4 +1,4 @@
-//! The writing ends of the publish-subscribe services: they never wait for a reader.
+//! Writers of the publish-subscribe services. They never wait for a reader.
 
 use std::fmt::Debug;
 
@@ -8,32 +8,32 @@ use iceoryx2::prelude::{BackpressureStrategy, IceoryxSend, PortFactory, ZeroCopy
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
 
-use crate::ports::port::{Counted, Places, create_port};
+use crate::ports::port::{PortLimit, SliceHeader, create_port};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::session::{Slices, Values};
 
-/// Why a message was not published. The owner is as before, and can go on.
+/// Error of publishing a message. The writer is unchanged and can continue.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum PublishError {
-    /// The message is longer than what the load announced.
+    /// The message is longer than the load announced.
     #[error(
         "{len} elements do not fit into a message of '{service}', which the load limited to {len_max}"
     )]
     TooLong {
-        /// The service's full name.
+        /// Full name of the service.
         service: String,
-        /// Elements of the message.
+        /// Number of elements in the message.
         len: usize,
         /// Most elements of a message.
         len_max: usize,
     },
-    /// No memory for the message could be had, or it could not be sent.
+    /// There was no memory for the message, or it could not be sent.
     #[error("cannot publish on '{service}': {detail}")]
     Failed {
-        /// The service's full name.
+        /// Full name of the service.
         service: String,
-        /// What iceoryx2 says.
+        /// Error of iceoryx2.
         detail: String,
     },
 }
@@ -44,27 +44,27 @@ impl PublishError {
     }
 }
 
-/// How much memory a writer of slices has.
+/// Memory of a writer of slices.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Capacity {
     /// Most elements of a message.
     pub(crate) len_max: usize,
-    /// Messages in use at the same time.
+    /// Most messages in use at the same time.
     pub(crate) samples: usize,
 }
 
-/// The writing end of a service of slices.
+/// A writer of a service of slices.
 #[derive(Debug)]
-pub(crate) struct SliceWriter<T: Debug + ZeroCopySend + 'static, H: Counted> {
+pub(crate) struct SliceWriter<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
     publisher: Publisher<ipc::Service, [T], H>,
     service: String,
     len_max: usize,
 }
 
-impl<T: Debug + Copy + ZeroCopySend + 'static, H: Counted> SliceWriter<T, H> {
+impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H> {
     pub(crate) fn create(service: &Slices<T, H>, capacity: Capacity) -> Result<Self, ServiceError> {
         let Capacity { len_max, samples } = capacity;
-        let publisher = publish(service, || {
+        let publisher = create_publisher(service, || {
             service
                 .publisher_builder()
                 .initial_max_slice_len(len_max)
@@ -76,14 +76,14 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: Counted> SliceWriter<T, H> {
         Ok(Self { publisher, service: service.name().to_string(), len_max })
     }
 
-    /// Publishes `element(0)`, `element(1)`, ... as one message of `header.count()` elements,
-    /// written straight into shared memory, once.
+    /// Publishes `element(0)`, `element(1)`, ... as one message of `header.element_count()` elements.
+    /// Each element is written once, straight into shared memory.
     pub(crate) fn write(
         &self,
         header: H,
         element: impl Fn(usize) -> T,
     ) -> Result<(), PublishError> {
-        let len = usize::try_from(header.count()).unwrap_or(usize::MAX);
+        let len = usize::try_from(header.element_count()).unwrap_or(usize::MAX);
         if len > self.len_max {
             let (service, len_max) = (self.service.clone(), self.len_max);
             return Err(PublishError::TooLong { service, len, len_max });
@@ -96,14 +96,14 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: Counted> SliceWriter<T, H> {
         Ok(())
     }
 
-    /// Gives the latched message to readers that have come since the last one was written.
+    /// Sends the latched message to readers that joined since it was written.
     pub(crate) fn refresh(&self) {
-        // A reader that cannot be reached is none of the owner's concern.
+        // A reader that cannot be reached does not concern the owner.
         let _ = self.publisher.update_connections();
     }
 }
 
-/// The writing end of a service of single values.
+/// A writer of a service of single values.
 #[derive(Debug)]
 pub(crate) struct ValueWriter<T: Debug + Copy + ZeroCopySend + 'static> {
     publisher: Publisher<ipc::Service, T, ()>,
@@ -113,7 +113,7 @@ pub(crate) struct ValueWriter<T: Debug + Copy + ZeroCopySend + 'static> {
 impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
     pub(crate) fn create(service: &Values<T>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
         let samples = spec.samples_in_use_max();
-        let publisher = publish(service, || {
+        let publisher = create_publisher(service, || {
             service
                 .publisher_builder()
                 .max_loaned_samples(1)
@@ -124,19 +124,19 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
         Ok(Self { publisher, service: service.name().to_string() })
     }
 
-    /// Publishes a value; returns how many readers' buffers have taken it.
+    /// Publishes a value. Returns the number of readers that received it.
     pub(crate) fn write(&self, value: T) -> Result<usize, PublishError> {
         let sent = self.publisher.send_copy(value);
         sent.map_err(|error| PublishError::failed(&self.service, &error))
     }
 
-    /// As [`SliceWriter::refresh`].
+    /// Same as [`SliceWriter::refresh`].
     pub(crate) fn refresh(&self) {
         let _ = self.publisher.update_connections();
     }
 }
 
-fn publish<P, H, W>(
+fn create_publisher<P, H, W>(
     service: &publish_subscribe::PortFactory<ipc::Service, P, H>,
     create: impl Fn() -> Result<W, PublisherCreateError>,
 ) -> Result<W, ServiceError>
@@ -145,6 +145,6 @@ where
     H: Debug + ZeroCopySend,
 {
     let full = PublisherCreateError::ExceedsMaxSupportedPublishers;
-    let places = Places { what: "writers", max: service.static_config().max_publishers() };
-    create_port(service, &full, places, create)
+    let limit = PortLimit { ports: "writers", max: service.static_config().max_publishers() };
+    create_port(service, &full, limit, create)
 }

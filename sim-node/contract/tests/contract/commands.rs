@@ -1,5 +1,5 @@
-//! Commands reach the owner, and outcomes their sender. Where both sides have to act, the owner
-//! does so in the test's thread until the client's thread has ended.
+//! Commands reach the owner, and outcomes reach their sender. If both sides have to act, the owner
+//! acts in the test's thread until the client's thread has ended.
 
 use std::thread;
 
@@ -14,8 +14,8 @@ use crate::support::{DEADLINE, MOMENT, answer_commands, create_owner, publish_st
 const PIN: Action = Action::Pin { particle: 3 };
 const RELEASE: Action = Action::Release { particle: 3 };
 
-/// Runs `client` beside an owner that answers at step 9 what it is asked.
-fn beside_an_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send + 'static) -> T {
+/// Runs `client` beside an owner that answers all commands at step 9.
+fn run_beside_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send + 'static) -> T {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     publish_step(&owner, 8);
@@ -29,15 +29,15 @@ fn beside_an_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send 
     client.join().unwrap()
 }
 
-fn received(owner: &Owner) -> Vec<(u64, u64, Action)> {
+fn receive(owner: &Owner) -> Vec<(u64, u64, Action)> {
     let mut commands = Vec::new();
     owner.receive_commands(&mut commands);
     commands.iter().map(|command| (command.client_id, command.sequence, command.action())).collect()
 }
 
 #[test]
-fn a_request_returns_the_outcome_applied_or_rejected() {
-    let outcomes = beside_an_owner(|endpoint| {
+fn a_request_returns_an_applied_or_rejected_outcome() {
+    let outcomes = run_beside_owner(|endpoint| {
         let mut client = Client::attach(&endpoint).unwrap();
         assert!((1..1 << 53).contains(&client.client_id()));
         [PIN, RELEASE].map(|action| client.request(action, DEADLINE).unwrap())
@@ -49,15 +49,15 @@ fn a_request_returns_the_outcome_applied_or_rejected() {
 }
 
 #[test]
-fn outcomes_come_in_order_and_only_to_their_sender() {
-    beside_an_owner(|endpoint| {
+fn outcomes_arrive_in_order_and_only_at_their_sender() {
+    run_beside_owner(|endpoint| {
         let mut other = Client::attach(&endpoint).unwrap();
         let mut client = Client::attach_as(&endpoint, 5).unwrap();
         for _ in 0..3 {
             other.send(RELEASE).unwrap();
             client.send(PIN).unwrap();
         }
-        // The answer to a later command does not lose those of earlier ones.
+        // Waiting for the outcome of a later command keeps the earlier outcomes.
         assert_eq!(client.request(PIN, DEADLINE).unwrap().command.sequence, 4);
         let mut next = || client.next_outcome(DEADLINE).unwrap().unwrap();
         let sequences = [next(), next(), next()].map(|outcome: Outcome| {
@@ -70,8 +70,8 @@ fn outcomes_come_in_order_and_only_to_their_sender() {
 }
 
 #[test]
-fn processes_that_share_the_console_are_told_apart_by_ascending_numbers() {
-    beside_an_owner(|endpoint| {
+fn processes_that_share_the_console_use_different_ascending_numbers() {
+    run_beside_owner(|endpoint| {
         let mut consoles =
             [(); 2].map(|()| Client::attach_as(&endpoint, CONSOLE_CLIENT_ID).unwrap());
         let mut sequences = Vec::new();
@@ -87,7 +87,7 @@ fn processes_that_share_the_console_are_told_apart_by_ascending_numbers() {
 }
 
 #[test]
-fn a_command_that_nobody_takes_times_out_and_says_that_no_node_answers() {
+fn an_unanswered_command_times_out_and_the_error_states_whether_a_node_runs() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
@@ -96,8 +96,8 @@ fn a_command_that_nobody_takes_times_out_and_says_that_no_node_answers() {
     assert_eq!(
         error.to_string(),
         format!(
-            "command 1 has no outcome after at most 20ms: no node answers, although process {process} \
-             runs as 'sim' in domain '{name}' (is it stopped, or overloaded?)"
+            "no outcome of command 1 after at most 20ms: process {process} runs as 'sim' in domain \
+             '{name}', but does not answer (is it stopped, or overloaded?)"
         )
     );
     drop(owner);
@@ -108,14 +108,14 @@ fn a_command_that_nobody_takes_times_out_and_says_that_no_node_answers() {
     assert_eq!(
         error.to_string(),
         format!(
-            "the command was not sent: no node answers, none runs as 'sim' in domain '{name}' any \
-             more (start one with `sim-node run --domain {name}`)"
+            "the command was not sent: no node runs as 'sim' in domain '{name}' now (start one with \
+             `sim-node run --domain {name}`)"
         )
     );
 }
 
 #[test]
-fn a_command_that_cannot_be_queued_is_an_error_and_those_before_it_are_kept() {
+fn a_command_beyond_the_queue_is_an_error_and_the_queued_commands_are_kept() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut client = Client::attach_as(&domain.endpoint(), 5).unwrap();
@@ -127,11 +127,11 @@ fn a_command_that_cannot_be_queued_is_an_error_and_those_before_it_are_kept() {
         matches!(error, RequestError::QueueFull { owner: OwnerState::Alive { .. } }),
         "{error}"
     );
-    let commands = received(&owner);
+    let commands = receive(&owner);
     let expected: Vec<_> = (1..=COMMANDS_BUFFERED as u64).map(|number| (5, number, PIN)).collect();
     assert_eq!(commands, expected);
     assert_eq!(client.send(RELEASE).unwrap(), 257);
-    assert_eq!(received(&owner), [(5, 257, RELEASE)]);
+    assert_eq!(receive(&owner), [(5, 257, RELEASE)]);
 }
 
 #[test]
@@ -142,10 +142,10 @@ fn dropping_a_client_waits_until_its_commands_are_answered() {
     let sender = thread::spawn(move || {
         Client::attach_as(&endpoint, 5).unwrap().send(PIN).unwrap();
     });
-    // The client is gone after this; if it did not wait, its command would be too.
+    // The client is dropped right after sending. Without the wait, its command would be lost.
     let mut commands = Vec::new();
     while commands.is_empty() && !sender.is_finished() {
-        commands = received(&owner);
+        commands = receive(&owner);
         thread::yield_now();
     }
     sender.join().unwrap();
@@ -153,16 +153,15 @@ fn dropping_a_client_waits_until_its_commands_are_answered() {
 }
 
 #[test]
-fn a_client_that_commands_takes_no_place_among_the_readers_and_the_other_way_round() {
+fn a_client_that_only_sends_is_no_reader_and_a_client_that_only_reads_is_no_sender() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     publish_step(&owner, 0);
     let mut commander = Client::attach(&domain.endpoint()).unwrap();
     commander.send(PIN).unwrap();
     assert_eq!(owner.reader_count(), 0);
-    // More watchers than there are places for clients that command, one after another.
-    let mut watcher = Client::attach(&domain.endpoint()).unwrap();
-    assert!(watcher.next_snapshot(MOMENT).unwrap().is_none());
+    let mut reader = Client::attach(&domain.endpoint()).unwrap();
+    assert!(reader.next_snapshot(MOMENT).unwrap().is_none());
     assert_eq!(owner.reader_count(), 1);
-    assert!(watcher.next_outcome(MOMENT).unwrap().is_none());
+    assert!(reader.next_outcome(MOMENT).unwrap().is_none());
 }

@@ -1,5 +1,5 @@
-//! Who comes late is told at once what is latched. The owner acts in the test's own thread and
-//! only before or beside the reader, so what the reader gets was there when it came.
+//! A late reader receives the latched messages at once. The owner acts in the test's own thread,
+//! before or beside the reader, so the messages that arrive were published before the reader joined.
 
 use std::thread;
 
@@ -12,7 +12,7 @@ use crate::support::{
 };
 
 #[test]
-fn a_late_joiner_gets_topology_surface_scene_and_the_last_snapshot() {
+fn a_late_reader_receives_topology_surface_scene_and_the_last_snapshot() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     publish_everything(&owner, 0);
@@ -33,11 +33,11 @@ fn a_late_joiner_gets_topology_surface_scene_and_the_last_snapshot() {
         assert_eq!(snapshot.header().step, 1);
         assert_eq!(snapshot.particles().len(), PARTICLE_COUNT as usize);
         assert_eq!(snapshot.particles()[3], particle(1, 3));
-        // What was latched can be asked for again; a snapshot is read once.
+        // Latched messages can be read again; a snapshot is read once.
         assert_eq!(client.topology(MOMENT).unwrap().unwrap(), topology);
         assert!(client.next_snapshot(MOMENT).unwrap().is_none());
     });
-    // A paused node: it publishes nothing, but looks after its readers.
+    // The owner acts like a paused node: it publishes nothing, but refreshes its readers.
     while !reader.is_finished() {
         owner.refresh();
         thread::yield_now();
@@ -46,7 +46,7 @@ fn a_late_joiner_gets_topology_surface_scene_and_the_last_snapshot() {
 }
 
 #[test]
-fn a_tap_that_comes_late_gets_every_kind_of_message() {
+fn a_late_tap_receives_every_kind_of_message() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     publish_everything(&owner, 5);
@@ -55,40 +55,31 @@ fn a_tap_that_comes_late_gets_every_kind_of_message() {
     assert_eq!((owner.reader_count(), owner.keyframe_reader_count()), (1, 1));
     owner.refresh();
     tap.wait(DEADLINE);
-    let mut steps = Vec::new();
-    let count = tap
-        .drain_particles(|header, particles| {
-            assert_eq!(particles[2], particle(header.step, 2));
-            steps.push(header.step);
-        })
-        .count;
-    assert_eq!((count, steps), (1, vec![5]));
-
     let cut = TornConstraint::new(2, Some(TearCause::Cut));
     let mut kinds = Vec::new();
-    let count = tap
-        .drain_updates(|update| {
-            kinds.push(match update {
-                Update::Scene(_, text) if text == SCENE.as_bytes() => "scene",
-                Update::Topology(_, all) if all == constraints() => "topology",
-                Update::Surface(_, all) if all == triangles() => "surface",
-                Update::Colliders(header, all) if all == colliders(header.step) => "colliders",
-                Update::Tears(header, [one]) if header.count == 1 && *one == cut => "tears",
-                Update::Parameters(_, values) if *values == parameters(5) => "parameters",
-                Update::Keyframe(header, b"keyframe") if header.size_bytes == 8 => "keyframe",
-                Update::Status(status) if status.step == 5 => "status",
-                update => panic!("{update:?}"),
-            });
-        })
-        .count;
+    let state = tap.next_state(|message| {
+        kinds.push(match *message {
+            Update::Scene(_, text) if text == SCENE.as_bytes() => "scene",
+            Update::Topology(_, list) if list == constraints() => "topology",
+            Update::Surface(_, list) if list == triangles() => "surface",
+            Update::Colliders(header, list) if list == colliders(header.step) => "colliders",
+            Update::Tears(header, [torn]) if header.count == 1 && *torn == cut => "tears",
+            Update::Parameters(_, values) if *values == parameters(5) => "parameters",
+            Update::Keyframe(header, b"keyframe") if header.size_bytes == 8 => "keyframe",
+            Update::Status(status) if status.step == 5 => "status",
+            update => panic!("{update:?}"),
+        });
+    });
+    let state = state.unwrap();
+    assert_eq!((state.header.step, state.particles[2]), (5, particle(5, 2)));
     let expected =
         ["scene", "topology", "surface", "colliders", "tears", "parameters", "keyframe", "status"];
     assert_eq!(kinds, expected);
-    assert_eq!(count, kinds.len());
+    assert!(tap.next_state(|_| {}).is_none());
 }
 
 #[test]
-fn a_late_joiner_knows_all_torn_constraints_with_their_causes_and_where_the_colliders_are() {
+fn a_late_client_reads_all_torn_constraints_with_their_causes_and_all_colliders() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let publish = |step, new_count, torn: &[TornConstraint]| {
@@ -104,7 +95,7 @@ fn a_late_joiner_knows_all_torn_constraints_with_their_causes_and_where_the_coll
     publish(3, 2, &[stretched, cut, unknown]);
 
     let mut client = Client::attach(&domain.endpoint()).unwrap();
-    // Takes its places; the owner notices it with the next refresh.
+    // The client connects with its first reads; the owner notices it at the next refresh.
     assert!(client.torn(MOMENT).unwrap().constraints.is_empty());
     assert!(client.colliders(MOMENT).unwrap().colliders.is_empty());
     owner.refresh();
@@ -113,7 +104,7 @@ fn a_late_joiner_knows_all_torn_constraints_with_their_causes_and_where_the_coll
     assert_eq!(torn.constraints, [stretched, cut, unknown]);
     assert_eq!((cut.cause(), unknown.cause()), (Some(TearCause::Cut), None));
     assert_eq!(client.colliders(DEADLINE).unwrap().colliders, colliders(3));
-    // What is latched can be asked for again, and a new list replaces it.
+    // A latched list can be read again, until a new list replaces it.
     assert_eq!(client.torn(MOMENT).unwrap(), torn);
     publish(4, 0, &[]);
     assert_eq!(client.torn(MOMENT).unwrap().header.step, 4);
@@ -121,7 +112,7 @@ fn a_late_joiner_knows_all_torn_constraints_with_their_causes_and_where_the_coll
 }
 
 #[test]
-fn a_late_joiner_knows_the_parameters_of_the_load_and_each_change() {
+fn a_late_client_reads_the_parameters_of_the_load_and_each_change() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
@@ -133,11 +124,15 @@ fn a_late_joiner_knows_the_parameters_of_the_load_and_each_change() {
     let second = client.parameters(DEADLINE).unwrap().unwrap();
     assert_eq!((second.header.step, second.header.run_id), (7, RUN_ID));
     assert_eq!(second.values, parameters(7));
-    assert_eq!(client.parameters(MOMENT).unwrap(), Some(second), "it can be asked for again");
+    assert_eq!(
+        client.parameters(MOMENT).unwrap(),
+        Some(second),
+        "a latched message can be read again"
+    );
 }
 
 #[test]
-fn nothing_is_torn_after_a_load_and_every_reader_is_told_so() {
+fn every_reader_receives_an_empty_list_of_tears_after_a_load() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
@@ -148,12 +143,12 @@ fn nothing_is_torn_after_a_load_and_every_reader_is_told_so() {
 }
 
 #[test]
-fn a_reader_that_falls_behind_gets_the_newest_and_knows_what_it_missed() {
+fn a_reader_that_falls_behind_receives_the_newest_snapshots() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     publish_step(&owner, 0);
     let mut client = Client::attach(&domain.endpoint()).unwrap();
-    // Takes its place; the owner notices it with the next step.
+    // The client connects with its first read; the owner notices it at the next step.
     assert!(client.next_snapshot(MOMENT).unwrap().is_none());
     for step in 1..=200 {
         publish_step(&owner, step);

@@ -1,6 +1,6 @@
-//! Freezes what other programs and languages build on: sizes, alignments, offsets and type names
-//! of everything in shared memory, the limits, the service names and the event ids, as one text.
-//! A change of it is a change of the contract's version.
+//! Freezes the facts that programs in other languages rely on: sizes, alignments, offsets and type
+//! names in shared memory, the limits and the event ids. Any change of these texts is a change of
+//! the contract's version.
 
 use std::fmt::Write as _;
 use std::mem::offset_of;
@@ -14,7 +14,7 @@ use sim_contract::{
 
 macro_rules! layout {
     ($text:ident, $type:ident { $($field:ident),+ $(,)? }) => {{
-        // Names every field: one that is added and not listed here does not compile.
+        // The pattern names every field, so a new field that is not listed here does not compile.
         let $type { $($field: _),+ } = $type::default();
         writeln!(
             $text,
@@ -37,12 +37,12 @@ macro_rules! constants {
 #[test]
 fn the_layout_of_shared_memory_is_frozen() {
     let mut text = String::new();
-    lay_out_states(&mut text);
-    lay_out_commands_and_status(&mut text);
+    write_state_layouts(&mut text);
+    write_command_and_status_layouts(&mut text);
     insta::assert_snapshot!("layout", text);
 }
 
-fn lay_out_states(text: &mut String) {
+fn write_state_layouts(text: &mut String) {
     layout!(text, ParticleState { position, inverse_mass, velocity, flags });
     layout!(
         text,
@@ -109,7 +109,7 @@ fn lay_out_states(text: &mut String) {
     layout!(text, KeyframeHeader { run_id, step, size_bytes });
 }
 
-fn lay_out_commands_and_status(text: &mut String) {
+fn write_command_and_status_layouts(text: &mut String) {
     layout!(
         text,
         Command {

@@ -1,5 +1,5 @@
-//! Another scene under the same name: connected readers go on with it, late ones know nothing else,
-//! and a load that cannot be had leaves the old one as it was.
+//! Loading another scene under the same name: connected readers continue with it, late readers
+//! receive nothing else, and a failed load leaves the old one as it was.
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
@@ -13,16 +13,17 @@ use crate::support::{
     publish_everything, publish_step, snapshot_header,
 };
 
-const NEW_SCENE: &str = "version = 1 # another, and a longer one";
+const NEW_SCENE: &str = "version = 1 # another scene, with a longer text";
 const NEW_COUNT: u32 = 9;
 
-/// A larger scene, that begins to show at step 6.
-fn new_load(use_it: impl FnOnce(&Load<'_>)) {
-    let joins = |a: u32| ConstraintState { a, b: a + 1, rest_length: 0.2, ..Default::default() };
-    let constraints: Vec<_> = (0..NEW_COUNT - 1).map(joins).collect();
+/// Passes a larger scene, with first step 6, to `receive`.
+fn with_new_load(receive: impl FnOnce(&Load<'_>)) {
+    let constraint =
+        |a: u32| ConstraintState { a, b: a + 1, rest_length: 0.2, ..Default::default() };
+    let constraints: Vec<_> = (0..NEW_COUNT - 1).map(constraint).collect();
     let header =
         LoadHeader { step: 6, particle_count: NEW_COUNT, topology_revision: 2, ..load_header() };
-    use_it(&Load {
+    receive(&Load {
         header,
         scene: NEW_SCENE.as_bytes(),
         constraints: &constraints,
@@ -34,10 +35,10 @@ fn new_load(use_it: impl FnOnce(&Load<'_>)) {
 }
 
 fn load(owner: &mut Owner) {
-    new_load(|load| owner.load(load).unwrap());
+    with_new_load(|load| owner.load(load).unwrap());
 }
 
-/// Publishes a step of the new scene, with all that belongs to it.
+/// Publishes a step of the new scene with all its messages.
 fn publish_new_step(owner: &Owner, step: u64) {
     let header = CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() };
     owner.publish_colliders(header, &[sphere(); 3]).unwrap();
@@ -50,8 +51,12 @@ fn publish_new_step(owner: &Owner, step: u64) {
 }
 
 fn publish_new_particles(owner: &Owner, step: u64) {
-    let header =
-        SnapshotHeader { particle_count: NEW_COUNT, topology_revision: 2, ..snapshot_header(step) };
+    let header = SnapshotHeader {
+        particle_count: NEW_COUNT,
+        topology_revision: 2,
+        torn_count: 1,
+        ..snapshot_header(step)
+    };
     owner.publish_particles(&header, |_| ParticleState::default()).unwrap();
     owner.wake(Wake::Frame);
     owner.refresh();
@@ -61,7 +66,7 @@ fn sphere() -> ColliderState {
     ColliderState { shape: ColliderShape::Sphere as u32, radius: 2.0, ..ColliderState::default() }
 }
 
-/// Lets a client take all its places, and the owner notice it.
+/// Connects a client to all services, and lets the owner notice it.
 fn connect(client: &mut Client, owner: &Owner) {
     client.topology(MOMENT).unwrap();
     client.surface(MOMENT).unwrap();
@@ -73,7 +78,7 @@ fn connect(client: &mut Client, owner: &Owner) {
     owner.refresh();
 }
 
-fn assert_is_new(client: &mut Client) {
+fn assert_reads_new_load(client: &mut Client) {
     let topology = client.topology(DEADLINE).unwrap().unwrap();
     assert_eq!((topology.header.topology_revision, topology.constraints.len()), (2, 8));
     assert_eq!(client.surface(DEADLINE).unwrap().unwrap().triangles.len(), 3);
@@ -86,7 +91,7 @@ fn assert_is_new(client: &mut Client) {
 }
 
 #[test]
-fn a_connected_client_goes_on_with_the_new_load() {
+fn a_connected_client_continues_with_the_new_load() {
     let domain = TestDomain::new();
     let mut owner = create_owner(&domain.endpoint()).unwrap();
     publish_everything(&owner, 5);
@@ -98,18 +103,18 @@ fn a_connected_client_goes_on_with_the_new_load() {
     let held = client.latest_snapshot(DEADLINE).unwrap().unwrap();
 
     load(&mut owner);
-    // The load itself says that nothing is torn, and brings its own parameters.
+    // The load publishes an empty list of tears and its own parameters.
     assert!(client.torn(DEADLINE).unwrap().constraints.is_empty());
     let parameters = client.parameters(DEADLINE).unwrap().unwrap();
     assert_eq!((parameters.header.step, parameters.values), (6, ParameterValues::default()));
     publish_new_step(&owner, 6);
-    assert_is_new(&mut client);
-    // What was read from the old load stays readable.
+    assert_reads_new_load(&mut client);
+    // Snapshots of the old load stay readable.
     assert_eq!((held.header().step, held.particles().len()), (5, 4));
 }
 
 #[test]
-fn a_reader_gets_what_it_has_not_read_of_the_old_load_before_the_new_one() {
+fn a_reader_receives_unread_messages_of_the_old_load_before_the_new_one() {
     let domain = TestDomain::new();
     let mut owner = create_owner(&domain.endpoint()).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
@@ -122,7 +127,7 @@ fn a_reader_gets_what_it_has_not_read_of_the_old_load_before_the_new_one() {
     for step in 1..=6 {
         assert_eq!(client.next_snapshot(DEADLINE).unwrap().unwrap().header().step, step);
     }
-    // The newest of those that are held back is the new one, even behind a full buffer.
+    // The newest waiting message belongs to the new load, even behind a full buffer.
     assert_eq!(client.colliders(DEADLINE).unwrap().header.step, 6);
     assert_eq!(client.torn(DEADLINE).unwrap().header.step, 6);
     publish_new_particles(&owner, 7);
@@ -137,36 +142,39 @@ fn a_tap_sees_both_loads_in_their_order() {
     publish_everything(&owner, 5);
     load(&mut owner);
     publish_new_step(&owner, 6);
-    let mut steps = Vec::new();
-    tap.drain_particles(|header, all| steps.push((header.step, all.len())));
-    assert_eq!(steps, [(5, 4), (6, 9)]);
-    let (mut scenes, mut tears) = (Vec::new(), Vec::new());
-    let drained = tap.drain_updates(|update| match update {
-        Update::Scene(_, text) => scenes.push(text.to_vec()),
-        Update::Tears(header, torn) => {
-            tears.push((header.step, torn.iter().map(|one| one.constraint).collect::<Vec<_>>()));
+    let indices = |list: &[TornConstraint]| list.iter().map(|torn| torn.constraint).collect();
+    let mut tears: Vec<(u64, Vec<u32>)> = Vec::new();
+    let first = tap.next_state(|message| {
+        if let Update::Tears(header, list) = message {
+            tears.push((header.step, indices(list)));
         }
-        _ => {}
     });
-    assert!(drained.errors.is_empty());
-    assert_eq!(scenes, [SCENE.as_bytes(), NEW_SCENE.as_bytes()]);
+    let first = first.unwrap();
+    assert_eq!((first.header.step, first.particles.len()), (5, 4));
+    assert_eq!((first.load.scene.as_slice(), first.torn[0].constraint), (SCENE.as_bytes(), 2));
     // Each load begins with an empty list.
     assert_eq!(tears, [(0, vec![]), (5, vec![2]), (6, vec![]), (6, vec![7])]);
+    let second = tap.next_state(|_| {}).unwrap();
+    assert_eq!((second.header.step, second.particles.len()), (6, 9));
+    assert_eq!(
+        (second.load.scene.as_slice(), second.torn[0].constraint),
+        (NEW_SCENE.as_bytes(), 7)
+    );
+    assert!(tap.next_state(|_| {}).is_none() && tap.drain_errors().is_empty());
 }
 
 #[test]
-fn a_late_joiner_is_given_nothing_of_the_old_load() {
+fn a_late_reader_receives_nothing_of_the_old_load() {
     let domain = TestDomain::new();
     let mut owner = create_owner(&domain.endpoint()).unwrap();
     publish_everything(&owner, 5);
     load(&mut owner);
     let mut early = Tap::attach(&domain.endpoint()).unwrap();
     owner.refresh();
-    // Before its first step the new load has a scene, and nothing of the old one stands beside it.
-    assert_eq!(early.drain_particles(|header, _| panic!("step {}", header.step)).count, 0);
+    // Before its first step, the new load has a scene, and no message of the old load is left.
     let mut kinds = Vec::new();
-    early.drain_updates(|update| {
-        kinds.push(match update {
+    let state = early.next_state(|message| {
+        kinds.push(match *message {
             Update::Scene(_, text) if text == NEW_SCENE.as_bytes() => "scene",
             Update::Topology(header, _) if header.topology_revision == 2 => "topology",
             Update::Surface(header, _) if header.topology_revision == 2 => "surface",
@@ -176,12 +184,13 @@ fn a_late_joiner_is_given_nothing_of_the_old_load() {
             update => panic!("{update:?}"),
         });
     });
+    assert!(state.is_none());
     assert_eq!(kinds, ["scene", "topology", "surface", "tears", "parameters", "status"]);
 
     publish_new_step(&owner, 6);
     let mut late = Client::attach(&domain.endpoint()).unwrap();
     connect(&mut late, &owner);
-    assert_is_new(&mut late);
+    assert_reads_new_load(&mut late);
 }
 
 #[test]
@@ -191,12 +200,12 @@ fn a_scene_can_be_loaded_many_times_beside_a_reader_that_never_reads() {
     let _idle = Tap::attach(&domain.endpoint()).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     connect(&mut client, &owner);
-    // More often than a reader can keep the buffers of writers that have gone.
+    // More loads than a reader can keep buffers of dropped writers.
     for _ in 0..200 {
         load(&mut owner);
         publish_new_step(&owner, 6);
     }
-    assert_is_new(&mut client);
+    assert_reads_new_load(&mut client);
 }
 
 #[test]
@@ -204,11 +213,11 @@ fn a_load_beyond_a_limit_leaves_the_old_one_as_it_was() {
     let domain = TestDomain::new();
     let mut owner = create_owner(&domain.endpoint()).unwrap();
     publish_everything(&owner, 5);
-    new_load(|load| {
+    with_new_load(|load| {
         let error = owner.load(&Load { collider_count: COLLIDERS_MAX + 1, ..*load }).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "the scene has 65537 colliders, at most 65536 are possible: take a smaller scene"
+            "the scene has 65537 colliders, but at most 65536 are possible: choose a smaller scene"
         );
     });
     let mut client = Client::attach(&domain.endpoint()).unwrap();

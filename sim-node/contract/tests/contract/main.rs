@@ -1,5 +1,5 @@
-//! What programs may rely on when they use the crate: each file says what it proves and how.
-#![allow(clippy::unwrap_used, reason = "an error fails the test, in its helpers as well")]
+//! The guarantees of the crate. Each file states what it proves and how.
+#![allow(clippy::unwrap_used, reason = "an error fails the test, also in helpers")]
 
 mod commands;
 mod late_joiner;

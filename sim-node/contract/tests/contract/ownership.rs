@@ -1,5 +1,5 @@
-//! One owner for a name, and what others see of it coming and going. Owners and clients are in one
-//! process, as far apart for iceoryx2 as in two: each has its own node.
+//! A name has one owner, and clients notice when it comes and goes. Owners and clients are in one
+//! process, but each has its own iceoryx2 node, so they are as separate as in two processes.
 
 use std::sync::mpsc;
 use std::thread;
@@ -12,7 +12,7 @@ use crate::support::{
 };
 
 #[test]
-fn a_second_owner_is_refused_and_told_who_has_the_name() {
+fn a_second_owner_is_refused_and_the_error_names_the_first() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let error = create_owner(&domain.endpoint()).unwrap_err();
@@ -24,16 +24,16 @@ fn a_second_owner_is_refused_and_told_who_has_the_name() {
         text,
         format!(
             "'sim' in domain '{domain_name}' is already running, as process {process}: stop that \
-             one, or choose another --name or --domain"
+             process, or choose another --name or --domain"
         )
     );
-    // The first one is none the worse, and another name is free.
+    // The first owner still works, and another name is free.
     publish_step(&owner, 0);
     create_owner(&Endpoint::new(Some(domain_name), "other").unwrap()).unwrap();
 }
 
 #[test]
-fn a_client_without_a_node_is_told_what_was_looked_for_and_how_to_start_one() {
+fn a_client_without_a_node_gets_an_error_that_names_the_service_and_the_remedy() {
     let domain = TestDomain::new();
     let endpoint = Endpoint::new(Some(domain.name()), "left").unwrap();
     let error = Client::attach(&endpoint).unwrap_err();
@@ -42,16 +42,16 @@ fn a_client_without_a_node_is_told_what_was_looked_for_and_how_to_start_one() {
     assert_eq!(
         error.to_string(),
         format!(
-            "no simulation runs as 'left' in domain '{name}': there is no service 'left/status'; \
-             start one with `sim-node run --domain {name} --name left`, or say with --domain and \
-             --name where it runs"
+            "no simulation runs as 'left' in domain '{name}': service 'left/status' does not \
+             exist; start one with `sim-node run --domain {name} --name left`, or name a running one \
+             with --domain and --name"
         )
     );
     assert!(matches!(Tap::attach(&endpoint).unwrap_err(), AttachError::NoNode { .. }));
 }
 
 #[test]
-fn a_dropped_owner_is_noticed_by_those_who_ask_and_those_who_wait() {
+fn clients_that_poll_or_wait_notice_a_dropped_owner() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     publish_step(&owner, 0);
@@ -61,15 +61,15 @@ fn a_dropped_owner_is_noticed_by_those_who_ask_and_those_who_wait() {
     assert!(client.is_owner_alive() && tap.is_owner_alive());
 
     let endpoint = domain.endpoint();
-    let (is_reading, reading) = mpsc::channel();
+    let (started_sender, started) = mpsc::channel();
     let waiter = thread::spawn(move || {
         let mut client = Client::attach(&endpoint).unwrap();
         client.latest_snapshot(DEADLINE).unwrap().unwrap();
-        is_reading.send(()).unwrap();
-        // Far longer than a test may take: only the owner's going ends it.
+        started_sender.send(()).unwrap();
+        // Far longer than the test may take: only the drop of the owner ends the wait.
         client.latest_snapshot(DEADLINE * 1000).unwrap().is_none() && !client.is_owner_alive()
     });
-    while reading.try_recv().is_err() {
+    while started.try_recv().is_err() {
         owner.refresh();
         thread::yield_now();
     }
@@ -83,7 +83,7 @@ fn a_dropped_owner_is_noticed_by_those_who_ask_and_those_who_wait() {
 }
 
 #[test]
-fn an_owner_can_come_again_while_a_client_stays() {
+fn a_client_stays_connected_when_a_new_owner_claims_the_name() {
     let domain = TestDomain::new();
     let first = create_owner(&domain.endpoint()).unwrap();
     publish_step(&first, 41);
@@ -111,6 +111,6 @@ fn an_owner_can_come_again_while_a_client_stays() {
     assert!(client.is_owner_alive());
     assert_eq!(client.next_snapshot(DEADLINE).unwrap().unwrap().header().step, 0);
     assert_eq!(client.topology(MOMENT).unwrap().unwrap().header.topology_revision, 2);
-    // What was read from the first one stays readable.
+    // Snapshots of the first owner stay readable.
     assert_eq!((held.header().step, held.particles().len()), (41, 4));
 }

@@ -1,27 +1,24 @@
-//! A tap puts states together: each snapshot comes with the load, tears, colliders, parameters and
-//! outcomes up to it. The owner acts in the test's own thread, so everything is there when it is
-//! read.
+//! A tap assembles states: each snapshot comes with the load, tears, colliders, parameters and
+//! outcomes up to it. The owner acts in the test's own thread, so all messages have arrived when the
+//! tap reads them.
 
 use sim_contract::testing::TestDomain;
-use sim_contract::{
-    Action, Change, Command, Outcome, Tap, TearCause, TornConstraint, Update, Wake,
-};
+use sim_contract::{Action, Change, Command, Outcome, Tap, TearCause, TornConstraint, Update};
 
 use crate::support::{
     PARTICLE_COUNT, RUN_ID, SCENE, colliders, constraints, create_owner, parameters, particle,
-    publish_everything, snapshot_header, triangles,
+    publish_everything, publish_step, triangles,
 };
 
 const CUT: TornConstraint = TornConstraint { constraint: 2, cause: TearCause::Cut as u32 };
 
 #[test]
-fn a_state_has_everything_that_was_published_up_to_it() {
+fn a_state_contains_all_messages_up_to_it() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut tap = Tap::attach(&domain.endpoint()).unwrap();
     owner.refresh();
-    let header = sim_contract::SnapshotHeader { topology_revision: 1, ..snapshot_header(0) };
-    owner.publish_particles(&header, |index| particle(0, index)).unwrap();
+    publish_step(&owner, 0);
     let command = Command::new(3, 0, Action::Pin { particle: 1 });
     let outcome = Outcome { run_id: RUN_ID, ..Outcome::new(0, 5, command, Ok(())) };
     owner.publish_outcome(&outcome).unwrap();
@@ -36,26 +33,17 @@ fn a_state_has_everything_that_was_published_up_to_it() {
     assert_eq!(first.parameters.values, parameters(0));
     assert_eq!(first.changes[0], Change::Load);
 
-    let second = tap.next_state(|_| {});
-    assert!(second.is_none(), "its snapshot belongs to another load");
-    let header = sim_contract::SnapshotHeader {
-        topology_revision: 1,
-        torn_count: 1,
-        outcome_count: 1,
-        ..snapshot_header(6)
-    };
-    owner.publish_particles(&header, |index| particle(6, index)).unwrap();
-    owner.wake(Wake::Frame);
-    let third = tap.next_state(|_| {}).unwrap();
-    assert_eq!((third.header.step, third.particles[3]), (6, particle(6, 3)));
-    assert_eq!((third.torn, third.colliders), (&[CUT][..], &colliders(5)[..]));
-    assert_eq!((third.parameters.header.step, third.parameters.values), (5, parameters(5)));
+    let second = tap.next_state(|_| {}).unwrap();
+    assert_eq!((second.header.step, second.particles[3]), (5, particle(5, 3)));
+    assert_eq!((second.torn, second.colliders), (&[CUT][..], &colliders(5)[..]));
+    assert_eq!((second.parameters.header.step, second.parameters.values), (5, parameters(5)));
+    assert!(second.changes.contains(&Change::Outcome(outcome)));
     assert!(tap.next_state(|_| {}).is_none());
     assert!(tap.drain_errors().is_empty());
 }
 
 #[test]
-fn outcomes_of_a_waiting_node_are_shown_at_once_and_belong_to_its_next_state() {
+fn outcomes_of_a_paused_node_arrive_at_once_and_belong_to_its_next_state() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut tap = Tap::attach(&domain.endpoint()).unwrap();
@@ -63,30 +51,28 @@ fn outcomes_of_a_waiting_node_are_shown_at_once_and_belong_to_its_next_state() {
     let command = Command::new(3, 0, Action::Pause);
     let outcome = Outcome { run_id: RUN_ID, ..Outcome::new(0, 1, command, Ok(())) };
     owner.publish_outcome(&outcome).unwrap();
-    let mut seen = Vec::new();
+    let mut outcomes = Vec::new();
     let state = tap.next_state(|message| {
         if let Update::Outcome(outcome) = message {
-            seen.push(**outcome);
+            outcomes.push(**outcome);
         }
     });
     assert!(state.is_none());
-    assert_eq!(seen, [outcome]);
-    let header = sim_contract::SnapshotHeader { topology_revision: 1, ..snapshot_header(1) };
-    owner.publish_particles(&header, |index| particle(1, index)).unwrap();
+    assert_eq!(outcomes, [outcome]);
+    publish_step(&owner, 1);
     let state = tap.latest_state(|_| {}).unwrap();
     assert!(state.changes.contains(&Change::Outcome(outcome)));
 }
 
 #[test]
-fn the_newest_state_brings_the_changes_of_those_that_were_skipped() {
+fn the_newest_state_contains_the_changes_of_skipped_states() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();
     let mut tap = Tap::attach(&domain.endpoint()).unwrap();
     owner.refresh();
     let publish = |step| {
-        let header = sim_contract::SnapshotHeader { topology_revision: 1, ..snapshot_header(step) };
         owner.publish_parameters(RUN_ID, step, &parameters(step)).unwrap();
-        owner.publish_particles(&header, |index| particle(step, index)).unwrap();
+        publish_step(&owner, step);
     };
     (1..=3).for_each(publish);
     let state = tap.latest_state(|_| {}).unwrap();

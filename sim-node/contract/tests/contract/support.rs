@@ -1,4 +1,4 @@
-//! A small scene, and an owner of it that acts step by step as a node would.
+//! A small scene, and an owner that publishes it step by step like a node.
 
 use std::time::Duration;
 
@@ -8,9 +8,9 @@ use sim_contract::{
     ParticleState, Reason, SnapshotHeader, TearCause, TearsHeader, TornConstraint, Triangle, Wake,
 };
 
-/// Longer than anything here takes; tests wait for what happens, not for this.
+/// Longer than any operation here takes. Tests wait for events, not for this deadline.
 pub(crate) const DEADLINE: Duration = Duration::from_secs(10);
-/// Long enough for an answer that is there already, short where none will come.
+/// Long enough to read a message that has arrived, and short if none will arrive.
 pub(crate) const MOMENT: Duration = Duration::from_millis(20);
 
 pub(crate) const RUN_ID: u64 = 77;
@@ -29,8 +29,9 @@ pub(crate) fn load_header() -> LoadHeader {
 }
 
 pub(crate) fn constraints() -> Vec<ConstraintState> {
-    let joins = |a: u32| ConstraintState { a, b: a + 1, rest_length: 0.1, ..Default::default() };
-    (0..PARTICLE_COUNT - 1).map(joins).collect()
+    let constraint =
+        |a: u32| ConstraintState { a, b: a + 1, rest_length: 0.1, ..Default::default() };
+    (0..PARTICLE_COUNT - 1).map(constraint).collect()
 }
 
 pub(crate) fn triangles() -> Vec<Triangle> {
@@ -50,7 +51,7 @@ pub(crate) fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
     Owner::create(endpoint, &load)
 }
 
-/// The parameters from `step` on.
+/// Returns the parameters from `step` on.
 pub(crate) fn parameters(step: u64) -> ParameterValues {
     ParameterValues { damping: step as f32, ..ParameterValues::default() }
 }
@@ -60,25 +61,29 @@ pub(crate) fn snapshot_header(step: u64) -> SnapshotHeader {
         contract_version: CONTRACT_VERSION,
         run_id: RUN_ID,
         step,
+        topology_revision: 1,
         particle_count: PARTICLE_COUNT,
         ..SnapshotHeader::default()
     }
 }
 
-/// The particle `index` of the state after `step`.
+/// Returns particle `index` of the state after `step`.
 #[allow(clippy::cast_possible_truncation, reason = "steps and indices of tests are small")]
 pub(crate) fn particle(step: u64, index: usize) -> ParticleState {
     ParticleState { position: [step as f32, index as f32, 0.5], ..ParticleState::default() }
 }
 
 pub(crate) fn publish_step(owner: &Owner, step: u64) {
-    let header = snapshot_header(step);
-    owner.publish_particles(&header, |index| particle(step, index)).unwrap();
+    publish_snapshot(owner, &snapshot_header(step));
+}
+
+fn publish_snapshot(owner: &Owner, header: &SnapshotHeader) {
+    owner.publish_particles(header, |index| particle(header.step, index)).unwrap();
     owner.wake(Wake::Frame);
     owner.refresh();
 }
 
-/// The colliders at the end of `step`: a sphere that rises with the steps, and a plane.
+/// Returns the colliders at the end of `step`: a sphere that rises with the steps, and a plane.
 pub(crate) fn colliders(step: u64) -> [ColliderState; COLLIDER_COUNT] {
     let sphere = ColliderState {
         shape: ColliderShape::Sphere as u32,
@@ -95,7 +100,7 @@ pub(crate) fn publish_colliders(owner: &Owner, step: u64) {
     owner.publish_colliders(header, &colliders(step)).unwrap();
 }
 
-/// Publishes everything that has a message of its own, with the particles of `step` last.
+/// Publishes a message on every service that changes with the steps, the particles last.
 pub(crate) fn publish_everything(owner: &Owner, step: u64) {
     let tears = TearsHeader { run_id: RUN_ID, step, new_count: 1, ..TearsHeader::default() };
     owner.publish_tears(tears, &[TornConstraint::new(2, Some(TearCause::Cut))]).unwrap();
@@ -104,10 +109,10 @@ pub(crate) fn publish_everything(owner: &Owner, step: u64) {
     let keyframe = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 0 };
     owner.publish_keyframe(keyframe, b"keyframe").unwrap();
     owner.publish_status(&NodeStatus { step, ..NodeStatus::default() }).unwrap();
-    publish_step(owner, step);
+    publish_snapshot(owner, &SnapshotHeader { torn_count: 1, ..snapshot_header(step) });
 }
 
-/// Answers the commands that have come: `pin` is applied at `step`, everything else is rejected.
+/// Answers the received commands: applies `pin` at `step`, and rejects all others.
 pub(crate) fn answer_commands(owner: &Owner, step: u64, outcome_count: &mut u64) {
     let mut commands = Vec::new();
     owner.receive_commands(&mut commands);

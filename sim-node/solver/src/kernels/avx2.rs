@@ -1,7 +1,7 @@
-//! Eight lanes as a register of AVX2: the one file of this crate, beside the threads' own, that
-//! asks the processor for more than the language promises.
+//! Lanes8 lanes in an AVX2 register. Apart from the worker pool, this is the crate's only file of
+//! unchecked code.
 //!
-//! Every operation stands for the scalar one in each lane: no fused multiply-add, no estimates.
+//! Every operation is the scalar one in each lane: no fused multiply-add, no estimates.
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code, reason = "intrinsics of AVX2; see the invariant of `Avx2`")]
 #![allow(clippy::wildcard_imports, reason = "all of their names begin with _mm256")]
@@ -10,39 +10,38 @@ use std::arch::x86_64::*;
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::Work;
-use super::lanes::{Body, Eight, Lanes, Wide, axes};
+use super::lanes::{LaneWork, Lanes, Lanes8, PackedParticle, Wide, axes};
 
-/// Eight numbers. There are values of this type only within [`run`], on a processor with AVX2: that
-/// is the invariant on which every block of this file rests.
+/// Lanes8 numbers. Values of this type exist only within [`run`], on a processor with AVX2. Every
+/// `unsafe` block of this file relies on that invariant.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(__m256);
 
-/// Eight times yes (all bits) or no.
+/// Lanes8 booleans: all bits set, or none.
 #[derive(Clone, Copy)]
-pub(crate) struct Mask(__m256);
+pub(crate) struct Avx2Mask(__m256);
 
-/// Does some work by AVX2.
+/// Runs work on AVX2 registers.
 ///
 /// # Panics
-/// If the processor has none.
+/// If the processor lacks AVX2.
 #[inline]
-pub(crate) fn run<T: Work>(work: T) -> T::Output {
-    assert!(is_x86_feature_detected!("avx2"), "this processor has no AVX2");
-    // SAFETY: the processor has AVX2, as was just seen.
-    unsafe { run_there(work) }
+pub(crate) fn run<T: LaneWork>(work: T) -> T::Output {
+    assert!(is_x86_feature_detected!("avx2"), "this processor lacks AVX2");
+    // SAFETY: the assertion above proves that the processor has AVX2.
+    unsafe { run_inlined(work) }
 }
 
-/// Everything in the work is inlined here, and thus compiled for AVX2.
+/// The work is inlined here and thus compiled for AVX2.
 #[target_feature(enable = "avx2")]
-fn run_there<T: Work>(work: T) -> T::Output {
+fn run_inlined<T: LaneWork>(work: T) -> T::Output {
     work.run::<Avx2>()
 }
 
-/// One intrinsic on values whose type proves the processor.
+/// Wraps one intrinsic on values whose type proves that the processor has AVX2.
 macro_rules! avx2 {
     ($operation:expr) => {
-        // SAFETY: a value of `Avx2` or `Mask`, or `run` that makes them, needs AVX2; see `Avx2`.
+        // SAFETY: values of `Avx2` and `Avx2Mask` exist only where AVX2 does; see `Avx2`.
         unsafe { $operation }
     };
 }
@@ -93,7 +92,7 @@ impl Neg for Avx2 {
 }
 
 impl Lanes for Avx2 {
-    type Mask = Mask;
+    type Mask = Avx2Mask;
 
     #[inline(always)]
     fn splat(number: f32) -> Self {
@@ -101,16 +100,16 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn load(from: &Eight, _lane: usize) -> Self {
+    fn load(from: &Lanes8, _lane: usize) -> Self {
         let pointer = from.as_ptr();
-        // SAFETY: eight numbers lie there; this load takes any address.
+        // SAFETY: the array holds eight numbers, and this load needs no alignment.
         Self(unsafe { _mm256_loadu_ps(pointer) })
     }
 
     #[inline(always)]
-    fn store(self, to: &mut Eight, _lane: usize) {
+    fn store(self, to: &mut Lanes8, _lane: usize) {
         let pointer = to.as_mut_ptr();
-        // SAFETY: as in `load`.
+        // SAFETY: the array holds eight numbers, and this store needs no alignment.
         unsafe { _mm256_storeu_ps(pointer, self.0) };
     }
 
@@ -125,71 +124,76 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn or_at_least(self, other: Self) -> Self {
-        // The second one on ties and where one is no number, as in the other programs.
-        Self(avx2!(_mm256_max_ps(self.0, other.0)))
+    fn max_or_rhs(self, rhs: Self) -> Self {
+        // The instruction returns its second operand on ties and NaN, as the trait requires.
+        Self(avx2!(_mm256_max_ps(self.0, rhs.0)))
     }
 
     #[inline(always)]
-    fn is_below(self, other: Self) -> Mask {
-        Mask(avx2!(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
+    fn is_below(self, other: Self) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
-    fn is_at_most(self, other: Self) -> Mask {
-        Mask(avx2!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
+    fn is_at_most(self, other: Self) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)))
     }
 
     #[inline(always)]
-    fn is_number(self) -> Mask {
-        Mask(avx2!(_mm256_cmp_ps::<_CMP_ORD_Q>(self.0, self.0)))
+    fn is_not_nan(self) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_cmp_ps::<_CMP_ORD_Q>(self.0, self.0)))
     }
 
     #[inline(always)]
-    fn both(a: Mask, b: Mask) -> Mask {
-        Mask(avx2!(_mm256_and_ps(a.0, b.0)))
+    fn both(a: Avx2Mask, b: Avx2Mask) -> Avx2Mask {
+        Avx2Mask(avx2!(_mm256_and_ps(a.0, b.0)))
     }
 
     #[inline(always)]
-    fn choose(mask: Mask, yes: Self, no: Self) -> Self {
+    fn select(mask: Avx2Mask, yes: Self, no: Self) -> Self {
         Self(avx2!(_mm256_blendv_ps(no.0, yes.0, mask.0)))
     }
 
     #[inline(always)]
-    fn only(self, mask: Mask) -> Self {
+    fn masked(self, mask: Avx2Mask) -> Self {
         Self(avx2!(_mm256_and_ps(self.0, mask.0)))
     }
 
     #[inline(always)]
-    fn any(mask: Mask) -> bool {
+    fn any(mask: Avx2Mask) -> bool {
         avx2!(_mm256_movemask_ps(mask.0)) != 0
     }
 }
 
 impl Avx2 {
-    /// What one body has more than another.
+    /// Component-wise `b - a`.
     ///
     /// # Safety
-    /// There are bodies of these numbers.
+    /// `a` and `b` must be below `particles.len()`.
     #[inline(always)]
-    unsafe fn difference(bodies: &[Cell<Body>], a: u32, b: u32) -> Self {
-        // SAFETY: the caller's promise.
-        let from = unsafe { bodies.get_unchecked(a as usize) };
+    unsafe fn difference(particles: &[Cell<PackedParticle>], a: u32, b: u32) -> Self {
+        // SAFETY: guaranteed by the caller.
+        let from = unsafe { particles.get_unchecked(a as usize) };
         // SAFETY: as above.
-        let to = unsafe { bodies.get_unchecked(b as usize) };
+        let to = unsafe { particles.get_unchecked(b as usize) };
         Self::load(&to.get().0, 0) - Self::load(&from.get().0, 0)
     }
 
-    /// The differences of four pairs, by columns.
+    /// Differences of four pairs, transposed to columns.
     ///
     /// # Safety
-    /// There are bodies of these numbers.
+    /// Every index in `a` and `b` must be below `particles.len()`.
     #[inline(always)]
-    unsafe fn four(bodies: &[Cell<Body>], a: &[u32; 8], b: &[u32; 8], first: usize) -> [Self; 3] {
+    unsafe fn four(
+        particles: &[Cell<PackedParticle>],
+        a: &[u32; 8],
+        b: &[u32; 8],
+        first: usize,
+    ) -> [Self; 3] {
         let mut rows = [Self::splat(0.0); 4];
         for (lane, row) in rows.iter_mut().enumerate() {
-            // SAFETY: the caller's promise.
-            *row = unsafe { Self::difference(bodies, a[first + lane], b[first + lane]) };
+            // SAFETY: guaranteed by the caller.
+            *row = unsafe { Self::difference(particles, a[first + lane], b[first + lane]) };
         }
         Self::three_columns(rows)
     }
@@ -204,10 +208,11 @@ impl Avx2 {
         Self(avx2!(_mm256_permute2f128_ps::<0x31>(low.0, high.0)))
     }
 
-    /// Four bodies to x, y, z of their first halves (low four lanes) and second halves (high).
+    /// Transposes four particles to x, y, z of their first halves (low lanes) and second halves
+    /// (high lanes).
     #[inline(always)]
     fn three_columns([a, b, c, d]: [Self; 4]) -> [Self; 3] {
-        // x y of a and b, of c and d; z of a and b, of c and d.
+        // x and y of a and b, then of c and d; z of a and b, then of c and d.
         let low_ab = avx2!(_mm256_unpacklo_ps(a.0, b.0));
         let low_cd = avx2!(_mm256_unpacklo_ps(c.0, d.0));
         let high_ab = avx2!(_mm256_unpackhi_ps(a.0, b.0));
@@ -245,8 +250,8 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
-    fn columns(bodies: &[Body; 8]) -> [[Self; 4]; 2] {
-        let [a, b, c, d, e, f, g, h] = bodies;
+    fn columns(particles: &[PackedParticle; 8]) -> [[Self; 4]; 2] {
+        let [a, b, c, d, e, f, g, h] = particles;
         let low = Self::transpose([a, b, c, d]);
         let high = Self::transpose([e, f, g, h]);
         let first = |number: usize| Self::low_halves(low[number], high[number]);
@@ -255,9 +260,9 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
-    fn set_displacements(bodies: &mut [Body; 8], displacements: [Self; 3]) {
+    fn set_displacements(particles: &mut [PackedParticle; 8], displacements: [Self; 3]) {
         let rows = Self::rows(displacements);
-        let [a, b, c, d, e, f, g, h] = bodies;
+        let [a, b, c, d, e, f, g, h] = particles;
         for (row, [low, high]) in rows.into_iter().zip([[a, e], [b, f], [c, g], [d, h]]) {
             row.low_as_second().set_second(low);
             row.high_as_second().set_second(high);
@@ -265,11 +270,15 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn differences(bodies: &[Cell<Body>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2] {
-        // SAFETY: the caller's promise.
-        let low = unsafe { Self::four(bodies, a, b, 0) };
+    unsafe fn differences(
+        particles: &[Cell<PackedParticle>],
+        a: &[u32; 8],
+        b: &[u32; 8],
+    ) -> [[Self; 3]; 2] {
+        // SAFETY: guaranteed by the caller.
+        let low = unsafe { Self::four(particles, a, b, 0) };
         // SAFETY: as above.
-        let high = unsafe { Self::four(bodies, a, b, 4) };
+        let high = unsafe { Self::four(particles, a, b, 4) };
         [
             axes(|axis| Self::low_halves(low[axis], high[axis])),
             axes(|axis| Self::high_halves(low[axis], high[axis])),
@@ -277,21 +286,24 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn take(bodies: &[Cell<Body>], from: &[u32; 8], amounts: [Self; 3]) {
+    unsafe fn subtract_displacements(
+        particles: &[Cell<PackedParticle>],
+        indices: &[u32; 8],
+        amounts: [Self; 3],
+    ) {
         for (lane, row) in Self::rows(amounts).into_iter().enumerate() {
-            // SAFETY: the caller's promise.
-            let low = unsafe { bodies.get_unchecked(from[lane] as usize) };
+            // SAFETY: guaranteed by the caller.
+            let low = unsafe { particles.get_unchecked(indices[lane] as usize) };
             // SAFETY: as above.
-            let high = unsafe { bodies.get_unchecked(from[lane + 4] as usize) };
-            row.low_as_second().take_from(low);
-            row.high_as_second().take_from(high);
+            let high = unsafe { particles.get_unchecked(indices[lane + 4] as usize) };
+            row.low_as_second().subtract_from(low);
+            row.high_as_second().subtract_from(high);
         }
     }
 }
 
 impl Avx2 {
-    /// Three numbers and 0 for each of eight bodies: those of bodies 0 and 4, 1 and 5, 2 and 6, 3
-    /// and 7.
+    /// Transposes columns to rows of x, y, z, 0: particles 0 and 4, 1 and 5, 2 and 6, 3 and 7.
     #[inline(always)]
     fn rows([x, y, z]: [Self; 3]) -> [Self; 4] {
         let zero = Self::splat(0.0).0;
@@ -307,10 +319,10 @@ impl Avx2 {
         ]
     }
 
-    /// Four bodies, number by number: of their first halves in the low lanes, of their second ones
-    /// in the high lanes.
+    /// Transposes four particles to columns: their first halves in the low lanes, their second
+    /// halves in the high lanes.
     #[inline(always)]
-    fn transpose([a, b, c, d]: [&Body; 4]) -> [Self; 4] {
+    fn transpose([a, b, c, d]: [&PackedParticle; 4]) -> [Self; 4] {
         let (a, b) = (Self::load(&a.0, 0), Self::load(&b.0, 0));
         let (c, d) = (Self::load(&c.0, 0), Self::load(&d.0, 0));
         let high_ab = avx2!(_mm256_unpackhi_ps(a.0, b.0));
@@ -319,28 +331,28 @@ impl Avx2 {
         [x, y, z, Self(avx2!(_mm256_shuffle_ps::<0xEE>(high_ab, high_cd)))]
     }
 
-    /// 0, 0, 0, 0, then the low half.
+    /// Four zeros, then the low half.
     #[inline(always)]
     fn low_as_second(self) -> Self {
         Self(avx2!(_mm256_permute2f128_ps::<0x08>(self.0, self.0)))
     }
 
-    /// 0, 0, 0, 0, then the high half.
+    /// Four zeros, then the high half.
     #[inline(always)]
     fn high_as_second(self) -> Self {
         Self(avx2!(_mm256_permute2f128_ps::<0x18>(self.0, self.0)))
     }
 
     #[inline(always)]
-    fn set_second(self, body: &mut Body) {
-        let before = Self::load(&body.0, 0);
-        Self(avx2!(_mm256_blend_ps::<0xF0>(before.0, self.0))).store(&mut body.0, 0);
+    fn set_second(self, particle: &mut PackedParticle) {
+        let before = Self::load(&particle.0, 0);
+        Self(avx2!(_mm256_blend_ps::<0xF0>(before.0, self.0))).store(&mut particle.0, 0);
     }
 
     #[inline(always)]
-    fn take_from(self, body: &Cell<Body>) {
-        let mut numbers = body.get();
+    fn subtract_from(self, particle: &Cell<PackedParticle>) {
+        let mut numbers = particle.get();
         (Self::load(&numbers.0, 0) - self).store(&mut numbers.0, 0);
-        body.set(numbers);
+        particle.set(numbers);
     }
 }

@@ -1,15 +1,18 @@
-//! Eight lanes as an array: the compiler makes of it what the processor has.
+//! Lanes8 lanes as a plain array, which the compiler vectorises as far as the target allows.
 
-#![allow(unsafe_code, reason = "the trait's promises; nothing here needs them")]
+#![allow(
+    unsafe_code,
+    reason = "the trait's unsafe functions; this implementation checks every index"
+)]
 
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::lanes::{Body, Eight, Lanes, Wide};
+use super::lanes::{Lanes, Lanes8, PackedParticle, Wide};
 
-/// Eight numbers.
+/// Lanes8 numbers in an array.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Portable(Eight);
+pub(crate) struct Portable(Lanes8);
 
 impl Portable {
     #[inline(always)]
@@ -90,12 +93,12 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn load(from: &Eight, _lane: usize) -> Self {
+    fn load(from: &Lanes8, _lane: usize) -> Self {
         Self(*from)
     }
 
     #[inline(always)]
-    fn store(self, to: &mut Eight, _lane: usize) {
+    fn store(self, to: &mut Lanes8, _lane: usize) {
         *to = self.0;
     }
 
@@ -110,8 +113,8 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn or_at_least(self, other: Self) -> Self {
-        self.zip_with(other, |a, b| if a > b { a } else { b })
+    fn max_or_rhs(self, rhs: Self) -> Self {
+        self.zip_with(rhs, |a, b| if a > b { a } else { b })
     }
 
     #[inline(always)]
@@ -125,7 +128,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn is_number(self) -> [bool; 8] {
+    fn is_not_nan(self) -> [bool; 8] {
         self.0.map(|number| !number.is_nan())
     }
 
@@ -139,7 +142,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn choose(mask: [bool; 8], yes: Self, no: Self) -> Self {
+    fn select(mask: [bool; 8], yes: Self, no: Self) -> Self {
         let mut result = no.0;
         for (number, (mask, yes)) in result.iter_mut().zip(mask.into_iter().zip(yes.0)) {
             *number = if mask { yes } else { *number };
@@ -148,8 +151,8 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn only(self, mask: [bool; 8]) -> Self {
-        Self::choose(mask, self, Self::splat(0.0))
+    fn masked(self, mask: [bool; 8]) -> Self {
+        Self::select(mask, self, Self::splat(0.0))
     }
 
     #[inline(always)]
@@ -179,30 +182,35 @@ impl Wide for Portable {
 
     #[inline(always)]
     fn zip_pairs(even: Self, odd: Self) -> [Self; 2] {
-        // The same exchange takes itself back.
+        // The exchange is its own inverse.
         Self::unzip_pairs(even, odd)
     }
 
     #[inline(always)]
-    fn columns(bodies: &[Body; 8]) -> [[Self; 4]; 2] {
-        let column = |number: usize| Self(bodies.map(|body| body.0[number]));
+    fn columns(particles: &[PackedParticle; 8]) -> [[Self; 4]; 2] {
+        let column = |number: usize| Self(particles.map(|particle| particle.0[number]));
         [[0, 1, 2, 3].map(column), [4, 5, 6, 7].map(column)]
     }
 
     #[inline(always)]
-    fn set_displacements(bodies: &mut [Body; 8], displacements: [Self; 3]) {
-        for (lane, body) in bodies.iter_mut().enumerate() {
+    fn set_displacements(particles: &mut [PackedParticle; 8], displacements: [Self; 3]) {
+        for (lane, particle) in particles.iter_mut().enumerate() {
             for (axis, along) in displacements.iter().enumerate() {
-                body.0[4 + axis] = along.0[lane];
+                particle.0[4 + axis] = along.0[lane];
             }
         }
     }
 
     #[inline(always)]
-    unsafe fn differences(bodies: &[Cell<Body>], a: &[u32; 8], b: &[u32; 8]) -> [[Self; 3]; 2] {
+    unsafe fn differences(
+        particles: &[Cell<PackedParticle>],
+        a: &[u32; 8],
+        b: &[u32; 8],
+    ) -> [[Self; 3]; 2] {
         let mut halves = [[[0.0; 8]; 3]; 2];
         for lane in 0..8 {
-            let (from, to) = (bodies[a[lane] as usize].get().0, bodies[b[lane] as usize].get().0);
+            let (from, to) =
+                (particles[a[lane] as usize].get().0, particles[b[lane] as usize].get().0);
             for (half, axes) in halves.iter_mut().enumerate() {
                 for (axis, numbers) in axes.iter_mut().enumerate() {
                     numbers[lane] = to[4 * half + axis] - from[4 * half + axis];
@@ -213,14 +221,18 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
-    unsafe fn take(bodies: &[Cell<Body>], from: &[u32; 8], amounts: [Self; 3]) {
-        for (lane, index) in from.iter().enumerate() {
-            let body = &bodies[*index as usize];
-            let mut numbers = body.get();
+    unsafe fn subtract_displacements(
+        particles: &[Cell<PackedParticle>],
+        indices: &[u32; 8],
+        amounts: [Self; 3],
+    ) {
+        for (lane, index) in indices.iter().enumerate() {
+            let particle = &particles[*index as usize];
+            let mut numbers = particle.get();
             for (axis, amount) in amounts.iter().enumerate() {
                 numbers.0[4 + axis] -= amount.0[lane];
             }
-            body.set(numbers);
+            particle.set(numbers);
         }
     }
 }

@@ -1,6 +1,6 @@
-//! One lane: a number.
+//! A single lane: `f32` itself.
 
-use super::lanes::{Eight, Lanes};
+use super::lanes::{Lanes, Lanes8};
 
 impl Lanes for f32 {
     type Mask = bool;
@@ -11,12 +11,12 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    fn load(from: &Eight, lane: usize) -> Self {
+    fn load(from: &Lanes8, lane: usize) -> Self {
         from[lane]
     }
 
     #[inline(always)]
-    fn store(self, to: &mut Eight, lane: usize) {
+    fn store(self, to: &mut Lanes8, lane: usize) {
         to[lane] = self;
     }
 
@@ -31,8 +31,8 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    fn or_at_least(self, other: Self) -> Self {
-        if self > other { self } else { other }
+    fn max_or_rhs(self, rhs: Self) -> Self {
+        if self > rhs { self } else { rhs }
     }
 
     #[inline(always)]
@@ -46,7 +46,7 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    fn is_number(self) -> bool {
+    fn is_not_nan(self) -> bool {
         !self.is_nan()
     }
 
@@ -56,12 +56,12 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    fn choose(mask: bool, yes: Self, no: Self) -> Self {
+    fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
 
     #[inline(always)]
-    fn only(self, mask: bool) -> Self {
+    fn masked(self, mask: bool) -> Self {
         if mask { self } else { 0.0 }
     }
 

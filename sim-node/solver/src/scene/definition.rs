@@ -1,13 +1,13 @@
 //! The checked scene, with every default filled in.
 
-pub(super) mod anchor;
-pub(super) mod collider;
-pub(super) mod decimal;
-pub(super) mod element;
-pub(super) mod limits;
-pub(super) mod settings;
-pub(super) mod softness;
-pub(super) mod wind;
+pub(crate) mod anchor;
+pub(crate) mod collider;
+pub(crate) mod decimal;
+pub(crate) mod element;
+pub(crate) mod limits;
+pub(crate) mod settings;
+pub(crate) mod softness;
+pub(crate) mod wind;
 
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use super::definition::element::{SceneConstraint, SceneParticle};
 use super::definition::limits::Limits;
 use crate::constraints::Constraint;
-use crate::families::Sheet;
+use crate::constraints::families::Sheet;
 use sim_types::Method;
 
 /// Every particle, constraint and triangle of a scene; immutable from load to load.
@@ -39,7 +39,17 @@ impl Model {
 
     /// Returns the limits of a constraint that replace the scene's.
     pub(crate) fn limits(&self, constraint: u32) -> Limits {
-        self.limits[self.limit_indices[constraint as usize] as usize]
+        self.limits[self.limits_index(constraint) as usize]
+    }
+
+    /// Returns the index of a constraint's own limits in [`Self::all_limits`].
+    pub(crate) fn limits_index(&self, constraint: u32) -> u32 {
+        self.limit_indices[constraint as usize]
+    }
+
+    /// Returns the limits that constraints have of their own.
+    pub(crate) fn all_limits(&self) -> &[Limits] {
+        &self.limits
     }
 
     /// Adds an explicit constraint with its own limits.

@@ -1,6 +1,6 @@
 //! Anchors: particles that follow a moving frame, and their interplay with pins and grabs.
 
-use sim_solver::{Grip, ParticleFlags, Pose, Reason};
+use sim_solver::{Grab, ParticleFlags, Pose, Reason};
 
 use super::{assert_close, assert_near, bits, position, solver, step, velocity};
 
@@ -86,7 +86,7 @@ fn an_anchor_overrides_a_pin_of_the_scene_and_a_client_can_pin_and_grab_its_part
     assert_eq!(solver.particle(0).position, held);
     assert_eq!(solver.particle(0).velocity, [0.0; 3]);
     solver.unpin(0).unwrap();
-    solver.grab(5, Grip { particle: 0, target: [0.5, 1.2, 0.0], over_s: 0.1 }).unwrap();
+    solver.grab(5, Grab { particle: 0, target: [0.5, 1.2, 0.0], over_s: 0.1 }).unwrap();
     step(&mut solver, 10);
     assert_near("grabbed", 1.2, position(&solver, 0)[1], 1e-6);
     solver.release(5, 0).unwrap();

@@ -1,6 +1,6 @@
 //! Mistakes of users, and scenes that blow up: the state stays finite, and the run continues.
 
-use sim_solver::{Grip, ParticleFlags, Scene, Solver};
+use sim_solver::{Grab, ParticleFlags, Scene, Solver};
 
 use super::{
     assert_at_most, assert_near, bits, distance, particles, position, solver, step, stepped,
@@ -39,7 +39,7 @@ fn particles_that_blow_up_freeze_at_their_last_position_and_the_others_continue(
 fn a_frozen_particle_refuses_commands_until_a_reset() {
     let mut solver = stepped(BLOWS_UP, 1);
     let before = bits(&solver);
-    let grip = Grip { particle: 0, target: [0.0; 3], over_s: 0.0 };
+    let grip = Grab { particle: 0, target: [0.0; 3], over_s: 0.0 };
     for refused in [solver.pin(0), solver.unpin(0), solver.grab(1, grip), solver.release(1, 0)] {
         assert_eq!(refused, Err(sim_solver::Reason::NoEffectHere));
     }
@@ -156,7 +156,7 @@ fn a_grab_follows_a_target_a_million_metres_away_at_max_speed_and_stays_finite()
     let mut solver = solver(
         "[solver]\nmax_speed = 1000\n[[generate]]\nshape = \"cloth\"\ncolumns = 10\nrows = 10\nspacing = 0.1\n",
     );
-    solver.grab(1, Grip { particle: 55, target: [1e6, 0.0, 0.0], over_s: 0.01 }).unwrap();
+    solver.grab(1, Grab { particle: 55, target: [1e6, 0.0, 0.0], over_s: 0.01 }).unwrap();
     for _ in 0..240 {
         step(&mut solver, 1);
         assert_finite(&solver);

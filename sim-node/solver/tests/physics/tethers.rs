@@ -93,7 +93,7 @@ fn a_cut_drops_the_tethers_of_its_paths_and_a_pin_creates_new_ones() {
 #[test]
 fn a_grabbed_particle_is_not_a_root_until_it_is_released() {
     let mut solver = solver(&rope(10, true));
-    solver.grab(1, sim_solver::Grip { particle: 0, target: [0.0; 3], over_s: 0.0 }).unwrap();
+    solver.grab(1, sim_solver::Grab { particle: 0, target: [0.0; 3], over_s: 0.0 }).unwrap();
     step(&mut solver, 60);
     let sag = distance(&solver, 0, 10) - 0.5;
     assert!(sag > 1e-3, "the end has no tether, so the rope stretches: {sag}");

@@ -189,10 +189,11 @@ impl Link {
         let state = self.tap.latest_state(|update| updates.add(update));
         let run_id = state.map(|state| state.header.run_id).or(updates.run_id);
         check_run(&mut self.run_id, run_id)?;
+        // A client that waits for an answer sees the effect of its command after the answer.
+        handle_outcomes(&mut self.dispatch, &mut self.client, &updates.outcomes, sinks);
         if let Some(state) = state {
             self.newest.update(&state, shown, sinks);
         }
-        self.handle_outcomes(&updates.outcomes, sinks);
         if let Some(status) = &updates.status {
             sinks.publish(&Update::Status(&StatusRow::from(status)));
             self.status = Some(*status);
@@ -200,24 +201,6 @@ impl Link {
         self.parameters = updates.parameters.or(self.parameters);
         self.publish_parameters(sinks);
         Ok(())
-    }
-
-    fn handle_outcomes(&mut self, outcomes: &[Outcome], sinks: &Sinks) {
-        for outcome in outcomes {
-            sinks.publish(&Update::Outcome(&OutcomeRow::from(outcome)));
-            let action = outcome.command.action();
-            if outcome.is_applied() && matches!(action, Action::Reset | Action::Load { .. }) {
-                self.dispatch.end_applied_grabs();
-                if action == Action::Reset {
-                    sinks.publish(&Update::Reset { step: outcome.step });
-                }
-            }
-            if outcome.command.client_id == self.client.client_id() {
-                self.dispatch.on_outcome(sinks, outcome);
-            }
-        }
-        // The client receives the same outcomes. Reading them makes room for the next ones.
-        while let Ok(Some(_)) = self.client.next_outcome(Duration::ZERO) {}
     }
 
     /// Publishes the parameters of the load on show if they have changed. They take effect at once, even
@@ -291,7 +274,7 @@ impl Link {
             self.dispatch.flush(&mut self.client, sinks);
             let mut updates = Updates::default();
             self.tap.latest_state(|update| updates.add(update));
-            self.handle_outcomes(&updates.outcomes, sinks);
+            handle_outcomes(&mut self.dispatch, &mut self.client, &updates.outcomes, sinks);
             let left_ns = end_ns.saturating_sub(monotonic_ns());
             if !self.dispatch.is_releasing() || left_ns == 0 {
                 return;
@@ -308,4 +291,28 @@ fn check_run(known: &mut Option<u64>, run_id: Option<u64>) -> Result<(), LinkEnd
         Some(known) if known != run_id => Err(LinkEnd::NewRun),
         _ => Ok(()),
     }
+}
+
+/// Publishes outcomes, and answers the clients whose commands they belong to.
+fn handle_outcomes(
+    dispatch: &mut Dispatch,
+    client: &mut Client,
+    outcomes: &[Outcome],
+    sinks: &Sinks,
+) {
+    for outcome in outcomes {
+        sinks.publish(&Update::Outcome(&OutcomeRow::from(outcome)));
+        let action = outcome.command.action();
+        if outcome.is_applied() && matches!(action, Action::Reset | Action::Load { .. }) {
+            dispatch.end_applied_grabs();
+            if action == Action::Reset {
+                sinks.publish(&Update::Reset { step: outcome.step });
+            }
+        }
+        if outcome.command.client_id == client.client_id() {
+            dispatch.on_outcome(sinks, outcome);
+        }
+    }
+    // The client receives the same outcomes. Reading them makes room for the next ones.
+    while let Ok(Some(_)) = client.next_outcome(Duration::ZERO) {}
 }

@@ -5,7 +5,7 @@ use sim_types::ConstraintKind;
 
 use super::pinned::Pinned;
 use crate::constraints::Constraint;
-use crate::families::Sheet;
+use crate::constraints::families::Sheet;
 use crate::scene::definition::element::SceneParticle;
 use crate::scene::definition::settings::Up;
 use crate::scene::definition::softness::KindSoftness;

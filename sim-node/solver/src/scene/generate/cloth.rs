@@ -4,7 +4,7 @@ use serde::Serialize;
 use sim_types::ConstraintKind;
 
 use super::builder::{Builder, round};
-use crate::families::Family;
+use crate::constraints::families::Family;
 use crate::scene::definition::decimal;
 
 /// A sheet of columns x rows particles. Particle (c, r) has index r columns + c.

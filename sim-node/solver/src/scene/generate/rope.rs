@@ -5,7 +5,7 @@ use sim_types::ConstraintKind;
 
 use super::builder::{Builder, interpolate};
 use super::pinned::is_pinned_end;
-use crate::families::Family;
+use crate::constraints::families::Family;
 use crate::scene::definition::decimal;
 
 /// A line of particles. Constraint i joins the particles i and i + 1.

@@ -1,6 +1,6 @@
 //! Warnings about particles.
 
-use crate::contact::depth_at_load;
+use crate::contacts::obstacle::depth_at_load;
 use crate::scene::definition::Scene;
 use crate::scene::model::Model;
 

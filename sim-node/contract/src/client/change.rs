@@ -1,0 +1,158 @@
+//! Changes between two states, and the changes that wait for their state.
+
+use std::collections::VecDeque;
+
+use sim_types::ParameterValues;
+
+use crate::client::views::Parameters;
+use crate::messages::collider::{ColliderState, CollidersHeader};
+use crate::messages::outcome::Outcome;
+use crate::messages::parameters::ParametersHeader;
+use crate::messages::snapshot::SnapshotHeader;
+use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::topology::KeyframeHeader;
+
+/// A change between two states.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Change {
+    /// The state is the first of another load.
+    Load,
+    /// The colliders at the end of a step.
+    Colliders(CollidersHeader, Vec<ColliderState>),
+    /// New tears, or a reset. The list holds only the tears that no earlier state contains;
+    /// `header.count` counts all torn constraints.
+    Tears(TearsHeader, Vec<TornConstraint>),
+    /// The parameters from a step on.
+    Parameters(ParametersHeader, ParameterValues),
+    /// The keyframe of a step.
+    Keyframe(KeyframeHeader, Vec<u8>),
+    /// The outcome of a command. Commands that control a replay are left out.
+    Outcome(Outcome),
+}
+
+impl Change {
+    /// Rank in the order of publication within a step.
+    fn publication_rank(&self) -> u32 {
+        match self {
+            Self::Load => 0,
+            Self::Colliders(..) => 1,
+            Self::Tears(..) => 2,
+            Self::Parameters(..) => 3,
+            Self::Keyframe(..) => 4,
+            Self::Outcome(_) => 5,
+        }
+    }
+}
+
+/// Most pending changes. Between two snapshots, a node that publishes every 1,000th step can move
+/// its colliders 1,000 times.
+const PENDING_MAX: usize = 4096;
+
+/// The changes that wait for a state of their step or a later step. At the limit, the oldest change
+/// is dropped and counted.
+#[derive(Debug, Default)]
+pub(crate) struct PendingChanges {
+    queue: VecDeque<PendingChange>,
+    lost_count: u64,
+}
+
+#[derive(Debug)]
+struct PendingChange {
+    run_id: u64,
+    step: u64,
+    change: Change,
+}
+
+impl PendingChanges {
+    pub(crate) fn push(&mut self, run_id: u64, step: u64, change: Change) {
+        if self.queue.len() == PENDING_MAX {
+            self.queue.pop_front();
+            self.lost_count += 1;
+        }
+        self.queue.push_back(PendingChange { run_id, step, change });
+    }
+
+    /// Number of dropped changes.
+    pub(crate) fn lost_count(&self) -> u64 {
+        self.lost_count
+    }
+
+    /// Removes the changes up to a snapshot. Returns them in the order of publication.
+    pub(crate) fn drain_due(&mut self, header: &SnapshotHeader) -> Vec<Change> {
+        let mut due =
+            self.drain(|pending| pending.run_id == header.run_id && pending.step <= header.step);
+        due.sort_by_key(|pending| (pending.step, pending.change.publication_rank()));
+        due.into_iter().map(|pending| pending.change).collect()
+    }
+
+    /// Removes all changes of a run. Returns them in the order of arrival.
+    pub(crate) fn drain_run(&mut self, run_id: u64) -> Vec<Change> {
+        let drained = self.drain(|pending| pending.run_id == run_id);
+        drained.into_iter().map(|pending| pending.change).collect()
+    }
+
+    fn drain(&mut self, is_due: impl Fn(&PendingChange) -> bool) -> Vec<PendingChange> {
+        let (due, rest): (VecDeque<_>, _) = self.queue.drain(..).partition(is_due);
+        self.queue = rest;
+        due.into()
+    }
+
+    /// Returns the first pending parameters of a run.
+    pub(crate) fn parameters(&self, run_id: u64) -> Option<Parameters> {
+        self.changes(run_id).find_map(|change| match change {
+            Change::Parameters(header, values) => {
+                Some(Parameters { header: *header, values: *values })
+            }
+            _ => None,
+        })
+    }
+
+    /// Returns the first pending list of tears that begins with the list of a snapshot.
+    pub(crate) fn tears(
+        &self,
+        snapshot: &SnapshotHeader,
+    ) -> Option<(&TearsHeader, &[TornConstraint])> {
+        self.changes(snapshot.run_id).find_map(|change| match change {
+            Change::Tears(header, list)
+                if header.since_step <= snapshot.step
+                    && list.len() >= snapshot.torn_count as usize =>
+            {
+                Some((header, list.as_slice()))
+            }
+            _ => None,
+        })
+    }
+
+    fn changes(&self, run_id: u64) -> impl Iterator<Item = &Change> {
+        let pending = self.queue.iter().filter(move |pending| pending.run_id == run_id);
+        pending.map(|pending| &pending.change)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(index: u64) -> Change {
+        Change::Outcome(Outcome { index, ..Outcome::default() })
+    }
+
+    #[test]
+    fn pending_changes_beyond_the_limit_are_dropped_and_counted() {
+        let mut pending = PendingChanges::default();
+        for index in 0..PENDING_MAX as u64 + 3 {
+            pending.push(7, 100, outcome(index));
+        }
+        assert_eq!(pending.lost_count(), 3);
+        assert_eq!(pending.drain_run(7)[0], outcome(3));
+    }
+
+    #[test]
+    fn draining_one_run_keeps_the_changes_of_another() {
+        let mut pending = PendingChanges::default();
+        pending.push(7, 1, outcome(0));
+        pending.push(8, 1, outcome(1));
+        assert_eq!(pending.drain_run(7), [outcome(0)]);
+        assert_eq!(pending.drain_run(8), [outcome(1)]);
+    }
+}

@@ -1,0 +1,113 @@
+//! Applies actions. This is the only match over kinds of commands.
+
+use sim_types::{Action, KindFilter, Parameter, ParameterValue, Reason, Text};
+
+use super::cut::{Ball, Sweep};
+use super::{Grab, Push};
+use crate::frame::Pose;
+use crate::solver::Solver;
+
+/// Effect of an applied action.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Applied {
+    /// The state or a parameter changed, or already was as the action asks.
+    State,
+    /// A grab has a new target. The next keyframe can wait.
+    Target,
+    /// The next step shows the initial state.
+    Reset,
+    /// Nothing changed in the solver: the action concerns the process that steps it.
+    Control(Control),
+}
+
+/// An action for the process that steps a solver.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Control {
+    /// Stop stepping.
+    Pause,
+    /// Go on stepping.
+    Resume,
+    /// Make `count` steps while paused.
+    Step {
+        /// Number of steps.
+        count: u32,
+    },
+    /// Change the pace, in multiples of real time; the value has been checked.
+    TimeScale(f32),
+    /// Replace the scene.
+    Load {
+        /// Name of a built-in scene, or path of a file.
+        scene: Text,
+    },
+}
+
+impl Solver {
+    /// Applies an action at the boundary before the next step.
+    ///
+    /// `client_id` names the sender: only the client that grabbed a particle can move or release
+    /// it.
+    ///
+    /// # Errors
+    /// The action is wrong or has no effect here. A rejected action changes no bit of the state.
+    pub fn apply(&mut self, client_id: u64, action: &Action) -> Result<Applied, Reason> {
+        match *action {
+            Action::Pin { particle } => self.pin(particle)?,
+            Action::Unpin { particle } => self.unpin(particle)?,
+            Action::Grab { particle, target, over_s } => {
+                self.grab(client_id, Grab { particle, target, over_s })?;
+            }
+            Action::Move { particle, target, over_s } => {
+                self.move_grabbed(client_id, Grab { particle, target, over_s })?;
+                return Ok(Applied::Target);
+            }
+            Action::Release { particle } => self.release(client_id, particle)?,
+            Action::Push { center, radius, delta, limit } => {
+                self.push(Push { ball: Ball { center, radius }, delta, limit })?;
+            }
+            Action::Cut { constraint } => self.cut(constraint)?,
+            Action::CutRadius { center, radius } => self.cut_radius(Ball { center, radius })?,
+            Action::CutSegment { from, to, direction } => {
+                self.cut_segment(Sweep { from, to, direction })?;
+            }
+            Action::MoveAnchor { anchor, translation, rotation } => {
+                self.move_anchor(anchor, Pose { translation, rotation })?;
+            }
+            Action::MoveCollider { collider, translation, rotation } => {
+                self.move_collider(collider, Pose { translation, rotation })?;
+            }
+            Action::Set { parameter, value, constraint_kind } => {
+                return self.apply_setting(parameter.as_str(), value, constraint_kind);
+            }
+            Action::Reset => {
+                self.reset();
+                return Ok(Applied::Reset);
+            }
+            Action::Pause => return Ok(Applied::Control(Control::Pause)),
+            Action::Resume => return Ok(Applied::Control(Control::Resume)),
+            Action::Step { count } => return Ok(Applied::Control(Control::Step { count })),
+            Action::Load { scene } => return Ok(Applied::Control(Control::Load { scene })),
+            Action::Unknown { .. } => return Err(Reason::NoEffectHere),
+        }
+        Ok(Applied::State)
+    }
+
+    fn apply_setting(
+        &mut self,
+        parameter: &str,
+        value: ParameterValue,
+        filter: Option<KindFilter>,
+    ) -> Result<Applied, Reason> {
+        let kind = match filter {
+            None => None,
+            Some(KindFilter::Known(kind)) => Some(kind),
+            Some(KindFilter::Unknown) => return Err(Reason::OutOfRange),
+        };
+        self.set(parameter, value, kind)?;
+        match value {
+            ParameterValue::Number(scale) if parameter == Parameter::TimeScale.name() => {
+                Ok(Applied::Control(Control::TimeScale(scale)))
+            }
+            _ => Ok(Applied::State),
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! Cuts: a single constraint, all around a point, or all that cross the path of a cursor.
+
+use glam::{DVec3, Vec3};
+
+use sim_types::{COORDINATE_MAX, Reason, TearCause};
+
+use crate::checks::{check_finite, is_near};
+use crate::constraints::Constraint;
+use crate::solver::Solver;
+
+/// The path of a cursor, extended along the direction of view to a strip that cuts the constraints
+/// that cross it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sweep {
+    /// Previous position of the cursor.
+    pub from: [f32; 3],
+    /// Current position of the cursor.
+    pub to: [f32; 3],
+    /// Direction in which the strip extends, both ways; not 0.
+    pub direction: [f32; 3],
+}
+
+/// All points nearer to the center than the radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ball {
+    /// Center.
+    pub center: [f32; 3],
+    /// Radius, >= 0.
+    pub radius: f32,
+}
+
+impl Solver {
+    /// Tears one constraint.
+    ///
+    /// # Errors
+    /// The constraint is unknown or already torn.
+    pub fn cut(&mut self, constraint: u32) -> Result<(), Reason> {
+        if constraint as usize >= self.constraint_count() {
+            return Err(Reason::UnknownConstraint);
+        }
+        if self.torn.is_torn(constraint) {
+            return Err(Reason::AlreadyTorn);
+        }
+        self.tear(constraint, TearCause::Cut);
+        self.tethers.drop_torn(&self.torn, &mut self.store);
+        Ok(())
+    }
+
+    /// Tears every constraint with an end strictly inside a ball.
+    ///
+    /// # Errors
+    /// A number is not finite or out of range.
+    pub fn cut_radius(&mut self, ball: Ball) -> Result<(), Reason> {
+        self.check_ball(&ball)?;
+        self.tear_all(|a, b| ball.contains(a) || ball.contains(b));
+        Ok(())
+    }
+
+    /// Tears every constraint that crosses a strip. A constraint within the plane of the strip does
+    /// not cross it, and nothing crosses a strip without area.
+    ///
+    /// # Errors
+    /// A number is not finite or out of range, or the direction is 0.
+    pub fn cut_segment(&mut self, sweep: Sweep) -> Result<(), Reason> {
+        let Sweep { from, to, direction } = sweep;
+        for vector in [from, to, direction] {
+            check_finite(&vector)?;
+        }
+        let is_near = is_near(&from) && is_near(&to) && is_near(&direction);
+        let leaves_plane = self.is_planar && (from[2] != 0.0 || to[2] != 0.0);
+        if !is_near || leaves_plane || direction == [0.0; 3] {
+            return Err(Reason::OutOfRange);
+        }
+        let strip = Strip::new(&sweep);
+        self.tear_all(|a, b| strip.is_crossed(a, b));
+        Ok(())
+    }
+
+    pub(crate) fn check_ball(&self, ball: &Ball) -> Result<(), Reason> {
+        check_finite(&ball.center)?;
+        check_finite(&[ball.radius])?;
+        let is_near = is_near(&ball.center);
+        let is_in_plane = !self.is_planar || ball.center[2] == 0.0;
+        let is_size = (0.0..=COORDINATE_MAX).contains(&ball.radius);
+        if is_near && is_in_plane && is_size { Ok(()) } else { Err(Reason::OutOfRange) }
+    }
+
+    /// Tears the constraints whose ends meet a condition, unless they are torn.
+    fn tear_all(&mut self, is_cut: impl Fn(Vec3, Vec3) -> bool) {
+        for index in 0..self.model.constraints.len() {
+            let Constraint { a, b, .. } = self.model.constraints[index];
+            let [a, b] = [a, b].map(|particle| {
+                Vec3::from_array(self.particles.states[particle as usize].position)
+            });
+            #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 constraints")]
+            let index = index as u32;
+            if !self.torn.is_torn(index) && is_cut(a, b) {
+                self.tear(index, TearCause::Cut);
+            }
+        }
+        self.tethers.drop_torn(&self.torn, &mut self.store);
+    }
+}
+
+impl Ball {
+    pub(crate) fn contains(&self, point: Vec3) -> bool {
+        let arm = point - Vec3::from_array(self.center);
+        arm.dot(arm) < self.radius * self.radius
+    }
+}
+
+/// A strip: from a point along one side, and both ways along a direction.
+struct Strip {
+    from: DVec3,
+    /// Normal of the plane of the strip; 0 if the strip has no area.
+    normal: DVec3,
+    /// Component of the side perpendicular to the direction.
+    across: DVec3,
+}
+
+impl Strip {
+    fn new(sweep: &Sweep) -> Self {
+        let vector = |axes: [f32; 3]| Vec3::from_array(axes).as_dvec3();
+        let (from, direction) = (vector(sweep.from), vector(sweep.direction));
+        let side = vector(sweep.to) - from;
+        let across = side - direction * (side.dot(direction) / direction.dot(direction));
+        Self { from, normal: side.cross(direction), across }
+    }
+
+    /// True if the segment from `a` to `b` crosses or touches the strip.
+    fn is_crossed(&self, a: Vec3, b: Vec3) -> bool {
+        let (a, b) = (a.as_dvec3() - self.from, b.as_dvec3() - self.from);
+        let (above, below) = (a.dot(self.normal), b.dot(self.normal));
+        if above * below > 0.0 || above == below {
+            return false;
+        }
+        let crossing = a + (b - a) * (above / (above - below));
+        let share = crossing.dot(self.across);
+        (0.0..=self.across.dot(self.across)).contains(&share)
+    }
+}

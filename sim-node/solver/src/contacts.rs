@@ -1,0 +1,11 @@
+//! Colliders, and the contacts of particles with them.
+
+pub(crate) mod colliders;
+pub(crate) mod contact;
+pub(crate) mod contact_substep;
+pub(crate) mod obstacle;
+pub(crate) mod path;
+pub(crate) mod placed_shape;
+pub(crate) mod solid;
+pub(crate) mod solid_box;
+pub(crate) mod zone;

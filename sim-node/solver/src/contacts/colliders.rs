@@ -1,0 +1,141 @@
+//! Colliders and their motion.
+
+use glam::{DVec3, Quat, Vec3};
+use sim_types::Reason;
+
+use super::placed_shape::PlacedShape;
+use crate::frame::{Frame, angular_velocity, rotation_about};
+use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
+
+/// A collider and its motion.
+#[derive(Debug, Clone)]
+pub(crate) struct Collider {
+    at_load: PlacedShape,
+    pub(crate) restitution: f32,
+    pub(crate) friction: f32,
+    velocity: DVec3,
+    angular_velocity: DVec3,
+    /// Frame that a client has set; it replaces the collider's own motion.
+    pub(crate) moved: Option<Frame>,
+    /// Frame at the start of the running step.
+    start: Frame,
+    /// Frame at the end of the running step.
+    end: Frame,
+    /// Velocity in the running step, or in the last one between two steps.
+    pub(crate) linear: Vec3,
+    /// Angular velocity in rad/s, likewise.
+    pub(crate) angular: Vec3,
+}
+
+/// A collider at its current pose, for drawing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedCollider {
+    /// Shape and pose; a plane's normal and a box's rotation are normalised.
+    pub shape: ColliderGeometry,
+    /// Fraction of the approach speed with which a particle bounces.
+    pub restitution: f32,
+    /// Coefficient of Coulomb friction.
+    pub friction: f32,
+    /// Velocity in the last step, in units per second.
+    pub velocity: [f32; 3],
+    /// Angular velocity in the last step, in rad/s.
+    pub angular_velocity: [f32; 3],
+}
+
+impl Collider {
+    pub(crate) fn new(scene: &SceneCollider) -> Self {
+        Self {
+            at_load: PlacedShape::new(&scene.shape),
+            restitution: scene.restitution,
+            friction: scene.friction,
+            velocity: Vec3::from_array(scene.velocity).as_dvec3(),
+            angular_velocity: Vec3::from_array(scene.angular_velocity).as_dvec3(),
+            moved: None,
+            start: Frame::AT_LOAD,
+            end: Frame::AT_LOAD,
+            linear: Vec3::from_array(scene.velocity),
+            angular: Vec3::from_array(scene.angular_velocity),
+        }
+    }
+
+    /// True if a client may set this frame: bounds do not rotate.
+    pub(crate) fn accepts(&self, frame: &Frame) -> bool {
+        frame.rotation == Quat::IDENTITY || !matches!(self.at_load, PlacedShape::Bounds { .. })
+    }
+
+    /// Moves it to a frame by the end of the next step.
+    pub(crate) fn move_to(&mut self, frame: Frame) -> Result<(), Reason> {
+        if !self.accepts(&frame) {
+            return Err(Reason::OutOfRange);
+        }
+        self.moved = Some(frame);
+        Ok(())
+    }
+
+    /// Places it as after a step that ends at `time_s`, in seconds.
+    pub(crate) fn place(&mut self, time_s: f64) {
+        self.end = self.frame(time_s);
+        self.start = self.end;
+        let is_own = self.moved.is_none();
+        self.linear = if is_own { self.velocity.as_vec3() } else { Vec3::ZERO };
+        self.angular = if is_own { self.angular_velocity.as_vec3() } else { Vec3::ZERO };
+    }
+
+    /// Begins a step that ends at `time_s` and takes `dt`, both in seconds.
+    pub(crate) fn begin_step(&mut self, time_s: f64, dt: f32) {
+        self.start = self.end;
+        self.end = self.frame(time_s);
+        if self.moved.is_some() {
+            self.linear = (self.end.translation - self.start.translation) / dt;
+            self.angular = angular_velocity(self.start.rotation, self.end.rotation, dt);
+        }
+    }
+
+    /// Frame by its own motion, or the one that a client has set.
+    fn frame(&self, time_s: f64) -> Frame {
+        if let Some(moved) = self.moved {
+            return moved;
+        }
+        let speed = self.angular_velocity.dot(self.angular_velocity).sqrt();
+        if speed == 0.0 {
+            return Frame { translation: (self.velocity * time_s).as_vec3(), ..Frame::AT_LOAD };
+        }
+        let axis = self.angular_velocity * (1.0 / speed);
+        Frame::new(self.velocity * time_s, rotation_about(axis, speed * time_s))
+    }
+
+    /// True if its pose changes in the running step.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.start != self.end
+    }
+
+    /// Pose and velocity after the last step.
+    pub(crate) fn placed(&self) -> PlacedCollider {
+        PlacedCollider {
+            shape: self.shape_at(1.0).to_scene(),
+            restitution: self.restitution,
+            friction: self.friction,
+            velocity: self.linear.to_array(),
+            angular_velocity: self.angular.to_array(),
+        }
+    }
+
+    /// Shape after a fraction of the running step.
+    pub(crate) fn shape_at(&self, share: f32) -> PlacedShape {
+        self.at_load.moved(&self.frame_at(share))
+    }
+
+    /// Center of rotation after a fraction of the running step.
+    pub(crate) fn pivot(&self, share: f32) -> Vec3 {
+        self.at_load.center() + self.frame_at(share).translation
+    }
+
+    fn frame_at(&self, share: f32) -> Frame {
+        match share {
+            _ if !self.is_moving() => self.end,
+            0.0 => self.start,
+            1.0 => self.end,
+            share => self.start.towards(&self.end, share),
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Obstacles: colliders as the particles of one substep meet them.
+
+use glam::Vec3;
+
+use super::colliders::Collider;
+use super::contact_substep::{ContactSubstep, Interval};
+use super::path::SubstepPath;
+use super::solid::{Solid, solids};
+use super::zone::Zone;
+use crate::scene::definition::collider::SceneCollider;
+
+/// A collider in one substep, or one face of bounds.
+#[derive(Debug, Clone)]
+pub(crate) struct Obstacle {
+    pub(crate) surface: Surface,
+    pub(crate) solid: Solid,
+    pub(crate) zone: Zone,
+}
+
+/// Motion and material of a collider in one substep.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surface {
+    linear: Vec3,
+    angular: Vec3,
+    pivot: Vec3,
+    pub(crate) restitution: f32,
+    pub(crate) friction: f32,
+    /// Length of the substep in seconds.
+    h: f32,
+    /// Approaches up to this distance do not bounce: 2 |g| h^2, twice what gravity adds in a substep.
+    pub(crate) rest_distance: f32,
+}
+
+/// Largest number of obstacles that a collider makes: bounds have six faces.
+pub(crate) const OBSTACLES_PER_COLLIDER: usize = 6;
+
+/// Replaces the obstacles by those of a substep, in the order of the scene.
+pub(crate) fn place_obstacles(
+    obstacles: &mut Vec<Obstacle>,
+    colliders: &[Collider],
+    substep: &ContactSubstep,
+) {
+    obstacles.clear();
+    for collider in colliders {
+        let surface = Surface::new(collider, substep);
+        for solid in solids(collider, substep).into_iter().flatten() {
+            let zone = solid.zone();
+            obstacles.push(Obstacle { surface, solid, zone });
+        }
+    }
+}
+
+/// Depth of a position inside a collider at load. None if it is outside, or inside by no more than
+/// rounding.
+pub(crate) fn depth_at_load(
+    scene: &SceneCollider,
+    position: [f32; 3],
+    is_planar: bool,
+) -> Option<f32> {
+    let interval = Interval { start: 0.0, end: 0.0 };
+    let substep = ContactSubstep { h: 1.0, rest_speed: 0.0, interval, is_planar };
+    let path = SubstepPath { start: Vec3::from_array(position), displacement: Vec3::ZERO };
+    let solids = solids(&Collider::new(scene), &substep);
+    let mut hits = solids.iter().flatten().filter_map(|solid| Some((solid, solid.hit(&path)?)));
+    let (_, hit) = hits.find(|(solid, hit)| hit.depth > rounding(&path, solid))?;
+    Some(hit.depth)
+}
+
+/// Bound on the rounding of a depth after a few operations on the coordinates of a path and a solid.
+pub(crate) fn rounding(path: &SubstepPath, solid: &Solid) -> f32 {
+    let size = path.start.abs().element_sum() + path.displacement.abs().element_sum();
+    4.0 * f32::EPSILON * (size + solid.reach())
+}
+
+impl Surface {
+    fn new(collider: &Collider, substep: &ContactSubstep) -> Self {
+        Self {
+            linear: collider.linear,
+            angular: collider.angular,
+            pivot: collider.pivot(substep.interval.end),
+            restitution: collider.restitution,
+            friction: collider.friction,
+            h: substep.h,
+            rest_distance: substep.rest_speed * substep.h,
+        }
+    }
+
+    /// Displacement of the collider's material at a point in the substep.
+    pub(crate) fn displacement_at(&self, point: Vec3) -> Vec3 {
+        (self.linear + self.angular.cross(point - self.pivot)) * self.h
+    }
+}

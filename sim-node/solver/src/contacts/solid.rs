@@ -1,0 +1,161 @@
+//! Solids: where a path through a collider leaves it.
+
+use glam::Vec3;
+
+use super::colliders::Collider;
+use super::contact_substep::ContactSubstep;
+use super::path::SubstepPath;
+use super::placed_shape::PlacedShape;
+use super::solid_box::{BoxPose, FaceHit, SolidBox};
+use super::zone::Zone;
+
+/// The point at which a particle leaves a collider.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Hit {
+    /// Unit vector out of the collider.
+    pub(crate) normal: Vec3,
+    /// Depth of the particle inside the collider, along the normal, > 0.
+    pub(crate) depth: f32,
+}
+
+/// A convex solid, or a half-space, at its pose at the end of a substep.
+#[derive(Debug, Clone)]
+pub(crate) enum Solid {
+    /// The solid lies where normal x < offset.
+    HalfSpace {
+        normal: Vec3,
+        offset: f32,
+    },
+    Sphere {
+        center: Vec3,
+        radius: f32,
+    },
+    Capsule {
+        ends: [Vec3; 2],
+        radius: f32,
+    },
+    /// `before` is the pose at the start of the substep.
+    Box {
+        solid: SolidBox,
+        now: BoxPose,
+        before: BoxPose,
+    },
+}
+
+/// Returns the solids of a collider: one half-space for each face of bounds, one solid for any
+/// other shape.
+pub(crate) fn solids(collider: &Collider, substep: &ContactSubstep) -> [Option<Solid>; 6] {
+    let one = |solid| [Some(solid), None, None, None, None, None];
+    match collider.shape_at(substep.interval.end) {
+        PlacedShape::Plane { normal, offset } => one(Solid::HalfSpace { normal, offset }),
+        PlacedShape::Sphere { center, radius } => one(Solid::Sphere { center, radius }),
+        PlacedShape::Capsule { a, b, radius } => one(Solid::Capsule { ends: [a, b], radius }),
+        PlacedShape::Box { center, half_extents, rotation } => one(Solid::Box {
+            solid: SolidBox::new(half_extents.to_array(), substep.axis_count(), center),
+            now: BoxPose::new(center, rotation),
+            before: match collider.shape_at(substep.interval.start) {
+                PlacedShape::Box { center, rotation, .. } => BoxPose::new(center, rotation),
+                _ => BoxPose::new(center, rotation),
+            },
+        }),
+        PlacedShape::Bounds { min, max } => {
+            let faces = |axis: usize, normal: Vec3| {
+                let low = Solid::HalfSpace { normal, offset: min[axis] };
+                let high = Solid::HalfSpace { normal: -normal, offset: -max[axis] };
+                if axis < substep.axis_count() { [Some(low), Some(high)] } else { [None, None] }
+            };
+            let [a, b] = faces(0, Vec3::X);
+            let [c, d] = faces(1, Vec3::Y);
+            let [e, f] = faces(2, Vec3::Z);
+            [a, b, c, d, e, f]
+        }
+    }
+}
+
+impl Solid {
+    /// Finds where a particle leaves the solid, if its path ends inside or, for a box, passes
+    /// through.
+    #[inline(always)]
+    pub(crate) fn hit(&self, path: &SubstepPath) -> Option<Hit> {
+        match self {
+            Self::HalfSpace { normal, offset } => hit_half_space(path, *normal, *offset),
+            Self::Sphere { center, radius } => hit_sphere(path, *center, *radius, Vec3::Y),
+            Self::Capsule { ends, radius } => hit_capsule(path, *ends, *radius),
+            Self::Box { solid, now, before } => {
+                let (start, end) = (before.local(path.start), now.local_end(path));
+                let FaceHit { face, depth } = solid.hit(start.to_array(), end.to_array())?;
+                Some(Hit { normal: now.face_normal(face), depth })
+            }
+        }
+    }
+
+    /// Zone outside of which no path hits the solid.
+    pub(crate) fn zone(&self) -> Zone {
+        let reach = self.reach();
+        match self {
+            Self::HalfSpace { normal, offset } => Zone::Below { normal: *normal, offset: *offset },
+            Self::Sphere { center, radius } => {
+                Zone::around([*center; 2], Vec3::splat(*radius), reach)
+            }
+            Self::Capsule { ends, radius } => Zone::around(*ends, Vec3::splat(*radius), reach),
+            Self::Box { solid, now, before } => {
+                let extents = Vec3::from_array(solid.extents);
+                // A box that turns stays within its bounding sphere.
+                let is_turned = now.is_turned || before.is_turned;
+                let mut distance = if is_turned { Vec3::splat(extents.length()) } else { extents };
+                if solid.axis_count == 2 {
+                    distance.z = f32::INFINITY;
+                }
+                Zone::around([now.center, before.center], distance, reach)
+            }
+        }
+    }
+
+    /// Magnitude of its coordinates, which bounds their rounding.
+    pub(crate) fn reach(&self) -> f32 {
+        match self {
+            Self::HalfSpace { offset, .. } => offset.abs(),
+            Self::Sphere { center, radius } => center.abs().element_sum() + radius,
+            Self::Capsule { ends: [a, b], radius } => {
+                a.abs().element_sum() + b.abs().element_sum() + radius
+            }
+            Self::Box { solid, .. } => solid.reach,
+        }
+    }
+}
+
+/// The displacement is added last: near the surface the rest is exact, so the displacement keeps
+/// its digits.
+#[inline(always)]
+fn hit_half_space(path: &SubstepPath, normal: Vec3, offset: f32) -> Option<Hit> {
+    let height = (normal.dot(path.start) - offset) + normal.dot(path.displacement);
+    (height < 0.0).then_some(Hit { normal, depth: -height })
+}
+
+/// `fallback` is the normal at the exact center.
+fn hit_sphere(path: &SubstepPath, center: Vec3, radius: f32, fallback: Vec3) -> Option<Hit> {
+    let arm = (path.start - center) + path.displacement;
+    let square = arm.dot(arm);
+    // NaN compares false and touches nothing.
+    let is_inside = square < radius * radius;
+    if !is_inside {
+        return None;
+    }
+    let distance = square.sqrt();
+    let normal = if square < f32::MIN_POSITIVE { fallback } else { arm / distance };
+    (distance < radius).then_some(Hit { normal, depth: radius - distance })
+}
+
+#[inline(never)]
+fn hit_capsule(path: &SubstepPath, [a, b]: [Vec3; 2], radius: f32) -> Option<Hit> {
+    let axis = b - a;
+    let square = axis.dot(axis);
+    let along =
+        if square > 0.0 { (path.start + path.displacement - a).dot(axis) / square } else { 0.0 };
+    let share = along.clamp(0.0, 1.0);
+    // Perpendicular to the axis, and within the plane of a 2-D scene.
+    let across = Vec3::new(-axis.y, axis.x, 0.0);
+    let has_side = across.dot(across) >= f32::MIN_POSITIVE;
+    let fallback = if has_side { across.normalize() } else { Vec3::X };
+    hit_sphere(path, a + axis * share, radius, fallback)
+}

@@ -1,0 +1,264 @@
+//! Keyframes: the state beside the particles of a snapshot.
+
+mod check;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use glam::{Quat, Vec3};
+use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
+
+use crate::constraints::tethers::{TetherBasis, Tethers};
+use crate::frame::{Frame, Pose};
+use crate::parameters::Parameters;
+use crate::solver::{Due, Solver};
+use crate::state::hash::state_hash;
+use crate::state::particles::Particle;
+use crate::step::drive::ActiveGrab;
+
+/// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
+const KEYFRAME_VERSION: u32 = 2;
+
+/// The state beside the particles of a snapshot. Both together are the complete state after a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Keyframe {
+    /// True if the node was paused. The solver only carries it: its own steps never pause.
+    pub paused: bool,
+    scene_step: u64,
+    /// Masses of fixed particles when they are free, ascending by particle.
+    fixed: Vec<FixedParticle>,
+    grabs: Vec<ActiveGrab>,
+    /// Torn constraints in the order of tearing, and the cause of each tear.
+    torn: Vec<u32>,
+    tear_causes: Vec<TearCause>,
+    /// State from which the tethers were last derived.
+    tethers: TetherBasis,
+    parameters: Parameters,
+    /// Anchors and colliders that clients have moved, ascending by index.
+    moved_anchors: Vec<Moved>,
+    moved_colliders: Vec<Moved>,
+}
+
+/// An anchor or a collider that a client has moved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Moved {
+    index: u32,
+    translation: [f32; 3],
+    /// A unit quaternion.
+    rotation: [f32; 4],
+}
+
+impl Moved {
+    fn all<'a>(frames: impl Iterator<Item = &'a Option<Frame>>) -> Vec<Self> {
+        let moved = (0_u32..).zip(frames).filter_map(|(index, frame)| Some((index, (*frame)?)));
+        let moved = moved.map(|(index, frame)| {
+            let Pose { translation, rotation } = frame.to_pose();
+            Self { index, translation, rotation }
+        });
+        moved.collect()
+    }
+
+    /// The frame, bit for bit: the rotation is normalised already.
+    fn frame(&self) -> Frame {
+        Frame {
+            translation: Vec3::from_array(self.translation),
+            rotation: Quat::from_array(self.rotation),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct FixedParticle {
+    particle: u32,
+    base_inverse_mass: f32,
+}
+
+/// Error of decoding a keyframe.
+#[derive(Debug, Error)]
+pub enum KeyframeError {
+    /// Fewer than four bytes.
+    #[error("a keyframe of {0} bytes is too short")]
+    TooShort(usize),
+    /// Bytes are left after the last field.
+    #[error("{0} bytes follow the end of the keyframe")]
+    TooLong(usize),
+    /// Another version wrote it.
+    #[error("keyframe version {found}, this program reads version {KEYFRAME_VERSION}")]
+    Version {
+        /// The version in the bytes.
+        found: u32,
+    },
+    /// The bytes do not decode.
+    #[error("damaged keyframe: {0}")]
+    Damaged(#[from] postcard::Error),
+}
+
+/// Error of restoring a snapshot and a keyframe.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum RestoreError {
+    /// The snapshot belongs to another scene.
+    #[error("the snapshot has {found} particles, the scene {expected}")]
+    ParticleCount {
+        /// Number of particles in the scene.
+        expected: usize,
+        /// Number of particles in the snapshot.
+        found: usize,
+    },
+    /// A particle has a state that no step produces.
+    #[error("particle {particle} of the snapshot is invalid: {what}")]
+    Particle {
+        /// Index of the particle.
+        particle: usize,
+        /// The fault.
+        what: &'static str,
+    },
+    /// The keyframe belongs to another snapshot.
+    #[error("the keyframe does not belong to the snapshot: {what}")]
+    Mismatch {
+        /// The difference.
+        what: &'static str,
+    },
+}
+
+impl Keyframe {
+    /// Returns the torn constraints, in the order of tearing.
+    pub fn torn(&self) -> &[u32] {
+        &self.torn
+    }
+
+    /// Returns the parameters of a scene that uses `method`, with a time scale of 1: the pace belongs to
+    /// the node and is not part of the state.
+    pub fn parameter_values(&self, method: Method) -> ParameterValues {
+        self.parameters.values(method)
+    }
+
+    /// Returns the cause of each tear in [`Self::torn`].
+    pub fn tear_causes(&self) -> &[TearCause] {
+        &self.tear_causes
+    }
+
+    /// Encodes the keyframe: its version as a little-endian u32, then the fields in postcard's
+    /// encoding.
+    ///
+    /// # Panics
+    /// Never: the fields always have an encoding.
+    #[allow(clippy::expect_used, reason = "encoding numbers into a growing Vec cannot fail")]
+    pub fn encode(&self) -> Vec<u8> {
+        let bytes = KEYFRAME_VERSION.to_le_bytes().to_vec();
+        postcard::to_extend(self, bytes).expect("numbers have an encoding")
+    }
+
+    /// Decodes the bytes of [`Self::encode`].
+    ///
+    /// # Errors
+    /// Another version wrote the bytes, or they are damaged.
+    pub fn decode(bytes: &[u8]) -> Result<Self, KeyframeError> {
+        let Some((version, fields)) = bytes.split_first_chunk() else {
+            return Err(KeyframeError::TooShort(bytes.len()));
+        };
+        let found = u32::from_le_bytes(*version);
+        if found != KEYFRAME_VERSION {
+            return Err(KeyframeError::Version { found });
+        }
+        match postcard::take_from_bytes(fields)? {
+            (keyframe, []) => Ok(keyframe),
+            (_, rest) => Err(KeyframeError::TooLong(rest.len())),
+        }
+    }
+}
+
+impl Solver {
+    /// Returns the state beside the particles after the last step. Call it at a boundary, before any
+    /// command.
+    pub fn keyframe(&self) -> Keyframe {
+        let fixed = (0_u32..)
+            .zip(&self.particles.base_inverse_masses)
+            .filter(|(particle, _)| self.is_fixed(*particle))
+            .map(|(particle, base)| FixedParticle { particle, base_inverse_mass: *base })
+            .collect();
+        Keyframe {
+            paused: false,
+            scene_step: self.scene_step,
+            fixed,
+            grabs: self.grabs.clone(),
+            torn: self.torn().to_vec(),
+            tear_causes: self.tear_causes().to_vec(),
+            tethers: self.tethers.basis.clone(),
+            parameters: self.parameters,
+            moved_anchors: Moved::all(self.anchors.moved.iter()),
+            moved_colliders: Moved::all(self.colliders.iter().map(|one| &one.moved)),
+        }
+    }
+
+    /// Returns the largest size of an encoded keyframe of this scene, in bytes.
+    pub fn keyframe_size_bytes_max(&self) -> usize {
+        // Integers have variable length: a u32 at most 5 bytes, a u64 or a length at most 10.
+        let (fixed, grab, root) = (5 + 4, 5 + 10 + 12 + 5, 5);
+        let (torn, cause, basis, moved) = (5, 5, 5, 5 + 12 + 16);
+        let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 8 * 5;
+        let head = 4 + 1 + 10 + 8 * 10 + parameters;
+        head + self.particle_count() * (fixed + grab + root)
+            + self.constraint_count() * (torn + cause + basis)
+            + (self.anchor_count() + self.collider_count()) * moved
+    }
+
+    /// Restores the state of a snapshot and the keyframe of the same step.
+    ///
+    /// # Errors
+    /// They are not a state of this scene. Then nothing changes.
+    pub fn restore(
+        &mut self,
+        particles: &[Particle],
+        keyframe: &Keyframe,
+    ) -> Result<(), RestoreError> {
+        self.check(particles, keyframe)?;
+        self.reset();
+        for (index, particle) in particles.iter().enumerate() {
+            self.particles.states[index] = *particle;
+            if particle.inverse_mass != 0.0 {
+                self.particles.base_inverse_masses[index] = particle.inverse_mass;
+            }
+        }
+        for one in &keyframe.fixed {
+            self.particles.base_inverse_masses[one.particle as usize] = one.base_inverse_mass;
+        }
+        self.grabs.extend_from_slice(&keyframe.grabs);
+        self.scene_step = keyframe.scene_step;
+        self.is_restored = false;
+        self.parameters = keyframe.parameters;
+        self.restore_constraints(keyframe);
+        self.restore_frames(keyframe);
+        self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());
+        Ok(())
+    }
+
+    fn restore_constraints(&mut self, keyframe: &Keyframe) {
+        self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
+        self.due = Due::default();
+        if self.settings.tethers {
+            let basis = keyframe.tethers.clone();
+            self.tethers.detach(&mut self.store);
+            self.tethers = Tethers::new(&self.model, &self.parameters, basis);
+        }
+        self.configure();
+        self.tethers.attach(&mut self.store, &self.particles);
+        self.tethers.drop_torn(&self.torn, &mut self.store);
+    }
+
+    fn restore_frames(&mut self, keyframe: &Keyframe) {
+        for moved in &keyframe.moved_anchors {
+            self.anchors.moved[moved.index as usize] = Some(moved.frame());
+        }
+        for moved in &keyframe.moved_colliders {
+            self.colliders[moved.index as usize].moved = Some(moved.frame());
+        }
+        let time_s = self.scene_time_s();
+        for collider in &mut self.colliders {
+            collider.place(time_s);
+        }
+    }
+
+    fn is_fixed(&self, particle: u32) -> bool {
+        self.particles.states[particle as usize].flags & ParticleFlags::ALL != 0
+    }
+}

@@ -1,0 +1,149 @@
+//! Checks that a snapshot and a keyframe are a state of a scene. Both come from outside.
+
+use sim_types::ParticleFlags;
+
+use super::{Keyframe, Moved, RestoreError};
+use crate::checks::is_near;
+use crate::constraints::tethers::TetherBasis;
+use crate::frame::{Frame, Pose};
+use crate::solver::Solver;
+use crate::state::particles::Particle;
+use crate::step::drive::GRAB_OVER_S_MAX;
+
+/// Latest step of a scene. Up to it, f64 counts steps exactly.
+const SCENE_STEP_MAX: u64 = 1 << 53;
+
+impl Solver {
+    pub(super) fn check(
+        &self,
+        particles: &[Particle],
+        keyframe: &Keyframe,
+    ) -> Result<(), RestoreError> {
+        let (expected, found) = (self.particle_count(), particles.len());
+        if expected != found {
+            return Err(RestoreError::ParticleCount { expected, found });
+        }
+        for (particle, state) in particles.iter().enumerate() {
+            self.check_particle(particle, state)
+                .map_err(|what| RestoreError::Particle { particle, what })?;
+        }
+        check_holds(particles, keyframe)
+            .and_then(|()| self.check_keyframe(keyframe))
+            .map_err(|what| RestoreError::Mismatch { what })
+    }
+
+    fn check_particle(&self, index: usize, particle: &Particle) -> Result<(), &'static str> {
+        let is_fixed = particle.flags & ParticleFlags::ALL != 0;
+        if !particle.position.iter().chain(&particle.velocity).all(|number| number.is_finite()) {
+            return Err("a number is not finite");
+        }
+        if particle.flags & !ParticleFlags::ALL != 0 {
+            return Err("its flags are unknown to this version");
+        }
+        if (particle.flags ^ self.particles.states[index].flags) & ParticleFlags::ANCHORED != 0 {
+            return Err("the scene has other anchored particles");
+        }
+        if is_fixed != (particle.inverse_mass == 0.0) {
+            return Err("its flags and its inverse mass contradict each other");
+        }
+        if self.is_planar && (particle.position[2] != 0.0 || particle.velocity[2] != 0.0) {
+            return Err("it lies outside of the plane of a scene of 2 dimensions");
+        }
+        if is_fixed || is_inverse_mass(particle.inverse_mass) {
+            Ok(())
+        } else {
+            Err("its inverse mass is not a positive number")
+        }
+    }
+
+    /// Checks the keyframe against the scene alone.
+    fn check_keyframe(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
+        let (particles, constraints) = (self.particle_count(), self.constraint_count());
+        let mut all_torn = keyframe.torn.clone();
+        all_torn.sort_unstable();
+        if !is_ascending_below(&all_torn, constraints) {
+            return Err("a torn constraint is unknown or listed twice");
+        }
+        if keyframe.tear_causes.len() != keyframe.torn.len() {
+            return Err("torn constraints and causes differ in number");
+        }
+        let TetherBasis { roots, torn } = &keyframe.tethers;
+        let is_torn = |index: &u32| all_torn.binary_search(index).is_ok();
+        if !is_ascending_below(roots, particles)
+            || !is_ascending_below(torn, constraints)
+            || !torn.iter().all(is_torn)
+        {
+            return Err("its tethers belong to another scene");
+        }
+        if !keyframe.parameters.is_valid(self.context()) {
+            return Err("a parameter is out of its range");
+        }
+        self.check_moved(&keyframe.moved_anchors, self.anchor_count())?;
+        self.check_moved(&keyframe.moved_colliders, self.collider_count())?;
+        let moved = keyframe.moved_colliders.iter();
+        for (collider, moved) in moved.map(|one| (&self.colliders[one.index as usize], one)) {
+            if !collider.accepts(&moved.frame()) {
+                return Err("bounds are rotated");
+            }
+        }
+        self.check_counters(keyframe)
+    }
+
+    fn check_moved(&self, all: &[Moved], count: usize) -> Result<(), &'static str> {
+        let indices: Vec<_> = all.iter().map(|one| one.index).collect();
+        if !is_ascending_below(&indices, count) {
+            return Err("a moved anchor or collider is unknown");
+        }
+        let is_frame = |moved: &Moved| {
+            let pose = Pose { translation: moved.translation, rotation: moved.rotation };
+            Frame::check(&pose, self.context()).is_ok() && moved.frame().is_unit()
+        };
+        if all.iter().all(is_frame) {
+            Ok(())
+        } else {
+            Err("an anchor or a collider is out of range")
+        }
+    }
+
+    fn check_counters(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
+        let steps_max = self.grab_steps(GRAB_OVER_S_MAX);
+        if keyframe.grabs.iter().any(|grab| grab.steps_left > steps_max) {
+            return Err("a grab exceeds the longest duration");
+        }
+        if keyframe.scene_step > SCENE_STEP_MAX {
+            return Err("its scene step is too large");
+        }
+        Ok(())
+    }
+}
+
+/// True if the indices ascend strictly, all below a limit.
+fn is_ascending_below(indices: &[u32], limit: usize) -> bool {
+    indices.windows(2).all(|pair| pair[0] < pair[1])
+        && indices.last().is_none_or(|last| (*last as usize) < limit)
+}
+
+fn is_inverse_mass(number: f32) -> bool {
+    number.is_finite() && number > 0.0
+}
+
+/// Checks that the snapshot and the keyframe agree on fixed and grabbed particles.
+fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'static str> {
+    let with = |flags: u32| {
+        let indices = (0_u32..).zip(particles);
+        indices.filter(move |(_, one)| one.flags & flags != 0).map(|(index, _)| index)
+    };
+    if !with(ParticleFlags::ALL).eq(keyframe.fixed.iter().map(|one| one.particle)) {
+        return Err("their fixed particles differ");
+    }
+    if !with(ParticleFlags::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
+        return Err("their grabbed particles differ");
+    }
+    if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {
+        return Err("a mass is not a positive number");
+    }
+    if !keyframe.grabs.iter().all(|grab| is_near(&grab.target)) {
+        return Err("a target is out of range");
+    }
+    Ok(())
+}

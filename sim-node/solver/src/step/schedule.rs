@@ -1,0 +1,124 @@
+//! The stages that a sheet or the graph runs in a pass.
+
+use super::stage::Stage;
+use crate::constraints::fields::Pass;
+
+/// A stage, and the constraint group on which it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ScheduledStage {
+    pub(crate) stage: Stage,
+    /// Group of a grouped stage, 0 for others: half of a family in a sheet, a group of the graph.
+    pub(crate) group: usize,
+    /// In a sheet, the number of rows from the first particle of a constraint to the second.
+    pub(crate) reach: usize,
+    /// In a sheet, the number of rows by which the stage follows the first stage.
+    pub(crate) lag: usize,
+}
+
+/// Stages that run only in scenes that need them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct OptionalStages {
+    pub(crate) limit_stretch: bool,
+    pub(crate) tether: bool,
+    pub(crate) contact: bool,
+}
+
+impl OptionalStages {
+    fn includes(self, stage: Stage, pass: Pass) -> bool {
+        match stage {
+            Stage::Predict => pass.is_first(),
+            Stage::Project => true,
+            Stage::LimitStretch => pass.is_last() && self.limit_stretch,
+            Stage::Tether => pass.is_last() && self.tether,
+            Stage::Contact => pass.is_last() && self.contact,
+            Stage::Advance => pass.is_last(),
+            Stage::Drive | Stage::Wind | Stage::Tear | Stage::Freeze | Stage::Hash => false,
+        }
+    }
+}
+
+/// The stages of each pass of a substep, in order.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Schedule {
+    /// Passes differ only in being the first, the last, both, or neither.
+    passes: [Vec<ScheduledStage>; 4],
+}
+
+impl Schedule {
+    /// Replaces the schedule. `reaches` has one entry for each constraint group.
+    pub(crate) fn rebuild(
+        &mut self,
+        optional: OptionalStages,
+        reaches: &(impl Iterator<Item = usize> + Clone),
+    ) {
+        for pass in Pass::all(3).chain(Pass::all(1)) {
+            let mut lag = 0;
+            let stages = &mut self.passes[place(pass)];
+            stages.clear();
+            for stage in
+                Stage::OF_SUBSTEP.into_iter().filter(|stage| optional.includes(*stage, pass))
+            {
+                if !stage.is_grouped() {
+                    stages.push(ScheduledStage { stage, group: 0, reach: 0, lag });
+                    continue;
+                }
+                for (group, reach) in reaches.clone().enumerate() {
+                    lag += reach;
+                    stages.push(ScheduledStage { stage, group, reach, lag });
+                }
+            }
+        }
+    }
+
+    /// The stages of a pass.
+    pub(crate) fn of_pass(&self, pass: Pass) -> &[ScheduledStage] {
+        &self.passes[place(pass)]
+    }
+}
+
+fn place(pass: Pass) -> usize {
+    usize::from(pass.is_first()) + 2 * usize::from(pass.is_last())
+}
+
+#[cfg(test)]
+mod tests {
+    //! A schedule against the list of stages.
+    use super::*;
+
+    fn stages(schedule: &Schedule, pass: Pass) -> Vec<(Stage, usize, usize)> {
+        let of_pass = schedule.of_pass(pass).iter();
+        of_pass.map(|one| (one.stage, one.group, one.lag)).collect()
+    }
+
+    #[test]
+    fn passes_run_the_stages_in_order_once_in_a_substep() {
+        let mut schedule = Schedule::default();
+        let optional = OptionalStages { limit_stretch: true, tether: true, contact: true };
+        schedule.rebuild(optional, &[1, 0].into_iter());
+        let project = |lag: usize| [(Stage::Project, 0, lag + 1), (Stage::Project, 1, lag + 1)];
+        let end = |lag: usize| {
+            let limit = |group| (Stage::LimitStretch, group, lag + 1);
+            let particle = |stage| (stage, 0, lag + 1);
+            let [tether, contact, advance] =
+                [Stage::Tether, Stage::Contact, Stage::Advance].map(particle);
+            vec![limit(0), limit(1), tether, contact, advance]
+        };
+        let begin = vec![(Stage::Predict, 0, 0)];
+        let expected = |parts: &[&[(Stage, usize, usize)]]| parts.concat();
+        let [first, middle, last] = [0, 1, 2].map(|index| Pass { index, count: 3 });
+        assert_eq!(stages(&schedule, first), expected(&[&begin, &project(0)]));
+        assert_eq!(stages(&schedule, middle), expected(&[&project(0)]));
+        assert_eq!(stages(&schedule, last), expected(&[&project(0), &end(1)]));
+        let only = Pass { index: 0, count: 1 };
+        assert_eq!(stages(&schedule, only), expected(&[&begin, &project(0), &end(1)]));
+    }
+
+    #[test]
+    fn a_scene_without_limits_tethers_and_colliders_skips_their_stages() {
+        let mut schedule = Schedule::default();
+        schedule.rebuild(OptionalStages::default(), &std::iter::once(0));
+        let only = Pass { index: 0, count: 1 };
+        let expected = [Stage::Predict, Stage::Project, Stage::Advance].map(|stage| (stage, 0, 0));
+        assert_eq!(stages(&schedule, only), expected);
+    }
+}

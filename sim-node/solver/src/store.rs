@@ -1,0 +1,369 @@
+//! The particles and constraints of a scene in the form that a substep uses: sheets in rows, the
+//! rest as a graph. The state is unpacked from the published particles at the start of a step, and
+//! packed again at the end.
+
+mod graph;
+mod layout;
+mod patch;
+mod publish;
+mod survey;
+mod workers;
+
+use graph::Graph;
+use graph::block::BLOCK_PARTICLES;
+use layout::Layout;
+pub(crate) use layout::{Location, SceneFields};
+use patch::Patch;
+use survey::Survey;
+use workers::Workers;
+
+use crate::constraints::builder::ConstraintBuilder;
+use crate::constraints::column_writer::ColumnWriter;
+use crate::constraints::families::{Family, Sheet};
+use crate::constraints::fields::{ConstraintFields, Pass};
+use crate::constraints::order::ProjectionOrder;
+use crate::constraints::parameters::ConstraintParameters;
+use crate::constraints::projection::TearMark;
+use crate::kernels::Kernels;
+use crate::scene::model::Model;
+use crate::state::particles::Particle;
+use crate::step::substep::SubstepInputs;
+
+/// Everything that a substep moves.
+#[derive(Debug, Clone)]
+pub(crate) struct ParticleStore {
+    workers: Workers,
+    graph: Graph,
+    patches: Vec<Patch>,
+    /// Sheets of the patches, ascending.
+    sheets: Vec<Sheet>,
+    layout: Layout,
+    is_allocated: bool,
+    /// Properties of the constraints with the current parameters.
+    survey: Survey,
+    /// By constraint: where its parameters are.
+    locations: Vec<Location>,
+    /// Largest number of particles in a block; 0 in scenes without colliders.
+    contact_count: usize,
+}
+
+/// Effect of a change of parameters on the locations of particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[must_use]
+pub(crate) enum Configured {
+    /// Everything stays in place.
+    InPlace,
+    /// Particles have new locations, and no tethers.
+    Moved,
+}
+
+impl ParticleStore {
+    pub(crate) fn new(model: &Model, order: &ProjectionOrder, kernels: Kernels) -> Self {
+        let is_structured = kernels != Kernels::Reference && order.independent_count > 0;
+        let sheets = if is_structured { pure_sheets(model) } else { Vec::new() };
+        let mut locations = vec![Location::default(); model.constraints.len()];
+        let graph = Graph::new(model, order, loose_particles(model, &sheets), &mut locations);
+        let families = families_of(model, &sheets);
+        let patches =
+            sheets.iter().zip(&families).map(|(sheet, families)| Patch::new(*sheet, families));
+        let mut store = Self {
+            workers: Workers::new(kernels, 1),
+            graph,
+            patches: patches.collect(),
+            sheets,
+            layout: Layout::default(),
+            is_allocated: false,
+            survey: Survey::default(),
+            locations,
+            contact_count: 0,
+        };
+        store.locate_constraints(model);
+        store
+    }
+
+    /// Sets the parameters of all constraints. Torn ones stay inactive. Allocates only fields that
+    /// are not in memory yet.
+    pub(crate) fn configure(
+        &mut self,
+        builder: &ConstraintBuilder<'_>,
+        scene: SceneFields,
+        is_torn: &[bool],
+    ) -> Configured {
+        self.survey.restart(self.patches.len());
+        for (constraint, location) in (0_u32..).zip(&self.locations) {
+            let family = builder.model.families[constraint as usize].map(Family::from_group);
+            let place = location.sheet().zip(family);
+            self.survey.observe(&builder.build(constraint), place);
+        }
+        let used = self.survey.fields(builder.pass_count());
+        let configured = self.use_fields(builder.model, used, scene);
+        for (constraint, is_torn) in (0_u32..).zip(is_torn) {
+            if *is_torn {
+                self.set_parameters(constraint, &ConstraintParameters::INACTIVE);
+            } else {
+                self.set_parameters(constraint, &builder.build(constraint));
+            }
+        }
+        configured
+    }
+
+    /// Sets the limits of all constraints, when nothing else has changed since
+    /// [`Self::configure`]. Torn ones stay inactive.
+    pub(crate) fn configure_limits(
+        &mut self,
+        builder: &ConstraintBuilder<'_>,
+        scene: SceneFields,
+        is_torn: &[bool],
+    ) -> Configured {
+        let possible = builder.possible_limit_fields();
+        let possible = ConstraintFields { multipliers: possible.tear_multipliers, ..possible };
+        if !self.layout.extended(possible, scene).fits(&self.layout) {
+            return self.configure(builder, scene, is_torn);
+        }
+        self.survey.restart_limits();
+        for (constraint, is_torn) in (0_u32..).zip(is_torn) {
+            let limits = builder.limit_lengths(constraint);
+            self.survey.observe_limits(&limits);
+            if !is_torn {
+                let location = self.locations[constraint as usize];
+                self.writer(location).set_limits(location.index(), &limits);
+            }
+        }
+        self.use_fields(builder.model, self.survey.fields(builder.pass_count()), scene)
+    }
+
+    /// Takes fields into use, and allocates them if they are not in memory.
+    fn use_fields(
+        &mut self,
+        model: &Model,
+        used: ConstraintFields,
+        scene: SceneFields,
+    ) -> Configured {
+        let before = self.layout;
+        self.layout = before.extended(used, scene);
+        self.graph.use_fields(self.layout, self.survey.graph_softness());
+        for (index, patch) in self.patches.iter_mut().enumerate() {
+            patch.use_fields(self.layout, self.survey.family_softness(index));
+        }
+        if self.is_allocated && self.layout.fits(&before) {
+            return Configured::InPlace;
+        }
+        self.graph.allocate();
+        for patch in &mut self.patches {
+            patch.allocate();
+        }
+        self.locate_constraints(model);
+        let widest = self.sheets.iter().map(|sheet| sheet.columns as usize).max();
+        let largest = BLOCK_PARTICLES.min(self.graph.particle_count()).max(widest.unwrap_or(0));
+        self.contact_count = if scene.colliders { largest } else { 0 };
+        self.workers.reserve_contacts(self.contact_count);
+        self.is_allocated = true;
+        Configured::Moved
+    }
+
+    /// Updates the locations of the constraints of sheets, whose indices depend on the layout.
+    fn locate_constraints(&mut self, model: &Model) {
+        if self.patches.is_empty() {
+            return;
+        }
+        for (constraint, group) in (0_u32..).zip(&model.families) {
+            let found = find_sheet(&self.sheets, model.pair(constraint)[0]);
+            if let (Some(found), Some(group)) = (found, group) {
+                let family = Family::from_group(*group);
+                let [row, column] = found.place;
+                let place = [row, column - family.shifts()[0]];
+                let index = self.patches[found.sheet].constraint_index(family, place);
+                self.locations[constraint as usize] = Location::in_sheet(found.sheet, index);
+            }
+        }
+    }
+
+    fn writer(&mut self, location: Location) -> ColumnWriter<'_> {
+        match location.sheet() {
+            None => self.graph.writer(),
+            Some(sheet) => self.patches[sheet].writer(),
+        }
+    }
+
+    fn set_parameters(&mut self, constraint: u32, parameters: &ConstraintParameters) {
+        let location = self.locations[constraint as usize];
+        self.writer(location).set(location.index(), parameters);
+    }
+
+    /// Takes a constraint out of every pass.
+    pub(crate) fn tear(&mut self, constraint: u32) {
+        self.set_parameters(constraint, &ConstraintParameters::INACTIVE);
+    }
+
+    /// Passes each constraint that the projections have marked to `accept`, in ascending order, and
+    /// clears its mark.
+    pub(crate) fn remove_marks(&mut self, mut accept: impl FnMut(u32, TearMark)) {
+        for constraint in 0..self.locations.len() {
+            let location = self.locations[constraint];
+            if let Some(mark) = self.writer(location).remove_mark(location.index()) {
+                #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 constraints")]
+                accept(constraint as u32, mark);
+            }
+        }
+    }
+
+    /// Copies the state at the start of a step, with velocities in the place of displacements.
+    pub(crate) fn unpack(&mut self, states: &[Particle]) {
+        self.graph.unpack(states);
+        for patch in &mut self.patches {
+            patch.unpack(states);
+        }
+    }
+
+    /// Writes the state back at the end of a step. Returns the number of particles that froze.
+    pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32) -> u64 {
+        let patches: u64 = self.patches.iter_mut().map(|patch| patch.pack(states, h)).sum();
+        patches + self.graph.pack(states, h)
+    }
+
+    /// Runs the swept stages of a substep, from `Predict` to `Advance`. Returns
+    /// true if any constraint was marked as torn.
+    ///
+    /// The graph and every sheet run them one after the other, each on particles of its own.
+    pub(crate) fn run_swept_stages(&mut self, inputs: &SubstepInputs<'_>, pass_count: u32) -> bool {
+        let Self { workers, graph, patches, .. } = self;
+        let mut is_marked = false;
+        for pass in Pass::all(pass_count) {
+            is_marked |= graph.run_pass(workers, pass, inputs);
+        }
+        for patch in patches {
+            for pass in Pass::all(pass_count) {
+                is_marked |= patch.run_pass(workers, pass, inputs);
+            }
+        }
+        is_marked
+    }
+
+    /// Replaces the threads by `count`, or as many as the system grants.
+    pub(crate) fn set_threads(&mut self, count: usize) {
+        self.workers = Workers::new(self.workers.kernels, count);
+        self.workers.reserve_contacts(self.contact_count);
+    }
+
+    pub(crate) fn thread_count(&self) -> usize {
+        self.workers.count()
+    }
+
+    /// Location of a particle, until the next [`Configured::Moved`].
+    pub(crate) fn location(&self, particle: u32) -> Location {
+        if let Some(Found { sheet, place }) = find_sheet(&self.sheets, particle) {
+            return Location::in_sheet(sheet, self.patches[sheet].particle_index(place));
+        }
+        let Some(index) = self.graph.find(particle) else {
+            unreachable!("particle {particle} is neither in a sheet nor in the graph")
+        };
+        Location::in_graph(index as usize)
+    }
+
+    #[inline(always)]
+    pub(crate) fn position(&self, location: Location) -> [f32; 3] {
+        match location.sheet() {
+            None => self.graph.position(location.index()),
+            Some(sheet) => self.patches[sheet].position(location.index()),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn inverse_mass(&self, location: Location) -> f32 {
+        match location.sheet() {
+            None => self.graph.inverse_mass(location.index()),
+            Some(sheet) => self.patches[sheet].inverse_mass(location.index()),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn displacement(&self, location: Location) -> [f32; 3] {
+        match location.sheet() {
+            None => self.graph.displacement(location.index()),
+            Some(sheet) => self.patches[sheet].displacement(location.index()),
+        }
+    }
+
+    pub(crate) fn set_displacement(&mut self, location: Location, displacement: [f32; 3]) {
+        match location.sheet() {
+            None => self.graph.set_displacement(location.index(), displacement),
+            Some(sheet) => self.patches[sheet].set_displacement(location.index(), displacement),
+        }
+    }
+
+    /// Sets the velocity that the wind adds to a particle in the running substep.
+    pub(crate) fn set_wind(&mut self, location: Location, gain: [f32; 3]) {
+        match location.sheet() {
+            None => self.graph.set_wind(location.index(), gain),
+            Some(sheet) => self.patches[sheet].set_wind(location.index(), gain),
+        }
+    }
+
+    /// Sets where the root of a particle's tether is at the end of the substep.
+    pub(crate) fn set_root(&mut self, location: Location, root: [f32; 3]) {
+        match location.sheet() {
+            None => self.graph.tether_mut(location.index()).root = root,
+            Some(sheet) => self.patches[sheet].set_root(location.index(), root),
+        }
+    }
+
+    /// Sets the largest distance of a particle from its root; infinite for no tether.
+    pub(crate) fn set_tether_length(&mut self, location: Location, length: f32) {
+        match location.sheet() {
+            None => self.graph.tether_mut(location.index()).length = length,
+            Some(sheet) => self.patches[sheet].set_tether_length(location.index(), length),
+        }
+    }
+}
+
+/// A particle in a sheet.
+struct Found {
+    /// Index of the sheet.
+    sheet: usize,
+    /// Row and column.
+    place: [usize; 2],
+}
+
+/// Finds the sheet of a particle. Sheets must ascend.
+fn find_sheet(sheets: &[Sheet], particle: u32) -> Option<Found> {
+    let sheet = sheets.partition_point(|sheet| sheet.first <= particle).checked_sub(1)?;
+    Some(Found { sheet, place: sheets[sheet].find(particle)? })
+}
+
+/// Returns the sheets whose particles have only constraints of families.
+fn pure_sheets(model: &Model) -> Vec<Sheet> {
+    let mut is_pure = vec![true; model.sheets.len()];
+    for (index, family) in (0_u32..).zip(&model.families) {
+        if family.is_none() {
+            for particle in model.pair(index) {
+                if let Some(found) = find_sheet(&model.sheets, particle) {
+                    is_pure[found.sheet] = false;
+                }
+            }
+        }
+    }
+    let sheets = model.sheets.iter().zip(is_pure);
+    sheets.filter(|(_, is_pure)| *is_pure).map(|(sheet, _)| *sheet).collect()
+}
+
+/// Returns the particles outside of the sheets, ascending.
+fn loose_particles(model: &Model, sheets: &[Sheet]) -> Vec<u32> {
+    let all = 0..model.particle_count();
+    all.filter(|particle| find_sheet(sheets, *particle).is_none()).collect()
+}
+
+/// Returns the families of each sheet, in the order of projection.
+fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<Vec<Family>> {
+    let mut has_family = vec![[false; Family::ALL.len()]; sheets.len()];
+    for (index, group) in (0_u32..).zip(&model.families) {
+        let found = find_sheet(sheets, model.pair(index)[0]);
+        if let (Some(found), Some(group)) = (found, group) {
+            has_family[found.sheet][Family::from_group(*group) as usize] = true;
+        }
+    }
+    let present = |has: [bool; Family::ALL.len()]| {
+        let all = Family::ALL.into_iter().zip(has);
+        all.filter(|(_, has)| *has).map(|(family, _)| family).collect()
+    };
+    has_family.into_iter().map(present).collect()
+}

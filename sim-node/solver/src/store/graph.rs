@@ -1,0 +1,287 @@
+//! Particles and constraints outside of sheets: batches of eight constraints that share no particle.
+
+mod batch;
+pub(crate) mod block;
+mod group;
+
+use batch::Batch;
+use block::{BLOCK_PARTICLES, BlockWork, GraphBlock, PackedTether};
+use group::{ConstraintGroup, part_count};
+
+use super::layout::{Layout, Location, SceneFields};
+use super::publish::{PublishedMotion, publish};
+use super::workers::{WorkerScratch, Workers};
+use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
+use crate::constraints::columns::{ConstraintColumns, FullPass};
+use crate::constraints::fields::Pass;
+use crate::constraints::order::ProjectionOrder;
+use crate::constraints::parameters::{ConstraintParameters, PassSoftness};
+use crate::kernels::huge_pages::refill;
+use crate::kernels::lanes::{Lanes8, PackedParticle};
+use crate::scene::model::Model;
+use crate::state::particles::Particle;
+use crate::step::schedule::{Schedule, ScheduledStage};
+use crate::step::stage::Stage;
+use crate::step::substep::SubstepInputs;
+
+/// Every particle and constraint outside of sheets.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Graph {
+    /// The particles, and one more for the padding of lane groups, which nothing moves.
+    particles: Vec<PackedParticle>,
+    /// By particle: its index in the scene, ascending.
+    indices: Vec<u32>,
+    /// By particle: the predicted displacement; empty in scenes without colliders.
+    predicted: Vec<[f32; 3]>,
+    /// By particle: the velocity that the wind adds in a substep; empty in scenes without wind.
+    gains: Vec<[f32; 3]>,
+    /// By particle: its tether; empty in scenes without tethers.
+    tethers: Vec<PackedTether>,
+    groups: Vec<ConstraintGroup>,
+    /// By lane group: the two particles of each constraint.
+    ends: Vec<[[u32; 8]; 2]>,
+    /// By lane group: their inverse masses.
+    inverse_masses: Vec<[Lanes8; 2]>,
+    /// Columns of the constraints, each as long as 8 `ends`.
+    columns: Vec<f32>,
+    column_order: ColumnOrder,
+    layout: Layout,
+    /// Softness of all constraints, unless they differ.
+    softness: PassSoftness,
+    schedule: Schedule,
+}
+
+/// A constraint between particles of the graph.
+struct GraphLink {
+    /// Index of the constraint in the scene.
+    constraint: u32,
+    /// Indices in the graph.
+    ends: [u32; 2],
+}
+
+impl Graph {
+    /// Makes the graph of the particles with these scene indices, which must ascend. Enters the
+    /// location of each of its constraints into `locations`, which is indexed by constraint.
+    pub(crate) fn new(
+        model: &Model,
+        order: &ProjectionOrder,
+        indices: Vec<u32>,
+        locations: &mut [Location],
+    ) -> Self {
+        let mut graph = Self { indices, ..Self::default() };
+        refill(&mut graph.particles, graph.indices.len() + 1, PackedParticle::default());
+        for (group, range) in order.groups.iter().enumerate() {
+            let links: Vec<_> = order.indices[range.clone()]
+                .iter()
+                .filter_map(|constraint| {
+                    let [a, b] = model.pair(*constraint);
+                    let ends = [graph.find(a)?, graph.find(b)?];
+                    Some(GraphLink { constraint: *constraint, ends })
+                })
+                .collect();
+            if !links.is_empty() {
+                let is_independent = group < order.independent_count;
+                graph.push(&links, is_independent, locations);
+            }
+        }
+        refill(&mut graph.inverse_masses, graph.ends.len(), [[0.0; 8]; 2]);
+        graph
+    }
+
+    /// Index of a particle of the scene in the graph, unless it lies in a sheet.
+    pub(crate) fn find(&self, particle: u32) -> Option<u32> {
+        let place = self.indices.binary_search(&particle).ok()?;
+        #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
+        Some(place as u32)
+    }
+
+    fn push(&mut self, links: &[GraphLink], is_independent: bool, locations: &mut [Location]) {
+        let first = self.ends.len();
+        #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
+        let padding = self.indices.len() as u32;
+        for lane_group in links.chunks(8) {
+            let mut ends = [[padding; 8]; 2];
+            for (lane, GraphLink { constraint, ends: [a, b] }) in lane_group.iter().enumerate() {
+                assert!(*a.max(b) < padding, "a constraint names a particle outside of the graph");
+                let index = 8 * self.ends.len() + lane;
+                locations[*constraint as usize] = Location::in_graph(index);
+                (ends[0][lane], ends[1][lane]) = (*a, *b);
+            }
+            self.ends.push(ends);
+        }
+        let lane_groups = first..self.ends.len();
+        self.groups.push(ConstraintGroup { lane_groups, count: links.len(), is_independent });
+    }
+
+    pub(crate) fn particle_count(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// Sets the fields in use, and the softness of constraints that have none of their own.
+    pub(crate) fn use_fields(&mut self, layout: Layout, softness: PassSoftness) {
+        (self.layout, self.softness) = (layout, softness);
+        self.schedule.rebuild(layout.optional_stages(), &self.groups.iter().map(|_| 0));
+    }
+
+    /// Allocates the fields of the layout. Every constraint is inactive afterwards.
+    pub(crate) fn allocate(&mut self) {
+        let Layout { constraints, scene, .. } = self.layout;
+        let count = |is_there: bool| if is_there { self.indices.len() } else { 0 };
+        let SceneFields { colliders, wind, tethers } = scene;
+        self.predicted = vec![[0.0; 3]; count(colliders)];
+        self.gains = vec![[0.0; 3]; count(wind)];
+        let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
+        self.tethers = vec![none; count(tethers)];
+        let length = 8 * self.ends.len();
+        refill(&mut self.columns, constraints.column_count() * length, 0.0);
+        self.column_order = ColumnOrder::new(constraints);
+        for index in 0..length {
+            self.writer().set(index, &ConstraintParameters::INACTIVE);
+        }
+    }
+
+    /// Writer for the constraints, by the indices of their locations.
+    pub(crate) fn writer(&mut self) -> ColumnWriter<'_> {
+        ColumnWriter::new(&mut self.columns, 8 * self.ends.len(), self.column_order)
+    }
+
+    /// Copies the state at the start of a step, with velocities in the place of displacements.
+    pub(crate) fn unpack(&mut self, states: &[Particle]) {
+        let mut is_mass_changed = false;
+        for (particle, index) in self.particles.iter_mut().zip(&self.indices) {
+            let state = &states[*index as usize];
+            let ([x, y, z], [vx, vy, vz]) = (state.position, state.velocity);
+            is_mass_changed |= particle.0[3] != state.inverse_mass;
+            *particle = PackedParticle([x, y, z, state.inverse_mass, vx, vy, vz, 0.0]);
+        }
+        if is_mass_changed {
+            self.update_inverse_masses();
+        }
+    }
+
+    /// Copies the inverse masses of the particles to the constraints.
+    fn update_inverse_masses(&mut self) {
+        for (ends, inverse_masses) in self.ends.iter().zip(&mut self.inverse_masses) {
+            for (ends, inverse_masses) in ends.iter().zip(inverse_masses) {
+                for (particle, inverse_mass) in ends.iter().zip(inverse_masses) {
+                    *inverse_mass = self.particles[*particle as usize].0[3];
+                }
+            }
+        }
+    }
+
+    /// Writes the state back. Returns the number of particles that froze.
+    pub(crate) fn pack(&self, states: &mut [Particle], h: f32) -> u64 {
+        let mut frozen_count = 0;
+        for (particle, index) in self.particles.iter().zip(&self.indices) {
+            let PackedParticle([x, y, z, _, dx, dy, dz, _]) = *particle;
+            let motion = PublishedMotion { position: [x, y, z], displacement: [dx, dy, dz], h };
+            frozen_count += u64::from(publish(&mut states[*index as usize], motion));
+        }
+        frozen_count
+    }
+
+    /// Runs the stages of a pass on all particles. Returns true if any constraint was marked as
+    /// torn.
+    pub(crate) fn run_pass(
+        &mut self,
+        workers: &mut Workers,
+        pass: Pass,
+        inputs: &SubstepInputs<'_>,
+    ) -> bool {
+        let schedule = std::mem::take(&mut self.schedule);
+        let stages = schedule.of_pass(pass);
+        let mut is_marked = false;
+        // Stages of single particles run together, block by block.
+        for run in stages.chunk_by(|a, b| !a.stage.is_grouped() && !b.stage.is_grouped()) {
+            let ScheduledStage { stage, group, .. } = run[0];
+            match stage {
+                Stage::Project => is_marked |= self.project(workers, group, pass),
+                Stage::LimitStretch => self.limit_stretch(workers, group),
+                _ => self.run_particle_stages(workers, run, inputs),
+            }
+        }
+        self.schedule = schedule;
+        is_marked
+    }
+
+    fn run_particle_stages(
+        &mut self,
+        workers: &mut Workers,
+        stages: &[ScheduledStage],
+        inputs: &SubstepInputs<'_>,
+    ) {
+        let (count, kernels) = (self.particle_count(), workers.kernels);
+        let length =
+            count.div_ceil(part_count(count, workers.count())).next_multiple_of(BLOCK_PARTICLES);
+        let all = GraphBlock {
+            particles: &mut self.particles[..count],
+            predicted: &mut self.predicted,
+            gains: if self.layout.is_wind_used { &self.gains } else { &[] },
+            tethers: &self.tethers,
+        };
+        let parts = all.chunks(length).map(Some);
+        let work = |part: &mut Option<GraphBlock<'_>>, scratch: &mut WorkerScratch| {
+            for block in part.take().into_iter().flat_map(|part| part.chunks(BLOCK_PARTICLES)) {
+                let contacts = &mut scratch.contacts;
+                kernels.run(BlockWork { block, stages, inputs, contacts });
+            }
+        };
+        workers.for_each(parts, work, |_| {});
+    }
+
+    fn project(&mut self, workers: &mut Workers, group: usize, pass: Pass) -> bool {
+        let (used, softness) = (self.layout.used, self.softness);
+        let (batch, columns) = self.batch(group);
+        let lane_groups = batch.group.lane_groups.clone();
+        if used.are_rigid(softness.scaled_compliance) {
+            batch.project(columns.rigid(&lane_groups, softness.share), workers)
+        } else {
+            let full_pass = FullPass { used, softness, pass };
+            batch.project(columns.full(&lane_groups, &full_pass), workers)
+        }
+    }
+
+    fn limit_stretch(&mut self, workers: &mut Workers, group: usize) {
+        let (batch, columns) = self.batch(group);
+        let limit = columns.stretch_limit(&batch.group.lane_groups);
+        batch.project(limit, workers);
+    }
+
+    fn batch(&mut self, group: usize) -> (Batch<'_>, ConstraintColumns<'_>) {
+        let length = 8 * self.ends.len();
+        let Self { particles, ends, inverse_masses, columns, groups, layout, .. } = self;
+        let group = &groups[group];
+        let lane_groups = group.lane_groups.clone();
+        let (ends, inverse_masses) = (&ends[lane_groups.clone()], &inverse_masses[lane_groups]);
+        let columns = ConstraintColumns::new(columns, length, layout.constraints);
+        (Batch { group, particles, ends, inverse_masses }, columns)
+    }
+
+    pub(crate) fn position(&self, index: usize) -> [f32; 3] {
+        let [x, y, z, ..] = self.particles[index].0;
+        [x, y, z]
+    }
+
+    pub(crate) fn inverse_mass(&self, index: usize) -> f32 {
+        self.particles[index].0[3]
+    }
+
+    pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
+        let [_, _, _, _, x, y, z, _] = self.particles[index].0;
+        [x, y, z]
+    }
+
+    pub(crate) fn set_displacement(&mut self, index: usize, displacement: [f32; 3]) {
+        self.particles[index].0[4..7].copy_from_slice(&displacement);
+    }
+
+    /// Sets the velocity that the wind adds in the running substep.
+    pub(crate) fn set_wind(&mut self, index: usize, gain: [f32; 3]) {
+        self.gains[index] = gain;
+    }
+
+    pub(crate) fn tether_mut(&mut self, index: usize) -> &mut PackedTether {
+        &mut self.tethers[index]
+    }
+}

@@ -1,0 +1,156 @@
+//! The projection of the constraints of one group.
+
+use super::group::{ConstraintGroup, part_count};
+use crate::constraints::projection::{LaneIndex, Projection};
+use crate::constraints::projection_block::{BLOCK_LENGTH, ProjectionBlock};
+use crate::constraints::separation::{Separation, correction};
+use crate::kernels::Kernels;
+use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide, axes};
+use crate::kernels::worker_pool::SharedSlice;
+use crate::store::workers::{WorkerScratch, Workers};
+
+/// Groups with fewer constraints are projected one by one: a lane group costs as much as a few
+/// constraints.
+const BATCHED_MIN: usize = 4;
+
+/// Constraints of one group, and the particles that they move.
+pub(crate) struct Batch<'a> {
+    pub(crate) group: &'a ConstraintGroup,
+    pub(crate) particles: &'a mut [PackedParticle],
+    pub(crate) ends: &'a [[[u32; 8]; 2]],
+    pub(crate) inverse_masses: &'a [[Lanes8; 2]],
+}
+
+impl Batch<'_> {
+    /// Projects every constraint once. Returns true if any was marked as torn.
+    #[allow(unsafe_code, reason = "only this function knows that the constraints are independent")]
+    pub(crate) fn project<T: Projection + Send>(
+        self,
+        projection: T,
+        workers: &mut Workers,
+    ) -> bool {
+        let is_batched = self.group.is_independent && self.group.count >= BATCHED_MIN;
+        if !is_batched || workers.kernels == Kernels::Reference {
+            return self.project_singly(projection);
+        }
+        // SAFETY: no two constraints of an independent group share a particle, and only the last
+        // lane group contains the particle of the padding.
+        let particles = unsafe { SharedSlice::new(self.particles) };
+        let Self { ends, inverse_masses, .. } = self;
+        let whole = BatchPart { ends, inverse_masses, particles, kernels: workers.kernels };
+        if part_count(self.group.count, workers.count()) == 1 {
+            return whole.project(projection, workers.own_scratch());
+        }
+        whole.project_by_all(projection, workers)
+    }
+
+    fn project_singly(self, mut projection: impl Projection) -> bool {
+        for place in 0..self.group.count {
+            let index = LaneIndex { group: place / 8, lane: place % 8 };
+            let ([a, b], [w_a, w_b]) = (&self.ends[index.group], &self.inverse_masses[index.group]);
+            let (a, b) = (a[index.lane] as usize, b[index.lane] as usize);
+            let (w_a, w_b) = (w_a[index.lane], w_b[index.lane]);
+            let difference = |axis: usize| self.particles[b].0[axis] - self.particles[a].0[axis];
+            let separation = Separation::new(axes(difference), axes(|axis| difference(4 + axis)));
+            let scale = projection.scale(index, &separation.squared, w_a + w_b);
+            let correction = correction(separation.vector, scale);
+            let (change_a, change_b) = (correction.displacement(w_a), correction.displacement(w_b));
+            for axis in 0..3 {
+                self.particles[a].0[4 + axis] += change_a[axis];
+                self.particles[b].0[4 + axis] -= change_b[axis];
+            }
+        }
+        projection.is_marked()
+    }
+}
+
+/// Lane groups of a batch that one worker projects.
+struct BatchPart<'a> {
+    ends: &'a [[[u32; 8]; 2]],
+    inverse_masses: &'a [[Lanes8; 2]],
+    particles: SharedSlice<'a, PackedParticle>,
+    kernels: Kernels,
+}
+
+/// A part of a batch with its projection, and the result.
+struct ProjectedPart<'a, T> {
+    part: BatchPart<'a>,
+    projection: Option<T>,
+    is_marked: bool,
+}
+
+impl BatchPart<'_> {
+    fn project(&self, mut projection: impl Projection, scratch: &mut WorkerScratch) -> bool {
+        let block = &mut scratch.block;
+        self.kernels.run(BatchWork { part: self, projection: &mut projection, block });
+        projection.is_marked()
+    }
+
+    /// Divides the part among all workers.
+    fn project_by_all<T: Projection + Send>(&self, projection: T, workers: &mut Workers) -> bool {
+        let length = self.ends.len().div_ceil(part_count(8 * self.ends.len(), workers.count()));
+        let mut rest = Some(projection);
+        let chunks = self.ends.chunks(length).zip(self.inverse_masses.chunks(length));
+        let parts = chunks.map(|(ends, inverse_masses)| {
+            let projection = rest.take().map(|projection| {
+                if ends.len() < length {
+                    return projection;
+                }
+                let (projection, others) = projection.split(ends.len());
+                rest = Some(others);
+                projection
+            });
+            let part = BatchPart { ends, inverse_masses, ..*self };
+            ProjectedPart { part, projection, is_marked: false }
+        });
+        let mut is_any_marked = false;
+        let work = |one: &mut ProjectedPart<'_, T>, scratch: &mut WorkerScratch| {
+            if let Some(projection) = one.projection.take() {
+                one.is_marked = one.part.project(projection, scratch);
+            }
+        };
+        workers.for_each(parts, work, |one| is_any_marked |= one.is_marked);
+        is_any_marked
+    }
+}
+
+struct BatchWork<'a, 'b, T> {
+    part: &'a BatchPart<'b>,
+    projection: &'a mut T,
+    block: &'a mut ProjectionBlock,
+}
+
+impl<T: Projection> LaneWork for BatchWork<'_, '_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    #[allow(unsafe_code, reason = "bounds checks would cost a third of the time")]
+    fn run<W: Wide>(self) {
+        let Self { part: BatchPart { ends, inverse_masses, particles, .. }, projection, block } =
+            self;
+        let particles = particles.cells();
+        for first in (0..ends.len()).step_by(BLOCK_LENGTH) {
+            let length = BLOCK_LENGTH.min(ends.len() - first);
+            let ends = &ends[first..first + length];
+            let inverse_masses = &inverse_masses[first..first + length];
+            for (group, [a, b]) in ends.iter().enumerate() {
+                // SAFETY: `Graph::push` checked that the ends are particles of the graph.
+                let [start, change] = unsafe { W::differences(particles, a, b) };
+                block.set_separation::<W>(group, &Separation::new(start, change));
+            }
+            for (group, [w_a, w_b]) in inverse_masses.iter().enumerate() {
+                let index = LaneIndex { group: first + group, lane: 0 };
+                block.solve(group, &mut *projection, index, W::load(w_a, 0) + W::load(w_b, 0));
+            }
+            for (group, ([a, b], [w_a, w_b])) in ends.iter().zip(inverse_masses).enumerate() {
+                let correction = block.correction::<W>(group);
+                let change_a = correction.displacement(-W::load(w_a, 0));
+                // SAFETY: as above.
+                unsafe { W::subtract_displacements(particles, a, change_a) };
+                let change_b = correction.displacement(W::load(w_b, 0));
+                // SAFETY: as above.
+                unsafe { W::subtract_displacements(particles, b, change_b) };
+            }
+        }
+    }
+}

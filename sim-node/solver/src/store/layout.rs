@@ -1,0 +1,98 @@
+//! The fields that a scene needs in memory, and the locations of particles and constraints there.
+
+use crate::constraints::fields::ConstraintFields;
+use crate::step::schedule::OptionalStages;
+
+/// Fields of particles that only some scenes have.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct SceneFields {
+    /// For colliders: the predicted displacement.
+    pub(crate) colliders: bool,
+    /// For wind: the velocity that it adds in a substep.
+    pub(crate) wind: bool,
+    /// For tethers: the position of the root, and the length with its square.
+    pub(crate) tethers: bool,
+}
+
+/// Fields in memory, and those in use. Fields that fall out of use stay in memory, so that a change
+/// of a parameter moves nothing.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Layout {
+    pub(crate) constraints: ConstraintFields,
+    pub(crate) scene: SceneFields,
+    /// Constraint fields that the current parameters use.
+    pub(crate) used: ConstraintFields,
+    pub(crate) is_wind_used: bool,
+}
+
+impl Layout {
+    /// The layout for these fields that also has all fields in memory now.
+    pub(crate) fn extended(self, used: ConstraintFields, scene: SceneFields) -> Self {
+        let scene_fields = SceneFields { wind: self.scene.wind || scene.wind, ..scene };
+        Self {
+            constraints: self.constraints.union(used),
+            scene: scene_fields,
+            used,
+            is_wind_used: scene.wind,
+        }
+    }
+
+    /// True if two layouts have the same fields in memory.
+    pub(crate) fn fits(&self, other: &Self) -> bool {
+        self.constraints == other.constraints && self.scene == other.scene
+    }
+
+    /// The layout of a sheet, whose families each have one softness, and no tethers among their
+    /// constraints.
+    pub(crate) fn of_sheet(self) -> Self {
+        let reduced = |fields: ConstraintFields| ConstraintFields {
+            softness: false,
+            floors: false,
+            ..fields
+        };
+        Self { constraints: reduced(self.constraints), used: reduced(self.used), ..self }
+    }
+
+    pub(crate) fn optional_stages(&self) -> OptionalStages {
+        OptionalStages {
+            limit_stretch: self.used.max_lengths,
+            tether: self.scene.tethers,
+            contact: self.scene.colliders,
+        }
+    }
+}
+
+/// Location of a particle or a constraint: an index in the graph or in a sheet.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Location {
+    /// 0 for the graph, else 1 + the index of the sheet.
+    part: u32,
+    index: u32,
+}
+
+impl Location {
+    pub(crate) fn in_graph(index: usize) -> Self {
+        Self::new(0, index)
+    }
+
+    pub(crate) fn in_sheet(sheet: usize, index: usize) -> Self {
+        Self::new(sheet + 1, index)
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "at most 2^24 particles of 100 numbers each"
+    )]
+    fn new(part: usize, index: usize) -> Self {
+        Self { part: part as u32, index: index as u32 }
+    }
+
+    pub(crate) fn index(self) -> usize {
+        self.index as usize
+    }
+
+    /// Index of the sheet. None for the graph.
+    pub(crate) fn sheet(self) -> Option<usize> {
+        (self.part as usize).checked_sub(1)
+    }
+}

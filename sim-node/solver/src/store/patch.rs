@@ -1,0 +1,294 @@
+//! A structured patch: a cloth or a rope, row by row, without indices between its numbers.
+//!
+//! A row is a sequence of fields of equal length: x, y, z of the positions, the inverse masses, x,
+//! y, z of the displacements, then fields that only some scenes have, then the constraints that
+//! begin in the row, family by family. A constraint between two rows combines eight columns of one
+//! row with eight of the other; columns of constraints within a row are separated in registers.
+
+mod band;
+mod ends;
+mod row;
+mod row_layout;
+mod span;
+
+use std::ops::Range;
+
+use band::{Band, PassSweep, SweepWork};
+use row_layout::{LINE_LENGTH, RowLayout};
+use span::Span;
+
+use super::layout::Layout;
+use super::publish::{PublishedMotion, publish};
+use super::survey::FamilySoftness;
+use super::workers::{WorkerScratch, Workers};
+use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
+use crate::constraints::families::{Family, Sheet};
+use crate::constraints::fields::Pass;
+use crate::constraints::parameters::ConstraintParameters;
+use crate::kernels::huge_pages::refill;
+use crate::kernels::lanes::axes;
+use crate::state::particles::Particle;
+use crate::step::schedule::Schedule;
+use crate::step::substep::SubstepInputs;
+
+/// Memory in whole cache lines.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
+struct CacheLine([f32; LINE_LENGTH]);
+
+/// One sheet of particles with its constraints.
+#[derive(Debug, Clone)]
+pub(crate) struct Patch {
+    pub(crate) sheet: Sheet,
+    layout: RowLayout,
+    lines: Vec<CacheLine>,
+    column_order: ColumnOrder,
+    schedule: Schedule,
+}
+
+/// The state fields of a row.
+struct RowState<'a> {
+    x: [&'a mut [f32]; 3],
+    w: &'a mut [f32],
+    d: [&'a mut [f32]; 3],
+}
+
+impl<'a> RowState<'a> {
+    fn new(row: &'a mut [f32], stride: usize) -> Self {
+        let mut rest = row;
+        let mut next = || {
+            let (field, others) = std::mem::take(&mut rest).split_at_mut(stride);
+            rest = others;
+            field
+        };
+        let x = [next(), next(), next()];
+        Self { x, w: next(), d: [next(), next(), next()] }
+    }
+}
+
+impl Patch {
+    /// Makes an empty patch with these families, in the order of projection.
+    pub(crate) fn new(sheet: Sheet, families: &[Family]) -> Self {
+        Self {
+            sheet,
+            layout: RowLayout::new(sheet.columns as usize, sheet.rows as usize, families),
+            lines: Vec::new(),
+            column_order: ColumnOrder::default(),
+            schedule: Schedule::default(),
+        }
+    }
+
+    /// Sets the fields in use, and the softness of each family.
+    pub(crate) fn use_fields(&mut self, layout: Layout, softness: &FamilySoftness) {
+        for block in &mut self.layout.families {
+            block.softness = softness[block.family as usize].unwrap_or_default();
+        }
+        self.layout.set_fields(layout.of_sheet());
+        let families = &self.layout.families;
+        let groups = 0..2 * families.len();
+        let reaches = groups.map(|group| families[group / 2].family.reach());
+        self.schedule.rebuild(layout.optional_stages(), &reaches);
+    }
+
+    /// Allocates the fields of the layout. Every constraint is inactive afterwards, and no particle
+    /// has a tether.
+    pub(crate) fn allocate(&mut self) {
+        let RowLayout { rows, row_length, stride, constraints_at, family_length, .. } = self.layout;
+        refill(&mut self.lines, rows * row_length / LINE_LENGTH, CacheLine([0.0; LINE_LENGTH]));
+        self.column_order = ColumnOrder::new(self.layout.fields.constraints);
+        for row in 0..rows {
+            for family in 0..self.layout.families.len() {
+                let first = row * row_length + constraints_at * stride + family * family_length;
+                for index in first..first + stride {
+                    self.writer().set(index, &ConstraintParameters::INACTIVE);
+                }
+            }
+        }
+        if self.layout.fields.scene.tethers {
+            for row in 0..rows {
+                for column in 0..stride {
+                    self.set_tether_length(self.particle_index([row, column]), f32::INFINITY);
+                }
+            }
+        }
+    }
+
+    /// Index of a constraint for [`Self::writer`].
+    pub(crate) fn constraint_index(&self, family: Family, place: [usize; 2]) -> usize {
+        self.layout.constraint_index(family, place)
+    }
+
+    /// Writer for the constraints, by [`Self::constraint_index`].
+    pub(crate) fn writer(&mut self) -> ColumnWriter<'_> {
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        ColumnWriter::new(numbers, self.layout.stride, self.column_order)
+    }
+
+    fn row(&mut self, row: usize) -> RowState<'_> {
+        let RowLayout { row_length, stride, .. } = self.layout;
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        RowState::new(&mut numbers[row * row_length..][..row_length], stride)
+    }
+
+    /// Copies the state at the start of a step, with velocities in the place of displacements.
+    pub(crate) fn unpack(&mut self, states: &[Particle]) {
+        let first = self.sheet.first as usize;
+        let columns = self.layout.columns;
+        for row in 0..self.layout.rows {
+            let states = &states[first + row * columns..][..columns];
+            let RowState { x, w, d } = self.row(row);
+            for axis in 0..3 {
+                for (number, state) in x[axis].iter_mut().zip(states) {
+                    *number = state.position[axis];
+                }
+                for (number, state) in d[axis].iter_mut().zip(states) {
+                    *number = state.velocity[axis];
+                }
+            }
+            for (number, state) in w.iter_mut().zip(states) {
+                *number = state.inverse_mass;
+            }
+        }
+    }
+
+    /// Runs the stages of a pass on all rows. Returns true if any constraint was marked as torn.
+    ///
+    /// Each worker has a band of rows. A second round finishes the seams between them, whose
+    /// constraints need rows of two bands.
+    pub(crate) fn run_pass(
+        &mut self,
+        workers: &mut Workers,
+        pass: Pass,
+        inputs: &SubstepInputs<'_>,
+    ) -> bool {
+        let (layout, stages) = (&self.layout, self.schedule.of_pass(pass));
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        let kernels = workers.kernels;
+        let reach = stages.iter().map(|stage| stage.reach).sum();
+        let count = layout.band_count(workers.count(), reach);
+        let cuts = (0..=count).map(|band| band * layout.rows / count);
+        let spans = cuts
+            .clone()
+            .zip(cuts.clone().skip(1))
+            .map(|(first, last)| (first..last, Span::new(first..last, layout.rows)));
+        let seams = cuts.skip(1).take(count - 1);
+        let seams = seams.map(|row| (row - reach..row + reach, Span::seam(row)));
+        let mut is_marked = false;
+        let mut round = |spans: &mut dyn Iterator<Item = (Range<usize>, Span)>| {
+            let work = |part: &mut BandPart<'_>, scratch: &mut WorkerScratch| {
+                let band = Band { numbers: part.numbers, first: part.first, layout };
+                let sweep = PassSweep { stages, pass, inputs, scratch };
+                part.is_marked = kernels.run(SweepWork { band, span: part.span.clone(), sweep });
+            };
+            let parts = BandPart::split(numbers, layout.row_length, spans);
+            workers.for_each(parts, work, |part| is_marked |= part.is_marked);
+        };
+        round(&mut spans.into_iter());
+        if count > 1 {
+            round(&mut seams.into_iter());
+        }
+        is_marked
+    }
+
+    /// Writes the state back. Returns the number of particles that froze.
+    pub(crate) fn pack(&mut self, states: &mut [Particle], h: f32) -> u64 {
+        let mut frozen_count = 0;
+        let first = self.sheet.first as usize;
+        let columns = self.layout.columns;
+        for row in 0..self.layout.rows {
+            let states = &mut states[first + row * columns..][..columns];
+            let RowState { x, d, .. } = self.row(row);
+            for (column, state) in states.iter_mut().enumerate() {
+                let vector = |fields: &[&mut [f32]; 3]| axes(|axis| fields[axis][column]);
+                let motion = PublishedMotion { position: vector(&x), displacement: vector(&d), h };
+                frozen_count += u64::from(publish(state, motion));
+            }
+        }
+        frozen_count
+    }
+
+    /// Index, among all numbers, of the x position of a particle.
+    pub(crate) fn particle_index(&self, [row, column]: [usize; 2]) -> usize {
+        row * self.layout.row_length + column
+    }
+
+    /// Vector of a particle in fields `field`, `field` + 1 and `field` + 2.
+    #[inline(always)]
+    fn vector(&self, index: usize, field: usize) -> [f32; 3] {
+        let numbers: &[f32] = bytemuck::cast_slice(&self.lines);
+        axes(|axis| numbers[index + (field + axis) * self.layout.stride])
+    }
+
+    fn set_vector(&mut self, index: usize, field: usize, vector: [f32; 3]) {
+        let stride = self.layout.stride;
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        for (axis, value) in vector.into_iter().enumerate() {
+            numbers[index + (field + axis) * stride] = value;
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn position(&self, index: usize) -> [f32; 3] {
+        self.vector(index, 0)
+    }
+
+    #[inline(always)]
+    pub(crate) fn inverse_mass(&self, index: usize) -> f32 {
+        let numbers: &[f32] = bytemuck::cast_slice(&self.lines);
+        numbers[index + 3 * self.layout.stride]
+    }
+
+    #[inline(always)]
+    pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
+        self.vector(index, 4)
+    }
+
+    pub(crate) fn set_displacement(&mut self, index: usize, displacement: [f32; 3]) {
+        self.set_vector(index, 4, displacement);
+    }
+
+    /// Sets the velocity that the wind adds in the running substep.
+    pub(crate) fn set_wind(&mut self, index: usize, gain: [f32; 3]) {
+        self.set_vector(index, self.layout.wind_at(), gain);
+    }
+
+    /// Sets the position of a tether's root at the end of the substep.
+    pub(crate) fn set_root(&mut self, index: usize, root: [f32; 3]) {
+        self.set_vector(index, self.layout.root_at(), root);
+    }
+
+    /// Sets the length of a tether; infinite for no tether.
+    pub(crate) fn set_tether_length(&mut self, index: usize, length: f32) {
+        let at = index + (self.layout.root_at() + 3) * self.layout.stride;
+        let stride = self.layout.stride;
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        (numbers[at], numbers[at + stride]) = (length, length * length);
+    }
+}
+
+/// Rows that one worker processes.
+struct BandPart<'a> {
+    numbers: &'a mut [f32],
+    /// Index of the first row.
+    first: usize,
+    span: Span,
+    is_marked: bool,
+}
+
+impl<'a> BandPart<'a> {
+    /// Splits ascending ranges of rows off the numbers of a sheet.
+    fn split(
+        numbers: &'a mut [f32],
+        row_length: usize,
+        spans: impl Iterator<Item = (Range<usize>, Span)>,
+    ) -> impl Iterator<Item = Self> {
+        let (mut rest, mut next) = (numbers, 0);
+        spans.map(move |(rows, span)| {
+            let (_, from) =
+                std::mem::take(&mut rest).split_at_mut((rows.start - next) * row_length);
+            let (numbers, others) = from.split_at_mut(rows.len() * row_length);
+            (rest, next) = (others, rows.end);
+            Self { numbers, first: rows.start, span, is_marked: false }
+        })
+    }
+}

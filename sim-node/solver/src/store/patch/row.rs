@@ -1,0 +1,145 @@
+//! The particles of a row, and the stages of single particles on them.
+
+use glam::Vec3;
+
+use super::row_layout::RowLayout;
+use crate::constraints::separation::RestLength;
+use crate::constraints::tether_pull::{Tethered, tether_excess};
+use crate::contacts::path::SubstepPath;
+use crate::contacts::zone::Zone;
+use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups_mut};
+use crate::step::particle_block::ParticleBlock;
+use crate::step::prediction::Prediction;
+use crate::store::layout::SceneFields;
+
+/// The particles of a row, with the fields that only some scenes have.
+pub(crate) struct SheetRow<'a> {
+    x: [&'a mut [Lanes8]; 3],
+    w: &'a [Lanes8],
+    d: [&'a mut [Lanes8]; 3],
+    predicted: Option<[&'a mut [Lanes8]; 3]>,
+    wind: Option<[&'a [Lanes8]; 3]>,
+    /// Position of the root at the end of the substep.
+    root: Option<[&'a [Lanes8]; 3]>,
+    /// Largest distance to the root, and its square.
+    tether: Option<[&'a [Lanes8]; 2]>,
+    /// Number of particles. The rest of the last lane group is padding.
+    count: usize,
+}
+
+impl<'a> SheetRow<'a> {
+    #[inline(always)]
+    pub(crate) fn new(row: &'a mut [f32], layout: &RowLayout) -> Self {
+        let count = layout.columns.div_ceil(8);
+        let mut rest = row;
+        let mut next = || {
+            let (field, others) = std::mem::take(&mut rest).split_at_mut(layout.stride);
+            rest = others;
+            lane_groups_mut(field, 0, count)
+        };
+        let SceneFields { colliders, wind, tethers } = layout.fields.scene;
+        let x = [next(), next(), next()];
+        let (w, d) = (&*next(), [next(), next(), next()]);
+        let predicted = colliders.then(|| [next(), next(), next()]);
+        let wind = wind.then(|| [&*next(), &*next(), &*next()]);
+        let wind = wind.filter(|_| layout.fields.is_wind_used);
+        let root = tethers.then(|| [&*next(), &*next(), &*next()]);
+        let tether = tethers.then(|| [&*next(), &*next()]);
+        Self { x, w, d, predicted, wind, root, tether, count: layout.columns }
+    }
+}
+
+fn vector(axes: &[&mut [Lanes8]; 3], index: usize) -> Vec3 {
+    let (group, lane) = (index / 8, index % 8);
+    Vec3::new(axes[0][group][lane], axes[1][group][lane], axes[2][group][lane])
+}
+
+fn set_vector(axes: &mut [&mut [Lanes8]; 3], index: usize, vector: Vec3) {
+    for (axis, number) in axes.iter_mut().zip(vector.to_array()) {
+        axis[index / 8][index % 8] = number;
+    }
+}
+
+impl ParticleBlock for SheetRow<'_> {
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn inverse_mass(&self, index: usize) -> f32 {
+        self.w[index / 8][index % 8]
+    }
+
+    fn path(&self, index: usize) -> SubstepPath {
+        SubstepPath { start: vector(&self.x, index), displacement: vector(&self.d, index) }
+    }
+
+    fn predicted(&self, index: usize) -> Vec3 {
+        let Some(predicted) = &self.predicted else {
+            unreachable!("a particle touches a collider in a scene that has none")
+        };
+        vector(predicted, index)
+    }
+
+    fn set_displacement(&mut self, index: usize, displacement: Vec3) {
+        set_vector(&mut self.d, index, displacement);
+    }
+
+    fn set_position(&mut self, index: usize, position: Vec3) {
+        set_vector(&mut self.x, index, position);
+    }
+
+    #[inline(always)]
+    fn may_touch<W: Wide>(&self, group: usize, zone: &Zone) -> bool {
+        let load = |field: &[Lanes8]| W::load(&field[group], 0);
+        let (x, d) = (axes(|axis| load(self.x[axis])), axes(|axis| load(self.d[axis])));
+        let is_free = W::splat(0.0).is_below(load(self.w));
+        W::any(W::both(zone.may_meet(x, d), is_free))
+    }
+
+    #[inline(always)]
+    fn predict<W: Wide>(&mut self, prediction: &Prediction) {
+        for group in 0..self.w.len() {
+            let load = |field: &[Lanes8]| W::load(&field[group], 0);
+            let before = axes(|axis| load(self.d[axis]));
+            let wind = match &self.wind {
+                Some(wind) => axes(|axis| load(wind[axis])),
+                None => [W::splat(0.0); 3],
+            };
+            let after = prediction.predict(before, wind, load(self.w));
+            for (axis, after) in after.into_iter().enumerate() {
+                after.store(&mut self.d[axis][group], 0);
+                if let Some(predicted) = &mut self.predicted {
+                    after.store(&mut predicted[axis][group], 0);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn pull_to_roots<W: Wide>(&mut self) {
+        let (Some(root), Some([length, square])) = (&self.root, &self.tether) else { return };
+        for group in 0..self.w.len() {
+            let load = |field: &[Lanes8]| W::load(&field[group], 0);
+            let start = axes(|axis| load(self.x[axis]) - load(root[axis]));
+            let before = axes(|axis| load(self.d[axis]));
+            let excess = tether_excess(Tethered {
+                start,
+                displacement: before,
+                limit: RestLength { length: load(length), square: load(square) },
+                inverse_mass: load(self.w),
+            });
+            for axis in 0..3 {
+                (before[axis] - excess[axis]).store(&mut self.d[axis][group], 0);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn advance<W: Wide>(&mut self) {
+        for axis in 0..3 {
+            for (x, d) in self.x[axis].iter_mut().zip(self.d[axis].iter()) {
+                (W::load(x, 0) + W::load(d, 0)).store(x, 0);
+            }
+        }
+    }
+}

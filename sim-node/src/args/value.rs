@@ -1,0 +1,70 @@
+//! Parsers of values, with errors that name the allowed ones.
+
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+/// Parser of whole numbers in a range.
+pub(super) fn whole<T: TryFrom<u64>>(
+    range: RangeInclusive<u64>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        let number = number.and_then(|number| T::try_from(number).ok());
+        let (min, max) = (range.start(), range.end());
+        number.ok_or_else(|| match *max {
+            u64::MAX => format!("it must be a whole number from {min}"),
+            max => format!("it must be a whole number from {min} to {max}"),
+        })
+    }
+}
+
+/// Parses the index of a particle, constraint, anchor or collider.
+pub(super) fn index(text: &str) -> Result<u32, String> {
+    text.parse().map_err(|_| "it must be an index: a whole number from 0".to_owned())
+}
+
+/// Parses a number. The node judges numbers that are not finite.
+pub(super) fn number(text: &str) -> Result<f32, String> {
+    text.parse().map_err(|_| "it must be a number".to_owned())
+}
+
+/// Parser of finite numbers in a range.
+pub(super) fn number_in(
+    range: RangeInclusive<f32>,
+) -> impl Fn(&str) -> Result<f32, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        let (min, max) = (range.start(), range.end());
+        number.ok_or_else(|| match *max {
+            f32::MAX => format!("it must be a number from {min}"),
+            max => format!("it must be a number from {min} to {max:?}"),
+        })
+    }
+}
+
+/// Parses a time with its unit.
+pub(super) fn time(text: &str) -> Result<Duration, String> {
+    humantime::parse_duration(text)
+        .map_err(|_| "it must be a time with its unit, such as 500ms, 10s or 2min".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_outside_their_range_are_refused_with_the_range() {
+        let threads = whole::<u8>(1..=64);
+        assert_eq!(threads("64"), Ok(64));
+        for text in ["0", "65", "300", "-1", "two", ""] {
+            assert_eq!(threads(text).unwrap_err(), "it must be a whole number from 1 to 64");
+        }
+        let compliance = number_in(0.0..=1e20);
+        assert_eq!(compliance("1e-3"), Ok(1e-3));
+        for text in ["-1", "1e21", "nan", "soft"] {
+            assert_eq!(compliance(text).unwrap_err(), "it must be a number from 0 to 1e20");
+        }
+        assert_eq!(number_in(0.0..=f32::MAX)("inf").unwrap_err(), "it must be a number from 0");
+        assert!(time("10").unwrap_err().contains("such as 500ms"));
+    }
+}

@@ -1,0 +1,188 @@
+//! The recorder refuses bad input: files that are not recordings, missing nodes, invalid options.
+
+use integration_tests::{Finished, Process, Program, Sandbox};
+
+fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
+    Process::run(Program::Recorder, sandbox, args)
+}
+
+fn assert_refused(finished: &Finished, words: &[&str]) {
+    assert_eq!(finished.code, Some(1), "{}{}", finished.stdout, finished.stderr);
+    for word in words {
+        assert!(finished.stderr.contains(word), "no \"{word}\" in: {}", finished.stderr);
+    }
+}
+
+#[test]
+fn a_file_that_is_not_a_recording_is_named() {
+    let sandbox = Sandbox::new();
+    let text = sandbox.write("text.mcap", "this is not a recording, but long enough to be read");
+    let empty = sandbox.write("empty.mcap", "");
+    let missing = sandbox.path("missing.mcap");
+    for verb in ["info", "play", "verify"] {
+        for file in [&text, &empty, &missing] {
+            assert_refused(&recorder(&sandbox, &[verb, file]), &[file]);
+        }
+    }
+}
+
+#[test]
+fn a_truncated_recording_is_read_to_its_end_and_reported_as_truncated() {
+    let sandbox = Sandbox::new();
+    let whole = sandbox.path("whole.mcap");
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "2400", "-o", &whole]).success();
+    let bytes = std::fs::read(&whole).unwrap();
+    let cut = sandbox.path("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() * 6 / 10]).unwrap();
+    for verb in ["info", "verify"] {
+        let finished = recorder(&sandbox, &[verb, &cut]);
+        assert_eq!(finished.code, Some(3), "{verb}: {}{}", finished.stdout, finished.stderr);
+        let output = finished.stdout + &finished.stderr;
+        assert!(output.contains("truncated"), "{verb}: {output}");
+    }
+    let played = recorder(&sandbox, &["play", &cut, "--rate", "50"]);
+    assert_eq!(played.code, Some(3), "{}", played.stderr);
+    assert!(played.stderr.contains("truncated"), "{}", played.stderr);
+}
+
+#[test]
+fn export_names_a_file_that_it_cannot_draw_and_draws_a_truncated_one() {
+    let sandbox = Sandbox::new();
+    let pictures = sandbox.path("pictures");
+    let text = sandbox.write("text.mcap", "this is not a recording, but long enough to be read");
+    assert_refused(&recorder(&sandbox, &["export", &text, "--png", &pictures]), &[&text]);
+    assert!(!std::path::Path::new(&pictures).exists());
+
+    let whole = sandbox.path("whole.mcap");
+    recorder(&sandbox, &["simulate", "rope", "--steps", "2400", "-o", &whole]).success();
+    let late = recorder(&sandbox, &["export", &whole, "--png", &pictures, "--at", "20s"]);
+    assert_refused(&late, &[&whole, "--at 20s", "10.000 s"]);
+    let bytes = std::fs::read(&whole).unwrap();
+    let cut = sandbox.path("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() * 6 / 10]).unwrap();
+    let args = ["export", &cut, "--svg", &pictures, "--frames", "2"];
+    let drawn = recorder(&sandbox, &args);
+    assert_eq!(drawn.code, Some(3), "{}", drawn.stderr);
+    assert!(drawn.stderr.contains("truncated"), "{}", drawn.stderr);
+    let files: Vec<_> = drawn.stdout.lines().collect();
+    assert_eq!(files.len(), 2, "{}", drawn.stdout);
+    assert!(files[0].ends_with("/rope_00000000.svg"), "{}", drawn.stdout);
+    assert!(std::fs::read_to_string(files[1]).unwrap().starts_with("<svg"));
+
+    assert_refused(&recorder(&sandbox, &args), &[files[0], "exists", "--overwrite"]);
+    let again: Vec<_> = args.into_iter().chain(["--overwrite", "--json"]).collect();
+    let again = recorder(&sandbox, &again);
+    assert_eq!(again.code, Some(3), "{}", again.stderr);
+    assert!(again.stdout.starts_with("[{\"file\":"), "{}", again.stdout);
+    assert!(again.stdout.contains("\"step\":0,\"time_s\":0.0}"), "{}", again.stdout);
+}
+
+#[test]
+fn a_missing_node_is_reported_with_its_domain_and_how_to_start_one() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let finished = recorder(&sandbox, &["record", "-o", &file]);
+    assert_refused(&finished, &["sim/status", sandbox.domain(), "sim-node run"]);
+    assert!(!std::path::Path::new(&file).exists());
+    assert!(!std::path::Path::new(&format!("{file}.part")).exists());
+}
+
+#[test]
+fn an_existing_file_is_overwritten_only_on_request() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.write("run.mcap", "precious");
+    let args = ["simulate", "curtain", "--steps", "3", "-o", &file];
+    assert_refused(&recorder(&sandbox, &args), &["exists", "--overwrite"]);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "precious");
+    let args: Vec<_> = args.into_iter().chain(["--overwrite"]).collect();
+    recorder(&sandbox, &args).success();
+    recorder(&sandbox, &["info", &file]).success();
+}
+
+#[test]
+fn an_invalid_command_file_is_refused_with_line_and_field_and_nothing_is_written() {
+    let sandbox = Sandbox::new();
+    let lines = "{\"step\":1,\"kind\":\"reset\"}\n{\"step\":2,\"kind\":\"pin\"}\n";
+    let commands = sandbox.write("bad.jsonl", lines);
+    let file = sandbox.path("out.mcap");
+    let args = ["simulate", "curtain", "--steps", "3", "--commands", &commands, "-o", &file];
+    let finished = recorder(&sandbox, &args);
+    let expected = format!("error: {commands}:2: particle: ");
+    assert_refused(&finished, &[]);
+    assert!(finished.stderr.starts_with(&expected), "{}", finished.stderr);
+    assert!(!std::path::Path::new(&file).exists());
+}
+
+#[test]
+fn invalid_options_exit_with_2() {
+    let sandbox = Sandbox::new();
+    for args in
+        [&["simulate", "curtain"][..], &["play"], &["play", "x.mcap", "--rate", "-1"], &["dance"]]
+    {
+        assert_eq!(recorder(&sandbox, args).code, Some(2), "{args:?}");
+    }
+}
+
+#[test]
+fn commands_that_cannot_apply_are_refused_and_nothing_is_written() {
+    let sandbox = Sandbox::new();
+    let commands = sandbox.write("late.jsonl", "{\"step\":100,\"kind\":\"pause\"}\n");
+    let output = sandbox.path("out.mcap");
+    let args = ["simulate", "rope", "--steps", "50", "--commands", &commands, "-o", &output];
+    assert_refused(&recorder(&sandbox, &args), &[&commands, "step 50", "--steps 100 or more"]);
+    assert!(!std::path::Path::new(&output).exists());
+    assert!(!std::path::Path::new(&(output + ".part")).exists());
+}
+
+#[test]
+fn a_fifo_is_refused_without_waiting_for_a_writer() {
+    let sandbox = Sandbox::new();
+    for (name, make) in [
+        ("pipe.toml", ["simulate", "--steps", "1"].as_slice()),
+        ("pipe.jsonl", ["simulate", "rope", "--steps", "1", "--commands"].as_slice()),
+        ("pipe.mcap", ["info"].as_slice()),
+    ] {
+        let pipe = sandbox.path(name);
+        rustix::fs::mknodat(
+            rustix::fs::CWD,
+            &pipe,
+            rustix::fs::FileType::Fifo,
+            rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR,
+            0,
+        )
+        .unwrap();
+        let args: Vec<_> = make.iter().copied().chain([pipe.as_str()]).collect();
+        assert_refused(&recorder(&sandbox, &args), &[&pipe, "FIFO"]);
+    }
+}
+
+#[test]
+fn the_scene_of_a_recording_simulates_to_the_same_states() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.path("run.mcap");
+    let args = ["simulate", "curtain", "--steps", "60", "-o", &run, "--json"];
+    let first = recorder(&sandbox, &args).success();
+    let scene = recorder(&sandbox, &["scene", &run]).success();
+    let scene = sandbox.write("scene.toml", &scene);
+    let again = recorder(&sandbox, &["simulate", &scene, "--steps", "60", "--json"]).success();
+    let hash = |stdout: &str| {
+        let summary: serde_json::Value = serde_json::from_str(stdout).unwrap();
+        summary["state_hash"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(hash(&again), hash(&first));
+}
+
+#[test]
+fn wrong_option_values_state_what_is_expected() {
+    let sandbox = Sandbox::new();
+    for (args, words) in [
+        (["simulate", "rope", "--steps", "-1"].as_slice(), "expected a whole number from 0"),
+        (&["record", "--duration", "-5s"], "expected a time with its unit"),
+        (&["play", "run.mcap", "--rate", "-1"], "expected a number above 0"),
+        (&["info", "run.mcap", "--jsn"], "there is no option --jsn"),
+    ] {
+        let refused = recorder(&sandbox, args);
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+        assert!(refused.stderr.contains(words), "{}", refused.stderr);
+    }
+}

@@ -1,0 +1,7 @@
+//! The recorder as a process: recordings of live nodes, simulations and playbacks, and bad input.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+mod bad_input;
+mod end_to_end;
+mod physics;
+mod threads;
