@@ -37,8 +37,8 @@ use sim_types::ParameterValues;
 /// owner frees the name and wakes all waiting processes with [`Wake::OwnerGone`].
 #[derive(Debug)]
 pub struct Owner {
-    // Dropped in this order: first the services lose their writers, then the name is free, and then
-    // readers wake and find it so.
+    // Dropped in this order: the writers go first, then the name is free, and then the readers wake
+    // and notice it.
     writers: LoadWriters,
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc::Service, Command, ()>,
@@ -66,7 +66,7 @@ impl Owner {
     /// empty list of tears. For a scene without colliders, also publishes an empty list of colliders.
     ///
     /// # Errors
-    /// Another process owns the name, the load is beyond a limit of the contract or of shared memory, or a
+    /// Another process owns the name, the load exceeds a limit of the contract or of shared memory, or a
     /// service could not be created.
     pub fn create(endpoint: &Endpoint, load: &Load<'_>) -> Result<Self, OwnerError> {
         check_limits(load)?;
@@ -102,8 +102,8 @@ impl Owner {
     /// its memory until this returns, and longer while a reader holds a snapshot.
     ///
     /// # Errors
-    /// The load is beyond a limit of the contract or of shared memory, or a writer could not be
-    /// created: nothing has changed, and the old load can continue. After [`OwnerError::Publish`] it
+    /// The load exceeds a limit of the contract or of shared memory, or a writer could not be created:
+    /// nothing has changed, and the old load can continue. After [`OwnerError::Publish`] it
     /// cannot continue, because its writers are gone.
     pub fn load(&mut self, load: &Load<'_>) -> Result<(), OwnerError> {
         check_limits(load)?;
@@ -199,7 +199,8 @@ impl Owner {
     }
 
     /// Appends all commands that have arrived, those of each client in the order of sending. Returns
-    /// their number. Skips clients with a broken connection: no other process can stop the owner.
+    /// their number. Ends early at a client with a broken connection, and returns no error: no other
+    /// process can stop the owner.
     pub fn receive_commands(&self, commands: &mut Vec<Command>) -> usize {
         let before = commands.len();
         while commands.len() - before < COMMANDS_RECEIVED_MAX {
