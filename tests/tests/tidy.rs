@@ -34,7 +34,7 @@ const LINES_MAX: usize = 500;
 const FOLDER_FILES_MAX: usize = 14;
 
 /// Folders with more source files than that.
-const CROWDED_FOLDERS: &[&str] = &["recorder/src/log", "sim-node/solver/benches/step"];
+const CROWDED_FOLDERS: &[&str] = &["recorder/src/log"];
 
 /// Words that do not begin a doc comment. It begins with a noun phrase or a third-person verb.
 const OPENINGS: [&str; 5] = ["What", "How", "Whether", "Who", "That"];
