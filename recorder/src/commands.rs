@@ -4,5 +4,6 @@ pub(crate) mod export;
 pub(crate) mod info;
 pub(crate) mod play;
 pub(crate) mod record;
+pub(crate) mod scene;
 pub(crate) mod simulate;
 pub(crate) mod verify;

@@ -4,8 +4,8 @@ mod decode;
 mod encoding;
 mod frames;
 mod index;
-mod keyframe_tears;
 mod message;
+mod open;
 mod part_file;
 mod read_error;
 mod reader;
@@ -22,18 +22,18 @@ pub use decode::LoggedMessage;
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
 pub use frames::{Frame, FrameReader};
 pub use index::{ChunkEntry, IndexedLog};
-pub use keyframe_tears::KeyframeTears;
 pub use message::Message;
+pub use open::open_regular_file;
 pub use part_file::{Existing, PartFile, PartFileError};
 pub use read_error::{LogEnd, ReadError};
 pub use reader::LogReader;
 pub use rows::{
-    ColliderRow, CollidersRow, EventRow, OutcomeRow, ShapeRow, Softness, StatusRow, StepRow,
-    SurfaceRow, TearsRow, TopologyRow,
+    ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow,
+    StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
 pub use run::{Closing, FORMAT_VERSION, RunDescription};
 pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
-pub use tears::{Torn, TornFollower};
+pub use tears::{TearTracker, TornList};
 pub use topic::{AllCounts, Topic, TopicCounts};
 pub use writer::{Compression, LogOptions, LogWriter, WriteError};

@@ -10,10 +10,11 @@ mod input;
 mod proof_tests;
 mod simulation;
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use cli::exit::{self, Exit};
-use commands::{export as export_command, info, play, record, simulate, verify};
+use commands::{export as export_command, info, play, record, scene, simulate, verify};
 
 /// Record a simulation, play it back, and prove that it can be re-simulated bit for bit
 #[derive(Debug, Parser)]
@@ -27,6 +28,7 @@ use commands::{export as export_command, info, play, record, simulate, verify};
         recorder simulate curtain --steps 2400 -o curtain.mcap\n  \
         recorder info curtain.mcap\n  \
         recorder export curtain.mcap --png pictures\n  \
+        recorder scene curtain.mcap > curtain.toml\n  \
         recorder verify curtain.mcap"
 )]
 struct Args {
@@ -44,6 +46,8 @@ enum Command {
     Play(play::PlayArgs),
     /// Record everything that a running simulation publishes
     Record(record::RecordArgs),
+    /// Print the scene of a recording
+    Scene(scene::SceneArgs),
     /// Simulate a scene in this process, as fast as possible, into the same recording as a live run
     Simulate(simulate::SimulateArgs),
     /// Re-simulate a recording and compare every bit
@@ -51,13 +55,32 @@ enum Command {
 }
 
 fn main() -> Exit {
-    let args = Args::parse();
+    let args = Args::try_parse().unwrap_or_else(|error| explain(error).exit());
     exit::from_result(match &args.command {
         Command::Export(args) => export_command::run(args),
         Command::Info(args) => info::run(args),
         Command::Play(args) => play::run(args),
         Command::Record(args) => record::run(args),
+        Command::Scene(args) => scene::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Verify(args) => verify::run(args),
     })
+}
+
+/// Replaces the text of clap for an unknown option, which speaks of an "unexpected argument".
+fn explain(error: clap::Error) -> clap::Error {
+    let (ErrorKind::UnknownArgument, Some(argument)) =
+        (error.kind(), error.get(ContextKind::InvalidArg))
+    else {
+        return error;
+    };
+    let suggestion = error.get(ContextKind::SuggestedArg);
+    let hint = suggestion.map_or_else(String::new, |name| format!(" (did you mean {name}?)"));
+    let text = if argument.to_string().starts_with('-') {
+        format!("there is no option {argument}{hint}")
+    } else {
+        format!("there is one argument too many: {argument}")
+    };
+    let text = text + "\n\nFor more information, try '--help'.\n";
+    clap::Error::raw(ErrorKind::UnknownArgument, text).with_cmd(&Args::command())
 }

@@ -1,18 +1,18 @@
-//! What is written is what is read back, and what cannot be read is named.
+//! Recordings read back as they were written, and unreadable files are named.
 //!
-//! Small recordings are built in memory, then cut, damaged or replaced by something else.
+//! Small recordings are built in memory, then truncated, damaged or replaced.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by it")]
 
 use std::io::{Cursor, Read};
 
 use recorder::{
     Closing, CollidersRow, EventRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
-    LoggedMessage, Message, OutcomeRow, ReadError, RunDescription, StatusRow, StepRow, SurfaceRow,
-    TearsRow, Topic, TopologyRow, WriteError,
+    LoggedMessage, Message, OutcomeRow, ParametersRow, ReadError, RunDescription, StatusRow,
+    StepRow, SurfaceRow, TearTracker, TearsRow, Topic, TopologyRow, TornList, WriteError,
 };
 use sim_contract::{
     Action, ColliderState, Command, ConstraintState, LoadHeader, NodeStatus, Outcome,
-    ParticleState, Reason, Triangle,
+    ParameterValues, ParticleState, Reason, TearCause, Triangle,
 };
 
 fn run() -> RunDescription {
@@ -83,6 +83,7 @@ fn messages() -> Vec<Message> {
         Message::Surface(SurfaceRow::new(&load, &[Triangle { corners: [0, 1, 0] }])),
         Message::Colliders(colliders(2)),
         Message::Tears(TearsRow { step: 2, constraints: vec![0], causes: vec!["cut".to_owned()] }),
+        Message::Parameters(ParametersRow { step: 2, values: ParameterValues::default() }),
         Message::Keyframe { step: 2, bytes: vec![0, 255, 3] },
         Message::Step(step_row(2)),
         Message::Particles { step: 2, particles: particles(2) },
@@ -120,7 +121,7 @@ fn read_all<R: Read>(log: &mut LogReader<R>) -> Result<Vec<LoggedMessage>, ReadE
     std::iter::from_fn(|| log.next_message().transpose()).collect()
 }
 
-/// Particles by their bits: NaN differs from itself otherwise.
+/// Returns particles as bytes, because NaN differs from itself.
 fn bits(message: &Message) -> Vec<u8> {
     match message {
         Message::Particles { particles, .. } => bytemuck::cast_slice(particles).to_vec(),
@@ -154,7 +155,7 @@ fn a_recording_reads_back_as_it_was_written() {
 }
 
 #[test]
-fn outcomes_become_the_messages_that_they_were() {
+fn outcomes_survive_a_round_trip_through_their_rows() {
     for row in outcomes() {
         assert_eq!(OutcomeRow::from(&Outcome::from(&row)), row);
     }
@@ -183,7 +184,7 @@ fn rows_have_the_documented_form() {
 }
 
 #[test]
-fn rows_beside_the_snapshots_have_the_documented_form() {
+fn the_other_rows_have_the_documented_form() {
     let expected = [
         r#"{"step":2,"colliders":[{"shape":"plane","normal":[0.0,1.0,0.0],"offset":0.0,"restitution":0.0,"friction":0.5,"velocity":[0.0,0.0,0.0]}]}"#,
         r#"{"step":2,"constraints":[0],"causes":["cut"]}"#,
@@ -199,23 +200,23 @@ fn rows_beside_the_snapshots_have_the_documented_form() {
 }
 
 #[test]
-fn a_recording_of_the_first_format_is_read_and_one_of_the_next_is_refused() {
+fn recordings_of_older_formats_are_read_and_those_of_the_next_are_refused() {
     let with_version = |version: &str| {
         let mut file = write(LogOptions::default());
-        let needle = b"format_version\x01\0\0\x002";
+        let needle = b"format_version\x01\0\0\x003";
         let place = file.windows(needle.len()).position(|window| window == needle).unwrap();
         file[place + needle.len() - 1] = version.as_bytes()[0];
         LogReader::new(Cursor::new(file)).map(|_| ())
     };
-    assert!(with_version("1").is_ok());
+    assert!(with_version("1").is_ok() && with_version("2").is_ok());
     assert_eq!(
-        with_version("3").unwrap_err().to_string(),
-        "has format version 3; this recorder reads versions 1 to 2"
+        with_version("4").unwrap_err().to_string(),
+        "has format version 4; this recorder reads versions 1 to 3"
     );
 }
 
 #[test]
-fn log_time_never_goes_back() {
+fn log_times_never_decrease() {
     let mut log = LogWriter::create(Vec::new(), LogOptions::default(), &run(), SCENE, 50).unwrap();
     for (step, log_time_ns) in [(0, 60), (1, 40), (2, 70)] {
         log.write(&Message::Step(step_row(step)), log_time_ns).unwrap();
@@ -226,11 +227,11 @@ fn log_time_never_goes_back() {
 }
 
 #[test]
-fn frames_hold_what_leads_up_to_a_snapshot() {
+fn frames_contain_the_messages_before_their_snapshot() {
     let file = write(LogOptions::default());
     let mut frames = FrameReader::new(LogReader::new(file.as_slice()).unwrap());
     let first = frames.next_frame().unwrap().unwrap();
-    assert_eq!((first.row.step, first.updates.len()), (2, 5));
+    assert_eq!((first.row.step, first.updates.len()), (2, 6));
     let second = frames.next_frame().unwrap().unwrap();
     assert_eq!((second.row.step, second.updates.len()), (3, 4));
     let mut step = 3;
@@ -283,7 +284,7 @@ fn a_truncated_file_is_read_up_to_the_cut() {
 }
 
 #[test]
-fn what_was_flushed_outlives_a_killed_recorder() {
+fn flushed_messages_outlive_a_killed_recorder() {
     let mut log = LogWriter::create(Vec::new(), LogOptions::default(), &run(), SCENE, 0).unwrap();
     let shared = SharedOut::default();
     let out = shared.clone();
@@ -301,11 +302,11 @@ fn what_was_flushed_outlives_a_killed_recorder() {
     assert_eq!(read_all(&mut reader).unwrap().len(), 7);
     assert!(matches!(reader.end(), Some(LogEnd::Truncated { .. })));
     drop(log);
-    assert_eq!(shared.bytes(), killed, "a dropped writer must not pretend to have finished");
+    assert_eq!(shared.bytes(), killed, "a dropped writer must not finish the file");
 }
 
 #[test]
-fn one_flipped_bit_anywhere_is_noticed() {
+fn one_flipped_bit_anywhere_is_detected() {
     let file = write(LogOptions { chunk_size_bytes: 500, ..LogOptions::default() });
     let whole: Vec<_> = messages().iter().map(bits).collect();
     for place in (0..file.len()).step_by(13) {
@@ -314,7 +315,7 @@ fn one_flipped_bit_anywhere_is_noticed() {
         let Ok(mut log) = LogReader::new(damaged.as_slice()) else { continue };
         let Ok(read) = read_all(&mut log) else { continue };
         assert_ne!(log.end(), Some(&LogEnd::Complete), "bit of byte {place}");
-        // A damaged record type hides a whole chunk; what is left is as it was written.
+        // A damaged opcode hides a whole chunk. The remaining messages are unchanged.
         let mut written = whole.iter();
         for logged in &read {
             let message = bits(&logged.message);
@@ -324,7 +325,7 @@ fn one_flipped_bit_anywhere_is_noticed() {
 }
 
 #[test]
-fn a_flipped_bit_of_a_chunk_is_named_as_a_checksum_error() {
+fn a_flipped_bit_in_a_chunk_is_a_checksum_error() {
     let options = LogOptions { compression: recorder::Compression::None, ..LogOptions::default() };
     let mut file = write(options);
     let needle = b"particle 1 was not finite";
@@ -337,7 +338,7 @@ fn a_flipped_bit_of_a_chunk_is_named_as_a_checksum_error() {
 }
 
 #[test]
-fn other_files_are_named_for_what_they_are() {
+fn files_that_are_not_recordings_are_named() {
     for not_mcap in [&b""[..], b"x", b"particles = 3\nand so on and so on and so on"] {
         let error = LogReader::new(not_mcap).unwrap_err();
         assert_eq!(error.to_string(), "is not an MCAP file");
@@ -361,7 +362,7 @@ fn other_files_are_named_for_what_they_are() {
 }
 
 #[test]
-fn a_recording_without_its_scene_is_read_all_the_same() {
+fn a_recording_without_a_scene_is_readable() {
     let metadata = |entries: &[(&str, &str)]| {
         let entries = entries.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned()));
         mcap::records::Metadata { name: "run".to_owned(), metadata: entries.collect() }
@@ -393,6 +394,69 @@ fn a_recording_without_its_scene_is_read_all_the_same() {
     assert!(error.to_string().contains("not a recording of a simulation"), "{error}");
 }
 
+/// A file as recorders of format 2 wrote it: without `/parameters`, and with unknown causes.
+fn format_2_file() -> Vec<u8> {
+    let mut file = mcap::WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
+    let entries = [
+        ("format_version", "2"),
+        ("run_id", "000000000000002a"),
+        ("epoch_ns", "0"),
+        ("scene", "two points"),
+        ("origin", "0 0 0"),
+        ("rate_hz", "240"),
+        ("method", "xpbd"),
+        ("particle_count", "0"),
+        ("constraint_count", "2"),
+        ("solver_version", "3"),
+        ("contract_version", "2"),
+        ("recorder_version", "0.1.0"),
+    ];
+    let metadata = entries.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+    let run = mcap::records::Metadata { name: "run".to_owned(), metadata };
+    file.write_metadata(&run).unwrap();
+    let rows = [
+        (
+            "/topology",
+            r#"{"step":7,"revision":0,"a":[0,1],"b":[1,2],"rest_length":[1,1],"compliance":[0,0],"kind":[0,0],"torn":[1]}"#,
+        ),
+        ("/tears", r#"{"step":8,"constraints":[0]}"#),
+        ("/tears", r#"{"step":9,"constraints":[0,1],"causes":["unknown","cut"]}"#),
+        (
+            "/status",
+            r#"{"step":9,"paused":false,"replay":false,"real_time_factor":1,"wake_late_ns_p50":0,"wake_late_ns_p99":0,"solve_ns_p50":0,"solve_ns_p99":0,"late_steps":0,"skipped_periods":0,"outcome_count":0,"rejected_count":0,"rate_hz":240,"particle_count":0,"constraint_count":2,"reader_count":1,"process_id":1,"scene_name":"two points"}"#,
+        ),
+    ];
+    for (sequence, (topic, row)) in (0..).zip(rows) {
+        let channel_id =
+            file.add_channel(0, topic, "json", &std::collections::BTreeMap::new()).unwrap();
+        let header =
+            mcap::records::MessageHeader { channel_id, sequence, log_time: 0, publish_time: 0 };
+        file.write_to_known_channel(&header, row.as_bytes()).unwrap();
+    }
+    file.finish().unwrap();
+    file.into_inner().into_inner()
+}
+
+#[test]
+fn a_file_of_format_2_is_readable() {
+    let file = format_2_file();
+    let mut log = LogReader::new(file.as_slice()).unwrap();
+    let messages: Vec<_> =
+        read_all(&mut log).unwrap().into_iter().map(|logged| logged.message).collect();
+    let [Message::Topology(topology), before, after, Message::Status(status)] = &messages[..]
+    else {
+        panic!("{messages:?}")
+    };
+    assert_eq!((topology.constraints().unwrap().len(), status.time_scale), (2, 1.0));
+    let mut tracker = TearTracker::new(TornList::before(&topology.torn));
+    tracker.process(before);
+    tracker.process(after);
+    let torn = tracker.at(9).unwrap();
+    assert_eq!(torn.constraints, [1, 0, 0, 1]);
+    assert_eq!(torn.causes, [None, None, None, Some(TearCause::Cut)]);
+    assert_eq!(log.end(), Some(&LogEnd::Complete));
+}
+
 #[test]
 fn nothing_is_written_after_the_first_error() {
     let shared = SharedOut::default();
@@ -410,7 +474,7 @@ fn nothing_is_written_after_the_first_error() {
     assert_eq!(shared.bytes().len(), length);
 }
 
-/// A sink that outlives its writer and may be full at some size.
+/// A sink that outlives its writer and may have a size limit.
 #[derive(Clone, Default)]
 struct SharedOut {
     bytes: std::sync::Arc<std::sync::Mutex<Vec<u8>>>,

@@ -1,7 +1,7 @@
-//! A recording read chunk by chunk holds what it holds read from its start, with its index and
-//! without it.
+//! Reading chunk by chunk gives the same messages as reading from the start, with an index and
+//! without.
 //!
-//! Small recordings are built into files, then cut and damaged.
+//! Small recordings are written to files, then truncated and damaged.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
 
 use std::fs;
@@ -43,7 +43,7 @@ fn written() -> Vec<u8> {
     log.finish(&Closing::default()).unwrap()
 }
 
-/// A file that goes with its guard.
+/// A file that is removed when its guard is dropped.
 struct TestFile(PathBuf);
 
 impl TestFile {
@@ -74,14 +74,14 @@ fn in_order(bytes: &[u8]) -> Vec<LoggedMessage> {
 }
 
 #[test]
-fn chunks_hold_what_the_file_holds_in_order() {
+fn the_chunks_contain_the_messages_of_the_file_in_order() {
     let bytes = written();
     let file = TestFile::new("whole", &bytes);
     let mut log = file.open().unwrap();
     assert!(log.has_index() && log.chunks().len() > 10, "{} chunks", log.chunks().len());
     assert_eq!((log.end(), log.scene()), (&LogEnd::Complete, &b"version = 1"[..]));
     assert_eq!(read_all(&mut log), in_order(&bytes));
-    // From the back as well.
+    // Reading from the back works too.
     let last = log.chunks().len() - 1;
     let newest = log.read_chunk(last).unwrap().pop().unwrap();
     assert_eq!(newest.message.step(), STEPS - 1);
@@ -91,8 +91,8 @@ fn chunks_hold_what_the_file_holds_in_order() {
 fn topics_of_a_chunk_are_known_without_reading_it() {
     let bytes = written();
     let whole = TestFile::new("topics", &bytes);
-    let walked = TestFile::new("topics-walked", &bytes[..bytes.len() - 1]);
-    for (file, has_index) in [(&whole, true), (&walked, false)] {
+    let scanned = TestFile::new("topics-scanned", &bytes[..bytes.len() - 1]);
+    for (file, has_index) in [(&whole, true), (&scanned, false)] {
         let mut log = file.open().unwrap();
         assert_eq!(log.has_index(), has_index);
         let has_tears: Vec<_> =
@@ -108,7 +108,7 @@ fn topics_of_a_chunk_are_known_without_reading_it() {
 }
 
 #[test]
-fn a_file_without_its_end_is_walked_up_to_the_cut() {
+fn a_file_without_an_end_is_scanned_up_to_the_truncation() {
     let bytes = written();
     let whole = in_order(&bytes);
     let mut counts = Vec::new();
@@ -130,7 +130,7 @@ fn a_file_without_its_end_is_walked_up_to_the_cut() {
 }
 
 #[test]
-fn an_index_that_is_too_short_ends_the_walk() {
+fn a_message_index_that_is_too_short_ends_the_scan() {
     let mut bytes = written();
     let size = |bytes: &[u8], at: usize| {
         9 + usize::try_from(u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap())).unwrap()
@@ -140,7 +140,7 @@ fn an_index_that_is_too_short_ends_the_walk() {
         at += size(&bytes, at);
     }
     bytes[at + 1] = 1;
-    // Without its end it has to be walked.
+    // A file without an end is scanned.
     bytes.truncate(bytes.len() - 20);
     let file = TestFile::new("short", &bytes);
     let whole = in_order(&written());
@@ -155,7 +155,7 @@ fn an_index_that_is_too_short_ends_the_walk() {
 }
 
 #[test]
-fn a_flipped_bit_spoils_its_chunk_only_and_never_gives_another_message() {
+fn a_flipped_bit_damages_only_its_chunk_and_never_changes_a_message() {
     let bytes = written();
     let whole = in_order(&bytes);
     for place in (0..bytes.len()).step_by(41) {

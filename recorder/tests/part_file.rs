@@ -1,4 +1,4 @@
-//! A file bears its name only once it is finished, and nothing is replaced unless told.
+//! A file gets its name only when it is finished, and nothing is replaced without permission.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by it")]
 
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use recorder::{Existing, PartFile, PartFileError};
 
-/// A directory of one test, removed at its end.
+/// The directory of a test, which is removed at its end.
 struct Directory(PathBuf);
 
 impl Directory {
@@ -35,7 +35,7 @@ fn write(path: &Path, existing: Existing, text: &str) -> Result<PartFile, PartFi
 }
 
 #[test]
-fn it_has_its_name_only_after_the_end() {
+fn a_file_gets_its_name_when_it_is_finished() {
     let directory = Directory::new("name");
     let path = directory.file("a.mcap");
     let file = write(&path, Existing::Refuse, "one").unwrap();
@@ -47,7 +47,7 @@ fn it_has_its_name_only_after_the_end() {
 }
 
 #[test]
-fn an_existing_file_is_refused_and_stays() {
+fn an_existing_file_is_refused_and_unchanged() {
     let directory = Directory::new("refuse");
     let path = directory.file("a.mcap");
     fs::write(&path, "old").unwrap();
@@ -61,7 +61,7 @@ fn an_existing_file_is_refused_and_stays() {
 }
 
 #[test]
-fn what_a_killed_recorder_left_is_refused_and_stays() {
+fn the_part_file_of_a_killed_recorder_is_refused_and_unchanged() {
     let directory = Directory::new("killed");
     let path = directory.file("a.mcap");
     drop(write(&path, Existing::Refuse, "half").unwrap());
@@ -71,7 +71,7 @@ fn what_a_killed_recorder_left_is_refused_and_stays() {
 }
 
 #[test]
-fn both_are_replaced_when_told() {
+fn both_files_are_replaced_with_overwrite() {
     let directory = Directory::new("overwrite");
     let path = directory.file("a.mcap");
     fs::write(&path, "old").unwrap();
@@ -81,7 +81,7 @@ fn both_are_replaced_when_told() {
 }
 
 #[test]
-fn a_file_that_appeared_meanwhile_is_not_replaced() {
+fn a_file_that_appears_in_the_meantime_is_not_replaced() {
     let directory = Directory::new("meanwhile");
     let path = directory.file("a.mcap");
     let file = write(&path, Existing::Refuse, "new").unwrap();
@@ -100,7 +100,7 @@ fn a_discarded_file_leaves_nothing() {
 }
 
 #[test]
-fn a_directory_that_is_not_there_is_named() {
+fn the_error_names_a_missing_directory() {
     let directory = Directory::new("missing");
     let error = write(&directory.file("no/a.mcap"), Existing::Refuse, "x").unwrap_err();
     assert!(error.to_string().contains("no/a.mcap.part: No such file"), "{error}");

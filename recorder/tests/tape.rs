@@ -1,8 +1,8 @@
-//! A recording that is wound to any step shows there what the solver had in that step, and what a
-//! reading of the file from its start finds.
+//! A tape wound to any step shows the state of the solver in that step, which a reader of the whole
+//! file finds too.
 //!
-//! A scene is simulated here with cuts, resets and colliders, and written in small chunks; what the
-//! solver had is kept beside it.
+//! The tests simulate a scene with cuts, resets and colliders, write it in small chunks, and keep the
+//! states of the solver for comparison.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by it")]
 
 use std::fs;
@@ -29,14 +29,14 @@ const SCENE: &str = "
     spacing = 0.1
     pinned = 'top'";
 
-/// Steps that are simulated, and what happens in some of them.
+/// Number of simulated steps, and the cuts and resets in some of them.
 const STEPS: u64 = 300;
 const CUTS: [(u64, u32); 6] = [(7, 3), (40, 11), (41, 2), (125, 30), (210, 5), (250, 12)];
 const RESETS: [u64; 2] = [90, 210];
 /// Steps between two keyframes.
 const KEYFRAME_PERIOD: u64 = 60;
 
-/// What the solver had after a step.
+/// The state of the solver after a step.
 #[derive(Debug, Clone, PartialEq)]
 struct Expected {
     step: u64,
@@ -46,7 +46,7 @@ struct Expected {
     hash: u64,
 }
 
-/// How a recording is written.
+/// The format of a test recording.
 #[derive(Debug, Clone, Copy)]
 struct Style {
     every: u64,
@@ -71,7 +71,7 @@ fn reset_outcome(step: u64) -> Message {
     Message::Outcome(OutcomeRow::from(&Outcome::new(0, step, command, Ok(()))))
 }
 
-/// The messages of a step, its snapshot not among them, in the order of publication.
+/// Returns the messages of a step except its snapshot, in the order of publication.
 fn updates(solver: &Solver, step: u64, style: Style) -> Vec<Message> {
     let mut messages = Vec::new();
     if step.is_multiple_of(25) {
@@ -92,7 +92,7 @@ fn updates(solver: &Solver, step: u64, style: Style) -> Vec<Message> {
     messages
 }
 
-/// Makes a step with all that happens in it.
+/// Computes a step with its cuts and resets.
 fn advance(solver: &mut Solver, step: u64) {
     if RESETS.contains(&step) {
         solver.reset();
@@ -167,7 +167,7 @@ fn row(solver: &Solver, step: u64) -> StepRow {
     }
 }
 
-/// A file that goes with its guard.
+/// A file that is removed when its guard is dropped.
 struct TestFile(PathBuf);
 
 impl TestFile {
@@ -188,7 +188,7 @@ impl Drop for TestFile {
     }
 }
 
-/// Steps forwards, backwards and far apart.
+/// Returns steps in forward, backward and scattered order.
 fn tour() -> impl Iterator<Item = u64> {
     let scattered = (0..=STEPS).map(|step| step * 127 % (STEPS + 1));
     scattered.chain(0..=STEPS).chain((0..=STEPS).rev())
@@ -210,7 +210,7 @@ fn assert_shows(tape: &mut Tape, step: u64, all: &[Expected]) {
 }
 
 #[test]
-fn a_tape_shows_at_any_step_what_the_solver_had() {
+fn a_tape_shows_the_state_of_the_solver_at_any_step() {
     let styles = [
         ("plain", PLAIN),
         ("decimated", Style { every: 4, ..PLAIN }),
@@ -229,13 +229,13 @@ fn a_tape_shows_at_any_step_what_the_solver_had() {
 }
 
 #[test]
-fn what_a_fresh_tape_shows_is_what_the_file_has_there() {
+fn a_newly_opened_tape_shows_the_state_in_the_file() {
     let (bytes, all) = written(PLAIN);
     let file = TestFile::new("linear", &bytes);
     let mut frames = FrameReader::new(LogReader::new(bytes.as_slice()).unwrap());
     let mut step = 0;
     while let Some(frame) = frames.next_frame().unwrap() {
-        // Opened anew, now and then: nothing is known of what came before.
+        // A newly opened tape has no cached chunks.
         if step % 37 == 0 {
             let state = file.open().unwrap().state_at(step).unwrap();
             assert_eq!((state.row, &*state.particles), (frame.row, &frame.particles));
@@ -247,7 +247,7 @@ fn what_a_fresh_tape_shows_is_what_the_file_has_there() {
 }
 
 #[test]
-fn neighbours_are_found_across_chunks() {
+fn neighboring_steps_are_found_across_chunks() {
     let (bytes, all) = written(Style { every: 3, ..PLAIN });
     let file = TestFile::new("neighbours", &bytes);
     let mut tape = file.open().unwrap();
@@ -259,7 +259,7 @@ fn neighbours_are_found_across_chunks() {
 }
 
 #[test]
-fn a_file_without_its_end_is_shown_as_far_as_it_goes() {
+fn a_file_without_an_end_is_shown_as_far_as_it_goes() {
     let (bytes, all) = written(PLAIN);
     let file = TestFile::new("cut", &bytes[..bytes.len() / 2]);
     let mut reports = Vec::new();
@@ -274,7 +274,7 @@ fn a_file_without_its_end_is_shown_as_far_as_it_goes() {
 }
 
 #[test]
-fn around_a_damaged_chunk_everything_else_is_shown() {
+fn everything_except_a_damaged_chunk_is_shown() {
     let (mut bytes, all) = written(PLAIN);
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
@@ -293,7 +293,7 @@ fn around_a_damaged_chunk_everything_else_is_shown() {
 }
 
 #[test]
-fn what_is_nothing_to_show_says_why() {
+fn a_file_without_a_state_reports_the_reason() {
     let (bytes, _) = written(PLAIN);
     let open = |name: &str, bytes: &[u8]| {
         TestFile::new(name, bytes).open().err().map(|error| error.to_string()).unwrap()

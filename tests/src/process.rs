@@ -10,7 +10,9 @@ use std::thread::JoinHandle;
 use rustix::process::{Pid, Signal, kill_process};
 use sim_contract::DOMAIN_VARIABLE;
 
-use crate::{Program, Sandbox, wait_for};
+use crate::programs::Program;
+use crate::sandbox::Sandbox;
+use crate::wait::wait_for;
 
 /// Exit code of `sim-node ctl` for a rejected command.
 const EXIT_REJECTED: i32 = 4;

@@ -6,15 +6,18 @@ use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct EndpointArgs {
     /// Name of the simulation. Its services are NAME/particles, NAME/commands and so on
-    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
+    #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", allow_hyphen_values = true,
+        value_parser = Endpoint::parse_name)]
     name: String,
-    /// Domain, which separates services from others on this host [env: CATENARY_DOMAIN]
+    /// Domain, which separates services from others on this host [env: `CATENARY_DOMAIN`]
     /// [default: that of iceoryx2]
-    #[arg(long, value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
+    #[arg(long, value_name = "DOMAIN", allow_hyphen_values = true,
+        value_parser = Endpoint::parse_domain)]
     domain: Option<String>,
 }
 
 impl EndpointArgs {
+    /// Returns the endpoint. Without `--domain`, the variable `CATENARY_DOMAIN` gives the domain.
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
         Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
     }

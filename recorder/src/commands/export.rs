@@ -18,6 +18,7 @@ use sim_solver::scene::Up;
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
+use crate::cli::parse::{self, whole_number_in};
 use crate::export::camera::{Basis, Camera, View};
 use crate::export::extent::ExtentTracker;
 use crate::export::mesh::Bend;
@@ -57,16 +58,16 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "DIR", group = "format")]
     svg: Option<PathBuf>,
     /// Draw a picture at the start and after each period of simulated time, such as 500ms
-    #[arg(long, value_name = "TIME", value_parser = period, group = "selection")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = period, group = "selection")]
     every: Option<Duration>,
     /// Draw N pictures, evenly spaced from the first to the last snapshot [default: 8]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), group = "selection")]
-    frames: Option<u16>,
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = frames, group = "selection")]
+    frames: Option<usize>,
     /// Draw a picture at this simulated time after the first snapshot. Can be repeated
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration, group = "selection")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration, group = "selection")]
     at: Vec<Duration>,
     /// Width and height in pixels, 16 to 8192 each
-    #[arg(long, value_name = "WxH", default_value = "960x720", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "960x720", allow_hyphen_values = true, value_parser = size)]
     size: Size,
     /// Direction of view [default: front for a 2-D scene, along the thin axis of a flat scene, else
     /// iso]
@@ -153,7 +154,7 @@ impl ExportArgs {
     fn selection(&self) -> Selection {
         match (self.every, self.frames) {
             (Some(period), _) => Selection::Every(period),
-            (_, Some(count)) => Selection::Spread(count.into()),
+            (_, Some(count)) => Selection::Spread(count),
             _ if !self.at.is_empty() => Selection::At(self.at.clone()),
             _ => Selection::Spread(FRAMES_DEFAULT),
         }
@@ -176,7 +177,7 @@ impl ExportArgs {
 impl Survey {
     /// Reads the whole recording for its steps and its end.
     fn read<R: Read>(log: LogReader<R>, path: &str) -> anyhow::Result<Self> {
-        let scene = scene_in_recording(&log, path).map_err(|error| format!("{error:#}"));
+        let scene = scene_in_recording(&log).map_err(|error| format!("{path}: {error:#}"));
         let run = log.run().clone();
         let mut frames = FrameReader::new(log);
         let mut steps = Vec::new();
@@ -221,6 +222,11 @@ fn renderer<R: Read>(
     })
 }
 
+fn frames(text: &str) -> Result<usize, String> {
+    let count = whole_number_in(text, &(1..=65_535))?;
+    usize::try_from(count).map_err(|error| error.to_string())
+}
+
 fn size(text: &str) -> Result<Size, String> {
     let side = |text: &str| text.parse().ok().filter(|side| (SIDE_MIN..=SIDE_MAX).contains(side));
     let size = text
@@ -230,9 +236,8 @@ fn size(text: &str) -> Result<Size, String> {
 }
 
 fn period(text: &str) -> Result<Duration, String> {
-    match humantime::parse_duration(text) {
-        Ok(Duration::ZERO) => Err("expected a time longer than 0s".to_owned()),
-        Ok(period) => Ok(period),
-        Err(error) => Err(error.to_string()),
+    match parse::duration(text)? {
+        Duration::ZERO => Err("expected a time longer than 0s".to_owned()),
+        period => Ok(period),
     }
 }

@@ -1,4 +1,4 @@
-//! `recorder play`: a recording on the services that it was recorded from.
+//! `recorder play`: plays a recording on the services of a node.
 
 mod control;
 mod pace;
@@ -14,65 +14,68 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::{
-    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
+    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow, TornList,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Endpoint, Method, Stop, TearCause};
-use sim_solver::{Keyframe, Solver};
+use sim_contract::{Endpoint, Method, Stop};
+use sim_solver::Solver;
 
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
 use crate::cli::output;
+use crate::cli::parse::{self, whole_number};
 use crate::input::scene_source::scene_in_recording;
 use control::Control;
 use pace::Pace;
 use position::Position;
-pub(crate) use position::{Happening, happenings};
 use replay::{Recorded, Replay};
 
-/// Longest wait before commands, readers and signals are looked at.
+/// Longest wait before the next check for commands, readers and signals.
 const WAIT_MAX_NS: u64 = SECOND_NS / 100;
-/// Longest time between two status messages: 10 Hz.
+/// Period of the status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
-/// How long the last snapshot stays, for readers that have just been woken by it.
+/// Time for which the services stay after the last snapshot, so that its readers can finish.
 const LINGER_NS: u64 = SECOND_NS / 10;
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Obeys pause, resume and step like a node: sim-node ctl pause.\n\n\
-    Exit codes: 0 played; 1 failed; 3 the file is cut off or damaged, played as far as it \
+#[command(
+    after_help = "Obeys pause, resume and step like a node, for example `sim-node ctl pause`.\n\n\
+    Exit codes: 0 played; 1 failed; 3 the file is truncated or damaged and was played as far as it \
     goes.\n\nExamples:\n  \
     recorder play run.mcap\n  \
     recorder play run.mcap --rate 0.25 --loop\n  \
-    recorder play run.mcap --start 2s --end 3500ms --wait-for-readers 1")]
+    recorder play run.mcap --start 2s --end 3500ms --wait-for-readers 1"
+)]
 pub(crate) struct PlayArgs {
     /// Recording to play
     file: PathBuf,
     #[command(flatten)]
     endpoint: EndpointArgs,
-    /// Simulated time per wall-clock time, above 0 to 1000; pauses of the recorded run are left out
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = rate)]
+    /// Simulated time per wall-clock time, above 0 and up to 1000. Pauses of the recorded run are
+    /// skipped
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_hyphen_values = true, value_parser = rate)]
     rate: f64,
-    /// Start again at the end, as a new run [default: end]
+    /// Start again at the end, as a new run
     #[arg(long = "loop")]
     loops: bool,
-    /// Start this much simulated time after the first snapshot, such as 2s or 500ms [default: 0s]
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    /// Start at this simulated time after the first snapshot, such as 2s or 500ms [default: 0s]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration)]
     start: Option<Duration>,
-    /// End this much simulated time after the first snapshot [default: the end of the recording]
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    /// End at this simulated time after the first snapshot [default: the end of the recording]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration)]
     end: Option<Duration>,
-    /// Wait with the first snapshot for `ctl resume` or `ctl step` [default: go on]
+    /// Pause after the first snapshot until `ctl resume` or `ctl step`
     #[arg(long)]
     paused: bool,
     /// Wait for this many readers before the first snapshot
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    wait_for_readers: usize,
+    #[arg(long, value_name = "N", default_value_t = 0, allow_hyphen_values = true, value_parser = whole_number)]
+    wait_for_readers: u64,
 }
 
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate) if rate > 0.0 && rate <= 1000.0 => Ok(rate),
-        _ => Err("not a number above 0 and up to 1000".to_owned()),
+        _ => Err("expected a number above 0 and up to 1000".to_owned()),
     }
 }
 
@@ -88,7 +91,7 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
     let mut is_paused = args.paused;
     loop {
         let mut pass = Pass::open(args, &endpoint).with_context(|| path.clone())?;
-        // Whoever pauses the end of a pass finds the next one paused.
+        // A pause at the end of a pass also applies to the next one.
         pass.replay.control = Control::new(is_paused);
         let readers = if is_first { args.wait_for_readers } else { 0 };
         if is_first {
@@ -114,7 +117,7 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
 struct Pass {
     frames: FrameReader<BufReader<File>>,
     first: Frame,
-    /// Wall clock of the recording after which nothing is played, in nanoseconds since 1970.
+    /// Recorded time of the last snapshot to play, in nanoseconds since 1970.
     end_ns: u64,
     replay: Replay,
     pace: Pace,
@@ -122,29 +125,26 @@ struct Pass {
 }
 
 impl Pass {
-    /// Goes to the first snapshot that is played, and takes the name.
+    /// Skips to the first snapshot to play, and becomes the owner of the name.
     fn open(args: &PlayArgs, endpoint: &Endpoint) -> anyhow::Result<Self> {
         let log = LogReader::open(&args.file)?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
-        let mut solver = Solver::new(&scene_in_recording(&log, &output::path_text(&args.file))?);
+        let solver = Solver::new(&scene_in_recording(&log)?);
         let mut frames = FrameReader::new(log);
         let mut first = next_frame(&mut frames)?;
-        let (topology, surface) = load_of(&first)?;
+        let (topology, surface) = load_rows(&first)?;
         let colliders = first_colliders(&first).map(|row| row.colliders.len());
         let collider_count = colliders.unwrap_or_else(|| solver.collider_count());
         let origin_ns = run.time_of_step_ns(first.row.step);
         let start_ns = origin_ns.saturating_add(nanoseconds(args.start.unwrap_or_default()));
-        let causes = causes_before(&mut solver, &first, &topology.torn);
-        let mut position = Position::new(&topology.torn, causes);
-        position.method = Method::from_number(run.method).unwrap_or_default();
-        position.since_step = first.row.step.saturating_sub(first.row.scene_step);
-        if let Some(Ok(keyframe)) = first.own_keyframe().map(Keyframe::decode) {
-            position.parameters = keyframe.parameter_values(position.method);
-        }
+        let torn = TornList::before_first(&topology, &first);
+        let method = Method::from_number(run.method).unwrap_or_default();
+        let mut position = Position::new(torn, method);
         while run.time_of_step_ns(first.row.step) < start_ns {
             position.skip(&first.updates);
-            first = next_frame(&mut frames).context("--start is behind its last snapshot")?;
+            first = next_frame(&mut frames).context("--start is after its last snapshot")?;
         }
+        first.updates.iter().for_each(|update| position.apply_parameters(update));
         let recorded = Recorded {
             run: &run,
             scene: &scene,
@@ -159,8 +159,8 @@ impl Pass {
         Ok(Self { frames, first, end_ns, replay, pace, next_status_ns: 0 })
     }
 
-    /// Plays to the end, or until asked to stop. How the file ends, if its end was reached.
-    fn play(&mut self, readers: usize, stop: &Stop) -> anyhow::Result<Option<LogEnd>> {
+    /// Plays to the end or until a signal. Returns the end of the file, if it was reached.
+    fn play(&mut self, readers: u64, stop: &Stop) -> anyhow::Result<Option<LogEnd>> {
         let first_step = self.first.row.step;
         self.wait_for_readers(readers, first_step, stop)?;
         self.replay.publish_latched(first_step)?;
@@ -173,22 +173,22 @@ impl Pass {
             }
             self.replay.publish(&frame)?;
             last_step = frame.row.step;
-            // Read ahead: unpacking it falls into the wait.
+            // Read ahead, so that decompression happens during the wait.
             next = self.frames.next_frame()?;
         }
         self.linger(last_step + 1, stop)?;
         Ok(self.frames.end().cloned())
     }
 
-    fn wait_for_readers(&mut self, count: usize, step: u64, stop: &Stop) -> anyhow::Result<()> {
-        while self.replay.reader_count() < count && !stop.is_requested() {
+    fn wait_for_readers(&mut self, count: u64, step: u64, stop: &Stop) -> anyhow::Result<()> {
+        while (self.replay.reader_count() as u64) < count && !stop.is_requested() {
             self.attend(step)?;
             sleep_until(monotonic_ns() + WAIT_MAX_NS);
         }
         Ok(())
     }
 
-    /// Waits until a snapshot is due; `false` if asked to stop.
+    /// Waits until a snapshot is due. Returns `false` on a signal.
     fn wait_until_due(&mut self, time_ns: u64, step: u64, stop: &Stop) -> anyhow::Result<bool> {
         loop {
             self.attend(step)?;
@@ -209,9 +209,9 @@ impl Pass {
         }
     }
 
-    /// Answers commands, serves late readers, and tells how the replay does.
+    /// Answers commands, serves late subscribers, and publishes the status.
     fn attend(&mut self, next_step: u64) -> anyhow::Result<()> {
-        // Whoever commanded and then asks for the status finds the effect in it.
+        // Publishes a fresh status after commands, so that `ctl status` shows their effect.
         let has_commands = self.replay.answer_commands(next_step)?;
         let now_ns = monotonic_ns();
         if has_commands || now_ns >= self.next_status_ns {
@@ -241,8 +241,8 @@ fn next_frame(frames: &mut FrameReader<BufReader<File>>) -> anyhow::Result<Frame
     }
 }
 
-/// The topology and surface stand before the first snapshot.
-fn load_of(first: &Frame) -> anyhow::Result<(TopologyRow, SurfaceRow)> {
+/// Returns the topology and the surface, which precede the first snapshot.
+fn load_rows(first: &Frame) -> anyhow::Result<(TopologyRow, SurfaceRow)> {
     let topology = first.updates.iter().find_map(|update| match update {
         Message::Topology(row) => Some(row.clone()),
         _ => None,
@@ -255,21 +255,12 @@ fn load_of(first: &Frame) -> anyhow::Result<(TopologyRow, SurfaceRow)> {
     Ok((topology, surface.context("has no /surface before its first snapshot")?))
 }
 
-/// The number of colliders never changes in a recording.
+/// Returns the first colliders. Their number never changes in a recording.
 fn first_colliders(first: &Frame) -> Option<&CollidersRow> {
     first.updates.iter().find_map(|update| match update {
         Message::Colliders(row) => Some(row),
         _ => None,
     })
-}
-
-/// Why each of `torn` tore before the recording: that stands in the first keyframe only. `None` if
-/// nothing did, or if the keyframe is of another version.
-fn causes_before(solver: &mut Solver, first: &Frame, torn: &[u32]) -> Option<Vec<TearCause>> {
-    let keyframe = Keyframe::decode(first.own_keyframe()?).ok()?;
-    solver.restore(bytemuck::cast_slice(&first.particles), &keyframe).ok()?;
-    let causes = solver.tear_causes().iter().map(|cause| *cause);
-    solver.torn().starts_with(torn).then(|| causes.take(torn.len()).collect())
 }
 
 fn nanoseconds(duration: Duration) -> u64 {

@@ -2,8 +2,9 @@
 
 mod accepted;
 mod batch;
-mod collider_log;
 mod intake;
+mod latched_log;
+mod lists;
 mod queue;
 mod report;
 mod tear_log;
@@ -22,6 +23,7 @@ use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
 use crate::cli::file_args::{FileArgs, LogFile, default_path};
 use crate::cli::output::{self, AsJson};
+use crate::cli::parse::{self, whole_number, whole_number_in};
 use accepted::{Accepted, RunEnd, RunHeader};
 use batch::Batch;
 use intake::{Intake, Now};
@@ -54,19 +56,25 @@ pub(crate) struct RecordArgs {
     #[arg(short, long, value_name = "OUT.mcap")]
     output: Option<PathBuf>,
     /// End after this time, such as 10s or 500ms [default: no limit]
-    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true,
+        value_parser = parse::duration)]
     duration: Option<Duration>,
     /// End N steps after the first recorded step [default: no limit]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
     steps: Option<u64>,
     /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
     /// not fit are lost and counted
-    #[arg(long, value_name = "BYTES", default_value_t = 256 << 20, value_parser = clap::value_parser!(u64).range(1 << 20..=1 << 40))]
+    #[arg(long, value_name = "BYTES", default_value_t = 256 << 20,
+        allow_hyphen_values = true, value_parser = queue_bytes)]
     queue_bytes: u64,
     #[command(flatten)]
     file: FileArgs,
     #[command(flatten)]
     as_json: AsJson,
+}
+
+fn queue_bytes(text: &str) -> Result<u64, String> {
+    whole_number_in(text, &(1 << 20..=1 << 40))
 }
 
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {

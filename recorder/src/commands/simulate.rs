@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use recorder::{Closing, OutcomeRow};
 use serde::Serialize;
 use sim_contract::Stop;
@@ -14,9 +14,11 @@ use sim_solver::Solver;
 use crate::cli::exit::Exit;
 use crate::cli::file_args::{FileArgs, LogFile};
 use crate::cli::output::{self, AsJson};
+use crate::cli::parse::whole_number;
 use crate::cli::progress::progress_bar;
 use crate::cli::thread_args::ThreadArgs;
-use crate::input::scene_source::{load_commands, load_scene};
+use crate::input::command_source::load_commands;
+use crate::input::scene_source::load_scene;
 use crate::simulation::{Job, SimulationResult, simulate};
 
 /// Steps between two checks for signals and updates of the progress bar.
@@ -32,7 +34,7 @@ pub(crate) struct SimulateArgs {
     /// scene (ending in .mcap)
     scene: String,
     /// Number of steps to compute after step 0
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
     steps: u64,
     /// Recording to write [default: none, only the summary is printed]
     #[arg(short, long, value_name = "OUT.mcap")]
@@ -68,13 +70,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let scene = load_scene(&args.scene)?;
     let commands = args.commands.as_deref().map_or(Ok(Vec::new()), load_commands)?;
     let job = Job { scene, commands, steps: args.steps };
-    let beyond = job.commands_beyond_the_end();
-    if beyond > 0 {
-        output::note(&format!(
-            "warning: commands for steps after {}, the last one: {beyond}",
-            args.steps
-        ));
-    }
+    check_command_steps(&job).with_context(|| args.commands.clone().unwrap_or_default())?;
     let mut solver = Solver::new(&job.scene);
     solver.set_threads(args.threads.count());
     let mut log =
@@ -98,6 +94,28 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let summary = summary(&job, &result, wall_ns, path.as_deref());
     output::result(args.as_json, &summary, &summary.to_string())?;
     Ok(if result.steps < args.steps { Exit::Loss } else { Exit::Done })
+}
+
+/// Warns if some commands are for steps after the last one, and fails if all are.
+fn check_command_steps(job: &Job) -> anyhow::Result<()> {
+    let late_count = job.commands_beyond_the_end();
+    let (Some(first), Some(last)) = (job.commands.first(), job.commands.last()) else {
+        return Ok(());
+    };
+    let (first, last, steps) = (first.step, last.step, job.steps);
+    if late_count == job.commands.len() {
+        bail!(
+            "all {late_count} commands are for steps {first} to {last}, but the simulation ends at \
+             step {steps}. Use --steps {last} or more"
+        );
+    }
+    if late_count > 0 {
+        output::note(&format!(
+            "warning: {late_count} commands are for steps after {steps}, the last one. Use --steps \
+             {last} or more to apply all"
+        ));
+    }
+    Ok(())
 }
 
 /// Describes the file after a write error.
@@ -157,5 +175,30 @@ impl fmt::Display for Summary {
         writeln!(f, "commands    {} applied, {} rejected", self.applied, self.rejected)?;
         write!(f, "speed       {:.1} x real time ({:.2} s)", self.real_time_factor, self.wall_s)?;
         self.output.iter().try_for_each(|path| write!(f, "\nwritten     {path}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_solver::{Scene, builtin};
+
+    use super::*;
+    use crate::input::command_file;
+
+    fn job(steps: u64) -> Job {
+        let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
+        let lines = "{\"step\":10,\"kind\":\"pause\"}\n{\"step\":40,\"kind\":\"pause\"}";
+        Job { scene, commands: command_file::parse(lines, "test").unwrap(), steps }
+    }
+
+    #[test]
+    fn commands_that_are_all_after_the_last_step_are_an_error() {
+        assert_eq!(
+            check_command_steps(&job(9)).unwrap_err().to_string(),
+            "all 2 commands are for steps 10 to 40, but the simulation ends at step 9. Use --steps \
+             40 or more"
+        );
+        assert!(check_command_steps(&job(10)).is_ok(), "some apply");
+        assert!(check_command_steps(&Job { commands: Vec::new(), ..job(9) }).is_ok());
     }
 }

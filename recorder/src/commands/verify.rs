@@ -102,7 +102,7 @@ pub(crate) fn verify<R: Read>(
              {SOLVER_VERSION}, whose bits differ. Verify it with the program that recorded it"
         );
     }
-    let scene = scene_in_recording(&log, path)?;
+    let scene = scene_in_recording(&log).with_context(|| path.to_owned())?;
     let mut frames = FrameReader::new(log);
     let mut simulation = None;
     let mut report = Report::new();

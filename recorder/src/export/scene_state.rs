@@ -4,10 +4,10 @@ use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::{Context, bail};
-use recorder::{ColliderRow, Frame, FrameReader, LogReader, Message, StepRow};
+use recorder::{
+    ColliderRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker, TornList,
+};
 use sim_contract::{ConstraintState, ParticleState, Triangle};
-
-use crate::commands::play::{Happening, happenings};
 
 /// The state at one snapshot.
 #[derive(Debug, Clone, Default)]
@@ -32,10 +32,12 @@ pub(crate) fn visit_states<R: Read>(
     let mut steps = steps.iter().copied().peekable();
     let mut frames = FrameReader::new(log);
     let mut state = SceneState::default();
+    let mut tears = TearTracker::new(TornList::default());
     while steps.peek().is_some() {
         let Some(frame) = frames.next_frame()? else { break };
-        state.apply_frame(frame)?;
+        state.apply_frame(frame, &mut tears)?;
         if steps.next_if_eq(&state.row.step).is_some() {
+            state.set_torn(tears.at(state.row.step))?;
             state.check_indices()?;
             if visit(&state)?.is_break() {
                 break;
@@ -46,12 +48,13 @@ pub(crate) fn visit_states<R: Read>(
 }
 
 impl SceneState {
-    fn apply_frame(&mut self, frame: Frame) -> anyhow::Result<()> {
-        for happening in happenings(&frame.updates) {
-            match happening {
-                Happening::Reset(_) => self.is_torn.fill(false),
-                Happening::Update(message) => self.apply_message(message)?,
+    fn apply_frame(&mut self, frame: Frame, tears: &mut TearTracker) -> anyhow::Result<()> {
+        for message in &frame.updates {
+            if let Message::Topology(row) = message {
+                *tears = TearTracker::new(TornList::before(&row.torn));
             }
+            tears.process(message);
+            self.apply_message(message)?;
         }
         self.row = frame.row;
         self.particles = frame.particles;
@@ -64,7 +67,6 @@ impl SceneState {
                 self.constraints =
                     row.constraints().context("the columns of /topology differ in length")?;
                 self.is_torn = vec![false; self.constraints.len()];
-                self.tear(&row.torn)?;
             }
             Message::Surface(row) => {
                 self.triangles = row
@@ -72,14 +74,14 @@ impl SceneState {
                     .context("the number of indices in /surface is not a multiple of three")?;
             }
             Message::Colliders(row) => self.colliders.clone_from(&row.colliders),
-            Message::Tears(row) => self.tear(&row.constraints)?,
             _ => {}
         }
         Ok(())
     }
 
-    fn tear(&mut self, constraints: &[u32]) -> anyhow::Result<()> {
-        for constraint in constraints {
+    fn set_torn(&mut self, torn: Option<&TornList>) -> anyhow::Result<()> {
+        self.is_torn.fill(false);
+        for constraint in torn.iter().flat_map(|torn| &torn.constraints) {
             let Some(is_torn) = self.is_torn.get_mut(*constraint as usize) else {
                 bail!("constraint {constraint} is torn but not in /topology");
             };

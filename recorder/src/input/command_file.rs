@@ -1,71 +1,91 @@
-//! Command files: one JSON object a line, as people write them and as `/outcomes` holds them.
+//! Command files: one JSON object per line. The rows of `/outcomes` are such lines.
 
 use serde_json::{Map, Value};
-use sim_contract::{Action, PlainF32};
+use sim_contract::{Action, PlainF32, Text};
 
-/// A command and when it takes effect.
+/// A command and the step in which it takes effect.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TimedCommand {
-    /// The first step that shows its effect.
+    /// The first step that shows the effect.
     pub(crate) step: u64,
-    /// Its place in the log that it comes from.
+    /// Number of the outcome in the log that the command comes from.
     pub(crate) index: Option<u64>,
     pub(crate) client_id: u64,
     pub(crate) sequence: u64,
     pub(crate) action: Action,
 }
 
-/// What is wrong with a command file, and where.
+/// An error in a command file, with its position.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{label}:{line}: {field}: {what} (allowed: {allowed})")]
+#[error("{label}:{line}: {}: {} (allowed: {})", .error.field, .error.problem, .error.allowed)]
 pub(crate) struct CommandFileError {
     label: String,
     /// From 1.
     line: usize,
+    error: FieldError,
+}
+
+/// An error in one field of a line.
+#[derive(Debug, PartialEq, Eq)]
+struct FieldError {
     field: String,
-    what: String,
+    problem: String,
     allowed: String,
 }
 
-/// What is wrong with one line: field, what, allowed.
-type Wrong = (String, String, String);
+/// The fields of a kind of command.
+struct Kind {
+    name: &'static str,
+    fields: &'static [&'static str],
+    /// The first fields are required, and the others are optional.
+    required_count: usize,
+}
 
-/// The kinds with their fields; those behind the number of required ones are optional.
-const KINDS: [(&str, &[&str], usize); 18] = [
-    ("pin", &["particle"], 1),
-    ("unpin", &["particle"], 1),
-    ("grab", &["particle", "target", "over_s"], 2),
-    ("move", &["particle", "target", "over_s"], 2),
-    ("release", &["particle"], 1),
-    ("pause", &[], 0),
-    ("resume", &[], 0),
-    ("step", &["count"], 1),
-    ("reset", &[], 0),
-    ("push", &["center", "radius", "delta", "limit"], 3),
-    ("cut", &["constraint"], 1),
-    ("cut_radius", &["center", "radius"], 2),
-    ("cut_segment", &["from", "to", "direction"], 3),
-    ("move_anchor", &["anchor", "translation", "rotation"], 2),
-    ("move_collider", &["collider", "translation", "rotation"], 2),
-    ("set", &["parameter", "value", "constraint_kind"], 2),
-    ("load", &["scene"], 1),
-    // What a log holds for a command of another version.
-    ("unknown", &["number"], 1),
+const fn kind(name: &'static str, required: &'static [&'static str]) -> Kind {
+    Kind { name, fields: required, required_count: required.len() }
+}
+
+const fn kind_with_optional(name: &'static str, fields: &'static [&'static str]) -> Kind {
+    Kind { name, fields, required_count: fields.len() - 1 }
+}
+
+/// The kinds of commands.
+const KINDS: [Kind; 18] = [
+    kind("pin", &["particle"]),
+    kind("unpin", &["particle"]),
+    kind_with_optional("grab", &["particle", "target", "over_s"]),
+    kind_with_optional("move", &["particle", "target", "over_s"]),
+    kind("release", &["particle"]),
+    kind("pause", &[]),
+    kind("resume", &[]),
+    kind("step", &["count"]),
+    kind("reset", &[]),
+    kind_with_optional("push", &["center", "radius", "delta", "limit"]),
+    kind("cut", &["constraint"]),
+    kind("cut_radius", &["center", "radius"]),
+    kind("cut_segment", &["from", "to", "direction"]),
+    kind_with_optional("move_anchor", &["anchor", "translation", "rotation"]),
+    kind_with_optional("move_collider", &["collider", "translation", "rotation"]),
+    kind_with_optional("set", &["parameter", "value", "constraint_kind"]),
+    kind("load", &["scene"]),
+    // A log has this kind for a command of another version.
+    kind("unknown", &["number"]),
 ];
 
-/// The fields of every line; `status` and `reason` are those of a log and say nothing here.
-const ENVELOPE: [&str; 7] = ["step", "kind", "client_id", "sequence", "index", "status", "reason"];
+/// The fields of every line. `status` and `reason` come from logs and have no effect.
+const COMMON_FIELDS: [&str; 7] =
+    ["step", "kind", "client_id", "sequence", "index", "status", "reason"];
 
-/// Reads commands in the order of their application. `label` is what errors call the text.
+/// Parses commands and sorts them in the order of application. `label` names the file in errors.
 pub(crate) fn parse(text: &str, label: &str) -> Result<Vec<TimedCommand>, CommandFileError> {
     let mut commands = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         if text.trim().is_empty() {
             continue;
         }
-        let command = parse_line(text, line).map_err(|(field, what, allowed)| {
+        let command = parse_line(text, line).map_err(|error| {
             let label = label.to_owned();
-            CommandFileError { label, line, field, what, allowed }
+            CommandFileError { label, line, error }
         })?;
         commands.push(command);
     }
@@ -73,7 +93,8 @@ pub(crate) fn parse(text: &str, label: &str) -> Result<Vec<TimedCommand>, Comman
     Ok(commands)
 }
 
-/// By step; within one by index where there is one, else by client and sequence.
+/// Sorts by step, then by index, then by client and sequence. Commands without an index come last in
+/// their step.
 pub(crate) fn sort(commands: &mut [TimedCommand]) {
     commands.sort_by_key(|command| {
         let index = command.index.unwrap_or(u64::MAX);
@@ -81,10 +102,10 @@ pub(crate) fn sort(commands: &mut [TimedCommand]) {
     });
 }
 
-fn parse_line(text: &str, line: usize) -> Result<TimedCommand, Wrong> {
+fn parse_line(text: &str, line: usize) -> Result<TimedCommand, FieldError> {
     let Ok(Value::Object(fields)) = serde_json::from_str(text) else {
         let example = r#"an object such as {"step":1,"kind":"pin","particle":0}"#;
-        return Err(wrong("line", "is not a JSON object", example));
+        return Err(invalid("line", "is not a JSON object", example));
     };
     let step = integer(&fields, "step", 1)?;
     Ok(TimedCommand {
@@ -96,45 +117,50 @@ fn parse_line(text: &str, line: usize) -> Result<TimedCommand, Wrong> {
     })
 }
 
-fn action(fields: &Map<String, Value>) -> Result<Action, Wrong> {
-    let Some(kind) = fields.get("kind") else {
+fn action(fields: &Map<String, Value>) -> Result<Action, FieldError> {
+    let Some(name) = fields.get("kind") else {
         return Err(missing("kind", &kind_names()));
     };
-    let known = KINDS.iter().find(|(name, ..)| kind.as_str() == Some(name));
-    let (_, names, required_count) =
-        known.ok_or_else(|| wrong("kind", &format!("{kind} is unknown"), &kind_names()))?;
-    let is_own = |name: &str| names.contains(&name);
-    let is_known = |name: &str| is_own(name) || ENVELOPE.contains(&name);
-    if let Some(name) = fields.keys().find(|name| !is_known(name)) {
-        let allowed: Vec<_> = names.iter().chain(&ENVELOPE).copied().collect();
-        return Err(wrong(name, &format!("is no field of {kind}"), &allowed.join(", ")));
+    let kind = KINDS.iter().find(|kind| name.as_str() == Some(kind.name));
+    let kind = kind.ok_or_else(|| invalid("kind", &format!("{name} is unknown"), &kind_names()))?;
+    let is_own = |name: &str| kind.fields.contains(&name);
+    let is_known = |name: &str| is_own(name) || COMMON_FIELDS.contains(&name);
+    if let Some(unknown) = fields.keys().find(|name| !is_known(name)) {
+        let allowed: Vec<_> = kind.fields.iter().chain(&COMMON_FIELDS).copied().collect();
+        let problem = format!("is not a field of {name}");
+        return Err(invalid(unknown, &problem, &allowed.join(", ")));
     }
-    for (count, name) in names.iter().enumerate() {
+    for (count, name) in kind.fields.iter().enumerate() {
         match fields.get(*name) {
-            Some(value) if is_value_of(name, value) => {}
-            Some(value) => return Err(wrong(name, &format!("{value} is wrong"), values_of(name))),
-            None if count < *required_count => return Err(missing(name, values_of(name))),
+            Some(value) if is_valid(name, value) => {}
+            Some(value) => {
+                return Err(invalid(name, &format!("{value} is invalid"), allowed_values(name)));
+            }
+            None if count < kind.required_count => {
+                return Err(missing(name, allowed_values(name)));
+            }
             None => {}
         }
     }
     let own_fields = fields.iter().filter(|(name, _)| *name == "kind" || is_own(name));
     let object = own_fields.map(|(name, value)| (name.clone(), value.clone())).collect();
+    // All fields are valid. The error of serde would name internal types.
     serde_json::from_value(Value::Object(object))
-        .map_err(|error| wrong("kind", &error.to_string(), &kind_names()))
+        .map_err(|_| invalid("line", "is not a command", &kind_names()))
 }
 
-fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u64>, Wrong> {
+fn integer(fields: &Map<String, Value>, name: &str, min: u64) -> Result<Option<u64>, FieldError> {
     let Some(value) = fields.get(name) else { return Ok(None) };
     match value.as_u64() {
         Some(number) if number >= min => Ok(Some(number)),
         _ => {
             let allowed = format!("whole numbers from {min}");
-            Err(wrong(name, &format!("{value} is wrong"), &allowed))
+            Err(invalid(name, &format!("{value} is invalid"), &allowed))
         }
     }
 }
 
-fn is_value_of(name: &str, value: &Value) -> bool {
+fn is_valid(name: &str, value: &Value) -> bool {
     let is_number = |value: &Value| serde_json::from_value::<PlainF32>(value.clone()).is_ok();
     let are_numbers =
         |count| value.as_array().is_some_and(|all| all.len() == count && all.iter().all(is_number));
@@ -145,12 +171,13 @@ fn is_value_of(name: &str, value: &Value) -> bool {
         "rotation" => are_numbers(4),
         "over_s" | "radius" | "limit" => is_number(value),
         "value" => value.is_null() || is_number(value) || are_numbers(3),
-        "parameter" | "constraint_kind" | "scene" => value.is_string(),
+        "constraint_kind" => value.is_string(),
+        "parameter" | "scene" => value.as_str().is_some_and(|text| Text::new(text).is_ok()),
         _ => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
     }
 }
 
-fn values_of(name: &str) -> &'static str {
+fn allowed_values(name: &str) -> &'static str {
     match name {
         "target" | "center" | "delta" | "from" | "to" | "translation" => "three numbers in m",
         "direction" => "three numbers",
@@ -158,24 +185,24 @@ fn values_of(name: &str) -> &'static str {
         "over_s" => "a number of seconds",
         "radius" | "limit" => "a number in m",
         "value" => "a number, three numbers, or null for off",
-        "parameter" => "the name of a parameter",
+        "parameter" => "the name of a parameter, at most 160 bytes",
         "constraint_kind" => "structural, shear, bend or tether",
-        "scene" => "the name of a scene",
+        "scene" => "the name of a scene, at most 160 bytes",
         _ => "whole numbers 0..=4294967295",
     }
 }
 
 fn kind_names() -> String {
-    let names: Vec<_> = KINDS.iter().map(|(name, ..)| *name).filter(|n| *n != "unknown").collect();
+    let names: Vec<_> = KINDS.iter().map(|kind| kind.name).filter(|n| *n != "unknown").collect();
     names.join(", ")
 }
 
-fn missing(field: &str, allowed: &str) -> Wrong {
-    wrong(field, "is missing", allowed)
+fn missing(field: &str, allowed: &str) -> FieldError {
+    invalid(field, "is missing", allowed)
 }
 
-fn wrong(field: &str, what: &str, allowed: &str) -> Wrong {
-    (field.to_owned(), what.to_owned(), allowed.to_owned())
+fn invalid(field: &str, problem: &str, allowed: &str) -> FieldError {
+    FieldError { field: field.to_owned(), problem: problem.to_owned(), allowed: allowed.to_owned() }
 }
 
 #[cfg(test)]
@@ -189,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn commands_come_in_the_order_of_their_application() {
+    fn commands_are_sorted_in_the_order_of_application() {
         let text = r#"
             {"step":9,"kind":"reset"}
             {"step":3,"kind":"pin","particle":4,"client_id":7}
@@ -205,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_line_is_a_command_line() {
+    fn a_line_of_a_log_is_a_command() {
         let line = r#"{"step":3,"client_id":7,"sequence":8,"index":0,"kind":"grab","particle":1,"target":["-inf",0.1,-0.0],"over_s":0.25,"status":"rejected","reason":"non_finite"}"#;
         let commands = parse(line, "x").unwrap();
         let target = [f32::NEG_INFINITY, 0.1, -0.0];
@@ -215,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_of_kinds_is_that_of_the_contract() {
+    fn the_table_of_kinds_matches_the_contract() {
         let particle = 1;
         let (target, over_s, radius, rotation) = ([0.5; 3], 0.1, 0.2, [0.0, 0.0, 0.0, 1.0]);
         let actions = [
@@ -243,9 +270,10 @@ mod tests {
             Action::Unknown { number: 77 },
         ];
         assert_eq!(KINDS.len(), actions.len());
-        for ((name, names, _), action) in KINDS.iter().zip(actions) {
+        for (kind, action) in KINDS.iter().zip(actions) {
+            let Kind { name, fields: names, .. } = kind;
             let Value::Object(mut fields) = serde_json::to_value(action).unwrap() else {
-                panic!("{action:?} is no object");
+                panic!("{action:?} is not an object");
             };
             assert_eq!(fields["kind"], *name);
             assert_eq!(fields.len(), names.len() + 1, "{name}");
@@ -257,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn every_mistake_is_named_with_its_line_and_field() {
+    fn every_error_names_its_line_and_field() {
         let wrong = [
             "nonsense",
             "[1]",
@@ -285,23 +313,23 @@ mod tests {
         drag.jsonl:2: line: is not a JSON object (allowed: an object such as {"step":1,"kind":"pin","particle":0})
         drag.jsonl:2: line: is not a JSON object (allowed: an object such as {"step":1,"kind":"pin","particle":0})
         drag.jsonl:2: step: is missing (allowed: whole numbers from 1)
-        drag.jsonl:2: step: 0 is wrong (allowed: whole numbers from 1)
-        drag.jsonl:2: step: 1.5 is wrong (allowed: whole numbers from 1)
+        drag.jsonl:2: step: 0 is invalid (allowed: whole numbers from 1)
+        drag.jsonl:2: step: 1.5 is invalid (allowed: whole numbers from 1)
         drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load)
         drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
-        drag.jsonl:2: particle: -1 is wrong (allowed: whole numbers 0..=4294967295)
-        drag.jsonl:2: colour: is no field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason)
-        drag.jsonl:2: target: [0,1] is wrong (allowed: three numbers in m)
-        drag.jsonl:2: over_s: "soon" is wrong (allowed: a number of seconds)
+        drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
+        drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason)
+        drag.jsonl:2: target: [0,1] is invalid (allowed: three numbers in m)
+        drag.jsonl:2: over_s: "soon" is invalid (allowed: a number of seconds)
         drag.jsonl:2: radius: is missing (allowed: a number in m)
-        drag.jsonl:2: limit: null is wrong (allowed: a number in m)
-        drag.jsonl:2: rotation: [1] is wrong (allowed: four numbers: a quaternion x, y, z, w)
-        drag.jsonl:2: value: [0,1] is wrong (allowed: a number, three numbers, or null for off)
+        drag.jsonl:2: limit: null is invalid (allowed: a number in m)
+        drag.jsonl:2: rotation: [1] is invalid (allowed: four numbers: a quaternion x, y, z, w)
+        drag.jsonl:2: value: [0,1] is invalid (allowed: a number, three numbers, or null for off)
         drag.jsonl:2: value: is missing (allowed: a number, three numbers, or null for off)
-        drag.jsonl:2: parameter: 7 is wrong (allowed: the name of a parameter)
-        drag.jsonl:2: constraint_kind: 0 is wrong (allowed: structural, shear, bend or tether)
-        drag.jsonl:2: scene: null is wrong (allowed: the name of a scene)
+        drag.jsonl:2: parameter: 7 is invalid (allowed: the name of a parameter, at most 160 bytes)
+        drag.jsonl:2: constraint_kind: 0 is invalid (allowed: structural, shear, bend or tether)
+        drag.jsonl:2: scene: null is invalid (allowed: the name of a scene, at most 160 bytes)
         "#);
     }
 }

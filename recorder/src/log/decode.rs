@@ -37,6 +37,7 @@ pub(super) fn decode_message(
         Topic::Surface => Message::Surface(row(data)?),
         Topic::Colliders => Message::Colliders(row(data)?),
         Topic::Tears => Message::Tears(row(data)?),
+        Topic::Parameters => Message::Parameters(row(data)?),
         Topic::Outcomes => Message::Outcome(row(data)?),
         Topic::Status => Message::Status(row(data)?),
         Topic::Events => Message::Event(row(data)?),
@@ -55,5 +56,62 @@ pub(super) fn decode_message(
 }
 
 fn row<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
-    serde_json::from_slice(data).map_err(|error| error.to_string())
+    serde_json::from_slice(data).map_err(|error| without_type_names(&error.to_string()))
+}
+
+/// Removes the names of internal types from an error of serde.
+fn without_type_names(error: &str) -> String {
+    if error.contains("variant") {
+        return "a field is missing or has the wrong type".to_owned();
+    }
+    let mut text = String::new();
+    let mut words = error.split(' ');
+    while let Some(word) = words.next() {
+        if !text.is_empty() {
+            text.push(' ');
+        }
+        text.push_str(match word {
+            "struct" => {
+                // The next word is the name of the type.
+                words.next();
+                "an object"
+            }
+            "u32" | "u64" => "a whole number",
+            "f32" | "f64" => "a number",
+            _ => word,
+        });
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::rows::{OutcomeRow, StepRow, TopologyRow};
+
+    #[test]
+    fn errors_do_not_name_internal_types() {
+        let errors = [
+            row::<StepRow>(b"7").unwrap_err(),
+            row::<StepRow>(b"{\"step\":\"x\"}").unwrap_err(),
+            row::<StepRow>(b"{").unwrap_err(),
+            row::<TopologyRow>(b"[]").unwrap_err(),
+            row::<TopologyRow>(
+                br#"{"step":0,"revision":0,"a":[],"b":[],"rest_length":[],"kind":[],"torn":[]}"#,
+            )
+            .unwrap_err(),
+            row::<OutcomeRow>(
+                br#"{"step":1,"client_id":1,"sequence":1,"index":0,"kind":"set","parameter":"x","value":{},"status":"","reason":""}"#,
+            )
+            .unwrap_err(),
+        ];
+        insta::assert_snapshot!(errors.join("\n"), @r#"
+        invalid type: integer `7`, expected an object at line 1 column 1
+        invalid type: string "x", expected a whole number at line 1 column 11
+        EOF while parsing an object at line 1 column 1
+        invalid type: sequence, expected an object at line 1 column 0
+        a field is missing or has the wrong type
+        expected a number, three numbers or null at line 1 column 111
+        "#);
+    }
 }

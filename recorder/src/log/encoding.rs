@@ -9,7 +9,8 @@ use sim_contract::ParticleState;
 
 use super::message::Message;
 use super::rows::{
-    CollidersRow, EventRow, OutcomeRow, StatusRow, StepRow, SurfaceRow, TearsRow, TopologyRow,
+    CollidersRow, EventRow, OutcomeRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TearsRow,
+    TopologyRow,
 };
 use super::topic::Topic;
 use descriptor::{FRAME_TRANSFORM, POINT_CLOUD, file_descriptor_set};
@@ -48,6 +49,7 @@ impl TopicFormat {
             Topic::Surface => json_format::<SurfaceRow>("catenary.Surface"),
             Topic::Colliders => json_format::<CollidersRow>("catenary.Colliders"),
             Topic::Tears => json_format::<TearsRow>("catenary.Tears"),
+            Topic::Parameters => json_format::<ParametersRow>("catenary.Parameters"),
             Topic::Outcomes => json_format::<OutcomeRow>("catenary.Outcome"),
             Topic::Status => json_format::<StatusRow>("catenary.Status"),
             Topic::Events => json_format::<EventRow>("catenary.Event"),
@@ -106,6 +108,7 @@ impl MessageEncoder {
             Message::Surface(row) => json(row, scratch)?,
             Message::Colliders(row) => json(row, scratch)?,
             Message::Tears(row) => json(row, scratch)?,
+            Message::Parameters(row) => json(row, scratch)?,
             Message::Outcome(row) => json(row, scratch)?,
             Message::Status(row) => json(row, scratch)?,
             Message::Event(row) => json(row, scratch)?,

@@ -17,6 +17,7 @@ use std::path::Path;
 use mcap::records::{Record, op};
 
 use super::decode::{LoggedMessage, decode_message};
+use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
 use super::reader::LogReader;
 use super::records::{RECORD_SIZE_BYTES_MAX, RecordReader};
@@ -86,7 +87,7 @@ impl IndexedLog {
     ) -> Result<Self, ReadError> {
         let log = LogReader::open(path)?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
-        let mut file = File::open(path)?;
+        let mut file = open_regular_file(path)?;
         let size_bytes = file.metadata()?.len();
         let summary = summary::read(&mut file, size_bytes)?;
         let has_index = summary.is_some();

@@ -3,8 +3,8 @@
 use sim_contract::{Action, ParticleState};
 
 use super::rows::{
-    ColliderRow, CollidersRow, EventRow, OutcomeRow, StatusRow, StepRow, SurfaceRow, TearsRow,
-    TopologyRow,
+    ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, StatusRow, StepRow, SurfaceRow,
+    TearsRow, TopologyRow,
 };
 use super::topic::Topic;
 
@@ -19,6 +19,8 @@ pub enum Message {
     Colliders(CollidersRow),
     /// The constraints that tore in a step.
     Tears(TearsRow),
+    /// The parameters from a step on.
+    Parameters(ParametersRow),
     /// The part of the solver's state after a step that the particles lack.
     Keyframe {
         /// The step of the snapshot that this completes.
@@ -54,6 +56,7 @@ impl Message {
             Self::Surface(_) => Topic::Surface,
             Self::Colliders(_) => Topic::Colliders,
             Self::Tears(_) => Topic::Tears,
+            Self::Parameters(_) => Topic::Parameters,
             Self::Keyframe { .. } => Topic::Keyframe,
             Self::Outcome(_) => Topic::Outcomes,
             Self::Status(_) => Topic::Status,
@@ -70,6 +73,7 @@ impl Message {
             Self::Surface(row) => row.step,
             Self::Colliders(row) => row.step,
             Self::Tears(row) => row.step,
+            Self::Parameters(row) => row.step,
             Self::Outcome(row) => row.step,
             Self::Status(row) => row.step,
             Self::Event(row) => row.step,
@@ -93,7 +97,11 @@ impl Message {
             Self::Tears(row) => row.constraints.len() * (size_of::<u32>() + TEAR_CAUSE_SIZE_BYTES),
             Self::Keyframe { bytes, .. } => bytes.len(),
             Self::Particles { particles, .. } => size_of_val(particles.as_slice()),
-            Self::Outcome(_) | Self::Status(_) | Self::Event(_) | Self::Step(_) => 0,
+            Self::Parameters(_)
+            | Self::Outcome(_)
+            | Self::Status(_)
+            | Self::Event(_)
+            | Self::Step(_) => 0,
         };
         size_of::<Self>() + heap_size_bytes
     }

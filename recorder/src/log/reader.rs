@@ -8,6 +8,7 @@ use std::path::Path;
 use mcap::records::Record;
 
 use super::decode::{LoggedMessage, decode_message};
+use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
 use super::records::{READ_SIZE_BYTES_MAX, RecordReader};
 use super::run::{
@@ -36,7 +37,7 @@ impl LogReader<BufReader<File>> {
     /// # Errors
     /// If the file is not a recording or has no readable header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::new(BufReader::with_capacity(READ_SIZE_BYTES_MAX, File::open(path)?))
+        Self::new(BufReader::with_capacity(READ_SIZE_BYTES_MAX, open_regular_file(path)?))
     }
 }
 

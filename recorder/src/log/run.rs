@@ -12,8 +12,8 @@ use super::topic::{AllCounts, Topic};
 /// Version of the topics, rows and metadata in a file.
 ///
 /// Version 2 added `/colliders`, the causes of tears, and the previously torn constraints in
-/// `/topology`.
-pub const FORMAT_VERSION: u32 = 2;
+/// `/topology`. Version 3 added `/parameters`.
+pub const FORMAT_VERSION: u32 = 3;
 /// Oldest version that this recorder reads. Missing fields have defaults.
 pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 

@@ -13,9 +13,9 @@ use sim_contract::ParticleState;
 
 use super::index::IndexedLog;
 use super::read_error::{LogEnd, ReadError};
-use super::rows::{CollidersRow, StatusRow, StepRow, SurfaceRow, TopologyRow};
+use super::rows::{CollidersRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow};
 use super::run::RunDescription;
-use super::tears::{Torn, TornFollower};
+use super::tears::{TearTracker, TornList};
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
 use load::read_load;
@@ -53,9 +53,11 @@ pub struct TapeState {
     /// Shape: particle count.
     pub particles: Arc<Vec<ParticleState>>,
     /// The torn constraints.
-    pub torn: Torn,
+    pub torn: TornList,
     /// The poses of the colliders, if there are any.
     pub colliders: Option<CollidersRow>,
+    /// The parameters. `None` in recordings of format 1 and 2.
+    pub parameters: Option<ParametersRow>,
     /// The latest status of the node, if there is one.
     pub status: Option<StatusRow>,
 }
@@ -169,10 +171,13 @@ impl Tape {
         let colliders = self.reader.latest(Topic::Colliders, chunk, |digest| {
             digest.colliders.iter().rfind(|row| row.step <= step).cloned()
         })?;
+        let parameters = self.reader.latest(Topic::Parameters, chunk, |digest| {
+            digest.parameters.iter().rfind(|row| row.step <= step).cloned()
+        })?;
         let status = self.reader.latest(Topic::Status, chunk, |digest| {
             digest.statuses.iter().rfind(|row| row.step <= step).cloned()
         })?;
-        Ok(TapeState { row, particles, torn, colliders, status })
+        Ok(TapeState { row, particles, torn, colliders, parameters, status })
     }
 
     fn find(&mut self, step: u64) -> Result<Option<SnapshotPosition>, ReadError> {
@@ -191,28 +196,28 @@ impl Tape {
 
     /// Returns the torn constraints at a step: those of the newest keyframe before it, and the
     /// tears since.
-    fn torn_at(&mut self, chunk: usize, step: u64) -> Result<Torn, ReadError> {
-        let (first_chunk, mut follower) = self.torn_base(chunk, step)?;
+    fn torn_at(&mut self, chunk: usize, step: u64) -> Result<TornList, ReadError> {
+        let (first_chunk, mut tracker) = self.torn_base(chunk, step)?;
         // One chunk earlier, because a batch of the recorder may contain changes after a keyframe
         // before the keyframe.
         let changes =
             self.reader.chunks.with_tear_changes().forward_from(first_chunk.saturating_sub(1));
         for chunk in changes.take_while(|one| *one <= chunk) {
             for change in self.reader.digest(chunk)?.changes.clone() {
-                follower.take_change(change);
+                tracker.add(change);
             }
         }
-        Ok(follower.at(step).cloned().unwrap_or_default())
+        Ok(tracker.at(step).cloned().unwrap_or_default())
     }
 
     /// Returns the torn constraints to start from and their chunk: those of the newest keyframe, or
     /// those at the start of the file.
-    fn torn_base(&mut self, chunk: usize, step: u64) -> Result<(usize, TornFollower), ReadError> {
-        let from_start = TornFollower::new(Torn::before(&self.topology.torn));
+    fn torn_base(&mut self, chunk: usize, step: u64) -> Result<(usize, TearTracker), ReadError> {
+        let from_start = TearTracker::new(TornList::before(&self.topology.torn));
         for chunk in self.reader.chunks.with_topic(Topic::Keyframe).backward_from(chunk) {
             match self.reader.digest(chunk)?.keyframe(step) {
-                Some((keyframe_step, Some(tears))) => {
-                    return Ok((chunk, TornFollower::from_keyframe(*keyframe_step, tears.clone())));
+                Some((keyframe_step, Some(torn))) => {
+                    return Ok((chunk, TearTracker::from_keyframe(*keyframe_step, torn.clone())));
                 }
                 // A keyframe of another version. All keyframes of a file have the same version.
                 Some((_, None)) => return Ok((0, from_start)),

@@ -1,71 +1,93 @@
-//! What is torn at a step, followed through the messages of a recording.
+//! The torn constraints at each step, tracked through the messages of a recording.
 
 use sim_contract::TearCause;
+use sim_solver::Keyframe;
 
-use super::keyframe_tears::KeyframeTears;
+use super::frames::Frame;
 use super::message::Message;
-use super::rows::TearsRow;
+use super::rows::{TearsRow, TopologyRow};
 
-/// The constraints that are torn in a state.
+/// The torn constraints of a state.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Torn {
+pub struct TornList {
     /// In the order of tearing.
     pub constraints: Vec<u32>,
-    /// Why each of them tore; `None` where the recording does not say.
+    /// Causes of the tears. `None` if the recording does not contain the cause.
     pub causes: Vec<Option<TearCause>>,
+    /// The step of the newest tear, or of the reset that emptied the list.
+    pub step: u64,
+    /// Number of constraints at the end of the list that tore in that step.
+    pub new_count: usize,
+    /// The step of the last reset, or 0.
+    pub since_step: u64,
 }
 
-/// A change of what is torn.
+/// A change of the torn constraints.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum TearChange {
-    /// From this step on nothing of what tore before is torn.
+    /// From this step on, the earlier tears are undone.
     Reset(u64),
-    /// What tore.
+    /// New tears.
     Tears(TearsRow),
 }
 
-/// Follows what is torn. A message counts from its step on, wherever it stands in the file: what a
-/// live run is told early or late by a round of its recorder is not part of another state.
+/// Tracks the torn constraints. A message takes effect at its step, independent of its position in
+/// the file, because a batch of the recorder may contain later messages early.
 #[derive(Debug, Clone)]
-pub struct TornFollower {
-    torn: Torn,
-    /// The step that [`Self::torn`] is of; `None` at the beginning of the file.
+pub struct TearTracker {
+    torn: TornList,
+    /// The step of [`Self::torn`]. `None` at the start of the file.
     step: Option<u64>,
-    /// Changes of later steps.
+    /// Changes in later steps.
     pending: Vec<TearChange>,
     is_known: bool,
 }
 
-impl Torn {
-    /// What was torn before a recording; why stands in its first keyframe only.
+impl TornList {
+    /// Returns the constraints that were torn before a recording, with unknown causes.
     pub fn before(torn: &[u32]) -> Self {
-        Self { constraints: torn.to_vec(), causes: vec![None; torn.len()] }
+        Self { constraints: torn.to_vec(), causes: vec![None; torn.len()], ..Self::default() }
     }
 
-    fn follow(&mut self, change: &TearChange) {
+    /// Returns the constraints that were torn before a recording, with the causes in the keyframe of
+    /// its first snapshot.
+    pub fn before_first(topology: &TopologyRow, first: &Frame) -> Self {
+        let mut torn = Self::before(&topology.torn);
+        if let Some(complete) = first.own_keyframe().and_then(Self::from_keyframe)
+            && complete.constraints.starts_with(&torn.constraints)
+        {
+            torn.causes.copy_from_slice(&complete.causes[..torn.constraints.len()]);
+        }
+        torn.since_step = first.row.step.saturating_sub(first.row.scene_step);
+        torn
+    }
+
+    /// Returns the torn constraints in a keyframe, or `None` if it is damaged or has another version.
+    pub fn from_keyframe(bytes: &[u8]) -> Option<Self> {
+        let keyframe = Keyframe::decode(bytes).ok()?;
+        let causes = keyframe.tear_causes().iter().copied().map(Some).collect();
+        Some(Self { constraints: keyframe.torn().to_vec(), causes, ..Self::default() })
+    }
+
+    fn apply(&mut self, change: &TearChange) {
         match change {
-            TearChange::Reset(_) => *self = Self::default(),
+            TearChange::Reset(step) => {
+                *self = Self { step: *step, since_step: *step, ..Self::default() };
+            }
             TearChange::Tears(row) => {
                 let cause = |place: usize| {
                     row.causes.get(place).and_then(|name| TearCause::from_name(name))
                 };
                 self.causes.extend((0..row.constraints.len()).map(cause));
                 self.constraints.extend(&row.constraints);
+                (self.step, self.new_count) = (row.step, row.constraints.len());
             }
         }
     }
 }
 
-impl From<KeyframeTears> for Torn {
-    fn from(tears: KeyframeTears) -> Self {
-        let mut causes: Vec<_> = tears.causes.into_iter().map(Some).collect();
-        causes.resize(tears.torn.len(), None);
-        Self { constraints: tears.torn, causes }
-    }
-}
-
 impl TearChange {
-    /// The change that a message is, if it is one.
+    /// Returns the change that a message describes, if any.
     pub(crate) fn from_message(message: &Message) -> Option<Self> {
         match message {
             Message::Tears(row) => Some(Self::Tears(row.clone())),
@@ -73,9 +95,9 @@ impl TearChange {
         }
     }
 
-    /// Of one step, a reset comes first: what tears in that step tears in the new state, and stands
-    /// in the file before the outcome that says so.
-    fn place(&self) -> (u64, bool) {
+    /// Returns the sort key. In each step a reset comes first, because the tears of that step belong
+    /// to the new state. In the file they precede the outcome of the reset.
+    fn order(&self) -> (u64, bool) {
         match self {
             Self::Reset(step) => (*step, false),
             Self::Tears(row) => (row.step, true),
@@ -83,52 +105,53 @@ impl TearChange {
     }
 }
 
-impl TornFollower {
-    /// Begins at the beginning of a file, with what was torn before it.
-    pub fn new(torn: Torn) -> Self {
+impl TearTracker {
+    /// Starts at the start of a file, with the constraints that were torn before.
+    pub fn new(torn: TornList) -> Self {
         Self { torn, step: None, pending: Vec::new(), is_known: true }
     }
 
-    /// Begins with a keyframe: what is of its step or before is part of it.
-    pub(crate) fn from_keyframe(step: u64, tears: KeyframeTears) -> Self {
-        Self { step: Some(step), ..Self::new(tears.into()) }
+    /// Starts at a keyframe, which includes all changes up to its step.
+    pub(crate) fn from_keyframe(step: u64, torn: TornList) -> Self {
+        Self { step: Some(step), ..Self::new(torn) }
     }
 
-    /// Takes a message; most say nothing of tears.
-    pub fn take(&mut self, message: &Message) {
+    /// Processes a message. Most messages do not concern tears.
+    pub fn process(&mut self, message: &Message) {
         if let Some(change) = TearChange::from_message(message) {
-            self.take_change(change);
+            self.add(change);
         }
         if !self.is_known
             && let Message::Keyframe { step, bytes } = message
-            && let Some(tears) = KeyframeTears::read(bytes)
+            && let Some(torn) = TornList::from_keyframe(bytes)
         {
-            self.torn = tears.into();
+            self.torn = torn;
             self.step = Some(*step);
             self.is_known = true;
-            self.pending.retain(|change| change.place().0 > *step);
+            self.pending.retain(|change| change.order().0 > *step);
         }
     }
 
-    pub(crate) fn take_change(&mut self, change: TearChange) {
-        if self.step.is_none_or(|step| change.place().0 > step) {
+    pub(crate) fn add(&mut self, change: TearChange) {
+        if self.step.is_none_or(|step| change.order().0 > step) {
             self.pending.push(change);
         }
     }
 
-    /// A part of the file cannot be read: nothing is known until a keyframe says it anew.
-    pub fn lose(&mut self) {
+    /// Marks a part of the file as unreadable. The torn constraints are unknown until the next
+    /// keyframe.
+    pub fn mark_gap(&mut self) {
         self.is_known = false;
     }
 
-    /// What is torn at a step, which is not before any that was asked for; `None` if that is not
-    /// known.
-    pub fn at(&mut self, step: u64) -> Option<&Torn> {
-        let mut due: Vec<_> = self.pending.extract_if(.., |one| one.place().0 <= step).collect();
-        // Stable: rows of one step stay in their order.
-        due.sort_by_key(TearChange::place);
+    /// Returns the torn constraints at a step, or `None` if they are unknown. Steps never decrease
+    /// from call to call.
+    pub fn at(&mut self, step: u64) -> Option<&TornList> {
+        let mut due: Vec<_> = self.pending.extract_if(.., |one| one.order().0 <= step).collect();
+        // The sort is stable, so rows of one step keep their order.
+        due.sort_by_key(TearChange::order);
         for change in &due {
-            self.torn.follow(change);
+            self.torn.apply(change);
         }
         self.step = self.step.max(Some(step));
         self.is_known.then_some(&self.torn)
@@ -138,9 +161,10 @@ impl TornFollower {
 #[cfg(test)]
 mod tests {
     use sim_contract::{Action, Command, Outcome};
+    use sim_solver::{Scene, Solver, builtin};
 
     use super::*;
-    use crate::log::rows::OutcomeRow;
+    use crate::log::rows::{OutcomeRow, StepRow};
 
     fn tears(step: u64, constraints: &[u32]) -> Message {
         let causes = vec!["cut".to_owned(); constraints.len()];
@@ -152,46 +176,72 @@ mod tests {
         Message::Outcome(OutcomeRow::from(&Outcome::new(0, step, command, Ok(()))))
     }
 
-    fn torn_at(follower: &mut TornFollower, step: u64) -> Vec<u32> {
-        follower.at(step).unwrap().constraints.clone()
+    fn torn_at(tracker: &mut TearTracker, step: u64) -> Vec<u32> {
+        tracker.at(step).unwrap().constraints.clone()
     }
 
     #[test]
-    fn a_message_counts_from_its_step_on() {
-        let mut follower = TornFollower::new(Torn::before(&[9]));
-        follower.take(&tears(4, &[1, 2]));
-        follower.take(&tears(6, &[3]));
-        assert_eq!(torn_at(&mut follower, 3), [9]);
-        assert_eq!(torn_at(&mut follower, 5), [9, 1, 2]);
-        assert_eq!(torn_at(&mut follower, 6), [9, 1, 2, 3]);
-        let causes = &follower.at(6).unwrap().causes;
-        assert_eq!(causes[..2], [None, Some(TearCause::Cut)]);
+    fn a_message_takes_effect_at_its_step() {
+        let mut tracker = TearTracker::new(TornList::before(&[9]));
+        tracker.process(&tears(4, &[1, 2]));
+        tracker.process(&tears(6, &[3]));
+        assert_eq!(torn_at(&mut tracker, 3), [9]);
+        assert_eq!(torn_at(&mut tracker, 5), [9, 1, 2]);
+        let torn = tracker.at(6).unwrap();
+        assert_eq!(torn.constraints, [9, 1, 2, 3]);
+        assert_eq!(torn.causes[..2], [None, Some(TearCause::Cut)]);
+        assert_eq!((torn.step, torn.new_count, torn.since_step), (6, 1, 0));
     }
 
     #[test]
-    fn what_tears_in_the_step_of_a_reset_is_torn_behind_it() {
-        let mut follower = TornFollower::new(Torn::default());
-        follower.take(&tears(2, &[5]));
-        follower.take(&tears(8, &[7]));
-        follower.take(&reset(8));
-        assert_eq!(torn_at(&mut follower, 7), [5]);
-        assert_eq!(torn_at(&mut follower, 8), [7]);
+    fn tears_in_the_step_of_a_reset_follow_the_reset() {
+        let mut tracker = TearTracker::new(TornList::default());
+        tracker.process(&tears(2, &[5]));
+        tracker.process(&tears(8, &[7]));
+        tracker.process(&reset(8));
+        assert_eq!(torn_at(&mut tracker, 7), [5]);
+        let torn = tracker.at(8).unwrap();
+        assert_eq!((torn.constraints.as_slice(), torn.since_step), (&[7][..], 8));
     }
 
     #[test]
-    fn what_a_keyframe_has_is_not_taken_twice() {
-        let known = KeyframeTears { torn: vec![1], causes: vec![TearCause::Force] };
-        let mut follower = TornFollower::from_keyframe(4, known);
-        follower.take(&tears(4, &[1]));
-        follower.take(&tears(5, &[2]));
-        assert_eq!(torn_at(&mut follower, 5), [1, 2]);
+    fn tears_that_a_keyframe_includes_are_not_added_twice() {
+        let mut tracker = TearTracker::from_keyframe(4, TornList::before(&[1]));
+        tracker.process(&tears(4, &[1]));
+        tracker.process(&tears(5, &[2]));
+        assert_eq!(torn_at(&mut tracker, 5), [1, 2]);
     }
 
     #[test]
-    fn behind_a_gap_nothing_is_known() {
-        let mut follower = TornFollower::new(Torn::default());
-        follower.lose();
-        follower.take(&Message::Keyframe { step: 3, bytes: vec![1, 2, 3] });
-        assert_eq!(follower.at(3), None);
+    fn after_a_gap_the_torn_constraints_are_unknown() {
+        let mut tracker = TearTracker::new(TornList::default());
+        tracker.mark_gap();
+        tracker.process(&Message::Keyframe { step: 3, bytes: vec![1, 2, 3] });
+        assert_eq!(tracker.at(3), None);
+    }
+
+    #[test]
+    fn the_first_keyframe_has_the_causes_of_earlier_tears() {
+        let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
+        let mut solver = Solver::new(&scene);
+        solver.cut(3).unwrap();
+        solver.step();
+        let causes = |torn: &[u32], bytes: Vec<u8>| {
+            let topology = TopologyRow {
+                torn: torn.to_vec(),
+                ..TopologyRow::new(&sim_contract::LoadHeader::default(), &[])
+            };
+            let first = Frame {
+                updates: vec![Message::Keyframe { step: 1, bytes }],
+                row: StepRow { step: 1, ..StepRow::default() },
+                particles: Vec::new(),
+            };
+            TornList::before_first(&topology, &first).causes
+        };
+        let keyframe = solver.keyframe().encode();
+        assert_eq!(causes(&[3], keyframe.clone()), [Some(TearCause::Cut)]);
+        assert_eq!(causes(&[], keyframe.clone()), []);
+        assert_eq!(causes(&[4], keyframe), [None], "a keyframe of another state");
+        assert_eq!(causes(&[3], vec![0; 9]), [None], "a damaged keyframe");
     }
 }

@@ -16,6 +16,8 @@ pub enum Topic {
     Colliders,
     /// [`crate::TearsRow`]: new tears. Only steps in which a constraint tore have a message.
     Tears,
+    /// [`crate::ParametersRow`]: all parameters at the start and after each change.
+    Parameters,
     /// The part of the solver's state that the particles lack, in the solver's encoding.
     Keyframe,
     /// [`crate::OutcomeRow`]: every answered command, in order of application.
@@ -32,12 +34,13 @@ pub enum Topic {
 
 impl Topic {
     /// All topics, in order.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Tf,
         Self::Topology,
         Self::Surface,
         Self::Colliders,
         Self::Tears,
+        Self::Parameters,
         Self::Keyframe,
         Self::Outcomes,
         Self::Status,
@@ -54,6 +57,7 @@ impl Topic {
             Self::Surface => "/surface",
             Self::Colliders => "/colliders",
             Self::Tears => "/tears",
+            Self::Parameters => "/parameters",
             Self::Keyframe => "/keyframe",
             Self::Outcomes => "/outcomes",
             Self::Status => "/status",

@@ -196,3 +196,31 @@ fn a_recording_that_starts_in_a_torn_scene_is_bit_identical() {
         );
     }
 }
+
+#[test]
+fn parameters_are_recorded_at_the_start_and_after_each_change() {
+    let (file, _) = record(&job(COMMANDS));
+    let rows = collect(&file, |message| match message {
+        Message::Parameters(row) => Some(row.clone()),
+        _ => None,
+    });
+    assert_eq!(rows[0].step, 0);
+    assert_eq!(rows[0].values.tear_force, Some(400.0));
+    let gravity = |step| rows.iter().rfind(|row| row.step <= step).unwrap().values.gravity;
+    assert_eq!(gravity(29), [0.0, -9.81, 0.0]);
+    assert_eq!((rows[1].step, gravity(30)), (30, [0.0, -5.0, 0.0]));
+    assert_eq!(gravity(31), [0.0; 3], "off");
+    assert_eq!(gravity(90), [0.0, -9.81, 0.0], "a reset");
+    assert!(rows.windows(2).all(|pair| pair[0].values != pair[1].values));
+
+    let changed = rebuild(&file, |message| match message {
+        Message::Parameters(mut row) if row.step == 32 => {
+            row.values.damping = 0.75;
+            Some(Message::Parameters(row))
+        }
+        other => Some(other),
+    });
+    let (report, _) = check(&changed);
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(32)), "{report}");
+    assert!(report.to_string().contains("parameter damping: recorded"), "{report}");
+}

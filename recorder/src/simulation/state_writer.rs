@@ -4,10 +4,10 @@ use std::io::Write;
 
 use bytemuck::cast;
 use recorder::{
-    CollidersRow, LogWriter, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TopologyRow,
-    WriteError,
+    CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, RunDescription, StepRow,
+    SurfaceRow, TopologyRow, WriteError,
 };
-use sim_contract::{ConstraintState, LoadHeader, ParticleState, Triangle};
+use sim_contract::{ConstraintState, LoadHeader, ParameterValues, ParticleState, Triangle};
 use sim_solver::Solver;
 
 use super::frozen::FrozenTracker;
@@ -32,6 +32,8 @@ pub(super) struct StateWriter<'a, W: Write> {
     outcome_count: u64,
     /// The last written row.
     colliders: CollidersRow,
+    /// The last written values.
+    parameters: Option<ParameterValues>,
     frozen: FrozenTracker,
 }
 
@@ -55,6 +57,7 @@ impl<'a, W: Write> StateWriter<'a, W> {
             outcome_count: 0,
             // A scene without colliders has no row.
             colliders: CollidersRow { step: 0, colliders: Vec::new() },
+            parameters: None,
             frozen: FrozenTracker::default(),
         })
     }
@@ -76,6 +79,7 @@ impl<'a, W: Write> StateWriter<'a, W> {
         if let Some(row) = new_tears_row(solver, step) {
             self.log.write(&Message::Tears(row), time_ns)?;
         }
+        self.write_parameters(solver, step)?;
         if is_second || keyframe == KeyframeDue::Now {
             let bytes = solver.keyframe().encode();
             self.log.write(&Message::Keyframe { step, bytes }, time_ns)?;
@@ -99,6 +103,17 @@ impl<'a, W: Write> StateWriter<'a, W> {
         }
         self.colliders = row.clone();
         self.log.write(&Message::Colliders(row), self.run.time_of_step_ns(step))
+    }
+
+    /// Writes the parameters at the start and after each change.
+    fn write_parameters(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
+        let values = solver.parameter_values();
+        if self.parameters == Some(values) {
+            return Ok(());
+        }
+        self.parameters = Some(values);
+        let row = ParametersRow { step, values };
+        self.log.write(&Message::Parameters(row), self.run.time_of_step_ns(step))
     }
 
     fn write_snapshot(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {

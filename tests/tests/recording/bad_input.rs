@@ -122,3 +122,67 @@ fn invalid_options_exit_with_2() {
         assert_eq!(recorder(&sandbox, args).code, Some(2), "{args:?}");
     }
 }
+
+#[test]
+fn commands_that_cannot_apply_are_refused_and_nothing_is_written() {
+    let sandbox = Sandbox::new();
+    let commands = sandbox.write("late.jsonl", "{\"step\":100,\"kind\":\"pause\"}\n");
+    let output = sandbox.path("out.mcap");
+    let args = ["simulate", "rope", "--steps", "50", "--commands", &commands, "-o", &output];
+    assert_refused(&recorder(&sandbox, &args), &[&commands, "step 50", "--steps 100 or more"]);
+    assert!(!std::path::Path::new(&output).exists());
+    assert!(!std::path::Path::new(&(output + ".part")).exists());
+}
+
+#[test]
+fn a_fifo_is_refused_without_waiting_for_a_writer() {
+    let sandbox = Sandbox::new();
+    for (name, make) in [
+        ("pipe.toml", ["simulate", "--steps", "1"].as_slice()),
+        ("pipe.jsonl", ["simulate", "rope", "--steps", "1", "--commands"].as_slice()),
+        ("pipe.mcap", ["info"].as_slice()),
+    ] {
+        let pipe = sandbox.path(name);
+        rustix::fs::mknodat(
+            rustix::fs::CWD,
+            &pipe,
+            rustix::fs::FileType::Fifo,
+            rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR,
+            0,
+        )
+        .unwrap();
+        let args: Vec<_> = make.iter().copied().chain([pipe.as_str()]).collect();
+        assert_refused(&recorder(&sandbox, &args), &[&pipe, "FIFO"]);
+    }
+}
+
+#[test]
+fn the_scene_of_a_recording_simulates_to_the_same_states() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.path("run.mcap");
+    let args = ["simulate", "curtain", "--steps", "60", "-o", &run, "--json"];
+    let first = recorder(&sandbox, &args).success();
+    let scene = recorder(&sandbox, &["scene", &run]).success();
+    let scene = sandbox.write("scene.toml", &scene);
+    let again = recorder(&sandbox, &["simulate", &scene, "--steps", "60", "--json"]).success();
+    let hash = |stdout: &str| {
+        let summary: serde_json::Value = serde_json::from_str(stdout).unwrap();
+        summary["state_hash"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(hash(&again), hash(&first));
+}
+
+#[test]
+fn wrong_option_values_state_what_is_expected() {
+    let sandbox = Sandbox::new();
+    for (args, words) in [
+        (["simulate", "rope", "--steps", "-1"].as_slice(), "expected a whole number from 0"),
+        (&["record", "--duration", "-5s"], "expected a time with its unit"),
+        (&["play", "run.mcap", "--rate", "-1"], "expected a number above 0"),
+        (&["info", "run.mcap", "--jsn"], "there is no option --jsn"),
+    ] {
+        let refused = recorder(&sandbox, args);
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+        assert!(refused.stderr.contains(words), "{}", refused.stderr);
+    }
+}

@@ -14,7 +14,7 @@ type ModulePath = Vec<String>;
 
 /// Returns the groups of files under a `src` folder that use each other in a circle. Each group is
 /// ascending.
-pub fn circles(src: &Path) -> Vec<Vec<String>> {
+pub(crate) fn circles(src: &Path) -> Vec<Vec<String>> {
     let modules = modules(src);
     let mut graph = BTreeMap::new();
     for (module, file) in &modules {
@@ -74,7 +74,7 @@ struct Scanner<'a> {
 
 impl<'a> Scanner<'a> {
     fn new(text: &str, file: &'a ModulePath, modules: &'a BTreeMap<ModulePath, PathBuf>) -> Self {
-        let tokens = without_tests(tokens(text));
+        let tokens = without_tests(&tokens(text));
         Self { tokens, scope: file.clone(), modules, file, used: BTreeSet::new() }
     }
 
@@ -139,11 +139,7 @@ impl<'a> Scanner<'a> {
                     at += 1;
                     while !matches!(self.token(at), "}" | "") {
                         at = self.tree(at, path.clone());
-                        // An alias, `as name`, and the comma.
-                        while !matches!(self.token(at), "," | "}" | "") {
-                            at += 1;
-                        }
-                        at += usize::from(self.token(at) == ",");
+                        at = self.after_alias(at);
                     }
                     return at + 1;
                 }
@@ -158,6 +154,14 @@ impl<'a> Scanner<'a> {
             }
             at += 2;
         }
+    }
+
+    /// Skips an alias, `as name`, and a comma. Returns the next token.
+    fn after_alias(&self, mut at: usize) -> usize {
+        while !matches!(self.token(at), "," | "}" | "") {
+            at += 1;
+        }
+        at + usize::from(self.token(at) == ",")
     }
 
     /// Notes the innermost module of a path that has a file.
@@ -227,7 +231,7 @@ fn tokens(text: &str) -> Vec<String> {
 }
 
 /// Removes the items behind `#[cfg(test)]`.
-fn without_tests(tokens: Vec<String>) -> Vec<String> {
+fn without_tests(tokens: &[String]) -> Vec<String> {
     const MARK: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let (mut kept, mut at) = (Vec::new(), 0);
     while at < tokens.len() {

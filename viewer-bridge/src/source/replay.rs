@@ -18,7 +18,7 @@ use std::sync::mpsc::channel;
 use std::thread;
 
 use anyhow::Context;
-use recorder::Torn;
+use recorder::TornList;
 
 use super::feed::Source;
 use crate::message::Mode;
@@ -48,7 +48,7 @@ impl Replay {
             log: tape.log().try_clone()?,
             first: first.row,
             last_step: tape.last_step(),
-            torn: Torn::before(&tape.topology().torn),
+            torn: TornList::before(&tape.topology().torn),
         })
     }
 }

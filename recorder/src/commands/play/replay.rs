@@ -1,17 +1,20 @@
-//! Publishes a recording as the node did that was recorded.
+//! Publishes a recording like the recorded node.
 
 use anyhow::{Context, bail};
-use recorder::{CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow};
+use recorder::{
+    CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow, TornList,
+};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, Load, LoadHeader,
-    NodeStatus, Outcome, Owner, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Wake,
+    NodeStatus, Outcome, Owner, ParameterValues, SnapshotFlags, SnapshotHeader, StatusFlags,
+    TearsHeader, TornConstraint, Wake,
 };
 
 use super::control::Control;
-use super::position::{Happening, Position, happenings};
+use super::position::Position;
 
-/// What a recording has at its head: enough to take a name.
+/// The part of a recording that the owner of a name needs.
 #[derive(Debug)]
 pub(crate) struct Recorded<'a> {
     pub(crate) run: &'a RunDescription,
@@ -19,11 +22,11 @@ pub(crate) struct Recorded<'a> {
     pub(crate) topology: &'a TopologyRow,
     pub(crate) surface: &'a SurfaceRow,
     pub(crate) collider_count: usize,
-    /// The longest keyframe of its scene.
+    /// Size of the longest keyframe of the scene.
     pub(crate) keyframe_size_bytes_max: usize,
 }
 
-/// One pass of a recording: a run of its own.
+/// One pass over a recording, with its own run id.
 #[derive(Debug)]
 pub(crate) struct Replay {
     owner: Owner,
@@ -33,16 +36,20 @@ pub(crate) struct Replay {
     /// Simulated time per wall-clock time.
     rate: f64,
     position: Position,
-    /// The last step that was published.
+    /// The last published list of torn constraints.
+    published_torn: TornList,
+    /// The last published parameters.
+    published_parameters: ParameterValues,
+    /// The last published step.
     step: u64,
-    /// The node's last status in the recording.
+    /// The latest recorded status of the node.
     status: Option<StatusRow>,
-    /// Reused by every look for commands.
-    arrived: Vec<Command>,
+    /// Reused for each batch of commands.
+    commands: Vec<Command>,
 }
 
 impl Replay {
-    /// Takes the name and publishes the scene.
+    /// Becomes the owner of the name and publishes the scene.
     pub(crate) fn new(
         endpoint: &Endpoint,
         recorded: &Recorded<'_>,
@@ -50,9 +57,12 @@ impl Replay {
         rate: f64,
     ) -> anyhow::Result<Self> {
         let Recorded { run, scene, topology, surface, .. } = *recorded;
-        let run_id = getrandom::u64().context("no random number for the run")?;
-        let constraints = topology.constraints().context("/topology has unequal columns")?;
-        let triangles = surface.triangles().context("/surface has half a triangle")?;
+        let run_id = getrandom::u64().context("cannot get a random run id")?;
+        let constraints =
+            topology.constraints().context("the columns of /topology differ in length")?;
+        let triangles = surface
+            .triangles()
+            .context("the number of indices in /surface is not a multiple of three")?;
         let header = LoadHeader { run_id, ..run.load_header(topology) };
         let load = Load {
             header,
@@ -66,37 +76,53 @@ impl Replay {
         let owner = Owner::create(endpoint, &load)?;
         let run = run.clone();
         let control = Control::new(false);
-        let (step, status, arrived) = (0, None, Vec::new());
-        Ok(Self { owner, run, run_id, control, rate, position, step, status, arrived })
+        Ok(Self {
+            owner,
+            run,
+            run_id,
+            control,
+            rate,
+            published_torn: TornList::default(),
+            published_parameters: position.parameters,
+            position,
+            step: 0,
+            status: None,
+            commands: Vec::new(),
+        })
     }
 
-    /// Publishes what a late joiner of the live node would have found before the first snapshot of
-    /// this pass: the colliders, what tore, and the newest keyframe.
+    /// Publishes the latched messages before the first snapshot: the colliders, the torn constraints
+    /// and the newest keyframe. A late subscriber of the node would have received them.
     pub(crate) fn publish_latched(&mut self, step: u64) -> anyhow::Result<()> {
         if let Some(row) = self.position.latched_colliders.take() {
             self.publish_colliders(&row)?;
         }
-        if !self.position.torn.is_empty() {
-            self.publish_tears(step, 0)?;
-        }
+        self.publish_tears(step.saturating_sub(1))?;
         if let Some(bytes) = self.position.latched_keyframe.take() {
             self.publish_keyframe(self.position.keyframe_step, &bytes)?;
         }
         Ok(())
     }
 
-    /// Publishes a snapshot and all that belongs to it, in the recorded order.
+    /// Publishes a snapshot and the messages that belong to it, in the order of a node.
     pub(crate) fn publish(&mut self, frame: &Frame) -> anyhow::Result<()> {
-        for happening in happenings(&frame.updates) {
-            self.position.follow(happening);
-            match happening {
-                Happening::Reset(step) => self.publish_tears(step, 0)?,
-                Happening::Update(update) => self.publish_update(update)?,
+        for update in &frame.updates {
+            self.position.apply(update);
+            if let Message::Colliders(row) = update {
+                self.publish_colliders(row)?;
             }
+        }
+        self.publish_tears(frame.row.step)?;
+        self.publish_parameters(frame.row.step)?;
+        for update in &frame.updates {
+            self.publish_update(update)?;
         }
         if frame.particles.len() != self.run.particle_count as usize {
             let (step, count) = (frame.row.step, frame.particles.len());
-            bail!("step {step} has {count} particles, the scene {}", self.run.particle_count);
+            bail!(
+                "the snapshot of step {step} has {count} particles, but the scene has {}",
+                self.run.particle_count
+            );
         }
         self.owner.publish_particles(&self.header(frame), |index| frame.particles[index])?;
         self.owner.wake(Wake::Frame);
@@ -109,20 +135,14 @@ impl Replay {
         match update {
             Message::Keyframe { step, bytes } => {
                 self.publish_keyframe(*step, bytes)?;
-                self.owner.publish_parameters(self.run_id, *step, &self.position.parameters)?;
             }
             Message::Outcome(row) => {
                 let outcome = Outcome { run_id: self.run_id, ..Outcome::from(row) };
                 self.owner.publish_outcome(&outcome)?;
                 self.owner.wake(Wake::Outcome);
             }
-            Message::Colliders(row) => self.publish_colliders(row)?,
-            Message::Tears(row) => {
-                let new_count = u32::try_from(row.constraints.len()).unwrap_or(u32::MAX);
-                self.publish_tears(row.step, new_count)?;
-            }
             Message::Status(row) => self.status = Some(row.clone()),
-            // The load is published already, and there is no service for the others.
+            // The other messages are published already, or have no service.
             _ => {}
         }
         Ok(())
@@ -134,11 +154,34 @@ impl Replay {
         Ok(self.owner.publish_keyframe(header, bytes)?)
     }
 
-    fn publish_tears(&self, step: u64, new_count: u32) -> anyhow::Result<()> {
-        let since_step = self.position.since_step;
-        let header = TearsHeader { run_id: self.run_id, step, since_step, new_count, count: 0 };
-        self.owner.publish_tears(header, &self.position.torn)?;
+    /// Publishes the torn constraints at a step, if they have changed.
+    fn publish_tears(&mut self, step: u64) -> anyhow::Result<()> {
+        let Some(torn) = self.position.tears.at(step) else { return Ok(()) };
+        if *torn == self.published_torn {
+            return Ok(());
+        }
+        self.published_torn.clone_from(torn);
+        let header = TearsHeader {
+            run_id: self.run_id,
+            step: torn.step,
+            since_step: torn.since_step,
+            new_count: u32::try_from(torn.new_count).unwrap_or(u32::MAX),
+            count: 0,
+        };
+        let pairs = torn.constraints.iter().zip(&torn.causes);
+        let pairs: Vec<_> =
+            pairs.map(|(constraint, cause)| TornConstraint::new(*constraint, *cause)).collect();
+        self.owner.publish_tears(header, &pairs)?;
         self.owner.wake(Wake::Tears);
+        Ok(())
+    }
+
+    /// Publishes the parameters, if they have changed.
+    fn publish_parameters(&mut self, step: u64) -> anyhow::Result<()> {
+        if self.published_parameters != self.position.parameters {
+            self.published_parameters = self.position.parameters;
+            self.owner.publish_parameters(self.run_id, step, &self.published_parameters)?;
+        }
         Ok(())
     }
 
@@ -172,13 +215,13 @@ impl Replay {
         }
     }
 
-    /// Takes commands and answers them; the answers are not part of the recorded run. `next_step`
-    /// is the first that can show an effect.
+    /// Answers commands. The answers are not part of the recorded run. `next_step` is the first step
+    /// that can show an effect. Returns `true` if a command arrived.
     pub(crate) fn answer_commands(&mut self, next_step: u64) -> anyhow::Result<bool> {
         self.owner.refresh();
-        self.owner.receive_commands(&mut self.arrived);
-        let has_any = !self.arrived.is_empty();
-        for command in self.arrived.drain(..) {
+        self.owner.receive_commands(&mut self.commands);
+        let has_any = !self.commands.is_empty();
+        for command in self.commands.drain(..) {
             let result = self.control.obey(command.action());
             let index = self.position.outcome_count;
             let mut outcome = Outcome::new(index, next_step, command, result);
@@ -190,12 +233,12 @@ impl Replay {
         Ok(has_any)
     }
 
-    /// Readers of the snapshots.
+    /// Returns the number of readers of snapshots.
     pub(crate) fn reader_count(&self) -> usize {
         self.owner.reader_count()
     }
 
-    /// Says how the replay does, with what the node said of itself.
+    /// Publishes the status of the replay, with the recorded timing of the node.
     pub(crate) fn publish_status(&self) -> anyhow::Result<()> {
         let mut status = NodeStatus {
             contract_version: CONTRACT_VERSION,
@@ -209,7 +252,7 @@ impl Replay {
             rate_hz: self.run.rate_hz,
             particle_count: self.run.particle_count,
             constraint_count: self.run.constraint_count,
-            torn_count: u32::try_from(self.position.torn.len()).unwrap_or(u32::MAX),
+            torn_count: u32::try_from(self.published_torn.constraints.len()).unwrap_or(u32::MAX),
             reader_count: u32::try_from(self.reader_count()).unwrap_or(u32::MAX),
             process_id: std::process::id(),
             flags: StatusFlags::REPLAY

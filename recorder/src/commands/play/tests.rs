@@ -1,21 +1,19 @@
-//! A replay publishes what was recorded: headers and payloads are compared in shared memory.
+//! Headers and payloads that a replay publishes equal the recorded ones.
 
 use std::time::Duration;
 
 use recorder::{
     CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TearsRow,
-    TopologyRow,
+    TopologyRow, TornList,
 };
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    Action, CONTRACT_VERSION, Client, ColliderState, Command, ConstraintState, LoadHeader, Outcome,
-    OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, TearCause,
+    Action, CONTRACT_VERSION, Client, ColliderState, Command, ConstraintState, LoadHeader, Method,
+    Outcome, OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, TearCause,
     Triangle,
 };
-use sim_solver::{Scene, Solver, builtin};
 
-use super::causes_before;
-use super::position::{Happening, Position, happenings};
+use super::position::Position;
 use super::replay::{Recorded, Replay};
 
 /// Long enough on any machine.
@@ -58,7 +56,7 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
 }
 
 fn replay(domain: &TestDomain) -> Replay {
-    replay_from(domain, Position::default())
+    replay_from(domain, Position::new(TornList::default(), Method::Xpbd))
 }
 
 fn replay_from(domain: &TestDomain, position: Position) -> Replay {
@@ -74,7 +72,7 @@ fn replay_from(domain: &TestDomain, position: Position) -> Replay {
     Replay::new(&domain.endpoint(), &recorded, position, 1.0).unwrap()
 }
 
-/// A client that reads snapshots from now on: the first look takes the place of a reader.
+/// Returns a client that reads snapshots from now on. Its first read subscribes it.
 fn reader(domain: &TestDomain) -> Client {
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert!(client.next_snapshot(Duration::ZERO).unwrap().is_none());
@@ -87,7 +85,7 @@ fn next_header(client: &mut Client) -> (SnapshotHeader, Vec<ParticleState>) {
 }
 
 #[test]
-fn snapshots_are_those_of_the_node_but_for_run_time_and_flag() {
+fn snapshots_equal_those_of_the_node_except_run_id_time_and_flag() {
     let domain = TestDomain::new();
     let mut replay = replay(&domain);
     let mut client = reader(&domain);
@@ -143,7 +141,7 @@ fn the_paused_flag_follows_the_recorded_outcomes() {
 }
 
 #[test]
-fn commands_are_answered_beside_the_recorded_run() {
+fn answers_to_commands_are_not_part_of_the_recorded_run() {
     let domain = TestDomain::new();
     let mut replay = replay(&domain);
     let mut client = Client::attach(&domain.endpoint()).unwrap();
@@ -161,7 +159,7 @@ fn commands_are_answered_beside_the_recorded_run() {
 }
 
 #[test]
-fn a_name_that_is_taken_is_refused() {
+fn a_name_in_use_is_refused() {
     let domain = TestDomain::new();
     let _replay = replay(&domain);
     let load = sim_contract::Load {
@@ -183,7 +181,7 @@ fn a_snapshot_of_another_size_is_refused() {
     let mut replay = replay(&domain);
     let short = Frame { particles: vec![ParticleState::default()], ..frame(1, Vec::new()) };
     let error = replay.publish(&short).unwrap_err();
-    assert_eq!(error.to_string(), "step 1 has 1 particles, the scene 2");
+    assert_eq!(error.to_string(), "the snapshot of step 1 has 1 particles, but the scene has 2");
 }
 
 fn tears(step: u64, constraints: &[u32], cause: &str) -> Message {
@@ -196,7 +194,7 @@ fn floor(step: u64, offset: f32) -> Message {
     Message::Colliders(CollidersRow::new(step, &[state]).unwrap())
 }
 
-/// Step, number of new ones, and all that is torn with why, as a client finds it.
+/// Returns the step, the number of new tears, and all tears with their causes, as a client reads them.
 fn torn(client: &mut Client) -> (u64, u32, Vec<(u32, Option<TearCause>)>) {
     let torn = client.torn(TIMEOUT).unwrap();
     let all = torn.constraints.iter().map(|one| (one.constraint, one.cause())).collect();
@@ -204,21 +202,22 @@ fn torn(client: &mut Client) -> (u64, u32, Vec<(u32, Option<TearCause>)>) {
 }
 
 #[test]
-fn tears_are_published_with_all_before_them_and_a_reset_clears_them() {
+fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
     let domain = TestDomain::new();
-    let position = Position::new(&[2], Some(vec![TearCause::Force]));
+    let before = TornList { causes: vec![Some(TearCause::Force)], ..TornList::before(&[2]) };
+    let position = Position::new(before, Method::Xpbd);
     let mut replay = replay_from(&domain, position);
     replay.publish_latched(5).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
     replay.answer_commands(5).unwrap();
     let (force, cut) = (Some(TearCause::Force), Some(TearCause::Cut));
-    assert_eq!(torn(&mut client), (5, 0, vec![(2, force)]));
+    assert_eq!(torn(&mut client), (0, 0, vec![(2, force)]));
     replay.publish(&frame(5, vec![tears(5, &[3, 1], "cut")])).unwrap();
     assert_eq!(torn(&mut client), (5, 2, vec![(2, force), (3, cut), (1, cut)]));
     replay.publish(&frame(7, vec![outcome(4, 7, Action::Reset)])).unwrap();
     assert_eq!(torn(&mut client), (7, 0, vec![]));
-    // What is cut at the boundary of a reset stands in the file before the reset.
+    // A cut at the boundary of a reset precedes the reset in the file.
     replay.publish(&frame(8, vec![tears(8, &[0], "x")])).unwrap();
     let updates = vec![tears(9, &[3], "cut"), outcome(5, 9, Action::Reset)];
     replay.publish(&frame(9, updates)).unwrap();
@@ -226,9 +225,9 @@ fn tears_are_published_with_all_before_them_and_a_reset_clears_them() {
 }
 
 #[test]
-fn a_replay_that_starts_later_has_what_was_torn_and_where_colliders_stood() {
+fn a_replay_that_starts_late_publishes_the_torn_constraints_and_the_colliders() {
     let domain = TestDomain::new();
-    let mut position = Position::new(&[2], None);
+    let mut position = Position::new(TornList::before(&[2]), Method::Xpbd);
     position.skip(&[floor(0, 0.0), tears(1, &[0], "stretch")]);
     position.skip(&[floor(2, 1.0), tears(2, &[1], "cut"), outcome(0, 2, Action::Reset)]);
     position.skip(&[floor(3, 2.0), tears(4, &[0], "distance")]);
@@ -248,40 +247,5 @@ fn a_replay_that_starts_later_has_what_was_torn_and_where_colliders_stood() {
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
     replay.answer_commands(6).unwrap();
-    assert_eq!(torn(&mut client), (6, 0, expected));
-}
-
-#[test]
-fn a_reset_happens_before_everything_of_its_step_and_a_refused_one_never() {
-    let refused = Outcome::new(3, 3, Command::new(9, 3, Action::Reset), Err(Reason::OutOfRange));
-    let refused = Message::Outcome(OutcomeRow::from(&refused));
-    let updates =
-        [tears(1, &[0], "cut"), refused, tears(4, &[1], "cut"), outcome(4, 4, Action::Reset)];
-    let expected = [
-        Happening::Update(&updates[0]),
-        Happening::Update(&updates[1]),
-        Happening::Reset(4),
-        Happening::Update(&updates[2]),
-        Happening::Update(&updates[3]),
-    ];
-    assert_eq!(happenings(&updates), expected);
-}
-
-#[test]
-fn why_something_tore_before_the_recording_stands_in_its_first_keyframe() {
-    let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
-    let mut solver = Solver::new(&scene);
-    solver.cut(3).unwrap();
-    solver.step();
-    let particles =
-        (0..solver.particle_count()).map(|index| bytemuck::cast(solver.particle(index)));
-    let keyframe = Message::Keyframe { step: 1, bytes: solver.keyframe().encode() };
-    let first = Frame { particles: particles.collect(), ..frame(1, vec![keyframe]) };
-    let causes = |torn: &[u32]| causes_before(&mut Solver::new(&scene), &first, torn);
-    assert_eq!(causes(&[3]), Some(vec![TearCause::Cut]));
-    assert_eq!(causes(&[]), Some(vec![]));
-    assert_eq!(causes(&[4]), None, "of another state");
-    let damaged = Message::Keyframe { step: 1, bytes: vec![0; 9] };
-    let first = frame(1, vec![damaged]);
-    assert_eq!(causes_before(&mut Solver::new(&scene), &first, &[3]), None);
+    assert_eq!(torn(&mut client), (4, 1, expected));
 }

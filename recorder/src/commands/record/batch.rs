@@ -1,27 +1,37 @@
-//! What arrives between two waits, copied out of shared memory at once.
+//! The messages that arrive between two waits, copied out of shared memory.
 
-use recorder::{Message, OutcomeRow, StatusRow, SurfaceRow, TopologyRow};
+use recorder::{
+    CollidersRow, Message, OutcomeRow, ParametersRow, StatusRow, SurfaceRow, TopologyRow,
+};
 use sim_contract::{
-    ColliderState, CollidersHeader, KeyframeHeader, LoadHeader, OUTCOME_FLAG_CONTROL,
-    ParticleState, SnapshotHeader, TearsHeader, Update,
+    KeyframeHeader, LoadHeader, OUTCOME_FLAG_CONTROL, ParticleState, SnapshotHeader, Update,
 };
 
-/// What arrived in one batch, out of shared memory.
+use super::tear_log::TearList;
+
+/// The messages that arrived together.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
     pub(crate) snapshots: Vec<Snapshot>,
-    /// Each with the run that it is of.
-    pub(crate) updates: Vec<(u64, Message)>,
-    /// Newest load, if one came.
+    pub(crate) statuses: Vec<RunMessage<Message>>,
+    /// The newest load, if one arrived.
     pub(crate) scene: Option<(LoadHeader, Vec<u8>)>,
     pub(crate) topology: Option<(LoadHeader, TopologyRow)>,
     pub(crate) surface: Option<(LoadHeader, SurfaceRow)>,
-    pub(crate) colliders: Vec<(CollidersHeader, Vec<ColliderState>)>,
-    /// All that tore since the load, each time, and why.
-    pub(crate) tears: Vec<(TearsHeader, Vec<u32>)>,
-    pub(crate) tear_causes: Vec<(TearsHeader, Vec<u8>)>,
+    /// The row is `None` if it has a shape of another version.
+    pub(crate) colliders: Vec<RunMessage<Option<CollidersRow>>>,
+    pub(crate) parameters: Vec<RunMessage<Option<ParametersRow>>>,
+    pub(crate) tears: Vec<TearList>,
     pub(crate) keyframes: Vec<(KeyframeHeader, Vec<u8>)>,
     pub(crate) outcomes: Vec<OutcomeRow>,
+}
+
+/// A row with its run and step.
+#[derive(Debug, Clone)]
+pub(crate) struct RunMessage<Row> {
+    pub(crate) run_id: u64,
+    pub(crate) step: u64,
+    pub(crate) row: Row,
 }
 
 #[derive(Debug, Clone)]
@@ -36,7 +46,8 @@ impl Batch {
         self.snapshots.push(Snapshot { header: *header, particles: particles.to_vec() });
     }
 
-    /// Copies anything else. Answers to those who control a replay are not part of its run.
+    /// Copies another message. Skips the answers of a replay to its controls, which are not part of
+    /// the recorded run.
     pub(crate) fn add_update(&mut self, update: Update<'_>) {
         match update {
             Update::Scene(header, bytes) => self.scene = Some((*header, bytes.to_vec())),
@@ -51,16 +62,22 @@ impl Batch {
             Update::Outcome(outcome) => self.outcomes.push(OutcomeRow::from(outcome)),
             Update::Status(status) => {
                 let row = Message::Status(StatusRow::from(status));
-                self.updates.push((status.run_id, row));
+                let (run_id, step) = (status.run_id, status.step);
+                self.statuses.push(RunMessage { run_id, step, row });
             }
-            Update::Colliders(header, list) => self.colliders.push((*header, list.to_vec())),
-            Update::Tears(header, list) => {
-                let causes = list.iter().map(|one| u8::try_from(one.cause).unwrap_or(u8::MAX));
-                self.tear_causes.push((*header, causes.collect()));
-                let constraints = list.iter().map(|one| one.constraint);
-                self.tears.push((*header, constraints.collect()));
+            Update::Colliders(header, list) => {
+                let (run_id, step) = (header.run_id, header.step);
+                let row = CollidersRow::new(step, list);
+                self.colliders.push(RunMessage { run_id, step, row });
             }
-            Update::Parameters(..) => {}
+            Update::Parameters(header, values) => {
+                let (run_id, step) = (header.run_id, header.step);
+                let row = Some(ParametersRow { step, values: *values });
+                self.parameters.push(RunMessage { run_id, step, row });
+            }
+            Update::Tears(header, torn) => {
+                self.tears.push(TearList { header: *header, torn: torn.to_vec() });
+            }
         }
     }
 }

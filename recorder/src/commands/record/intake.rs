@@ -1,5 +1,4 @@
-//! From what arrives in shared memory to what is written: where a recording starts, in which order
-//! it goes on, where it ends, and what is missing.
+//! Selects and orders the messages of a recording: its start, its end, and the missing messages.
 
 mod started;
 
@@ -11,12 +10,11 @@ use sim_solver::{Scene, SceneError};
 
 use super::accepted::{Accepted, RunHeader};
 use super::batch::{Batch, Snapshot};
-use super::collider_log::ColliderLog;
+use super::lists::Lists;
 use super::queue::Content;
-use super::tear_log::TearLog;
 use started::Started;
 
-/// Clocks at a batch, in nanoseconds.
+/// The clocks at the reception of a batch, in nanoseconds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Now {
     /// Since 1970.
@@ -25,44 +23,42 @@ pub(crate) struct Now {
     pub(crate) monotonic_ns: u64,
 }
 
-/// Why a run cannot be recorded at all.
+/// The reason why a run cannot be recorded.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum IntakeError {
-    #[error("the node's scene is not text")]
+    #[error("the scene of the node is not text")]
     NotText,
-    #[error("the node's scene cannot be read: {0}")]
+    #[error("the scene of the node is invalid: {0}")]
     Scene(#[from] SceneError),
 }
 
-/// Most outcomes that are kept before the first snapshot; of more, the oldest are forgotten.
-const OUTCOMES_KEPT_MAX: usize = 1 << 16;
+/// Most outcomes to keep before the first snapshot. Beyond it the oldest are dropped.
+const OUTCOMES_PENDING_MAX: usize = 1 << 16;
 
-/// Takes in a run from the first snapshot that is a complete state with its keyframe.
+/// Accepts a run from the first snapshot that has its keyframe.
 #[derive(Debug, Default)]
 pub(crate) struct Intake {
     load: Batch,
-    /// The scene of the load, read with all its checks: its name stands nowhere else, and a scene
-    /// that cannot be read makes a recording that cannot be verified.
+    /// The validated scene of the load. A recording with an invalid scene could not be verified.
     scene: Option<Scene>,
     /// Steps to record after the first one.
     steps_max: Option<u64>,
-    /// The newest snapshot and keyframe, until a pair of one step has come.
+    /// The newest snapshot and keyframe, until both have the same step.
     candidate: Option<Snapshot>,
     candidate_keyframe: Option<(KeyframeHeader, Vec<u8>)>,
-    /// What tore and where colliders were, until the recording has started.
-    tears: TearLog,
-    colliders: ColliderLog,
+    /// The lists, until the recording has started.
+    lists: Lists,
     started: Option<Started>,
     counts: AllCounts,
 }
 
 impl Intake {
-    /// Takes in a run, up to `steps_max` steps after the first one.
+    /// Accepts up to `steps_max` steps after the first one.
     pub(crate) fn new(steps_max: Option<u64>) -> Self {
         Self { steps_max, ..Self::default() }
     }
 
-    /// Takes in a batch.
+    /// Returns the part of a batch that goes into the recording.
     pub(crate) fn accept(&mut self, mut batch: Batch, now: Now) -> Result<Accepted, IntakeError> {
         let mut accepted = Accepted::default();
         self.keep_load(&mut batch)?;
@@ -75,12 +71,12 @@ impl Intake {
         Ok(accepted)
     }
 
-    /// The step that the recording starts with, once it has.
+    /// Returns the first recorded step, once the recording has started.
     pub(crate) fn first_step(&self) -> Option<u64> {
         self.started.as_ref().map(|started| started.first_step)
     }
 
-    /// What was received, and what never came.
+    /// Returns the numbers of received and missing messages.
     pub(crate) fn counts(&self) -> AllCounts {
         let mut counts = self.counts;
         if let Some(started) = &self.started {
@@ -103,39 +99,37 @@ impl Intake {
         Ok(())
     }
 
-    /// Starts at the first snapshot of this batch, or the newest before it, that has a keyframe of
-    /// its step; what is older is dropped.
+    /// Starts at the first snapshot of this batch, or at the candidate before it, that has a keyframe
+    /// of its step. Drops older messages.
     fn try_start(&mut self, batch: &mut Batch, now: Now, accepted: &mut Accepted) {
-        self.tears.add(take(&mut batch.tears), take(&mut batch.tear_causes));
-        self.colliders.add(take(&mut batch.colliders));
+        self.lists.add(batch);
         let snapshots = self.candidate.take().into_iter().chain(batch.snapshots.drain(..));
         let snapshots: Vec<_> = snapshots.collect();
         let keyframes = self.candidate_keyframe.take().into_iter().chain(batch.keyframes.drain(..));
         let keyframes: Vec<_> = keyframes.collect();
-        let is_of = |header: &SnapshotHeader, keyframe: &KeyframeHeader| {
+        let completes = |header: &SnapshotHeader, keyframe: &KeyframeHeader| {
             (keyframe.run_id, keyframe.step) == (header.run_id, header.step)
         };
         let start = snapshots
             .iter()
-            .position(|one| keyframes.iter().any(|(of, _)| is_of(&one.header, of)))
-            .filter(|place| self.has_load_of(&snapshots[*place].header));
-        // An outcome may come before the keyframe of the snapshot that it follows.
+            .position(|one| keyframes.iter().any(|(keyframe, _)| completes(&one.header, keyframe)))
+            .filter(|place| self.is_load_complete(&snapshots[*place].header));
+        // An outcome may arrive before the keyframe of the snapshot that precedes it.
         batch.outcomes.splice(..0, self.load.outcomes.drain(..));
         let Some(place) = start else {
             self.candidate = snapshots.into_iter().next_back();
             self.candidate_keyframe = keyframes.into_iter().next_back();
             let known = self.candidate.as_ref().map_or(0, |one| one.header.outcome_count);
             self.load.outcomes.extend(batch.outcomes.drain(..).filter(|row| row.index >= known));
-            let excess = self.load.outcomes.len().saturating_sub(OUTCOMES_KEPT_MAX);
+            let excess = self.load.outcomes.len().saturating_sub(OUTCOMES_PENDING_MAX);
             self.load.outcomes.drain(..excess);
             return;
         };
         let first = &snapshots[place];
         accepted.header = self.header(&first.header, now);
-        let (mut tears, mut colliders) = (take(&mut self.tears), take(&mut self.colliders));
-        let torn = tears.begin(&first.header);
-        colliders.begin(&first.header);
-        self.started = Some(Started::new(&first.header, self.steps_max, tears, colliders));
+        let mut lists = take(&mut self.lists);
+        let torn = lists.begin(&first.header);
+        self.started = Some(Started::new(&first.header, self.steps_max, lists));
         for message in self.load_rows(torn) {
             self.counts[message.topic()].received += 1;
             accepted.contents.push(Content::Update(message));
@@ -144,16 +138,15 @@ impl Intake {
         batch.snapshots = snapshots.into_iter().skip(place).collect();
     }
 
-    fn has_load_of(&self, header: &SnapshotHeader) -> bool {
-        let is_of = |load: &LoadHeader| {
+    fn is_load_complete(&self, header: &SnapshotHeader) -> bool {
+        let is_current = |load: &LoadHeader| {
             (load.run_id, load.topology_revision) == (header.run_id, header.topology_revision)
         };
         let Batch { scene, topology, surface, .. } = &self.load;
-        scene.as_ref().is_some_and(|(load, _)| is_of(load))
-            && topology.as_ref().is_some_and(|(load, _)| is_of(load))
-            && surface.as_ref().is_some_and(|(load, _)| is_of(load))
-            && self.tears.is_known_at(header)
-            && self.colliders.is_known_in(header.run_id)
+        scene.as_ref().is_some_and(|(load, _)| is_current(load))
+            && topology.as_ref().is_some_and(|(load, _)| is_current(load))
+            && surface.as_ref().is_some_and(|(load, _)| is_current(load))
+            && self.lists.are_known_at(header)
     }
 
     fn load_rows(&mut self, torn: Vec<u32>) -> Vec<Message> {

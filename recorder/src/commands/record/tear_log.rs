@@ -1,146 +1,222 @@
-//! From the lists of all that tore, as a node publishes them, to what is new in each.
+//! The new tears in each list of the service `tears`.
 //!
-//! Each list repeats the ones before it, so one that was missed loses nothing: what it said comes
-//! with the next one, and is written with the step of that. Only a reset starts a list anew, and
-//! only its outcome tells for sure: after it, the same constraints may tear in the same order. An
-//! outcome is published after the list of its step. So lists wait for a snapshot of their step, or
-//! of a later one, by which all of the step has been seen.
+//! A list contains all tears since the load or the last reset, so a missed list loses nothing: its
+//! tears are written with the step of the next one.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 
 use recorder::TearsRow;
-use sim_contract::{SnapshotHeader, TearCause, TearsHeader};
+use sim_contract::{SnapshotHeader, TearsHeader, TornConstraint};
 
-/// Most lists that wait, and causes of lists. Of more, the oldest are dropped: a list after them
-/// holds the same.
-const WAITING_MAX: usize = 64;
+/// Most lists that wait for a snapshot of their step or a later step. Beyond it the oldest are
+/// dropped.
+const PENDING_MAX: usize = 64;
 
-/// A payload under its header.
-type List<T> = (TearsHeader, Vec<T>);
+/// A message of the service `tears`.
+#[derive(Debug, Clone)]
+pub(crate) struct TearList {
+    pub(crate) header: TearsHeader,
+    pub(crate) torn: Vec<TornConstraint>,
+}
 
-/// What tore in the run that is recorded.
+/// The tears of the recorded run.
 #[derive(Debug, Default)]
 pub(crate) struct TearLog {
     /// In the order of publication.
-    lists: VecDeque<List<u32>>,
-    causes: VecDeque<List<u8>>,
-    /// Steps of the resets that no list has shown yet.
-    resets: BTreeSet<u64>,
-    /// How many of the newest list have been told of, and its step.
+    lists: VecDeque<TearList>,
+    /// [`TearsHeader::since_step`] of the last list in the file.
+    since_step: u64,
+    /// Number of its constraints.
     known_count: usize,
-    known_step: u64,
 }
 
 impl TearLog {
-    /// Takes in what arrived in a batch.
-    pub(crate) fn add(&mut self, lists: Vec<List<u32>>, causes: Vec<List<u8>>) {
+    /// Adds the lists of a batch.
+    pub(crate) fn add(&mut self, lists: Vec<TearList>) {
         self.lists.extend(lists);
-        self.causes.extend(causes);
-        self.lists.drain(..self.lists.len().saturating_sub(WAITING_MAX));
-        self.causes.drain(..self.causes.len().saturating_sub(WAITING_MAX));
+        self.lists.drain(..self.lists.len().saturating_sub(PENDING_MAX));
     }
 
-    /// Takes in that a reset took effect at a step.
-    pub(crate) fn add_reset(&mut self, step: u64) {
-        self.resets.insert(step);
-    }
-
-    /// Whether what was torn at a snapshot is known. Some list always comes: a load begins with
-    /// one, and whoever joins is given the newest.
+    /// Returns `true` if the torn constraints at a snapshot are known. Every load publishes a list,
+    /// and a subscriber receives the newest one.
     pub(crate) fn is_known_at(&self, snapshot: &SnapshotHeader) -> bool {
         self.list_at(snapshot).is_some()
     }
 
-    /// Begins with a snapshot: what was torn before it. What tore in its own step comes as a row.
+    /// Starts at a snapshot. Returns the constraints that were torn before it. The tears of its own
+    /// step become a row.
     pub(crate) fn begin(&mut self, first: &SnapshotHeader) -> Vec<u32> {
         let torn_count = first.torn_count as usize;
-        let before = self.list_at(first).map_or(Vec::new(), |(header, list)| {
-            let is_whole = header.step == first.step && list.len() == torn_count;
-            let new_count = if is_whole { header.new_count as usize } else { 0 };
-            list[..torn_count.saturating_sub(new_count)].to_vec()
-        });
-        self.lists.retain(|(header, _)| header.step >= first.step && header.run_id == first.run_id);
-        self.causes.retain(|(header, _)| header.run_id == first.run_id);
-        (self.known_count, self.known_step) = (before.len(), first.step);
+        let mut before = Vec::new();
+        if let Some(list) = self.list_at(first) {
+            let is_of_first = list.header.step == first.step && list.torn.len() == torn_count;
+            let new_count = if is_of_first { list.header.new_count as usize } else { 0 };
+            let before_count = torn_count.saturating_sub(new_count);
+            before = list.torn[..before_count].iter().map(|torn| torn.constraint).collect();
+            self.since_step = list.header.since_step;
+        }
+        let is_needed =
+            |list: &TearList| list.header.step >= first.step && list.header.run_id == first.run_id;
+        self.lists.retain(is_needed);
+        self.known_count = before.len();
         before
     }
 
-    /// The list that was in force at a snapshot, or a later one that begins with it.
-    fn list_at(&self, snapshot: &SnapshotHeader) -> Option<&List<u32>> {
-        let is_long = |list: &&List<u32>| {
-            list.0.run_id == snapshot.run_id && list.1.len() >= snapshot.torn_count as usize
+    /// Returns the list in force at a snapshot, or a later one that continues it.
+    fn list_at(&self, snapshot: &SnapshotHeader) -> Option<&TearList> {
+        let is_complete = |list: &&TearList| {
+            list.header.run_id == snapshot.run_id && list.torn.len() >= snapshot.torn_count as usize
         };
-        let is_later = |list: &&List<u32>| list.0.step > snapshot.step;
-        let mut lists = self.lists.iter().filter(is_long);
+        let is_later = |list: &&TearList| list.header.step > snapshot.step;
+        let mut lists = self.lists.iter().filter(is_complete);
         let in_force = lists.clone().rfind(|list| !is_later(list));
-        in_force.or_else(|| lists.find(is_later))
+        let continues = |list: &&TearList| list.header.since_step <= snapshot.step;
+        in_force.or_else(|| lists.find(|list| is_later(list) && continues(list)))
     }
 
-    /// The rows of the lists up to the newest snapshot.
+    /// Returns the rows of the lists up to the newest snapshot.
     pub(crate) fn rows_until(&mut self, newest: &SnapshotHeader) -> Vec<TearsRow> {
-        let mut rows = Vec::new();
-        while let Some((header, list)) = self.lists.pop_front() {
-            if header.run_id != newest.run_id {
-                continue;
-            }
-            if header.step > newest.step {
-                self.lists.push_front((header, list));
-                break;
-            }
-            rows.extend(self.row(header, &list));
-        }
-        self.causes.retain(|(header, _)| header.step > newest.step);
-        rows
+        self.lists.retain(|list| list.header.run_id == newest.run_id);
+        let count = self.lists.partition_point(|list| list.header.step <= newest.step);
+        let lists: Vec<_> = self.lists.drain(..count).collect();
+        lists.iter().filter_map(|list| self.row(list)).collect()
     }
 
-    fn row(&mut self, header: TearsHeader, list: &[u32]) -> Option<TearsRow> {
-        let is_reset = self.has_reset(self.known_step, header.step);
-        self.resets = self.resets.split_off(&(header.step + 1));
-        // A list never gets shorter otherwise: this is the reset of an outcome that was missed.
-        if is_reset || list.len() < self.known_count {
-            self.known_count = 0;
+    /// Returns the tears of a list that are not in the file yet, if there are any.
+    fn row(&mut self, list: &TearList) -> Option<TearsRow> {
+        if list.header.since_step != self.since_step {
+            (self.since_step, self.known_count) = (list.header.since_step, 0);
         }
-        let known_count = std::mem::replace(&mut self.known_count, list.len());
-        self.known_step = header.step;
-        let constraints = list[known_count..].to_vec();
-        let causes = self.causes_of(&header, list.len());
-        (!constraints.is_empty()).then(|| TearsRow {
-            step: header.step,
-            constraints,
-            causes: causes.into_iter().skip(known_count).collect(),
+        let new = list.torn.get(self.known_count..).unwrap_or_default();
+        self.known_count = list.torn.len();
+        let cause = |torn: &TornConstraint| torn.cause().map_or("unknown", |cause| cause.name());
+        (!new.is_empty()).then(|| TearsRow {
+            step: list.header.step,
+            constraints: new.iter().map(|torn| torn.constraint).collect(),
+            causes: new.iter().map(|torn| cause(torn).to_owned()).collect(),
         })
     }
 
-    /// Whether a reset took effect after one step, up to another.
-    fn has_reset(&self, after: u64, until: u64) -> bool {
-        after < until && self.resets.range(after + 1..=until).next().is_some()
-    }
-
-    /// The causes of a list: its own, or those of a later list that begins with it. Empty if they
-    /// are not known.
-    fn causes_of(&self, list: &TearsHeader, count: usize) -> Vec<String> {
-        let found = self.causes.iter().find(|(header, causes)| {
-            (header.run_id, causes.len() >= count) == (list.run_id, true)
-                && header.step >= list.step
-                && !self.has_reset(list.step, header.step)
-        });
-        let Some((_, numbers)) = found else { return Vec::new() };
-        let causes: Vec<_> = numbers[..count]
-            .iter()
-            .map(|number| TearCause::from_number((*number).into()))
-            .collect();
-        if causes.iter().all(Option::is_none) {
-            return Vec::new();
-        }
-        let name = |cause: Option<TearCause>| cause.map_or("unknown", TearCause::name).to_owned();
-        causes.into_iter().map(name).collect()
-    }
-
-    /// Constraints that a snapshot counts as torn, and no list has named.
+    /// Returns the number of constraints that a snapshot counts as torn and no list contains.
     pub(crate) fn missing_count(&self, newest: &SnapshotHeader) -> u64 {
         (newest.torn_count as usize).saturating_sub(self.known_count) as u64
     }
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use sim_contract::TearCause;
+
+    use super::*;
+
+    const RUN_ID: u64 = 77;
+
+    fn snapshot(step: u64, torn_count: u32) -> SnapshotHeader {
+        SnapshotHeader { run_id: RUN_ID, step, torn_count, ..SnapshotHeader::default() }
+    }
+
+    /// A list in which even constraints were cut and odd ones stretched.
+    fn list(step: u64, since_step: u64, torn: &[u32]) -> TearList {
+        let cause =
+            |one: u32| if one.is_multiple_of(2) { TearCause::Cut } else { TearCause::Stretch };
+        let header = TearsHeader { run_id: RUN_ID, step, since_step, new_count: 1, count: 0 };
+        let torn = torn.iter().map(|one| TornConstraint::new(*one, Some(cause(*one)))).collect();
+        TearList { header, torn }
+    }
+
+    /// Returns rows as text, such as "5: 2 cut, 3 stretch".
+    fn rows(log: &mut TearLog, step: u64) -> Vec<String> {
+        let text = |row: TearsRow| {
+            let tears = row.constraints.iter().zip(&row.causes);
+            let tears = tears.map(|(constraint, cause)| format!("{constraint} {cause}"));
+            format!("{}: {}", row.step, tears.collect::<Vec<_>>().join(", "))
+        };
+        log.rows_until(&snapshot(step, 0)).into_iter().map(text).collect()
+    }
+
+    /// A log that started at step 4 without torn constraints.
+    fn started() -> TearLog {
+        let mut log = TearLog::default();
+        log.add(vec![list(0, 0, &[])]);
+        assert!(log.is_known_at(&snapshot(4, 0)));
+        assert!(log.begin(&snapshot(4, 0)).is_empty());
+        log
+    }
+
+    #[test]
+    fn each_row_has_the_new_tears_of_its_list() {
+        let mut log = started();
+        log.add(vec![list(5, 0, &[2]), list(7, 0, &[2, 3, 8])]);
+        assert_eq!(rows(&mut log, 7), ["5: 2 cut", "7: 3 stretch, 8 cut"]);
+        assert!(rows(&mut log, 9).is_empty());
+        assert_eq!(log.missing_count(&snapshot(9, 3)), 0);
+    }
+
+    #[test]
+    fn a_list_waits_for_the_snapshot_of_its_step() {
+        let mut log = started();
+        log.add(vec![list(6, 0, &[2])]);
+        assert!(rows(&mut log, 5).is_empty());
+        assert_eq!(rows(&mut log, 6), ["6: 2 cut"]);
+    }
+
+    #[test]
+    fn the_tears_of_a_missed_list_come_with_the_next_one_or_are_counted() {
+        let mut log = started();
+        log.add(vec![list(9, 0, &[2, 5, 8])]);
+        assert_eq!(rows(&mut log, 9), ["9: 2 cut, 5 stretch, 8 cut"]);
+        let mut log = started();
+        assert_eq!(log.missing_count(&snapshot(9, 3)), 3);
+        let torn: Vec<u32> = (0..200).collect();
+        for count in 1..=torn.len() {
+            log.add(vec![list(9 + count as u64, 0, &torn[..count])]);
+        }
+        let all = log.rows_until(&snapshot(1000, 200));
+        let constraints: Vec<u32> = all.into_iter().flat_map(|row| row.constraints).collect();
+        assert_eq!(constraints, torn, "also beyond the limit of lists");
+    }
+
+    #[test]
+    fn a_list_after_a_reset_starts_again_even_with_the_same_tears() {
+        let mut log = started();
+        log.add(vec![list(5, 0, &[2, 3])]);
+        assert_eq!(rows(&mut log, 5).len(), 1);
+        // The empty list of the reset was missed.
+        log.add(vec![list(11, 8, &[2, 3, 4])]);
+        assert_eq!(rows(&mut log, 11), ["11: 2 cut, 3 stretch, 4 cut"]);
+        log.add(vec![list(12, 12, &[6])]);
+        assert_eq!(rows(&mut log, 12), ["12: 6 cut"], "cut at the boundary of the reset");
+    }
+
+    #[test]
+    fn a_recording_starts_with_the_constraints_torn_before_its_first_snapshot() {
+        let mut log = TearLog::default();
+        log.add(vec![list(3, 0, &[9, 1])]);
+        assert!(!log.is_known_at(&snapshot(6, 3)), "a newer list will follow");
+        assert_eq!(log.begin(&snapshot(6, 2)), [9, 1]);
+        assert!(rows(&mut log, 6).is_empty());
+
+        let mut log = TearLog::default();
+        log.add(vec![list(3, 0, &[9, 1]), list(6, 0, &[9, 1, 4])]);
+        assert_eq!(log.begin(&snapshot(6, 3)), [9, 1]);
+        assert_eq!(rows(&mut log, 6), ["6: 4 cut"], "the tears of the first step are a row");
+
+        let mut log = TearLog::default();
+        log.add(vec![list(8, 0, &[9, 1, 4, 5])]);
+        assert_eq!(log.begin(&snapshot(6, 3)), [9, 1, 4], "the list in force was missed");
+        assert_eq!(rows(&mut log, 8), ["8: 5 stretch"]);
+
+        let mut log = TearLog::default();
+        log.add(vec![list(8, 7, &[9, 1, 4, 5])]);
+        assert!(!log.is_known_at(&snapshot(6, 3)), "a list after a later reset");
+    }
+
+    #[test]
+    fn lists_of_another_run_are_ignored() {
+        let mut log = started();
+        let mut other = list(5, 0, &[3]);
+        other.header.run_id = RUN_ID + 1;
+        log.add(vec![other, list(6, 0, &[2])]);
+        assert_eq!(rows(&mut log, 6), ["6: 2 cut"]);
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use recorder::{Frame, Message, OutcomeRow, StepRow, state_hash};
+use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, TornList, state_hash};
 use sim_contract::{Action, Outcome, ParticleState};
 use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
@@ -242,17 +242,13 @@ impl Resimulation {
 /// Returns the torn constraints of the first snapshot, from its rows. Returns `None` for later
 /// snapshots.
 fn torn_in_first_frame(frame: &Frame) -> Option<Vec<u32>> {
-    let mut updates = frame.updates.iter();
-    let mut torn = updates.find_map(|update| match update {
-        Message::Topology(row) => Some(row.torn.clone()),
+    let torn = frame.updates.iter().find_map(|update| match update {
+        Message::Topology(row) => Some(TornList::before(&row.torn)),
         _ => None,
     })?;
-    for update in updates {
-        if let Message::Tears(row) = update {
-            torn.extend(&row.constraints);
-        }
-    }
-    Some(torn)
+    let mut tracker = TearTracker::new(torn);
+    frame.updates.iter().for_each(|update| tracker.process(update));
+    tracker.at(frame.row.step).map(|torn| torn.constraints.clone())
 }
 
 /// Compares the recorded header, the recorded payload and the simulated state.

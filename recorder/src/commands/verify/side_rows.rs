@@ -1,8 +1,9 @@
-//! The tears and the colliders of a recording, compared with the re-simulation.
+//! The tears, colliders and parameters of a recording, compared with the re-simulation.
 
 use std::collections::BTreeMap;
 
-use recorder::{CollidersRow, Message, TearsRow};
+use recorder::{CollidersRow, Message, ParametersRow, TearsRow};
+use sim_contract::ParameterValues;
 use sim_solver::Solver;
 
 use crate::simulation::solver_rows::{colliders_row, newest_tears_row};
@@ -12,6 +13,7 @@ use crate::simulation::solver_rows::{colliders_row, newest_tears_row};
 pub(super) struct SideRows {
     tears: BTreeMap<u64, TearsRow>,
     colliders: BTreeMap<u64, CollidersRow>,
+    parameters: BTreeMap<u64, ParametersRow>,
 }
 
 impl SideRows {
@@ -25,6 +27,9 @@ impl SideRows {
                 Message::Colliders(row) => {
                     self.colliders.insert(row.step, row.clone());
                 }
+                Message::Parameters(row) => {
+                    self.parameters.insert(row.step, row.clone());
+                }
                 _ => {}
             }
         }
@@ -35,7 +40,10 @@ impl SideRows {
     pub(super) fn compare(&mut self, solver: &Solver, step: u64) -> Option<String> {
         let tears = self.tears.remove(&step).and_then(|row| compare_tears(&row, solver));
         let colliders = self.colliders.remove(&step);
-        tears.or_else(|| colliders.and_then(|row| compare_colliders(&row, solver)))
+        let parameters = self.parameters.remove(&step);
+        tears
+            .or_else(|| colliders.and_then(|row| compare_colliders(&row, solver)))
+            .or_else(|| parameters.and_then(|row| compare_parameters(&row, solver)))
     }
 }
 
@@ -61,6 +69,16 @@ fn tear_text(row: &TearsRow, place: usize) -> String {
     let Some(constraint) = row.constraints.get(place) else { return "none".to_owned() };
     let cause = row.causes.get(place).map_or("unknown", String::as_str);
     format!("constraint {constraint} ({cause})")
+}
+
+/// Compares all parameters except the time scale, which belongs to the node.
+fn compare_parameters(recorded: &ParametersRow, solver: &Solver) -> Option<String> {
+    let time_scale = recorded.values.time_scale;
+    let simulated = ParameterValues { time_scale, ..solver.parameter_values() };
+    let settings = recorded.values.settings().into_iter().zip(simulated.settings());
+    let (old, new) = settings.into_iter().find(|(old, new)| old != new)?;
+    let name = old.parameter.name();
+    Some(format!("parameter {name}: recorded {:?}, simulated {:?}", old.value, new.value))
 }
 
 fn compare_colliders(recorded: &CollidersRow, solver: &Solver) -> Option<String> {

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::log::keyframe_tears::KeyframeTears;
 use crate::log::message::Message;
-use crate::log::rows::{CollidersRow, StatusRow, StepRow};
-use crate::log::tears::TearChange;
+use crate::log::rows::{CollidersRow, ParametersRow, StatusRow, StepRow};
+use crate::log::tears::{TearChange, TornList};
 
 /// Most memory for digests, in bytes: minutes of a large scene that tears in every step.
 const CACHE_SIZE_BYTES_MAX: usize = 64 << 20;
@@ -17,9 +16,10 @@ pub(super) struct Digest {
     pub(super) snapshots: Vec<u64>,
     pub(super) rows: Vec<StepRow>,
     /// The torn list is `None` if the keyframe has another version.
-    pub(super) keyframes: Vec<(u64, Option<KeyframeTears>)>,
+    pub(super) keyframes: Vec<(u64, Option<TornList>)>,
     pub(super) changes: Vec<TearChange>,
     pub(super) colliders: Vec<CollidersRow>,
+    pub(super) parameters: Vec<ParametersRow>,
     pub(super) statuses: Vec<StatusRow>,
     size_bytes: usize,
 }
@@ -33,6 +33,7 @@ impl Digest {
             keyframes: Vec::new(),
             changes: Vec::new(),
             colliders: Vec::new(),
+            parameters: Vec::new(),
             statuses: Vec::new(),
             size_bytes: 0,
         }
@@ -46,16 +47,17 @@ impl Digest {
             Message::Particles { step, .. } => self.snapshots.push(*step),
             Message::Step(row) => self.rows.push(*row),
             Message::Keyframe { step, bytes } => {
-                let tears = KeyframeTears::read(bytes);
-                let count = tears.as_ref().map_or(0, |tears| tears.torn.len());
+                let torn = TornList::from_keyframe(bytes);
+                let count = torn.as_ref().map_or(0, |torn| torn.constraints.len());
                 self.size_bytes += count * 2 * size_of::<u32>();
-                self.keyframes.push((*step, tears));
+                self.keyframes.push((*step, torn));
             }
             Message::Colliders(row) => {
                 self.size_bytes += message.size_bytes();
                 self.colliders.push(row.clone());
             }
             Message::Tears(_) => self.size_bytes += message.size_bytes(),
+            Message::Parameters(row) => self.parameters.push(row.clone()),
             Message::Status(row) => self.statuses.push(row.clone()),
             _ => {}
         }
@@ -67,7 +69,7 @@ impl Digest {
     }
 
     /// Returns the newest keyframe up to a step, with its torn list.
-    pub(super) fn keyframe(&self, step: u64) -> Option<&(u64, Option<KeyframeTears>)> {
+    pub(super) fn keyframe(&self, step: u64) -> Option<&(u64, Option<TornList>)> {
         self.keyframes.iter().rfind(|(keyframe_step, _)| *keyframe_step <= step)
     }
 }

@@ -1,52 +1,44 @@
-//! A benchmark that cannot flatter: how fast a substep is against the loop of a tutorial, in the
-//! same run and on the same particles and links, and how well a sheet moves at that cost.
+//! A fair benchmark: the speed of a substep against the loop of a tutorial, in the same run and on the
+//! same particles and links, and the quality of a sheet's motion at that cost.
 //!
 //! `cargo bench -p sim-solver --bench step [-- --json] [--full] [--quick] [CASE ...]`
 //!
-//! A case is named in full, or by how it begins: "torn" is "torn-32", "torn-100", and so on.
-//! Results go to stdout: Markdown tables at the end, or with `--json` one object a line and case.
-//! `--full` runs what takes minutes, too; `--quick` shows that everything works, not how fast.
+//! Name a case in full or by its beginning: "torn" means "torn-32", "torn-100", and so on. Results go
+//! to stdout: Markdown tables at the end, or with `--json` one object per line and case. `--full` also
+//! runs the cases that take minutes. `--quick` checks that everything works, but not how fast.
 //!
 //! | cases | what they measure |
 //! |---|---|
-//! | sheet-N | a substep of the sheet, N = 32, 100, 316, 1000; and how well it moves, up to 316 |
-//! | torn-N | the same with 1 % of the links cut |
+//! | sheet-N | a substep of the sheet, N = 32, 100, 316, 1000; up to 316 also its quality |
+//! | torn-N | the same sheet with 1 % of the links cut |
 //! | ragdolls-1000, web-large | 1,000 figures that fall on a plane; a web of 10,000 particles |
 //! | mesh, mesh-shuffled | an imported mesh of 10,000 vertices, numbered as built or at random |
-//! | rope-20, rope-50 | ropes of so many particles |
+//! | rope-20, rope-50 | ropes of 20 and 50 particles |
 //! | curtain, ragdoll, pendulum ... | every built-in scene that has links |
-//! | quality-N-START | how well a sheet with tethers moves in 2 ms (N = 100) or 8 ms (316) a frame |
-//! | cost-316 | packing, hashing and publishing, against a step of the sheet |
-//! | threads-N | a step of the sheet with one and two threads, on the wall clock |
-//! | stability-START-N-SUBSTEPS | a minute without gaining 1 % of energy, or the exit code is 1; long |
+//! | quality-N-START | quality of a sheet with tethers at 2 ms (N = 100) or 8 ms (316) per frame |
+//! | cost-316 | packing, hashing and publishing, compared with a step of the sheet |
+//! | threads-N | a step of the sheet with one and two threads, in wall-clock time |
+//! | stability-START-N-SUBSTEPS | a minute without a gain of 1 % in energy, else the exit code is 1; long |
 //!
-//! START is "swing" (level, held at one side), "hang" (upright) or "corners" (level, held at two).
-//! The reference of 316 takes half a minute: name that case in full, or say `--full`.
+//! START is "swing" (level, pinned at one side), "hang" (upright) or "corners" (level, pinned at two
+//! corners). The reference of 316 takes half a minute: name that case in full, or pass `--full`.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what it is for")]
 #![allow(clippy::unwrap_used, reason = "a panic is how a benchmark fails")]
 
-mod budget;
-mod clock;
-mod cost;
-mod graphs;
-mod memory;
-mod mesh;
-mod naive;
+mod cases;
+mod measures;
 mod options;
-mod quality;
-mod reference;
+mod programs;
 mod report;
-mod sheet;
-mod speed;
-mod stability;
-mod threads;
+mod scenes;
 
 use std::process::ExitCode;
 
+use cases::{budget, cost, speed, stability, threads};
 use options::Options;
 use report::Report;
 
-/// The exit code of arguments that mean nothing.
+/// Exit code for wrong arguments.
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
@@ -65,7 +57,7 @@ fn main() -> ExitCode {
     threads::run(&options, &mut report);
     let are_stable = stability::run(&options, &mut report);
     if report.is_empty() {
-        eprintln!("there is no case of that name");
+        eprintln!("no case has that name");
         return ExitCode::from(USAGE);
     }
     report.finish();

@@ -1,15 +1,15 @@
-//! What is printed: JSON as the cases end, or Markdown tables at the end.
+//! Output: JSON after each case, or Markdown tables at the end.
 
 use serde::Serialize;
 
 /// The result of a case as a row of a table.
 pub(crate) trait Row {
-    /// The columns behind the name of the case.
+    /// Columns after the name of the case.
     const HEADINGS: &'static [&'static str];
 
     fn case(&self) -> &str;
 
-    /// One text for each heading.
+    /// Returns one text for each heading.
     fn cells(&self) -> Vec<String>;
 }
 
@@ -23,7 +23,7 @@ pub(crate) struct Report {
 #[derive(Debug)]
 struct Table {
     headings: &'static [&'static str],
-    /// Each with the name of its case first.
+    /// Lines, each starting with the name of its case.
     rows: Vec<Vec<String>>,
 }
 
@@ -32,7 +32,7 @@ impl Report {
         Self { as_json, tables: Vec::new() }
     }
 
-    /// Takes the result of a case.
+    /// Adds the result of a case.
     pub(crate) fn push<R: Row + Serialize>(&mut self, row: &R) {
         if self.as_json {
             println!("{}", serde_json::to_string(row).unwrap());
@@ -40,10 +40,10 @@ impl Report {
         self.tabulate(row);
     }
 
-    /// Takes what the JSON of a case has already.
+    /// Adds a result to the tables only; the JSON of the case has it already.
     pub(crate) fn tabulate<R: Row>(&mut self, row: &R) {
         let cells = row.cells();
-        // Whoever waits, or ends it early, has read what is done.
+        // Flushed, so that the results so far are visible during the run.
         let parts: Vec<_> = (R::HEADINGS.iter().zip(&cells))
             .map(|(heading, cell)| format!("{heading} {cell}"))
             .collect();
@@ -61,7 +61,7 @@ impl Report {
         self.tables.is_empty()
     }
 
-    /// Prints the tables, ready for a document.
+    /// Prints the tables as Markdown.
     pub(crate) fn finish(&self) {
         for table in self.tables.iter().filter(|_| !self.as_json) {
             table.print();
@@ -94,7 +94,7 @@ impl Table {
     }
 }
 
-/// Names to the left, numbers to the right.
+/// Prints names left-aligned and numbers right-aligned.
 fn print_line<T: AsRef<str>>(cells: &[T], widths: &[usize]) {
     let padded = cells.iter().zip(widths).enumerate().map(|(column, (cell, width))| match column {
         0 => format!("{:<width$}", cell.as_ref()),
@@ -103,7 +103,7 @@ fn print_line<T: AsRef<str>>(cells: &[T], widths: &[usize]) {
     println!("| {} |", padded.collect::<Vec<_>>().join(" | "));
 }
 
-/// A number for a cell; a dash where there is none.
+/// Formats a number for a cell; a dash stands for none.
 pub(crate) fn cell(number: Option<f64>, decimals: usize) -> String {
     number.map_or_else(|| "-".to_owned(), |number| format!("{number:.decimals$}"))
 }

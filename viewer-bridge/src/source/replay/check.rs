@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 
 use recorder::{
-    IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, Torn, TornFollower,
-    state_hash,
+    IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, TearTracker,
+    TornList, state_hash,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Action, ParticleState};
@@ -36,7 +36,7 @@ pub(super) struct Job {
     pub(super) first: StepRow,
     pub(super) last_step: u64,
     /// Constraints that were torn before the recording.
-    pub(super) torn: Torn,
+    pub(super) torn: TornList,
 }
 
 /// Reads to the end, or until it is cancelled.
@@ -62,7 +62,7 @@ pub(super) fn check(mut job: Job, reports: &Sender<Report>, is_cancelled: &Atomi
 struct Check {
     marks: Marks,
     parameters: ParameterLog,
-    torn: TornFollower,
+    torn: TearTracker,
     row: Option<StepRow>,
     /// A step is late if it began later than this, in ns.
     period_ns: u64,
@@ -82,7 +82,7 @@ impl Check {
         Self {
             marks: Marks::new(first_step, job.last_step),
             parameters: ParameterLog::new(first_step, job.first.outcome_count),
-            torn: TornFollower::new(job.torn.clone()),
+            torn: TearTracker::new(job.torn.clone()),
             row: None,
             period_ns: SECOND_NS / u64::from(job.log.run().rate_hz.max(1)),
             equal_count: 0,
@@ -97,7 +97,7 @@ impl Check {
     fn add_chunk(&mut self, read: Result<Vec<LoggedMessage>, ReadError>) {
         let Ok(messages) = read else {
             self.damaged_count += 1;
-            self.torn.lose();
+            self.torn.mark_gap();
             self.parameters.add_gap(self.step + 1);
             self.row = None;
             return;
@@ -108,7 +108,7 @@ impl Check {
     }
 
     fn add(&mut self, message: &Message) {
-        self.torn.take(message);
+        self.torn.process(message);
         match message {
             Message::Tears(row) => {
                 let count = u32::try_from(row.constraints.len()).unwrap_or(u32::MAX);

@@ -1,10 +1,10 @@
-//! Where a recording starts and ends, in which order it goes on, and that whatever is missing is
-//! counted. Batchs are put together by hand.
+//! The start, the end and the order of a recording, and the counts of missing messages. The batches
+//! are built by hand.
 
 use sim_contract::{
     Action, ColliderState, CollidersHeader, Command, ConstraintState, NodeStatus,
-    OUTCOME_FLAG_CONTROL, Outcome, ParticleFlags, ParticleState, TearCause, TearsHeader,
-    TornConstraint, Update,
+    OUTCOME_FLAG_CONTROL, Outcome, ParameterValues, ParametersHeader, ParticleFlags, ParticleState,
+    TearCause, TearsHeader, TornConstraint, Update,
 };
 
 use recorder::Topic;
@@ -22,7 +22,7 @@ fn header(step: u64, outcome_count: u64) -> SnapshotHeader {
         step,
         outcome_count,
         particle_count: 1,
-        // One second before now.
+        // One second ago.
         publish_monotonic_ns: 1_000_000_000,
         ..SnapshotHeader::default()
     }
@@ -38,19 +38,25 @@ fn add_load(batch: &mut Batch) {
         &[],
     ));
     add_tears(batch, 0, &[], 0);
+    add_parameters(batch, 0);
 }
 
 fn add_snapshot(batch: &mut Batch, header: &SnapshotHeader) {
     batch.add_snapshot(header, &[ParticleState::default()]);
 }
 
-/// A list of all that is torn, and that all of it was cut.
+/// Adds a list of cut constraints.
 fn add_tears(batch: &mut Batch, step: u64, torn: &[u32], new_count: u32) {
     let count = u32::try_from(torn.len()).unwrap();
     let header = TearsHeader { run_id: RUN_ID, step, since_step: 0, new_count, count };
     let cut = |one: &u32| TornConstraint::new(*one, Some(TearCause::Cut));
     let torn: Vec<_> = torn.iter().map(cut).collect();
     batch.add_update(Update::Tears(&header, &torn));
+}
+
+fn add_parameters(batch: &mut Batch, step: u64) {
+    let header = ParametersHeader { run_id: RUN_ID, step, ..ParametersHeader::default() };
+    batch.add_update(Update::Parameters(&header, &ParameterValues::default()));
 }
 
 fn add_keyframe(batch: &mut Batch, step: u64) {
@@ -62,7 +68,7 @@ fn outcome(index: u64, step: u64) -> Outcome {
     Outcome::new(index, step, Command::new(1, index, Action::Reset), Ok(()))
 }
 
-/// "snapshot 3", "/keyframe 3", ...
+/// Returns names such as "snapshot 3" and "/keyframe 3".
 fn names(accepted: &Accepted) -> Vec<String> {
     let name = |content: &Content| match content {
         Content::Snapshot(row, _) => format!("snapshot {}", row.step),
@@ -71,7 +77,7 @@ fn names(accepted: &Accepted) -> Vec<String> {
     accepted.contents.iter().map(name).collect()
 }
 
-/// An intake that has started at step 4, with two outcomes before it.
+/// An intake that started at step 4, after two outcomes.
 fn started() -> Intake {
     let mut intake = Intake::default();
     let mut batch = Batch::default();
@@ -83,7 +89,7 @@ fn started() -> Intake {
 }
 
 #[test]
-fn it_starts_at_the_first_snapshot_that_has_its_keyframe() {
+fn the_recording_starts_at_the_first_snapshot_with_a_keyframe() {
     let mut intake = Intake::default();
     let mut batch = Batch::default();
     add_load(&mut batch);
@@ -99,17 +105,17 @@ fn it_starts_at_the_first_snapshot_that_has_its_keyframe() {
     let accepted = intake.accept(batch, NOW).unwrap();
     assert_eq!(
         names(&accepted),
-        ["/topology 0", "/surface 0", "/keyframe 4", "snapshot 4", "snapshot 5"]
+        ["/topology 0", "/surface 0", "/parameters 0", "/keyframe 4", "snapshot 4", "snapshot 5"]
     );
     let run = accepted.header.unwrap().run;
     assert_eq!((run.scene_name.as_str(), run.rate_hz, run.constraint_count), ("dot", 10, 1));
-    // Published at 4 s of the wall, at step 4 of 10 Hz.
+    // Published at a wall-clock time of 4 s, in step 4 at 10 Hz.
     assert_eq!(run.epoch_ns, 4_000_000_000 - 400_000_000);
     assert_eq!(intake.first_step(), Some(4));
 }
 
 #[test]
-fn a_keyframe_that_comes_after_its_snapshot_starts_it_too() {
+fn a_keyframe_that_arrives_after_its_snapshot_starts_the_recording() {
     let mut intake = Intake::default();
     let mut batch = Batch::default();
     add_load(&mut batch);
@@ -119,12 +125,13 @@ fn a_keyframe_that_comes_after_its_snapshot_starts_it_too() {
     let mut batch = Batch::default();
     add_keyframe(&mut batch, 9);
     let accepted = intake.accept(batch, NOW).unwrap();
-    let expected = ["/topology 0", "/surface 0", "/keyframe 9", "snapshot 9", "/outcomes 10"];
+    let expected =
+        ["/topology 0", "/surface 0", "/parameters 0", "/keyframe 9", "snapshot 9", "/outcomes 10"];
     assert_eq!(names(&accepted), expected);
 }
 
 #[test]
-fn an_outcome_that_comes_before_any_snapshot_is_kept() {
+fn an_outcome_before_the_first_snapshot_is_kept() {
     let mut intake = Intake::default();
     let mut batch = Batch::default();
     add_load(&mut batch);
@@ -134,12 +141,12 @@ fn an_outcome_that_comes_before_any_snapshot_is_kept() {
     add_snapshot(&mut batch, &header(0, 0));
     add_keyframe(&mut batch, 0);
     let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(names(&accepted)[2..], ["/keyframe 0", "snapshot 0", "/outcomes 1"]);
+    assert_eq!(names(&accepted)[3..], ["/keyframe 0", "snapshot 0", "/outcomes 1"]);
     assert_eq!(intake.counts().missing(), 0);
 }
 
 #[test]
-fn it_ends_with_the_last_step_that_is_wanted_and_counts_nothing_beyond() {
+fn the_recording_ends_with_the_last_requested_step_and_counts_nothing_after_it() {
     let mut intake = Intake::new(Some(2));
     let mut batch = Batch::default();
     add_load(&mut batch);
@@ -160,13 +167,13 @@ fn it_ends_with_the_last_step_that_is_wanted_and_counts_nothing_beyond() {
         "/outcomes 2",
         "snapshot 2",
     ];
-    assert_eq!(names(&accepted)[2..], expected);
+    assert_eq!(names(&accepted)[3..], expected);
     assert_eq!(intake.counts().missing(), 0);
     assert_eq!(intake.counts()[Topic::Particles].received, 3);
 }
 
 #[test]
-fn a_round_is_written_in_the_order_of_publication() {
+fn a_batch_is_written_in_the_order_of_publication() {
     let mut intake = started();
     let mut batch = Batch::default();
     add_snapshot(&mut batch, &header(5, 3));
@@ -197,7 +204,7 @@ fn a_round_is_written_in_the_order_of_publication() {
 }
 
 #[test]
-fn outcomes_of_the_first_state_and_answers_of_a_replay_are_left_out() {
+fn outcomes_of_the_first_state_and_answers_of_a_replay_are_skipped() {
     let mut intake = started();
     let mut batch = Batch::default();
     batch.add_update(Update::Outcome(&outcome(1, 4)));
@@ -218,20 +225,21 @@ fn missing_outcomes_are_counted() {
     let mut batch = Batch::default();
     add_snapshot(&mut batch, &header(6, 9));
     intake.accept(batch, NOW).unwrap();
-    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 6, "also those at the very end");
+    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 6, "including those at the end");
 }
 
 #[test]
 fn missing_snapshots_are_counted_by_the_stride_of_the_node() {
     let mut intake = started();
     let mut batch = Batch::default();
-    for step in [8, 12, 16, 28, 32, 40] {
-        add_snapshot(&mut batch, &header(step, 2));
+    // The node paused at step 30. Steps 20, 24 and 36 are missing.
+    for step in [8, 12, 16, 28, 30, 32, 40] {
+        add_snapshot(&mut batch, &SnapshotHeader { stride: 4, ..header(step, 2) });
     }
     intake.accept(batch, NOW).unwrap();
     let counts = intake.counts();
     assert_eq!(counts[Topic::Particles].gaps, 3);
-    assert_eq!((counts[Topic::Particles].received, counts[Topic::Steps].received), (7, 7));
+    assert_eq!((counts[Topic::Particles].received, counts[Topic::Steps].received), (8, 8));
 }
 
 #[test]
@@ -242,7 +250,7 @@ fn missing_keyframes_are_counted() {
         add_snapshot(&mut batch, &SnapshotHeader { keyframe_step, ..header(step, 2) });
     }
     add_keyframe(&mut batch, 7);
-    // Read ahead of its snapshot: it says nothing of those between.
+    // A keyframe that was read before its snapshot does not affect those in between.
     add_keyframe(&mut batch, 11);
     intake.accept(batch, NOW).unwrap();
     assert_eq!(intake.counts()[Topic::Keyframe].gaps, 1);
@@ -255,7 +263,7 @@ fn missing_keyframes_are_counted() {
 }
 
 #[test]
-fn another_run_ends_it_and_nothing_of_that_is_taken() {
+fn another_run_ends_the_recording_and_is_not_part_of_it() {
     let mut intake = started();
     let mut batch = Batch::default();
     add_snapshot(&mut batch, &header(5, 3));
@@ -271,7 +279,7 @@ fn another_run_ends_it_and_nothing_of_that_is_taken() {
 }
 
 #[test]
-fn another_load_ends_it() {
+fn another_load_ends_the_recording() {
     let mut intake = started();
     let mut batch = Batch::default();
     add_snapshot(&mut batch, &SnapshotHeader { topology_revision: 1, ..header(5, 2) });
@@ -280,7 +288,7 @@ fn another_load_ends_it() {
 }
 
 #[test]
-fn a_scene_that_cannot_be_read_is_refused() {
+fn an_invalid_scene_is_refused() {
     let mut intake = Intake::default();
     let mut batch = Batch::default();
     add_load(&mut batch);
@@ -291,7 +299,7 @@ fn a_scene_that_cannot_be_read_is_refused() {
     assert!(matches!(intake.accept(batch, NOW), Err(IntakeError::Scene(_))));
 }
 
-/// The rows of tears and events, and the colliders of each step.
+/// Returns the tears, the events and the number of colliders in each step.
 fn side_rows(accepted: &Accepted) -> Vec<String> {
     let text = |content: &Content| match content {
         Content::Update(Message::Topology(row)) => Some(format!("torn {:?}", row.torn)),
@@ -313,7 +321,7 @@ fn add_colliders(batch: &mut Batch, step: u64, count: usize) {
 }
 
 #[test]
-fn a_late_recording_has_what_was_torn_and_where_colliders_stood_before_it() {
+fn a_late_recording_starts_with_the_torn_constraints_and_the_colliders() {
     let mut intake = Intake::default();
     let mut batch = Batch::default();
     add_load(&mut batch);
@@ -327,12 +335,15 @@ fn a_late_recording_has_what_was_torn_and_where_colliders_stood_before_it() {
     }
     let accepted = intake.accept(batch, NOW).unwrap();
     assert_eq!(side_rows(&accepted), ["torn [0]", "2: 2 colliders", "7: 2 colliders"]);
-    assert_eq!(names(&accepted)[..3], ["/topology 0", "/surface 0", "/colliders 2"]);
+    assert_eq!(
+        names(&accepted)[..4],
+        ["/topology 0", "/surface 0", "/parameters 0", "/colliders 2"]
+    );
     assert_eq!(intake.counts().missing(), 0);
 }
 
 #[test]
-fn it_waits_until_it_knows_what_is_torn() {
+fn the_recording_starts_only_when_the_torn_constraints_are_known() {
     let mut intake = Intake::default();
     let torn = |step| SnapshotHeader { torn_count: 1, ..header(step, 0) };
     let mut batch = Batch::default();
@@ -343,12 +354,15 @@ fn it_waits_until_it_knows_what_is_torn() {
     let mut batch = Batch::default();
     add_tears(&mut batch, 5, &[0], 1);
     let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(names(&accepted), ["/topology 0", "/surface 0", "/keyframe 6", "snapshot 6"]);
+    assert_eq!(
+        names(&accepted),
+        ["/topology 0", "/surface 0", "/parameters 0", "/keyframe 6", "snapshot 6"]
+    );
     assert_eq!(side_rows(&accepted), ["torn [0]"]);
 }
 
 #[test]
-fn tears_colliders_and_events_come_before_their_snapshot() {
+fn tears_colliders_and_events_precede_their_snapshot() {
     let mut intake = started();
     let mut batch = Batch::default();
     let frozen = ParticleState { flags: ParticleFlags::FROZEN, ..ParticleState::default() };
@@ -368,7 +382,7 @@ fn tears_colliders_and_events_come_before_their_snapshot() {
 }
 
 #[test]
-fn what_another_load_begins_with_is_not_of_this_file() {
+fn messages_of_another_load_are_not_part_of_the_recording() {
     let mut intake = started();
     let mut batch = Batch::default();
     add_snapshot(&mut batch, &header(5, 2));
@@ -383,17 +397,15 @@ fn what_another_load_begins_with_is_not_of_this_file() {
 }
 
 #[test]
-fn a_reset_and_the_same_tears_again_are_told_of_twice() {
+fn tears_before_and_after_a_reset_are_both_recorded() {
     let mut intake = started();
-    for (step, reset) in [(5, None), (9, Some(outcome(2, 8)))] {
-        let outcome_count = 2 + u64::from(reset.is_some());
+    for (step, since_step) in [(5, 0), (9, 8)] {
         let mut batch = Batch::default();
-        add_tears(&mut batch, step, &[0], 1);
-        let last = SnapshotHeader { torn_count: 1, ..header(step, outcome_count) };
-        add_snapshot(&mut batch, &last);
-        if let Some(outcome) = &reset {
-            batch.add_update(Update::Outcome(outcome));
-        }
+        let header_of_tears =
+            TearsHeader { run_id: RUN_ID, step, since_step, new_count: 1, count: 1 };
+        let torn = TornConstraint::new(0, Some(TearCause::Cut));
+        batch.add_update(Update::Tears(&header_of_tears, &[torn]));
+        add_snapshot(&mut batch, &SnapshotHeader { torn_count: 1, ..header(step, 2) });
         let accepted = intake.accept(batch, NOW).unwrap();
         assert_eq!(side_rows(&accepted), [format!("{step}: tore [0] by [\"cut\"]")]);
     }

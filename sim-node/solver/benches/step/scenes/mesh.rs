@@ -1,5 +1,4 @@
-//! A closed surface as a modelling program would export it: a torus of irregular triangles, as OBJ
-//! text.
+//! A closed surface as a modelling program exports it: a torus of irregular triangles, as OBJ text.
 
 use std::f64::consts::TAU;
 
@@ -9,19 +8,19 @@ const AROUND_TUBE: usize = 80;
 /// Radii of the ring and of its tube, in m.
 const RING_RADIUS: f64 = 1.0;
 const TUBE_RADIUS: f64 = 0.4;
-/// How far a vertex is off its regular place, as a share of the way to the next one.
+/// Offset of a vertex from its regular place, as a fraction of the distance to the next one.
 const JITTER: f64 = 0.3;
 
-/// How vertices and faces are numbered.
+/// Numbering of vertices and faces.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Numbering {
-    /// Neighbours mostly have near numbers.
+    /// Neighbours mostly have close numbers.
     AsBuilt,
-    /// At random: no two neighbours are near each other in memory.
+    /// Random: neighbours are far apart in memory.
     Shuffled,
 }
 
-/// The text of a torus that stands upright about the z axis.
+/// Returns the OBJ text of an upright torus about the z axis.
 pub(crate) fn torus(numbering: Numbering) -> String {
     let mut random = Random(1);
     let mut vertices = vertices(&mut random);
@@ -52,7 +51,7 @@ fn vertices(random: &mut Random) -> Vec<[f64; 3]> {
     (0..AROUND_RING * AROUND_TUBE).map(&mut vertex).collect()
 }
 
-/// Two triangles a cell, cut along either diagonal.
+/// Returns two triangles per cell, split along a random diagonal.
 fn faces(random: &mut Random) -> Vec<[usize; 3]> {
     let mut faces = Vec::new();
     for ring in 0..AROUND_RING {
@@ -69,7 +68,7 @@ fn faces(random: &mut Random) -> Vec<[usize; 3]> {
     faces
 }
 
-/// New numbers for the vertices, and another order of the faces.
+/// Renumbers the vertices and reorders the faces.
 fn shuffle(vertices: &mut Vec<[f64; 3]>, faces: &mut [[usize; 3]], random: &mut Random) {
     let mut olds: Vec<_> = (0..vertices.len()).collect();
     random.shuffle(&mut olds);
@@ -84,20 +83,19 @@ fn shuffle(vertices: &mut Vec<[f64; 3]>, faces: &mut [[usize; 3]], random: &mut 
     random.shuffle(faces);
 }
 
-/// Numbers that are the same in every run: a linear congruential generator with the constants of
-/// Knuth's MMIX.
+/// Reproducible random numbers: a linear congruential generator with the constants of Knuth's MMIX.
 struct Random(u64);
 
 impl Random {
-    /// Between 0 and 1.
+    /// Returns a number between 0 and 1.
     fn share(&mut self) -> f64 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        // The upper 32 bits: the lower ones repeat soon.
+        // The upper 32 bits, because the lower ones repeat soon.
         (self.0 >> 32) as f64 / 4_294_967_296.0
     }
 
-    /// Fisher and Yates.
+    /// Shuffles by the method of Fisher and Yates.
     fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
             #[allow(

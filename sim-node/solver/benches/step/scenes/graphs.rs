@@ -1,19 +1,18 @@
-//! Scenes whose links form any graph: figures, webs, meshes, ropes, and the built-in scenes.
+//! Scenes whose links form an arbitrary graph: figures, webs, meshes, ropes, and the built-in scenes.
 
 use sim_solver::{Scene, builtin};
 
-use super::mesh::{self, Numbering};
+use crate::scenes::mesh::{self, Numbering};
 
-/// Figures of the crowd; rows of it.
+/// Figures in the crowd, and its rows.
 const FIGURES: u32 = 1000;
 const FIGURES_PER_ROW: u32 = 40;
-/// A web with this many spokes and as many rings has 10,001 particles. Its hub has more links than
-/// there are groups.
+/// Spokes and rings of a web with 10,001 particles. Its hub has more links than there are groups.
 const SPOKES: u32 = 100;
-/// A plane that nothing reaches in two seconds.
+/// A plane that no particle reaches in two seconds.
 const FAR_PLANE: &str = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -50\n";
 
-/// A scene, made when it is needed.
+/// A scene, built on demand.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Graph {
     /// Figures that fall onto a plane, each as in the built-in scene.
@@ -22,14 +21,14 @@ pub(crate) enum Graph {
     Web,
     /// An imported mesh of 10,000 vertices.
     Mesh(Numbering),
-    /// A rope of so many particles.
+    /// A rope of `count` particles.
     Rope(u32),
-    /// One that comes with the programs.
+    /// A built-in scene.
     BuiltIn(&'static str),
 }
 
 impl Graph {
-    /// All of them; built-in scenes only where they have links.
+    /// Returns all graphs, including the built-in scenes that have links.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
         let big = [Self::Ragdolls, Self::Web]
             .into_iter()
@@ -39,7 +38,7 @@ impl Graph {
         big.chain(small).chain(built_in)
     }
 
-    /// The name of its case.
+    /// Returns the name of the case.
     pub(crate) fn name(self) -> String {
         match self {
             Self::Ragdolls => format!("ragdolls-{FIGURES}"),
@@ -66,7 +65,7 @@ fn from_toml(text: &str) -> Scene {
     Scene::from_toml(text, "benchmark").unwrap()
 }
 
-/// Settings of the figure, the floor and the mass are those of the built-in scene.
+/// Returns the crowd. Settings, floor and mass are those of the built-in scene.
 fn ragdolls() -> String {
     let mut text =
         "version = 1\n[solver]\nrate_hz = 60\nsubsteps = 4\niterations = 6\ndamping = 0.1\n\
@@ -83,7 +82,7 @@ fn ragdolls() -> String {
     text
 }
 
-/// A level web that sags.
+/// Returns a level web that sags.
 fn web() -> String {
     format!(
         "version = 1\n[solver]\nrate_hz = 60\nsubsteps = 8\n{FAR_PLANE}\
@@ -92,7 +91,7 @@ fn web() -> String {
     )
 }
 
-/// As `sim-node import` writes it, held at its top.
+/// Returns an imported mesh as `sim-node import` writes it, pinned at its top.
 fn imported(numbering: Numbering) -> Scene {
     let text = format!(
         "version = 1\n[solver]\nsubsteps = 8\n{FAR_PLANE}\
@@ -103,7 +102,7 @@ fn imported(numbering: Numbering) -> Scene {
     Scene::from_toml_with_files(&text, "mesh", &|_| Ok(obj.clone())).unwrap()
 }
 
-/// With the substeps that a scene has by default: what a step costs beside them shows most here.
+/// Returns a rope with the default substeps. The cost of a step beside its substeps shows most here.
 fn rope(count: u32) -> String {
     format!(
         "version = 1\n{FAR_PLANE}[[generate]]\nshape = \"rope\"\ncount = {count}\nfrom = [0, 0, 0]\n\

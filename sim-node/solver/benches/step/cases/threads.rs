@@ -1,20 +1,20 @@
-//! What a second thread gains, in wall-clock time.
+//! Gain by a second thread, in wall-clock time.
 
 use serde::Serialize;
 use sim_solver::{Scene, Solver};
 
-use super::clock::{tenth_percentile, wall_ns};
-use super::options::Options;
-use super::report::{Report, Row};
-use super::sheet::Sheet;
+use crate::measures::clock::{tenth_percentile, wall_ns};
+use crate::options::Options;
+use crate::report::{Report, Row};
+use crate::scenes::sheet::Sheet;
 
 /// Side of the sheet, substeps, and turns.
 const SHEETS: [(u32, u32, usize); 4] = [(32, 16, 60), (100, 16, 30), (316, 8, 8), (1000, 4, 2)];
-/// Steps in a row of the same solver: a thread that still waits for work disturbs only the first
+/// Consecutive steps of one solver. A thread that still waits for work disturbs only the first step
 /// of the other solver.
 const STEPS_PER_TURN: usize = 5;
-/// Pairs of solvers. Which one is made first takes turns, too: where its arrays lie in memory is
-/// worth some percent.
+/// Pairs of solvers. They take turns in being created first, because the place of the arrays in memory
+/// matters by a few percent.
 const PAIRS: usize = 4;
 
 /// A sheet with one thread and with two.
@@ -22,11 +22,11 @@ const PAIRS: usize = 4;
 struct Threads {
     case: String,
     substeps: u32,
-    /// A tenth of the steps take less: what other processes take away is in the slower ones. CPU
-    /// time would count the waiting, too.
+    /// The tenth percentile of the steps, because other processes slow down some of them. CPU time
+    /// would include the waiting.
     one_thread_p10_ms: f64,
     two_threads_p10_ms: f64,
-    /// How many times as fast with two.
+    /// Speed with two threads relative to one.
     speedup: f64,
 }
 
@@ -58,7 +58,7 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
     }
 }
 
-/// In turns, so that both have the same share of the machine's moods.
+/// Measures in turns, so that disturbances affect both alike.
 fn measure(case: String, scene: &Scene, turns: usize) -> Threads {
     let (mut ones, mut twos) = (Vec::new(), Vec::new());
     for pair in 0..PAIRS {
@@ -66,8 +66,8 @@ fn measure(case: String, scene: &Scene, turns: usize) -> Threads {
         let mut one = with_threads(scene, 1);
         let two = two.get_or_insert_with(|| with_threads(scene, 2));
         for _ in 0..turns {
-            take_turn(&mut one, &mut ones);
-            take_turn(two, &mut twos);
+            time_steps(&mut one, &mut ones);
+            time_steps(two, &mut twos);
         }
         assert_eq!(one.state_hash(), two.state_hash(), "{case}: the bits depend on the threads");
     }
@@ -87,6 +87,6 @@ fn with_threads(scene: &Scene, count: usize) -> Solver {
     solver
 }
 
-fn take_turn(solver: &mut Solver, times_ns: &mut Vec<f64>) {
+fn time_steps(solver: &mut Solver, times_ns: &mut Vec<f64>) {
     times_ns.extend((0..STEPS_PER_TURN).map(|_| wall_ns(|| solver.step())));
 }

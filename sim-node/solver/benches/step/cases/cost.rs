@@ -1,20 +1,20 @@
-//! What a step costs beside its substeps, and what publishing it costs.
+//! Cost of a step beside its substeps, and cost of publishing it.
 
 use serde::Serialize;
 use sim_solver::{Particle, Scene, Solver};
 
-use super::clock::{cpu_ns, median};
-use super::options::Options;
-use super::report::{Report, Row};
-use super::sheet::Sheet;
+use crate::measures::clock::{cpu_ns, median};
+use crate::options::Options;
+use crate::report::{Report, Row};
+use crate::scenes::sheet::Sheet;
 
 const COLUMNS: u32 = 316;
 const SUBSTEPS: u32 = 8;
 /// Substeps of the second scene of free particles.
 const MORE_SUBSTEPS: u32 = 5;
-/// Steps of each program, in turn.
+/// Steps of each program, which take turns.
 const ROUNDS: usize = 41;
-/// Buffers that are published into in turn: a reader keeps some of them.
+/// Buffers for publishing, used in turn, because a reader keeps some of them.
 const LOANS: usize = 4;
 
 /// The cost of a step of the sheet that does not depend on its constraints.
@@ -24,13 +24,12 @@ struct Cost {
     particles: usize,
     substeps: u32,
     step_ms: f64,
-    /// What a step of free particles costs beside its substeps: packing and hashing the state, and
-    /// before that, one look at every number. From a step of 1 substep and one of 5, whose
-    /// difference are 4 substeps.
+    /// Cost of a step of free particles beside its substeps: reading every number once, packing and
+    /// hashing the state. It is computed from steps of 1 and 5 substeps, which differ by 4 substeps.
     pack_and_hash_ns_per_particle: f64,
     pack_and_hash_gb_per_s: f64,
     pack_and_hash_percent_of_step: f64,
-    /// Writing the state into a buffer of 32 B a particle.
+    /// Cost of writing the state into a buffer of 32 B per particle.
     publish_ns_per_particle: f64,
     publish_gb_per_s: f64,
     publish_percent_of_step: f64,
@@ -102,13 +101,13 @@ fn measure(case: String, options: &Options) -> Cost {
     }
 }
 
-/// Writes the state into a buffer that stands for a loan of shared memory.
+/// Writes the state into a buffer in place of a loan of shared memory.
 fn publish(solver: &Solver, loan: &mut [Particle]) {
     loan.copy_from_slice(solver.particles());
     std::hint::black_box(loan);
 }
 
-/// As many particles as the sheet has, without constraints and colliders.
+/// Returns a scene with the particles of the sheet, but without constraints and colliders.
 fn free_particles(substeps: u32) -> Scene {
     let text = format!(
         "version = 1\n[solver]\nrate_hz = 60\nsubsteps = {substeps}\n[[generate]]\nshape = \"cloth\"\n\

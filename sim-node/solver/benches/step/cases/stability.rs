@@ -1,14 +1,13 @@
-//! Whether a sheet ever gains energy: a minute of every start, size and number of substeps,
-//! undamped.
+//! Gain of energy in undamped sheets: a minute of every start, size and number of substeps.
 
 use serde::Serialize;
 use sim_solver::Solver;
 
-use super::clock::Pacer;
-use super::options::Options;
-use super::quality::EnergyGain;
-use super::report::{Report, Row};
-use super::sheet::{Sheet, Start};
+use crate::measures::clock::Pacer;
+use crate::measures::quality::EnergyGain;
+use crate::options::Options;
+use crate::report::{Report, Row};
+use crate::scenes::sheet::{Sheet, Start};
 
 const STARTS: [Start; 3] = [Start::Swing, Start::Hang, Start::Corners];
 const COLUMNS: [u32; 4] = [8, 32, 100, 316];
@@ -16,16 +15,15 @@ const SUBSTEPS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Largest energy above that at the start, in percent of m g 2 m for each particle.
 const ENERGY_GAIN_MAX_PERCENT: f64 = 1.0;
 
-/// What became of one sheet.
+/// Result of one sheet.
 #[derive(Debug, Serialize)]
 struct Stability {
     case: String,
     substeps: u32,
     frames: u32,
-    /// Whether all numbers were finite in all frames.
+    /// All numbers were finite in all frames.
     is_finite: bool,
-    /// The largest energy of all frames less that at the start, against the range that there is:
-    /// m g 2 m for each particle.
+    /// Largest energy of all frames minus that at the start, relative to m g 2 m for each particle.
     energy_gain_percent: f64,
 }
 
@@ -53,7 +51,7 @@ impl Row for Stability {
     }
 }
 
-/// Whether all that was wanted is stable.
+/// Runs the requested cases. Returns `true` if all of them are stable.
 pub(crate) fn run(options: &Options, report: &mut Report) -> bool {
     let mut are_stable = true;
     for (start, columns, substeps) in combinations() {
@@ -76,7 +74,7 @@ fn combinations() -> impl Iterator<Item = (Start, u32, u32)> {
     })
 }
 
-/// Ends with the first number that is none: what comes after it means nothing.
+/// Runs a sheet until its first NaN, after which the numbers have no meaning.
 fn watch(case: String, sheet: &Sheet, frames: u32) -> Stability {
     let mut solver = Solver::new(&sheet.scene());
     let energy = EnergyGain::new(&solver);
@@ -92,7 +90,7 @@ fn watch(case: String, sheet: &Sheet, frames: u32) -> Stability {
         solver.step();
         result.frames += 1;
         result.energy_gain_percent = result.energy_gain_percent.max(energy.percent(&solver));
-        // The solver takes out at once what is no longer finite.
+        // The solver freezes particles at once when their state is not finite.
         result.is_finite = solver.frozen_count() == 0;
         if pacer.is_due() {
             eprintln!("{}: frame {} of {frames}", result.case, result.frames);

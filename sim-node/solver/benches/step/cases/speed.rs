@@ -1,35 +1,34 @@
-//! How fast a substep is, against the loop of a tutorial in the same run.
+//! Speed of a substep, compared with the loop of a tutorial in the same run.
 //!
-//! Both begin with the scene as the solver has it after half a second, and go through the next two
-//! again and again: what falls does not fall for hours. Every time is CPU time of this process, the
-//! median of runs in turn.
+//! Both start from the solver's state after half a second and repeat the next two seconds, so that
+//! nothing falls for hours. Every time is CPU time of this process, the median of runs that take turns.
 //!
-//! The first frames are no measure of the others: of a sheet that was level, most displacements are
-//! 0, and those ahead of the wave that runs through it are below the smallest normal f32, which
-//! many processors are slow at. What that costs is the slowest frame of the sheet's quality.
+//! The first frames are not representative. In a level sheet most displacements are 0, and those ahead
+//! of the wave that runs through it are subnormal, which is slow on many processors. The slowest frame
+//! in the sheet's quality shows this cost.
 
 use serde::Serialize;
 use sim_solver::{Scene, Solver};
 
-use super::clock::{cpu_ns, median};
-use super::graphs::Graph;
-use super::memory::Footprint;
-use super::naive::Naive;
-use super::options::Options;
-use super::quality::{self, Quality};
-use super::report::{Report, Row, cell};
-use super::sheet::Sheet;
+use crate::measures::clock::{cpu_ns, median};
+use crate::measures::memory::Footprint;
+use crate::measures::quality::{self, Quality};
+use crate::options::Options;
+use crate::programs::naive::Naive;
+use crate::report::{Report, Row, cell};
+use crate::scenes::graphs::Graph;
+use crate::scenes::sheet::Sheet;
 
 /// Sheets: particles along a side, and substeps.
 const SHEETS: [(u32, u32); 4] = [(32, 16), (100, 16), (316, 8), (1000, 4)];
-/// Sheets whose motion is looked at, too; the biggest has no room for it.
+/// Sheets whose quality is measured, too. The largest would take too long.
 const QUALITY_COLUMNS_MAX: u32 = 316;
-/// Runs of each program, in turn; odd, so that there is a median.
+/// Runs of each program, which take turns. The number is odd, so that there is a median.
 const ROUNDS: usize = 5;
-/// Seconds of the scene after which it begins again.
+/// Seconds of the scene after which it starts again.
 const COURSE_SECONDS: u32 = 2;
 
-/// What is measured of a case.
+/// Measurements of a case.
 #[derive(Debug, Serialize)]
 struct Speed {
     case: String,
@@ -37,12 +36,12 @@ struct Speed {
     constraints: usize,
     substeps: u32,
     iterations: u32,
-    /// Constraints that are whole, times substeps, times iterations.
+    /// Intact constraints times substeps times iterations.
     projections_per_step: u64,
-    /// Of the whole substep: predict, project, collide, update, and the step's hash.
+    /// Time of a whole substep: predict, project, collide, update, and its part of the hash.
     ns_per_projection: f64,
-    /// How many times as fast as the tutorial's loop: one step of as many passes. None if its
-    /// numbers are none.
+    /// Speed relative to the tutorial's loop, which makes one step of as many passes. None if the
+    /// loop's numbers become NaN.
     ratio_to_naive: Option<f64>,
     naive_ns_per_projection: Option<f64>,
     steps_per_s: f64,
@@ -101,7 +100,7 @@ pub(crate) fn run_sheets(options: &Options, report: &mut Report) {
     }
 }
 
-/// Scenes whose links form any graph.
+/// Runs the scenes whose links form an arbitrary graph.
 pub(crate) fn run_graphs(options: &Options, report: &mut Report) {
     for graph in Graph::all() {
         let case = graph.name();
@@ -112,7 +111,7 @@ pub(crate) fn run_graphs(options: &Options, report: &mut Report) {
     }
 }
 
-/// A sheet, with how well it moves.
+/// Runs a sheet, with its quality.
 fn push_sheet(case: &str, sheet: &Sheet, options: &Options, report: &mut Report) {
     let scene = sheet.scene();
     let mut speed = speed(case, &scene, Solver::new(&scene), options);
@@ -132,7 +131,7 @@ fn cut_one_in_a_hundred(solver: &mut Solver) {
     }
 }
 
-/// Measures a scene that a solver is at the beginning of.
+/// Measures a scene with a solver at step 0.
 fn speed(case: &str, scene: &Scene, mut solver: Solver, options: &Options) -> Speed {
     let settings = scene.solver;
     (0..options.lead_steps(settings.rate_hz)).for_each(|_| solver.step());
@@ -169,7 +168,7 @@ fn speed(case: &str, scene: &Scene, mut solver: Solver, options: &Options) -> Sp
     }
 }
 
-/// A program that begins again after a number of steps.
+/// A program that starts again after a number of steps.
 struct Course<T> {
     start: T,
     now: T,
@@ -177,7 +176,7 @@ struct Course<T> {
     is_finite: fn(&T) -> bool,
     period: u64,
     steps_left: u64,
-    /// Whether its numbers were finite at the end of every run, and whenever it began again.
+    /// Its numbers were finite at the end of every run and of every repetition.
     was_finite: bool,
 }
 
@@ -187,7 +186,7 @@ impl<T: Clone> Course<T> {
         Self { start, now, step, is_finite, period, steps_left: period, was_finite: true }
     }
 
-    /// CPU time of the next steps, in ns. Beginning again is not part of it.
+    /// Returns the CPU time of the next steps, in ns, without the time for starting again.
     fn cpu_ns(&mut self, mut steps: u64) -> f64 {
         let mut sum = 0.0;
         while steps > 0 {

@@ -1,13 +1,13 @@
-//! The clock of the measurements, and what is made of many of them.
+//! Clocks of the measurements, and their statistics.
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// CPU time of this process for some work, in ns: time that other processes take does not count.
+/// Returns the CPU time of this process for some work, in ns. Other processes do not count.
 pub(crate) fn cpu_ns(work: impl FnOnce()) -> f64 {
     between(ClockId::ProcessCPUTime, work)
 }
 
-/// Time on the wall for some work, in ns: the measure of work that is shared out.
+/// Returns the wall-clock time for some work, in ns. Use it for work on several threads.
 pub(crate) fn wall_ns(work: impl FnOnce()) -> f64 {
     between(ClockId::Monotonic, work)
 }
@@ -27,24 +27,24 @@ pub(crate) fn median(times: Vec<f64>) -> f64 {
     after_share(2, times)
 }
 
-/// The time that a tenth of them stay below.
+/// Returns the time that a tenth of the measurements stay below.
 pub(crate) fn tenth_percentile(times: Vec<f64>) -> f64 {
     after_share(10, times)
 }
 
-/// The first time behind the n-th part of the smaller ones.
+/// Returns the first time after the smallest n-th part of all.
 fn after_share(n: usize, mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / n]
 }
 
-/// Says when whoever waits should hear that it goes on.
+/// Decides when to print a sign of progress.
 #[derive(Debug)]
 pub(crate) struct Pacer {
     last_ns: f64,
 }
 
-/// Between two signs of life, in ns.
+/// Time between two signs of progress, in ns.
 const PACE_NS: f64 = 10e9;
 
 impl Pacer {
@@ -52,7 +52,7 @@ impl Pacer {
         Self { last_ns: now(ClockId::Monotonic) }
     }
 
-    /// Whether a while has passed since this was true.
+    /// Returns `true` once per interval.
     pub(crate) fn is_due(&mut self) -> bool {
         let now_ns = now(ClockId::Monotonic);
         let is_due = now_ns - self.last_ns >= PACE_NS;

@@ -1,7 +1,7 @@
 //! The loop of a tutorial: particles as structs, sticks in the order in which the scene lists them,
-//! one step of many passes. (In small steps of one pass its numbers are soon none.)
+//! one step of many passes. (With small steps of one pass its numbers soon become NaN.)
 //!
-//! It knows no collider, wind, softness or limit: what it leaves out makes it faster, not slower.
+//! It has no colliders, wind, softness or limits. Their absence makes it faster.
 
 use glam::Vec3;
 use sim_solver::{Scene, Solver};
@@ -31,7 +31,7 @@ pub(crate) struct Naive {
 }
 
 impl Naive {
-    /// As a solver of this scene has them now; without what is torn. A step makes as many passes
+    /// Copies the current state of a solver without its torn constraints. A step makes as many passes
     /// as a step of the solver.
     pub(crate) fn new(scene: &Scene, solver: &Solver) -> Self {
         let dt = 1.0 / scene.solver.rate_hz as f32;
@@ -60,7 +60,7 @@ impl Naive {
         }
     }
 
-    /// Verlet, then the passes.
+    /// Makes a step of Verlet, followed by the passes.
     pub(crate) fn step(&mut self) {
         let dt = self.dt;
         for particle in &mut self.particles {

@@ -1,40 +1,38 @@
-//! How well a sheet moves: its stretch, its energy, and how far it is from a run in very small
-//! steps.
+//! Quality of a sheet's motion: stretch, energy, and distance from a run with very small steps.
 
 use serde::Serialize;
 use sim_solver::{ConstraintKind, Solver};
 
-use super::clock::cpu_ns;
-use super::options::Options;
-use super::reference;
-use super::report::{self, cell};
-use super::sheet::{SIDE, Sheet};
+use crate::measures::clock::cpu_ns;
+use crate::options::Options;
+use crate::programs::reference;
+use crate::report::{self, cell};
+use crate::scenes::sheet::{SIDE, Sheet};
 
-/// Frames after which the motion is compared: half a second, before it is chaotic.
+/// Frames after which the motion is compared: half a second, before it becomes chaotic.
 const COMPARED_FRAMES: u32 = 30;
-/// Frames of a measurement; stretch is that of the second half.
+/// Frames of a measurement. Stretch is measured in the second half.
 const FRAMES: u32 = 120;
-/// The biggest sheet whose reference takes seconds; 316 take half a minute.
+/// Largest sheet whose reference takes seconds. 316 takes half a minute.
 const REFERENCE_COLUMNS_MAX: u32 = 100;
 
-/// What is measured in two seconds.
+/// Measurements of two seconds.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Quality {
-    /// CPU time of the slowest of all frames.
+    /// CPU time of the slowest frame.
     slowest_frame_ms: f64,
     /// Mean |length / rest - 1| of the structural links: the mean over the frames 61..=120.
     stretch_mean_percent: f64,
-    /// The largest one: the mean over those frames.
+    /// Largest |length / rest - 1|: the mean over the same frames.
     stretch_max_percent: f64,
-    /// The largest energy of all frames less that at the start, against the range that there is:
-    /// m g 2 m for each particle.
+    /// Largest energy of all frames minus that at the start, relative to m g 2 m for each particle.
     energy_gain_percent: f64,
-    /// Root mean square distance at half a second to the reference, in mm. None where that takes
-    /// long and nobody asked.
+    /// Root mean square distance from the reference at half a second, in mm. None if the reference
+    /// takes long and was not requested.
     rms_to_reference_mm: Option<f64>,
 }
 
-/// The quality of a sheet, and what it costs.
+/// Quality and cost of a sheet.
 #[derive(Debug, Serialize)]
 pub(crate) struct Row {
     case: String,
@@ -46,7 +44,7 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// `case` decides whether a long reference is wanted.
+    /// Measures a sheet. `case` decides whether to compute a long reference.
     pub(crate) fn measure(case: &str, sheet: &Sheet, ms_per_frame: f64, options: &Options) -> Self {
         let has_reference = sheet.columns <= REFERENCE_COLUMNS_MAX || options.wants_all_of(case);
         Self {
@@ -120,11 +118,11 @@ impl Quality {
     }
 }
 
-/// The energy of a sheet against that at its start.
+/// Energy of a sheet relative to the start.
 #[derive(Debug)]
 pub(crate) struct EnergyGain {
     start: f64,
-    /// All of it 2 m lower.
+    /// Energy of the whole sheet 2 m lower.
     range: f64,
 }
 
@@ -133,13 +131,13 @@ impl EnergyGain {
         Self { start: energy(solver), range: 9.81 * SIDE * solver.particle_count() as f64 }
     }
 
-    /// In percent of the range.
+    /// Returns the gain in percent of the range.
     pub(crate) fn percent(&self, solver: &Solver) -> f64 {
         100.0 * (energy(solver) - self.start) / self.range
     }
 }
 
-/// Kinetic and potential energy in J; every mass is 1 kg.
+/// Returns the kinetic and potential energy in J. Every mass is 1 kg.
 fn energy(solver: &Solver) -> f64 {
     let of = |index: usize| {
         let one = solver.particle(index);
@@ -153,7 +151,7 @@ fn position(solver: &Solver, index: usize) -> [f64; 3] {
     solver.particle(index).position.map(f64::from)
 }
 
-/// Mean and largest |length / rest - 1| of the structural links.
+/// Returns the mean and the largest |length / rest - 1| of the structural links.
 fn stretch(solver: &Solver) -> (f64, f64) {
     let structural = solver.constraints().filter(|one| one.kind == ConstraintKind::Structural);
     let strains = structural.map(|one| {

@@ -1,25 +1,25 @@
-//! How well a sheet with tethers moves if a frame may take so many ms of one processor.
+//! Quality of a sheet with tethers, given a time budget per frame on one processor.
 
 use serde::Serialize;
 use sim_solver::Solver;
 
-use super::clock::cpu_ns;
-use super::options::Options;
-use super::quality;
-use super::report::{self, Report};
-use super::sheet::{Sheet, Start};
+use crate::measures::clock::cpu_ns;
+use crate::measures::quality;
+use crate::options::Options;
+use crate::report::{self, Report};
+use crate::scenes::sheet::{Sheet, Start};
 
-/// Side and start of the sheet, and the time of a frame in ms.
+/// Side and start of the sheet, and the time budget of a frame in ms.
 const BUDGETS: [(u32, Start, f64); 3] =
     [(100, Start::Swing, 2.0), (100, Start::Corners, 2.0), (316, Start::Swing, 8.0)];
-/// Between these the largest number of substeps within the time is sought.
+/// Range in which the largest number of substeps within the budget is searched.
 const SUBSTEPS_MIN: u32 = 8;
 const SUBSTEPS_MAX: u32 = 64;
-/// Frames whose mean is the time of a frame: those in which quality is measured.
+/// Frames over which the time is averaged: those in which quality is measured.
 const FRAMES: usize = 120;
 
-/// What the time is good for. With fewer than 8 substeps it is not measured: then the time is that
-/// of 8, and exceeds the budget.
+/// Quality within the budget. It is not measured with fewer than 8 substeps: then the time is that of
+/// 8 substeps and exceeds the budget.
 #[derive(Debug, Serialize)]
 struct Budget {
     budget_ms: f64,
@@ -52,8 +52,8 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
     }
 }
 
-/// The sheet with the most substeps whose frame is within the time, and that frame's time in ms; by
-/// halving the interval, as more substeps never take less time.
+/// Returns the sheet with the most substeps within the budget, and the time of its frame in ms. It
+/// bisects, because more substeps never take less time.
 fn finest_within(budget_ms: f64, coarsest: &Sheet, options: &Options) -> (Sheet, f64) {
     let mut found = (*coarsest, ms_per_frame(coarsest, options));
     let (mut low, mut high) = (SUBSTEPS_MIN, SUBSTEPS_MAX);
@@ -70,7 +70,7 @@ fn finest_within(budget_ms: f64, coarsest: &Sheet, options: &Options) -> (Sheet,
     found
 }
 
-/// CPU time of a frame in ms, the slow first ones included.
+/// Returns the CPU time of a frame in ms, including the slow first frames.
 fn ms_per_frame(sheet: &Sheet, options: &Options) -> f64 {
     let mut solver = Solver::new(&sheet.scene());
     let frames = options.count(FRAMES);

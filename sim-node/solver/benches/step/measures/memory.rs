@@ -1,4 +1,4 @@
-//! What a solver keeps in memory, counted by the allocator.
+//! Memory of a solver, counted by the allocator.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,17 +12,17 @@ struct Counting;
 /// Bytes that are allocated and not yet freed.
 static LIVE_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: every call goes on to the system's allocator unchanged; counting touches no memory of it.
+// SAFETY: every call is forwarded to the system's allocator unchanged. Counting touches none of its memory.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         LIVE_BYTES.fetch_add(layout.size(), Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`, which is the system's.
+        // SAFETY: the caller upholds the contract of `alloc`, which is the system's.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         LIVE_BYTES.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: the pointer came from `System.alloc` with this layout, as above.
+        // SAFETY: the pointer came from `System.alloc` with this layout.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -30,16 +30,16 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// A corner of a triangle in the surface of a solver, in bytes.
+/// Size of a triangle's corner in the surface of a solver, in bytes.
 const CORNER_SIZE: usize = 4;
 
-/// Memory of a solver on the heap; what is needed between steps is part of it.
+/// Memory of a solver on the heap, including its working memory.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct Footprint {
-    /// Of the same scene without constraints.
+    /// Memory of the same scene without constraints.
     pub(crate) bytes_per_particle: f64,
-    /// What the constraints add, their order and tethers included; the corners of triangles are
-    /// left out.
+    /// Memory that the constraints add, including their order and tethers, but not the corners of
+    /// triangles.
     pub(crate) bytes_per_constraint: f64,
 }
 
@@ -55,7 +55,7 @@ impl Footprint {
     }
 }
 
-/// Bytes of a solver after its first step, and that solver.
+/// Returns the bytes of a solver after its first step, and that solver.
 fn heap_bytes(scene: &Scene) -> (f64, Solver) {
     let before = LIVE_BYTES.load(Ordering::Relaxed);
     let mut solver = Solver::new(scene);
@@ -63,7 +63,7 @@ fn heap_bytes(scene: &Scene) -> (f64, Solver) {
     ((LIVE_BYTES.load(Ordering::Relaxed) - before) as f64, solver)
 }
 
-/// The particles of a scene alone, with its colliders, anchors and settings.
+/// Returns the particles of a scene with its colliders, anchors and settings.
 fn without_constraints(scene: &Scene, solver: &Solver) -> Scene {
     let particle = |index: usize| {
         let one = solver.particle(index);

@@ -1,7 +1,7 @@
-//! The motion that a sheet is compared with: the same method in f64 and 256 substeps, written
-//! without anything of the solver, plain and slow.
+//! Reference motion of a sheet: the same method in f64 with 256 substeps, plain and slow, without any
+//! code of the solver.
 
-use super::sheet::{RATE_HZ, SIDE, Sheet, Start};
+use crate::scenes::sheet::{RATE_HZ, SIDE, Sheet, Start};
 
 /// Substeps of a frame.
 const SUBSTEPS: u32 = 256;
@@ -10,9 +10,9 @@ const GRAVITY: f64 = -9.81;
 struct Particle {
     position: [f64; 3],
     velocity: [f64; 3],
-    /// d of the running substep.
+    /// Displacement d of the current substep.
     displacement: [f64; 3],
-    /// 1, or 0 where it is pinned.
+    /// 1, or 0 if pinned.
     inverse_mass: f64,
 }
 
@@ -22,7 +22,7 @@ struct Link {
     length: f64,
 }
 
-/// Where the particles of a sheet are after some frames. Its own substeps and tethers do not count.
+/// Returns the positions of a sheet after some frames. Its own substeps and tethers are ignored.
 pub(crate) fn positions(sheet: &Sheet, frames: u32) -> Vec<[f64; 3]> {
     let mut particles = particles(sheet);
     let links = links(sheet.columns as usize);
@@ -55,13 +55,13 @@ fn particles(sheet: &Sheet) -> Vec<Particle> {
     (0..columns * columns).map(particle).collect()
 }
 
-/// The families of links in the order of projection, each as (row, column) of its two ends against
-/// the particle where it begins: vertical, horizontal, diagonal to the right, diagonal to the left.
+/// Families of links in the order of projection, each as (row, column) of its two ends relative to the
+/// first particle: vertical, horizontal, diagonal to the right, diagonal to the left.
 const FAMILIES: [[(usize, usize); 2]; 4] =
     [[(0, 0), (1, 0)], [(0, 0), (0, 1)], [(0, 0), (1, 1)], [(0, 1), (1, 0)]];
 
-/// Family by family, of each the even half and then the odd one: no two links of a half share a
-/// particle, if rows are counted, and columns where a link stays in its row.
+/// Returns the links family by family, each with its even and then its odd half. Rows decide the half,
+/// or columns if a link stays in its row, so that no two links of a half share a particle.
 fn links(columns: usize) -> Vec<Link> {
     let spacing = SIDE / (columns - 1) as f64;
     let mut links = Vec::new();
@@ -83,7 +83,7 @@ fn links(columns: usize) -> Vec<Link> {
     links
 }
 
-/// Semi-implicit Euler on v, the links on d = h v, then x += d and v = d / h.
+/// Applies semi-implicit Euler to v, projects the links on d = h v, then sets x += d and v = d / h.
 fn substep(particles: &mut [Particle], links: &[Link], h: f64) {
     for particle in particles.iter_mut().filter(|particle| particle.inverse_mass > 0.0) {
         particle.velocity[1] += h * GRAVITY;

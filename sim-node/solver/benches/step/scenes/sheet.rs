@@ -1,22 +1,22 @@
 //! The sheet: N x N particles, 2 m wide, unit masses, structural and both diagonal links
-//! (4 N^2 - 6 N + 2), rigid, undamped, 60 frames a second, and one plane far below, which nothing
+//! (4 N^2 - 6 N + 2), rigid, undamped, 60 frames per second, and one plane far below, which no particle
 //! touches.
 
 use sim_solver::Scene;
 
-/// How wide and how long a sheet is, in m.
+/// Width and length of a sheet, in m.
 pub(crate) const SIDE: f64 = 2.0;
-/// Frames a second.
+/// Frames per second.
 pub(crate) const RATE_HZ: u32 = 60;
 
-/// How a sheet begins.
+/// Start of a sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Start {
-    /// Level, held at one side.
+    /// Level, pinned at one side.
     Swing,
-    /// Upright, held at its upper side.
+    /// Upright, pinned at its upper side.
     Hang,
-    /// Level, held at two corners: all of the weight is on two particles.
+    /// Level, pinned at two corners, which carry the whole weight.
     Corners,
 }
 
@@ -29,7 +29,7 @@ impl Start {
         }
     }
 
-    /// The scene's word for what is pinned.
+    /// Returns the scene's word for the pinned particles.
     fn pinned(self) -> &'static str {
         match self {
             Self::Swing | Self::Hang => "top",
@@ -37,7 +37,7 @@ impl Start {
         }
     }
 
-    /// The direction from row to row.
+    /// Returns the direction from row to row.
     fn down(self) -> [i8; 3] {
         match self {
             Self::Swing | Self::Corners => [0, 0, 1],
@@ -46,7 +46,7 @@ impl Start {
     }
 }
 
-/// A sheet that is simulated.
+/// A sheet to simulate.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sheet {
     /// Particles along each side.
@@ -57,7 +57,7 @@ pub(crate) struct Sheet {
 }
 
 impl Sheet {
-    /// One that swings, without tethers.
+    /// Creates a swinging sheet without tethers.
     pub(crate) fn swing(columns: u32, substeps: u32) -> Self {
         Self { columns, substeps, start: Start::Swing, has_tethers: false }
     }

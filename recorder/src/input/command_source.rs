@@ -1,0 +1,106 @@
+//! Loads commands from command files and recordings.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use recorder::{LogEnd, LogReader, Message, OutcomeRow};
+
+use super::command_file::{self, TimedCommand};
+use super::scene_source::has_extension;
+use super::text_file::read_text_file;
+
+/// Largest command file, in bytes: several hours of commands at 60 Hz.
+const COMMAND_FILE_SIZE_BYTES_MAX: u64 = 1 << 30;
+
+/// Reads commands and sorts them in the order of application. They are the outcomes of a recording
+/// if `source` ends in `.mcap`, else the lines of a command file.
+pub(crate) fn load_commands(source: &str) -> anyhow::Result<Vec<TimedCommand>> {
+    if has_extension(source, ".mcap") {
+        return commands_in_recording(Path::new(source)).with_context(|| source.to_owned());
+    }
+    let text = read_text_file(Path::new(source), COMMAND_FILE_SIZE_BYTES_MAX)
+        .with_context(|| format!("{source}: cannot read the commands"))?;
+    Ok(command_file::parse(&text, source)?)
+}
+
+fn commands_in_recording(path: &Path) -> anyhow::Result<Vec<TimedCommand>> {
+    let mut log = LogReader::open(path)?;
+    let mut first_row = None;
+    let mut outcomes = Vec::new();
+    while let Some(logged) = log.next_message()? {
+        match logged.message {
+            Message::Step(row) => _ = first_row.get_or_insert(row),
+            Message::Outcome(row) => outcomes.push(row),
+            _ => {}
+        }
+    }
+    match log.end() {
+        Some(LogEnd::Complete) | None => {}
+        Some(end) => bail!("the file is {end}, so its commands are incomplete"),
+    }
+    if let Some(row) = first_row
+        && row.outcome_count > 0
+    {
+        bail!(
+            "the recording starts at step {}, so it lacks the {} earlier commands of its run. Use a \
+             recording that starts at step 0, or prove this one with `recorder verify`",
+            row.step,
+            row.outcome_count
+        );
+    }
+    let mut commands: Vec<_> = outcomes.iter().map(timed_command).collect();
+    command_file::sort(&mut commands);
+    Ok(commands)
+}
+
+fn timed_command(row: &OutcomeRow) -> TimedCommand {
+    TimedCommand {
+        step: row.step,
+        index: Some(row.index),
+        client_id: row.client_id,
+        sequence: row.sequence,
+        action: row.action,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use recorder::{Closing, LogOptions, LogWriter, RunDescription, StepRow};
+
+    use super::*;
+
+    #[test]
+    fn a_recording_that_starts_after_some_commands_is_refused() {
+        let description = RunDescription {
+            run_id: 1,
+            epoch_ns: 0,
+            scene_name: "point".to_owned(),
+            origin: [0.0; 3],
+            rate_hz: 240,
+            method: 0,
+            particle_count: 0,
+            constraint_count: 0,
+            solver_version: 1,
+            contract_version: 1,
+            recorder_version: "0.1.0".to_owned(),
+        };
+        let path = std::env::temp_dir().join(format!("late-{}.mcap", std::process::id()));
+        let load = |outcome_count| {
+            let options = LogOptions::default();
+            let mut log = LogWriter::create(Vec::new(), options, &description, b"", 0).unwrap();
+            let row = StepRow { step: 120, outcome_count, ..StepRow::default() };
+            log.write(&Message::Step(row), 0).unwrap();
+            fs::write(&path, log.finish(&Closing::default()).unwrap()).unwrap();
+            load_commands(&path.display().to_string())
+        };
+        assert_eq!(load(0).unwrap(), []);
+        let error = format!("{:#}", load(3).unwrap_err());
+        fs::remove_file(&path).unwrap();
+        let expected = ".mcap: the recording starts at step 120, so it lacks the 3 earlier commands \
+            of its run. Use a recording that starts at step 0, or prove this one with `recorder \
+            verify`";
+        assert!(error.ends_with(expected), "{error}");
+    }
+}

@@ -1,0 +1,4 @@
+//! Programs to compare the solver with.
+
+pub(crate) mod naive;
+pub(crate) mod reference;

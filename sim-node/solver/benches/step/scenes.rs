@@ -1,0 +1,5 @@
+//! Scenes of the benchmark.
+
+pub(crate) mod graphs;
+pub(crate) mod mesh;
+pub(crate) mod sheet;
