@@ -257,7 +257,7 @@ impl Client {
     }
 
     /// Returns the next outcome of this client's commands, in the order of application. Outcomes that
-    /// [`Client::request`] returned are left out. A client that has sent no command waits in vain.
+    /// [`Client::request`] returned are left out. A client that has sent no command receives none.
     ///
     /// # Errors
     /// The service has no place for another reader.

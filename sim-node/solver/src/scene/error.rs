@@ -14,7 +14,7 @@ pub struct SceneError {
     pub line: usize,
     /// Path of the field, such as `solver.rate_hz` or `particle[3].mass`.
     pub field: String,
-    /// What is wrong, and what is allowed.
+    /// Description of the error, with the allowed values.
     pub problem: String,
 }
 
