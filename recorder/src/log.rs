@@ -1,15 +1,10 @@
 //! The recording format, from the bytes of a message to the state at any step.
 
-mod decode;
 mod encoding;
-mod frames;
 mod index;
 mod message;
-mod open;
 mod part_file;
-mod read_error;
-mod reader;
-mod records;
+mod read;
 mod rows;
 mod run;
 mod state_hash;
@@ -18,15 +13,15 @@ mod tears;
 mod topic;
 mod writer;
 
-pub use decode::LoggedMessage;
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
-pub use frames::{Frame, FrameReader};
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
-pub use open::open_regular_file;
 pub use part_file::{Existing, PartFile, PartFileError};
-pub use read_error::{LogEnd, ReadError};
-pub use reader::LogReader;
+pub use read::decode::LoggedMessage;
+pub use read::frames::{Frame, FrameReader};
+pub use read::open::open_regular_file;
+pub use read::read_error::{LogEnd, ReadError};
+pub use read::reader::LogReader;
 pub use rows::{
     ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow,
     StepRow, SurfaceRow, TearsRow, TopologyRow,

@@ -120,7 +120,8 @@ fn every_command_in_the_reference_is_accepted_and_every_kind_has_an_example() {
 /// The paths that a document names in backticks: those with a folder and an extension.
 fn named_paths(document: &str) -> Vec<&str> {
     let spans = document.split('`').skip(1).step_by(2);
-    let is_path = |span: &&str| span.contains('/') && span.ends_with(".rs");
+    let is_source = |span: &str| Path::new(span).extension().is_some_and(|one| one == "rs");
+    let is_path = |span: &&str| span.contains('/') && is_source(span);
     spans.filter(is_path).collect()
 }
 

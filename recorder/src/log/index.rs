@@ -16,11 +16,11 @@ use std::path::Path;
 
 use mcap::records::{Record, op};
 
-use super::decode::{LoggedMessage, decode_message};
-use super::open::open_regular_file;
-use super::read_error::{LogEnd, ReadError};
-use super::reader::LogReader;
-use super::records::{RECORD_SIZE_BYTES_MAX, RecordReader};
+use super::read::decode::{LoggedMessage, decode_message};
+use super::read::open::open_regular_file;
+use super::read::read_error::{LogEnd, ReadError};
+use super::read::reader::LogReader;
+use super::read::records::{RECORD_SIZE_BYTES_MAX, RecordReader};
 use super::run::RunDescription;
 use super::topic::Topic;
 use chunk::{LocatedChunk, record_size_bytes};

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use sim_contract::ParticleState;
 
 use super::index::IndexedLog;
-use super::read_error::{LogEnd, ReadError};
+use super::read::read_error::{LogEnd, ReadError};
 use super::rows::{CollidersRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow};
 use super::run::RunDescription;
 use super::tears::{TearTracker, TornList};

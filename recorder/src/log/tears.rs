@@ -3,8 +3,8 @@
 use sim_contract::TearCause;
 use sim_solver::Keyframe;
 
-use super::frames::Frame;
 use super::message::Message;
+use super::read::frames::Frame;
 use super::rows::{TearsRow, TopologyRow};
 
 /// The torn constraints of a state.

@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::constraint_kind::ConstraintKind;
 use crate::json_number::{number, optional_number, rotation, vector};
-use crate::{ConstraintKind, ParameterValue, Text};
+use crate::parameter::ParameterValue;
+use crate::text::Text;
 
 /// Default time in which a grabbed particle reaches its target, in seconds: one frame at 60 Hz.
 pub const GRAB_OVER_S_DEFAULT: f32 = 1.0 / 60.0;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::NumberRange;
 use crate::json_number::{number, vector};
+use crate::range::NumberRange;
 
 /// A parameter that can change while a scene runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

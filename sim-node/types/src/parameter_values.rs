@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::constraint_kind::ConstraintKind;
 use crate::json_number::{number, optional_number, vector};
-use crate::{ConstraintKind, Parameter, ParameterValue};
+use crate::parameter::{Parameter, ParameterValue};
 
 /// A parameter with a value. `compliance` and `stiffness` have a value for each kind of constraint.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@ use mcap::MAGIC;
 use mcap::records::op;
 
 use super::chunk::{CHUNK_COUNT_MAX, LocatedChunk, RECORD_HEADER_SIZE_BYTES, record_size_bytes};
-use crate::log::read_error::{LogEnd, ReadError};
+use crate::log::read::read_error::{LogEnd, ReadError};
 
 /// Size of a record's header and of the channel id that follows it in a message index.
 const HEADER_AND_ID_SIZE_BYTES: usize = RECORD_HEADER_SIZE_BYTES + size_of::<u16>();

@@ -7,8 +7,8 @@ use mcap::Summary;
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
 use super::chunk::{CHUNK_COUNT_MAX, LocatedChunk};
-use crate::log::read_error::ReadError;
-use crate::log::records::{RECORD_SIZE_BYTES_MAX, read_some};
+use crate::log::read::read_error::ReadError;
+use crate::log::read::records::{RECORD_SIZE_BYTES_MAX, read_some};
 
 /// Returns the chunks, or `None` if the file has no index or an inconsistent one.
 pub(super) fn read(

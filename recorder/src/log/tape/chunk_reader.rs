@@ -9,7 +9,7 @@ use super::chunks::{Chunks, Span};
 use super::digest::{Digest, DigestCache};
 use crate::log::index::IndexedLog;
 use crate::log::message::Message;
-use crate::log::read_error::ReadError;
+use crate::log::read::read_error::ReadError;
 use crate::log::topic::Topic;
 
 /// Chunks whose particles are cached: the one that is played and the one before it.

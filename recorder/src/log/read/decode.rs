@@ -3,10 +3,10 @@
 use mcap::records::MessageHeader;
 use serde::de::DeserializeOwned;
 
-use super::encoding::decode_particles;
-use super::message::Message;
-use super::run::RunDescription;
-use super::topic::Topic;
+use crate::log::encoding::decode_particles;
+use crate::log::message::Message;
+use crate::log::run::RunDescription;
+use crate::log::topic::Topic;
 
 /// A message with its times in the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +23,7 @@ pub struct LoggedMessage {
 
 /// Decodes a message. Returns `None` for `/tf`, which no reader of ours needs. `Err` describes the
 /// error in the content.
-pub(super) fn decode_message(
+pub(in crate::log) fn decode_message(
     topic: Topic,
     header: &MessageHeader,
     data: &[u8],

@@ -10,12 +10,12 @@ use super::read_error::{LogEnd, ReadError};
 
 /// Longest record and largest chunk to read, in bytes. The largest possible snapshot and topology
 /// are smaller, and a damaged length does not cause a huge allocation.
-pub(super) const RECORD_SIZE_BYTES_MAX: usize = 1 << 30;
+pub(in crate::log) const RECORD_SIZE_BYTES_MAX: usize = 1 << 30;
 /// Most bytes to request from the file at a time.
-pub(super) const READ_SIZE_BYTES_MAX: usize = 1 << 20;
+pub(in crate::log) const READ_SIZE_BYTES_MAX: usize = 1 << 20;
 
 /// Reads the records one by one and remembers how far the file is intact.
-pub(super) struct RecordReader<R> {
+pub(in crate::log) struct RecordReader<R> {
     linear: LinearReader,
     source: R,
     /// Bytes read from the source.
@@ -24,20 +24,20 @@ pub(super) struct RecordReader<R> {
     /// gets more than it requests, so this is exact.
     intact_count: u64,
     /// The file starts as an MCAP file does.
-    pub(super) is_mcap: bool,
+    pub(in crate::log) is_mcap: bool,
     /// The end of the file, once it is reached.
-    pub(super) end: Option<LogEnd>,
+    pub(in crate::log) end: Option<LogEnd>,
 }
 
 impl<R: Read> RecordReader<R> {
-    pub(super) fn new(source: R) -> Self {
+    pub(in crate::log) fn new(source: R) -> Self {
         let options =
             options().with_validate_data_section_crc(true).with_validate_summary_section_crc(true);
         Self::with_options(source, options)
     }
 
     /// Reads records from the middle of a file.
-    pub(super) fn without_magic(source: R) -> Self {
+    pub(in crate::log) fn without_magic(source: R) -> Self {
         Self::with_options(source, options().with_skip_start_magic(true).with_skip_end_magic(true))
     }
 
@@ -54,7 +54,7 @@ impl<R: Read> RecordReader<R> {
 
     /// Passes the next record to `read`, with the position up to which the file is intact.
     /// Returns `None` at the end of the readable part.
-    pub(super) fn next<T>(
+    pub(in crate::log) fn next<T>(
         &mut self,
         read: impl FnOnce(Record<'_>, u64) -> Result<T, ReadError>,
     ) -> Result<Option<T>, ReadError> {
@@ -112,7 +112,10 @@ fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<Record<'_>> {
     }
 }
 
-pub(super) fn read_some(source: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+pub(in crate::log) fn read_some(
+    source: &mut impl Read,
+    buffer: &mut [u8],
+) -> std::io::Result<usize> {
     loop {
         match source.read(buffer) {
             Err(error) if error.kind() == ErrorKind::Interrupted => {}

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::run::{FORMAT_VERSION, FORMAT_VERSION_MIN};
+use crate::log::run::{FORMAT_VERSION, FORMAT_VERSION_MIN};
 
 /// The end of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]

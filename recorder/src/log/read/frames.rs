@@ -5,10 +5,10 @@ use std::io::Read;
 use sim_contract::ParticleState;
 
 use super::decode::LoggedMessage;
-use super::message::Message;
 use super::read_error::{LogEnd, ReadError};
 use super::reader::LogReader;
-use super::rows::StepRow;
+use crate::log::message::Message;
+use crate::log::rows::StepRow;
 
 /// A snapshot and the messages between the previous snapshot and this one.
 #[derive(Debug, Clone, PartialEq)]
