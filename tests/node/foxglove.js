@@ -58,7 +58,8 @@ function decoder(channel) {
     return (data) => JSON.parse(new TextDecoder().decode(data));
   }
   const set = Buffer.from(channel.schema, "base64");
-  const type = protobuf.Root.fromDescriptor(set).lookupType(channel.schemaName);
+  // The names of the schema, not their JSON names.
+  const type = protobuf.Root.fromDescriptor(set, { keepCase: true }).lookupType(channel.schemaName);
   const options = { defaults: true, longs: Number };
   return (data) => type.toObject(type.decode(new Uint8Array(data.buffer, data.byteOffset, data.byteLength)), options);
 }

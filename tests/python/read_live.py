@@ -74,16 +74,18 @@ def main(prefix, root):
     node = iox2.NodeBuilder.new().config(config).create(iox2.ServiceType.Ipc)
     snapshot, particles = receive(node, "sim/particles", ParticleState, SnapshotHeader)
     tears, torn = receive(node, "sim/tears", TornConstraint, TearsHeader)
-    _, parameters = receive(node, "sim/parameters", ParameterState, ParametersHeader)
+    header, parameters = receive(node, "sim/parameters", ParameterState, ParametersHeader)
     report = {
         "contract_version": snapshot.contract_version,
         "step": snapshot.step,
         "particle_count": snapshot.particle_count,
         "first": [list(particle.position) for particle in particles[:3]],
-        "torn": [[one.constraint, one.cause] for one in torn],
+        # The header gives the count: a payload can be longer than its list.
+        "torn": [[one.constraint, one.cause] for one in torn[: tears.count]],
         "new_tears": tears.new_count,
         "parameters": [
-            [one.parameter, one.constraint_kind, one.form, list(one.value)] for one in parameters
+            [one.parameter, one.constraint_kind, one.form, list(one.value)]
+            for one in parameters[: header.count]
         ],
     }
     print(json.dumps(report))

@@ -25,14 +25,15 @@ def check_cloud(cloud):
 
 def main(recording, published):
     expected = dict(line.split() for line in open(published, encoding="ascii"))
-    counts, compared = {}, 0
+    counts, rows, compared = {}, {}, 0
     with open(recording, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == ""
         attachments = [attachment.name for attachment in reader.iter_attachments()]
         assert attachments == ["scene.toml"], attachments
-        metadata = [record.name for record in reader.iter_metadata()]
-        assert metadata == ["run", "recorder"], metadata
+        metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+        assert list(metadata) == ["run", "recorder"], metadata
+        assert metadata["run"]["format_version"] == "3", metadata
         last_log_time = 0
         for _schema, channel, message in reader.iter_messages(log_time_order=False):
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
@@ -41,6 +42,7 @@ def main(recording, published):
             if channel.message_encoding == "json":
                 row = json.loads(message.data)
                 assert row["step"] % 2**32 == message.sequence
+                rows.setdefault(channel.topic, []).append(row)
         for _schema, channel, message, cloud in reader.iter_decoded_messages(topics=["/particles"]):
             check_cloud(cloud)
             if str(message.sequence) in expected:
@@ -51,7 +53,8 @@ def main(recording, published):
     assert compared == len(expected) > 0, (compared, len(expected))
     assert counts["/steps"] == counts["/particles"]
     assert counts["/topology"] == counts["/surface"] == counts["/tf"] == 1
-    print(json.dumps({"compared": compared, "counts": counts}))
+    report = {topic: rows.get(topic, []) for topic in ("/tears", "/parameters")}
+    print(json.dumps({"compared": compared, "counts": counts, **report}))
 
 
 main(*sys.argv[1:])

@@ -27,6 +27,8 @@ fn the_stock_python_reader_finds_the_published_bits() {
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let mut published = String::new();
     ctl(&sandbox, &["grab", "90", "0.5", "0.2", "0.3"]);
+    ctl(&sandbox, &["cut", "40"]);
+    ctl(&sandbox, &["set", "gravity", "0", "-1.5", "0"]);
     ctl(&sandbox, &["step", "60"]);
     while let Some(snapshot) = client.next_snapshot(DEADLINE).unwrap() {
         let step = snapshot.header().step;
@@ -43,6 +45,14 @@ fn the_stock_python_reader_finds_the_published_bits() {
     let published = sandbox.write("published.txt", &published);
     let result = python(&sandbox, "read_recording.py", &[&file, &published]);
     assert_eq!(result["counts"]["/particles"], 61);
+    let tears = json!([{ "step": 1, "constraints": [40], "causes": ["cut"] }]);
+    assert_eq!(result["/tears"], tears);
+    let rows = result["/parameters"].as_array().unwrap();
+    let gravity: Vec<_> = rows.iter().map(|row| (&row["step"], &row["gravity"])).collect();
+    assert_eq!(
+        gravity,
+        [(&json!(0), &json!([0.0, -9.81, 0.0])), (&json!(1), &json!([0.0, -1.5, 0.0]))]
+    );
 }
 
 #[test]

@@ -73,14 +73,12 @@ fn an_invalid_number_of_threads_exits_with_2_and_names_the_range() {
         (Program::Recorder, &["simulate", "curtain", "--steps", "1"]),
         (Program::Recorder, &["verify", "run.mcap"]),
     ] {
-        for (threads, cause) in
-            [("0", "1..=64"), ("65", "1..=64"), ("-1", "1..=64"), ("x", "invalid digit")]
-        {
+        for threads in ["0", "65", "-1", "x"] {
             let finished =
                 Process::run(program, &sandbox, &[command, &["--threads", threads]].concat());
             assert_eq!(finished.code, Some(2), "{program:?} {threads}: {}", finished.stderr);
-            for word in ["--threads", cause] {
-                assert!(finished.stderr.contains(word), "no \"{word}\" in: {}", finished.stderr);
+            for words in ["--threads", "from 1 to 64"] {
+                assert!(finished.stderr.contains(words), "no \"{words}\" in: {}", finished.stderr);
             }
         }
     }
