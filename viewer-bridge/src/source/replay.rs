@@ -6,7 +6,6 @@
 mod check;
 mod marks;
 mod open;
-mod parameter_log;
 mod player;
 mod playhead;
 mod statistics;

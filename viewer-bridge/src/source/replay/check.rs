@@ -1,5 +1,5 @@
 //! Reads a recording once from its start, in a thread of its own: compares every state with its recorded
-//! hash, and collects the marks of the timeline and the changes of parameters.
+//! hash, and collects the marks of the timeline.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
@@ -12,7 +12,6 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Action, ParticleState};
 
 use super::marks::Marks;
-use super::parameter_log::ParameterLog;
 use crate::message::{Hashes, Mark, MarkKind};
 
 /// Time between two reports.
@@ -25,8 +24,6 @@ pub(super) struct Report {
     pub(super) hashes: Hashes,
     /// The result of the hashes for the user.
     pub(super) hash_text: String,
-    /// Changes of parameters; `None` until the whole file is read.
-    pub(super) parameters: Option<ParameterLog>,
 }
 
 /// A recording to check.
@@ -61,7 +58,6 @@ pub(super) fn check(mut job: Job, reports: &Sender<Report>, is_cancelled: &Atomi
 #[derive(Debug)]
 struct Check {
     marks: Marks,
-    parameters: ParameterLog,
     torn: TearTracker,
     row: Option<StepRow>,
     /// A step is late if it began later than this, in ns.
@@ -72,8 +68,6 @@ struct Check {
     different_count: u64,
     first_different: Option<u64>,
     damaged_count: u64,
-    /// The last step that was read.
-    step: u64,
 }
 
 impl Check {
@@ -81,7 +75,6 @@ impl Check {
         let first_step = job.first.step;
         Self {
             marks: Marks::new(first_step, job.last_step),
-            parameters: ParameterLog::new(first_step, job.first.outcome_count),
             torn: TearTracker::new(job.torn.clone()),
             row: None,
             period_ns: SECOND_NS / u64::from(job.log.run().rate_hz.max(1)),
@@ -90,7 +83,6 @@ impl Check {
             different_count: 0,
             first_different: None,
             damaged_count: 0,
-            step: first_step,
         }
     }
 
@@ -98,7 +90,6 @@ impl Check {
         let Ok(messages) = read else {
             self.damaged_count += 1;
             self.torn.mark_gap();
-            self.parameters.add_gap(self.step + 1);
             self.row = None;
             return;
         };
@@ -127,7 +118,6 @@ impl Check {
     }
 
     fn add_outcome(&mut self, row: &OutcomeRow) {
-        self.parameters.add_outcome(row);
         if row.is_applied() {
             let kind = match row.action {
                 Action::Pin { .. } | Action::Unpin { .. } => MarkKind::Pin,
@@ -138,7 +128,6 @@ impl Check {
     }
 
     fn compare(&mut self, step: u64, particles: &[ParticleState]) {
-        self.step = step;
         let row = self.row.take().filter(|row| row.step == step);
         let torn = self.torn.at(step).map(|torn| torn.constraints.as_slice());
         let torn = torn.zip(row).and_then(|(torn, row)| torn.get(..row.torn_count as usize));
@@ -160,7 +149,6 @@ impl Check {
             marks: self.marks.list(),
             hashes: Hashes::Checking,
             hash_text: format!("checking hashes: {percent} %"),
-            parameters: None,
         }
     }
 
@@ -183,7 +171,6 @@ impl Check {
         if *end != LogEnd::Complete {
             text += &format!("; the file is {end}");
         }
-        let (marks, parameters) = (self.marks.list(), Some(self.parameters));
-        Report { marks, hashes, hash_text: text, parameters }
+        Report { marks: self.marks.list(), hashes, hash_text: text }
     }
 }

@@ -9,7 +9,6 @@ use sim_contract::{ParameterValues, Reason, TornConstraint};
 
 use super::check::Report;
 use super::open::Recording;
-use super::parameter_log::LoggedParameters;
 use super::playhead::{Advanced, Playhead};
 use super::statistics::statistics;
 use super::texts;
@@ -40,9 +39,8 @@ pub(super) struct Player<'a> {
     playhead: Playhead,
     /// The state at the place of the playhead.
     state: TapeState,
+    /// The parameters that were published last.
     parameters: Option<ParametersText>,
-    /// The origin of the parameters.
-    parameters_origin: Option<ParametersOrigin>,
     /// Applied commands, which are answered with the step that shows their effect.
     answers: Vec<Answer>,
     /// The playback has changed since it was published.
@@ -59,13 +57,6 @@ struct Answer {
     outcome: OutcomeText,
 }
 
-/// The changes of the recording and the pace from which the parameters follow.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct ParametersOrigin {
-    change_count: Option<usize>,
-    rate: f32,
-}
-
 impl<'a> Player<'a> {
     /// Starts at the first step.
     pub(super) fn new(
@@ -79,7 +70,6 @@ impl<'a> Player<'a> {
             marks: Vec::new(),
             hashes: Hashes::Checking,
             hash_text: "checking hashes".to_owned(),
-            parameters: None,
         };
         Self {
             recording,
@@ -90,7 +80,6 @@ impl<'a> Player<'a> {
             playhead,
             state,
             parameters: None,
-            parameters_origin: None,
             answers: Vec::new(),
             is_playback_changed: true,
             shown_step: None,
@@ -253,23 +242,21 @@ impl<'a> Player<'a> {
         self.publish_parameters();
     }
 
-    /// Publishes the parameters at this step, if they have changed.
+    /// Publishes the parameters at this step, if they have changed. Recordings before format 3 lack
+    /// them; then those of the scene are shown as incomplete.
     fn publish_parameters(&mut self) {
-        let log = self.report.parameters.as_ref();
-        let change_count = log.map(|log| log.count_until(self.state.row.step));
-        let origin = Some(ParametersOrigin { change_count, rate: self.playhead.rate });
-        if origin == self.parameters_origin {
-            return;
-        }
-        self.parameters_origin = origin;
         let initial = self.recording.load.summary.parameters;
-        let unknown = LoggedParameters { values: initial, is_complete: false };
-        let logged = log.zip(change_count).map(|(log, count)| log.after(count, initial));
-        let LoggedParameters { values, is_complete } = logged.unwrap_or(unknown);
-        let values = ParameterValues { time_scale: self.playhead.rate, ..values };
-        let text = ParametersText { is_complete, values: Some(values), initial: Some(initial) };
-        self.sinks.publish(&Update::Parameters(&text));
-        self.parameters = Some(text);
+        let recorded = self.state.parameters.as_ref().map(|row| row.values);
+        let values = recorded.unwrap_or(initial);
+        let text = ParametersText {
+            is_complete: recorded.is_some(),
+            values: Some(ParameterValues { time_scale: self.playhead.rate, ..values }),
+            initial: Some(initial),
+        };
+        if self.parameters.as_ref() != Some(&text) {
+            self.sinks.publish(&Update::Parameters(&text));
+            self.parameters = Some(text);
+        }
     }
 
     /// Shows the state if it is new and a frame is due. A frame is due at once after a command.
@@ -310,7 +297,6 @@ impl<'a> Player<'a> {
         let Some(report) = self.reports.try_iter().last() else { return };
         self.report = report;
         self.publish_timeline();
-        self.publish_parameters();
     }
 
     fn publish_timeline(&self) {
