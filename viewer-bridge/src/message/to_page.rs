@@ -154,8 +154,8 @@ pub struct Node {
 /// The parameters of the scene; `None` without a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParametersText {
-    /// The values are certain. Those of a recording are not until it has been read, or if it lost
-    /// commands.
+    /// The values are certain. Those of a recording before format 3 are not: it lacks parameters,
+    /// and the values are those of its scene.
     pub is_complete: bool,
     /// Present values.
     pub values: Option<ParameterValues>,
