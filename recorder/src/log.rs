@@ -29,6 +29,6 @@ pub use rows::{
 pub use run::{Closing, FORMAT_VERSION, RunDescription};
 pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
-pub use tears::{TearTracker, TornList};
+pub use tears::{TearTracker, torn_before_first};
 pub use topic::{AllCounts, Topic, TopicCounts};
 pub use writer::{Compression, LogOptions, LogWriter, WriteError};

@@ -4,8 +4,8 @@
 
 use std::io::Cursor;
 
-use recorder::{LogEnd, LogReader, Message, TearTracker, TornList};
-use sim_contract::TearCause;
+use recorder::{LogEnd, LogReader, Message, TearTracker};
+use sim_contract::{TearCause, TornConstraint};
 
 #[test]
 fn a_recording_without_a_scene_is_readable() {
@@ -96,11 +96,12 @@ fn a_file_of_format_2_is_readable() {
         panic!("{messages:?}")
     };
     assert_eq!((topology.constraints().unwrap().len(), status.time_scale), (2, 1.0));
-    let mut tracker = TearTracker::new(TornList::before(&topology.torn));
+    let mut tracker = TearTracker::new(topology.torn_before());
     tracker.process(before);
     tracker.process(after);
     let torn = tracker.at(9).unwrap();
-    assert_eq!(torn.constraints, [1, 0, 0, 1]);
-    assert_eq!(torn.causes, [None, None, None, Some(TearCause::Cut)]);
+    let causes: Vec<_> = torn.constraints.iter().map(TornConstraint::cause).collect();
+    assert_eq!(torn.indices().collect::<Vec<_>>(), [1, 0, 0, 1]);
+    assert_eq!(causes, [None, None, None, Some(TearCause::Cut)]);
     assert_eq!(log.end(), Some(&LogEnd::Complete));
 }

@@ -14,7 +14,7 @@ use recorder::{
     state_hash,
 };
 use sim_contract::{
-    Action, Command, ConstraintState, LoadHeader, Outcome, ParticleState, TearCause,
+    Action, Command, ConstraintState, LoadHeader, Outcome, ParticleState, TearCause, TornConstraint,
 };
 use sim_solver::{Scene, Solver};
 
@@ -197,12 +197,13 @@ fn tour() -> impl Iterator<Item = u64> {
 fn assert_shows(tape: &mut Tape, step: u64, all: &[Expected]) {
     let expected = all.iter().rfind(|one| one.step <= step).unwrap();
     let state = tape.state_at(step).unwrap();
+    let torn: Vec<_> = state.torn.indices().collect();
     let found = Expected {
         step: state.row.step,
         particles: state.particles.to_vec(),
-        torn: state.torn.constraints.clone(),
-        causes: state.torn.causes,
-        hash: state_hash(&state.particles, &state.torn.constraints),
+        causes: state.torn.constraints.iter().map(TornConstraint::cause).collect(),
+        hash: state_hash(&state.particles, &torn),
+        torn,
     };
     assert_eq!(found, *expected, "wound to step {step}");
     let colliders_step = state.colliders.unwrap().step;

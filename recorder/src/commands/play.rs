@@ -14,7 +14,8 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::{
-    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow, TornList,
+    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
+    torn_before_first,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Endpoint, Method, Stop};
@@ -137,7 +138,7 @@ impl Pass {
         let collider_count = colliders.unwrap_or_else(|| solver.collider_count());
         let origin_ns = run.time_of_step_ns(first.row.step);
         let start_ns = origin_ns.saturating_add(nanoseconds(args.start.unwrap_or_default()));
-        let torn = TornList::before_first(&topology, &first);
+        let torn = torn_before_first(&topology, &first);
         let method = Method::from_number(run.method).unwrap_or_default();
         let mut position = Position::new(torn, method);
         while run.time_of_step_ns(first.row.step) < start_ns {

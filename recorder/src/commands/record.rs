@@ -1,13 +1,12 @@
 //! `recorder record`: records everything that a node publishes into one file.
 
 mod accepted;
-mod batch;
+mod first_state;
 mod intake;
-mod latched_log;
-mod lists;
+mod load;
+mod messages;
 mod queue;
 mod report;
-mod tear_log;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,7 +16,7 @@ use std::time::Duration;
 use anyhow::{Context, anyhow, bail};
 use recorder::{Closing, Message, PartFile, WriteError};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
-use sim_contract::{Endpoint, ReadError, Stop, Tap};
+use sim_contract::{Endpoint, ReadError, SNAPSHOTS_BUFFERED, Stop, Tap};
 
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
@@ -25,8 +24,9 @@ use crate::cli::file_args::{FileArgs, LogFile, default_path};
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number, whole_number_in};
 use accepted::{Accepted, RunEnd, RunHeader};
-use batch::Batch;
-use intake::{Intake, Now};
+use intake::Intake;
+use load::{LoadError, Now};
+use messages::Messages;
 use queue::{Content, Item, Popped, Queue};
 use report::Report;
 
@@ -36,8 +36,6 @@ const WAIT_MAX: Duration = Duration::from_millis(50);
 const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
 /// Flush period: the most that a killed recorder loses.
 const FLUSH_NS: u64 = SECOND_NS;
-/// Most reads per batch. Each read empties at most one buffer of each service.
-const READS_PER_BATCH_MAX: usize = 8;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -153,11 +151,9 @@ impl Recording {
         loop {
             // Checked before reading, so that messages from before the end are read.
             let reason = self.reason_to_stop(args, stop);
-            let (batch, log_time_ns) = self.read();
-            let now = Now { realtime_ns: log_time_ns, monotonic_ns: monotonic_ns() };
-            let accepted = self.intake.accept(batch, now)?;
+            let accepted = self.read()?;
             let end = accepted.end.map(StopReason::Run);
-            self.enqueue(accepted, args, log_time_ns)?;
+            self.enqueue(accepted, args, realtime_ns())?;
             if let Some(reason) = end.or(reason) {
                 return Ok(reason);
             }
@@ -183,21 +179,26 @@ impl Recording {
         }
     }
 
-    /// Copies messages out of shared memory. Particles come first, so that the messages that belong
-    /// to them have arrived.
-    fn read(&mut self) -> (Batch, u64) {
-        let mut batch = Batch::default();
-        let drained =
-            self.tap.drain_particles(|header, particles| batch.add_snapshot(header, particles));
-        self.note_unreadable(&drained.errors);
-        for _ in 0..READS_PER_BATCH_MAX {
-            let drained = self.tap.drain_updates(|update| batch.add_update(update));
-            self.note_unreadable(&drained.errors);
-            if drained.count == 0 {
+    /// Copies everything that has arrived out of shared memory. Returns the part that goes into the
+    /// recording, in the order of publication.
+    fn read(&mut self) -> Result<Accepted, LoadError> {
+        let mut messages = Messages::default();
+        let mut accepted = Accepted::default();
+        // Bounded, so that a node that is faster than this loop cannot keep it from ending.
+        for _ in 0..SNAPSHOTS_BUFFERED {
+            let state = self.tap.next_state(|message| messages.add(message));
+            let Some(state) = state else { break };
+            self.intake.accept_state(&state, Now::read(), &mut accepted)?;
+            if accepted.end.is_some() {
                 break;
             }
         }
-        (batch, realtime_ns())
+        self.intake.accept_messages(messages, Now::read(), &mut accepted);
+        self.intake.set_lost(self.tap.lost_changes());
+        let errors = self.tap.drain_errors();
+        self.note_unreadable(&errors);
+        accepted.sort();
+        Ok(accepted)
     }
 
     /// Counts messages that could not be read, and reports the first one.
@@ -215,7 +216,10 @@ impl Recording {
         args: &RecordArgs,
         log_time_ns: u64,
     ) -> anyhow::Result<()> {
-        if let Some(header) = accepted.header {
+        if let Some(mut header) = accepted.header {
+            for row in std::mem::take(&mut header.rows) {
+                self.queue.push(Item { content: Content::Update(row), log_time_ns });
+            }
             self.begin(args, header, log_time_ns)?;
         }
         for content in accepted.contents {

@@ -4,10 +4,8 @@ use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::{Context, bail};
-use recorder::{
-    ColliderRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker, TornList,
-};
-use sim_contract::{ConstraintState, ParticleState, Triangle};
+use recorder::{ColliderRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker};
+use sim_contract::{ConstraintState, ParticleState, Torn, Triangle};
 
 /// The state at one snapshot.
 #[derive(Debug, Clone, Default)]
@@ -32,7 +30,7 @@ pub(crate) fn visit_states<R: Read>(
     let mut steps = steps.iter().copied().peekable();
     let mut frames = FrameReader::new(log);
     let mut state = SceneState::default();
-    let mut tears = TearTracker::new(TornList::default());
+    let mut tears = TearTracker::new(Torn::default());
     while steps.peek().is_some() {
         let Some(frame) = frames.next_frame()? else { break };
         state.apply_frame(frame, &mut tears)?;
@@ -51,7 +49,7 @@ impl SceneState {
     fn apply_frame(&mut self, frame: Frame, tears: &mut TearTracker) -> anyhow::Result<()> {
         for message in &frame.updates {
             if let Message::Topology(row) = message {
-                *tears = TearTracker::new(TornList::before(&row.torn));
+                *tears = TearTracker::new(row.torn_before());
             }
             tears.process(message);
             self.apply_message(message)?;
@@ -79,10 +77,10 @@ impl SceneState {
         Ok(())
     }
 
-    fn set_torn(&mut self, torn: Option<&TornList>) -> anyhow::Result<()> {
+    fn set_torn(&mut self, torn: Option<&Torn>) -> anyhow::Result<()> {
         self.is_torn.fill(false);
-        for constraint in torn.iter().flat_map(|torn| &torn.constraints) {
-            let Some(is_torn) = self.is_torn.get_mut(*constraint as usize) else {
+        for constraint in torn.iter().flat_map(|torn| torn.indices()) {
+            let Some(is_torn) = self.is_torn.get_mut(constraint as usize) else {
                 bail!("constraint {constraint} is torn but not in /topology");
             };
             *is_torn = true;

@@ -9,13 +9,13 @@ mod search;
 use std::path::Path;
 use std::sync::Arc;
 
-use sim_contract::ParticleState;
+use sim_contract::{ParticleState, Torn};
 
 use super::index::IndexedLog;
 use super::read::read_error::{LogEnd, ReadError};
 use super::rows::{CollidersRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow};
 use super::run::RunDescription;
-use super::tears::{TearTracker, TornList};
+use super::tears::TearTracker;
 use super::topic::Topic;
 use chunk_reader::ChunkReader;
 use load::read_load;
@@ -53,7 +53,7 @@ pub struct TapeState {
     /// Shape: particle count.
     pub particles: Arc<Vec<ParticleState>>,
     /// The torn constraints.
-    pub torn: TornList,
+    pub torn: Torn,
     /// The poses of the colliders, if there are any.
     pub colliders: Option<CollidersRow>,
     /// The parameters. `None` in recordings of format 1 and 2.
@@ -164,8 +164,7 @@ impl Tape {
         let row = self.row(chunk, step)?;
         let mut torn = self.torn_at(chunk, step)?;
         if let Some(row) = &row {
-            torn.constraints.truncate(row.torn_count as usize);
-            torn.causes.truncate(row.torn_count as usize);
+            torn.truncate(row.torn_count);
         }
         let row = row.unwrap_or(StepRow { step, ..StepRow::default() });
         let colliders = self.reader.latest(Topic::Colliders, chunk, |digest| {
@@ -196,7 +195,7 @@ impl Tape {
 
     /// Returns the torn constraints at a step: those of the newest keyframe before it, and the
     /// tears since.
-    fn torn_at(&mut self, chunk: usize, step: u64) -> Result<TornList, ReadError> {
+    fn torn_at(&mut self, chunk: usize, step: u64) -> Result<Torn, ReadError> {
         let (first_chunk, mut tracker) = self.torn_base(chunk, step)?;
         // One chunk earlier, because a batch of the recorder may contain changes after a keyframe
         // before the keyframe.
@@ -213,7 +212,7 @@ impl Tape {
     /// Returns the torn constraints to start from and their chunk: those of the newest keyframe, or
     /// those at the start of the file.
     fn torn_base(&mut self, chunk: usize, step: u64) -> Result<(usize, TearTracker), ReadError> {
-        let from_start = TearTracker::new(TornList::before(&self.topology.torn));
+        let from_start = TearTracker::new(self.topology.torn_before());
         for chunk in self.reader.chunks.with_topic(Topic::Keyframe).backward_from(chunk) {
             match self.reader.digest(chunk)?.keyframe(step) {
                 Some((keyframe_step, Some(torn))) => {

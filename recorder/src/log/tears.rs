@@ -1,26 +1,11 @@
 //! The torn constraints at each step, tracked through the messages of a recording.
 
-use sim_contract::TearCause;
+use sim_contract::{Torn, TornConstraint};
 use sim_solver::Keyframe;
 
 use super::message::Message;
 use super::read::frames::Frame;
 use super::rows::{TearsRow, TopologyRow};
-
-/// The torn constraints of a state.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct TornList {
-    /// In the order of tearing.
-    pub constraints: Vec<u32>,
-    /// Causes of the tears. `None` if the recording does not contain the cause.
-    pub causes: Vec<Option<TearCause>>,
-    /// The step of the newest tear, or of the reset that emptied the list.
-    pub step: u64,
-    /// Number of constraints at the end of the list that tore in that step.
-    pub new_count: usize,
-    /// The step of the last reset, or 0.
-    pub since_step: u64,
-}
 
 /// A change of the torn constraints.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,7 +20,7 @@ pub(crate) enum TearChange {
 /// the file, because a batch of the recorder may contain later messages early.
 #[derive(Debug, Clone)]
 pub struct TearTracker {
-    torn: TornList,
+    torn: Torn,
     /// The step of [`Self::torn`]. `None` at the start of the file.
     step: Option<u64>,
     /// Changes in later steps.
@@ -43,47 +28,25 @@ pub struct TearTracker {
     is_known: bool,
 }
 
-impl TornList {
-    /// Returns the constraints that were torn before a recording, with unknown causes.
-    pub fn before(torn: &[u32]) -> Self {
-        Self { constraints: torn.to_vec(), causes: vec![None; torn.len()], ..Self::default() }
+/// Returns the constraints that were torn before a recording, with the causes in the keyframe of its
+/// first snapshot.
+pub fn torn_before_first(topology: &TopologyRow, first: &Frame) -> Torn {
+    let mut torn = topology.torn_before();
+    let count = torn.constraints.len();
+    if let Some(complete) = first.own_keyframe().and_then(torn_in_keyframe)
+        && complete.indices().take(count).eq(torn.indices())
+    {
+        torn.constraints.copy_from_slice(&complete.constraints[..count]);
     }
+    torn.header.since_step = first.row.step.saturating_sub(first.row.scene_step);
+    torn
+}
 
-    /// Returns the constraints that were torn before a recording, with the causes in the keyframe of
-    /// its first snapshot.
-    pub fn before_first(topology: &TopologyRow, first: &Frame) -> Self {
-        let mut torn = Self::before(&topology.torn);
-        if let Some(complete) = first.own_keyframe().and_then(Self::from_keyframe)
-            && complete.constraints.starts_with(&torn.constraints)
-        {
-            torn.causes.copy_from_slice(&complete.causes[..torn.constraints.len()]);
-        }
-        torn.since_step = first.row.step.saturating_sub(first.row.scene_step);
-        torn
-    }
-
-    /// Returns the torn constraints in a keyframe, or `None` if it is damaged or has another version.
-    pub fn from_keyframe(bytes: &[u8]) -> Option<Self> {
-        let keyframe = Keyframe::decode(bytes).ok()?;
-        let causes = keyframe.tear_causes().iter().copied().map(Some).collect();
-        Some(Self { constraints: keyframe.torn().to_vec(), causes, ..Self::default() })
-    }
-
-    fn apply(&mut self, change: &TearChange) {
-        match change {
-            TearChange::Reset(step) => {
-                *self = Self { step: *step, since_step: *step, ..Self::default() };
-            }
-            TearChange::Tears(row) => {
-                let cause = |place: usize| {
-                    row.causes.get(place).and_then(|name| TearCause::from_name(name))
-                };
-                self.causes.extend((0..row.constraints.len()).map(cause));
-                self.constraints.extend(&row.constraints);
-                (self.step, self.new_count) = (row.step, row.constraints.len());
-            }
-        }
-    }
+/// Returns the torn constraints in a keyframe, or `None` if it is damaged or has another version.
+pub(crate) fn torn_in_keyframe(bytes: &[u8]) -> Option<Torn> {
+    let keyframe = Keyframe::decode(bytes).ok()?;
+    let pairs = keyframe.torn().iter().zip(keyframe.tear_causes());
+    Some(pairs.map(|(index, cause)| TornConstraint::new(*index, Some(*cause))).collect())
 }
 
 impl TearChange {
@@ -107,12 +70,12 @@ impl TearChange {
 
 impl TearTracker {
     /// Starts at the start of a file, with the constraints that were torn before.
-    pub fn new(torn: TornList) -> Self {
+    pub fn new(torn: Torn) -> Self {
         Self { torn, step: None, pending: Vec::new(), is_known: true }
     }
 
     /// Starts at a keyframe, which includes all changes up to its step.
-    pub(crate) fn from_keyframe(step: u64, torn: TornList) -> Self {
+    pub(crate) fn from_keyframe(step: u64, torn: Torn) -> Self {
         Self { step: Some(step), ..Self::new(torn) }
     }
 
@@ -123,7 +86,7 @@ impl TearTracker {
         }
         if !self.is_known
             && let Message::Keyframe { step, bytes } = message
-            && let Some(torn) = TornList::from_keyframe(bytes)
+            && let Some(torn) = torn_in_keyframe(bytes)
         {
             self.torn = torn;
             self.step = Some(*step);
@@ -146,12 +109,15 @@ impl TearTracker {
 
     /// Returns the torn constraints at a step, or `None` if they are unknown. Steps never decrease
     /// from call to call.
-    pub fn at(&mut self, step: u64) -> Option<&TornList> {
+    pub fn at(&mut self, step: u64) -> Option<&Torn> {
         let mut due: Vec<_> = self.pending.extract_if(.., |one| one.order().0 <= step).collect();
         // The sort is stable, so rows of one step keep their order.
         due.sort_by_key(TearChange::order);
         for change in &due {
-            self.torn.apply(change);
+            match change {
+                TearChange::Reset(step) => self.torn.reset(*step),
+                TearChange::Tears(row) => self.torn.extend(row.step, row.torn()),
+            }
         }
         self.step = self.step.max(Some(step));
         self.is_known.then_some(&self.torn)
@@ -160,7 +126,7 @@ impl TearTracker {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::{Action, Command, Outcome};
+    use sim_contract::{Action, Command, Outcome, TearCause, TearsHeader};
     use sim_solver::{Scene, Solver, builtin};
 
     use super::*;
@@ -176,37 +142,42 @@ mod tests {
         Message::Outcome(OutcomeRow::from(&Outcome::new(0, step, command, Ok(()))))
     }
 
+    fn before(torn: &[u32]) -> Torn {
+        torn.iter().map(|index| TornConstraint::new(*index, None)).collect()
+    }
+
     fn torn_at(tracker: &mut TearTracker, step: u64) -> Vec<u32> {
-        tracker.at(step).unwrap().constraints.clone()
+        tracker.at(step).unwrap().indices().collect()
     }
 
     #[test]
     fn a_message_takes_effect_at_its_step() {
-        let mut tracker = TearTracker::new(TornList::before(&[9]));
+        let mut tracker = TearTracker::new(before(&[9]));
         tracker.process(&tears(4, &[1, 2]));
         tracker.process(&tears(6, &[3]));
         assert_eq!(torn_at(&mut tracker, 3), [9]);
         assert_eq!(torn_at(&mut tracker, 5), [9, 1, 2]);
         let torn = tracker.at(6).unwrap();
-        assert_eq!(torn.constraints, [9, 1, 2, 3]);
-        assert_eq!(torn.causes[..2], [None, Some(TearCause::Cut)]);
-        assert_eq!((torn.step, torn.new_count, torn.since_step), (6, 1, 0));
+        let causes: Vec<_> = torn.constraints.iter().map(TornConstraint::cause).collect();
+        assert_eq!(causes[..2], [None, Some(TearCause::Cut)]);
+        let expected = TearsHeader { run_id: 0, step: 6, since_step: 0, new_count: 1, count: 4 };
+        assert_eq!(torn.header, expected);
     }
 
     #[test]
     fn tears_in_the_step_of_a_reset_follow_the_reset() {
-        let mut tracker = TearTracker::new(TornList::default());
+        let mut tracker = TearTracker::new(Torn::default());
         tracker.process(&tears(2, &[5]));
         tracker.process(&tears(8, &[7]));
         tracker.process(&reset(8));
         assert_eq!(torn_at(&mut tracker, 7), [5]);
-        let torn = tracker.at(8).unwrap();
-        assert_eq!((torn.constraints.as_slice(), torn.since_step), (&[7][..], 8));
+        assert_eq!(torn_at(&mut tracker, 8), [7]);
+        assert_eq!(tracker.at(8).unwrap().header.since_step, 8);
     }
 
     #[test]
     fn tears_that_a_keyframe_includes_are_not_added_twice() {
-        let mut tracker = TearTracker::from_keyframe(4, TornList::before(&[1]));
+        let mut tracker = TearTracker::from_keyframe(4, before(&[1]));
         tracker.process(&tears(4, &[1]));
         tracker.process(&tears(5, &[2]));
         assert_eq!(torn_at(&mut tracker, 5), [1, 2]);
@@ -214,7 +185,7 @@ mod tests {
 
     #[test]
     fn after_a_gap_the_torn_constraints_are_unknown() {
-        let mut tracker = TearTracker::new(TornList::default());
+        let mut tracker = TearTracker::new(Torn::default());
         tracker.mark_gap();
         tracker.process(&Message::Keyframe { step: 3, bytes: vec![1, 2, 3] });
         assert_eq!(tracker.at(3), None);
@@ -236,7 +207,8 @@ mod tests {
                 row: StepRow { step: 1, ..StepRow::default() },
                 particles: Vec::new(),
             };
-            TornList::before_first(&topology, &first).causes
+            let torn = torn_before_first(&topology, &first);
+            torn.constraints.iter().map(TornConstraint::cause).collect::<Vec<_>>()
         };
         let keyframe = solver.keyframe().encode();
         assert_eq!(causes(&[3], keyframe.clone()), [Some(TearCause::Cut)]);

@@ -5,13 +5,15 @@ pub(crate) mod loaded_scene;
 pub(crate) mod request;
 pub(crate) mod state;
 pub(crate) mod tap;
+pub(crate) mod torn;
 pub(crate) mod views;
 pub(crate) mod watch;
 
 use std::time::Duration;
 
 use crate::client::request::{Commander, RequestError};
-use crate::client::views::{Colliders, Parameters, Snapshot, Surface, Topology, Torn};
+use crate::client::torn::Torn;
+use crate::client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};

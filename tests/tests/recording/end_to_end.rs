@@ -195,7 +195,9 @@ fn headers(tap: &mut Tap, count: usize) -> Vec<SnapshotHeader> {
     let mut headers = Vec::new();
     wait_for("the headers", || {
         tap.wait(Duration::from_millis(20));
-        tap.drain_particles(|header, _| headers.push(*header));
+        while let Some(state) = tap.next_state(|_| {}) {
+            headers.push(*state.header);
+        }
         (headers.len() >= count).then_some(())
     });
     headers

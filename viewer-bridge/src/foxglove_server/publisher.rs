@@ -15,7 +15,6 @@ use recorder::{
     encode_transform,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
-use sim_contract::{TearCause, TornConstraint};
 
 use super::picture::Picture;
 use crate::sink::{State, Torn};
@@ -63,7 +62,7 @@ struct PublisherState {
     /// Number of messages that were encoded on `/particles` and `/scene`.
     encoded_count: u64,
     /// Earlier messages for late subscribers.
-    torn: Option<TornList>,
+    torn: Option<TearsRow>,
     status: Option<StatusRow>,
     step: Option<StepRow>,
 }
@@ -82,25 +81,6 @@ struct PublishedLoad {
     /// Time of step 0 in ns since 1970, if the node had never paused.
     epoch_ns: u64,
     picture: Picture,
-}
-
-/// All torn constraints since a step.
-#[derive(Debug)]
-struct TornList {
-    step: u64,
-    all: Vec<TornConstraint>,
-}
-
-impl TornList {
-    /// The row with the entries from `first` on.
-    fn row(&self, first: usize) -> Message {
-        let rows = self.all[first..].iter();
-        let cause =
-            |torn: &TornConstraint| torn.cause().map_or("unknown", TearCause::name).to_owned();
-        let causes = rows.clone().map(cause).collect();
-        let constraints = rows.map(|torn| torn.constraint).collect();
-        Message::Tears(TearsRow { step: self.step, constraints, causes })
-    }
 }
 
 impl PublishedLoad {
@@ -260,11 +240,12 @@ impl Publisher {
         let Some(load) = &mut state.load else { return };
         load.picture.set_torn(torn.all);
         self.is_scene_due.store(true, Ordering::Relaxed);
-        let list = TornList { step: torn.stamp.step, all: torn.all.to_vec() };
-        if self.has_subscribers(Topic::Tears) && torn.known_count < torn.all.len() {
-            self.send(&mut state, &list.row(torn.known_count), None);
+        let row = |torn_list| TearsRow::new(torn.stamp.step, torn_list);
+        let new = &torn.all[torn.known_count..];
+        if self.has_subscribers(Topic::Tears) && !new.is_empty() {
+            self.send(&mut state, &Message::Tears(row(new)), None);
         }
-        state.torn = (!torn.all.is_empty()).then_some(list);
+        state.torn = (!torn.all.is_empty()).then(|| row(torn.all));
     }
 
     /// Publishes an outcome. Late subscribers do not receive it.
@@ -339,7 +320,7 @@ impl Publisher {
                     }
                     continue;
                 }
-                Topic::Tears => state.torn.as_ref().map(|torn| torn.row(0)),
+                Topic::Tears => state.torn.clone().map(Message::Tears),
                 Topic::Status => state.status.clone().map(Message::Status),
                 Topic::Steps => state.step.map(Message::Step),
                 _ => None,

@@ -17,7 +17,6 @@ use std::sync::mpsc::channel;
 use std::thread;
 
 use anyhow::Context;
-use recorder::TornList;
 
 use super::feed::Source;
 use crate::message::Mode;
@@ -47,7 +46,7 @@ impl Replay {
             log: tape.log().try_clone()?,
             first: first.row,
             last_step: tape.last_step(),
-            torn: TornList::before(&tape.topology().torn),
+            torn: tape.topology().torn_before(),
         })
     }
 }

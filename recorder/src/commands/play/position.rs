@@ -1,7 +1,7 @@
 //! The state of a replay: the values for headers and for late subscribers.
 
-use recorder::{CollidersRow, Message, OutcomeRow, TearTracker, TornList};
-use sim_contract::{Action, Method, ParameterValues};
+use recorder::{CollidersRow, Message, OutcomeRow, TearTracker};
+use sim_contract::{Action, Method, ParameterValues, Torn};
 use sim_solver::Keyframe;
 
 /// The state of a replay after the messages so far, as far as `/steps` does not contain it.
@@ -27,7 +27,7 @@ pub(crate) struct Position {
 
 impl Position {
     /// Starts with the constraints that were torn before the recording.
-    pub(crate) fn new(torn: TornList, method: Method) -> Self {
+    pub(crate) fn new(torn: Torn, method: Method) -> Self {
         Self {
             keyframe_step: 0,
             latched_keyframe: None,

@@ -1,14 +1,12 @@
 //! Publishes a recording like the recorded node.
 
 use anyhow::{Context, bail};
-use recorder::{
-    CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow, TornList,
-};
+use recorder::{CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, Load, LoadHeader,
     NodeStatus, Outcome, Owner, ParameterValues, SnapshotFlags, SnapshotHeader, StatusFlags,
-    TearsHeader, TornConstraint, Wake,
+    TearsHeader, Torn, Wake,
 };
 
 use super::control::Control;
@@ -37,7 +35,7 @@ pub(crate) struct Replay {
     rate: f64,
     position: Position,
     /// The last published list of torn constraints.
-    published_torn: TornList,
+    published_torn: Torn,
     /// The last published parameters.
     published_parameters: ParameterValues,
     /// The last published step.
@@ -82,7 +80,7 @@ impl Replay {
             run_id,
             control,
             rate,
-            published_torn: TornList::default(),
+            published_torn: Torn::default(),
             published_parameters: position.parameters,
             position,
             step: 0,
@@ -161,17 +159,8 @@ impl Replay {
             return Ok(());
         }
         self.published_torn.clone_from(torn);
-        let header = TearsHeader {
-            run_id: self.run_id,
-            step: torn.step,
-            since_step: torn.since_step,
-            new_count: u32::try_from(torn.new_count).unwrap_or(u32::MAX),
-            count: 0,
-        };
-        let pairs = torn.constraints.iter().zip(&torn.causes);
-        let pairs: Vec<_> =
-            pairs.map(|(constraint, cause)| TornConstraint::new(*constraint, *cause)).collect();
-        self.owner.publish_tears(header, &pairs)?;
+        let header = TearsHeader { run_id: self.run_id, ..torn.header };
+        self.owner.publish_tears(header, &torn.constraints)?;
         self.owner.wake(Wake::Tears);
         Ok(())
     }
@@ -252,7 +241,7 @@ impl Replay {
             rate_hz: self.run.rate_hz,
             particle_count: self.run.particle_count,
             constraint_count: self.run.constraint_count,
-            torn_count: u32::try_from(self.published_torn.constraints.len()).unwrap_or(u32::MAX),
+            torn_count: self.published_torn.header.count,
             reader_count: u32::try_from(self.reader_count()).unwrap_or(u32::MAX),
             process_id: std::process::id(),
             flags: StatusFlags::REPLAY

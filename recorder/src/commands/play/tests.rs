@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use recorder::{
     CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TearsRow,
-    TopologyRow, TornList,
+    TopologyRow,
 };
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     Action, CONTRACT_VERSION, Client, ColliderState, Command, ConstraintState, LoadHeader, Method,
     Outcome, OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, TearCause,
-    Triangle,
+    Torn, TornConstraint, Triangle,
 };
 
 use super::position::Position;
@@ -56,7 +56,7 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
 }
 
 fn replay(domain: &TestDomain) -> Replay {
-    replay_from(domain, Position::new(TornList::default(), Method::Xpbd))
+    replay_from(domain, Position::new(Torn::default(), Method::Xpbd))
 }
 
 fn replay_from(domain: &TestDomain, position: Position) -> Replay {
@@ -201,11 +201,15 @@ fn torn(client: &mut Client) -> (u64, u32, Vec<(u32, Option<TearCause>)>) {
     (torn.header.step, torn.header.new_count, all)
 }
 
+/// Constraint 2 tore before the recording.
+fn before(cause: Option<TearCause>) -> Torn {
+    Torn::from_iter([TornConstraint::new(2, cause)])
+}
+
 #[test]
 fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
     let domain = TestDomain::new();
-    let before = TornList { causes: vec![Some(TearCause::Force)], ..TornList::before(&[2]) };
-    let position = Position::new(before, Method::Xpbd);
+    let position = Position::new(before(Some(TearCause::Force)), Method::Xpbd);
     let mut replay = replay_from(&domain, position);
     replay.publish_latched(5).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
@@ -227,7 +231,7 @@ fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
 #[test]
 fn a_replay_that_starts_late_publishes_the_torn_constraints_and_the_colliders() {
     let domain = TestDomain::new();
-    let mut position = Position::new(TornList::before(&[2]), Method::Xpbd);
+    let mut position = Position::new(before(None), Method::Xpbd);
     position.skip(&[floor(0, 0.0), tears(1, &[0], "stretch")]);
     position.skip(&[floor(2, 1.0), tears(2, &[1], "cut"), outcome(0, 2, Action::Reset)]);
     position.skip(&[floor(3, 2.0), tears(4, &[0], "distance")]);

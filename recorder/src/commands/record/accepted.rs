@@ -1,14 +1,17 @@
-//! The part of a batch that goes into the recording.
+//! The part of the messages of a node that goes into the recording.
 
-use recorder::RunDescription;
+use recorder::{Message, RunDescription};
 
 use super::queue::Content;
 
-/// The header of a recording.
+/// The start of a recording.
 #[derive(Debug)]
 pub(crate) struct RunHeader {
     pub(crate) run: RunDescription,
+    /// The scene as TOML.
     pub(crate) scene: Vec<u8>,
+    /// The rows of the load.
+    pub(crate) rows: Vec<Message>,
 }
 
 /// The reason why this file cannot record the rest of a run.
@@ -22,12 +25,26 @@ pub(crate) enum RunEnd {
     EndStep,
 }
 
-/// The part of a batch that goes into the recording.
+/// The part of the messages since the last wait that goes into the recording.
 #[derive(Debug, Default)]
 pub(crate) struct Accepted {
-    /// The header, in the batch that starts the recording.
+    /// The header, when the recording starts.
     pub(crate) header: Option<RunHeader>,
-    /// In the order of publication.
     pub(crate) contents: Vec<Content>,
     pub(crate) end: Option<RunEnd>,
+}
+
+impl Accepted {
+    /// Adds a message.
+    pub(super) fn push(&mut self, message: Message) {
+        self.contents.push(Content::Update(message));
+    }
+
+    /// Sorts the contents in the order of publication: by step, then by topic.
+    pub(crate) fn sort(&mut self) {
+        self.contents.sort_by_key(|content| match content {
+            Content::Update(message) => (message.step(), message.topic()),
+            Content::Snapshot(row, _) => (row.step, recorder::Topic::Steps),
+        });
+    }
 }

@@ -1,54 +1,32 @@
-//! Selects and orders the messages of a recording: its start, its end, and the missing messages.
+//! Selects the states and messages of a recording: its start, its end, and the missing messages.
 
 mod started;
 
-use std::mem::take;
+use recorder::AllCounts;
+use sim_contract::{Change, LostChanges, Outcome, State};
 
-use recorder::{AllCounts, Message, RunDescription, TopologyRow};
-use sim_contract::{KeyframeHeader, LoadHeader, SnapshotHeader};
-use sim_solver::{Scene, SceneError};
-
-use super::accepted::{Accepted, RunHeader};
-use super::batch::{Batch, Snapshot};
-use super::lists::Lists;
-use super::queue::Content;
+use super::accepted::Accepted;
+use super::first_state::FirstState;
+use super::load::{Load, LoadError, Now};
+use super::messages::Messages;
 use started::Started;
 
-/// The clocks at the reception of a batch, in nanoseconds.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Now {
-    /// Since 1970.
-    pub(crate) realtime_ns: u64,
-    /// CLOCK_MONOTONIC.
-    pub(crate) monotonic_ns: u64,
-}
-
-/// The reason why a run cannot be recorded.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum IntakeError {
-    #[error("the scene of the node is not text")]
-    NotText,
-    #[error("the scene of the node is invalid: {0}")]
-    Scene(#[from] SceneError),
-}
-
-/// Most outcomes to keep before the first snapshot. Beyond it the oldest are dropped.
+/// Most outcomes to keep before the first state. Beyond it the oldest are dropped.
 const OUTCOMES_PENDING_MAX: usize = 1 << 16;
 
-/// Accepts a run from the first snapshot that has its keyframe.
+/// Accepts a run from the first state that has its keyframe.
 #[derive(Debug, Default)]
 pub(crate) struct Intake {
-    load: Batch,
-    /// The validated scene of the load. A recording with an invalid scene could not be verified.
-    scene: Option<Scene>,
     /// Steps to record after the first one.
     steps_max: Option<u64>,
-    /// The newest snapshot and keyframe, until both have the same step.
-    candidate: Option<Snapshot>,
-    candidate_keyframe: Option<(KeyframeHeader, Vec<u8>)>,
-    /// The lists, until the recording has started.
-    lists: Lists,
+    /// The load of the newest state, until the recording starts.
+    load: Option<Load>,
+    /// The newest state, until its keyframe arrives. A paused node publishes it after the state.
+    candidate: Option<FirstState>,
+    /// Outcomes that may follow the first state.
+    outcomes: Vec<Outcome>,
     started: Option<Started>,
+    lost: LostChanges,
     counts: AllCounts,
 }
 
@@ -58,17 +36,73 @@ impl Intake {
         Self { steps_max, ..Self::default() }
     }
 
-    /// Returns the part of a batch that goes into the recording.
-    pub(crate) fn accept(&mut self, mut batch: Batch, now: Now) -> Result<Accepted, IntakeError> {
-        let mut accepted = Accepted::default();
-        self.keep_load(&mut batch)?;
-        if self.started.is_none() {
-            self.try_start(&mut batch, now, &mut accepted);
+    /// Accepts the next state of a tap.
+    pub(crate) fn accept_state(
+        &mut self,
+        state: &State<'_>,
+        now: Now,
+        accepted: &mut Accepted,
+    ) -> Result<(), LoadError> {
+        for change in state.changes {
+            if let Change::Keyframe(header, bytes) = change
+                && let Some(candidate) = &mut self.candidate
+            {
+                candidate.add_keyframe(header, bytes);
+            }
         }
+        self.start_if_ready(now, accepted);
         if let Some(started) = &mut self.started {
-            started.accept(batch, &mut self.counts, &mut accepted);
+            let particles = state.particles.to_vec();
+            started.accept(state.header, particles, state.changes, &mut self.counts, accepted);
+            return Ok(());
         }
-        Ok(accepted)
+        if matches!(state.changes.first(), Some(Change::Load)) {
+            self.load = Some(Load::new(state.load)?);
+        }
+        self.outcomes.retain(|outcome| {
+            outcome.run_id != state.header.run_id || outcome.index >= state.header.outcome_count
+        });
+        self.candidate = FirstState::new(state);
+        self.start_if_ready(now, accepted);
+        Ok(())
+    }
+
+    /// Accepts the messages that have arrived between states.
+    pub(crate) fn accept_messages(
+        &mut self,
+        messages: Messages,
+        now: Now,
+        accepted: &mut Accepted,
+    ) {
+        if let Some(candidate) = &mut self.candidate {
+            for (header, bytes) in &messages.keyframes {
+                candidate.add_keyframe(header, bytes);
+            }
+            self.start_if_ready(now, accepted);
+        }
+        self.outcomes.extend(messages.outcomes);
+        let Some(started) = &mut self.started else {
+            let excess = self.outcomes.len().saturating_sub(OUTCOMES_PENDING_MAX);
+            self.outcomes.drain(..excess);
+            return;
+        };
+        started.accept_outcomes(self.outcomes.drain(..), &mut self.counts, accepted);
+        started.accept_statuses(&messages.statuses, &mut self.counts, accepted);
+    }
+
+    /// Starts the recording at the candidate, once it has its keyframe.
+    fn start_if_ready(&mut self, now: Now, accepted: &mut Accepted) {
+        let Some(first) = self.candidate.take_if(|first| first.has_keyframe()) else { return };
+        let Some(load) = self.load.take() else { return };
+        let mut started = Started::new(&first, self.steps_max, self.lost);
+        let header = load.into_run_header(&first.header, first.torn_before, now);
+        for row in &header.rows {
+            self.counts[row.topic()].received += 1;
+        }
+        accepted.header = Some(header);
+        let FirstState { header, particles, changes, .. } = first;
+        started.accept(&header, particles, &changes, &mut self.counts, accepted);
+        self.started = Some(started);
     }
 
     /// Returns the first recorded step, once the recording has started.
@@ -76,107 +110,18 @@ impl Intake {
         self.started.as_ref().map(|started| started.first_step)
     }
 
+    /// Sets the numbers of changes that the tap has dropped so far.
+    pub(crate) fn set_lost(&mut self, lost: LostChanges) {
+        self.lost = lost;
+    }
+
     /// Returns the numbers of received and missing messages.
     pub(crate) fn counts(&self) -> AllCounts {
         let mut counts = self.counts;
         if let Some(started) = &self.started {
-            started.add_gaps(&mut counts);
+            started.add_gaps(&self.lost, &mut counts);
         }
         counts
-    }
-
-    fn keep_load(&mut self, batch: &mut Batch) -> Result<(), IntakeError> {
-        let load = &mut self.load;
-        if let Some((_, text)) = &batch.scene
-            && self.started.is_none()
-        {
-            let text = std::str::from_utf8(text).map_err(|_| IntakeError::NotText)?;
-            self.scene = Some(Scene::from_toml(text, "scene.toml")?);
-        }
-        load.scene = batch.scene.take().or(load.scene.take());
-        load.topology = batch.topology.take().or(load.topology.take());
-        load.surface = batch.surface.take().or(load.surface.take());
-        Ok(())
-    }
-
-    /// Starts at the first snapshot of this batch, or at the candidate before it, that has a keyframe
-    /// of its step. Drops older messages.
-    fn try_start(&mut self, batch: &mut Batch, now: Now, accepted: &mut Accepted) {
-        self.lists.add(batch);
-        let snapshots = self.candidate.take().into_iter().chain(batch.snapshots.drain(..));
-        let snapshots: Vec<_> = snapshots.collect();
-        let keyframes = self.candidate_keyframe.take().into_iter().chain(batch.keyframes.drain(..));
-        let keyframes: Vec<_> = keyframes.collect();
-        let completes = |header: &SnapshotHeader, keyframe: &KeyframeHeader| {
-            (keyframe.run_id, keyframe.step) == (header.run_id, header.step)
-        };
-        let start = snapshots
-            .iter()
-            .position(|one| keyframes.iter().any(|(keyframe, _)| completes(&one.header, keyframe)))
-            .filter(|place| self.is_load_complete(&snapshots[*place].header));
-        // An outcome may arrive before the keyframe of the snapshot that precedes it.
-        batch.outcomes.splice(..0, self.load.outcomes.drain(..));
-        let Some(place) = start else {
-            self.candidate = snapshots.into_iter().next_back();
-            self.candidate_keyframe = keyframes.into_iter().next_back();
-            let known = self.candidate.as_ref().map_or(0, |one| one.header.outcome_count);
-            self.load.outcomes.extend(batch.outcomes.drain(..).filter(|row| row.index >= known));
-            let excess = self.load.outcomes.len().saturating_sub(OUTCOMES_PENDING_MAX);
-            self.load.outcomes.drain(..excess);
-            return;
-        };
-        let first = &snapshots[place];
-        accepted.header = self.header(&first.header, now);
-        let mut lists = take(&mut self.lists);
-        let torn = lists.begin(&first.header);
-        self.started = Some(Started::new(&first.header, self.steps_max, lists));
-        for message in self.load_rows(torn) {
-            self.counts[message.topic()].received += 1;
-            accepted.contents.push(Content::Update(message));
-        }
-        batch.keyframes = keyframes;
-        batch.snapshots = snapshots.into_iter().skip(place).collect();
-    }
-
-    fn is_load_complete(&self, header: &SnapshotHeader) -> bool {
-        let is_current = |load: &LoadHeader| {
-            (load.run_id, load.topology_revision) == (header.run_id, header.topology_revision)
-        };
-        let Batch { scene, topology, surface, .. } = &self.load;
-        scene.as_ref().is_some_and(|(load, _)| is_current(load))
-            && topology.as_ref().is_some_and(|(load, _)| is_current(load))
-            && surface.as_ref().is_some_and(|(load, _)| is_current(load))
-            && self.lists.are_known_at(header)
-    }
-
-    fn load_rows(&mut self, torn: Vec<u32>) -> Vec<Message> {
-        let topology = self.load.topology.take();
-        let topology = topology.map(|(_, row)| Message::Topology(TopologyRow { torn, ..row }));
-        let surface = self.load.surface.take().map(|(_, row)| Message::Surface(row));
-        topology.into_iter().chain(surface).collect()
-    }
-
-    fn header(&mut self, header: &SnapshotHeader, now: Now) -> Option<RunHeader> {
-        let (load, text) = self.load.scene.take()?;
-        let scene = self.scene.take()?;
-        let constraint_count = self.load.topology.as_ref().map_or(0, |(load, _)| load.count);
-        let mut run = RunDescription {
-            run_id: header.run_id,
-            epoch_ns: 0,
-            scene_name: scene.name,
-            origin: load.origin,
-            rate_hz: scene.solver.rate_hz,
-            method: load.method,
-            particle_count: header.particle_count,
-            constraint_count,
-            solver_version: header.solver_version,
-            contract_version: header.contract_version,
-            recorder_version: env!("CARGO_PKG_VERSION").to_owned(),
-        };
-        let age_ns = now.monotonic_ns.saturating_sub(header.publish_monotonic_ns);
-        let published_ns = now.realtime_ns.saturating_sub(age_ns);
-        run.epoch_ns = published_ns.saturating_sub(run.time_of_step_ns(header.step));
-        Some(RunHeader { run, scene: text })
     }
 }
 

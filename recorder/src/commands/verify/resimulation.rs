@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, TornList, state_hash};
+use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, state_hash};
 use sim_contract::{Action, Outcome, ParticleState};
 use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
@@ -243,12 +243,12 @@ impl Resimulation {
 /// snapshots.
 fn torn_in_first_frame(frame: &Frame) -> Option<Vec<u32>> {
     let torn = frame.updates.iter().find_map(|update| match update {
-        Message::Topology(row) => Some(TornList::before(&row.torn)),
+        Message::Topology(row) => Some(row.torn_before()),
         _ => None,
     })?;
     let mut tracker = TearTracker::new(torn);
     frame.updates.iter().for_each(|update| tracker.process(update));
-    tracker.at(frame.row.step).map(|torn| torn.constraints.clone())
+    tracker.at(frame.row.step).map(|torn| torn.indices().collect())
 }
 
 /// Compares the recorded header, the recorded payload and the simulated state.

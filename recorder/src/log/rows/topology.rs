@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{ConstraintState, LoadHeader, PlainF32, Triangle};
+use sim_contract::{ConstraintState, LoadHeader, PlainF32, Torn, TornConstraint, Triangle};
 
 use super::json::JsonNumber;
 
@@ -67,6 +67,11 @@ impl TopologyRow {
             kind: constraints.iter().map(|c| c.kind).collect(),
             torn: Vec::new(),
         }
+    }
+
+    /// Returns the constraints that were torn before the recording, with unknown causes.
+    pub fn torn_before(&self) -> Torn {
+        self.torn.iter().map(|index| TornConstraint::new(*index, None)).collect()
     }
 
     /// Returns the constraints, or `None` if the columns differ in length.

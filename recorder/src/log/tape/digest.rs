@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use sim_contract::{Torn, TornConstraint};
+
 use crate::log::message::Message;
 use crate::log::rows::{CollidersRow, ParametersRow, StatusRow, StepRow};
-use crate::log::tears::{TearChange, TornList};
+use crate::log::tears::{TearChange, torn_in_keyframe};
 
 /// Most memory for digests, in bytes: minutes of a large scene that tears in every step.
 const CACHE_SIZE_BYTES_MAX: usize = 64 << 20;
@@ -16,7 +18,7 @@ pub(super) struct Digest {
     pub(super) snapshots: Vec<u64>,
     pub(super) rows: Vec<StepRow>,
     /// The torn list is `None` if the keyframe has another version.
-    pub(super) keyframes: Vec<(u64, Option<TornList>)>,
+    pub(super) keyframes: Vec<(u64, Option<Torn>)>,
     pub(super) changes: Vec<TearChange>,
     pub(super) colliders: Vec<CollidersRow>,
     pub(super) parameters: Vec<ParametersRow>,
@@ -47,9 +49,9 @@ impl Digest {
             Message::Particles { step, .. } => self.snapshots.push(*step),
             Message::Step(row) => self.rows.push(*row),
             Message::Keyframe { step, bytes } => {
-                let torn = TornList::from_keyframe(bytes);
+                let torn = torn_in_keyframe(bytes);
                 let count = torn.as_ref().map_or(0, |torn| torn.constraints.len());
-                self.size_bytes += count * 2 * size_of::<u32>();
+                self.size_bytes += count * size_of::<TornConstraint>();
                 self.keyframes.push((*step, torn));
             }
             Message::Colliders(row) => {
@@ -69,7 +71,7 @@ impl Digest {
     }
 
     /// Returns the newest keyframe up to a step, with its torn list.
-    pub(super) fn keyframe(&self, step: u64) -> Option<&(u64, Option<TornList>)> {
+    pub(super) fn keyframe(&self, step: u64) -> Option<&(u64, Option<Torn>)> {
         self.keyframes.iter().rfind(|(keyframe_step, _)| *keyframe_step <= step)
     }
 }

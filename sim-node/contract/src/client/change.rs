@@ -44,6 +44,34 @@ impl Change {
     }
 }
 
+/// Numbers of changes that were dropped because their state did not arrive.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LostChanges {
+    /// Lists of colliders.
+    pub colliders: u64,
+    /// Lists of tears. Every later list contains them.
+    pub tears: u64,
+    /// Values of the parameters.
+    pub parameters: u64,
+    /// Keyframes.
+    pub keyframes: u64,
+    /// Outcomes.
+    pub outcomes: u64,
+}
+
+impl LostChanges {
+    fn add(&mut self, change: &Change) {
+        match change {
+            Change::Load => {}
+            Change::Colliders(..) => self.colliders += 1,
+            Change::Tears(..) => self.tears += 1,
+            Change::Parameters(..) => self.parameters += 1,
+            Change::Keyframe(..) => self.keyframes += 1,
+            Change::Outcome(_) => self.outcomes += 1,
+        }
+    }
+}
+
 /// Most pending changes. Between two snapshots, a node that publishes every 1,000th step can move
 /// its colliders 1,000 times.
 const PENDING_MAX: usize = 4096;
@@ -53,7 +81,7 @@ const PENDING_MAX: usize = 4096;
 #[derive(Debug, Default)]
 pub(crate) struct PendingChanges {
     queue: VecDeque<PendingChange>,
-    lost_count: u64,
+    lost: LostChanges,
 }
 
 #[derive(Debug)]
@@ -65,16 +93,17 @@ struct PendingChange {
 
 impl PendingChanges {
     pub(crate) fn push(&mut self, run_id: u64, step: u64, change: Change) {
-        if self.queue.len() == PENDING_MAX {
-            self.queue.pop_front();
-            self.lost_count += 1;
+        if self.queue.len() == PENDING_MAX
+            && let Some(oldest) = self.queue.pop_front()
+        {
+            self.lost.add(&oldest.change);
         }
         self.queue.push_back(PendingChange { run_id, step, change });
     }
 
-    /// Number of dropped changes.
-    pub(crate) fn lost_count(&self) -> u64 {
-        self.lost_count
+    /// Numbers of dropped changes.
+    pub(crate) fn lost(&self) -> LostChanges {
+        self.lost
     }
 
     /// Removes the changes up to a snapshot. Returns them in the order of publication.
@@ -143,7 +172,7 @@ mod tests {
         for index in 0..PENDING_MAX as u64 + 3 {
             pending.push(7, 100, outcome(index));
         }
-        assert_eq!(pending.lost_count(), 3);
+        assert_eq!(pending.lost(), LostChanges { outcomes: 3, ..LostChanges::default() });
         assert_eq!(pending.drain_run(7)[0], outcome(3));
     }
 

@@ -1,12 +1,12 @@
 //! Coherent states, assembled from the messages of all services.
 
-use crate::client::change::{Change, PendingChanges};
+use crate::client::change::{Change, LostChanges, PendingChanges};
 use crate::client::loaded_scene::{LoadedScene, PendingLoads};
-use crate::client::views::Parameters;
-use crate::messages::collider::ColliderState;
+use crate::client::torn::Torn;
+use crate::client::views::{Colliders, Parameters};
 use crate::messages::outcome::OUTCOME_FLAG_CONTROL;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::tears::{TearsHeader, TornConstraint};
+use crate::messages::tears::TearsHeader;
 use crate::messages::update::Update;
 
 /// A published state with everything that belongs to it, at the end of its step.
@@ -18,11 +18,11 @@ pub struct State<'a> {
     pub particles: &'a [ParticleState],
     /// The load that the state belongs to.
     pub load: &'a LoadedScene,
-    /// The `header.torn_count` constraints torn since the load or the last reset, in the order of
-    /// tearing. Shorter if a message was lost.
-    pub torn: &'a [TornConstraint],
-    /// The colliders, by index.
-    pub colliders: &'a [ColliderState],
+    /// The `header.torn_count` constraints torn since the load or the last reset; fewer if a message
+    /// was lost.
+    pub torn: &'a Torn,
+    /// The colliders. The `run_id` of their header is 0 until they have arrived.
+    pub colliders: &'a Colliders,
     /// The parameters. In the first state after attaching to a paused node, they may be those of the
     /// next step; their header states the step.
     pub parameters: &'a Parameters,
@@ -35,10 +35,8 @@ pub struct State<'a> {
 pub(crate) struct StateAssembler {
     run_id: u64,
     load: Option<LoadedScene>,
-    torn: Vec<TornConstraint>,
-    /// `since_step` of the last list of tears.
-    since_step: u64,
-    colliders: Vec<ColliderState>,
+    torn: Torn,
+    colliders: Colliders,
     parameters: Parameters,
     /// Changes since the state before.
     changes: Vec<Change>,
@@ -79,9 +77,9 @@ impl StateAssembler {
         }
     }
 
-    /// Returns the number of changes that were dropped because their state did not arrive.
-    pub(crate) fn lost_count(&self) -> u64 {
-        self.pending_changes.lost_count()
+    /// Returns the numbers of changes that were dropped because their state did not arrive.
+    pub(crate) fn lost_changes(&self) -> LostChanges {
+        self.pending_changes.lost()
     }
 
     /// Assembles the state of a snapshot. Returns `None` if its load has not arrived, for example
@@ -121,9 +119,9 @@ impl StateAssembler {
         if run_id != self.run_id {
             self.pending_changes.drain_run(self.run_id);
             self.run_id = run_id;
-            (self.load, self.since_step) = (None, 0);
-            self.torn.clear();
-            self.colliders.clear();
+            self.load = None;
+            self.torn = Torn::default();
+            self.colliders = Colliders::default();
             self.parameters = Parameters::default();
         }
     }
@@ -140,12 +138,15 @@ impl StateAssembler {
 
     fn apply(&mut self, change: Change) {
         match &change {
-            Change::Colliders(_, list) => self.colliders.clone_from(list),
+            Change::Colliders(header, list) => {
+                self.colliders.header = *header;
+                self.colliders.colliders.clone_from(list);
+            }
             Change::Parameters(header, values) => {
                 self.parameters = Parameters { header: *header, values: *values };
             }
             Change::Tears(header, list) => {
-                let new = self.replace_torn(header, list);
+                let new = self.torn.replace(*header, list);
                 self.changes.push(Change::Tears(*header, new));
                 return;
             }
@@ -154,32 +155,17 @@ impl StateAssembler {
         self.changes.push(change);
     }
 
-    /// Replaces the list of torn constraints. Returns the constraints that the old list lacks.
-    fn replace_torn(
-        &mut self,
-        header: &TearsHeader,
-        list: &[TornConstraint],
-    ) -> Vec<TornConstraint> {
-        let is_continuation = header.since_step == self.since_step;
-        let known_count = if is_continuation { self.torn.len().min(list.len()) } else { 0 };
-        self.since_step = header.since_step;
-        self.torn.clear();
-        self.torn.extend_from_slice(list);
-        list[known_count..].to_vec()
-    }
-
     /// Replaces a list of tears that was overwritten before it was read. A later list begins with it.
-    fn complete_torn(&mut self, header: &SnapshotHeader) {
-        let count = header.torn_count as usize;
-        if self.torn.len() == count {
+    fn complete_torn(&mut self, snapshot: &SnapshotHeader) {
+        if self.torn.constraints.len() == snapshot.torn_count as usize {
             return;
         }
-        let Some((later, list)) = self.pending_changes.tears(header) else { return };
-        let (later, list) = (*later, list[..count].to_vec());
-        let new = self.replace_torn(&later, &list);
-        let new_count = u32::try_from(new.len()).unwrap_or(u32::MAX);
-        let (step, count) = (header.step, header.torn_count);
-        self.changes.push(Change::Tears(TearsHeader { step, new_count, count, ..later }, new));
+        let Some((later, list)) = self.pending_changes.tears(snapshot) else { return };
+        let list = list[..snapshot.torn_count as usize].to_vec();
+        let header = TearsHeader { step: snapshot.step, count: snapshot.torn_count, ..*later };
+        let new = self.torn.replace(header, &list);
+        self.torn.header.new_count = u32::try_from(new.len()).unwrap_or(u32::MAX);
+        self.changes.push(Change::Tears(self.torn.header, new));
     }
 
     /// Reads pending parameters if none of this run have arrived in time, as after attaching to a
@@ -201,6 +187,7 @@ mod tests {
     use crate::messages::command::Command;
     use crate::messages::outcome::Outcome;
     use crate::messages::parameters::ParametersHeader;
+    use crate::messages::tears::TornConstraint;
     use crate::messages::topology::LoadHeader;
 
     const RUN_ID: u64 = 7;
@@ -275,7 +262,10 @@ mod tests {
             Change::Tears(_, new) => Some(indices(new)),
             _ => None,
         });
-        TornIndices { all: indices(state.torn), new: new.flat_map(|list: Vec<u32>| list).collect() }
+        TornIndices {
+            all: state.torn.indices().collect(),
+            new: new.flat_map(|list: Vec<u32>| list).collect(),
+        }
     }
 
     #[test]
@@ -327,7 +317,7 @@ mod tests {
         add_load(&mut assembler, 1);
         add_tears(&mut assembler, Interval { since_step: 3, step: 3 }, &[]);
         let state = assembler.assemble(&second, &[]).unwrap();
-        assert_eq!((state.load.header.topology_revision, state.torn.len()), (1, 0));
+        assert_eq!((state.load.header.topology_revision, state.torn.constraints.len()), (1, 0));
         assert_eq!(state.changes[0], Change::Load);
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::client::change::Change;
+use crate::client::change::{Change, LostChanges};
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
@@ -142,25 +142,14 @@ impl Tap {
         std::mem::take(&mut self.errors)
     }
 
-    /// Returns the number of changes that were dropped because their state did not arrive.
-    pub fn lost_change_count(&self) -> u64 {
-        self.assembler.lost_count()
+    /// Returns the numbers of changes that were dropped because their state did not arrive.
+    pub fn lost_changes(&self) -> LostChanges {
+        self.assembler.lost_changes()
     }
 
-    /// Passes at most [`crate::SNAPSHOTS_BUFFERED`] unread snapshots to `sink`, oldest first. Drops
-    /// malformed snapshots and returns their errors.
-    pub fn drain_particles(
-        &mut self,
-        sink: impl FnMut(&SnapshotHeader, &[ParticleState]),
-    ) -> Drained {
-        let mut drained = Drained::default();
-        self.particles.drain(&mut drained, sink);
-        drained
-    }
-
-    /// Passes the unread messages of all other services to `sink`: at most one buffer of each service,
-    /// oldest first. Drops malformed messages and returns their errors.
-    pub fn drain_updates(&mut self, mut sink: impl FnMut(Update<'_>)) -> Drained {
+    /// Passes the unread messages of all services except `particles` to `sink`: at most one buffer of
+    /// each service, oldest first. Drops malformed messages and returns their errors.
+    fn drain_updates(&mut self, mut sink: impl FnMut(Update<'_>)) -> Drained {
         let mut drained = Drained::default();
         let result = &mut drained;
         self.scene.drain(result, |header, bytes| sink(Update::Scene(header, bytes)));

@@ -3,7 +3,6 @@
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::parameters::ParametersHeader;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
 use crate::ports::reader::SliceSample;
 use sim_types::ParameterValues;
@@ -40,15 +39,6 @@ pub struct Surface {
     pub header: LoadHeader,
     /// The `header.count` triangles; empty if the scene has no surface.
     pub triangles: Vec<Triangle>,
-}
-
-/// The constraints torn since the load or the last reset. Empty if nothing tore.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Torn {
-    /// Header of the list: the step of the newest tear, and the number of tears in that step.
-    pub header: TearsHeader,
-    /// The `header.count` constraints, in the order of tearing.
-    pub constraints: Vec<TornConstraint>,
 }
 
 /// The values of all parameters.

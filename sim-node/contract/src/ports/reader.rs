@@ -41,11 +41,11 @@ pub enum ReadError {
 
 /// Result of draining services.
 #[derive(Debug, Default)]
-pub struct Drained {
+pub(crate) struct Drained {
     /// Number of received messages, including those that could not be read.
-    pub count: usize,
+    pub(crate) count: usize,
     /// Errors of the messages that could not be read. These messages were dropped.
-    pub errors: Vec<ReadError>,
+    pub(crate) errors: Vec<ReadError>,
 }
 
 /// A message in shared memory whose header agrees with its payload.

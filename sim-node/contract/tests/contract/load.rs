@@ -151,13 +151,16 @@ fn a_tap_sees_both_loads_in_their_order() {
     });
     let first = first.unwrap();
     assert_eq!((first.header.step, first.particles.len()), (5, 4));
-    assert_eq!((first.load.scene.as_slice(), first.torn[0].constraint), (SCENE.as_bytes(), 2));
+    assert_eq!(
+        (first.load.scene.as_slice(), first.torn.constraints[0].constraint),
+        (SCENE.as_bytes(), 2)
+    );
     // Each load begins with an empty list.
     assert_eq!(tears, [(0, vec![]), (5, vec![2]), (6, vec![]), (6, vec![7])]);
     let second = tap.next_state(|_| {}).unwrap();
     assert_eq!((second.header.step, second.particles.len()), (6, 9));
     assert_eq!(
-        (second.load.scene.as_slice(), second.torn[0].constraint),
+        (second.load.scene.as_slice(), second.torn.constraints[0].constraint),
         (NEW_SCENE.as_bytes(), 7)
     );
     assert!(tap.next_state(|_| {}).is_none() && tap.drain_errors().is_empty());

@@ -29,13 +29,17 @@ fn a_state_contains_all_messages_up_to_it() {
     assert_eq!(first.load.scene, SCENE.as_bytes());
     assert_eq!(first.load.constraints, constraints());
     assert_eq!(first.load.triangles, triangles());
-    assert!(first.torn.is_empty() && first.colliders.is_empty());
+    assert!(first.torn.constraints.is_empty() && first.colliders.colliders.is_empty());
     assert_eq!(first.parameters.values, parameters(0));
     assert_eq!(first.changes[0], Change::Load);
 
     let second = tap.next_state(|_| {}).unwrap();
     assert_eq!((second.header.step, second.particles[3]), (5, particle(5, 3)));
-    assert_eq!((second.torn, second.colliders), (&[CUT][..], &colliders(5)[..]));
+    assert_eq!(second.torn.constraints, [CUT]);
+    assert_eq!(
+        (second.colliders.header.step, &second.colliders.colliders[..]),
+        (5, &colliders(5)[..])
+    );
     assert_eq!((second.parameters.header.step, second.parameters.values), (5, parameters(5)));
     assert!(second.changes.contains(&Change::Outcome(outcome)));
     assert!(tap.next_state(|_| {}).is_none());

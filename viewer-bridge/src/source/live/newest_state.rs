@@ -45,10 +45,10 @@ impl NewestState {
         let Some(load) = &self.load else { return };
         let (step, constraint_count) = (state.header.step, load.constraints.len());
         shown.set_pins(sinks, step, state.particles);
-        if state.torn.iter().all(|torn| (torn.constraint as usize) < constraint_count) {
-            shown.set_torn(sinks, step, state.torn);
+        if state.torn.indices().all(|constraint| (constraint as usize) < constraint_count) {
+            shown.set_torn(sinks, step, &state.torn.constraints);
         }
-        shown.set_colliders(sinks, step, state.colliders);
+        shown.set_colliders(sinks, step, &state.colliders.colliders);
     }
 
     fn begin_load(&mut self, state: &NodeState<'_>, shown: &mut ShownState, sinks: &Sinks) {

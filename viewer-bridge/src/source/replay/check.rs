@@ -6,10 +6,10 @@ use std::sync::mpsc::Sender;
 
 use recorder::{
     IndexedLog, LogEnd, LoggedMessage, Message, OutcomeRow, ReadError, StepRow, TearTracker,
-    TornList, state_hash,
+    state_hash,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{Action, ParticleState};
+use sim_contract::{Action, ParticleState, Torn};
 
 use super::marks::Marks;
 use crate::message::{Hashes, Mark, MarkKind};
@@ -33,7 +33,7 @@ pub(super) struct Job {
     pub(super) first: StepRow,
     pub(super) last_step: u64,
     /// Constraints that were torn before the recording.
-    pub(super) torn: TornList,
+    pub(super) torn: Torn,
 }
 
 /// Reads to the end, or until it is cancelled.
@@ -129,8 +129,9 @@ impl Check {
 
     fn compare(&mut self, step: u64, particles: &[ParticleState]) {
         let row = self.row.take().filter(|row| row.step == step);
-        let torn = self.torn.at(step).map(|torn| torn.constraints.as_slice());
-        let torn = torn.zip(row).and_then(|(torn, row)| torn.get(..row.torn_count as usize));
+        let torn: Option<Vec<u32>> = self.torn.at(step).map(|torn| torn.indices().collect());
+        let torn = torn.as_deref().zip(row);
+        let torn = torn.and_then(|(torn, row)| torn.get(..row.torn_count as usize));
         match (row, torn) {
             (Some(row), Some(torn)) if row.state_hash == state_hash(particles, torn) => {
                 self.equal_count += 1;

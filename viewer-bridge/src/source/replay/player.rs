@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use recorder::{ReadError, TapeError, TapeState};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{ParameterValues, Reason, TornConstraint};
+use sim_contract::{ParameterValues, Reason};
 
 use super::check::Report;
 use super::open::Recording;
@@ -226,15 +226,8 @@ impl<'a> Player<'a> {
         self.shown.set_pins(self.sinks, step, &state.particles);
         let constraint_count = self.recording.load.constraints.len();
         let torn = &state.torn;
-        if torn.constraints.iter().all(|constraint| (*constraint as usize) < constraint_count) {
-            let causes = torn.causes.iter().copied().chain(std::iter::repeat(None));
-            let torn: Vec<_> = torn
-                .constraints
-                .iter()
-                .zip(causes)
-                .map(|(constraint, cause)| TornConstraint::new(*constraint, cause))
-                .collect();
-            self.shown.set_torn(self.sinks, step, &torn);
+        if torn.indices().all(|constraint| (constraint as usize) < constraint_count) {
+            self.shown.set_torn(self.sinks, step, &torn.constraints);
         }
         if let Some(row) = &state.colliders {
             self.shown.set_colliders(self.sinks, step, &row.states());

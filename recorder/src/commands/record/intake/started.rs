@@ -1,13 +1,16 @@
-//! The run in progress: the accepted messages of each batch, their order, and the end.
+//! The run in progress: the accepted states and messages, the end, and the missing messages.
 
-use std::collections::BTreeSet;
-
-use recorder::{AllCounts, Message, OutcomeRow, StepRow, Topic};
-use sim_contract::SnapshotHeader;
+use recorder::{
+    AllCounts, CollidersRow, Message, OutcomeRow, ParametersRow, StatusRow, StepRow, TearsRow,
+    Topic,
+};
+use sim_contract::{
+    Change, ColliderState, KeyframeHeader, LostChanges, NodeStatus, Outcome, ParticleState,
+    SnapshotHeader,
+};
 
 use crate::commands::record::accepted::{Accepted, RunEnd};
-use crate::commands::record::batch::{Batch, Snapshot};
-use crate::commands::record::lists::Lists;
+use crate::commands::record::first_state::FirstState;
 use crate::commands::record::queue::Content;
 use crate::simulation::frozen::FrozenTracker;
 
@@ -19,91 +22,78 @@ pub(super) struct Started {
     pub(super) first_step: u64,
     /// The last step to record.
     end_step: u64,
+    /// The last recorded state.
     last: SnapshotHeader,
     next_outcome: u64,
-    /// The newest keyframe that a snapshot refers to.
+    /// Step of the newest keyframe that a state refers to.
     keyframe_step: u64,
-    /// Steps of the keyframes that arrived, from that one on.
-    keyframes: BTreeSet<u64>,
-    /// Snapshots that never arrived.
-    snapshot_gaps: u64,
-    lists: Lists,
+    /// Step of the newest keyframe in the file.
+    recorded_keyframe_step: Option<u64>,
+    /// Number of torn constraints in the file.
+    torn_count: u32,
+    /// States that never arrived.
+    state_gaps: u64,
+    /// Colliders of an unknown shape.
+    unknown_colliders: u64,
+    /// The changes that the tap dropped before the start.
+    lost_before: LostChanges,
     frozen: FrozenTracker,
 }
 
 impl Started {
-    /// `lists` have started with the first snapshot.
-    pub(super) fn new(first: &SnapshotHeader, steps_max: Option<u64>, lists: Lists) -> Self {
+    /// Starts before a state, which comes next.
+    pub(super) fn new(
+        first: &FirstState,
+        steps_max: Option<u64>,
+        lost_before: LostChanges,
+    ) -> Self {
+        let FirstState { header, torn_before, .. } = first;
         Self {
-            run_id: first.run_id,
-            end_step: steps_max.map_or(u64::MAX, |steps| first.step.saturating_add(steps)),
-            topology_revision: first.topology_revision,
-            first_step: first.step,
-            last: *first,
+            run_id: header.run_id,
+            end_step: steps_max.map_or(u64::MAX, |steps| header.step.saturating_add(steps)),
+            topology_revision: header.topology_revision,
+            first_step: header.step,
+            last: *header,
             // Earlier outcomes are part of the first state.
-            next_outcome: first.outcome_count,
+            next_outcome: header.outcome_count,
             keyframe_step: 0,
-            keyframes: BTreeSet::new(),
-            snapshot_gaps: 0,
-            lists,
+            recorded_keyframe_step: None,
+            torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
+            state_gaps: 0,
+            unknown_colliders: 0,
+            lost_before,
             frozen: FrozenTracker::default(),
         }
     }
 
-    /// Accepts a batch and sorts it in the order of publication.
+    /// Accepts a state and the changes before it, unless the recording ends before it.
     pub(super) fn accept(
         &mut self,
-        mut batch: Batch,
+        header: &SnapshotHeader,
+        particles: Vec<ParticleState>,
+        changes: &[Change],
         counts: &mut AllCounts,
         accepted: &mut Accepted,
     ) {
-        self.lists.add(&mut batch);
-        let (run_id, steps) = (self.run_id, self.first_step..=self.end_step);
-        let keyframes = batch
-            .keyframes
-            .into_iter()
-            .filter(|(header, _)| header.run_id == run_id && steps.contains(&header.step));
-        let keyframes: Vec<_> = keyframes
-            .map(|(header, bytes)| Message::Keyframe { step: header.step, bytes })
-            .collect();
-        self.keyframes.extend(keyframes.iter().map(Message::step));
-        let mut contents = self.accept_snapshots(batch.snapshots, counts, accepted);
-        let outcomes = self.accept_outcomes(batch.outcomes, accepted.end, counts);
-        let statuses = batch.statuses.into_iter();
-        let statuses = statuses.filter(|one| one.run_id == run_id && steps.contains(&one.step));
-        let statuses = statuses.map(|one| one.row);
-        let rows = self.lists.rows_until(&self.last);
-        for update in statuses.chain(keyframes).chain(outcomes).chain(rows) {
-            counts[update.topic()].received += 1;
-            contents.push(Content::Update(update));
+        accepted.end = self.end_at(header);
+        if accepted.end.is_some() {
+            return;
         }
-        contents.sort_by_key(order);
-        accepted.contents.append(&mut contents);
-    }
-
-    /// Accepts the snapshots up to the end, with the events that they show.
-    fn accept_snapshots(
-        &mut self,
-        snapshots: Vec<Snapshot>,
-        counts: &mut AllCounts,
-        accepted: &mut Accepted,
-    ) -> Vec<Content> {
-        let mut contents = Vec::new();
-        for snapshot in snapshots {
-            accepted.end = self.end_at(&snapshot.header);
-            if accepted.end.is_some() {
-                break;
-            }
-            for event in self.frozen.new_events(snapshot.header.step, &snapshot.particles) {
-                counts[Topic::Events].received += 1;
-                contents.push(Content::Update(Message::Event(event)));
-            }
-            contents.push(self.accept_snapshot(snapshot, counts));
+        let rows = changes.iter().filter_map(|change| self.row(change));
+        let rows: Vec<_> = rows.collect();
+        let events = self.frozen.new_events(header.step, &particles);
+        for message in rows.into_iter().chain(events.into_iter().map(Message::Event)) {
+            counts[message.topic()].received += 1;
+            accepted.push(message);
         }
-        if accepted.end.is_none() && self.last.step >= self.end_step {
+        self.count_gaps(header, counts);
+        self.last = *header;
+        counts[Topic::Steps].received += 1;
+        counts[Topic::Particles].received += 1;
+        accepted.contents.push(Content::Snapshot(StepRow::from(header), particles));
+        if header.step >= self.end_step {
             accepted.end = Some(RunEnd::EndStep);
         }
-        contents
     }
 
     fn end_at(&self, header: &SnapshotHeader) -> Option<RunEnd> {
@@ -118,62 +108,98 @@ impl Started {
         }
     }
 
-    fn accept_snapshot(&mut self, snapshot: Snapshot, counts: &mut AllCounts) -> Content {
-        let Snapshot { header, particles } = snapshot;
+    /// Returns the row of a change, if it has one. Outcomes are recorded as they arrive.
+    fn row(&mut self, change: &Change) -> Option<Message> {
+        match change {
+            Change::Load | Change::Outcome(_) => None,
+            Change::Colliders(header, list) => self.colliders_row(header.step, list),
+            Change::Tears(header, new) => {
+                self.torn_count = header.count;
+                (!new.is_empty()).then(|| Message::Tears(TearsRow::new(header.step, new)))
+            }
+            Change::Parameters(header, values) => {
+                Some(Message::Parameters(ParametersRow { step: header.step, values: *values }))
+            }
+            Change::Keyframe(header, bytes) => self.keyframe_row(header, bytes),
+        }
+    }
+
+    /// Returns the row of a list of colliders. A scene without colliders has no rows.
+    fn colliders_row(&mut self, step: u64, list: &[ColliderState]) -> Option<Message> {
+        let row = CollidersRow::new(step, list);
+        self.unknown_colliders += u64::from(row.is_none());
+        row.filter(|row| !row.colliders.is_empty()).map(Message::Colliders)
+    }
+
+    /// Returns the row of a keyframe, unless it is in the file. The first one may arrive twice: after
+    /// its state, and with the next one.
+    fn keyframe_row(&mut self, header: &KeyframeHeader, bytes: &[u8]) -> Option<Message> {
+        let step = header.step;
+        let is_new = step >= self.first_step && self.recorded_keyframe_step < Some(step);
+        is_new.then(|| {
+            self.recorded_keyframe_step = Some(step);
+            Message::Keyframe { step, bytes: bytes.to_vec() }
+        })
+    }
+
+    /// Counts the states and keyframes that are missing before a state.
+    fn count_gaps(&mut self, header: &SnapshotHeader, counts: &mut AllCounts) {
         // A node that pauses also publishes the step before the pause, so the distance may be less
         // than the stride.
         let distance = header.step.saturating_sub(self.last.step);
         let stride = u64::from(header.stride.max(1));
-        self.snapshot_gaps += distance.div_ceil(stride).saturating_sub(1);
-        let keyframe_step = header.keyframe_step;
-        if keyframe_step > self.keyframe_step && keyframe_step >= self.first_step {
-            self.keyframe_step = keyframe_step;
-            // A keyframe is published before the snapshots that refer to it, and read after them.
-            let is_missing = !self.keyframes.contains(&keyframe_step);
+        self.state_gaps += distance.div_ceil(stride).saturating_sub(1);
+        if header.keyframe_step > self.keyframe_step && header.keyframe_step >= self.first_step {
+            self.keyframe_step = header.keyframe_step;
+            let is_missing = self.recorded_keyframe_step < Some(header.keyframe_step);
             counts[Topic::Keyframe].gaps += u64::from(is_missing);
-            self.keyframes = self.keyframes.split_off(&keyframe_step);
         }
-        self.last = header;
-        counts[Topic::Steps].received += 1;
-        counts[Topic::Particles].received += 1;
-        Content::Snapshot(StepRow::from(&header), particles)
     }
 
-    /// Accepts the outcomes of this run. After its end these are the ones that the last snapshot
-    /// counts.
-    fn accept_outcomes(
+    /// Accepts the outcomes of this run. After its end these are the ones that the last state counts.
+    pub(super) fn accept_outcomes(
         &mut self,
-        outcomes: Vec<OutcomeRow>,
-        end: Option<RunEnd>,
+        outcomes: impl Iterator<Item = Outcome>,
         counts: &mut AllCounts,
-    ) -> Vec<Message> {
-        let mut accepted = Vec::new();
-        for row in outcomes {
-            let is_foreign =
-                end.is_some() && row.index >= self.last.outcome_count || row.step > self.end_step;
-            if row.index < self.next_outcome || is_foreign {
+        accepted: &mut Accepted,
+    ) {
+        for outcome in outcomes {
+            let is_later = accepted.end.is_some() && outcome.index >= self.last.outcome_count
+                || outcome.step > self.end_step;
+            let is_foreign = outcome.run_id != self.run_id || is_later;
+            if is_foreign || outcome.index < self.next_outcome {
                 continue;
             }
-            counts[Topic::Outcomes].gaps += row.index - self.next_outcome;
-            self.next_outcome = row.index + 1;
-            accepted.push(Message::Outcome(row));
+            counts[Topic::Outcomes].gaps += outcome.index - self.next_outcome;
+            counts[Topic::Outcomes].received += 1;
+            self.next_outcome = outcome.index + 1;
+            accepted.push(Message::Outcome(OutcomeRow::from(&outcome)));
         }
-        accepted
+    }
+
+    pub(super) fn accept_statuses(
+        &self,
+        statuses: &[NodeStatus],
+        counts: &mut AllCounts,
+        accepted: &mut Accepted,
+    ) {
+        let steps = self.first_step..=self.end_step;
+        for status in statuses {
+            if status.run_id == self.run_id && steps.contains(&status.step) {
+                counts[Topic::Status].received += 1;
+                accepted.push(Message::Status(StatusRow::from(status)));
+            }
+        }
     }
 
     /// Adds the messages that are still missing.
-    pub(super) fn add_gaps(&self, counts: &mut AllCounts) {
-        counts[Topic::Particles].gaps = self.snapshot_gaps;
-        counts[Topic::Steps].gaps = self.snapshot_gaps;
+    pub(super) fn add_gaps(&self, lost: &LostChanges, counts: &mut AllCounts) {
+        counts[Topic::Particles].gaps = self.state_gaps;
+        counts[Topic::Steps].gaps = self.state_gaps;
         counts[Topic::Outcomes].gaps += self.last.outcome_count.saturating_sub(self.next_outcome);
-        self.lists.add_gaps(&self.last, counts);
-    }
-}
-
-/// Returns the sort key: the step, then the order of publication.
-fn order(content: &Content) -> (u64, Topic) {
-    match content {
-        Content::Update(message) => (message.step(), message.topic()),
-        Content::Snapshot(row, _) => (row.step, Topic::Steps),
+        counts[Topic::Tears].gaps = u64::from(self.last.torn_count.saturating_sub(self.torn_count));
+        counts[Topic::Colliders].gaps =
+            self.unknown_colliders + (lost.colliders - self.lost_before.colliders);
+        counts[Topic::Parameters].gaps = lost.parameters - self.lost_before.parameters;
     }
 }

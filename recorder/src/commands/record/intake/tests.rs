@@ -1,13 +1,14 @@
-//! The start, the end and the order of a recording, and the counts of missing messages. The batches
+//! The start, the end and the order of a recording, and the counts of missing messages. The states
 //! are built by hand.
 
 use sim_contract::{
-    Action, ColliderState, CollidersHeader, Command, ConstraintState, NodeStatus,
-    OUTCOME_FLAG_CONTROL, Outcome, ParameterValues, ParametersHeader, ParticleFlags, ParticleState,
-    TearCause, TearsHeader, TornConstraint, Update,
+    Action, ColliderState, Colliders, CollidersHeader, Command, ConstraintState, KeyframeHeader,
+    LoadHeader, LoadedScene, NodeStatus, OUTCOME_FLAG_CONTROL, ParameterValues, Parameters,
+    ParametersHeader, ParticleFlags, ParticleState, SnapshotHeader, TearCause, TearsHeader, Torn,
+    TornConstraint, Update,
 };
 
-use recorder::Topic;
+use recorder::{Message, Topic};
 
 use super::*;
 use crate::commands::record::accepted::RunEnd;
@@ -15,6 +16,78 @@ use crate::commands::record::queue::Content;
 
 const RUN_ID: u64 = 77;
 const NOW: Now = Now { realtime_ns: 5_000_000_000, monotonic_ns: 2_000_000_000 };
+
+/// The parts of a state that change rarely.
+#[derive(Debug)]
+struct Node {
+    load: LoadedScene,
+    particles: Vec<ParticleState>,
+    torn: Torn,
+    colliders: Colliders,
+    parameters: Parameters,
+}
+
+impl Node {
+    /// A node with one particle and nothing torn.
+    fn new() -> Self {
+        let header = LoadHeader { run_id: RUN_ID, rate_hz: 10, count: 1, ..LoadHeader::default() };
+        let load = LoadedScene {
+            header,
+            scene: b"version = 1\nname = \"dot\"\nsolver.rate_hz = 10\n".to_vec(),
+            constraints: vec![ConstraintState::default()],
+            triangles: Vec::new(),
+        };
+        Self {
+            load,
+            particles: vec![ParticleState::default()],
+            torn: Torn { header: tears_header(0), constraints: Vec::new() },
+            colliders: Colliders { header: colliders_header(0), colliders: Vec::new() },
+            parameters: Parameters { header: parameters_header(0), ..Parameters::default() },
+        }
+    }
+
+    /// Publishes a state.
+    fn publish(
+        &self,
+        intake: &mut Intake,
+        header: SnapshotHeader,
+        changes: &[Change],
+        accepted: &mut Accepted,
+    ) -> Result<(), LoadError> {
+        let state = State {
+            header: &header,
+            particles: &self.particles,
+            load: &self.load,
+            torn: &self.torn,
+            colliders: &self.colliders,
+            parameters: &self.parameters,
+            changes,
+        };
+        intake.accept_state(&state, NOW, accepted)
+    }
+}
+
+/// Publishes a state alone.
+fn publish(intake: &mut Intake, header: SnapshotHeader, changes: &[Change]) -> Accepted {
+    let mut accepted = Accepted::default();
+    Node::new().publish(intake, header, changes, &mut accepted).unwrap();
+    accepted.sort();
+    accepted
+}
+
+/// Sends messages without a state.
+fn send(intake: &mut Intake, updates: &[Update<'_>]) -> Accepted {
+    let mut accepted = Accepted::default();
+    add(intake, updates, &mut accepted);
+    accepted
+}
+
+fn add(intake: &mut Intake, updates: &[Update<'_>], accepted: &mut Accepted) {
+    let mut messages = Messages::default();
+    updates.iter().for_each(|update| messages.add(update));
+    intake.accept_messages(messages, NOW, accepted);
+    accepted.sort();
+}
 
 fn header(step: u64, outcome_count: u64) -> SnapshotHeader {
     SnapshotHeader {
@@ -28,44 +101,40 @@ fn header(step: u64, outcome_count: u64) -> SnapshotHeader {
     }
 }
 
-fn add_load(batch: &mut Batch) {
-    let load = LoadHeader { run_id: RUN_ID, rate_hz: 10, count: 1, ..LoadHeader::default() };
-    batch.add_update(Update::Scene(&load, b"version = 1\nname = \"dot\"\nsolver.rate_hz = 10\n"));
-    batch.add_update(Update::Topology(&load, &[ConstraintState::default()]));
-    batch.add_update(Update::Surface(&load, &[]));
-    batch.add_update(Update::Colliders(
-        &CollidersHeader { run_id: RUN_ID, ..Default::default() },
-        &[],
-    ));
-    add_tears(batch, 0, &[], 0);
-    add_parameters(batch, 0);
+fn keyframe_header(step: u64) -> KeyframeHeader {
+    KeyframeHeader { run_id: RUN_ID, step, size_bytes: 1 }
 }
 
-fn add_snapshot(batch: &mut Batch, header: &SnapshotHeader) {
-    batch.add_snapshot(header, &[ParticleState::default()]);
+fn keyframe(step: u64) -> Change {
+    Change::Keyframe(keyframe_header(step), vec![1])
 }
 
-/// Adds a list of cut constraints.
-fn add_tears(batch: &mut Batch, step: u64, torn: &[u32], new_count: u32) {
-    let count = u32::try_from(torn.len()).unwrap();
-    let header = TearsHeader { run_id: RUN_ID, step, since_step: 0, new_count, count };
-    let cut = |one: &u32| TornConstraint::new(*one, Some(TearCause::Cut));
-    let torn: Vec<_> = torn.iter().map(cut).collect();
-    batch.add_update(Update::Tears(&header, &torn));
+fn tears_header(step: u64) -> TearsHeader {
+    TearsHeader { run_id: RUN_ID, step, ..TearsHeader::default() }
 }
 
-fn add_parameters(batch: &mut Batch, step: u64) {
-    let header = ParametersHeader { run_id: RUN_ID, step, ..ParametersHeader::default() };
-    batch.add_update(Update::Parameters(&header, &ParameterValues::default()));
+/// A list of new cuts. `count` constraints are torn in all.
+fn tears(step: u64, new: &[u32], count: u32) -> Change {
+    let new_count = u32::try_from(new.len()).unwrap();
+    let header = TearsHeader { new_count, count, ..tears_header(step) };
+    Change::Tears(header, new.iter().copied().map(cut).collect())
 }
 
-fn add_keyframe(batch: &mut Batch, step: u64) {
-    let header = KeyframeHeader { run_id: RUN_ID, step, size_bytes: 1 };
-    batch.add_update(Update::Keyframe(&header, &[1]));
+fn cut(constraint: u32) -> TornConstraint {
+    TornConstraint::new(constraint, Some(TearCause::Cut))
+}
+
+fn colliders_header(step: u64) -> CollidersHeader {
+    CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() }
+}
+
+fn parameters_header(step: u64) -> ParametersHeader {
+    ParametersHeader { run_id: RUN_ID, step, ..ParametersHeader::default() }
 }
 
 fn outcome(index: u64, step: u64) -> Outcome {
-    Outcome::new(index, step, Command::new(1, index, Action::Reset), Ok(()))
+    let command = Command::new(1, index, Action::Reset);
+    Outcome { run_id: RUN_ID, ..Outcome::new(index, step, command, Ok(())) }
 }
 
 /// Returns names such as "snapshot 3" and "/keyframe 3".
@@ -77,232 +146,9 @@ fn names(accepted: &Accepted) -> Vec<String> {
     accepted.contents.iter().map(name).collect()
 }
 
-/// An intake that started at step 4, after two outcomes.
-fn started() -> Intake {
-    let mut intake = Intake::default();
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    add_snapshot(&mut batch, &header(4, 2));
-    add_keyframe(&mut batch, 4);
-    assert!(intake.accept(batch, NOW).unwrap().header.is_some());
-    intake
-}
-
-#[test]
-fn the_recording_starts_at_the_first_snapshot_with_a_keyframe() {
-    let mut intake = Intake::default();
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    add_keyframe(&mut batch, 1);
-    add_snapshot(&mut batch, &header(2, 0));
-    assert!(names(&intake.accept(batch, NOW).unwrap()).is_empty());
-
-    let mut batch = Batch::default();
-    for step in 3..6 {
-        add_snapshot(&mut batch, &header(step, 0));
-    }
-    add_keyframe(&mut batch, 4);
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(
-        names(&accepted),
-        ["/topology 0", "/surface 0", "/parameters 0", "/keyframe 4", "snapshot 4", "snapshot 5"]
-    );
-    let run = accepted.header.unwrap().run;
-    assert_eq!((run.scene_name.as_str(), run.rate_hz, run.constraint_count), ("dot", 10, 1));
-    // Published at a wall-clock time of 4 s, in step 4 at 10 Hz.
-    assert_eq!(run.epoch_ns, 4_000_000_000 - 400_000_000);
-    assert_eq!(intake.first_step(), Some(4));
-}
-
-#[test]
-fn a_keyframe_that_arrives_after_its_snapshot_starts_the_recording() {
-    let mut intake = Intake::default();
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    add_snapshot(&mut batch, &header(9, 0));
-    batch.add_update(Update::Outcome(&outcome(0, 10)));
-    assert!(names(&intake.accept(batch, NOW).unwrap()).is_empty());
-    let mut batch = Batch::default();
-    add_keyframe(&mut batch, 9);
-    let accepted = intake.accept(batch, NOW).unwrap();
-    let expected =
-        ["/topology 0", "/surface 0", "/parameters 0", "/keyframe 9", "snapshot 9", "/outcomes 10"];
-    assert_eq!(names(&accepted), expected);
-}
-
-#[test]
-fn an_outcome_before_the_first_snapshot_is_kept() {
-    let mut intake = Intake::default();
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    batch.add_update(Update::Outcome(&outcome(0, 1)));
-    assert!(names(&intake.accept(batch, NOW).unwrap()).is_empty());
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &header(0, 0));
-    add_keyframe(&mut batch, 0);
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(names(&accepted)[3..], ["/keyframe 0", "snapshot 0", "/outcomes 1"]);
-    assert_eq!(intake.counts().missing(), 0);
-}
-
-#[test]
-fn the_recording_ends_with_the_last_requested_step_and_counts_nothing_after_it() {
-    let mut intake = Intake::new(Some(2));
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    for step in [0, 1, 2, 5] {
-        add_snapshot(&mut batch, &header(step, step));
-        add_keyframe(&mut batch, step);
-        batch.add_update(Update::Outcome(&outcome(step, step + 1)));
-    }
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(accepted.end, Some(RunEnd::EndStep));
-    let expected = [
-        "/keyframe 0",
-        "snapshot 0",
-        "/keyframe 1",
-        "/outcomes 1",
-        "snapshot 1",
-        "/keyframe 2",
-        "/outcomes 2",
-        "snapshot 2",
-    ];
-    assert_eq!(names(&accepted)[3..], expected);
-    assert_eq!(intake.counts().missing(), 0);
-    assert_eq!(intake.counts()[Topic::Particles].received, 3);
-}
-
-#[test]
-fn a_batch_is_written_in_the_order_of_publication() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &header(5, 3));
-    add_snapshot(&mut batch, &header(6, 4));
-    for run_id in [RUN_ID, RUN_ID + 1] {
-        let status = NodeStatus { run_id, step: 5, ..NodeStatus::default() };
-        batch.add_update(Update::Status(&status));
-    }
-    for step in [5, 6, 7] {
-        add_keyframe(&mut batch, step);
-    }
-    for (index, step) in [(2, 5), (3, 6), (4, 7)] {
-        batch.add_update(Update::Outcome(&outcome(index, step)));
-    }
-    let expected = [
-        "/keyframe 5",
-        "/outcomes 5",
-        "/status 5",
-        "snapshot 5",
-        "/keyframe 6",
-        "/outcomes 6",
-        "snapshot 6",
-        "/keyframe 7",
-        "/outcomes 7",
-    ];
-    assert_eq!(names(&intake.accept(batch, NOW).unwrap()), expected);
-    assert_eq!(intake.counts().missing(), 0);
-}
-
-#[test]
-fn outcomes_of_the_first_state_and_answers_of_a_replay_are_skipped() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    batch.add_update(Update::Outcome(&outcome(1, 4)));
-    let control = Outcome { flags: OUTCOME_FLAG_CONTROL, ..outcome(2, 5) };
-    batch.add_update(Update::Outcome(&control));
-    assert!(names(&intake.accept(batch, NOW).unwrap()).is_empty());
-    assert_eq!(intake.counts().missing(), 0);
-}
-
-#[test]
-fn missing_outcomes_are_counted() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &header(5, 4));
-    batch.add_update(Update::Outcome(&outcome(3, 5)));
-    intake.accept(batch, NOW).unwrap();
-    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 1);
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &header(6, 9));
-    intake.accept(batch, NOW).unwrap();
-    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 6, "including those at the end");
-}
-
-#[test]
-fn missing_snapshots_are_counted_by_the_stride_of_the_node() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    // The node paused at step 30. Steps 20, 24 and 36 are missing.
-    for step in [8, 12, 16, 28, 30, 32, 40] {
-        add_snapshot(&mut batch, &SnapshotHeader { stride: 4, ..header(step, 2) });
-    }
-    intake.accept(batch, NOW).unwrap();
-    let counts = intake.counts();
-    assert_eq!(counts[Topic::Particles].gaps, 3);
-    assert_eq!((counts[Topic::Particles].received, counts[Topic::Steps].received), (8, 8));
-}
-
-#[test]
-fn missing_keyframes_are_counted() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    for (step, keyframe_step) in [(5, 4), (6, 6), (7, 7), (8, 7)] {
-        add_snapshot(&mut batch, &SnapshotHeader { keyframe_step, ..header(step, 2) });
-    }
-    add_keyframe(&mut batch, 7);
-    // A keyframe that was read before its snapshot does not affect those in between.
-    add_keyframe(&mut batch, 11);
-    intake.accept(batch, NOW).unwrap();
-    assert_eq!(intake.counts()[Topic::Keyframe].gaps, 1);
-    let mut batch = Batch::default();
-    for (step, keyframe_step) in [(9, 9), (10, 10), (11, 11)] {
-        add_snapshot(&mut batch, &SnapshotHeader { keyframe_step, ..header(step, 2) });
-    }
-    intake.accept(batch, NOW).unwrap();
-    assert_eq!(intake.counts()[Topic::Keyframe].gaps, 3);
-}
-
-#[test]
-fn another_run_ends_the_recording_and_is_not_part_of_it() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &header(5, 3));
-    add_snapshot(&mut batch, &SnapshotHeader { run_id: 78, ..header(0, 0) });
-    batch.add_update(Update::Outcome(&outcome(2, 5)));
-    batch.add_update(Update::Outcome(&outcome(3, 7)));
-    let other = KeyframeHeader { run_id: 78, step: 9, size_bytes: 1 };
-    batch.add_update(Update::Keyframe(&other, &[1]));
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(names(&accepted), ["/outcomes 5", "snapshot 5"]);
-    assert_eq!(accepted.end, Some(RunEnd::NewRun));
-    assert_eq!(intake.counts().missing(), 0);
-}
-
-#[test]
-fn another_load_ends_the_recording() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &SnapshotHeader { topology_revision: 1, ..header(5, 2) });
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!((names(&accepted).len(), accepted.end), (0, Some(RunEnd::NewLoad)));
-}
-
-#[test]
-fn an_invalid_scene_is_refused() {
-    let mut intake = Intake::default();
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    let load = LoadHeader { run_id: RUN_ID, ..LoadHeader::default() };
-    batch.add_update(Update::Scene(&load, b"version = 99"));
-    add_snapshot(&mut batch, &header(0, 0));
-    add_keyframe(&mut batch, 0);
-    assert!(matches!(intake.accept(batch, NOW), Err(IntakeError::Scene(_))));
-}
-
 /// Returns the tears, the events and the number of colliders in each step.
 fn side_rows(accepted: &Accepted) -> Vec<String> {
     let text = |content: &Content| match content {
-        Content::Update(Message::Topology(row)) => Some(format!("torn {:?}", row.torn)),
         Content::Update(Message::Tears(row)) => {
             Some(format!("{}: tore {:?} by {:?}", row.step, row.constraints, row.causes))
         }
@@ -315,62 +161,297 @@ fn side_rows(accepted: &Accepted) -> Vec<String> {
     accepted.contents.iter().filter_map(text).collect()
 }
 
-fn add_colliders(batch: &mut Batch, step: u64, count: usize) {
-    let header = CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() };
-    batch.add_update(Update::Colliders(&header, &vec![ColliderState::default(); count]));
+/// Returns the constraints that tore before the recording.
+fn torn_before(accepted: &Accepted) -> &[u32] {
+    match &accepted.header.as_ref().unwrap().rows[..] {
+        [Message::Topology(row), Message::Surface(_)] => &row.torn,
+        rows => panic!("{rows:?}"),
+    }
+}
+
+/// An intake that started at step 4, after two outcomes.
+fn started() -> Intake {
+    let mut intake = Intake::default();
+    let accepted = publish(&mut intake, header(4, 2), &[Change::Load, keyframe(4)]);
+    assert!(accepted.header.is_some());
+    intake
 }
 
 #[test]
-fn a_late_recording_starts_with_the_torn_constraints_and_the_colliders() {
+fn the_recording_starts_at_the_first_state_with_a_keyframe() {
     let mut intake = Intake::default();
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    add_tears(&mut batch, 3, &[0], 1);
-    for step in [1, 2, 7] {
-        add_colliders(&mut batch, step, 2);
-    }
-    for step in [6, 7] {
-        add_snapshot(&mut batch, &SnapshotHeader { torn_count: 1, ..header(step, 0) });
-        add_keyframe(&mut batch, step);
-    }
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(side_rows(&accepted), ["torn [0]", "2: 2 colliders", "7: 2 colliders"]);
-    assert_eq!(
-        names(&accepted)[..4],
-        ["/topology 0", "/surface 0", "/parameters 0", "/colliders 2"]
-    );
+    assert!(names(&publish(&mut intake, header(2, 0), &[Change::Load, keyframe(1)])).is_empty());
+    assert!(names(&publish(&mut intake, header(3, 0), &[])).is_empty());
+    let accepted = publish(&mut intake, header(4, 0), &[keyframe(4)]);
+    assert_eq!(names(&accepted), ["/parameters 0", "/keyframe 4", "snapshot 4"]);
+    assert!(torn_before(&accepted).is_empty());
+    let run = accepted.header.unwrap().run;
+    assert_eq!((run.scene_name.as_str(), run.rate_hz, run.constraint_count), ("dot", 10, 1));
+    // Published at a wall-clock time of 4 s, in step 4 at 10 Hz.
+    assert_eq!(run.epoch_ns, 4_000_000_000 - 400_000_000);
+    assert_eq!(names(&publish(&mut intake, header(5, 0), &[])), ["snapshot 5"]);
+    assert_eq!((intake.first_step(), intake.counts().missing()), (Some(4), 0));
+}
+
+#[test]
+fn a_keyframe_that_a_paused_node_publishes_after_the_state_starts_the_recording() {
+    let mut intake = Intake::default();
+    assert!(names(&publish(&mut intake, header(9, 0), &[Change::Load])).is_empty());
+    let answer = outcome(0, 10);
+    assert!(names(&send(&mut intake, &[Update::Outcome(&answer)])).is_empty());
+    let accepted = send(&mut intake, &[Update::Keyframe(&keyframe_header(9), &[1])]);
+    let expected = ["/parameters 0", "/keyframe 9", "snapshot 9", "/outcomes 10"];
+    assert_eq!(names(&accepted), expected);
+    // The tap passes on the keyframe with the next state as well.
+    let accepted = publish(&mut intake, header(10, 1), &[keyframe(9)]);
+    assert_eq!(names(&accepted), ["snapshot 10"]);
     assert_eq!(intake.counts().missing(), 0);
 }
 
 #[test]
-fn the_recording_starts_only_when_the_torn_constraints_are_known() {
+fn a_keyframe_that_comes_with_the_next_state_starts_the_recording_before_it() {
     let mut intake = Intake::default();
-    let torn = |step| SnapshotHeader { torn_count: 1, ..header(step, 0) };
-    let mut batch = Batch::default();
-    add_load(&mut batch);
-    add_snapshot(&mut batch, &torn(6));
-    add_keyframe(&mut batch, 6);
-    assert!(names(&intake.accept(batch, NOW).unwrap()).is_empty());
-    let mut batch = Batch::default();
-    add_tears(&mut batch, 5, &[0], 1);
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!(
-        names(&accepted),
-        ["/topology 0", "/surface 0", "/parameters 0", "/keyframe 6", "snapshot 6"]
-    );
-    assert_eq!(side_rows(&accepted), ["torn [0]"]);
+    assert!(names(&publish(&mut intake, header(9, 0), &[Change::Load])).is_empty());
+    let accepted = publish(&mut intake, header(10, 0), &[keyframe(9)]);
+    let expected = ["/parameters 0", "/keyframe 9", "snapshot 9", "snapshot 10"];
+    assert_eq!(names(&accepted), expected);
+}
+
+#[test]
+fn outcomes_that_the_first_state_does_not_contain_are_kept() {
+    let mut intake = Intake::default();
+    let outcomes = [outcome(0, 1), outcome(1, 3)];
+    let updates = outcomes.each_ref().map(Update::Outcome);
+    assert!(names(&send(&mut intake, &updates)).is_empty());
+    let mut accepted = publish(&mut intake, header(2, 1), &[Change::Load, keyframe(2)]);
+    add(&mut intake, &[], &mut accepted);
+    assert_eq!(names(&accepted)[1..], ["/keyframe 2", "snapshot 2", "/outcomes 3"]);
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn the_recording_ends_with_the_last_requested_step_and_counts_nothing_after_it() {
+    let (mut intake, node) = (Intake::new(Some(2)), Node::new());
+    let mut accepted = Accepted::default();
+    let load = [Change::Load, keyframe(0)];
+    node.publish(&mut intake, header(0, 0), &load, &mut accepted).unwrap();
+    for step in [1, 2] {
+        assert_eq!(accepted.end, None);
+        node.publish(&mut intake, header(step, step), &[keyframe(step)], &mut accepted).unwrap();
+    }
+    assert_eq!(accepted.end, Some(RunEnd::EndStep));
+    let outcomes = [outcome(0, 1), outcome(1, 2), outcome(2, 3)];
+    add(&mut intake, &outcomes.each_ref().map(Update::Outcome), &mut accepted);
+    let expected = [
+        "/keyframe 0",
+        "snapshot 0",
+        "/keyframe 1",
+        "/outcomes 1",
+        "snapshot 1",
+        "/keyframe 2",
+        "/outcomes 2",
+        "snapshot 2",
+    ];
+    assert_eq!(names(&accepted)[1..], expected);
+    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(intake.counts()[Topic::Particles].received, 3);
+}
+
+#[test]
+fn a_state_beyond_the_last_requested_step_ends_the_recording() {
+    let mut intake = Intake::new(Some(2));
+    publish(&mut intake, header(0, 0), &[Change::Load, keyframe(0)]);
+    let accepted = publish(&mut intake, header(5, 0), &[keyframe(5)]);
+    assert_eq!((names(&accepted).len(), accepted.end), (0, Some(RunEnd::EndStep)));
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn messages_are_written_in_the_order_of_publication() {
+    let (mut intake, node) = (started(), Node::new());
+    let mut accepted = Accepted::default();
+    node.publish(&mut intake, header(5, 3), &[keyframe(5)], &mut accepted).unwrap();
+    node.publish(&mut intake, header(6, 4), &[keyframe(6)], &mut accepted).unwrap();
+    let status = |run_id, step| NodeStatus { run_id, step, ..NodeStatus::default() };
+    let statuses = [status(RUN_ID, 5), status(RUN_ID + 1, 5), status(RUN_ID, 3)];
+    let outcomes = [outcome(2, 5), outcome(3, 6), outcome(4, 7)];
+    let mut updates: Vec<_> = statuses.iter().map(Update::Status).collect();
+    updates.extend(outcomes.iter().map(Update::Outcome));
+    add(&mut intake, &updates, &mut accepted);
+    let expected = [
+        "/keyframe 5",
+        "/outcomes 5",
+        "/status 5",
+        "snapshot 5",
+        "/keyframe 6",
+        "/outcomes 6",
+        "snapshot 6",
+        "/outcomes 7",
+    ];
+    assert_eq!(names(&accepted), expected);
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn outcomes_of_the_first_state_of_other_runs_and_of_a_replay_are_skipped() {
+    let mut intake = started();
+    let other = Outcome { run_id: RUN_ID + 1, ..outcome(7, 5) };
+    let control = Outcome { flags: OUTCOME_FLAG_CONTROL, ..outcome(2, 5) };
+    let outcomes = [outcome(1, 4), other, control];
+    let accepted = send(&mut intake, &outcomes.each_ref().map(Update::Outcome));
+    assert!(names(&accepted).is_empty());
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn missing_outcomes_are_counted() {
+    let mut intake = started();
+    publish(&mut intake, header(5, 4), &[]);
+    send(&mut intake, &[Update::Outcome(&outcome(3, 5))]);
+    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 1);
+    publish(&mut intake, header(6, 9), &[]);
+    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 6, "including those at the end");
+}
+
+#[test]
+fn missing_states_are_counted_by_the_stride_of_the_node() {
+    let mut intake = started();
+    // The node paused at step 30. Steps 20, 24 and 36 are missing.
+    for step in [8, 12, 16, 28, 30, 32, 40] {
+        publish(&mut intake, SnapshotHeader { stride: 4, ..header(step, 2) }, &[]);
+    }
+    let counts = intake.counts();
+    assert_eq!(counts[Topic::Particles].gaps, 3);
+    assert_eq!((counts[Topic::Particles].received, counts[Topic::Steps].received), (8, 8));
+}
+
+#[test]
+fn missing_keyframes_are_counted() {
+    let mut intake = started();
+    let mut publish = |step, keyframe_step, changes: &[Change]| {
+        publish(&mut intake, SnapshotHeader { keyframe_step, ..header(step, 2) }, changes);
+        intake.counts()[Topic::Keyframe].gaps
+    };
+    assert_eq!(publish(5, 4, &[]), 0);
+    assert_eq!(publish(6, 6, &[]), 1);
+    assert_eq!(publish(7, 7, &[keyframe(7)]), 1);
+    assert_eq!(publish(8, 7, &[]), 1);
+    assert_eq!(publish(9, 9, &[]), 2);
+}
+
+#[test]
+fn dropped_changes_are_counted_from_the_start_on() {
+    let mut intake = Intake::default();
+    let lost =
+        |count| LostChanges { colliders: count, parameters: 2 * count, ..Default::default() };
+    intake.set_lost(lost(5));
+    publish(&mut intake, header(4, 2), &[Change::Load, keyframe(4)]);
+    assert_eq!(intake.counts().missing(), 0);
+    intake.set_lost(lost(6));
+    let counts = intake.counts();
+    assert_eq!((counts[Topic::Colliders].gaps, counts[Topic::Parameters].gaps), (1, 2));
+}
+
+#[test]
+fn another_run_ends_the_recording_and_is_not_part_of_it() {
+    let (mut intake, node) = (started(), Node::new());
+    let mut accepted = Accepted::default();
+    node.publish(&mut intake, header(5, 3), &[], &mut accepted).unwrap();
+    let other = SnapshotHeader { run_id: RUN_ID + 1, ..header(0, 0) };
+    node.publish(&mut intake, other, &[Change::Load, keyframe(0)], &mut accepted).unwrap();
+    let outcomes = [outcome(2, 5), outcome(3, 7)];
+    add(&mut intake, &outcomes.each_ref().map(Update::Outcome), &mut accepted);
+    assert_eq!(names(&accepted), ["/outcomes 5", "snapshot 5"]);
+    assert_eq!(accepted.end, Some(RunEnd::NewRun));
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn another_load_ends_the_recording() {
+    let mut intake = started();
+    let other = SnapshotHeader { topology_revision: 1, ..header(5, 2) };
+    let accepted = publish(&mut intake, other, &[Change::Load, tears(5, &[], 0), keyframe(5)]);
+    assert_eq!((names(&accepted).len(), accepted.end), (0, Some(RunEnd::NewLoad)));
+    assert_eq!(intake.counts().missing(), 0);
+}
+
+#[test]
+fn an_invalid_scene_is_refused() {
+    let mut node = Node::new();
+    node.load.scene = b"version = 99".to_vec();
+    let (mut intake, mut accepted) = (Intake::default(), Accepted::default());
+    let result = node.publish(&mut intake, header(0, 0), &[Change::Load], &mut accepted);
+    assert!(matches!(result, Err(LoadError::Scene(_))));
+}
+
+#[test]
+fn a_late_recording_starts_with_the_torn_constraints_and_the_colliders() {
+    let mut node = Node::new();
+    node.torn.constraints = vec![cut(9), cut(1), cut(4)];
+    node.torn.header = TearsHeader { new_count: 1, count: 3, ..tears_header(6) };
+    node.colliders.header = colliders_header(2);
+    node.colliders.colliders = vec![ColliderState::default(); 2];
+    node.parameters.header = parameters_header(5);
+    let start = |step| {
+        let (mut intake, mut accepted) = (Intake::default(), Accepted::default());
+        let header = SnapshotHeader { torn_count: 3, ..header(step, 0) };
+        let changes = [Change::Load, keyframe(step)];
+        node.publish(&mut intake, header, &changes, &mut accepted).unwrap();
+        accepted.sort();
+        assert_eq!(intake.counts().missing(), 0);
+        accepted
+    };
+    let first = start(6);
+    assert_eq!(torn_before(&first), [9, 1]);
+    let expected = ["/colliders 2", "/parameters 5", "/tears 6", "/keyframe 6", "snapshot 6"];
+    assert_eq!(names(&first), expected);
+    assert_eq!(side_rows(&first), ["2: 2 colliders", "6: tore [4] by [\"cut\"]"]);
+    let later = start(7);
+    assert_eq!(torn_before(&later), [9, 1, 4]);
+    assert_eq!(names(&later), ["/colliders 2", "/parameters 5", "/keyframe 7", "snapshot 7"]);
+}
+
+#[test]
+fn the_recording_starts_only_with_a_complete_state() {
+    let starts = |change: fn(&mut Node)| {
+        let mut node = Node::new();
+        change(&mut node);
+        let (mut intake, mut accepted) = (Intake::default(), Accepted::default());
+        let changes = [Change::Load, keyframe(4)];
+        node.publish(&mut intake, header(4, 0), &changes, &mut accepted).unwrap();
+        accepted.header.is_some()
+    };
+    assert!(starts(|_| {}));
+    assert!(!starts(|node| node.torn.header = TearsHeader::default()));
+    assert!(!starts(|node| node.torn.constraints = vec![cut(1)]));
+    assert!(!starts(|node| node.colliders.header = CollidersHeader::default()));
+    assert!(!starts(|node| node.parameters.header = ParametersHeader::default()));
+}
+
+#[test]
+fn parameters_of_the_next_step_follow_with_its_state() {
+    let mut node = Node::new();
+    node.parameters.header = parameters_header(5);
+    let (mut intake, mut accepted) = (Intake::default(), Accepted::default());
+    let changes = [Change::Load, keyframe(4)];
+    node.publish(&mut intake, header(4, 0), &changes, &mut accepted).unwrap();
+    accepted.sort();
+    assert_eq!(names(&accepted), ["/keyframe 4", "snapshot 4"]);
+    let changed = Change::Parameters(parameters_header(5), ParameterValues::default());
+    let accepted = publish(&mut intake, header(5, 0), &[changed]);
+    assert_eq!(names(&accepted), ["/parameters 5", "snapshot 5"]);
 }
 
 #[test]
 fn tears_colliders_and_events_precede_their_snapshot() {
-    let mut intake = started();
-    let mut batch = Batch::default();
-    let frozen = ParticleState { flags: ParticleFlags::FROZEN, ..ParticleState::default() };
-    batch.add_snapshot(&SnapshotHeader { torn_count: 1, ..header(5, 2) }, &[frozen]);
-    add_keyframe(&mut batch, 5);
-    add_tears(&mut batch, 5, &[0], 1);
-    add_colliders(&mut batch, 5, 1);
-    let accepted = intake.accept(batch, NOW).unwrap();
+    let (mut intake, mut node) = (started(), Node::new());
+    node.particles[0].flags = ParticleFlags::FROZEN;
+    let colliders = Change::Colliders(colliders_header(5), vec![ColliderState::default()]);
+    let changes = [colliders, tears(5, &[0], 1), keyframe(5)];
+    let header = SnapshotHeader { torn_count: 1, ..header(5, 2) };
+    let mut accepted = Accepted::default();
+    node.publish(&mut intake, header, &changes, &mut accepted).unwrap();
+    accepted.sort();
     let expected = ["/colliders 5", "/tears 5", "/keyframe 5", "/events 5", "snapshot 5"];
     assert_eq!(names(&accepted), expected);
     let frozen = "5: particle 0 was not finite and is frozen";
@@ -382,32 +463,12 @@ fn tears_colliders_and_events_precede_their_snapshot() {
 }
 
 #[test]
-fn messages_of_another_load_are_not_part_of_the_recording() {
+fn tears_that_never_arrived_are_counted() {
     let mut intake = started();
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &header(5, 2));
-    add_tears(&mut batch, 6, &[], 0);
-    add_colliders(&mut batch, 6, 3);
-    assert_eq!(names(&intake.accept(batch, NOW).unwrap()), ["snapshot 5"]);
-    let mut batch = Batch::default();
-    add_snapshot(&mut batch, &SnapshotHeader { topology_revision: 1, ..header(6, 3) });
-    let accepted = intake.accept(batch, NOW).unwrap();
-    assert_eq!((names(&accepted).len(), accepted.end), (0, Some(RunEnd::NewLoad)));
-    assert_eq!(intake.counts().missing(), 0);
-}
-
-#[test]
-fn tears_before_and_after_a_reset_are_both_recorded() {
-    let mut intake = started();
-    for (step, since_step) in [(5, 0), (9, 8)] {
-        let mut batch = Batch::default();
-        let header_of_tears =
-            TearsHeader { run_id: RUN_ID, step, since_step, new_count: 1, count: 1 };
-        let torn = TornConstraint::new(0, Some(TearCause::Cut));
-        batch.add_update(Update::Tears(&header_of_tears, &[torn]));
-        add_snapshot(&mut batch, &SnapshotHeader { torn_count: 1, ..header(step, 2) });
-        let accepted = intake.accept(batch, NOW).unwrap();
-        assert_eq!(side_rows(&accepted), [format!("{step}: tore [0] by [\"cut\"]")]);
-    }
+    publish(&mut intake, SnapshotHeader { torn_count: 1, ..header(5, 2) }, &[tears(5, &[0], 1)]);
     assert_eq!(intake.counts()[Topic::Tears].gaps, 0);
+    publish(&mut intake, SnapshotHeader { torn_count: 3, ..header(6, 2) }, &[]);
+    assert_eq!(intake.counts()[Topic::Tears].gaps, 2);
+    publish(&mut intake, header(7, 3), &[tears(7, &[], 0)]);
+    assert_eq!(intake.counts()[Topic::Tears].gaps, 0, "after a reset");
 }

@@ -1,0 +1,70 @@
+//! A copy of the state at which a recording can start.
+
+use sim_contract::{Change, KeyframeHeader, ParticleState, SnapshotHeader, State, TearsHeader};
+
+/// A copy of a state, with the changes that a recording from this state on begins with.
+#[derive(Debug)]
+pub(crate) struct FirstState {
+    pub(crate) header: SnapshotHeader,
+    pub(crate) particles: Vec<ParticleState>,
+    /// Constraints that tore in earlier steps.
+    pub(crate) torn_before: Vec<u32>,
+    /// The colliders, the tears of its own step, the parameters, and its keyframe if it has arrived.
+    pub(crate) changes: Vec<Change>,
+}
+
+impl FirstState {
+    /// Copies a state. Returns `None` if a part of it has not arrived, as right after attaching.
+    pub(crate) fn new(state: &State<'_>) -> Option<Self> {
+        let State { header, torn, colliders, parameters, .. } = *state;
+        let is_complete = torn.constraints.len() == header.torn_count as usize
+            && torn.header.run_id == header.run_id
+            && colliders.header.run_id == header.run_id
+            && parameters.header.run_id == header.run_id;
+        if !is_complete {
+            return None;
+        }
+        let own_count = own_tear_count(header, &torn.header);
+        let (before, own) =
+            torn.constraints.split_at(torn.constraints.len().saturating_sub(own_count));
+        let mut changes = vec![
+            Change::Colliders(colliders.header, colliders.colliders.clone()),
+            Change::Tears(torn.header, own.to_vec()),
+        ];
+        // Parameters of the next step follow with its state.
+        if parameters.header.step <= header.step {
+            changes.push(Change::Parameters(parameters.header, parameters.values));
+        }
+        changes
+            .extend(state.changes.iter().filter(|change| is_keyframe_of(change, header)).cloned());
+        Some(Self {
+            header: *header,
+            particles: state.particles.to_vec(),
+            torn_before: before.iter().map(|torn| torn.constraint).collect(),
+            changes,
+        })
+    }
+
+    /// Returns `true` if the keyframe has arrived.
+    pub(crate) fn has_keyframe(&self) -> bool {
+        self.changes.iter().any(|change| is_keyframe_of(change, &self.header))
+    }
+
+    /// Adds the keyframe of this state. Ignores those of other states.
+    pub(crate) fn add_keyframe(&mut self, keyframe: &KeyframeHeader, bytes: &[u8]) {
+        let change = Change::Keyframe(*keyframe, bytes.to_vec());
+        if is_keyframe_of(&change, &self.header) && !self.has_keyframe() {
+            self.changes.push(change);
+        }
+    }
+}
+
+/// Returns the number of constraints that tore in the step of a snapshot.
+fn own_tear_count(snapshot: &SnapshotHeader, tears: &TearsHeader) -> usize {
+    if tears.step == snapshot.step { tears.new_count as usize } else { 0 }
+}
+
+fn is_keyframe_of(change: &Change, snapshot: &SnapshotHeader) -> bool {
+    matches!(change, Change::Keyframe(keyframe, _)
+        if (keyframe.run_id, keyframe.step) == (snapshot.run_id, snapshot.step))
+}

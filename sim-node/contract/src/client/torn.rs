@@ -1,0 +1,106 @@
+//! The list of torn constraints.
+
+use crate::messages::tears::{TearsHeader, TornConstraint};
+
+/// The constraints torn since the load or the last reset. Empty if nothing tore.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Torn {
+    /// Header of the list: the step of the newest tear, and the number of tears in that step.
+    pub header: TearsHeader,
+    /// The `header.count` constraints, in the order of tearing.
+    pub constraints: Vec<TornConstraint>,
+}
+
+impl Torn {
+    /// Returns the indices of the constraints, in the order of tearing.
+    pub fn indices(&self) -> impl Iterator<Item = u32> {
+        self.constraints.iter().map(|torn| torn.constraint)
+    }
+
+    /// Empties the list at a reset in `step`.
+    pub fn reset(&mut self, step: u64) {
+        self.constraints.clear();
+        let TearsHeader { run_id, .. } = self.header;
+        self.header = TearsHeader { run_id, step, since_step: step, new_count: 0, count: 0 };
+    }
+
+    /// Adds the constraints that tore in `step`.
+    pub fn extend(&mut self, step: u64, new: impl IntoIterator<Item = TornConstraint>) {
+        let old_count = self.constraints.len();
+        self.constraints.extend(new);
+        self.header.step = step;
+        self.header.new_count = to_count(self.constraints.len() - old_count);
+        self.header.count = to_count(self.constraints.len());
+    }
+
+    /// Keeps the first `count` constraints.
+    pub fn truncate(&mut self, count: u32) {
+        self.constraints.truncate(count as usize);
+        self.header.count = to_count(self.constraints.len());
+        self.header.new_count = self.header.new_count.min(self.header.count);
+    }
+
+    /// Replaces the list by a later one. Returns the constraints that the old list lacks.
+    pub(crate) fn replace(
+        &mut self,
+        header: TearsHeader,
+        list: &[TornConstraint],
+    ) -> Vec<TornConstraint> {
+        let (old, new) = (&self.header, &header);
+        let is_continuation = (old.run_id, old.since_step) == (new.run_id, new.since_step);
+        let known_count = if is_continuation { self.constraints.len().min(list.len()) } else { 0 };
+        self.header = header;
+        self.constraints.clear();
+        self.constraints.extend_from_slice(list);
+        list[known_count..].to_vec()
+    }
+}
+
+/// Collects constraints that tore before step 0, in the order of tearing.
+impl FromIterator<TornConstraint> for Torn {
+    fn from_iter<T: IntoIterator<Item = TornConstraint>>(constraints: T) -> Self {
+        let mut torn = Self::default();
+        torn.extend(0, constraints);
+        torn.header.new_count = 0;
+        torn
+    }
+}
+
+fn to_count(len: usize) -> u32 {
+    u32::try_from(len).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn torn(indices: &[u32]) -> Vec<TornConstraint> {
+        indices.iter().map(|index| TornConstraint::new(*index, None)).collect()
+    }
+
+    #[test]
+    fn a_list_grows_by_steps_and_a_reset_empties_it() {
+        let mut list: Torn = torn(&[7, 2]).into_iter().collect();
+        let before = TearsHeader { count: 2, ..TearsHeader::default() };
+        assert_eq!(list.header, before);
+        list.extend(5, torn(&[4]));
+        let header = TearsHeader { step: 5, new_count: 1, count: 3, ..TearsHeader::default() };
+        assert_eq!((list.header, list.constraints.as_slice()), (header, &torn(&[7, 2, 4])[..]));
+        list.truncate(2);
+        assert_eq!((list.header.count, list.indices().collect::<Vec<_>>()), (2, vec![7, 2]));
+        list.reset(8);
+        let empty = TearsHeader { step: 8, since_step: 8, ..TearsHeader::default() };
+        assert_eq!((list.header, list.constraints.len()), (empty, 0));
+    }
+
+    #[test]
+    fn a_later_list_continues_the_same_load_or_replaces_another() {
+        let header = |step, since_step| TearsHeader { step, since_step, ..TearsHeader::default() };
+        let mut list = Torn::default();
+        assert_eq!(list.replace(header(3, 0), &torn(&[7])), torn(&[7]));
+        assert_eq!(list.replace(header(5, 0), &torn(&[7, 2])), torn(&[2]));
+        assert_eq!(list.replace(header(9, 8), &torn(&[7, 2])), torn(&[7, 2]), "after a reset");
+        let other_run = TearsHeader { run_id: 1, ..header(9, 8) };
+        assert_eq!(list.replace(other_run, &torn(&[7])), torn(&[7]), "another run");
+    }
+}
