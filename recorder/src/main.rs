@@ -21,7 +21,7 @@ use commands::{export as export_command, info, play, record, scene, simulate, ve
 #[command(
     name = "recorder",
     version,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong option, 3 finished with loss or \
+    after_help = "Exit codes: 0 done, 1 failed, 2 usage error, 3 finished with loss or \
         divergence.\n\nExamples:\n  \
         recorder record -o run.mcap\n  \
         recorder play run.mcap\n  \
@@ -48,7 +48,7 @@ enum Command {
     Record(record::RecordArgs),
     /// Print the scene of a recording
     Scene(scene::SceneArgs),
-    /// Simulate a scene in this process, as fast as possible, into the same recording as a live run
+    /// Simulate a scene in this process, as fast as possible, and record it like a live run
     Simulate(simulate::SimulateArgs),
     /// Re-simulate a recording and compare every bit
     Verify(verify::VerifyArgs),

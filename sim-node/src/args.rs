@@ -24,7 +24,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
-/// The node publishes every state in shared memory, where other processes read it without a copy,
+/// The node publishes every state in shared memory, where other processes read it without copying,
 /// and accepts commands (grab, pin, pause, ...) from all of them. Without arguments, it runs the
 /// built-in scene `curtain` until Ctrl-C.
 #[derive(Debug, Parser)]
@@ -33,7 +33,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
     version,
     override_usage = "sim-node [run] [OPTIONS] [SCENE]\n       \
         sim-node [--name NAME] [--domain DOMAIN] <COMMAND> ...",
-    after_help = "Exit codes: 0 done, 1 failure, 2 wrong command line, 4 the node rejected a command of `ctl`.\n\n\
+    after_help = "Exit codes: 0 done, 1 failure, 2 usage error, 4 the node rejected a command of `ctl`.\n\n\
         Examples:\n  \
         sim-node                                    run the curtain\n  \
         sim-node run rope --rate 1000               run the rope at 1 kHz\n  \
@@ -43,7 +43,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
         sim-node --domain lab ctl status            show a node of another domain\n  \
         sim-node scenes                             list the built-in scenes\n  \
         sim-node import shirt.obj -o shirt.toml     convert a mesh to a scene\n  \
-        sim-node lesson                             list the lessons of physics"
+        sim-node lesson                             list the physics lessons"
 )]
 pub(crate) struct Args {
     #[command(subcommand)]
@@ -58,11 +58,11 @@ pub(crate) enum Verb {
     Run(RunArgs),
     /// List the built-in scenes
     Scenes(ScenesArgs),
-    /// Print a scene as complete TOML with every default
+    /// Print a scene as complete TOML, with every default
     Show(ShowArgs),
     /// Check a scene without running it, and warn of likely mistakes
     Check(CheckArgs),
-    /// Convert an OBJ mesh to a scene of cloth
+    /// Convert an OBJ mesh to a cloth scene
     Import(ImportArgs),
     /// Command a running node, or query its state
     Ctl(CtlArgs),
@@ -70,7 +70,7 @@ pub(crate) enum Verb {
     Lesson(LessonArgs),
 }
 
-/// Reads the command line. Exits with code 2 and the usage if it is wrong.
+/// Reads the command line. Exits with code 2 and the usage if it is invalid.
 #[allow(clippy::print_stderr, clippy::exit, reason = "clap ends the program in the same way")]
 pub(crate) fn parse() -> Args {
     try_parse(std::env::args_os()).unwrap_or_else(|error| {

@@ -7,7 +7,7 @@ use std::process::{ExitCode, Termination};
 pub(crate) enum Exit {
     /// Exit code 0.
     Done,
-    /// Exit code 1: failed, with the reason on stderr. (Code 2 is a wrong command line.)
+    /// Exit code 1: failed, with the reason on stderr. (Code 2 is a usage error.)
     Failed,
     /// Exit code 4: the node rejected the command of `ctl`.
     Rejected,

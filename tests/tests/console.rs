@@ -130,7 +130,7 @@ fn all_programs_blame_the_environment_for_a_bad_domain_in_it() {
         let finished = Process::start_in(program, "Big Lab", args).wait();
         assert_eq!(finished.code, Some(1), "{program:?}: {}", finished.stderr);
         let blamed = "the environment variable CATENARY_DOMAIN is 'Big Lab', which is not a valid \
-                      domain (allowed: 1 to 24 of a-z, 0-9, '_', '-')";
+                      domain (allowed: 1 to 24 characters of a-z, 0-9, '_', '-')";
         assert!(finished.stderr.contains(blamed), "{program:?}: {}", finished.stderr);
         assert!(!finished.stderr.contains("--domain"), "{program:?}: {}", finished.stderr);
     }

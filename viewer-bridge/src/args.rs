@@ -7,7 +7,7 @@ use clap::Parser;
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 
-/// Show a running simulation in a browser, and touch it there.
+/// Show a running simulation in a browser, and interact with it there.
 ///
 /// Open the printed address to drag, pin, push and cut the particles of a node, to change its
 /// parameters and to watch its timing. The node may start later, end, and start again.
@@ -17,7 +17,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
     name = "viewer-bridge",
     version,
     after_help = "Stop it with Ctrl-C or SIGTERM.\n\n\
-        Exit codes: 0 success, 1 failure, 2 wrong option.\n\nExamples:\n  \
+        Exit codes: 0 success, 1 failure, 2 usage error.\n\nExamples:\n  \
         viewer-bridge                               show the node `sim` at http://127.0.0.1:8080/\n  \
         viewer-bridge --listen 127.0.0.1:0          use any free port; the address is printed\n  \
         viewer-bridge --name left --domain lab      show another node\n  \
@@ -31,7 +31,8 @@ pub(crate) struct Args {
     /// in the printed address. The connection is not encrypted
     #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8080")]
     pub(crate) listen: SocketAddr,
-    /// Name of this host in browsers, besides its addresses and `localhost`; can be repeated
+    /// Name by which browsers reach this host, besides its addresses and `localhost`; can be
+    /// repeated
     #[arg(long = "host", value_name = "HOST")]
     pub(crate) hosts: Vec<String>,
     /// Recording to show instead of a node, written by `recorder record` or `recorder simulate`; an
@@ -60,7 +61,7 @@ pub(crate) struct Args {
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: String,
     /// Domain that separates these services from others on this host [env: CATENARY_DOMAIN]
-    /// [default: that of iceoryx2]
+    /// [default: iceoryx2's own domain]
     #[arg(long, value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
     domain: Option<String>,
     /// Folder with the files of the page, for development [default: the built-in files]

@@ -1,5 +1,5 @@
 //! Shows a running simulation or a recording in a browser and in Foxglove viewers, and lets their users
-//! touch it.
+//! interact with it.
 //!
 //! A [`Source`] (a live node, or a recording) publishes updates to [`Sinks`]; each [`sink::Sink`]
 //! translates them into the protocol of its clients. Commands of the clients return to the source as

@@ -1,4 +1,5 @@
-//! `viewer-bridge`: shows a running simulation or a recording in a browser, and lets its users touch it.
+//! `viewer-bridge`: shows a running simulation or a recording in a browser, and lets users interact
+//! with it.
 #![forbid(unsafe_code)]
 
 mod args;

@@ -306,7 +306,7 @@ fn to_page() -> Vec<ToPage> {
             scenes: catalog::all(),
             limits: PageLimits::default(),
         })),
-        ToPage::Node(Node { text: "no simulation runs".to_owned(), ..Node::default() }),
+        ToPage::Node(Node { text: "no node runs".to_owned(), ..Node::default() }),
         ToPage::Node(Node {
             state: NodeState::Alive,
             text: String::new(),

@@ -1,16 +1,16 @@
-//! The options that select a simulation.
+//! The options that select a node.
 
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 
-/// The name and the domain of a simulation.
+/// The name and the domain of a node.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct EndpointArgs {
-    /// Name of the simulation. Its services are NAME/particles, NAME/commands and so on
+    /// Name of the node: its services are NAME/particles, NAME/commands, ...
     #[arg(long, default_value = NAME_DEFAULT, value_name = "NAME", allow_hyphen_values = true,
         value_parser = Endpoint::parse_name)]
     name: String,
-    /// Domain, which separates services from others on this host [env: `CATENARY_DOMAIN`]
-    /// [default: that of iceoryx2]
+    /// Domain that separates these services from others on this host [env: `CATENARY_DOMAIN`]
+    /// [default: iceoryx2's own domain]
     #[arg(long, value_name = "DOMAIN", allow_hyphen_values = true,
         value_parser = Endpoint::parse_domain)]
     domain: Option<String>,

@@ -7,7 +7,7 @@ use std::process::{ExitCode, Termination};
 pub(crate) enum Exit {
     /// 0: success.
     Done,
-    /// 1: failure, with the reason on stderr. (2 is a wrong option, with which clap exits.)
+    /// 1: failure, with the reason on stderr. (2 is a usage error, with which clap exits.)
     Failed,
     /// 3: finished, but with loss, truncation or divergence.
     Loss,

@@ -7,7 +7,7 @@ use super::parse::whole_number_in;
 /// The option of the subcommands that step a solver.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ThreadArgs {
-    /// Number of solver threads, 1 to 64. It speeds up large scenes and does not change any bit of
+    /// Number of solver threads, 1 to 64. More threads speed up large scenes and change no bit of
     /// the result
     #[arg(long, value_name = "N", default_value_t = 1, allow_hyphen_values = true,
         value_parser = thread_count)]

@@ -4,14 +4,14 @@ use std::fmt;
 
 use thiserror::Error;
 
-/// Default name of a simulation.
+/// Default name of a node.
 pub const NAME_DEFAULT: &str = "sim";
 /// Environment variable that replaces an absent `--domain`.
 pub const DOMAIN_VARIABLE: &str = "CATENARY_DOMAIN";
 
 /// Longest name of a domain, in characters: it is part of a socket path of at most 107 bytes.
 const DOMAIN_LENGTH_MAX: usize = 24;
-/// Longest name of a simulation, in characters: service names hold 255.
+/// Longest name of a node, in characters: service names hold 255.
 const NAME_LENGTH_MAX: usize = 64;
 
 /// The address of a simulation: a domain and a name. Programs meet where both are equal.
@@ -31,7 +31,7 @@ pub struct Endpoint {
 pub enum EndpointError {
     /// The domain is empty, too long, or contains a character that is not allowed in it.
     #[error(
-        "'{domain}' is not a valid domain (allowed: 1 to {DOMAIN_LENGTH_MAX} of a-z, 0-9, '_', '-')"
+        "'{domain}' is not a valid domain (allowed: 1 to {DOMAIN_LENGTH_MAX} characters of a-z, 0-9, '_', '-')"
     )]
     Domain {
         /// The refused domain.
@@ -41,7 +41,7 @@ pub enum EndpointError {
     /// it.
     #[error(
         "the environment variable {DOMAIN_VARIABLE} is '{domain}', which is not a valid domain \
-         (allowed: 1 to {DOMAIN_LENGTH_MAX} of a-z, 0-9, '_', '-')"
+         (allowed: 1 to {DOMAIN_LENGTH_MAX} characters of a-z, 0-9, '_', '-')"
     )]
     Variable {
         /// Value of the variable.
@@ -49,7 +49,7 @@ pub enum EndpointError {
     },
     /// The name is empty, too long, or contains a character that is not allowed in it.
     #[error(
-        "'{name}' is not a valid name of a simulation (allowed: 1 to {NAME_LENGTH_MAX} of A-Z, a-z, 0-9, '_', '-', '.')"
+        "'{name}' is not a valid name of a node (allowed: 1 to {NAME_LENGTH_MAX} characters of A-Z, a-z, 0-9, '_', '-', '.')"
     )]
     Name {
         /// The refused name.
@@ -174,7 +174,7 @@ impl Endpoint {
         Ok((Self::resolve(domain.as_deref(), variable, name.as_deref())?, others))
     }
 
-    /// Name of the simulation; its services are called `<name>/...`.
+    /// Name of the node; its services are called `<name>/...`.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(
             parse(Some("Big Lab"), &[]).unwrap_err().to_string(),
             "the environment variable CATENARY_DOMAIN is 'Big Lab', which is not a valid domain \
-             (allowed: 1 to 24 of a-z, 0-9, '_', '-')"
+             (allowed: 1 to 24 characters of a-z, 0-9, '_', '-')"
         );
         let error = parse(Some("Big Lab"), &["--domain", "Lab"]).unwrap_err().to_string();
         assert!(error.starts_with("'Lab' is not a valid domain (allowed: "), "{error}");
@@ -261,12 +261,15 @@ mod tests {
         let long = "x".repeat(25);
         for domain in ["", "Lab", "a/b", "..", "a b", "é", long.as_str()] {
             let error = Endpoint::new(Some(domain), "sim").unwrap_err().to_string();
-            assert!(error.contains("1 to 24 of a-z, 0-9, '_', '-'"), "{error}");
+            assert!(error.contains("1 to 24 characters of a-z, 0-9, '_', '-'"), "{error}");
         }
         let long = "x".repeat(65);
         for name in ["", "a/b", "a b", "é", "a\0", long.as_str()] {
             let error = Endpoint::new(None, name).unwrap_err().to_string();
-            assert!(error.contains("1 to 64 of A-Z, a-z, 0-9, '_', '-', '.'"), "{error}");
+            assert!(
+                error.contains("1 to 64 characters of A-Z, a-z, 0-9, '_', '-', '.'"),
+                "{error}"
+            );
         }
     }
 

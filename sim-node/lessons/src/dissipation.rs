@@ -64,7 +64,7 @@ fn rotor() -> Table {
     Table::new("rotor", "a rigid stick that turns freely, once per second at first, 60 Hz; after 1 s")
         .column(Column::new(Origin::Given, "substeps", "per step").cells(COUNTS))
         .column(
-            column(Origin::Solver, "kept_%", "angular velocity, percent of the first")
+            column(Origin::Solver, "kept_%", "angular velocity, percent of its initial value")
                 .cells(substeps(ROTOR_HZ).map(|rates| 100.0 * rotor_in_solver(rates))),
         )
         .column(
@@ -173,8 +173,8 @@ fn pendulum() -> Table {
         )
         .note(
             "The loss is proportional to h. The cure is more substeps: four times as many leave about \
-             a quarter of the loss and take four times as long to compute. As many passes instead \
-             cost the same and change nothing, because one pass already solves a single stick.",
+             a quarter of the loss and take four times as long to compute. Spending the same time on \
+             passes changes nothing, because one pass already solves a single stick.",
         )
 }
 

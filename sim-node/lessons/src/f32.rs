@@ -171,7 +171,7 @@ fn sum() -> Table {
         .note(
             "At 10 s the tutorial prints 500.498, but the same loop gives 500.497. The last digit is \
              not reproduced. The f64 clock falls short of 10 s and of 1,000 s by its rounding error, \
-             so its loops make one step too many. Count the steps, and compute the time as \
+             so its loops take one step too many. Count the steps, and compute the time as \
              step x dt.",
         )
         .note(

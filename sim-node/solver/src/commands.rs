@@ -130,7 +130,7 @@ impl Solver {
         self.due.tethers |= self.has_flag(index, ParticleFlags::PINNED | ParticleFlags::ANCHORED);
     }
 
-    /// Sets the velocity of every free particle strictly inside a ball to that of a brush.
+    /// Sets the velocity of every free particle strictly inside a sphere to that of a brush.
     ///
     /// # Errors
     /// A number is not finite or out of range.

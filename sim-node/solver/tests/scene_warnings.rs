@@ -82,7 +82,7 @@ const SPHERE: &str = "[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradi
 fn a_particle_inside_a_collider_causes_a_warning() {
     assert_warns(
         &format!("{PAIR}{SPHERE}"),
-        "1 particle starts inside a collider, the deepest is particle 0, 0.5 m inside collider 0",
+        "1 particle starts inside a collider; the deepest is particle 0, 0.5 m inside collider 0",
     );
 }
 
@@ -92,13 +92,13 @@ fn the_deepest_particle_of_a_collider_is_named_and_not_the_first() {
     let row: String = [0.375, 0.125, 0.25, 2.0].map(particle).concat();
     assert_warns(
         &format!("{row}{SPHERE}"),
-        "3 particles start inside a collider, the deepest is particle 1, 0.375 m inside collider 0",
+        "3 particles start inside a collider; the deepest is particle 1, 0.375 m inside collider 0",
     );
     // Particle 0 is 1/8 m inside the sphere, and 3/8 m inside the floor.
     let floor = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0.375\n";
     assert_warns(
         &format!("{}{SPHERE}{floor}", particle(0.375)),
-        "1 particle starts inside a collider, the deepest is particle 0, 0.375 m inside collider 1",
+        "1 particle starts inside a collider; the deepest is particle 0, 0.375 m inside collider 1",
     );
 }
 

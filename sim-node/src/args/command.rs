@@ -62,7 +62,7 @@ pub(crate) enum CommandVerb {
         #[command(flatten)]
         pose: PoseArgs,
     },
-    /// Move a collider to a pose within one step
+    /// Move a collider to a pose by the end of the next step
     #[command(
         allow_negative_numbers = true,
         after_help = "Example: sim-node ctl move-collider 0 0 0.1 -0.2 --rotation 0 0.6 0 0.8"
@@ -86,7 +86,7 @@ pub(crate) enum CommandVerb {
     Pause,
     /// Resume a paused node
     Resume,
-    /// Let a paused node make COUNT steps, and wait for the last one
+    /// Run COUNT steps of a paused node, and wait for the last one
     #[command(after_help = "Example: sim-node ctl step 10")]
     Step {
         /// Number of steps, at least 1
@@ -178,7 +178,7 @@ pub(crate) struct CutSegmentArgs {
     #[arg(long, num_args = 3, action = ArgAction::Set, required = true,
         value_names = ["X", "Y", "Z"], value_parser = number)]
     pub(crate) to: Vec<f32>,
-    /// Direction along which the strip extends from the segment, without end on both sides
+    /// Direction in which the strip extends from the segment, without end to both sides
     #[arg(long, num_args = 3, action = ArgAction::Set, default_values = ["0", "0", "1"],
         value_names = ["DX", "DY", "DZ"], value_parser = number)]
     pub(crate) direction: Vec<f32>,
@@ -217,7 +217,7 @@ pub(crate) struct SetArgs {
     /// A number, three numbers for a vector, or "off"
     #[arg(num_args = 1..=3, required = true, value_name = "VALUE", value_parser = setting_word)]
     pub(crate) values: Vec<SettingWord>,
-    /// Kind of the constraints that get the compliance or stiffness [default: all kinds]
+    /// Kind of constraints that receive the compliance or stiffness [default: all kinds]
     #[arg(long, value_name = "KIND", value_parser = ["structural", "shear", "bend", "tether"])]
     pub(crate) kind: Option<String>,
 }
@@ -258,7 +258,7 @@ impl SetArgs {
         }
     }
 
-    /// Kind of the constraints that get the value; `None` is all kinds.
+    /// Kind of constraints that receive the value; `None` is all kinds.
     pub(crate) fn constraint_kind(&self) -> Option<ConstraintKind> {
         self.kind.as_deref().and_then(ConstraintKind::from_name)
     }

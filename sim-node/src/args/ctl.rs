@@ -17,7 +17,7 @@ use super::value::{index, time};
     after_help = "A command takes effect at a step boundary; its outcome names the first step that \
         shows it.\nAll calls of `ctl` are one client: what one call grabs, a later call can \
         release.\n\n\
-        Exit codes: 0 applied or answered, 1 no answer, 2 wrong command line, 4 rejected.\n\n\
+        Exit codes: 0 applied or answered, 1 no answer, 2 usage error, 4 rejected.\n\n\
         Examples:\n  \
         sim-node ctl nearest 0.5 0.5 0\n  \
         sim-node ctl particles 90\n  \
@@ -35,7 +35,7 @@ use super::value::{index, time};
 pub(crate) struct CtlArgs {
     #[command(subcommand)]
     pub(crate) verb: CtlVerb,
-    /// Wait this long for the answer of the node
+    /// Wait at most this long for the node's answer
     #[arg(long, value_name = "TIME", default_value = "5s",
         value_parser = time)]
     pub(crate) timeout: Duration,

@@ -10,7 +10,7 @@ pub(crate) struct EndpointArgs {
     #[arg(long, value_name = "NAME", value_parser = Endpoint::parse_name)]
     name: Option<String>,
     /// Domain that separates these services from others on this host [env: CATENARY_DOMAIN]
-    /// [default: the domain of iceoryx2]
+    /// [default: iceoryx2's own domain]
     #[arg(long, value_name = "DOMAIN", value_parser = Endpoint::parse_domain)]
     domain: Option<String>,
 }

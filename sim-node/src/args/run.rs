@@ -36,11 +36,11 @@ pub(crate) struct RunArgs {
     /// Start paused: wait at step 0 for `ctl resume` or `ctl step`
     #[arg(long)]
     pub(crate) paused: bool,
-    /// Make each step as soon as the last one is done, without waiting for its time
+    /// Start each step as soon as the previous one is done, without waiting for its time
     #[arg(long)]
     pub(crate) as_fast_as_possible: bool,
-    /// Threads of the solver, 1 to 64; their number changes no bit [default: 1 for scenes with fewer
-    /// than 4000 particles, else one less than the cores available to this process]
+    /// Threads of the solver, 1 to 64; they change no bit of the result [default: 1 for scenes with
+    /// fewer than 4000 particles, else one less than the number of cores available to this process]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
         value_parser = whole::<u8>(1..=u64::from(THREADS_MAX)))]
     pub(crate) threads: Option<u8>,

@@ -26,8 +26,8 @@ pub(crate) struct ShowArgs {
 
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "An error exits with 1 and names file, line, field and the allowed values. \
-    Warnings do not\nchange the exit code.\n\nExamples:\n  \
+    after_help = "An invalid scene exits with 1; the error names the file, line, field and allowed \
+    values.\nWarnings do not change the exit code.\n\nExamples:\n  \
     sim-node check my.toml\n  \
     sim-node check --json my.toml"
 )]
@@ -41,8 +41,8 @@ pub(crate) struct CheckArgs {
 
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Vertices become particles. Edges become structural constraints, diagonals of faces shear\n\
-        constraints, and the corners on both sides of an edge bend constraints. Faces without\n\
+    after_help = "Vertices become particles. Edges become structural constraints and diagonals of faces become\n\
+        shear constraints. Bend constraints join the corners on both sides of an edge. Faces without\n\
         area, duplicate faces and vertices without a face are left out with a warning.\n\nExamples:\n  \
         sim-node import shirt.obj --pin 'y > 1.45' -o shirt.toml && sim-node run ./shirt.toml\n  \
         sim-node import net.obj --density 0.05 --pin 'group rim' --bend 0.01 > net.toml"

@@ -73,7 +73,7 @@ fn wait_for_steps(
     if outcome.flags & OUTCOME_FLAG_CONTROL != 0 {
         return Ok(());
     }
-    bail!("the node began the steps up to {last}, but published none for {timeout:?}")
+    bail!("the node began the steps up to {last}, but published no snapshot for {timeout:?}")
 }
 
 /// Wall-clock time between two steps, which is long at a small time scale.

@@ -24,8 +24,8 @@ pub(super) fn for_rejection(action: &Action, outcome: &Outcome) -> String {
             " (allowed: coordinates within 1e7, z 0 in 2-D, --over 0 to 0.25)".to_owned()
         }
         (Action::Load { .. }, Reason::NoEffectHere) => {
-            " (the scene runs at another rate than the node, or needs more memory than available; \
-             see the messages of the node)"
+            " (the scene runs at another rate than the node, or needs more memory than is \
+             available; see the node's messages)"
                 .to_owned()
         }
         (Action::Load { .. }, Reason::OutOfRange) => {

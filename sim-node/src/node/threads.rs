@@ -22,8 +22,8 @@ pub(crate) fn with_threads(mut solver: Solver, requested: Option<u8>) -> Solver 
     solver
 }
 
-/// Default number of threads: 1 for a small scene, else one less than the cores available to this
-/// process, at least 1 and at most [`THREADS_MAX`]. Threads wait for each other several times per
+/// Default number of threads: 1 for a small scene, else one less than the number of cores available
+/// to this process, at least 1 and at most [`THREADS_MAX`]. Threads wait for each other several times per
 /// substep, so a thread that shares its core delays all of them.
 fn default_count(particle_count: usize, core_count: usize) -> usize {
     if particle_count < SHARED_MIN {

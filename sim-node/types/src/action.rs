@@ -62,12 +62,12 @@ pub enum Action {
     },
     /// Restores the initial state as the state of the next step. The step number continues.
     Reset,
-    /// Sets the velocity of each free particle inside a ball to `delta` times the rate.
+    /// Sets the velocity of each free particle inside a sphere to `delta` times the rate.
     Push {
-        /// Centre of the ball in m, relative to the scene's origin.
+        /// Center of the sphere in m, relative to the scene's origin.
         #[serde(with = "vector")]
         center: [f32; 3],
-        /// Radius of the ball in m. A particle at exactly this distance is outside.
+        /// Radius of the sphere in m. A particle at exactly this distance is outside.
         #[serde(with = "number")]
         radius: f32,
         /// Displacement of the particles in the next step, in m.
@@ -82,12 +82,12 @@ pub enum Action {
         /// Index of the constraint.
         constraint: u32,
     },
-    /// Tears every constraint with an end inside a ball.
+    /// Tears every constraint with an end inside a sphere.
     CutRadius {
-        /// Centre of the ball in m, relative to the scene's origin.
+        /// Center of the sphere in m, relative to the scene's origin.
         #[serde(with = "vector")]
         center: [f32; 3],
-        /// Radius of the ball in m. An end at exactly this distance is outside.
+        /// Radius of the sphere in m. An end at exactly this distance is outside.
         #[serde(with = "number")]
         radius: f32,
     },

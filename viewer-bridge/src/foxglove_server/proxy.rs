@@ -62,7 +62,7 @@ async fn upgrade(
     upgrade: WebSocketUpgrade,
 ) -> Response {
     let Ok(permit) = Arc::clone(&state.clients).try_acquire_owned() else {
-        let text = format!("{CLIENTS_MAX} viewers are connected already; close one\n");
+        let text = format!("{CLIENTS_MAX} viewers are already connected; close one\n");
         return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
     };
     match connect(state.library, &headers).await {

@@ -53,11 +53,11 @@ impl Refusal {
         match self {
             Self::Node(reason) => reason_text(reason),
             Self::Unknown => "the node gave an unknown reason",
-            Self::NoNode => "no node runs",
+            Self::NoNode => "no node is running",
             Self::NoAnswer => "the node did not answer; the command may still take effect",
-            Self::Busy => "too many commands wait; try again",
+            Self::Busy => "too many commands are waiting; try again",
             Self::StaleEpoch => "another scene was loaded in the meantime",
-            Self::TooManyGrabs => "you already hold 16 particles",
+            Self::TooManyGrabs => "you have already grabbed 16 particles",
             Self::OnlyLive => "a recording cannot be changed",
             Self::OnlyReplay => "only a recording can do this",
         }
@@ -75,7 +75,7 @@ fn reason_text(reason: Reason) -> &'static str {
         Reason::UnknownParameter => "there is no such parameter",
         Reason::AlreadyTorn => "the constraint is already torn",
         Reason::NotGrabbed => "the particle is not grabbed",
-        Reason::GrabbedByOther => "somebody else holds the particle",
+        Reason::GrabbedByOther => "another client has grabbed the particle",
         Reason::NoEffectHere => {
             "the command has no effect here: the particle is frozen, the parameter belongs to the \
              other method, the simulation is running, the scene has another rate, or a recording \

@@ -124,7 +124,7 @@ async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade
     let waiting = Arc::clone(&state.waiting).try_acquire_owned();
     let is_full = state.sessions.pages.available_permits() == 0;
     let Some(waiting) = waiting.ok().filter(|_| !is_full) else {
-        let text = format!("{CLIENTS_MAX} pages are open already; close one\n");
+        let text = format!("{CLIENTS_MAX} pages are already open; close one\n");
         return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
     };
     limit(upgrade)

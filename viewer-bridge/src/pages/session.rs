@@ -44,7 +44,7 @@ pub(super) async fn serve(socket: WebSocket, sessions: &Sessions, waiting: Owned
                 drop(waiting);
                 return serve_page(peer, sessions, &hello).await;
             }
-            Err(_) => End::closed(FULL, "too many pages are open already; close one"),
+            Err(_) => End::closed(FULL, "too many pages are already open; close one"),
         },
         Ok(Err(end)) => end,
         Err(_) => End::closed(TOO_SLOW, "no hello arrived"),
@@ -102,9 +102,9 @@ async fn converse(peer: &mut Peer, sessions: &Sessions, mut connection: Connecti
             }
             changed = connection.frames.changed(), if has_credit => match changed {
                 Ok(()) => send_frame(peer, hub, &mut connection).await,
-                Err(_) => Err(End::closed(GOING_AWAY, "the server ends")),
+                Err(_) => Err(End::closed(GOING_AWAY, "the server shuts down")),
             },
-            () = sessions.shutdown.begun() => Err(End::closed(GOING_AWAY, "the server ends")),
+            () = sessions.shutdown.begun() => Err(End::closed(GOING_AWAY, "the server shuts down")),
         };
         if let Err(end) = result {
             return end;

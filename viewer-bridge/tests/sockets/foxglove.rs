@@ -295,7 +295,7 @@ fn published_commands_reach_the_source_and_grabs_end_with_the_client() {
     assert_eq!(command, Command::Grab { particle: 3, target: [0.0, 1.0, 2.0], over_s: 0.1 });
     site.reject(holder, id, "grab", Reason::GrabbedByOther);
     let status = client.text("status");
-    assert!(status["message"].as_str().unwrap().contains("somebody else"), "{status}");
+    assert!(status["message"].as_str().unwrap().contains("another client"), "{status}");
     let leaves = |holder: ClientId| {
         wait_for("the client to leave", || {
             let request = site.requests.next(Duration::ZERO)?;

@@ -281,7 +281,7 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
     }
     if row.state_hash != simulated_hash {
         let what = format!(
-            "its row in /steps has the hash {:016x}, its particles have {simulated_hash:016x}",
+            "its row in /steps has the hash {:016x}, but its particles have {simulated_hash:016x}",
             row.state_hash
         );
         return diverged(what, None);

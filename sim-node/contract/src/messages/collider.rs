@@ -22,7 +22,7 @@ pub struct ColliderState {
     pub offset: f32,
     /// Unit normal of a plane; points to the free side.
     pub normal: [f32; 3],
-    /// Centre of a box or sphere.
+    /// Center of a box or sphere.
     pub center: [f32; 3],
     /// Half the edge lengths of a box, along its own axes.
     pub half_extents: [f32; 3],
@@ -34,7 +34,7 @@ pub struct ColliderState {
     pub b: [f32; 3],
     /// Velocity of the collider.
     pub velocity: [f32; 3],
-    /// Angular velocity of a box about its centre, in rad/s.
+    /// Angular velocity of a box about its center, in rad/s.
     pub angular_velocity: [f32; 3],
 }
 

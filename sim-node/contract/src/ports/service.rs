@@ -167,7 +167,7 @@ pub enum ServiceError {
     },
     /// Another process has been creating or removing the service for too long.
     #[error(
-        "another process is creating or removing service '{service}' and does not finish ({detail}): try again, and end that process if it hangs"
+        "another process is creating or removing service '{service}' and has not finished ({detail}): try again, and end that process if it hangs"
     )]
     InTransition {
         /// Full name of the service.

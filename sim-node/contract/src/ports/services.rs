@@ -61,7 +61,7 @@ impl Services {
 pub enum AttachError {
     /// No living process owns the name.
     #[error(
-        "no simulation runs as {endpoint}: {detail}; start one with `sim-node run{options}`, or name a running one with --domain and --name"
+        "no node runs as {endpoint}: {detail}; start one with `sim-node run{options}`, or name a running one with --domain and --name"
     )]
     NoNode {
         /// Address without a simulation.
@@ -143,7 +143,7 @@ impl Attachment {
             }
         }
         let service = session.service_name(&STATUS);
-        Err(no_node(&session, format!("service '{service}' has no living publisher")))
+        Err(no_node(&session, format!("service '{service}' has no live publisher")))
     }
 
     pub(crate) fn owner(&self) -> Option<OwnerProcess> {

@@ -42,7 +42,7 @@ fn a_client_without_a_node_gets_an_error_that_names_the_service_and_the_remedy()
     assert_eq!(
         error.to_string(),
         format!(
-            "no simulation runs as 'left' in domain '{name}': service 'left/status' does not \
+            "no node runs as 'left' in domain '{name}': service 'left/status' does not \
              exist; start one with `sim-node run --domain {name} --name left`, or name a running one \
              with --domain and --name"
         )
@@ -79,7 +79,7 @@ fn clients_that_poll_or_wait_notice_a_dropped_owner() {
     assert!(!tap.is_owner_alive());
     tap.wait(DEADLINE);
     let error = Client::attach(&domain.endpoint()).unwrap_err().to_string();
-    assert!(error.contains("service 'sim/status' has no living publisher"), "{error}");
+    assert!(error.contains("service 'sim/status' has no live publisher"), "{error}");
 }
 
 #[test]

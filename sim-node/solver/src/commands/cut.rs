@@ -46,7 +46,7 @@ impl Solver {
         Ok(())
     }
 
-    /// Tears every constraint with an end strictly inside a ball.
+    /// Tears every constraint with an end strictly inside a sphere.
     ///
     /// # Errors
     /// A number is not finite or out of range.

@@ -51,7 +51,7 @@ pub struct Generator {
 pub enum Shape {
     /// A hanging sheet.
     Cloth(Cloth),
-    /// A sheet that keeps its form: by default it has bends, and nothing is pinned.
+    /// A sheet that keeps its shape: by default it has bends, and nothing is pinned.
     Mesh(Cloth),
     /// A line.
     Rope(Rope),

@@ -83,7 +83,7 @@ pub enum KeyframeError {
     #[error("{0} bytes follow the end of the keyframe")]
     TooLong(usize),
     /// Another version wrote it.
-    #[error("keyframe version {found}, this program reads version {KEYFRAME_VERSION}")]
+    #[error("keyframe version {found}; this program reads version {KEYFRAME_VERSION}")]
     Version {
         /// The version in the bytes.
         found: u32,
@@ -97,7 +97,7 @@ pub enum KeyframeError {
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum RestoreError {
     /// The snapshot belongs to another scene.
-    #[error("the snapshot has {found} particles, the scene {expected}")]
+    #[error("the snapshot has {found} particles, but the scene has {expected}")]
     ParticleCount {
         /// Number of particles in the scene.
         expected: usize,

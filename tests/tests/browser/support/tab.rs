@@ -255,7 +255,7 @@ impl Tab {
             "buttons": if is_down { button.bit() } else { 0 }, "clickCount": clicks })
     }
 
-    /// Clicks the centre of the element with a selector.
+    /// Clicks the center of the element with a selector.
     pub(crate) fn click(&self, selector: &str) {
         self.click_at(selector, 0.5);
     }

@@ -9,7 +9,7 @@ pub(super) fn node_text(status: Option<&NodeStatus>, method: Option<&'static str
     let Some(status) = status else {
         return Node {
             state: NodeState::Alive,
-            text: "a node runs, but has not published its status yet".to_owned(),
+            text: "a node is running, but has not published its status yet".to_owned(),
             ..Node::default()
         };
     };

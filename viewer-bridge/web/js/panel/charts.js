@@ -22,7 +22,7 @@ export class Charts {
     this.charts = [
       chart("Solve time", "µs", [{ name: "step", series: solve, color: "--plot-a" }], () => stats()?.deadlineUs ?? NaN,
         () => `${readable(stats()?.solveUsP50 ?? NaN, "µs")} of ${readable(stats()?.deadlineUs ?? NaN, "µs")}`),
-      chart("Wake-up latency", "µs", [{ name: "late", series: wake, color: "--plot-b" }], null,
+      chart("Wake-up delay", "µs", [{ name: "late", series: wake, color: "--plot-b" }], null,
         () => `99 %: ${readable(stats()?.wakeLateUsP99 ?? NaN, "µs")}`),
       chart("Stretch", "%", [{ name: "maximum", series: most, color: "--plot-b" }, { name: "mean", series: mean, color: "--plot-a" }], null,
         () => `max ${readable(most.last(), "%")}, mean ${readable(mean.last(), "%")}`),
@@ -58,7 +58,7 @@ export class Charts {
       ["Real-time factor", `${stats.realTimeFactor.toFixed(2)} of ${stats.timeScale.toFixed(2)}`],
       ["Late steps, skipped", `${stats.lateSteps}, ${stats.skippedPeriods}`],
       ["Torn, frozen", `${stats.tornCount}, ${stats.frozenCount}`],
-      ["Commands, refused", `${stats.outcomes}, ${stats.rejected}`],
+      ["Commands, rejected", `${stats.outcomes}, ${stats.rejected}`],
       ["Readers, pages", `${stats.readers}, ${stats.clients}`],
       ["Frames", `${readable(stats.framesPerSecond, "/s")}, ${readable(stats.encodeUs, "µs")} each`],
     ];

@@ -41,7 +41,7 @@ export class Panel {
     const reason = this.reasonAgainst();
     this.note.hidden = reason === "" && (simulation.parameters?.is_complete ?? true);
     this.form.hidden = simulation.parameters?.values == null;
-    this.note.textContent = reason || "The bridge started after some commands: values may differ.";
+    this.note.textContent = reason || "This recording has no parameters: the values are those of its scene.";
     for (const refresh of this.refreshers) refresh();
     for (const element of this.form.querySelectorAll("fieldset")) element.disabled = reason !== "";
   }

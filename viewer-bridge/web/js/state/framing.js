@@ -48,7 +48,7 @@ function includeSolid(box, one, middle, size) {
   }
 }
 
-/** Centre and radius of a bounding sphere of a solid; infinite for a plane. @param {Collider} one @returns {[Vec3, number]} */
+/** Center and radius of a bounding sphere of a solid; infinite for a plane. @param {Collider} one @returns {[Vec3, number]} */
 function boundingSphere(one) {
   if (one.shape === "sphere") return [one.center, one.radius];
   if (one.shape === "box") return [one.center, length(one.halfExtents)];

@@ -197,7 +197,7 @@ export class Simulation extends Emitter {
     return Math.max(length(subtract(this.scene.max, this.scene.min)) / 2, 1e-3);
   }
 
-  /** The centre of the bounding box of the scene's positions. @returns {Vec3} */
+  /** The center of the bounding box of the scene's positions. @returns {Vec3} */
   middle() {
     return this.scene === null ? [0, 0, 0] : scale(add(this.scene.min, this.scene.max), 0.5);
   }

@@ -152,7 +152,7 @@ export class Controls {
     const isAlive = simulation.node?.state === "alive" || simulation.isReplay;
     const isRecording = simulation.isReplay || (simulation.node?.is_replay ?? false);
     this.pause.setAttribute("aria-pressed", String(simulation.isPaused));
-    setText(this.pause, simulation.isPaused ? "Go on" : "Pause");
+    setText(this.pause, simulation.isPaused ? "Resume" : "Pause");
     enable(this.pause, isAlive, "No node is running.");
     enable(this.step, isAlive, "No node is running.");
     enable(this.reset, isAlive && !isRecording, isRecording ? "A recording cannot be reset. Use the timeline to go back." : "No node is running.");

@@ -22,7 +22,7 @@ impl GeneratorFields<'_, '_> {
             (None, Some(vertices)) => self.written_mesh(vertices)?,
             (path, _) => {
                 let span = path.as_ref().map_or(self.span.clone(), Spanned::span);
-                let problem = "a mesh needs a path, or vertices and faces (allowed: one of both)";
+                let problem = "a mesh needs a path, or vertices and faces (allowed: either one)";
                 return self.reader.error(span, &self.name("path"), problem);
             }
         };

@@ -233,7 +233,7 @@ impl Reader<'_> {
         };
         if let Some(other) = other {
             let method = self.method.name();
-            let problem = format!("has no meaning with method \"{method}\" (allowed: {own_name})");
+            let problem = format!("does not apply to method \"{method}\" (allowed: {own_name})");
             return self.error(other.span(), &field(other_name), problem);
         }
         Ok(own.map(|own| (own_name, own)))

@@ -4,7 +4,7 @@ use crate::contacts::obstacle::depth_at_load;
 use crate::scene::definition::Scene;
 use crate::scene::model::Model;
 
-/// Distance from the scene's origin, in m, beyond which f32 positions make a scene at rest tremble.
+/// Distance from the scene's origin, in m, beyond which f32 positions make a scene at rest jitter.
 const NEAR_ORIGIN: f32 = 100.0;
 /// Standard gravity in m/s^2. A scene in a smaller unit has a greater one.
 const GRAVITY: f32 = 9.81;
@@ -25,7 +25,7 @@ pub(super) fn far_from_origin(scene: &Scene, model: &Model) -> Option<String> {
     (farthest > near).then(|| {
         format!(
             "a coordinate reaches {farthest} {unit} from the origin: beyond {near:.0} {unit} a \
-             scene at rest trembles; put the distance into `origin`",
+             scene at rest jitters; put the distance into `origin`",
             unit = scene.unit
         )
     })
@@ -72,7 +72,7 @@ pub(super) fn inside_collider(scene: &Scene, model: &Model) -> Option<String> {
         count => format!("{count} particles start"),
     };
     Some(format!(
-        "{count} inside a collider, the deepest is particle {particle}, {depth} {unit} inside \
+        "{count} inside a collider; the deepest is particle {particle}, {depth} {unit} inside \
          collider {collider}: the first step pushes it out at once",
         unit = scene.unit
     ))
