@@ -169,8 +169,8 @@ fn the_tearable_cloth_hangs_without_tears_and_tears_where_it_is_pulled() {
     for pull in 1..=3_u8 {
         let [x, y, _] = solver.particle(lowest).position;
         let target = [x, y + 150.0 * f32::from(pull), 0.0];
-        let grip = sim_solver::Grab { particle: 32 * 121 + 60, target, over_s: 0.25 };
-        solver.grab(1, grip).unwrap();
+        let grab = sim_solver::Grab { particle: 32 * 121 + 60, target, over_s: 0.25 };
+        solver.grab(1, grab).unwrap();
         for _ in 0..15 {
             solver.step();
         }

@@ -16,7 +16,7 @@ fn one_particle(extra: &str) -> Solver {
     Solver::new(&Scene::from_toml(&text, "test").unwrap())
 }
 
-fn grip(particle: u32, target: [f32; 3]) -> Grab {
+fn grab(particle: u32, target: [f32; 3]) -> Grab {
     Grab { particle, target, over_s: 1.0 / 60.0 }
 }
 
@@ -53,7 +53,7 @@ fn a_pinned_particle_stays_bit_for_bit_and_falls_from_rest_when_unpinned() {
 #[test]
 fn a_grabbed_particle_reaches_its_target_in_a_straight_line_after_whole_steps() {
     let mut solver = one_particle("");
-    solver.grab(CLIENT, grip(0, [0.4, -0.8, 1.2])).unwrap();
+    solver.grab(CLIENT, grab(0, [0.4, -0.8, 1.2])).unwrap();
     for quarter in 1..=4 {
         solver.step();
         let share = quarter as f32 / 4.0;
@@ -74,10 +74,10 @@ fn a_release_keeps_the_velocity_of_the_grab_at_each_phase_of_its_moves() {
     // Moves of 0.05 m at 60 Hz on a node of 240 Hz are 3 m/s, at each of the four steps.
     for phase in 1..=4 {
         let mut solver = one_particle("gravity = [0, 0, 0]");
-        solver.grab(CLIENT, grip(0, [0.05, 0.0, 0.0])).unwrap();
+        solver.grab(CLIENT, grab(0, [0.05, 0.0, 0.0])).unwrap();
         step(&mut solver, 4);
         for tick in 2..=5_u8 {
-            solver.move_grabbed(CLIENT, grip(0, [0.05 * f32::from(tick), 0.0, 0.0])).unwrap();
+            solver.move_grabbed(CLIENT, grab(0, [0.05 * f32::from(tick), 0.0, 0.0])).unwrap();
             step(&mut solver, if tick == 5 { phase } else { 4 });
         }
         solver.release(CLIENT, 0).unwrap();
@@ -91,7 +91,7 @@ fn a_release_keeps_the_velocity_of_the_grab_at_each_phase_of_its_moves() {
 #[test]
 fn a_distant_target_is_followed_at_max_speed() {
     let mut solver = one_particle("");
-    solver.grab(CLIENT, grip(0, [1e6, 0.0, 0.0])).unwrap();
+    solver.grab(CLIENT, grab(0, [1e6, 0.0, 0.0])).unwrap();
     step(&mut solver, 24);
     let [x, ..] = solver.particle(0).position;
     assert!((x - 1000.0).abs() < 0.1, "0.1 s at 10,000 m/s: {x}");
@@ -100,7 +100,7 @@ fn a_distant_target_is_followed_at_max_speed() {
 #[test]
 fn a_pinned_particle_can_be_grabbed_and_stays_where_it_is_released() {
     let mut solver = curtain();
-    solver.grab(CLIENT, grip(0, [-0.6, 1.2, 0.1])).unwrap();
+    solver.grab(CLIENT, grab(0, [-0.6, 1.2, 0.1])).unwrap();
     step(&mut solver, 8);
     assert_eq!(solver.particle(0).flags, ParticleFlags::PINNED | ParticleFlags::GRABBED);
     solver.release(CLIENT, 0).unwrap();
@@ -113,11 +113,11 @@ fn a_pinned_particle_can_be_grabbed_and_stays_where_it_is_released() {
 fn only_the_client_that_grabbed_a_particle_moves_and_releases_it() {
     let mut solver = curtain();
     assert_eq!(solver.release(CLIENT, 5), Err(Reason::NotGrabbed));
-    assert_eq!(solver.move_grabbed(CLIENT, grip(5, [0.0; 3])), Err(Reason::NotGrabbed));
-    solver.grab(CLIENT, grip(5, [0.0; 3])).unwrap();
+    assert_eq!(solver.move_grabbed(CLIENT, grab(5, [0.0; 3])), Err(Reason::NotGrabbed));
+    solver.grab(CLIENT, grab(5, [0.0; 3])).unwrap();
     for other in [
-        solver.grab(8, grip(5, [0.0; 3])),
-        solver.move_grabbed(8, grip(5, [0.0; 3])),
+        solver.grab(8, grab(5, [0.0; 3])),
+        solver.move_grabbed(8, grab(5, [0.0; 3])),
         solver.release(8, 5),
     ] {
         assert_eq!(other, Err(Reason::GrabbedByOther));
@@ -128,23 +128,23 @@ fn only_the_client_that_grabbed_a_particle_moves_and_releases_it() {
 #[test]
 fn a_rejected_command_changes_no_bit_of_the_future() {
     let mut solver = curtain();
-    solver.grab(CLIENT, grip(90, [0.1, 0.2, 0.3])).unwrap();
+    solver.grab(CLIENT, grab(90, [0.1, 0.2, 0.3])).unwrap();
     step(&mut solver, 3);
     let mut untouched = solver.clone();
-    let long = Grab { over_s: 0.26, ..grip(9, [0.0; 3]) };
+    let long = Grab { over_s: 0.26, ..grab(9, [0.0; 3]) };
     let backwards = Grab { over_s: -0.1, ..long };
     let timeless = Grab { over_s: f32::NAN, ..long };
     let rejected = [
         (solver.pin(168), Reason::UnknownParticle),
         (solver.unpin(u32::MAX), Reason::UnknownParticle),
-        (solver.grab(CLIENT, grip(168, [0.0; 3])), Reason::UnknownParticle),
-        (solver.grab(CLIENT, grip(9, [f32::NAN, 0.0, 0.0])), Reason::NonFinite),
-        (solver.grab(CLIENT, grip(9, [0.0, f32::INFINITY, 0.0])), Reason::NonFinite),
-        (solver.grab(CLIENT, grip(9, [0.0, 0.0, 1.1e7])), Reason::OutOfRange),
+        (solver.grab(CLIENT, grab(168, [0.0; 3])), Reason::UnknownParticle),
+        (solver.grab(CLIENT, grab(9, [f32::NAN, 0.0, 0.0])), Reason::NonFinite),
+        (solver.grab(CLIENT, grab(9, [0.0, f32::INFINITY, 0.0])), Reason::NonFinite),
+        (solver.grab(CLIENT, grab(9, [0.0, 0.0, 1.1e7])), Reason::OutOfRange),
         (solver.grab(CLIENT, long), Reason::OutOfRange),
         (solver.grab(CLIENT, backwards), Reason::OutOfRange),
         (solver.grab(CLIENT, timeless), Reason::NonFinite),
-        (solver.move_grabbed(CLIENT, grip(90, [f32::NAN; 3])), Reason::NonFinite),
+        (solver.move_grabbed(CLIENT, grab(90, [f32::NAN; 3])), Reason::NonFinite),
         (solver.release(CLIENT, 91), Reason::NotGrabbed),
     ];
     for (result, reason) in rejected {
@@ -159,7 +159,7 @@ fn a_rejected_command_changes_no_bit_of_the_future() {
 #[test]
 fn in_two_dimensions_a_target_off_the_plane_is_out_of_range() {
     let mut solver = one_particle("dimensions = 2");
-    assert_eq!(solver.grab(CLIENT, grip(0, [0.0, 0.0, 0.1])), Err(Reason::OutOfRange));
+    assert_eq!(solver.grab(CLIENT, grab(0, [0.0, 0.0, 0.1])), Err(Reason::OutOfRange));
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn a_reset_shows_the_initial_state_in_its_own_step_and_then_repeats_the_run() {
     let mut fresh = curtain();
     let initial = bits(&fresh);
     let mut solver = curtain();
-    solver.grab(CLIENT, grip(90, [0.3, 0.2, 0.1])).unwrap();
+    solver.grab(CLIENT, grab(90, [0.3, 0.2, 0.1])).unwrap();
     solver.pin(80).unwrap();
     step(&mut solver, 50);
     solver.reset();
@@ -204,7 +204,7 @@ fn fixed_particles_survive_a_neighbour_that_blows_up_and_the_state_can_be_restor
          [[constraint]]\nparticles = [0, 1]\nrest_length = 1e30\n\
          [[constraint]]\nparticles = [1, 2]\nrest_length = 1e30\n";
     let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
-    solver.grab(CLIENT, grip(2, [2.0, 1.0, 0.0])).unwrap();
+    solver.grab(CLIENT, grab(2, [2.0, 1.0, 0.0])).unwrap();
     step(&mut solver, 20);
     assert_eq!(solver.particle(1).flags, ParticleFlags::FROZEN);
     assert_eq!(

@@ -62,12 +62,12 @@ fn random_command() -> impl Strategy<Value = RandomCommand> {
 
 /// Applies a command. A rejection is a valid outcome, too.
 fn apply(solver: &mut Solver, command: &RandomCommand) {
-    let grip = |particle, target| Grab { particle, target, over_s: 0.05 };
+    let grab = |particle, target| Grab { particle, target, over_s: 0.05 };
     let _outcome = match *command {
         RandomCommand::Pin(particle) => solver.pin(particle),
         RandomCommand::Unpin(particle) => solver.unpin(particle),
-        RandomCommand::Grab(particle, target) => solver.grab(1, grip(particle, target)),
-        RandomCommand::Move(particle, target) => solver.move_grabbed(1, grip(particle, target)),
+        RandomCommand::Grab(particle, target) => solver.grab(1, grab(particle, target)),
+        RandomCommand::Move(particle, target) => solver.move_grabbed(1, grab(particle, target)),
         RandomCommand::Release(particle) => solver.release(1, particle),
         RandomCommand::Push(center) => solver.push(Push {
             ball: Ball { center, radius: 0.4 },
@@ -291,6 +291,28 @@ fn an_invalid_state_is_refused_and_changes_nothing() {
         assert_eq!(solver.state_hash(), hash);
     }
     assert!(solver.restore(&good, &keyframe).is_ok());
+}
+
+#[test]
+fn a_pinned_particle_with_a_velocity_is_refused() {
+    let mut solver = Solver::new(&scene());
+    let (keyframe, mut particles) = (solver.keyframe(), particles(&solver));
+    assert_eq!(particles[0].flags, ParticleFlags::PINNED);
+    particles[0].velocity = [1.0, 0.0, 0.0];
+    let error = solver.restore(&particles, &keyframe).unwrap_err().to_string();
+    assert!(error.contains("it is pinned or frozen, but has a velocity"), "{error}");
+}
+
+#[test]
+fn in_two_dimensions_a_keyframe_with_a_target_off_the_plane_is_refused() {
+    let [mut plane, mut space] = [2, 3].map(|dimensions| {
+        let text =
+            format!("version = 1\ndimensions = {dimensions}\n[[particle]]\nposition = [0, 0, 0]\n");
+        Solver::new(&Scene::from_toml(&text, "test").unwrap())
+    });
+    space.grab(1, Grab { particle: 0, target: [0.0, 0.0, 0.5], over_s: 0.1 }).unwrap();
+    let error = plane.restore(&particles(&space), &space.keyframe()).unwrap_err().to_string();
+    assert!(error.contains("a target lies outside of the plane"), "{error}");
 }
 
 #[test]

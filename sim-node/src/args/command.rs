@@ -218,7 +218,7 @@ pub(crate) struct SetArgs {
     #[arg(num_args = 1..=3, required = true, value_name = "VALUE", value_parser = setting_word)]
     pub(crate) values: Vec<SettingWord>,
     /// Kind of constraints that receive the compliance or stiffness [default: all kinds]
-    #[arg(long, value_name = "KIND", value_parser = ["structural", "shear", "bend", "tether"])]
+    #[arg(long, value_name = "KIND", value_parser = ConstraintKind::ALL.map(ConstraintKind::name))]
     pub(crate) kind: Option<String>,
 }
 

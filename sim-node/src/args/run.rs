@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use clap::Args as ClapArgs;
 use sim_solver::THREADS_MAX;
+use sim_solver::scene::{PASSES_MAX, RATE_HZ_MAX};
 
 use super::endpoint::EndpointArgs;
 use super::value::{time, whole};
@@ -20,11 +21,11 @@ pub(crate) struct RunArgs {
     pub(crate) scene: String,
     /// Steps per second, 1 to 100000 [default: the rate of the scene]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true,
-        value_parser = whole::<u32>(1..=100_000))]
+        value_parser = whole::<u32>(1..=u64::from(RATE_HZ_MAX)))]
     pub(crate) rate: Option<u32>,
     /// Substeps per step, 1 to 1000 [default: the substeps of the scene]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
-        value_parser = whole::<u32>(1..=1000))]
+        value_parser = whole::<u32>(1..=u64::from(PASSES_MAX)))]
     pub(crate) substeps: Option<u32>,
     /// Exit after N steps [default: run until Ctrl-C]
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "duration",

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
+use sim_contract::NumberRange;
 
 use super::value::number_in;
 
@@ -65,14 +66,14 @@ pub(crate) struct ImportArgs {
     pub(crate) pin: String,
     /// Compliance of structural constraints, in m/N
     #[arg(long, value_name = "M/N", default_value_t = 0.0, allow_negative_numbers = true,
-        value_parser = number_in(0.0..=1e20))]
+        value_parser = number_in(0.0..=NumberRange::COMPLIANCE.max))]
     pub(crate) structural: f32,
     /// Compliance of shear constraints, in m/N
     #[arg(long, value_name = "M/N", default_value_t = 0.0, allow_negative_numbers = true,
-        value_parser = number_in(0.0..=1e20))]
+        value_parser = number_in(0.0..=NumberRange::COMPLIANCE.max))]
     pub(crate) shear: f32,
     /// Compliance of bend constraints, in m/N
     #[arg(long, value_name = "M/N", default_value_t = 1e-2, allow_negative_numbers = true,
-        value_parser = number_in(0.0..=1e20))]
+        value_parser = number_in(0.0..=NumberRange::COMPLIANCE.max))]
     pub(crate) bend: f32,
 }

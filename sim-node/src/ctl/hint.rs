@@ -8,7 +8,7 @@ use sim_contract::{
 
 /// Cause or remedy of a rejection, to print behind its reason; may be empty.
 pub(super) fn for_rejection(action: &Action, outcome: &Outcome) -> String {
-    let Some(reason) = Reason::from_name(outcome.reason_name()) else { return String::new() };
+    let Some(reason) = outcome.reason() else { return String::new() };
     match (action, reason) {
         (Action::Set { .. }, Reason::UnknownParameter) => {
             format!(" (allowed: {})", PARAMETERS.map(|info| info.name).join(", "))
@@ -32,6 +32,7 @@ pub(super) fn for_rejection(action: &Action, outcome: &Outcome) -> String {
             " (the node cannot read that scene; see its messages)".to_owned()
         }
         (Action::Step { .. }, Reason::NoEffectHere) => " (the node is not paused)".to_owned(),
+        (Action::Step { .. }, Reason::OutOfRange) => " (allowed: 1 or more)".to_owned(),
         _ => String::new(),
     }
 }

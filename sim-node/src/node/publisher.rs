@@ -4,7 +4,7 @@ mod load;
 mod status;
 
 use anyhow::Context;
-use bytemuck::cast;
+use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus, Outcome,
@@ -151,8 +151,8 @@ impl Publisher {
         }
         self.publish_outcomes()?;
         self.last = self.header(solver, position, times);
-        let particle = |index| cast::<_, ParticleState>(solver.particle(index));
-        self.owner.publish_particles(&self.last, particle)?;
+        let particles: &[ParticleState] = cast_slice(solver.particles());
+        self.owner.publish_particles(&self.last, |index| particles[index])?;
         self.owner.wake(Wake::Frame);
         Ok(())
     }

@@ -63,10 +63,16 @@ impl Outcome {
         self.status == OutcomeStatus::Applied as u32
     }
 
+    /// Returns the reason for the rejection; `None` if the command was applied, or for a number that
+    /// this version does not know.
+    pub fn reason(&self) -> Option<Reason> {
+        Reason::from_number(self.reason)
+    }
+
     /// Name of the [`Reason`]: "" if the command was applied, "unknown" for a number that this version
     /// does not know.
     pub fn reason_name(&self) -> &'static str {
-        match Reason::from_number(self.reason) {
+        match self.reason() {
             Some(reason) => reason.name(),
             None if self.reason == 0 => "",
             None => "unknown",

@@ -18,9 +18,9 @@ pub(crate) struct ConstraintBuilder<'a> {
     pub(crate) model: &'a Model,
     parameters: &'a Parameters,
     setup: Setup,
-    /// The previous stiffness, and its share per pass. The root is expensive, and most constraints
-    /// have the stiffness of the one before.
-    last_share: Cell<(f32, f32)>,
+    /// By kind: the previous stiffness, and its share per pass. The root is expensive, and most
+    /// constraints have the stiffness of the one of their kind before.
+    last_shares: [Cell<(f32, f32)>; ConstraintKind::ALL.len()],
     /// Limits of the constraint before, with their index in the model.
     last_limits: Cell<Option<(u32, Limits)>>,
 }
@@ -35,8 +35,8 @@ pub(crate) struct Setup {
 
 impl<'a> ConstraintBuilder<'a> {
     pub(crate) fn new(model: &'a Model, parameters: &'a Parameters, setup: Setup) -> Self {
-        let last_share = Cell::new((f32::NAN, f32::NAN));
-        Self { model, parameters, setup, last_share, last_limits: Cell::new(None) }
+        let last_shares = ConstraintKind::ALL.map(|_| Cell::new((f32::NAN, f32::NAN)));
+        Self { model, parameters, setup, last_shares, last_limits: Cell::new(None) }
     }
 
     /// Number of passes in a substep.
@@ -101,19 +101,21 @@ impl<'a> ConstraintBuilder<'a> {
                 scaled_compliance: softness / (self.setup.h * self.setup.h),
                 share: relaxation,
             },
-            Method::Pbd => {
-                PassSoftness { scaled_compliance: 0.0, share: relaxation * self.share(softness) }
-            }
+            Method::Pbd => PassSoftness {
+                scaled_compliance: 0.0,
+                share: relaxation * self.share(constraint.kind, softness),
+            },
         }
     }
 
-    fn share(&self, stiffness: f32) -> f32 {
-        let (last, share) = self.last_share.get();
+    fn share(&self, kind: ConstraintKind, stiffness: f32) -> f32 {
+        let last_share = &self.last_shares[kind as usize];
+        let (last, share) = last_share.get();
         if stiffness.to_bits() == last.to_bits() {
             return share;
         }
         let share = stiffness_per_pass(stiffness, self.parameters.iterations);
-        self.last_share.set((stiffness, share));
+        last_share.set((stiffness, share));
         share
     }
 

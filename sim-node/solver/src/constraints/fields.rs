@@ -16,7 +16,7 @@ pub(crate) struct ConstraintFields {
 }
 
 impl ConstraintFields {
-    /// True if a [`RigidProjection`] suffices for constraints of this scaled compliance.
+    /// True if a `RigidProjection` suffices for constraints of this scaled compliance.
     pub(crate) fn are_rigid(self, scaled_compliance: f32) -> bool {
         let rigid = Self { max_lengths: self.max_lengths, ..Self::default() };
         self == rigid && scaled_compliance == 0.0

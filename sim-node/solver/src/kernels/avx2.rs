@@ -1,5 +1,4 @@
-//! Lanes8 lanes in an AVX2 register. Apart from the worker pool, this is the crate's only file of
-//! unchecked code.
+//! Eight lanes in an AVX2 register.
 //!
 //! Every operation is the scalar one in each lane: no fused multiply-add, no estimates.
 #![cfg(target_arch = "x86_64")]
@@ -12,12 +11,12 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::lanes::{LaneWork, Lanes, Lanes8, PackedParticle, Wide, axes};
 
-/// Lanes8 numbers. Values of this type exist only within [`run`], on a processor with AVX2. Every
+/// Eight numbers. Values of this type exist only within [`run`], on a processor with AVX2. Every
 /// `unsafe` block of this file relies on that invariant.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(__m256);
 
-/// Lanes8 booleans: all bits set, or none.
+/// Eight booleans: all bits set, or none.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2Mask(__m256);
 

@@ -1,4 +1,4 @@
-//! Lanes8 lanes as a plain array, which the compiler vectorises as far as the target allows.
+//! Eight lanes as a plain array, which the compiler vectorises as far as the target allows.
 
 #![allow(
     unsafe_code,
@@ -10,7 +10,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::lanes::{Lanes, Lanes8, PackedParticle, Wide};
 
-/// Lanes8 numbers in an array.
+/// Eight numbers in an array.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Portable(Lanes8);
 

@@ -1,5 +1,4 @@
-//! Threads that work on one job at a time. Apart from the AVX2 kernels, this is the crate's only
-//! file of unchecked code.
+//! Threads that work on one job at a time.
 //!
 //! A job within a step takes a few microseconds, so workers spin while they wait for one; between
 //! steps they park. A job is always divided in the same way and parts are never stolen, so the

@@ -19,7 +19,7 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use serde::Deserialize;
-use sim_types::{COORDINATE_MAX, Method};
+use sim_types::{COORDINATE_MAX, Method, ParameterValues};
 
 use super::definition::settings::Up;
 use super::definition::{ELEMENTS_MAX, SCENE_VERSION, Scene};
@@ -125,7 +125,11 @@ impl Reader<'_> {
             dimensions,
             up: up.transpose()?.unwrap_or_default(),
             unit: file.unit.clone().unwrap_or_else(|| "m".to_owned()),
-            gravity: self.vector_or("gravity", file.gravity.as_ref(), [0.0, -9.81, 0.0])?,
+            gravity: self.vector_or(
+                "gravity",
+                file.gravity.as_ref(),
+                ParameterValues::DEFAULT.gravity,
+            )?,
             solver: self.solver(&file.solver)?,
             wind: file.wind.as_ref().map(|wind| self.wind(wind)).transpose()?,
             particles: enumerate(&file.particle, |index, one| self.particle(index, one))?,

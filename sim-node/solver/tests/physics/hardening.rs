@@ -39,8 +39,8 @@ fn particles_that_blow_up_freeze_at_their_last_position_and_the_others_continue(
 fn a_frozen_particle_refuses_commands_until_a_reset() {
     let mut solver = stepped(BLOWS_UP, 1);
     let before = bits(&solver);
-    let grip = Grab { particle: 0, target: [0.0; 3], over_s: 0.0 };
-    for refused in [solver.pin(0), solver.unpin(0), solver.grab(1, grip), solver.release(1, 0)] {
+    let grab = Grab { particle: 0, target: [0.0; 3], over_s: 0.0 };
+    for refused in [solver.pin(0), solver.unpin(0), solver.grab(1, grab), solver.release(1, 0)] {
         assert_eq!(refused, Err(sim_solver::Reason::NoEffectHere));
     }
     assert_eq!(bits(&solver), before);

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::decimal;
 use super::limits::Limits;
-use sim_types::Method;
+use sim_types::{Method, ParameterValues};
 
 /// Largest [`SolverSettings::rate_hz`].
 pub const RATE_HZ_MAX: u32 = 100_000;
@@ -84,16 +84,18 @@ pub struct SolverSettings {
 
 impl Default for SolverSettings {
     fn default() -> Self {
+        let ParameterValues { substeps, iterations, relaxation, damping, max_speed, .. } =
+            ParameterValues::DEFAULT;
         Self {
             rate_hz: 240,
-            substeps: 4,
-            iterations: 1,
+            substeps,
+            iterations,
             method: Method::Xpbd,
             order: ConstraintOrder::Grouped,
-            damping: 0.0,
-            relaxation: 1.0,
+            damping,
+            relaxation,
             tethers: false,
-            max_speed: 10_000.0,
+            max_speed,
             limits: Limits::default(),
         }
     }

@@ -46,6 +46,11 @@ impl Solver {
         if is_fixed != (particle.inverse_mass == 0.0) {
             return Err("its flags and its inverse mass contradict each other");
         }
+        let is_held = particle.flags & (ParticleFlags::PINNED | ParticleFlags::FROZEN) != 0;
+        let is_grabbed = particle.flags & ParticleFlags::GRABBED != 0;
+        if is_held && !is_grabbed && particle.velocity != [0.0; 3] {
+            return Err("it is pinned or frozen, but has a velocity");
+        }
         if self.is_planar && (particle.position[2] != 0.0 || particle.velocity[2] != 0.0) {
             return Err("it lies outside of the plane of a scene of 2 dimensions");
         }
@@ -86,7 +91,7 @@ impl Solver {
                 return Err("bounds are rotated");
             }
         }
-        self.check_counters(keyframe)
+        self.check_grabs_and_counters(keyframe)
     }
 
     fn check_moved(&self, all: &[Moved], count: usize) -> Result<(), &'static str> {
@@ -105,10 +110,13 @@ impl Solver {
         }
     }
 
-    fn check_counters(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
+    fn check_grabs_and_counters(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
         let steps_max = self.grab_steps(GRAB_OVER_S_MAX);
         if keyframe.grabs.iter().any(|grab| grab.steps_left > steps_max) {
             return Err("a grab exceeds the longest duration");
+        }
+        if self.is_planar && keyframe.grabs.iter().any(|grab| grab.target[2] != 0.0) {
+            return Err("a target lies outside of the plane of a scene of 2 dimensions");
         }
         if keyframe.scene_step > SCENE_STEP_MAX {
             return Err("its scene step is too large");
