@@ -285,12 +285,9 @@ fn a_truncated_file_is_read_up_to_the_cut() {
 
 #[test]
 fn flushed_messages_outlive_a_killed_recorder() {
-    let mut log = LogWriter::create(Vec::new(), LogOptions::default(), &run(), SCENE, 0).unwrap();
     let shared = SharedOut::default();
-    let out = shared.clone();
-    log.write(&Message::Step(step_row(0)), 0).unwrap();
-    drop(log);
-    let mut log = LogWriter::create(out, LogOptions::default(), &run(), SCENE, 0).unwrap();
+    let mut log =
+        LogWriter::create(shared.clone(), LogOptions::default(), &run(), SCENE, 0).unwrap();
     for step in 0..10 {
         log.write(&Message::Step(step_row(step)), 0).unwrap();
         if step == 6 {

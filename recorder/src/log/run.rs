@@ -190,7 +190,8 @@ fn parsed<T: FromStr<Err: Display>>(
 
 fn origin(text: &str) -> Option<[f64; 3]> {
     let numbers: Vec<f64> = text.split(' ').map(str::parse).collect::<Result<_, _>>().ok()?;
-    numbers.try_into().ok()
+    let origin: [f64; 3] = numbers.try_into().ok()?;
+    origin.iter().all(|number| number.is_finite()).then_some(origin)
 }
 
 #[cfg(test)]

@@ -192,8 +192,7 @@ fn tokens(text: &str) -> Vec<String> {
                 at += 1;
             }
             at += 2;
-        } else if starts(at, "r\"") || starts(at, "r#") {
-            let hashes = chars[at + 1..].iter().take_while(|char| **char == '#').count();
+        } else if let Some(hashes) = raw_hashes(&chars[at..]) {
             let end = format!("\"{}", "#".repeat(hashes));
             at += 2 + hashes;
             while at < chars.len() && !starts(at, &end) {
@@ -228,6 +227,13 @@ fn tokens(text: &str) -> Vec<String> {
         }
     }
     tokens
+}
+
+/// Number of `#` of the raw string that begins the text. `r#type` is an identifier.
+fn raw_hashes(text: &[char]) -> Option<usize> {
+    let (first, rest) = text.split_first()?;
+    let hashes = rest.iter().take_while(|char| **char == '#').count();
+    (*first == 'r' && rest.get(hashes) == Some(&'"')).then_some(hashes)
 }
 
 /// Removes the items behind `#[cfg(test)]`.
@@ -313,7 +319,7 @@ mod tests {
         let files = [
             ("lib.rs", "mod a; mod b; mod c;"),
             ("a.rs", "use crate::{c, b::{B as Other, self}}; pub struct A;"),
-            ("b.rs", "pub struct B; fn f(_: crate::a::A) {}"),
+            ("b.rs", "pub struct B; fn f(r#type: u8, _: crate::a::A) {}"),
             ("c.rs", "pub struct C;"),
         ];
         assert_eq!(circles_of("pair", &files), [["a.rs", "b.rs"]]);

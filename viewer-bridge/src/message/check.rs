@@ -1,14 +1,11 @@
 //! Range checks of the numbers in a command, before it reaches the source.
 
-use sim_contract::{ParameterValue, Reason};
+use sim_contract::{COORDINATE_MAX, ParameterValue, Reason};
+use sim_solver::GRAB_OVER_S_MAX;
 
 use super::from_page::Command;
 use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
 
-/// Largest coordinate in m, as in the node.
-const COORDINATE_MAX: f32 = 1e7;
-/// Longest time in which a grabbed particle reaches its target, in s.
-const OVER_S_MAX: f32 = 0.25;
 /// Shortest time of a brush stroke, in s.
 const BRUSH_OVER_S_MIN: f32 = 1e-3;
 /// Range of `rate`.
@@ -21,13 +18,13 @@ pub(crate) fn check(command: &Command) -> Result<(), Reason> {
     match command {
         Command::Grab { target, over_s, .. } | Command::Move { target, over_s, .. } => {
             points(&[*target])?;
-            within(*over_s, 0.0, OVER_S_MAX)
+            within(*over_s, 0.0, GRAB_OVER_S_MAX)
         }
         Command::Brush { eye, ray, radius, delta, over_s, cap } => {
             points(&[*eye, *ray, *delta])?;
             direction(ray)?;
             within(*radius, 0.0, COORDINATE_MAX)?;
-            within(*over_s, BRUSH_OVER_S_MIN, OVER_S_MAX)?;
+            within(*over_s, BRUSH_OVER_S_MIN, GRAB_OVER_S_MAX)?;
             cap.map_or(Ok(()), |cap| within(cap, 0.0, f32::MAX))
         }
         Command::Cut { constraints, .. } => at_most(constraints.len(), CONSTRAINTS_PER_CUT_MAX),

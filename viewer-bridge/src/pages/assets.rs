@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_a_file_already_is_told_so() {
+    fn a_client_with_the_current_file_receives_not_modified() {
         let first = Assets::Embedded.answer("", &HeaderMap::new());
         let mut headers = HeaderMap::new();
         headers.insert(header::IF_NONE_MATCH, first.headers()[header::ETAG].clone());

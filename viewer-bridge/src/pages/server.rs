@@ -121,12 +121,16 @@ async fn file(
 }
 
 async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> Response {
-    let waiting = Arc::clone(&state.waiting).try_acquire_owned();
-    let is_full = state.sessions.pages.available_permits() == 0;
-    let Some(waiting) = waiting.ok().filter(|_| !is_full) else {
-        let text = format!("{CLIENTS_MAX} pages are already open; close one\n");
-        return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
+    if state.sessions.pages.available_permits() == 0 {
+        return refusal(format!("{CLIENTS_MAX} pages are already open; close one\n"));
+    }
+    let Ok(waiting) = Arc::clone(&state.waiting).try_acquire_owned() else {
+        return refusal(format!("{WAITING_MAX} sockets have not sent hello; try again later\n"));
     };
     limit(upgrade)
         .on_upgrade(async move |socket| session::serve(socket, &state.sessions, waiting).await)
+}
+
+fn refusal(text: String) -> Response {
+    (StatusCode::SERVICE_UNAVAILABLE, text).into_response()
 }

@@ -106,6 +106,7 @@ fn a_page_with_the_newest_frame_does_not_request_another() {
     site.publish(&Update::SameState);
     site.show(9, 1);
     assert_eq!(page.frame().0, 9);
+    assert_eq!(site.requests.next(Duration::ZERO), None);
 }
 
 #[test]

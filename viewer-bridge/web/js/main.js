@@ -126,11 +126,17 @@ function listenToSimulation(input) {
     document.title = `${scene.name} · Catenary`;
   });
   simulation.on("reset", () => input.abandon());
-  simulation.on("frame", (frame) => {
-    const count = Math.max(frame.nonFinite.length, simulation.stats?.frozenCount ?? 0);
-    banner.set("nonFinite", count === 0 ? "" : `Frozen particles: ${count}. Their state is no longer finite. Reset restores them.`);
-    banner.set("saturated", frame.isSaturated ? "Some particles are far outside the scene. They are shown at its border." : "");
-  });
+  simulation.on("frame", warnOfParticles);
+  simulation.on("stats", warnOfParticles);
+}
+
+function warnOfParticles() {
+  const { frame, stats } = simulation;
+  if (frame === null) return;
+  const frozen = stats?.epoch === frame.epoch ? stats.frozenCount : 0;
+  const count = Math.max(frame.nonFinite.length, frozen);
+  banner.set("nonFinite", count === 0 ? "" : `Frozen particles: ${count}. Their state is no longer finite. Reset restores them.`);
+  banner.set("saturated", frame.isSaturated ? "Some particles are far outside the scene. They are shown at its border." : "");
 }
 
 /** @param {Renderer} renderer @param {Connector} connector */

@@ -7,6 +7,7 @@ import { test } from "node:test";
 import { decode } from "../js/net/wire.js";
 
 const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
+const SHAPES = ["plane", "box", "sphere", "capsule", "bounds"];
 const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders"];
 
 /** Decodes hex into an array buffer that starts at offset 0. */
@@ -68,8 +69,10 @@ function compareColliders(read, written) {
   assert.equal(read.length, written.length);
   read.forEach((one, i) => {
     const other = written[i];
+    assert.deepEqual([one.shape, one.restitution, one.friction], [SHAPES[other.shape], other.restitution, other.friction]);
     assert.deepEqual([one.radius, one.offset, one.normal, one.center, one.a, one.b], [other.radius, other.offset, other.normal, other.center, other.a, other.b]);
-    assert.deepEqual([one.halfExtents, one.rotation, one.velocity], [other.half_extents, other.rotation, other.velocity]);
+    assert.deepEqual([one.halfExtents, one.rotation], [other.half_extents, other.rotation]);
+    assert.deepEqual([one.velocity, one.angularVelocity], [other.velocity, other.angular_velocity]);
   });
 }
 

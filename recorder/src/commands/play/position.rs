@@ -89,7 +89,7 @@ impl Position {
 
     fn apply_outcome(&mut self, row: &OutcomeRow) {
         let is_applied = row.is_applied();
-        self.outcome_count = row.index + 1;
+        self.outcome_count = row.index.saturating_add(1);
         self.rejected_count += u64::from(!is_applied);
         // A keyframe of the same step precedes the outcome in the file and is more recent.
         if !is_applied || row.step <= self.keyframe_step {

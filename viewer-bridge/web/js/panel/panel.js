@@ -39,9 +39,10 @@ export class Panel {
       this.form.replaceChildren(...rowsOf(simulation.node?.method ?? null).map((row) => (row.kind === "vector" ? this.vectorRow(row) : this.numberRow(row))));
     }
     const reason = this.reasonAgainst();
-    this.note.hidden = reason === "" && (simulation.parameters?.is_complete ?? true);
+    const note = `${reason} ${this.doubt()}`.trim();
+    this.note.hidden = note === "";
+    this.note.textContent = note;
     this.form.hidden = simulation.parameters?.values == null;
-    this.note.textContent = reason || "This recording has no parameters: the values are those of its scene.";
     for (const refresh of this.refreshers) refresh();
     for (const element of this.form.querySelectorAll("fieldset")) element.disabled = reason !== "";
   }
@@ -52,6 +53,13 @@ export class Panel {
     if (simulation.isReplay || simulation.node?.is_replay) return "The parameters of a recording cannot be changed.";
     if (simulation.parameters?.values == null) return "No scene is loaded.";
     return "";
+  }
+
+  /** The reason why the values may be wrong, or "". */
+  doubt() {
+    const { parameters } = this.simulation;
+    if (parameters?.values == null || parameters.is_complete) return "";
+    return "It has an older format without parameters: these are the values of its scene.";
   }
 
   /** Sends the parameters that changed since the last animation frame. */

@@ -123,8 +123,8 @@ export class Controls {
 
   /** @param {number} index */
   loadNumber(index) {
-    const option = this.scene.options[index];
-    if (option !== undefined && !option.disabled && !this.scene.disabled) this.load(option.value);
+    const scene = this.app.simulation.hello?.scenes[index];
+    if (scene !== undefined && !this.scene.disabled) this.load(scene.name);
   }
 
   /** @param {Mode} mode */

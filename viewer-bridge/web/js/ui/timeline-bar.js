@@ -70,7 +70,7 @@ export class TimelineBar {
     if (timeline === null) return;
     this.slider.min = String(timeline.first_step);
     this.slider.max = String(timeline.last_step);
-    this.hashes.textContent = timeline.hash_text || { checking: "checking hashes…", verified: "hashes verified", diverged: "hashes differ", absent: "no hashes" }[timeline.hashes] || timeline.hashes;
+    this.hashes.textContent = timeline.hash_text;
     this.hashes.classList.toggle("is-good", timeline.hashes === "verified");
     this.hashes.classList.toggle("is-bad", timeline.hashes === "diverged");
     this.hashes.title = timeline.file;
