@@ -87,7 +87,8 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     })
     .with_context(|| truncation(args))?;
     bar.finish_and_clear();
-    let path = log.map(|log| finish(log, &result, args.steps)).transpose()?;
+    let path = log.map(|log| finish(log, &result, args.steps)).transpose();
+    let path = path.with_context(|| truncation(args))?;
     let wall_ns = monotonic_ns() - before_ns;
 
     note_rejections(&result);
@@ -126,7 +127,9 @@ fn truncation(args: &SimulateArgs) -> String {
 
 fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow::Result<LogFile> {
     let file = args.file.create(path)?;
-    args.file.begin(file, &job.description(solver), job.scene.to_toml().as_bytes(), 0)
+    args.file
+        .begin(file, &job.description(solver), job.scene.to_toml().as_bytes(), 0)
+        .with_context(|| truncation(args))
 }
 
 fn finish(log: LogFile, result: &SimulationResult, steps: u64) -> anyhow::Result<PathBuf> {

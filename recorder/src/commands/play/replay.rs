@@ -38,8 +38,8 @@ pub(crate) struct Replay {
     published_torn: Torn,
     /// The last published parameters.
     published_parameters: ParameterValues,
-    /// The last published step.
-    step: u64,
+    /// The last published step; `None` before the first.
+    step: Option<u64>,
     /// The latest recorded status of the node.
     status: Option<StatusRow>,
     /// Reused for each batch of commands.
@@ -83,7 +83,7 @@ impl Replay {
             published_torn: Torn::default(),
             published_parameters: position.parameters,
             position,
-            step: 0,
+            step: None,
             status: None,
             commands: Vec::new(),
         })
@@ -104,6 +104,13 @@ impl Replay {
 
     /// Publishes a snapshot and the messages that belong to it, in the order of a node.
     pub(crate) fn publish(&mut self, frame: &Frame) -> anyhow::Result<()> {
+        if frame.particles.len() != self.run.particle_count as usize {
+            let (step, count) = (frame.row.step, frame.particles.len());
+            bail!(
+                "the snapshot of step {step} has {count} particles, but the scene has {}",
+                self.run.particle_count
+            );
+        }
         for update in &frame.updates {
             self.position.apply(update);
             if let Message::Colliders(row) = update {
@@ -115,16 +122,9 @@ impl Replay {
         for update in &frame.updates {
             self.publish_update(update)?;
         }
-        if frame.particles.len() != self.run.particle_count as usize {
-            let (step, count) = (frame.row.step, frame.particles.len());
-            bail!(
-                "the snapshot of step {step} has {count} particles, but the scene has {}",
-                self.run.particle_count
-            );
-        }
         self.owner.publish_particles(&self.header(frame), |index| frame.particles[index])?;
         self.owner.wake(Wake::Frame);
-        self.step = frame.row.step;
+        self.step = Some(frame.row.step);
         self.control.count_step();
         Ok(())
     }
@@ -199,9 +199,16 @@ impl Replay {
             torn_count: row.torn_count,
             particle_count: self.run.particle_count,
             flags: SnapshotFlags::REPLAY | paused,
-            stride: 1,
+            stride: self.stride(row.step),
             spare: 0,
         }
+    }
+
+    /// Returns the distance of a step from the last published step. A file does not contain the stride of
+    /// its node, but a reader that receives every snapshot must not count missing ones.
+    fn stride(&self, step: u64) -> u32 {
+        let distance = step.saturating_sub(self.step.unwrap_or(step));
+        u32::try_from(distance).unwrap_or(u32::MAX).max(1)
     }
 
     /// Answers commands. The answers are not part of the recorded run. `next_step` is the first step
@@ -233,7 +240,7 @@ impl Replay {
             contract_version: CONTRACT_VERSION,
             solver_version: self.run.solver_version,
             run_id: self.run_id,
-            step: self.step,
+            step: self.step.unwrap_or_default(),
             real_time_factor: if self.control.is_moving() { self.rate } else { 0.0 },
             time_scale: self.rate,
             outcome_count: self.position.outcome_count,

@@ -179,9 +179,26 @@ fn a_name_in_use_is_refused() {
 fn a_snapshot_of_another_size_is_refused() {
     let domain = TestDomain::new();
     let mut replay = replay(&domain);
-    let short = Frame { particles: vec![ParticleState::default()], ..frame(1, Vec::new()) };
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert!(client.colliders(Duration::ZERO).unwrap().colliders.is_empty());
+    let particles = vec![ParticleState::default()];
+    let short = Frame { particles, ..frame(1, vec![floor(1, 2.0)]) };
     let error = replay.publish(&short).unwrap_err();
     assert_eq!(error.to_string(), "the snapshot of step 1 has 1 particles, but the scene has 2");
+    replay.answer_commands(1).unwrap();
+    assert!(client.colliders(Duration::ZERO).unwrap().colliders.is_empty(), "nothing of its step");
+}
+
+#[test]
+fn the_stride_is_the_distance_from_the_snapshot_before() {
+    let domain = TestDomain::new();
+    let mut replay = replay(&domain);
+    let mut client = reader(&domain);
+    let strides = [8, 12, 13, 20].map(|step| {
+        replay.publish(&frame(step, Vec::new())).unwrap();
+        next_header(&mut client).0.stride
+    });
+    assert_eq!(strides, [1, 4, 1, 7]);
 }
 
 fn tears(step: u64, constraints: &[u32], cause: &str) -> Message {

@@ -120,3 +120,19 @@ enum ParameterValueSchema {
     Number(JsonNumber),
     Vector([JsonNumber; 3]),
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_schema_has_every_field_of_a_command() {
+        let schema = schemars::schema_for!(ActionSchema).to_value();
+        for action in Action::samples() {
+            for (field, _) in serde_json::to_value(action).unwrap().as_object().unwrap() {
+                let is_known = !schema["properties"][field].is_null();
+                assert!(is_known || field == "number", "{field} of {action:?}");
+            }
+        }
+    }
+}

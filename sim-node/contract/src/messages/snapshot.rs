@@ -62,7 +62,8 @@ pub struct SnapshotHeader {
     /// [`SnapshotFlags`] bits.
     pub flags: u32,
     /// Number of steps from one published snapshot to the next: 1, unless the node runs with
-    /// `--every`. A node that pauses also publishes the step before the pause.
+    /// `--every`. A node that pauses also publishes the step before the pause. In a replay, the distance
+    /// from the snapshot before.
     pub stride: u32,
     /// Always 0.
     pub spare: u32,
