@@ -1,7 +1,7 @@
 //! Command files: one JSON object per line. The rows of `/outcomes` are such lines.
 
 use serde_json::{Map, Value};
-use sim_contract::{Action, PlainF32, Text};
+use sim_contract::{Action, ActionFields, PlainF32, Text};
 
 /// A command and the step in which it takes effect.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,45 +32,6 @@ struct FieldError {
     problem: String,
     allowed: String,
 }
-
-/// The fields of a kind of command.
-struct Kind {
-    name: &'static str,
-    fields: &'static [&'static str],
-    /// The first fields are required, and the others are optional.
-    required_count: usize,
-}
-
-const fn kind(name: &'static str, required: &'static [&'static str]) -> Kind {
-    Kind { name, fields: required, required_count: required.len() }
-}
-
-const fn kind_with_optional(name: &'static str, fields: &'static [&'static str]) -> Kind {
-    Kind { name, fields, required_count: fields.len() - 1 }
-}
-
-/// The kinds of commands.
-const KINDS: [Kind; 18] = [
-    kind("pin", &["particle"]),
-    kind("unpin", &["particle"]),
-    kind_with_optional("grab", &["particle", "target", "over_s"]),
-    kind_with_optional("move", &["particle", "target", "over_s"]),
-    kind("release", &["particle"]),
-    kind("pause", &[]),
-    kind("resume", &[]),
-    kind("step", &["count"]),
-    kind("reset", &[]),
-    kind_with_optional("push", &["center", "radius", "delta", "limit"]),
-    kind("cut", &["constraint"]),
-    kind("cut_radius", &["center", "radius"]),
-    kind("cut_segment", &["from", "to", "direction"]),
-    kind_with_optional("move_anchor", &["anchor", "translation", "rotation"]),
-    kind_with_optional("move_collider", &["collider", "translation", "rotation"]),
-    kind_with_optional("set", &["parameter", "value", "constraint_kind"]),
-    kind("load", &["scene"]),
-    // A log has this kind for a command of another version.
-    kind("unknown", &["number"]),
-];
 
 /// The fields of every line. `status` and `reason` come from logs and have no effect.
 const COMMON_FIELDS: [&str; 7] =
@@ -121,28 +82,29 @@ fn action(fields: &Map<String, Value>) -> Result<Action, FieldError> {
     let Some(name) = fields.get("kind") else {
         return Err(missing("kind", &kind_names()));
     };
-    let kind = KINDS.iter().find(|kind| name.as_str() == Some(kind.name));
-    let kind = kind.ok_or_else(|| invalid("kind", &format!("{name} is unknown"), &kind_names()))?;
-    let is_own = |name: &str| kind.fields.contains(&name);
-    let is_known = |name: &str| is_own(name) || COMMON_FIELDS.contains(&name);
+    let row = ActionFields::ALL.iter().find(|row| name.as_str() == Some(row.kind));
+    let row = row.ok_or_else(|| invalid("kind", &format!("{name} is unknown"), &kind_names()))?;
+    let own = || row.required.iter().chain(row.optional).copied();
+    let is_known = |name: &str| own().chain(COMMON_FIELDS).any(|known| known == name);
     if let Some(unknown) = fields.keys().find(|name| !is_known(name)) {
-        let allowed: Vec<_> = kind.fields.iter().chain(&COMMON_FIELDS).copied().collect();
+        let allowed: Vec<_> = own().chain(COMMON_FIELDS).collect();
         let problem = format!("is not a field of {name}");
         return Err(invalid(unknown, &problem, &allowed.join(", ")));
     }
-    for (count, name) in kind.fields.iter().enumerate() {
-        match fields.get(*name) {
+    for name in own() {
+        match fields.get(name) {
             Some(value) if is_valid(name, value) => {}
             Some(value) => {
                 return Err(invalid(name, &format!("{value} is invalid"), allowed_values(name)));
             }
-            None if count < kind.required_count => {
+            None if row.required.contains(&name) => {
                 return Err(missing(name, allowed_values(name)));
             }
             None => {}
         }
     }
-    let own_fields = fields.iter().filter(|(name, _)| *name == "kind" || is_own(name));
+    let own_fields =
+        fields.iter().filter(|(name, _)| *name == "kind" || own().any(|own| own == *name));
     let object = own_fields.map(|(name, value)| (name.clone(), value.clone())).collect();
     // All fields are valid. The error of serde would name internal types.
     serde_json::from_value(Value::Object(object))
@@ -193,8 +155,9 @@ fn allowed_values(name: &str) -> &'static str {
 }
 
 fn kind_names() -> String {
-    let names: Vec<_> = KINDS.iter().map(|kind| kind.name).filter(|n| *n != "unknown").collect();
-    names.join(", ")
+    let names = ActionFields::ALL.iter().map(|fields| fields.kind);
+    // A log has this kind for a command of another version.
+    names.filter(|name| *name != "unknown").collect::<Vec<_>>().join(", ")
 }
 
 fn missing(field: &str, allowed: &str) -> FieldError {
@@ -207,8 +170,6 @@ fn invalid(field: &str, problem: &str, allowed: &str) -> FieldError {
 
 #[cfg(test)]
 mod tests {
-    use sim_contract::Command;
-
     use super::*;
 
     fn error(text: &str) -> String {
@@ -241,32 +202,12 @@ mod tests {
         assert_eq!(commands, [expected]);
     }
 
-    fn fields(action: Action) -> Map<String, Value> {
-        match serde_json::to_value(action).unwrap() {
-            Value::Object(fields) => fields,
-            other => panic!("{other} is not an object"),
-        }
-    }
-
     #[test]
-    fn every_command_can_be_read_with_all_its_fields() {
+    fn every_command_can_be_read() {
         for action in Action::samples() {
-            let mut fields = fields(action);
-            let kind = KINDS.iter().find(|kind| fields["kind"] == kind.name).unwrap();
-            let is_known = |name: &String| name == "kind" || kind.fields.contains(&name.as_str());
-            assert!(fields.keys().all(is_known), "{action:?}");
-            fields.insert("step".to_owned(), 1.into());
-            let read = parse(&Value::Object(fields).to_string(), "x").unwrap();
-            assert_eq!(read[0].action, action);
-        }
-    }
-
-    #[test]
-    fn the_table_has_every_kind_of_the_contract() {
-        for kind in 0..=1000 {
-            let action = Command { kind, ..Command::new(0, 0, Action::Pause) }.action();
-            let name = &fields(action)["kind"];
-            assert!(KINDS.iter().any(|kind| *name == kind.name), "{name}");
+            let mut line = serde_json::to_value(action).unwrap();
+            line["step"] = 1.into();
+            assert_eq!(parse(&line.to_string(), "x").unwrap()[0].action, action);
         }
     }
 

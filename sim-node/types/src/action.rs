@@ -148,6 +148,49 @@ pub enum Action {
     },
 }
 
+/// The fields of a kind of action in its JSON form, besides `kind`.
+#[derive(Debug)]
+pub struct ActionFields {
+    /// Name of the kind.
+    pub kind: &'static str,
+    /// Fields that must be present.
+    pub required: &'static [&'static str],
+    /// Fields that may be absent.
+    pub optional: &'static [&'static str],
+}
+
+impl ActionFields {
+    /// All kinds, in the order of their numbers on the wire.
+    pub const ALL: [Self; 18] = [
+        Self::new("pin", &["particle"], &[]),
+        Self::new("unpin", &["particle"], &[]),
+        Self::new("grab", &["particle", "target"], &["over_s"]),
+        Self::new("move", &["particle", "target"], &["over_s"]),
+        Self::new("release", &["particle"], &[]),
+        Self::new("pause", &[], &[]),
+        Self::new("resume", &[], &[]),
+        Self::new("step", &["count"], &[]),
+        Self::new("reset", &[], &[]),
+        Self::new("push", &["center", "radius", "delta"], &["limit"]),
+        Self::new("cut", &["constraint"], &[]),
+        Self::new("cut_radius", &["center", "radius"], &[]),
+        Self::new("cut_segment", &["from", "to", "direction"], &[]),
+        Self::new("move_anchor", &["anchor", "translation"], &["rotation"]),
+        Self::new("move_collider", &["collider", "translation"], &["rotation"]),
+        Self::new("set", &["parameter", "value"], &["constraint_kind"]),
+        Self::new("load", &["scene"], &[]),
+        Self::new("unknown", &["number"], &[]),
+    ];
+
+    const fn new(
+        kind: &'static str,
+        required: &'static [&'static str],
+        optional: &'static [&'static str],
+    ) -> Self {
+        Self { kind, required, optional }
+    }
+}
+
 fn grab_over_s_default() -> f32 {
     GRAB_OVER_S_DEFAULT
 }
@@ -251,6 +294,28 @@ impl Action {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_table_of_fields_has_those_of_every_action() {
+        let samples: Vec<_> =
+            Action::samples().iter().map(|one| serde_json::to_value(one).unwrap()).collect();
+        for sample in &samples {
+            let row = ActionFields::ALL.iter().find(|row| sample["kind"] == row.kind).unwrap();
+            let fields = || row.required.iter().chain(row.optional).copied();
+            let is_known = |name: &String| name == "kind" || fields().any(|field| field == name);
+            assert!(sample.as_object().unwrap().keys().all(is_known), "{sample}");
+            for absent in fields() {
+                let mut without = sample.clone();
+                without.as_object_mut().unwrap().remove(absent);
+                let is_optional = row.optional.contains(&absent);
+                let is_read = serde_json::from_value::<Action>(without).is_ok();
+                assert_eq!(is_read, is_optional, "{absent} of {}", row.kind);
+            }
+        }
+        for row in &ActionFields::ALL {
+            assert!(samples.iter().any(|sample| sample["kind"] == row.kind), "{}", row.kind);
+        }
+    }
 
     fn set(name: &str, value: ParameterValue, constraint_kind: Option<KindFilter>) -> Action {
         Action::Set { parameter: Text::cut(name), value, constraint_kind }

@@ -29,7 +29,7 @@ mod reason;
 mod tear_cause;
 mod text;
 
-pub use action::{Action, GRAB_OVER_S_DEFAULT, KindFilter};
+pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter};
 pub use collider_shape::ColliderShape;
 pub use constraint_kind::ConstraintKind;
 pub use json_number::PlainF32;

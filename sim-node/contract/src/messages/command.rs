@@ -269,6 +269,10 @@ mod tests {
         numbers.dedup();
         let expected: Vec<_> = (1..=17).chain([99]).collect();
         assert_eq!(numbers, expected);
+        for kind in (0..=1000).filter(|kind| !numbers.contains(kind)) {
+            let action = Command { kind, ..Command::new(0, 0, Action::Pause) }.action();
+            assert_eq!(action, Action::Unknown { number: kind }, "an action without a sample");
+        }
     }
 
     #[test]
