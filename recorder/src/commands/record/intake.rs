@@ -27,7 +27,6 @@ pub(crate) struct Intake {
     outcomes: Vec<Outcome>,
     started: Option<Started>,
     lost: LostChanges,
-    counts: AllCounts,
 }
 
 impl Intake {
@@ -53,7 +52,7 @@ impl Intake {
         self.start_if_ready(now, accepted);
         if let Some(started) = &mut self.started {
             let particles = state.particles.to_vec();
-            started.accept(state.header, particles, state.changes, &mut self.counts, accepted);
+            started.accept(state.header, particles, state.changes, accepted);
             return Ok(());
         }
         if matches!(state.changes.first(), Some(Change::Load)) {
@@ -86,8 +85,8 @@ impl Intake {
             self.outcomes.drain(..excess);
             return;
         };
-        started.accept_outcomes(self.outcomes.drain(..), &mut self.counts, accepted);
-        started.accept_statuses(&messages.statuses, &mut self.counts, accepted);
+        started.accept_outcomes(self.outcomes.drain(..), accepted);
+        started.accept_statuses(&messages.statuses, accepted);
     }
 
     /// Starts the recording at the candidate, once it has its keyframe.
@@ -96,12 +95,10 @@ impl Intake {
         let Some(load) = self.load.take() else { return };
         let mut started = Started::new(&first, self.steps_max, self.lost);
         let header = load.into_run_header(&first.header, first.torn_before, now);
-        for row in &header.rows {
-            self.counts[row.topic()].received += 1;
-        }
+        started.count_load(&header.rows);
         accepted.header = Some(header);
         let FirstState { header, particles, changes, .. } = first;
-        started.accept(&header, particles, &changes, &mut self.counts, accepted);
+        started.accept(&header, particles, &changes, accepted);
         self.started = Some(started);
     }
 
@@ -117,11 +114,7 @@ impl Intake {
 
     /// Returns the numbers of received and missing messages.
     pub(crate) fn counts(&self) -> AllCounts {
-        let mut counts = self.counts;
-        if let Some(started) = &self.started {
-            started.add_gaps(&self.lost, &mut counts);
-        }
-        counts
+        self.started.as_ref().map_or_else(AllCounts::default, |started| started.counts(&self.lost))
     }
 }
 

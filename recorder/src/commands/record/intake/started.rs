@@ -38,6 +38,7 @@ pub(super) struct Started {
     /// The changes that the tap dropped before the start.
     lost_before: LostChanges,
     frozen: FrozenTracker,
+    counts: AllCounts,
 }
 
 impl Started {
@@ -63,6 +64,14 @@ impl Started {
             unknown_colliders: 0,
             lost_before,
             frozen: FrozenTracker::default(),
+            counts: AllCounts::default(),
+        }
+    }
+
+    /// Counts the rows of the load.
+    pub(super) fn count_load(&mut self, rows: &[Message]) {
+        for row in rows {
+            self.counts[row.topic()].received += 1;
         }
     }
 
@@ -72,7 +81,6 @@ impl Started {
         header: &SnapshotHeader,
         particles: Vec<ParticleState>,
         changes: &[Change],
-        counts: &mut AllCounts,
         accepted: &mut Accepted,
     ) {
         accepted.end = self.end_at(header);
@@ -83,13 +91,13 @@ impl Started {
         let rows: Vec<_> = rows.collect();
         let events = self.frozen.new_events(header.step, &particles);
         for message in rows.into_iter().chain(events.into_iter().map(Message::Event)) {
-            counts[message.topic()].received += 1;
+            self.counts[message.topic()].received += 1;
             accepted.push(message);
         }
-        self.count_gaps(header, counts);
+        self.count_gaps(header);
         self.last = *header;
-        counts[Topic::Steps].received += 1;
-        counts[Topic::Particles].received += 1;
+        self.counts[Topic::Steps].received += 1;
+        self.counts[Topic::Particles].received += 1;
         accepted.contents.push(Content::Snapshot(StepRow::from(header), particles));
         if header.step >= self.end_step {
             accepted.end = Some(RunEnd::EndStep);
@@ -143,7 +151,7 @@ impl Started {
     }
 
     /// Counts the states and keyframes that are missing before a state.
-    fn count_gaps(&mut self, header: &SnapshotHeader, counts: &mut AllCounts) {
+    fn count_gaps(&mut self, header: &SnapshotHeader) {
         // A node that pauses also publishes the step before the pause, so the distance may be less
         // than the stride.
         let distance = header.step.saturating_sub(self.last.step);
@@ -152,7 +160,7 @@ impl Started {
         if header.keyframe_step > self.keyframe_step && header.keyframe_step >= self.first_step {
             self.keyframe_step = header.keyframe_step;
             let is_missing = self.recorded_keyframe_step < Some(header.keyframe_step);
-            counts[Topic::Keyframe].gaps += u64::from(is_missing);
+            self.counts[Topic::Keyframe].gaps += u64::from(is_missing);
         }
     }
 
@@ -160,7 +168,6 @@ impl Started {
     pub(super) fn accept_outcomes(
         &mut self,
         outcomes: impl Iterator<Item = Outcome>,
-        counts: &mut AllCounts,
         accepted: &mut Accepted,
     ) {
         for outcome in outcomes {
@@ -170,30 +177,26 @@ impl Started {
             if is_foreign || outcome.index < self.next_outcome {
                 continue;
             }
-            counts[Topic::Outcomes].gaps += outcome.index - self.next_outcome;
-            counts[Topic::Outcomes].received += 1;
-            self.next_outcome = outcome.index + 1;
+            self.counts[Topic::Outcomes].gaps += outcome.index - self.next_outcome;
+            self.counts[Topic::Outcomes].received += 1;
+            self.next_outcome = outcome.index.saturating_add(1);
             accepted.push(Message::Outcome(OutcomeRow::from(&outcome)));
         }
     }
 
-    pub(super) fn accept_statuses(
-        &self,
-        statuses: &[NodeStatus],
-        counts: &mut AllCounts,
-        accepted: &mut Accepted,
-    ) {
+    pub(super) fn accept_statuses(&mut self, statuses: &[NodeStatus], accepted: &mut Accepted) {
         let steps = self.first_step..=self.end_step;
         for status in statuses {
             if status.run_id == self.run_id && steps.contains(&status.step) {
-                counts[Topic::Status].received += 1;
+                self.counts[Topic::Status].received += 1;
                 accepted.push(Message::Status(StatusRow::from(status)));
             }
         }
     }
 
-    /// Adds the messages that are still missing.
-    pub(super) fn add_gaps(&self, lost: &LostChanges, counts: &mut AllCounts) {
+    /// Returns the numbers of received and missing messages.
+    pub(super) fn counts(&self, lost: &LostChanges) -> AllCounts {
+        let mut counts = self.counts;
         counts[Topic::Particles].gaps = self.state_gaps;
         counts[Topic::Steps].gaps = self.state_gaps;
         counts[Topic::Outcomes].gaps += self.last.outcome_count.saturating_sub(self.next_outcome);
@@ -201,5 +204,6 @@ impl Started {
         counts[Topic::Colliders].gaps =
             self.unknown_colliders + (lost.colliders - self.lost_before.colliders);
         counts[Topic::Parameters].gaps = lost.parameters - self.lost_before.parameters;
+        counts
     }
 }

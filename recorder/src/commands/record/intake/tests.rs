@@ -84,7 +84,9 @@ fn send(intake: &mut Intake, updates: &[Update<'_>]) -> Accepted {
 
 fn add(intake: &mut Intake, updates: &[Update<'_>], accepted: &mut Accepted) {
     let mut messages = Messages::default();
-    updates.iter().for_each(|update| messages.add(update));
+    for update in updates {
+        messages.add(update);
+    }
     intake.accept_messages(messages, NOW, accepted);
     accepted.sort();
 }
