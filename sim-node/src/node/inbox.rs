@@ -1,52 +1,65 @@
 //! Order in which the commands of several clients are applied.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
+use std::ops::Bound;
 
 use sim_contract::{COMMANDS_PER_STEP_MAX, Command};
 
-/// Commands that wait to be applied, by client.
+/// Commands that wait to be applied.
 ///
-/// A turn visits the clients round-robin by ascending id and takes one command of each, in the
-/// client's sequence, so that no client can starve another.
-#[derive(Debug, Default)]
+/// Commands are taken round-robin: one of each client by ascending id, in the client's sequence. A turn
+/// continues after the client that was served last, so that no client can starve another.
+#[derive(Debug)]
 pub(super) struct Inbox {
-    queues: BTreeMap<u64, VecDeque<Command>>,
-    count: usize,
+    waiting: BTreeMap<Place, Command>,
+    /// Number of commands that have arrived.
+    arrived_count: u64,
+    /// The client that was served last. The greatest id before the first one, so that the lowest
+    /// follows.
+    last_served: u64,
 }
+
+/// The key of a command: client, sequence, and order of arrival for equal sequences.
+type Place = (u64, u64, u64);
 
 /// Number of commands from which on the inbox accepts no more. The rest waits in shared memory, where
 /// each client has a bounded queue.
 const INBOX_MAX: usize = 16 * COMMANDS_PER_STEP_MAX;
 
+impl Default for Inbox {
+    fn default() -> Self {
+        Self { waiting: BTreeMap::new(), arrived_count: 0, last_served: u64::MAX }
+    }
+}
+
 impl Inbox {
     /// Returns `true` if the inbox accepts more commands.
     pub(super) fn has_room(&self) -> bool {
-        self.count < INBOX_MAX
+        self.waiting.len() < INBOX_MAX
     }
 
     /// Adds commands in their order of arrival.
     pub(super) fn add(&mut self, commands: impl IntoIterator<Item = Command>) {
         for command in commands {
-            let queue = self.queues.entry(command.client_id).or_default();
-            // Sorted by sequence, equal numbers in their order of arrival; this mostly appends.
-            let place = queue.partition_point(|queued| queued.sequence <= command.sequence);
-            queue.insert(place, command);
-            self.count += 1;
+            let place = (command.client_id, command.sequence, self.arrived_count);
+            self.waiting.insert(place, command);
+            self.arrived_count += 1;
         }
     }
 
     /// Removes the commands of one turn, in the order of application.
     pub(super) fn next_turn(&mut self) -> Vec<Command> {
-        let mut turn = Vec::new();
-        while self.count > 0 && turn.len() < COMMANDS_PER_STEP_MAX {
-            let room = COMMANDS_PER_STEP_MAX - turn.len();
-            let fronts = self.queues.values_mut().take(room).filter_map(VecDeque::pop_front);
-            let before = turn.len();
-            turn.extend(fronts);
-            self.count -= turn.len() - before;
-            self.queues.retain(|_, queue| !queue.is_empty());
-        }
-        turn
+        std::iter::from_fn(|| self.next()).take(COMMANDS_PER_STEP_MAX).collect()
+    }
+
+    /// Removes the first command of the next client.
+    fn next(&mut self) -> Option<Command> {
+        let end_of_last = Bound::Excluded((self.last_served, u64::MAX, u64::MAX));
+        let after_last = self.waiting.range((end_of_last, Bound::Unbounded)).next();
+        let (place, _) = after_last.or_else(|| self.waiting.first_key_value())?;
+        let place = *place;
+        self.last_served = place.0;
+        self.waiting.remove(&place)
     }
 }
 
@@ -83,6 +96,17 @@ mod tests {
         assert_eq!(first[..3], [(1, 0), (2, 0), (1, 1)]);
         let rest = order(&inbox.next_turn());
         assert_eq!((rest.len(), rest[0]), (1501 - COMMANDS_PER_STEP_MAX, (1, 1023)));
+    }
+
+    #[test]
+    fn a_turn_begins_after_the_client_that_was_served_last() {
+        let mut inbox = Inbox::default();
+        let flood = |round| (0..COMMANDS_PER_STEP_MAX as u64).map(move |id| pin(id, round));
+        inbox.add([pin(u64::MAX - 1, 0)]);
+        inbox.add(flood(0));
+        assert_eq!(inbox.next_turn().len(), COMMANDS_PER_STEP_MAX);
+        inbox.add(flood(1));
+        assert_eq!(order(&inbox.next_turn())[..2], [(u64::MAX - 1, 0), (0, 1)]);
     }
 
     #[test]
