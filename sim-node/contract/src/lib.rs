@@ -80,10 +80,10 @@ pub use ports::services::AttachError;
 pub use ports::wake::Wake;
 pub use ports::writer::PublishError;
 pub use sim_types::{
-    Action, COORDINATE_MAX, ColliderShape, ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Method,
-    NumberRange, OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ParameterValues,
-    ParticleFlags, PerKind, PlainF32, Reason, SETTINGS_COUNT, Setting, TearCause, Text, TextError,
-    ValueForm,
+    Action, COLLIDERS_MAX, COORDINATE_MAX, ColliderShape, ConstraintKind, ELEMENTS_MAX,
+    GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS, Parameter,
+    ParameterInfo, ParameterValue, ParameterValues, ParticleFlags, PerKind, PlainF32, Reason,
+    SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, Setting, TearCause, Text, TextError, ValueForm,
 };
 pub use stop::Stop;
 pub use text_file::{TextFileError, read_scene_file};

@@ -4,12 +4,6 @@
 /// service, and is checked on open. It changes with any change of the bytes in shared memory.
 pub const CONTRACT_VERSION: u32 = 3;
 
-/// Most particles, and most constraints, of a scene: indices below 2^24 are exact in f32.
-pub const ELEMENTS_MAX: usize = 1 << 24;
-/// Longest scene text, in bytes.
-pub const SCENE_SIZE_BYTES_MAX: usize = 16 << 20;
-/// Most colliders of a scene: each substep tests every free particle against every collider.
-pub const COLLIDERS_MAX: usize = 1 << 16;
 /// Most commands that a node applies at one step boundary; the others wait for the next boundary.
 pub const COMMANDS_PER_STEP_MAX: usize = 1024;
 
