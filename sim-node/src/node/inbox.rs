@@ -6,7 +6,7 @@ use sim_contract::{COMMANDS_PER_STEP_MAX, Command};
 
 /// Commands that wait to be applied, by client.
 ///
-/// A turn visits the clients round-robin by ascending id and takes one command of each, in the
+/// A turn, the commands of one poll, visits the clients round-robin by ascending id and takes one command of each, in the
 /// client's sequence, so that no client can starve another.
 #[derive(Debug, Default)]
 pub(super) struct Inbox {
