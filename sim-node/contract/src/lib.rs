@@ -27,7 +27,7 @@
 //!
 //! | service | payload; header | written |
 //! |---|---|---|
-//! | particles | [`ParticleState`]s; [`SnapshotHeader`] | after every step, or every n-th with `--every n` |
+//! | particles | [`ParticleState`]s; [`SnapshotHeader`] | after every step; with `--every n` after every n-th, and the last one before a pause |
 //! | keyframe | bytes; [`KeyframeHeader`] | per load, when a reader joins, after commands except `move`, and every second: the state that particles lack |
 //! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s; [`LoadHeader`] | once per load |
 //! | colliders | [`ColliderState`]s; [`CollidersHeader`] | per load, on a change, and each step while one moves |
