@@ -165,7 +165,7 @@ fn import_names_the_option_that_replaces_an_existing_file() {
     let refused = run(&sandbox, &format!("import {mesh} -o {scene}"));
     assert_eq!(
         (refused.code, refused.stderr),
-        (Some(1), format!("error: {scene}: the file exists (--overwrite replaces it)\n"))
+        (Some(1), format!("error: {scene} exists (use --overwrite to replace it)\n"))
     );
     run(&sandbox, &format!("import {mesh} -o {scene} --overwrite")).success();
 }
