@@ -21,7 +21,7 @@ use commands::{export as export_command, info, play, record, scene, simulate, ve
 #[command(
     name = "recorder",
     version,
-    after_help = "Exit codes: 0 done, 1 failed, 2 usage error, 3 finished with loss or \
+    after_help = "Exit codes: 0 success, 1 failure, 2 usage error, 3 finished with loss or \
         divergence.\n\nExamples:\n  \
         recorder record -o run.mcap\n  \
         recorder play run.mcap\n  \
@@ -79,7 +79,7 @@ fn explain(error: clap::Error) -> clap::Error {
     let text = if argument.to_string().starts_with('-') {
         format!("there is no option {argument}{hint}")
     } else {
-        format!("there is one argument too many: {argument}")
+        format!("there is one argument too many: '{argument}'")
     };
     let text = text + "\n\nFor more information, try '--help'.\n";
     clap::Error::raw(ErrorKind::UnknownArgument, text).with_cmd(&Args::command())

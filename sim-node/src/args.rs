@@ -33,7 +33,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
     version,
     override_usage = "sim-node [run] [OPTIONS] [SCENE]\n       \
         sim-node [--name NAME] [--domain DOMAIN] <COMMAND> ...",
-    after_help = "Exit codes: 0 done, 1 failure, 2 usage error, 4 the node rejected a command of `ctl`.\n\n\
+    after_help = "Exit codes: 0 success, 1 failure, 2 usage error, 4 the node rejected a command of `ctl`.\n\n\
         Examples:\n  \
         sim-node                                    run the curtain\n  \
         sim-node run rope --rate 1000               run the rope at 1 kHz\n  \
@@ -198,7 +198,7 @@ mod tests {
             ("sim-node ctl status -3", "the negative number '-3' is not allowed here"),
             ("sim-node ctl grab 3 -1 -2 0 --fast", "there is no option '--fast' here"),
             ("sim-node run --spee 3", "there is no option '--spee' here"),
-            ("sim-node ctl pin 1 2", "'2' is one argument too many"),
+            ("sim-node ctl pin 1 2", "there is one argument too many: '2'"),
         ] {
             let text = refused(line);
             assert!(text.starts_with(&format!("error: {problem}")), "{line}: {text}");

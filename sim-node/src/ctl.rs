@@ -5,6 +5,7 @@ mod command;
 mod hint;
 mod parameters;
 mod particles;
+mod rejection;
 mod status;
 
 use sim_contract::{CONSOLE_CLIENT_ID, Client};

@@ -85,7 +85,7 @@ fn write(path: &Path, text: &str, args: &ImportArgs) -> anyhow::Result<()> {
     let options = if args.overwrite { options.create(true) } else { options.create_new(true) };
     let mut file = options.open(path).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => {
-            anyhow!("{}: the file exists (--overwrite replaces it)", path.display())
+            anyhow!("{} exists (use --overwrite to replace it)", path.display())
         }
         _ => anyhow!("{}: cannot create the file: {error}", path.display()),
     })?;

@@ -10,7 +10,7 @@ mod warnings;
 
 use anyhow::Context;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Command, Endpoint, OwnerError, Reason, Stop};
+use sim_contract::{Action, Command, Endpoint, OwnerError, Reason, Stop};
 use sim_solver::{Applied, Control, Scene, Solver};
 
 use crate::scene_source;
@@ -113,7 +113,7 @@ impl Node {
             if stop.is_requested() {
                 break;
             }
-            self.apply_commands()?;
+            self.apply_commands(due.is_some())?;
             if let Some(wake_late_ns) = due
                 && self.progress.is_stepping()
             {
@@ -161,12 +161,20 @@ impl Node {
     }
 
     /// Applies the commands that have arrived, at the boundary before the next step.
-    fn apply_commands(&mut self) -> anyhow::Result<()> {
+    ///
+    /// If the node pauses here, the state before these commands must be published. A boundary of a
+    /// step that is not due has further polls, and one of them may bring the pause.
+    fn apply_commands(&mut self, is_step_due: bool) -> anyhow::Result<()> {
         if self.inbox.has_room() {
             self.publisher.receive_commands(&mut self.arrived);
             self.inbox.add(self.arrived.drain(..));
         }
-        for command in self.inbox.next_turn() {
+        let turn = self.inbox.next_turn();
+        let is_pause = |command: &Command| command.action() == Action::Pause;
+        if turn.iter().any(|command| !is_step_due || is_pause(command)) {
+            self.publisher.publish_left_out(&self.solver, self.position())?;
+        }
+        for command in turn {
             // A fresh status follows, so that `ctl status` shows the effect.
             self.next_status_ns = 0;
             let result = match self.solver.apply(command.client_id, &command.action()) {

@@ -20,7 +20,7 @@ pub enum Program {
     /// The contract's example that prints snapshots.
     Watch,
     /// The contract's example that grabs and moves a particle.
-    Drag,
+    Grab,
     /// The Python interpreter of `.venv`, which `.ci/run` creates.
     Python,
     /// Node.js from the search path, for scripts whose packages `.ci/run` installs in `tests/node`.
@@ -38,7 +38,7 @@ impl Program {
             Self::StubbornReader => built().join("stubborn-reader"),
             Self::Demo => built().join("demo"),
             Self::Watch => built().join("examples/watch"),
-            Self::Drag => built().join("examples/drag"),
+            Self::Grab => built().join("examples/grab"),
             // Found through the search path.
             Self::Node => PathBuf::from("node"),
             Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),

@@ -19,13 +19,34 @@ fn a_rejected_command_exits_with_4_and_an_applied_one_with_0() {
     let applied = run(&sandbox, "ctl pin 90");
     assert_eq!((applied.code, applied.stdout.as_str()), (Some(0), "applied at step 1\n"));
     let rejected = run(&sandbox, "ctl pin 168");
-    assert_eq!(
-        (rejected.code, rejected.stdout.as_str()),
-        (Some(4), "rejected at step 1: unknown_particle\n")
-    );
+    let text = "rejected at step 1: unknown_particle: the scene has no such particle (allowed: 0 to \
+                167)\n";
+    assert_eq!((rejected.code, rejected.stdout.as_str()), (Some(4), text));
     let json = run(&sandbox, "ctl --json pin 168");
     assert_eq!(json.code, Some(4));
     assert!(json.stdout.contains(r#""status":"rejected","reason":"unknown_particle""#));
+}
+
+#[test]
+fn a_rejection_names_the_remedy() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "flag", "--paused"]);
+    let count = ctl(&sandbox, &["status"])["constraints"].as_u64().unwrap();
+    let last_constraint = format!(
+        "unknown_constraint: the scene has no such constraint (allowed: 0 to {})",
+        count - 1
+    );
+    for (command, expected) in [
+        ("cut 4000000000", last_constraint.as_str()),
+        ("move-anchor 7 0 0 0", "unknown_anchor: the scene has no such anchor (it has none)"),
+        ("move-collider 0 0 0 0", "unknown_collider: the scene has no such collider (it has none)"),
+        ("release 3", "not_grabbed: the particle is not grabbed (`ctl grab` grabs it)"),
+        ("grab 90 nan 0 0", "non_finite: a number is not finite (allowed: finite numbers)"),
+        ("step 0", "out_of_range: a value is out of its range (allowed: 1 or more)"),
+    ] {
+        let rejected = run(&sandbox, &format!("ctl {command}"));
+        assert_eq!(rejected.stdout, format!("rejected at step 1: {expected}\n"));
+    }
 }
 
 #[test]
@@ -144,7 +165,7 @@ fn import_names_the_option_that_replaces_an_existing_file() {
     let refused = run(&sandbox, &format!("import {mesh} -o {scene}"));
     assert_eq!(
         (refused.code, refused.stderr),
-        (Some(1), format!("error: {scene}: the file exists (--overwrite replaces it)\n"))
+        (Some(1), format!("error: {scene} exists (use --overwrite to replace it)\n"))
     );
     run(&sandbox, &format!("import {mesh} -o {scene} --overwrite")).success();
 }

@@ -18,10 +18,10 @@ fn watch_prints_the_requested_number_of_snapshots() {
 }
 
 #[test]
-fn drag_moves_and_releases_a_particle() {
+fn grab_moves_and_releases_a_particle() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
-    let printed = Process::run(Program::Drag, &sandbox, &["90"]).success();
+    let printed = Process::run(Program::Grab, &sandbox, &["90"]).success();
     assert!(printed.starts_with("released at step "), "{printed}");
     let status = Process::run(Program::SimNode, &sandbox, &["ctl", "status", "--json"]).json();
     // One grab, 120 moves and one release, all applied.
@@ -35,7 +35,7 @@ fn drag_moves_and_releases_a_particle() {
 fn both_examples_stay_short() {
     for source in [
         include_str!("../../sim-node/contract/examples/watch.rs"),
-        include_str!("../../sim-node/contract/examples/drag.rs"),
+        include_str!("../../sim-node/contract/examples/grab.rs"),
     ] {
         assert!(source.lines().count() <= 50);
     }
@@ -44,7 +44,7 @@ fn both_examples_stay_short() {
 #[test]
 fn the_examples_end_with_the_text_of_an_error() {
     let sandbox = Sandbox::new();
-    for program in [Program::Watch, Program::Drag] {
+    for program in [Program::Watch, Program::Grab] {
         let finished = Process::run(program, &sandbox, &[]);
         assert_eq!(finished.code, Some(1));
         assert!(finished.stderr.starts_with("error: "), "{}", finished.stderr);

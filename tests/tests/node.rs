@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
 use sim_contract::{Action, Client, ParticleFlags, Snapshot};
 
 fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
@@ -77,6 +77,34 @@ fn a_paused_node_makes_exactly_the_requested_steps() {
 }
 
 #[test]
+fn a_pause_publishes_the_last_step_although_most_steps_are_left_out() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--every", "1000000"]);
+    wait_for("a step", || ctl(&sandbox, &["status"])["step"].as_u64().filter(|step| *step > 0));
+    let first_paused = ctl(&sandbox, &["pause"])["step"].as_u64().unwrap();
+    assert_eq!(ctl(&sandbox, &["hash"])["step"], first_paused - 1);
+    assert_eq!(ctl(&sandbox, &["step"])["step"], first_paused);
+    assert_eq!(ctl(&sandbox, &["hash"])["step"], first_paused);
+}
+
+#[test]
+fn the_last_step_before_a_pause_shows_no_command_that_came_before_the_pause() {
+    let sandbox = Sandbox::new();
+    // The next step is a second away, so a poll of the node can separate the two commands.
+    let _node = node(&sandbox, &["run", "curtain", "--rate", "1", "--every", "1000000"]);
+    wait_for("a step", || ctl(&sandbox, &["status"])["step"].as_u64().filter(|step| *step > 0));
+    let mut client = attach(&sandbox);
+    let pin = client.request(Action::Pin { particle: 90 }, DEADLINE).unwrap();
+    let pause = client.request(Action::Pause, DEADLINE).unwrap();
+    let snapshot = snapshot_from(&mut client, pause.step - 1);
+    assert_eq!(snapshot.header().step, pause.step - 1);
+    let is_shown = pin.step < pause.step;
+    let flags = if is_shown { ParticleFlags::PINNED } else { 0 };
+    assert_eq!(snapshot.particles()[90].flags, flags);
+    assert_eq!(snapshot.header().outcome_count, u64::from(is_shown));
+}
+
+#[test]
 fn a_paused_node_answers_commands_with_the_step_that_will_show_them() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain", "--paused"]);
@@ -145,7 +173,7 @@ fn readers_of_a_killed_node_continue_with_its_replacement() {
     first.signal(Signal::KILL);
     assert_eq!(first.wait().code, None);
     let _second = node(&sandbox, &["run", "curtain"]);
-    integration_tests::wait_for("a snapshot of the second run", || {
+    wait_for("a snapshot of the second run", || {
         let snapshot = client.next_snapshot(Duration::from_millis(100)).unwrap()?;
         (snapshot.header().run_id != run_id).then_some(())
     });

@@ -27,7 +27,7 @@
 //!
 //! | service | payload; header | written |
 //! |---|---|---|
-//! | particles | [`ParticleState`]s; [`SnapshotHeader`] | after every step, or every n-th with `--every n` |
+//! | particles | [`ParticleState`]s; [`SnapshotHeader`] | after every step; with `--every n` after every n-th, and the last one before a pause |
 //! | keyframe | bytes; [`KeyframeHeader`] | per load, when a reader joins, after commands except `move`, and every second: the state that particles lack |
 //! | scene, topology, surface | TOML, [`ConstraintState`]s, [`Triangle`]s; [`LoadHeader`] | once per load |
 //! | colliders | [`ColliderState`]s; [`CollidersHeader`] | per load, on a change, and each step while one moves |
@@ -80,10 +80,10 @@ pub use ports::services::AttachError;
 pub use ports::wake::Wake;
 pub use ports::writer::PublishError;
 pub use sim_types::{
-    Action, ActionFields, COORDINATE_MAX, ColliderShape, ConstraintKind, GRAB_OVER_S_DEFAULT,
-    KindFilter, Method, NumberRange, OffMeaning, PARAMETERS, Parameter, ParameterInfo,
-    ParameterValue, ParameterValues, ParticleFlags, PerKind, PlainF32, Reason, SETTINGS_COUNT,
-    Setting, TearCause, Text, TextError, ValueForm,
+    Action, ActionFields, COLLIDERS_MAX, COORDINATE_MAX, ColliderShape, ConstraintKind,
+    ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS,
+    Parameter, ParameterInfo, ParameterValue, ParameterValues, ParticleFlags, PerKind, PlainF32,
+    Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, Setting, TearCause, Text, TextError, ValueForm,
 };
 pub use stop::Stop;
 pub use text_file::{TextFileError, read_scene_file};

@@ -4,13 +4,9 @@
 /// service, and is checked on open. It changes with any change of the bytes in shared memory.
 pub const CONTRACT_VERSION: u32 = 3;
 
-/// Most particles, and most constraints, of a scene: indices below 2^24 are exact in f32.
-pub const ELEMENTS_MAX: usize = 1 << 24;
-/// Longest scene text, in bytes.
-pub const SCENE_SIZE_BYTES_MAX: usize = 16 << 20;
-/// Most colliders of a scene: each substep tests every free particle against every collider.
-pub const COLLIDERS_MAX: usize = 1 << 16;
-/// Most commands that a node applies at one step boundary; the others wait for the next boundary.
+/// Most commands that a node applies in one poll; the others wait for the next one. A running node
+/// polls once before each step. While it is paused, or waits for a distant step, it polls repeatedly
+/// at the same boundary.
 pub const COMMANDS_PER_STEP_MAX: usize = 1024;
 
 /// Publishers of a service that only the owner writes: its own, a second while a load replaces the
@@ -25,7 +21,7 @@ pub const BORROWED_SAMPLES_MAX: usize = 4;
 pub const SNAPSHOTS_BUFFERED: usize = 64;
 /// Messages that wait for one reader at a service without a limit of its own, such as tears.
 pub const UPDATES_BUFFERED: usize = 4;
-/// Outcomes that wait for one reader: twice the most that one step can produce.
+/// Outcomes that wait for one reader: twice the most that one poll can produce.
 pub const OUTCOMES_BUFFERED: usize = 2 * COMMANDS_PER_STEP_MAX;
 /// Most clients that send commands at the same time.
 pub const CLIENTS_MAX: usize = 32;

@@ -8,7 +8,7 @@ use std::path::Path;
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-use crate::limits::SCENE_SIZE_BYTES_MAX;
+use sim_types::SCENE_SIZE_BYTES_MAX;
 
 /// Error of reading a text file.
 #[derive(Debug, Error)]

@@ -10,7 +10,7 @@ use std::error::Error;
 use std::thread;
 
 use sim_solver::{
-    Ball, Grab, ParameterValue, Pose, Push, SOLVER_VERSION, Scene, Solver, Sweep, builtin,
+    Grab, ParameterValue, Pose, Push, SOLVER_VERSION, Scene, Solver, Sphere, Sweep, builtin,
 };
 
 /// The test scenes.
@@ -60,13 +60,13 @@ fn run(scene: &Scene) -> u64 {
 
 fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Reason> {
     let [x, y, _] = solver.particle(solver.particle_count() / 2).position;
-    let ball = Ball { center: [x, y, 0.0], radius: 0.3 };
+    let sphere = Sphere { center: [x, y, 0.0], radius: 0.3 };
     let pose = Pose { translation: [0.1, 0.05, 0.0], rotation: [0.0, 0.0, 0.3, 1.0] };
     match step {
         100 => solver.grab(1, Grab { particle: 20, target: [0.3, 0.7, 0.0], over_s: 0.2 }),
         300 => solver.pin(15),
         500 => solver.release(1, 20),
-        700 => solver.push(Push { ball, delta: [0.01, 0.02, 0.0], limit: Some(0.015) }),
+        700 => solver.push(Push { sphere, delta: [0.01, 0.02, 0.0], limit: Some(0.015) }),
         900 => solver.cut(17),
         1000 => solver.cut_segment(Sweep {
             from: [x - 0.05, y - 0.05, 0.0],
@@ -79,7 +79,7 @@ fn command(solver: &mut Solver, step: u32) -> Result<(), sim_solver::Reason> {
         3000 => solver.set("substeps", ParameterValue::Number(4.0), None),
         3500 => solver.set("wind_velocity", ParameterValue::Vector([-4.0, 0.0, 0.0]), None),
         4000 => solver.unpin(15),
-        5000 => solver.cut_radius(Ball { radius: 0.15, ..ball }),
+        5000 => solver.cut_radius(Sphere { radius: 0.15, ..sphere }),
         6000 => {
             solver.reset();
             Ok(())

@@ -11,7 +11,7 @@ use crate::frame::{Frame, Pose};
 use crate::parameters::Affected;
 use crate::solver::Solver;
 use crate::step::drive::{ActiveGrab, GRAB_OVER_S_MAX};
-use cut::Ball;
+use cut::Sphere;
 
 /// A request to drive a particle to a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +29,7 @@ pub struct Grab {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Push {
     /// Region of the brush.
-    pub ball: Ball,
+    pub sphere: Sphere,
     /// Displacement of the brush in one step.
     pub delta: [f32; 3],
     /// Limit of each component of `delta`, >= 0. None for no limit.
@@ -135,7 +135,7 @@ impl Solver {
     /// # Errors
     /// A number is not finite or out of range.
     pub fn push(&mut self, push: Push) -> Result<(), Reason> {
-        self.check_ball(&push.ball)?;
+        self.check_sphere(&push.sphere)?;
         check_finite(&push.delta)?;
         check_finite(push.limit.as_slice())?;
         let limit = push.limit.unwrap_or(f32::MAX);
@@ -149,7 +149,7 @@ impl Solver {
         }
         let [x, y, z] = delta.map(|axis| axis * self.settings.rate_hz as f32);
         for state in &mut self.particles.states {
-            if state.inverse_mass != 0.0 && push.ball.contains(Vec3::from_array(state.position)) {
+            if state.inverse_mass != 0.0 && push.sphere.contains(Vec3::from_array(state.position)) {
                 state.velocity = [x, y, z];
             }
         }

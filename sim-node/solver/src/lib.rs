@@ -39,7 +39,7 @@ mod step;
 mod store;
 
 pub use commands::apply::{Applied, Control};
-pub use commands::cut::{Ball, Sweep};
+pub use commands::cut::{Sphere, Sweep};
 pub use commands::{Grab, Push};
 pub use constraints::Constraint;
 pub use contacts::colliders::PlacedCollider;

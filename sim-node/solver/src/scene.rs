@@ -22,7 +22,7 @@ pub use definition::limits::Limits;
 pub use definition::settings::{ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
 pub use definition::softness::{KindSoftness, Softness, SoftnessValues};
 pub use definition::wind::Wind;
-pub use definition::{ELEMENTS_MAX, SCENE_VERSION, Scene, SceneCounts};
+pub use definition::{SCENE_VERSION, Scene, SceneCounts};
 pub use error::SceneError;
 pub use generate::bridge::Bridge;
 pub use generate::cloth::{Cloth, Diagonals};

@@ -59,7 +59,7 @@ pub struct Solver {
     /// True if the state was replaced since the last step. The next step publishes it, and
     /// integrates nothing.
     pub(crate) is_restored: bool,
-    /// Particles frozen since this solver was made. For messages; not part of the state.
+    /// Particles frozen since the load or the last reset. For messages; not part of the state.
     pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
 }
@@ -152,6 +152,7 @@ impl Solver {
         }
         self.due = Due { constraints: true, tethers: true, ..Due::default() };
         self.is_restored = true;
+        self.frozen_count = 0;
     }
 
     /// Updates derived state after the commands of a boundary, once for all of them. A caller that
@@ -268,8 +269,8 @@ impl Solver {
         self.state_hash
     }
 
-    /// Returns the number of particles that froze since this solver was made, because their state was
-    /// not finite. A frozen particle stays in place until a reset.
+    /// Returns the number of particles that froze since the load or the last reset, because their
+    /// state was not finite. A frozen particle stays in place until a reset.
     pub fn frozen_count(&self) -> u64 {
         self.frozen_count
     }
@@ -307,7 +308,7 @@ impl Solver {
         &self.model.triangles
     }
 
-    /// Returns the constraints torn since the load, by step and then by index.
+    /// Returns the constraints torn since the load or the last reset, by step and then by index.
     pub fn torn(&self) -> &[u32] {
         self.torn.order()
     }

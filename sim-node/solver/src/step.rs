@@ -41,20 +41,37 @@ impl Solver {
         self.begin_step();
         let mut is_marked = false;
         for substep in Substep::all(self.parameters.substeps) {
-            // The swept stages form one run; each of the others is a run of its own.
-            for stages in Stage::OF_SUBSTEP.chunk_by(|a, b| a.is_swept() && b.is_swept()) {
-                match stages {
-                    [Stage::Drive] => self.drive(substep),
-                    [Stage::Wind] => self.blow(substep),
-                    _ => is_marked |= self.sweep(substep),
+            for stage in Stage::OF_SUBSTEP {
+                match stage {
+                    Stage::Drive => self.drive(substep),
+                    Stage::Wind => self.blow(substep),
+                    Stage::Predict => is_marked |= self.sweep(substep),
+                    // The sweep that begins with `Predict` contains them.
+                    Stage::Project
+                    | Stage::LimitStretch
+                    | Stage::Tether
+                    | Stage::Contact
+                    | Stage::Advance => {}
+                    Stage::Tear | Stage::Freeze | Stage::Hash => {
+                        unreachable!("{stage:?} is not a stage of a substep")
+                    }
                 }
             }
         }
+        count_step(&mut self.grabs);
         for stage in Stage::AFTER_SUBSTEPS {
             match stage {
                 Stage::Tear => self.tear_marked(is_marked),
                 Stage::Freeze => self.freeze(),
-                _ => self.hash(),
+                Stage::Hash => self.hash(),
+                Stage::Drive
+                | Stage::Wind
+                | Stage::Predict
+                | Stage::Project
+                | Stage::LimitStretch
+                | Stage::Tether
+                | Stage::Contact
+                | Stage::Advance => unreachable!("{stage:?} is a stage of a substep"),
             }
         }
     }
@@ -102,8 +119,9 @@ impl Solver {
         self.air.blow(&mut self.store, &self.model.triangles, &wind);
     }
 
-    /// [`Stage::Predict`] to [`Stage::Advance`], which each sheet and the graph run on their own
-    /// particles. Returns true if any constraint was marked as torn.
+    /// [`Stage::Predict`] to [`Stage::Advance`]. Each sheet and the graph run them on their own
+    /// particles, in one sweep, because their particles share no constraint. Returns true if any
+    /// constraint was marked as torn.
     fn sweep(&mut self, substep: Substep) -> bool {
         let contact_substep = self.contact_substep(substep);
         place_obstacles(&mut self.obstacles, &self.colliders, &contact_substep);
@@ -162,7 +180,6 @@ impl Solver {
     /// [`Stage::Freeze`]. Writes the state back, with v = d / h. A particle that freezes is no longer
     /// grabbed.
     fn freeze(&mut self) {
-        count_step(&mut self.grabs);
         let h = self.h();
         let frozen_count = self.store.pack(&mut self.particles.states, h);
         if frozen_count > 0 {

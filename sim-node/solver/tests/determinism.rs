@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 use sim_solver::{
-    Ball, Grab, Keyframe, ParameterValue, Particle, ParticleFlags, Pose, Push, RestoreError, Scene,
-    Solver, Sweep, builtin,
+    Grab, Keyframe, ParameterValue, Particle, ParticleFlags, Pose, Push, RestoreError, Scene,
+    Solver, Sphere, Sweep, builtin,
 };
 
 #[derive(Debug, Clone)]
@@ -70,12 +70,12 @@ fn apply(solver: &mut Solver, command: &RandomCommand) {
         RandomCommand::Move(particle, target) => solver.move_grabbed(1, grab(particle, target)),
         RandomCommand::Release(particle) => solver.release(1, particle),
         RandomCommand::Push(center) => solver.push(Push {
-            ball: Ball { center, radius: 0.4 },
+            sphere: Sphere { center, radius: 0.4 },
             delta: center,
             limit: Some(0.01),
         }),
         RandomCommand::Cut(constraint) => solver.cut(constraint),
-        RandomCommand::CutRadius(center) => solver.cut_radius(Ball { center, radius: 0.1 }),
+        RandomCommand::CutRadius(center) => solver.cut_radius(Sphere { center, radius: 0.1 }),
         RandomCommand::CutSegment(from, to) => {
             solver.cut_segment(Sweep { from, to, direction: [0.0, 0.0, 1.0] })
         }

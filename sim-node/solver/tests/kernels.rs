@@ -3,7 +3,7 @@
 //! that of a vector, and with every property of a constraint.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use sim_solver::{Ball, Grab, Kernels, ParameterValue, Push, Scene, Solver, TearCause, builtin};
+use sim_solver::{Grab, Kernels, ParameterValue, Push, Scene, Solver, Sphere, TearCause, builtin};
 
 /// Steps all kernels side by side with the same commands, compares every particle, and returns the
 /// reference.
@@ -41,7 +41,7 @@ fn command(solver: &mut Solver, step: u32) {
         7 => solver.pin(particle),
         11 => solver.unpin(particle),
         13 => solver.push(Push {
-            ball: Ball { center: [x, y, z], radius: 0.3 },
+            sphere: Sphere { center: [x, y, z], radius: 0.3 },
             delta: [0.01, 0.0, 0.0],
             limit: None,
         }),

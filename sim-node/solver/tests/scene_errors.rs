@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::Scene;
+use sim_types::{COLLIDERS_MAX, SCENE_SIZE_BYTES_MAX};
 
 /// Wrong scenes with their errors.
 const CASES: &str = include_str!("scenes/errors.txt");
@@ -46,6 +47,30 @@ fn the_version_is_required_and_checked_first() {
     ] {
         assert_eq!(error(text), expected);
     }
+}
+
+#[test]
+fn a_scene_with_too_many_colliders_is_refused() {
+    let with_colliders = |count| {
+        let collider = "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n";
+        error(&format!("version = 1\n{}", collider.repeat(count)))
+    };
+    assert_eq!(with_colliders(COLLIDERS_MAX), "accepted");
+    let expected = "f.toml:262146: collider[65536]: is one of 65537 colliders (allowed: 65536)";
+    assert_eq!(with_colliders(COLLIDERS_MAX + 1), expected);
+}
+
+#[test]
+fn a_scene_whose_complete_text_is_too_long_is_refused() {
+    let with_unit = |length| error(&format!("version = 1\nunit = \"{}\"", "m".repeat(length)));
+    assert_eq!(with_unit(SCENE_SIZE_BYTES_MAX - 1000), "accepted");
+    let error = with_unit(SCENE_SIZE_BYTES_MAX - 20);
+    let (size_bytes, rest) = error
+        .strip_prefix("f.toml:1: scene: has ")
+        .and_then(|error| error.split_once(" bytes of text "))
+        .unwrap_or_else(|| panic!("{}", &error[..100.min(error.len())]));
+    assert!(size_bytes.parse::<usize>().unwrap() > SCENE_SIZE_BYTES_MAX);
+    assert_eq!(rest, "with every default and mesh written out (allowed: 16777216)");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Command lines of the commands of `ctl`: each one is applied by the node and has an outcome.
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
 use sim_contract::{
     ConstraintKind, GRAB_OVER_S_DEFAULT, PARAMETERS, ParameterInfo, ParameterValue,
@@ -218,8 +219,14 @@ pub(crate) struct SetArgs {
     #[arg(num_args = 1..=3, required = true, value_name = "VALUE", value_parser = setting_word)]
     pub(crate) values: Vec<SettingWord>,
     /// Kind of constraints that receive the compliance or stiffness [default: all kinds]
-    #[arg(long, value_name = "KIND", value_parser = ConstraintKind::ALL.map(ConstraintKind::name))]
-    pub(crate) kind: Option<String>,
+    #[arg(long, value_name = "KIND", value_parser = constraint_kind())]
+    pub(crate) kind: Option<ConstraintKind>,
+}
+
+/// Parser of the name of a kind; the help lists the names.
+fn constraint_kind() -> impl TypedValueParser<Value = ConstraintKind> {
+    PossibleValuesParser::new(ConstraintKind::ALL.map(ConstraintKind::name))
+        .try_map(|name| ConstraintKind::from_name(&name).ok_or("there is no such kind"))
 }
 
 /// Names of the parameters, with their units.
@@ -256,10 +263,5 @@ impl SetArgs {
             [Number(x), Number(y), Number(z)] => Ok(ParameterValue::Vector([x, y, z])),
             _ => Err("VALUE must be one number, three numbers for a vector, or \"off\" alone"),
         }
-    }
-
-    /// Kind of constraints that receive the value; `None` is all kinds.
-    pub(crate) fn constraint_kind(&self) -> Option<ConstraintKind> {
-        self.kind.as_deref().and_then(ConstraintKind::from_name)
     }
 }

@@ -15,7 +15,7 @@ pub(super) fn text(error: &clap::Error) -> Option<String> {
     };
     let argument = context(ContextKind::InvalidArg)?;
     let problem = if !argument.starts_with('-') {
-        format!("'{argument}' is one argument too many")
+        format!("there is one argument too many: '{argument}'")
     } else if argument.parse::<f64>().is_ok() {
         format!("the negative number '{argument}' is not allowed here")
     } else {

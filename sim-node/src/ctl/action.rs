@@ -50,7 +50,7 @@ pub(super) fn from_verb(verb: &CommandVerb) -> anyhow::Result<Action> {
         CommandVerb::Set(args) => Action::Set {
             parameter: text(&args.parameter)?,
             value: args.value().map_err(anyhow::Error::msg)?,
-            constraint_kind: args.constraint_kind().map(KindFilter::Known),
+            constraint_kind: args.kind.map(KindFilter::Known),
         },
         CommandVerb::Load { scene } => Action::Load { scene: scene_text(scene)? },
         CommandVerb::Pause => Action::Pause,
@@ -145,6 +145,17 @@ mod tests {
         let number = ParameterValue::Number(1e-4);
         let expected = set("compliance", number, Some(ConstraintKind::Bend));
         assert_eq!(action("set compliance 1e-4 --kind bend"), expected);
+        let line = ["sim-node", "ctl", "set", "compliance", "1", "--kind", "knot"];
+        let error = try_parse(line).unwrap_err().to_string();
+        assert!(error.contains("[possible values: structural, shear, bend, tether]"), "{error}");
+    }
+
+    #[test]
+    fn every_kind_of_constraints_can_be_addressed() {
+        for kind in ConstraintKind::ALL {
+            let expected = set("compliance", ParameterValue::Number(0.0), Some(kind));
+            assert_eq!(action(&format!("set compliance 0 --kind {}", kind.name())), expected);
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use anyhow::bail;
 use serde::Serialize;
 use sim_contract::{Action, Client, OUTCOME_FLAG_CONTROL, Outcome};
 
-use super::hint;
+use super::{hint, rejection};
 use crate::args::CtlArgs;
 use crate::exit::Exit;
 
@@ -44,7 +44,11 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
     } else if outcome.is_applied() {
         println!("applied at step {step}");
     } else {
-        println!("rejected at step {step}: {reason}{}", hint::for_rejection(&row.action, &outcome));
+        let explanation = outcome
+            .reason()
+            .map(|reason| rejection::explain(client, args.timeout, &row.action, reason))
+            .map_or_else(String::new, |explanation| format!(": {explanation}"));
+        println!("rejected at step {step}: {reason}{explanation}");
     }
     if !outcome.is_applied() {
         return Ok(Exit::Rejected);

@@ -7,8 +7,9 @@ use sim_contract::{COMMANDS_PER_STEP_MAX, Command};
 
 /// Commands that wait to be applied.
 ///
-/// Commands are taken round-robin: one of each client by ascending id, in the client's sequence. A turn
-/// continues after the client that was served last, so that no client can starve another.
+/// A turn is the commands of one poll. They are taken round-robin: one of each client by ascending id,
+/// in the client's sequence. A turn continues after the client that was served last, so that no client
+/// can starve another.
 #[derive(Debug)]
 pub(super) struct Inbox {
     waiting: BTreeMap<Place, Command>,

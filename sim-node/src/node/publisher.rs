@@ -43,6 +43,8 @@ pub(crate) struct Publisher {
     topology_revision: u32,
     /// Number of steps between published snapshots. The last one before a pause is always published.
     every: u64,
+    /// Times of the last step.
+    times: StepTimes,
     /// Header of the newest published snapshot.
     last: SnapshotHeader,
     /// The next snapshot needs a keyframe.
@@ -78,6 +80,7 @@ impl Publisher {
             rate_hz: scene.solver.rate_hz,
             topology_revision: 0,
             every,
+            times: StepTimes::default(),
             last: SnapshotHeader::default(),
             is_keyframe_due: true,
             keyframe_step: 0,
@@ -140,17 +143,34 @@ impl Publisher {
         times: StepTimes,
     ) -> anyhow::Result<()> {
         self.is_keyframe_due |= position.step.is_multiple_of(u64::from(self.rate_hz));
+        self.times = times;
         self.publish_colliders(solver, position.step)?;
         self.publish_tears(solver, position.step)?;
         if !(position.step.is_multiple_of(self.every) || position.is_last) {
             return self.publish_outcomes();
         }
+        self.publish_snapshot(solver, position)
+    }
+
+    /// Publishes the last step if it was left out, before commands change its state.
+    pub(crate) fn publish_left_out(
+        &mut self,
+        solver: &Solver,
+        position: Position,
+    ) -> anyhow::Result<()> {
+        if self.last.step == position.step {
+            return Ok(());
+        }
+        self.publish_snapshot(solver, position)
+    }
+
+    fn publish_snapshot(&mut self, solver: &Solver, position: Position) -> anyhow::Result<()> {
         self.watch_keyframe_readers();
         if self.is_keyframe_due {
             self.publish_keyframe(solver, position)?;
         }
         self.publish_outcomes()?;
-        self.last = self.header(solver, position, times);
+        self.last = self.header(solver, position);
         let particles: &[ParticleState] = cast_slice(solver.particles());
         self.owner.publish_particles(&self.last, |index| particles[index])?;
         self.owner.wake(Wake::Frame);
@@ -259,7 +279,7 @@ impl Publisher {
         Ok(())
     }
 
-    fn header(&self, solver: &Solver, position: Position, times: StepTimes) -> SnapshotHeader {
+    fn header(&self, solver: &Solver, position: Position) -> SnapshotHeader {
         SnapshotHeader {
             contract_version: CONTRACT_VERSION,
             solver_version: SOLVER_VERSION,
@@ -271,8 +291,8 @@ impl Publisher {
             publish_monotonic_ns: monotonic_ns(),
             state_hash: solver.state_hash(),
             outcome_count: self.outcome_count,
-            wake_late_ns: times.wake_late_ns,
-            solve_ns: times.solve_ns,
+            wake_late_ns: self.times.wake_late_ns,
+            solve_ns: self.times.solve_ns,
             topology_revision: self.topology_revision,
             torn_count: count(solver.torn().len()),
             particle_count: count(solver.particle_count()),

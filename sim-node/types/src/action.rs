@@ -143,7 +143,8 @@ pub enum Action {
     },
     /// A kind that this version does not know. Always rejected.
     Unknown {
-        /// Number of the kind on the wire.
+        /// Number of the kind on the wire. The number of a known kind becomes `u32::MAX` there, which
+        /// no version will assign, so that an unknown action never becomes a known one.
         number: u32,
     },
 }

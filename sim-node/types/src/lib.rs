@@ -1,6 +1,6 @@
 //! Plain data shared by all programs of this project: actions and the reasons for rejecting them,
-//! kinds of constraints, causes of tears, shapes of colliders, particle flags, and the one table of
-//! parameters.
+//! kinds of constraints, causes of tears, shapes of colliders, particle flags, the limits of a scene, and
+//! the one table of parameters.
 //!
 //! ```
 //! use sim_types::{Action, PARAMETERS, Parameter};
@@ -20,6 +20,7 @@ mod action;
 mod collider_shape;
 mod constraint_kind;
 mod json_number;
+mod limits;
 mod method;
 mod parameter;
 mod parameter_values;
@@ -33,6 +34,7 @@ pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter};
 pub use collider_shape::ColliderShape;
 pub use constraint_kind::ConstraintKind;
 pub use json_number::PlainF32;
+pub use limits::{COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX};
 pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
 pub use parameter_values::{ParameterValues, PerKind, SETTINGS_COUNT, Setting};

@@ -108,22 +108,19 @@ impl PendingChanges {
 
     /// Removes the changes up to a snapshot. Returns them in the order of publication.
     pub(crate) fn drain_due(&mut self, header: &SnapshotHeader) -> Vec<Change> {
-        let mut due =
-            self.drain(|pending| pending.run_id == header.run_id && pending.step <= header.step);
+        let is_due = |pending: &PendingChange| {
+            pending.run_id == header.run_id && pending.step <= header.step
+        };
+        let (due, rest): (VecDeque<_>, _) = self.queue.drain(..).partition(is_due);
+        self.queue = rest;
+        let mut due = Vec::from(due);
         due.sort_by_key(|pending| (pending.step, pending.change.publication_rank()));
         due.into_iter().map(|pending| pending.change).collect()
     }
 
-    /// Removes all changes of a run. Returns them in the order of arrival.
-    pub(crate) fn drain_run(&mut self, run_id: u64) -> Vec<Change> {
-        let drained = self.drain(|pending| pending.run_id == run_id);
-        drained.into_iter().map(|pending| pending.change).collect()
-    }
-
-    fn drain(&mut self, is_due: impl Fn(&PendingChange) -> bool) -> Vec<PendingChange> {
-        let (due, rest): (VecDeque<_>, _) = self.queue.drain(..).partition(is_due);
-        self.queue = rest;
-        due.into()
+    /// Drops all changes of a run.
+    pub(crate) fn drop_run(&mut self, run_id: u64) {
+        self.queue.retain(|pending| pending.run_id != run_id);
     }
 
     /// Returns the first pending parameters of a run.
@@ -162,6 +159,10 @@ impl PendingChanges {
 mod tests {
     use super::*;
 
+    fn snapshot(run_id: u64) -> SnapshotHeader {
+        SnapshotHeader { run_id, step: 100, ..SnapshotHeader::default() }
+    }
+
     fn outcome(index: u64) -> Change {
         Change::Outcome(Outcome { index, ..Outcome::default() })
     }
@@ -173,15 +174,16 @@ mod tests {
             pending.push(7, 100, outcome(index));
         }
         assert_eq!(pending.lost(), LostChanges { outcomes: 3, ..LostChanges::default() });
-        assert_eq!(pending.drain_run(7)[0], outcome(3));
+        assert_eq!(pending.drain_due(&snapshot(7))[0], outcome(3));
     }
 
     #[test]
-    fn draining_one_run_keeps_the_changes_of_another() {
+    fn dropping_one_run_keeps_the_changes_of_another() {
         let mut pending = PendingChanges::default();
         pending.push(7, 1, outcome(0));
         pending.push(8, 1, outcome(1));
-        assert_eq!(pending.drain_run(7), [outcome(0)]);
-        assert_eq!(pending.drain_run(8), [outcome(1)]);
+        pending.drop_run(7);
+        assert_eq!(pending.drain_due(&snapshot(7)), []);
+        assert_eq!(pending.drain_due(&snapshot(8)), [outcome(1)]);
     }
 }

@@ -109,15 +109,10 @@ impl StateAssembler {
         })
     }
 
-    /// Removes and returns the changes of this run that belong to no state yet.
-    pub(crate) fn drain_pending(&mut self) -> Vec<Change> {
-        self.pending_changes.drain_run(self.run_id)
-    }
-
     /// Drops everything of the old run with the first snapshot of another run.
     fn begin_run(&mut self, run_id: u64) {
         if run_id != self.run_id {
-            self.pending_changes.drain_run(self.run_id);
+            self.pending_changes.drop_run(self.run_id);
             self.run_id = run_id;
             self.load = None;
             self.torn = Torn::default();
@@ -336,7 +331,7 @@ mod tests {
         let state = assembler.assemble(&other, &[]).unwrap();
         let expected = Outcome { run_id: 8, ..outcome(0, 1) };
         assert_eq!(state.changes, [Change::Load, Change::Outcome(expected)]);
-        assert!(assembler.drain_pending().is_empty());
+        assert!(assembler.pending_changes.drain_due(&snapshot(2, 0)).is_empty());
     }
 
     #[test]

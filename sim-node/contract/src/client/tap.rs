@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::client::change::{Change, LostChanges};
+use crate::client::change::LostChanges;
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
@@ -130,11 +130,6 @@ impl Tap {
         }
         let sample = self.held.as_ref()?;
         self.assembler.assemble(sample.user_header(), sample.payload())
-    }
-
-    /// Removes and returns the changes that belong to no state yet, such as those of a paused node.
-    pub fn drain_pending_changes(&mut self) -> Vec<Change> {
-        self.assembler.drain_pending()
     }
 
     /// Removes and returns the errors of messages that could not be read.

@@ -105,6 +105,8 @@ mod kind {
     pub(super) const MOVE_COLLIDER: u32 = 15;
     pub(super) const SET: u32 = 16;
     pub(super) const LOAD: u32 = 17;
+    /// No version will assign it.
+    pub(super) const UNKNOWN: u32 = u32::MAX;
 }
 
 const ZERO: [f32; 3] = [0.0; 3];
@@ -158,7 +160,17 @@ impl Command {
             Action::Load { scene } => {
                 Self { text: scene.to_wire(), ..Self::with_kind(kind::LOAD, 0) }
             }
-            Action::Unknown { number } => Self::with_kind(number, 0),
+            Action::Unknown { number } => Self::unknown(number),
+        }
+    }
+
+    /// A command that decodes as [`Action::Unknown`], with the number unless an empty command of that
+    /// kind has a meaning.
+    fn unknown(number: u32) -> Self {
+        let command = Self::with_kind(number, 0);
+        match command.action() {
+            Action::Unknown { .. } => command,
+            _ => Self::with_kind(kind::UNKNOWN, 0),
         }
     }
 
@@ -272,6 +284,16 @@ mod tests {
         for kind in (0..=1000).filter(|kind| !numbers.contains(kind)) {
             let action = Command { kind, ..Command::new(0, 0, Action::Pause) }.action();
             assert_eq!(action, Action::Unknown { number: kind }, "an action without a sample");
+        }
+    }
+
+    #[test]
+    fn an_unknown_action_never_becomes_a_known_one() {
+        for number in (0..=100).chain([u32::MAX - 1, u32::MAX]) {
+            let decoded = Command::new(0, 0, Action::Unknown { number }).action();
+            let is_known = (1..=17).contains(&number) && number != kind::SET;
+            let expected = if is_known { u32::MAX } else { number };
+            assert_eq!(decoded, Action::Unknown { number: expected });
         }
     }
 

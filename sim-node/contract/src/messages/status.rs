@@ -37,7 +37,7 @@ pub struct NodeStatus {
     pub outcome_count: u64,
     /// Number of rejected commands of this run.
     pub rejected_count: u64,
-    /// Number of particles frozen since the load because their state was not finite.
+    /// Number of particles frozen since the load or the last reset because their state was not finite.
     pub frozen_count: u64,
     /// Steps per second.
     pub rate_hz: u32,

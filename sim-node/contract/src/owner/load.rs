@@ -1,8 +1,6 @@
 //! The data that an owner publishes per load, and the writers whose sizes follow from it.
 
-use crate::limits::{
-    BORROWED_SAMPLES_MAX, COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, SNAPSHOTS_BUFFERED,
-};
+use crate::limits::{BORROWED_SAMPLES_MAX, SNAPSHOTS_BUFFERED};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
@@ -15,7 +13,9 @@ use crate::ports::service::{
 use crate::ports::services::Services;
 use crate::ports::writer::PublishError;
 use crate::ports::writer::{Capacity, SliceWriter};
-use sim_types::{ParameterValues, SETTINGS_COUNT};
+use sim_types::{
+    COLLIDERS_MAX, ELEMENTS_MAX, ParameterValues, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT,
+};
 
 /// A load: the data that an owner publishes once, and the sizes of its later messages.
 #[derive(Debug, Clone, Copy)]
@@ -144,8 +144,8 @@ fn payload_count<T>(payload: &[T]) -> u32 {
 
 pub(crate) fn check_limits(load: &Load<'_>) -> Result<(), OwnerError> {
     let limits = [
-        ("particles", load.header.particle_count as usize, ELEMENTS_MAX),
-        ("constraints", load.constraints.len(), ELEMENTS_MAX),
+        ("particles", load.header.particle_count as usize, ELEMENTS_MAX as usize),
+        ("constraints", load.constraints.len(), ELEMENTS_MAX as usize),
         ("colliders", load.collider_count, COLLIDERS_MAX),
         ("bytes of text", load.scene.len(), SCENE_SIZE_BYTES_MAX),
     ];

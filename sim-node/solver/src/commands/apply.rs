@@ -2,7 +2,7 @@
 
 use sim_types::{Action, KindFilter, Parameter, ParameterValue, Reason, Text};
 
-use super::cut::{Ball, Sweep};
+use super::cut::{Sphere, Sweep};
 use super::{Grab, Push};
 use crate::frame::Pose;
 use crate::solver::Solver;
@@ -62,10 +62,10 @@ impl Solver {
             }
             Action::Release { particle } => self.release(client_id, particle)?,
             Action::Push { center, radius, delta, limit } => {
-                self.push(Push { ball: Ball { center, radius }, delta, limit })?;
+                self.push(Push { sphere: Sphere { center, radius }, delta, limit })?;
             }
             Action::Cut { constraint } => self.cut(constraint)?,
-            Action::CutRadius { center, radius } => self.cut_radius(Ball { center, radius })?,
+            Action::CutRadius { center, radius } => self.cut_radius(Sphere { center, radius })?,
             Action::CutSegment { from, to, direction } => {
                 self.cut_segment(Sweep { from, to, direction })?;
             }

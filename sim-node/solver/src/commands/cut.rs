@@ -22,7 +22,7 @@ pub struct Sweep {
 
 /// All points nearer to the center than the radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ball {
+pub struct Sphere {
     /// Center.
     pub center: [f32; 3],
     /// Radius, >= 0.
@@ -50,9 +50,9 @@ impl Solver {
     ///
     /// # Errors
     /// A number is not finite or out of range.
-    pub fn cut_radius(&mut self, ball: Ball) -> Result<(), Reason> {
-        self.check_ball(&ball)?;
-        self.tear_all(|a, b| ball.contains(a) || ball.contains(b));
+    pub fn cut_radius(&mut self, sphere: Sphere) -> Result<(), Reason> {
+        self.check_sphere(&sphere)?;
+        self.tear_all(|a, b| sphere.contains(a) || sphere.contains(b));
         Ok(())
     }
 
@@ -76,12 +76,12 @@ impl Solver {
         Ok(())
     }
 
-    pub(crate) fn check_ball(&self, ball: &Ball) -> Result<(), Reason> {
-        check_finite(&ball.center)?;
-        check_finite(&[ball.radius])?;
-        let is_near = is_near(&ball.center);
-        let is_in_plane = !self.is_planar || ball.center[2] == 0.0;
-        let is_size = (0.0..=COORDINATE_MAX).contains(&ball.radius);
+    pub(crate) fn check_sphere(&self, sphere: &Sphere) -> Result<(), Reason> {
+        check_finite(&sphere.center)?;
+        check_finite(&[sphere.radius])?;
+        let is_near = is_near(&sphere.center);
+        let is_in_plane = !self.is_planar || sphere.center[2] == 0.0;
+        let is_size = (0.0..=COORDINATE_MAX).contains(&sphere.radius);
         if is_near && is_in_plane && is_size { Ok(()) } else { Err(Reason::OutOfRange) }
     }
 
@@ -102,7 +102,7 @@ impl Solver {
     }
 }
 
-impl Ball {
+impl Sphere {
     pub(crate) fn contains(&self, point: Vec3) -> bool {
         let arm = point - Vec3::from_array(self.center);
         arm.dot(arm) < self.radius * self.radius

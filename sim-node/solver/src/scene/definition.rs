@@ -19,9 +19,6 @@ use element::{SceneConstraint, SceneParticle};
 use settings::{PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
 use wind::Wind;
 
-/// Largest number of particles, and of constraints, in a scene. All indices are exact in f32.
-pub const ELEMENTS_MAX: u32 = 1 << 24;
-
 /// Version of the scene format.
 pub const SCENE_VERSION: u32 = 1;
 

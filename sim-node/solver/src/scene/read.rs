@@ -19,10 +19,12 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use serde::Deserialize;
-use sim_types::{COORDINATE_MAX, Method, ParameterValues};
+use sim_types::{
+    COLLIDERS_MAX, COORDINATE_MAX, ELEMENTS_MAX, Method, ParameterValues, SCENE_SIZE_BYTES_MAX,
+};
 
 use super::definition::settings::Up;
-use super::definition::{ELEMENTS_MAX, SCENE_VERSION, Scene};
+use super::definition::{SCENE_VERSION, Scene};
 use super::error::{Place, SceneError};
 use super::model::Model;
 use anchor::FileAnchor;
@@ -102,6 +104,7 @@ impl Scene {
         let model = scene.model();
         reader.check_generated(&scene, &file, &model)?;
         reader.read_references(&mut scene, &file, &model)?;
+        reader.check_text_size(&scene)?;
         scene.read_warnings = reader.warnings.take();
         Ok(scene)
     }
@@ -224,6 +227,12 @@ impl Reader<'_> {
                 return self.error(span, &format!("generate[{index}]"), problem);
             }
         }
+        if let Some(first_excess) = file.collider.get(COLLIDERS_MAX) {
+            let problem =
+                format!("is one of {} colliders (allowed: {COLLIDERS_MAX})", file.collider.len());
+            let field = format!("collider[{COLLIDERS_MAX}]");
+            return self.error(first_excess.span(), &field, problem);
+        }
         if particles.max(constraints) > u64::from(ELEMENTS_MAX) {
             let problem = format!(
                 "has {particles} particles and {constraints} constraints (allowed: {ELEMENTS_MAX} \
@@ -232,5 +241,18 @@ impl Reader<'_> {
             return self.error(0..0, "scene", problem);
         }
         Ok(())
+    }
+
+    /// Refuses a scene whose complete text is too long to be published.
+    fn check_text_size(&self, scene: &Scene) -> Result<(), SceneError> {
+        let size_bytes = scene.to_toml().len();
+        if size_bytes <= SCENE_SIZE_BYTES_MAX {
+            return Ok(());
+        }
+        let problem = format!(
+            "has {size_bytes} bytes of text with every default and mesh written out (allowed: \
+             {SCENE_SIZE_BYTES_MAX})"
+        );
+        self.error(0..0, "scene", problem)
     }
 }

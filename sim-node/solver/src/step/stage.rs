@@ -47,12 +47,6 @@ impl Stage {
     /// The stages after the last substep, in order.
     pub(crate) const AFTER_SUBSTEPS: [Self; 3] = [Self::Tear, Self::Freeze, Self::Hash];
 
-    /// True for the stages that each sheet and the graph run on their own particles, in one sweep:
-    /// their particles share no constraint.
-    pub(crate) fn is_swept(self) -> bool {
-        !matches!(self, Self::Drive | Self::Wind | Self::Tear | Self::Freeze | Self::Hash)
-    }
-
     /// True for stages that run constraint group by constraint group.
     pub(crate) fn is_grouped(self) -> bool {
         matches!(self, Self::Project | Self::LimitStretch)

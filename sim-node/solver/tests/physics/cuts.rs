@@ -1,6 +1,6 @@
 //! The reach and the effect of cuts and pushes.
 
-use sim_solver::{Ball, Push, Reason, Solver, Sweep, TearCause};
+use sim_solver::{Push, Reason, Solver, Sphere, Sweep, TearCause};
 
 use super::{assert_near, bits, position, solver, step, velocity};
 
@@ -8,8 +8,8 @@ use super::{assert_near, bits, position, solver, step, velocity};
 const NET: &str = "gravity = [0, 0, 0]\n[solver]\nrate_hz = 100\nsubsteps = 1\n[[generate]]\nshape = \"cloth\"\n\
      columns = 5\nrows = 4\nspacing = 1\nlinks = [\"structural\"]\npinned = \"none\"\n";
 
-fn ball(center: [f32; 3], radius: f32) -> Ball {
-    Ball { center, radius }
+fn sphere(center: [f32; 3], radius: f32) -> Sphere {
+    Sphere { center, radius }
 }
 
 /// Returns the two particles of each torn constraint.
@@ -32,14 +32,14 @@ fn a_cut_tears_one_constraint_before_the_step() {
 fn a_cut_with_a_radius_tears_constraints_with_an_end_strictly_inside() {
     let mut solver = solver(NET);
     // Particle 6 is at (1, -1). Its neighbours are exactly 1 m away, and thus not inside.
-    solver.cut_radius(ball([1.0, -1.0, 0.0], 1.0)).unwrap();
+    solver.cut_radius(sphere([1.0, -1.0, 0.0], 1.0)).unwrap();
     step(&mut solver, 1);
     let mut pairs = torn_pairs(&solver);
     pairs.sort_unstable();
     assert_eq!(pairs, [[1, 6], [5, 6], [6, 7], [6, 11]]);
     // The same cut again tears nothing new.
-    solver.cut_radius(ball([1.0, -1.0, 0.0], 1.0)).unwrap();
-    solver.cut_radius(ball([1.0, -1.0, 0.0], 0.0)).unwrap();
+    solver.cut_radius(sphere([1.0, -1.0, 0.0], 1.0)).unwrap();
+    solver.cut_radius(sphere([1.0, -1.0, 0.0], 0.0)).unwrap();
     step(&mut solver, 1);
     assert_eq!(solver.new_torn_count(), 0);
 }
@@ -86,7 +86,7 @@ fn a_push_gives_particles_strictly_inside_its_sphere_the_clamped_velocity_of_the
     let mut solver = solver(NET);
     solver.pin(0).unwrap();
     // The push reaches (1, 0), (0, -1) and the pinned (0, 0). (1, -1) is sqrt(2) away.
-    let push = Push { ball: ball([0.0; 3], 1.25), delta: [0.03, -0.5, 0.01], limit: Some(0.1) };
+    let push = Push { sphere: sphere([0.0; 3], 1.25), delta: [0.03, -0.5, 0.01], limit: Some(0.1) };
     solver.push(push).unwrap();
     for (index, expected) in
         [(1, [3.0, -10.0, 1.0]), (5, [3.0, -10.0, 1.0]), (0, [0.0; 3]), (6, [0.0; 3])]
@@ -104,14 +104,15 @@ fn a_pushed_particle_moves_as_far_as_the_brush_in_the_next_step() {
     let mut solver = solver(
         "gravity = [0, 0, 0]\n[solver]\nrate_hz = 240\nsubsteps = 4\n[[particle]]\nposition = [0, 0, 0]\n",
     );
-    let push = Push { ball: ball([0.0; 3], 1.0), delta: [0.02, -30.0, 12.0], limit: Some(10.0) };
+    let push =
+        Push { sphere: sphere([0.0; 3], 1.0), delta: [0.02, -30.0, 12.0], limit: Some(10.0) };
     solver.push(push).unwrap();
     step(&mut solver, 1);
     for (axis, expected) in [0.02, -10.0, 10.0].into_iter().enumerate() {
         assert_near("distance in one step", expected, position(&solver, 0)[axis], 1e-4);
     }
     solver
-        .push(Push { limit: None, delta: [0.5, 0.0, 0.0], ball: ball([0.0, -10.0, 10.0], 1.0) })
+        .push(Push { limit: None, delta: [0.5, 0.0, 0.0], sphere: sphere([0.0, -10.0, 10.0], 1.0) })
         .unwrap();
     step(&mut solver, 1);
     assert_near("without a limit", 0.52, position(&solver, 0)[0], 1e-4);
@@ -122,12 +123,12 @@ fn a_wrong_push_or_cut_changes_no_bit() {
     let mut solver = solver(NET);
     step(&mut solver, 3);
     let before = bits(&solver);
-    let good = Push { ball: ball([0.0; 3], 1.0), delta: [1.0; 3], limit: None };
+    let good = Push { sphere: sphere([0.0; 3], 1.0), delta: [1.0; 3], limit: None };
     for (wrong, reason) in [
-        (Push { ball: ball([0.0; 3], -1.0), ..good }, Reason::OutOfRange),
-        (Push { ball: ball([2e7, 0.0, 0.0], 1.0), ..good }, Reason::OutOfRange),
-        (Push { ball: ball([f32::NAN, 0.0, 0.0], 1.0), ..good }, Reason::NonFinite),
-        (Push { ball: ball([0.0; 3], f32::INFINITY), ..good }, Reason::NonFinite),
+        (Push { sphere: sphere([0.0; 3], -1.0), ..good }, Reason::OutOfRange),
+        (Push { sphere: sphere([2e7, 0.0, 0.0], 1.0), ..good }, Reason::OutOfRange),
+        (Push { sphere: sphere([f32::NAN, 0.0, 0.0], 1.0), ..good }, Reason::NonFinite),
+        (Push { sphere: sphere([0.0; 3], f32::INFINITY), ..good }, Reason::NonFinite),
         (Push { delta: [0.0, f32::NAN, 0.0], ..good }, Reason::NonFinite),
         (Push { delta: [0.0, 1e8, 0.0], ..good }, Reason::OutOfRange),
         (Push { limit: Some(-0.1), ..good }, Reason::OutOfRange),
@@ -135,7 +136,7 @@ fn a_wrong_push_or_cut_changes_no_bit() {
     ] {
         assert_eq!(solver.push(wrong), Err(reason), "{wrong:?}");
     }
-    assert_eq!(solver.cut_radius(ball([0.0; 3], -0.5)), Err(Reason::OutOfRange));
-    assert_eq!(solver.cut_radius(ball([0.0; 3], f32::NAN)), Err(Reason::NonFinite));
+    assert_eq!(solver.cut_radius(sphere([0.0; 3], -0.5)), Err(Reason::OutOfRange));
+    assert_eq!(solver.cut_radius(sphere([0.0; 3], f32::NAN)), Err(Reason::NonFinite));
     assert_eq!(bits(&solver), before);
 }

@@ -47,6 +47,9 @@ fn a_frozen_particle_refuses_commands_until_a_reset() {
     solver.reset();
     step(&mut solver, 1);
     assert_eq!((solver.particle(0).flags, solver.particle(0).inverse_mass), (0, 1.0));
+    assert_eq!(solver.frozen_count(), 0);
+    step(&mut solver, 1);
+    assert_eq!(solver.frozen_count(), 2);
 }
 
 #[test]

@@ -124,9 +124,9 @@ fn a_push_with_zero_velocity_stops_particles_in_its_reach() {
     let mut solver =
         solver("gravity = [0, 0, 0]\n[[particle]]\nposition = [0, 0, 0]\nvelocity = [3, 2, 1]\n");
     step(&mut solver, 5);
-    let ball = sim_solver::Ball { center: solver.particle(0).position, radius: 0.1 };
+    let sphere = sim_solver::Sphere { center: solver.particle(0).position, radius: 0.1 };
     let before = solver.particle(0).position;
-    solver.push(sim_solver::Push { ball, delta: [0.0; 3], limit: None }).unwrap();
+    solver.push(sim_solver::Push { sphere, delta: [0.0; 3], limit: None }).unwrap();
     step(&mut solver, 5);
     assert_eq!((solver.particle(0).position, solver.particle(0).velocity), (before, [0.0; 3]));
 }

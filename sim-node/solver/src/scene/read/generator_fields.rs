@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
-use sim_types::{NumberRange, Parameter};
+use sim_types::{ELEMENTS_MAX, NumberRange, Parameter};
 
 use super::generator_file::{FileGenerator, FilePinned, FileSoftness};
 use super::reader::{Reader, SIZE};
 use super::value::{Number, Vector, Whole};
-use crate::scene::definition::ELEMENTS_MAX;
 use crate::scene::definition::softness::{KindSoftness, Softness, SoftnessValues};
 use crate::scene::error::SceneError;
 use crate::scene::generate::pinned::Pinned;

@@ -26,7 +26,7 @@ impl Batch<'_> {
     #[allow(unsafe_code, reason = "only this function knows that the constraints are independent")]
     pub(crate) fn project<T: Projection + Send>(
         self,
-        projection: T,
+        mut projection: T,
         workers: &mut Workers,
     ) -> bool {
         let is_batched = self.group.is_independent && self.group.count >= BATCHED_MIN;
@@ -39,9 +39,10 @@ impl Batch<'_> {
         let Self { ends, inverse_masses, .. } = self;
         let whole = BatchPart { ends, inverse_masses, particles, kernels: workers.kernels };
         if part_count(self.group.count, workers.count()) == 1 {
-            return whole.project(projection, workers.own_scratch());
+            whole.project(&mut projection, workers.own_scratch());
+            return projection.is_marked();
         }
-        whole.project_by_all(projection, workers)
+        ProjectedPart { part: whole, projection }.project_by_all(workers)
     }
 
     fn project_singly(self, mut projection: impl Projection) -> bool {
@@ -72,45 +73,54 @@ struct BatchPart<'a> {
     kernels: Kernels,
 }
 
-/// A part of a batch with its projection, and the result.
-struct ProjectedPart<'a, T> {
-    part: BatchPart<'a>,
-    projection: Option<T>,
-    is_marked: bool,
-}
-
 impl BatchPart<'_> {
-    fn project(&self, mut projection: impl Projection, scratch: &mut WorkerScratch) -> bool {
+    fn project(&self, projection: &mut impl Projection, scratch: &mut WorkerScratch) {
         let block = &mut scratch.block;
-        self.kernels.run(BatchWork { part: self, projection: &mut projection, block });
-        projection.is_marked()
+        self.kernels.run(BatchWork { part: self, projection, block });
     }
 
-    /// Divides the part among all workers.
-    fn project_by_all<T: Projection + Send>(&self, projection: T, workers: &mut Workers) -> bool {
-        let length = self.ends.len().div_ceil(part_count(8 * self.ends.len(), workers.count()));
-        let mut rest = Some(projection);
-        let chunks = self.ends.chunks(length).zip(self.inverse_masses.chunks(length));
-        let parts = chunks.map(|(ends, inverse_masses)| {
-            let projection = rest.take().map(|projection| {
-                if ends.len() < length {
-                    return projection;
-                }
-                let (projection, others) = projection.split(ends.len());
-                rest = Some(others);
-                projection
-            });
-            let part = BatchPart { ends, inverse_masses, ..*self };
-            ProjectedPart { part, projection, is_marked: false }
+    /// Splits the part after `count` lane groups.
+    fn split(self, count: usize) -> (Self, Self) {
+        let (ends, other_ends) = self.ends.split_at(count);
+        let (inverse_masses, other_inverse_masses) = self.inverse_masses.split_at(count);
+        let other = Self { ends: other_ends, inverse_masses: other_inverse_masses, ..self };
+        (Self { ends, inverse_masses, ..self }, other)
+    }
+}
+
+/// A part of a batch with its projection.
+struct ProjectedPart<'a, T> {
+    part: BatchPart<'a>,
+    projection: T,
+}
+
+impl<T: Projection + Send> ProjectedPart<'_, T> {
+    /// Divides the part among all workers. Returns true if any constraint was marked as torn.
+    fn project_by_all(self, workers: &mut Workers) -> bool {
+        let group_count = self.part.ends.len();
+        let length = group_count.div_ceil(part_count(8 * group_count, workers.count()));
+        let mut rest = Some(self);
+        let parts = std::iter::from_fn(|| {
+            let one = rest.take()?;
+            if one.part.ends.len() <= length {
+                return Some(one);
+            }
+            let (first, others) = one.split(length);
+            rest = Some(others);
+            Some(first)
         });
         let mut is_any_marked = false;
-        let work = |one: &mut ProjectedPart<'_, T>, scratch: &mut WorkerScratch| {
-            if let Some(projection) = one.projection.take() {
-                one.is_marked = one.part.project(projection, scratch);
-            }
+        let work = |one: &mut Self, scratch: &mut WorkerScratch| {
+            one.part.project(&mut one.projection, scratch);
         };
-        workers.for_each(parts, work, |one| is_any_marked |= one.is_marked);
+        workers.for_each(parts, work, |one| is_any_marked |= one.projection.is_marked());
         is_any_marked
+    }
+
+    fn split(self, count: usize) -> (Self, Self) {
+        let (part, other_part) = self.part.split(count);
+        let (projection, other_projection) = self.projection.split(count);
+        (Self { part, projection }, Self { part: other_part, projection: other_projection })
     }
 }
 

@@ -1,7 +1,7 @@
-//! Drags a particle around a circle: `cargo run -p sim-contract --example drag -- 7`
+//! Grabs a particle and moves it around a circle: `cargo run -p sim-contract --example grab -- 7`
 //!
-//! Grabs particle 7 (without an argument, particle 0), moves it around in two seconds, and releases
-//! it. `--domain` and `--name` select the simulation.
+//! It is particle 7 here, particle 0 without an argument. The circle takes two seconds; then the
+//! particle is released. `--domain` and `--name` select the simulation.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is its purpose")]
 
 use std::{error::Error, f32::consts::TAU, process::ExitCode, time::Duration};
@@ -12,12 +12,12 @@ const TIMEOUT: Duration = Duration::from_secs(1);
 const MOVES: u16 = 120;
 
 fn main() -> ExitCode {
-    let Err(error) = drag() else { return ExitCode::SUCCESS };
+    let Err(error) = run() else { return ExitCode::SUCCESS };
     eprintln!("error: {error}");
     ExitCode::FAILURE
 }
 
-fn drag() -> Result<(), Box<dyn Error>> {
+fn run() -> Result<(), Box<dyn Error>> {
     let (endpoint, arguments) = Endpoint::from_env_and_args()?;
     let argument = arguments.first().map_or("0", String::as_str);
     let particle: u32 = argument.parse().map_err(|_| format!("'{argument}' is not an index"))?;

@@ -1,0 +1,203 @@
+//! Explanations of rejected commands.
+
+use std::time::Duration;
+
+use sim_contract::{
+    Action, Client, NodeStatus, OffMeaning, PARAMETERS, Parameter, ParameterInfo, Reason,
+    StatusFlags, ValueForm,
+};
+use sim_solver::Scene;
+
+/// Explains a rejection: the meaning of its reason, and the remedy in parentheses where one is known.
+pub(super) fn explain(
+    client: &mut Client,
+    timeout: Duration,
+    action: &Action,
+    reason: Reason,
+) -> String {
+    match remedy(client, timeout, action, reason) {
+        Some(remedy) => format!("{reason} ({remedy})"),
+        None => reason.to_string(),
+    }
+}
+
+/// Remedy of a rejection. Without an answer of the node, only a remedy that needs none.
+fn remedy(
+    client: &mut Client,
+    timeout: Duration,
+    action: &Action,
+    reason: Reason,
+) -> Option<String> {
+    let mut status = || client.status(timeout).ok().flatten();
+    let count = match reason {
+        Reason::UnknownParticle => status()?.particle_count as usize,
+        Reason::UnknownConstraint => status()?.constraint_count as usize,
+        Reason::UnknownAnchor => anchor_count(client, timeout)?,
+        Reason::UnknownCollider => client.colliders(timeout).ok()?.colliders.len(),
+        Reason::NoEffectHere
+            if !matches!(action, Action::Step { .. }) && status().is_some_and(is_replay) =>
+        {
+            return Some("a recording accepts only pause, resume and step".to_owned());
+        }
+        _ => return fixed_remedy(action, reason),
+    };
+    Some(allowed_indices(count))
+}
+
+fn is_replay(status: NodeStatus) -> bool {
+    status.flags & StatusFlags::REPLAY != 0
+}
+
+/// Number of anchors, which only the scene names.
+fn anchor_count(client: &mut Client, timeout: Duration) -> Option<usize> {
+    let scene = client.scene(timeout).ok()??;
+    Some(Scene::from_toml(&scene, "scene").ok()?.anchors.len())
+}
+
+fn allowed_indices(count: usize) -> String {
+    match count {
+        0 => "it has none".to_owned(),
+        1 => "allowed: 0".to_owned(),
+        count => format!("allowed: 0 to {}", count - 1),
+    }
+}
+
+/// Remedy that follows from the command alone.
+fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
+    let remedy = match reason {
+        Reason::UnknownParameter => {
+            return Some(format!("allowed: {}", PARAMETERS.map(|info| info.name).join(", ")));
+        }
+        Reason::OutOfRange => return Some(format!("allowed: {}", allowed_values(action)?)),
+        Reason::NonFinite => "allowed: finite numbers",
+        Reason::AlreadyTorn => "`ctl reset` restores it",
+        Reason::NotGrabbed => "`ctl grab` grabs it",
+        Reason::GrabbedByOther => "that client must release it first",
+        Reason::NoEffectHere => missing_condition(action)?,
+        Reason::UnknownParticle
+        | Reason::UnknownConstraint
+        | Reason::UnknownAnchor
+        | Reason::UnknownCollider => return None,
+    };
+    Some(remedy.to_owned())
+}
+
+/// Condition under which a command has an effect.
+fn missing_condition(action: &Action) -> Option<&'static str> {
+    Some(match action {
+        Action::Set { .. } => "method \"xpbd\" has compliance, method \"pbd\" has stiffness",
+        Action::Load { .. } => {
+            "the scene runs at another rate than the node, or needs more memory than is available; \
+             see the node's messages"
+        }
+        Action::Step { .. } => "the node is not paused",
+        Action::Pin { .. }
+        | Action::Unpin { .. }
+        | Action::Grab { .. }
+        | Action::Move { .. }
+        | Action::Release { .. } => "the particle is frozen; `ctl reset` restores it",
+        _ => return None,
+    })
+}
+
+/// Allowed values of a command, in words.
+fn allowed_values(action: &Action) -> Option<String> {
+    let values = match action {
+        Action::Set { parameter, constraint_kind, .. } => {
+            let info = Parameter::from_name(parameter.as_str())?.info();
+            let kind =
+                if constraint_kind.is_some() && !info.is_per_kind { ", no --kind" } else { "" };
+            return Some(format!("{}{kind}", allowed_parameter(info)));
+        }
+        Action::Grab { .. } | Action::Move { .. } => {
+            "coordinates within 1e7, z 0 in 2-D, --over 0 to 0.25"
+        }
+        Action::Push { .. } => {
+            "coordinates and --delta within 1e7, z 0 in 2-D, --radius 0 to 1e7, --limit 0 or more"
+        }
+        Action::CutRadius { .. } => "coordinates within 1e7, z 0 in 2-D, --radius 0 to 1e7",
+        Action::CutSegment { .. } => {
+            "coordinates within 1e7, --direction not 0; in 2-D, z of --from and --to 0"
+        }
+        Action::MoveAnchor { .. } => {
+            "coordinates within 1e7, --rotation not 0; in 2-D, z 0 and a rotation about z"
+        }
+        Action::MoveCollider { .. } => {
+            "coordinates within 1e7, --rotation not 0; in 2-D, z 0 and a rotation about z; for \
+             bounds, no rotation"
+        }
+        Action::Load { .. } => "a scene that the node can read; see its messages",
+        Action::Step { .. } => "1 or more",
+        _ => return None,
+    };
+    Some(values.to_owned())
+}
+
+/// Allowed values of a parameter, in words.
+fn allowed_parameter(info: &ParameterInfo) -> String {
+    let values = match info.form {
+        ValueForm::Vector => format!("three numbers, each {}, z 0 in 2-D", info.range.text),
+        ValueForm::Number | ValueForm::Whole => info.range.text.to_owned(),
+    };
+    let off = match info.off {
+        OffMeaning::Zero => ", or off for 0",
+        OffMeaning::NoLimit => ", or off for no limit",
+        OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
+    };
+    let kind = if info.is_per_kind { ", for one --kind or all" } else { "" };
+    format!("{values}{off}{kind}")
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_contract::{ConstraintKind, KindFilter, ParameterValue, Text};
+
+    use super::*;
+
+    #[test]
+    fn the_allowed_values_name_range_off_and_kind() {
+        let text = |parameter: Parameter| allowed_parameter(parameter.info());
+        assert_eq!(text(Parameter::Substeps), "a whole number from 1 to 1000");
+        assert_eq!(text(Parameter::TearForce), "a number > 0, or off for no limit");
+        assert_eq!(text(Parameter::Stiffness), "0 to 1, for one --kind or all");
+        let gravity = "three numbers, each -1e7 to 1e7, z 0 in 2-D, or off for 0";
+        assert_eq!(text(Parameter::Gravity), gravity);
+    }
+
+    #[test]
+    fn a_kind_for_a_parameter_without_kinds_is_named() {
+        let action = Action::Set {
+            parameter: Text::cut("damping"),
+            value: ParameterValue::Number(1.0),
+            constraint_kind: Some(KindFilter::Known(ConstraintKind::Bend)),
+        };
+        let remedy = fixed_remedy(&action, Reason::OutOfRange).unwrap();
+        assert_eq!(remedy, "allowed: a number >= 0, or off for 0, no --kind");
+    }
+
+    #[test]
+    fn every_action_that_can_be_out_of_range_names_its_values() {
+        for action in Action::samples() {
+            let is_checked = !matches!(
+                action,
+                Action::Pin { .. }
+                    | Action::Unpin { .. }
+                    | Action::Release { .. }
+                    | Action::Pause
+                    | Action::Resume
+                    | Action::Reset
+                    | Action::Cut { .. }
+                    | Action::Unknown { .. }
+            );
+            let remedy = fixed_remedy(&action, Reason::OutOfRange);
+            assert_eq!(remedy.is_some(), is_checked, "{action:?}");
+        }
+    }
+
+    #[test]
+    fn allowed_indices_end_before_the_count() {
+        assert_eq!(allowed_indices(0), "it has none");
+        assert_eq!(allowed_indices(1), "allowed: 0");
+        assert_eq!(allowed_indices(168), "allowed: 0 to 167");
+    }
+}

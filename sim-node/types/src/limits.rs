@@ -1,0 +1,8 @@
+//! The limits of a scene, for the reader of scenes and for the services that publish them.
+
+/// Most particles, and most constraints, of a scene: indices below 2^24 are exact in f32.
+pub const ELEMENTS_MAX: u32 = 1 << 24;
+/// Most colliders of a scene: each substep tests every free particle against every collider.
+pub const COLLIDERS_MAX: usize = 1 << 16;
+/// Longest text of a scene, in bytes: as a file, and with every default and mesh written out.
+pub const SCENE_SIZE_BYTES_MAX: usize = 16 << 20;
