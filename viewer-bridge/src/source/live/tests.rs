@@ -31,6 +31,7 @@ struct Fixture {
     shown: ShownState,
     sinks: Sinks,
     requests: Requests,
+    hub: Arc<Hub>,
     page: Connection,
     owner: Owner,
     outcome_count: u64,
@@ -69,10 +70,10 @@ impl Fixture {
         let hub = Arc::new(Hub::new(Mode::Live, sender));
         let page = hub.join(Choice::F32);
         let (shown, mut sinks) = (ShownState::default(), Sinks::default());
-        sinks.add(hub);
+        sinks.add(Arc::<Hub>::clone(&hub));
         let outcome_count = 0;
         let mut fixture =
-            Self { link, shown, sinks, requests, page, owner, outcome_count, _domain: domain };
+            Self { link, shown, sinks, requests, hub, page, owner, outcome_count, _domain: domain };
         fixture.owner.refresh();
         fixture.publish(0, 0, 2);
         fixture.read();
@@ -329,4 +330,22 @@ fn the_last_answers_and_the_last_status_of_a_run_are_published_before_the_next_r
     let answer = newest_text(&mut fixture.page, "outcome").unwrap();
     assert_eq!((&answer["id"], &answer["status"]), (&json!(9), &json!("applied")));
     assert_eq!(*log.0.lock().unwrap(), [("outcome", 1), ("status", 5)]);
+}
+
+#[test]
+fn a_page_that_joins_later_reads_why_the_newest_load_is_not_shown() {
+    let mut fixture = Fixture::start();
+    let outside = ConstraintState { a: 0, b: 9, ..ConstraintState::default() };
+    fixture.owner.load(&OwnerLoad { constraints: &[outside], ..load(1, 1) }).unwrap();
+    fixture.publish(1, 1, 2);
+    fixture.read();
+    let notice = newest_text(&mut fixture.page, "notice").unwrap();
+    assert_eq!(notice["level"], "error");
+    let mut late = fixture.hub.join(Choice::F32);
+    assert_eq!(newest_text(&mut late, "notice"), Some(notice));
+    fixture.owner.load(&load(2, 2)).unwrap();
+    fixture.publish(2, 2, 2);
+    fixture.read();
+    let mut latest = fixture.hub.join(Choice::F32);
+    assert_eq!(newest_text(&mut latest, "notice"), None);
 }
