@@ -50,7 +50,8 @@ impl End {
     fn from_error(error: Error) -> Self {
         match error.into_inner().downcast_ref() {
             Some(tungstenite::Error::Capacity(_)) => {
-                Self::closed(MESSAGE_TOO_LONG, "a message is longer than 64 KiB")
+                let limit_kib = MESSAGE_SIZE_BYTES_MAX >> 10;
+                Self::closed(MESSAGE_TOO_LONG, format!("a message is longer than {limit_kib} KiB"))
             }
             _ => Self::Gone,
         }
