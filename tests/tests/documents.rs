@@ -1,15 +1,19 @@
 //! The reference documents agree with the programs: their examples run, and they list every scene key,
-//! every kind of command and every built-in scene.
+//! every kind of command, every built-in scene and every recorded topic.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox};
+use recorder::Topic;
 
 const README: &str = include_str!("../../README.md");
 const SCENES: &str = include_str!("../../sim-node/scenes/README.md");
 const SOLVER: &str = include_str!("../../sim-node/solver/README.md");
 const CONTRACT: &str = include_str!("../../sim-node/contract/README.md");
+const RECORDER: &str = include_str!("../../recorder/README.md");
+const VIEWER: &str = include_str!("../../viewer-bridge/README.md");
 
 /// Returns the fenced blocks of a language, each with the number of its first line.
 fn blocks(document: &str, language: &str) -> Vec<(usize, String)> {
@@ -115,6 +119,50 @@ fn every_command_in_the_reference_is_accepted_and_every_kind_has_an_example() {
         let field = format!(r#""kind":"{kind}""#);
         assert!(commands.iter().any(|(_, text)| text.contains(&field)), "{kind} has no example");
     }
+}
+
+/// The cells in backticks of the first column of a document's table of topics.
+fn table_topics(document: &str) -> Vec<&str> {
+    let rows = document.lines().filter_map(|line| line.strip_prefix("| `/"));
+    let cells = rows.map(|row| row.split_once(" |").unwrap().0);
+    cells.flat_map(|cell| cell.split(", ")).map(|topic| topic.trim_matches(['`', '/'])).collect()
+}
+
+#[test]
+fn the_tables_of_topics_name_those_that_exist() {
+    let recorded: BTreeSet<_> =
+        Topic::ALL.iter().map(|topic| topic.name().trim_start_matches('/')).collect();
+    assert_eq!(table_topics(RECORDER).into_iter().collect::<BTreeSet<_>>(), recorded);
+    let served = table_topics(VIEWER);
+    assert!(served.len() > 5, "found only {served:?}");
+    for topic in served {
+        assert!(topic == "scene" || recorded.contains(topic), "{topic} does not exist");
+    }
+}
+
+#[test]
+fn every_option_in_the_commands_of_a_document_exists() {
+    let sandbox = Sandbox::new();
+    let mut count = 0;
+    for (line, text) in [README, RECORDER, VIEWER].iter().flat_map(|one| blocks(one, "sh")) {
+        for command in text.lines() {
+            let mut words = command.split('#').next().unwrap().split_whitespace();
+            let program = match words.next() {
+                Some("recorder") => Program::Recorder,
+                Some("viewer-bridge") => Program::ViewerBridge,
+                _ => continue,
+            };
+            let words: Vec<_> = words.collect();
+            let subcommand = words.first().filter(|word| !word.starts_with('-'));
+            let args: Vec<_> = subcommand.copied().into_iter().chain(["--help"]).collect();
+            let help = Process::run(program, &sandbox, &args).success();
+            for option in words.iter().filter(|word| word.starts_with('-')) {
+                assert!(help.contains(option), "block of line {line}: {command}: no {option}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 10, "found only {count} options");
 }
 
 /// The paths that a document names in backticks: those with a folder and an extension.

@@ -1,6 +1,6 @@
 //! The command line. The doc comments are the help texts.
 
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 
 use clap::Parser;
@@ -33,11 +33,11 @@ pub(crate) struct Args {
     pub(crate) listen: SocketAddr,
     /// Name by which browsers reach this host, besides its addresses and `localhost`; can be
     /// repeated
-    #[arg(long = "host", value_name = "HOST")]
+    #[arg(long = "host", value_name = "HOST", value_parser = host_name)]
     pub(crate) hosts: Vec<String>,
     /// Recording to show instead of a node, written by `recorder record` or `recorder simulate`; an
     /// incomplete file is shown as far as it goes
-    #[arg(long, value_name = "FILE.mcap", conflicts_with = "name")]
+    #[arg(long, value_name = "FILE.mcap", conflicts_with_all = ["name", "domain"])]
     pub(crate) replay: Option<PathBuf>,
     /// Also serve viewers that speak the Foxglove protocol (foxglove.sdk.v1) at this address; port 0
     /// is any free port. Loopback only: the protocol cannot authenticate clients
@@ -94,4 +94,55 @@ fn foxglove_address(text: &str) -> Result<SocketAddr, String> {
         text.parse().map_err(|_| "expected an address and a port, as in 127.0.0.1:8765")?;
     FoxgloveOptions::check_address(address).map_err(|error| error.to_string())?;
     Ok(address)
+}
+
+/// Accepts the host part of an address as browsers send it, without a scheme and a port.
+fn host_name(text: &str) -> Result<String, String> {
+    if text.trim_matches(['[', ']']).parse::<IpAddr>().is_ok() {
+        return Err("addresses need no --host; to serve other machines at this one, use \
+                    --listen ADDR:PORT"
+            .to_owned());
+    }
+    let is_allowed = |letter: char| letter.is_ascii_alphanumeric() || "-._".contains(letter);
+    if text.is_empty() || !text.chars().all(is_allowed) {
+        return Err(
+            "expected a name of letters, digits, '-' and '.', as in lab.example; the port \
+                    is that of --listen"
+                .to_owned(),
+        );
+    }
+    Ok(text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(args: &[&str]) -> String {
+        let args = ["viewer-bridge"].iter().chain(args);
+        Args::try_parse_from(args).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_recording_has_no_node() {
+        for option in ["--name", "--domain"] {
+            let error = error(&["--replay", "run.mcap", option, "lab"]);
+            assert!(error.contains("cannot be used with") && error.contains(option), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_host_is_a_name_without_a_port() {
+        let args = ["viewer-bridge", "--host", "lab.example", "--host", "my_host-1"];
+        let args = Args::try_parse_from(args).unwrap();
+        assert_eq!(args.hosts, ["lab.example", "my_host-1"]);
+        for host in ["lab:8080", "http://lab", "lab/", "", "lab example"] {
+            let error = error(&["--host", host]);
+            assert!(error.contains("the port is that of --listen"), "{error}");
+        }
+        for host in ["10.0.0.7", "[::1]", "::1"] {
+            let error = error(&["--host", host]);
+            assert!(error.contains("--listen ADDR:PORT"), "{error}");
+        }
+    }
 }

@@ -16,6 +16,11 @@ pub const MESSAGE_SIZE_BYTES_MAX: usize = 64 << 10;
 pub const MESSAGES_PER_SECOND_MAX: u32 = 240;
 /// Messages that a client can send at once after a pause.
 pub const MESSAGES_BURST_MAX: u32 = 480;
+/// Bytes that the server reads from a connection per second. A message that never ends counts as no
+/// message, and its frames can be empty, so their bytes are limited. A page sends about 50 KiB per second.
+pub const BYTES_PER_SECOND_MAX: u32 = 1 << 20;
+/// Bytes that a client can send at once after a pause.
+pub const BYTES_BURST_MAX: u32 = 4 << 20;
 /// Frames that a page has not acknowledged. With one, the network latency halves the frame rate;
 /// with more, a slow page lags.
 pub const FRAMES_UNACKNOWLEDGED_MAX: u32 = 2;

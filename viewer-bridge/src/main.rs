@@ -108,9 +108,9 @@ fn stop_signal(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> 
     let listen = |kind| signal(kind).context("listening for signals");
     let (mut interrupt, mut terminate) =
         (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
-    let is_asked = stop.is_requested();
+    let is_requested = stop.is_requested();
     Ok(async move {
-        if !is_asked {
+        if !is_requested {
             tokio::select! {
                 _ = interrupt.recv() => {}
                 _ = terminate.recv() => {}

@@ -19,6 +19,11 @@ use crate::wire::{Colliders, Pins, Scene, Stamp, Statistics};
 pub enum Update<'a> {
     /// A new load. Nothing of it is torn, held or moved yet.
     Load(&'a Scene),
+    /// The newest load cannot be shown. The previous one stays on show until the next [`Update::Load`].
+    LoadRefused {
+        /// The reason, for the user.
+        text: &'a str,
+    },
     /// The list of torn constraints has changed.
     Torn(Torn<'a>),
     /// The set of particles that are not free has changed.

@@ -4,3 +4,4 @@ pub(crate) mod guard;
 pub(crate) mod listen;
 pub(crate) mod peer;
 mod rate_limit;
+mod throttle;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use anyhow::bail;
+use recorder::RunDescription;
 
 /// Most pictures of one call. A higher number is probably a mistake.
 const FRAMES_MAX: usize = 10_000;
@@ -22,8 +23,9 @@ impl Selection {
     /// Selects from `steps`, which ascend. The result ascends and has no duplicates.
     pub(crate) fn select(&self, steps: &[u64], rate_hz: u32) -> anyhow::Result<Vec<u64>> {
         let Some(last) = steps.len().checked_sub(1) else { return Ok(Vec::new()) };
-        let times_ns: Vec<u64> =
-            steps.iter().map(|step| time_ns(step.saturating_sub(steps[0]), rate_hz)).collect();
+        let time_ns =
+            |step: &u64| RunDescription::duration_ns(step.saturating_sub(steps[0]), rate_hz);
+        let times_ns: Vec<u64> = steps.iter().map(time_ns).collect();
         let first_at = |time_ns: u64| times_ns.partition_point(|one| *one < time_ns);
         let mut places: Vec<usize> = match self {
             Self::Spread(1) => vec![last],
@@ -54,12 +56,6 @@ impl Selection {
         }
         Ok(places.into_iter().map(|place| steps[place]).collect())
     }
-}
-
-/// Returns the simulated time of a number of steps, in nanoseconds, rounded down.
-fn time_ns(step_count: u64, rate_hz: u32) -> u64 {
-    let time_ns = u128::from(step_count) * 1_000_000_000 / u128::from(rate_hz);
-    u64::try_from(time_ns).unwrap_or(u64::MAX)
 }
 
 fn nanoseconds(duration: Duration) -> u64 {

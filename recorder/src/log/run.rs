@@ -56,8 +56,14 @@ pub struct RunDescription {
 impl RunDescription {
     /// Returns the wall clock of a step, in nanoseconds: epoch + step / rate, rounded down.
     pub fn time_of_step_ns(&self, step: u64) -> u64 {
-        let since_epoch = u128::from(step) * NS_PER_S / u128::from(self.rate_hz);
-        self.epoch_ns.saturating_add(u64::try_from(since_epoch).unwrap_or(u64::MAX))
+        self.epoch_ns.saturating_add(Self::duration_ns(step, self.rate_hz))
+    }
+
+    /// Returns the simulated time of a number of steps, in nanoseconds, rounded down. A rate of 0,
+    /// which no valid run has, counts as 1.
+    pub fn duration_ns(step_count: u64, rate_hz: u32) -> u64 {
+        let duration_ns = u128::from(step_count) * NS_PER_S / u128::from(rate_hz.max(1));
+        u64::try_from(duration_ns).unwrap_or(u64::MAX)
     }
 
     /// Returns the step at a time. The inverse of [`RunDescription::time_of_step_ns`]; `None` for

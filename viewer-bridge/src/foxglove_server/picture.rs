@@ -9,12 +9,14 @@ use foxglove::messages::{
 };
 use recorder::WORLD_FRAME;
 use sim_contract::clock::SECOND_NS;
-use sim_contract::{ParticleState, TornConstraint};
+use sim_contract::{ConstraintKind, ParticleState, TornConstraint};
 
 use crate::wire::Scene;
 
 /// Width of a stick in pixels, at any distance.
 const STICK_WIDTH_PX: f64 = 1.5;
+/// Number of the kind in [`Scene::kinds`].
+const STRUCTURAL_KIND: u8 = ConstraintKind::Structural as u8;
 const STICK_COLOR: Color = Color { r: 0.45, g: 0.6, b: 0.75, a: 1.0 };
 const SURFACE_COLOR: Color = Color { r: 0.72, g: 0.2, b: 0.18, a: 0.85 };
 const IDENTITY: Pose = Pose {
@@ -27,8 +29,10 @@ const IDENTITY: Pose = Pose {
 pub(super) struct Picture {
     sticks: Vec<[u32; 2]>,
     triangles: Vec<[u32; 3]>,
+    /// Structural constraints, in the order of `sticks`.
+    is_structural: Vec<bool>,
     is_torn: Vec<bool>,
-    /// A triangle disappears when the first of its edges tears.
+    /// A triangle is gone once any structural constraint along one of its edges is torn.
     is_gone: Vec<bool>,
 }
 
@@ -36,6 +40,7 @@ impl Picture {
     /// Creates the drawing of a load without torn constraints.
     pub(super) fn new(scene: &Scene) -> Self {
         Self {
+            is_structural: scene.kinds.iter().map(|kind| *kind == STRUCTURAL_KIND).collect(),
             is_torn: vec![false; scene.ends.len()],
             is_gone: vec![false; scene.triangles.len()],
             sticks: scene.ends.clone(),
@@ -50,7 +55,9 @@ impl Picture {
         for constraint in torn.iter().map(|torn| torn.constraint as usize) {
             if let Some(ends) = self.sticks.get(constraint) {
                 self.is_torn[constraint] = true;
-                edges.insert(ordered(*ends));
+                if self.is_structural.get(constraint) == Some(&true) {
+                    edges.insert(ordered(*ends));
+                }
             }
         }
         for (is_gone, [a, b, c]) in self.is_gone.iter_mut().zip(&self.triangles) {
@@ -142,7 +149,8 @@ mod tests {
 
     fn picture() -> Picture {
         Picture::new(&Scene {
-            ends: vec![[0, 1], [1, 2], [2, 3]],
+            ends: vec![[0, 1], [1, 2], [2, 3], [2, 1], [0, 1]],
+            kinds: vec![0, 1, 0, 1, 2],
             triangles: vec![[0, 1, 2], [3, 2, 1]],
             ..Scene::default()
         })
@@ -155,18 +163,27 @@ mod tests {
     #[test]
     fn sticks_and_triangles_are_drawn_at_the_particles() {
         let update = picture().draw(1_500_000_000, &particles());
-        assert_eq!(indices(&update), (&[0, 1, 1, 2, 2, 3][..], &[0, 1, 2, 3, 2, 1][..]));
+        assert_eq!(
+            indices(&update),
+            (&[0, 1, 1, 2, 2, 3, 2, 1, 0, 1][..], &[0, 1, 2, 3, 2, 1][..])
+        );
         let point = update.entities[0].lines[0].points[3];
         assert_eq!((point.x, point.y, point.z), (1.0, 1.0, 0.0));
         assert_eq!(update.entities[0].frame_id, "world");
     }
 
     #[test]
-    fn torn_constraints_and_the_triangles_along_them_are_not_drawn() {
+    fn torn_constraints_and_the_triangles_along_structural_ones_are_not_drawn() {
         let mut picture = picture();
-        let torn = [2, 99].map(|constraint| TornConstraint::new(constraint, None));
-        picture.set_torn(&torn);
-        assert_eq!(indices(&picture.draw(0, &particles())), (&[0, 1, 1, 2][..], &[0, 1, 2][..]));
+        let torn = |list: &[u32]| {
+            list.iter().map(|one| TornConstraint::new(*one, None)).collect::<Vec<_>>()
+        };
+        picture.set_torn(&torn(&[2, 99]));
+        let sticks = &[0, 1, 1, 2, 2, 1, 0, 1][..];
+        assert_eq!(indices(&picture.draw(0, &particles())), (sticks, &[0, 1, 2][..]));
+        picture.set_torn(&torn(&[1, 3, 4]));
+        let all = &[0, 1, 2, 3, 2, 1][..];
+        assert_eq!(indices(&picture.draw(0, &particles())), (&[0, 1, 2, 3][..], all));
         picture.set_torn(&[]);
         assert_eq!(indices(&picture.draw(0, &particles())).1.len(), 6);
     }
@@ -176,7 +193,7 @@ mod tests {
         let mut particles = particles();
         particles[3].position[1] = f32::NAN;
         let update = picture().draw(0, &particles);
-        assert_eq!(indices(&update), (&[0, 1, 1, 2][..], &[0, 1, 2][..]));
+        assert_eq!(indices(&update), (&[0, 1, 1, 2, 2, 1, 0, 1][..], &[0, 1, 2][..]));
         assert!(update.entities[0].lines[0].points.iter().all(|point| point.y.is_finite()));
     }
 }

@@ -11,14 +11,14 @@ use foxglove::{
     Channel, Context, Encode, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId,
 };
 use recorder::{
-    Message, MessageEncoder, OutcomeRow, StatusRow, StepRow, TearsRow, Topic, TopicFormat,
-    encode_transform,
+    Message, MessageEncoder, OutcomeRow, RunDescription, StatusRow, StepRow, TearsRow, Topic,
+    TopicFormat, encode_transform,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
 use super::picture::Picture;
 use crate::sink::{State, Torn};
-use crate::source::recording_times::{RecordingTimes, step_ns};
+use crate::source::recording_times::RecordingTimes;
 use crate::wire::Scene;
 
 /// Topics with the messages of a recording.
@@ -86,7 +86,7 @@ struct PublishedLoad {
 impl PublishedLoad {
     /// Time of a step, as in recordings.
     fn time_ns(&self, step: u64) -> u64 {
-        self.epoch_ns.saturating_add(step_ns(step, self.rate_hz))
+        self.epoch_ns.saturating_add(RunDescription::duration_ns(step, self.rate_hz))
     }
 }
 
@@ -219,7 +219,8 @@ impl Publisher {
                 (Some(times), _) => times.epoch_ns,
                 (None, Some(before)) => before.epoch_ns,
                 (None, None) => {
-                    realtime_ns().saturating_sub(step_ns(scene.stamp.step, scene.rate_hz))
+                    let age_ns = RunDescription::duration_ns(scene.stamp.step, scene.rate_hz);
+                    realtime_ns().saturating_sub(age_ns)
                 }
             },
             picture: Picture::new(scene),

@@ -24,8 +24,8 @@ use crate::source::recording_times::RecordingTimes;
 pub(super) const ANY_CLIENT: ClientId = ClientId::FoxgloveCaller(0);
 
 /// Time between two complaints about a client's published commands. The library disconnects a client
-/// that leaves more than a few messages unread, and a client can publish hundreds of commands per
-/// second. Each rejected command is on `/outcomes` as well.
+/// for which more than [`crate::limits::FOXGLOVE_QUEUED_MAX`] answers and complaints wait, and a client
+/// can publish hundreds of commands per second. Each rejected command is on `/outcomes` as well.
 const COMPLAINT_PERIOD_NS: u64 = SECOND_NS / 10;
 
 /// The bridge between the clients' requests and the source.
@@ -290,7 +290,7 @@ fn refused_set(reason: Reason) -> OutcomeText {
 
 /// The reason of a refusal for the user.
 fn refusal_text(name: &str, outcome: &OutcomeText) -> String {
-    format!("{name}: {}", outcome.reason.map_or("unknown reason", Refusal::text))
+    format!("{name}: {}", outcome.reason.map_or("unknown reason".into(), Refusal::text))
 }
 
 fn respond(responder: Responder, outcome: &OutcomeText) {

@@ -64,7 +64,8 @@ impl Sink for FoxgloveSink {
                 outcome,
             } => self.bridge.answer(outcome),
             // The protocol has no messages for these, or they are for pages.
-            Update::Pins(_)
+            Update::LoadRefused { .. }
+            | Update::Pins(_)
             | Update::Colliders(_)
             | Update::SameState
             | Update::Statistics(_)

@@ -1,7 +1,11 @@
 //! Reasons for which a command is not applied.
 
+use std::borrow::Cow;
+
 use serde::{Serialize, Serializer};
 use sim_contract::Reason;
+
+use crate::limits::GRABS_PER_CLIENT_MAX;
 
 /// The reason for which a command was not applied: the node's, or the bridge's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,18 +53,21 @@ impl Refusal {
     }
 
     /// Sentence for the user.
-    pub fn text(self) -> &'static str {
-        match self {
+    pub fn text(self) -> Cow<'static, str> {
+        let text = match self {
             Self::Node(reason) => reason_text(reason),
             Self::Unknown => "the node gave an unknown reason",
             Self::NoNode => "no node is running",
             Self::NoAnswer => "the node did not answer; the command may still take effect",
             Self::Busy => "too many commands are waiting; try again",
             Self::StaleEpoch => "another scene was loaded in the meantime",
-            Self::TooManyGrabs => "you have already grabbed 16 particles",
+            Self::TooManyGrabs => {
+                return format!("you have already grabbed {GRABS_PER_CLIENT_MAX} particles").into();
+            }
             Self::OnlyLive => "a recording cannot be changed",
             Self::OnlyReplay => "only a recording can do this",
-        }
+        };
+        text.into()
     }
 }
 

@@ -246,7 +246,7 @@ impl OutcomeText {
     pub(crate) fn explain(&mut self, reason: Refusal) {
         if self.reason.is_none() {
             self.reason = Some(reason);
-            reason.text().clone_into(&mut self.text);
+            self.text = reason.text().into_owned();
         }
     }
 }

@@ -17,7 +17,7 @@ use super::frame_encoder::FrameEncoder;
 pub use super::frame_set::Formats;
 use super::frame_set::{FrameSet, format_for};
 use crate::limits::{PROTOCOL, RELIABLE_QUEUED_MAX};
-use crate::message::{Choice, Mode, PageLimits, ToPage, Welcome};
+use crate::message::{Choice, Level, Mode, PageLimits, ToPage, Welcome};
 use crate::request::{ClientId, RequestKind, RequestSender};
 use crate::scene::catalog;
 use crate::sink::{Demand, Sink, Torn, Update};
@@ -35,6 +35,8 @@ enum Slot {
     Scene,
     Tear,
     Pins,
+    /// The notice about a newer load that cannot be shown.
+    LoadRefused,
 }
 
 /// The sink of the pages.
@@ -243,6 +245,10 @@ impl Sink for Hub {
             Update::Load(scene) => {
                 lock(&self.encoder).begin_load(scene);
                 self.latch_binary(Slot::Scene, scene.encode());
+            }
+            Update::LoadRefused { text } => {
+                let text = text.to_owned();
+                self.latch(Slot::LoadRefused, &ToPage::Notice { level: Level::Error, text });
             }
             Update::Torn(torn) => self.publish_torn(&torn),
             Update::Pins(pins) => self.latch_binary(Slot::Pins, pins.encode()),

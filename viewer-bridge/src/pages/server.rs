@@ -16,7 +16,7 @@ use tokio::sync::Semaphore;
 use super::assets::Assets;
 use super::hub::Hub;
 use super::session::{self, Sessions};
-use crate::limits::{CLIENTS_MAX, WAITING_MAX};
+use crate::limits::WAITING_MAX;
 use crate::shutdown::Shutdown;
 use crate::socket::guard::{Guard, guarded};
 use crate::socket::listen::{HttpListener, client_permits};
@@ -121,16 +121,10 @@ async fn file(
 }
 
 async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> Response {
-    if state.sessions.pages.available_permits() == 0 {
-        return refusal(format!("{CLIENTS_MAX} pages are already open; close one\n"));
-    }
     let Ok(waiting) = Arc::clone(&state.waiting).try_acquire_owned() else {
-        return refusal(format!("{WAITING_MAX} sockets have not sent hello; try again later\n"));
+        let text = format!("{WAITING_MAX} sockets have not sent hello; try again later\n");
+        return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
     };
     limit(upgrade)
         .on_upgrade(async move |socket| session::serve(socket, &state.sessions, waiting).await)
-}
-
-fn refusal(text: String) -> Response {
-    (StatusCode::SERVICE_UNAVAILABLE, text).into_response()
 }

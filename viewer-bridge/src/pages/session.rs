@@ -35,7 +35,8 @@ pub(super) struct Sessions {
 }
 
 /// Serves a page until it leaves or breaks the rules. A page counts against the limit once it has sent
-/// a valid token; until then it only holds `waiting`.
+/// a valid token; until then it only holds `waiting`. A page beyond the limit gets a close code, because
+/// browsers hide the status of a refused upgrade from the page.
 pub(super) async fn serve(socket: WebSocket, sessions: &Sessions, waiting: OwnedSemaphorePermit) {
     let mut peer = Peer::new(socket);
     let end = match timeout(HELLO_TIMEOUT, receive_hello(&mut peer, &sessions.guard)).await {

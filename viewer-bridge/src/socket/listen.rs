@@ -12,6 +12,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
+use super::throttle::{BYTES, Throttled};
 use crate::limits::{
     ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, CONNECTIONS_MAX, HELLO_TIMEOUT, SHUTDOWN_TIMEOUT,
 };
@@ -82,7 +83,7 @@ async fn serve_connection(stream: TcpStream, router: Router) {
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(HELLO_TIMEOUT)
-        .serve_connection(TokioIo::new(stream), service)
+        .serve_connection(TokioIo::new(Throttled::new(stream, BYTES)), service)
         .with_upgrades();
     // A broken connection needs no report. A WebSocket is served by its own task after the upgrade.
     let _ended = timeout(CONNECTION_TIMEOUT, connection).await;

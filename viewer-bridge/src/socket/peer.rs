@@ -9,8 +9,10 @@ use sim_contract::clock::monotonic_ns;
 use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use tokio_tungstenite::tungstenite;
 
-use super::rate_limit::RateLimit;
-use crate::limits::{MESSAGE_SIZE_BYTES_MAX, PING_PERIOD, SILENCE_MAX};
+use super::rate_limit::{Rate, RateLimit};
+use crate::limits::{
+    MESSAGE_SIZE_BYTES_MAX, MESSAGES_BURST_MAX, MESSAGES_PER_SECOND_MAX, PING_PERIOD, SILENCE_MAX,
+};
 
 /// The server ends.
 pub(crate) const GOING_AWAY: u16 = 1001;
@@ -21,6 +23,7 @@ pub(crate) const TOO_SLOW: u16 = 4408;
 /// The client sent too many messages.
 const TOO_MANY_MESSAGES: u16 = 4429;
 
+const MESSAGES: Rate = Rate { per_second: MESSAGES_PER_SECOND_MAX, burst: MESSAGES_BURST_MAX };
 /// Time for a client to read the close frame.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Longest reason in a close frame, in bytes.
@@ -50,7 +53,8 @@ impl End {
     fn from_error(error: Error) -> Self {
         match error.into_inner().downcast_ref() {
             Some(tungstenite::Error::Capacity(_)) => {
-                Self::closed(MESSAGE_TOO_LONG, "a message is longer than 64 KiB")
+                let limit_kib = MESSAGE_SIZE_BYTES_MAX >> 10;
+                Self::closed(MESSAGE_TOO_LONG, format!("a message is longer than {limit_kib} KiB"))
             }
             _ => Self::Gone,
         }
@@ -79,7 +83,7 @@ impl Peer {
         let now_ns = monotonic_ns();
         let mut ping = interval(PING_PERIOD);
         ping.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        Self { socket, rate: RateLimit::new(now_ns), last_message_ns: now_ns, ping }
+        Self { socket, rate: RateLimit::new(MESSAGES, now_ns), last_message_ns: now_ns, ping }
     }
 
     /// Returns the next text or binary message, and pings the client while it waits. Dropping the
@@ -93,7 +97,7 @@ impl Peer {
                     match incoming {
                         None | Some(Ok(Message::Close(_))) => return Err(End::Gone),
                         Some(Err(error)) => return Err(End::from_error(error)),
-                        Some(Ok(_)) if !self.rate.allows(self.last_message_ns) => {
+                        Some(Ok(_)) if !self.rate.count(1, self.last_message_ns).is_zero() => {
                             return Err(End::closed(TOO_MANY_MESSAGES, "too many messages a second"));
                         }
                         Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}

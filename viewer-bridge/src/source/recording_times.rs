@@ -1,5 +1,6 @@
 //! Times of the steps of a recording.
 
+use recorder::RunDescription;
 use sim_contract::clock::SECOND_NS;
 
 /// Times of the steps of a recording.
@@ -15,16 +16,10 @@ pub struct RecordingTimes {
     pub last_step: u64,
 }
 
-/// Simulated time of a step, in ns, rounded down.
-pub(crate) fn step_ns(step: u64, rate_hz: u32) -> u64 {
-    let time_ns = u128::from(step) * u128::from(SECOND_NS) / u128::from(rate_hz.max(1));
-    u64::try_from(time_ns).unwrap_or(u64::MAX)
-}
-
 impl RecordingTimes {
     /// Time of a step, in ns since 1970.
     pub(crate) fn time_ns(&self, step: u64) -> u64 {
-        self.epoch_ns.saturating_add(step_ns(step, self.rate_hz))
+        self.epoch_ns.saturating_add(RunDescription::duration_ns(step, self.rate_hz))
     }
 
     /// Time of the first step, in ns since 1970.

@@ -8,6 +8,7 @@ mod marks;
 mod open;
 mod player;
 mod playhead;
+mod resets;
 mod statistics;
 mod texts;
 

@@ -1,5 +1,6 @@
 //! Access control: Host and Origin of every request, the token, and the limit on pages.
 
+use tungstenite::Message;
 use tungstenite::http::{HeaderValue, header};
 
 use crate::support::{Site, wait_for};
@@ -84,10 +85,13 @@ fn there_is_no_token_on_loopback() {
 fn the_seventeenth_page_is_refused_until_another_page_disconnects() {
     let site = Site::start();
     let mut pages: Vec<_> = (0..16).map(|_| site.page()).collect();
-    assert_eq!(site.open(site.request(None)).err(), Some(503));
+    assert_eq!(site.greeting_page().close_code(), Some(1013));
     drop(pages.pop());
     site.wait_for_clients(15);
-    wait_for("a free slot", || site.open(site.request(None)).ok());
+    wait_for("a free slot", || match site.greeting_page().next() {
+        Ok(Message::Text(_)) => Some(()),
+        _ => None,
+    });
 }
 
 #[test]
@@ -95,6 +99,14 @@ fn silent_sockets_do_not_count_against_the_limit_on_pages() {
     let site = Site::start();
     let silent: Vec<_> = (0..40).map(|_| site.silent_page()).collect();
     let pages: Vec<_> = (0..16).map(|_| site.page()).collect();
-    assert_eq!(site.open(site.request(None)).err(), Some(503));
+    assert_eq!(site.greeting_page().close_code(), Some(1013));
     assert_eq!((silent.len(), pages.len()), (40, 16));
+}
+
+#[test]
+fn the_limit_on_silent_sockets_refuses_the_upgrade() {
+    let site = Site::start();
+    let silent: Vec<_> = (0..64).map(|_| site.silent_page()).collect();
+    assert_eq!(site.open(site.request(None)).err(), Some(503));
+    drop(silent);
 }

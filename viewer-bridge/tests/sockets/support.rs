@@ -90,10 +90,16 @@ impl Site {
         self.open(self.request(None)).unwrap()
     }
 
-    /// Opens a page, and reads the server's `hello`.
-    pub(crate) fn page(&self) -> Page {
+    /// Opens a socket that has sent `hello`.
+    pub(crate) fn greeting_page(&self) -> Page {
         let mut page = self.silent_page();
         page.send(r#"{"type":"hello","protocol":2}"#);
+        page
+    }
+
+    /// Opens a page, and reads the server's `hello`.
+    pub(crate) fn page(&self) -> Page {
+        let mut page = self.greeting_page();
         assert_eq!(page.text()["type"], "hello");
         page
     }

@@ -121,11 +121,7 @@ function listenToSimulation(input) {
   simulation.on("outcome", (outcome) => input.app.commands.receive(outcome));
   simulation.on("notice", ({ text, level }) => banner.notify(text, level));
   simulation.on("node", (node) => banner.set("node", node.state === "alive" || simulation.isReplay ? "" : sentence(node.text || "no node is running")));
-  simulation.on("scene", (scene) => {
-    input.abandon();
-    document.title = `${scene.name} · Catenary`;
-  });
-  simulation.on("reset", () => input.abandon());
+  simulation.on("scene", (scene) => { document.title = `${scene.name} · Catenary`; });
   simulation.on("frame", warnOfParticles);
   simulation.on("stats", warnOfParticles);
 }

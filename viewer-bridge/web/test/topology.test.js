@@ -61,13 +61,15 @@ test("a fan has the rest length to its first corner, or 0 without a constraint",
   assert.equal(bare.fans[2], 0);
 });
 
-test("a torn constraint removes the triangles along it and no others", () => {
+test("a torn structural constraint removes the triangles along it and no others", () => {
   const scene = sheet(3, 3);
   const topology = new Topology(scene);
-  topology.remove([find(scene, 0, 4)]);
-  assert.equal(live(topology), 6, "both triangles of the cell go with its diagonal");
+  topology.remove([find(scene, 3, 4)]);
+  assert.equal(live(topology), 6, "an inner edge has two triangles");
   topology.remove([find(scene, 7, 8)]);
   assert.equal(live(topology), 5, "an edge at the border has one triangle");
+  topology.remove([find(scene, 1, 5)]);
+  assert.equal(live(topology), 5, "a diagonal removes none");
   for (let t = 0; t < scene.triangleCount; t++) {
     const corners = [...topology.indices.subarray(3 * t, 3 * t + 3)];
     assert.deepEqual(corners, topology.isDead[t] ? [0, 0, 0] : [...scene.triangles.subarray(3 * t, 3 * t + 3)]);
@@ -77,15 +79,51 @@ test("a torn constraint removes the triangles along it and no others", () => {
 test("a constraint whose triangles are gone becomes a stick, and a torn one does not", () => {
   const scene = sheet(2, 2);
   const topology = new Topology(scene);
-  const [right, diagonal] = [find(scene, 0, 1), find(scene, 0, 3)];
+  const [top, right, diagonal] = [find(scene, 0, 1), find(scene, 1, 3), find(scene, 0, 3)];
   assert.ok(topology.styles[right] & STICK.isCovered);
-  topology.remove([diagonal]);
+  topology.remove([top]);
   assert.equal(topology.styles[right] & STICK.isCovered, 0);
-  assert.ok(topology.styles[diagonal] & STICK.isGone);
+  assert.ok(topology.styles[diagonal] & STICK.isCovered, "the other triangle covers it");
+  assert.ok(topology.styles[top] & STICK.isGone);
   topology.restore();
   assert.equal(live(topology), 2);
   assert.ok(topology.styles[right] & STICK.isCovered);
-  assert.equal(topology.styles[diagonal] & STICK.isGone, 0);
+  assert.equal(topology.styles[top] & STICK.isGone, 0);
+});
+
+/** One triangle with three constraints along its first edge: bend, structural, shear. */
+const strutted = () => {
+  const scene = sceneOf([0, 0, 0, 1, 0, 0, 0, 1, 0], [0, 1, 1, 0, 0, 1], [2, 0, 1], [0, 1, 2]);
+  scene.restLengths.set([3, 1, 2]);
+  return scene;
+};
+
+test("each structural constraint along an edge removes its triangle, whichever others lie there", () => {
+  const scene = strutted();
+  const topology = new Topology(scene);
+  assert.ok([0, 1, 2].every((constraint) => topology.styles[constraint] & STICK.isCovered));
+  topology.remove([0, 2]);
+  assert.equal(live(topology), 1);
+  topology.remove([1]);
+  assert.equal(live(topology), 0);
+});
+
+test("a fan has the rest length of an intact constraint, structural first", () => {
+  const topology = new Topology(strutted());
+  const restLength = () => new Float32Array(topology.fans.buffer)[topology.fanEntries[0] * FAN_WORDS + 2];
+  assert.equal(restLength(), 1);
+  topology.remove([2]);
+  assert.equal(restLength(), 1);
+  topology.remove([1]);
+  assert.equal(restLength(), 0, "the triangle is gone");
+  const loose = strutted();
+  loose.constraintKinds.set([2, 1, 1]);
+  const shear = new Topology(loose);
+  const lengths = [[], [1], [0], [2]].map((torn) => {
+    shear.remove(torn);
+    return new Float32Array(shear.fans.buffer)[shear.fanEntries[0] * FAN_WORDS + 2];
+  });
+  assert.deepEqual(lengths, [3, 3, 2, 0]);
 });
 
 test("constraints and triangles of a particle without a position are not drawn", () => {

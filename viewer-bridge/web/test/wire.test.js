@@ -33,7 +33,7 @@ const readers = {
   tear: (m) => ({ first: m.first, constraints: [...m.constraints] }),
   pins: (m) => ({ held: [...m.particles].map((particle, i) => [particle, m.flags[i]]) }),
   stats: (m) => ({
-    solve_us: [m.solveUsP50, m.solveUsP99], wake_late_us: [m.wakeLateUsP50, m.wakeLateUsP99], period_us: m.deadlineUs,
+    solve_us: [m.solveUsP50, m.solveUsP99], wake_late_us: [m.wakeLateUsP50, m.wakeLateUsP99], period_us: m.periodUs,
     real_time_factor: m.realTimeFactor, time_scale: m.timeScale, stretch_mean: m.stretchMean, stretch_max: m.stretchMax,
     stretch_max_constraint: m.stretchMaxConstraint, kinetic_j: m.kineticJ, potential_j: m.potentialJ,
     late_steps: m.lateSteps, skipped_periods: m.skippedPeriods, outcome_count: m.outcomes, rejected_count: m.rejected,

@@ -185,19 +185,21 @@ impl Link {
 
     /// Reads everything that has arrived.
     pub(super) fn read(&mut self, shown: &mut ShownState, sinks: &Sinks) -> Result<(), LinkEnd> {
-        let mut updates = Updates::default();
+        let mut updates = Updates::for_run(self.run_id);
         let state = self.tap.latest_state(|update| updates.add(update));
         let run_id = state.map(|state| state.header.run_id).or(updates.run_id);
-        check_run(&mut self.run_id, run_id)?;
-        // A client that waits for an answer sees the effect of its command after the answer.
+        let run = check_run(&mut self.run_id, run_id);
+        // A client that waits for an answer sees the effect of its command after the answer. The last
+        // answers of a run arrive together with the first messages of the next one.
         handle_outcomes(&mut self.dispatch, &mut self.client, &updates.outcomes, sinks);
-        if let Some(state) = state {
+        if let (Some(state), Ok(())) = (state, run) {
             self.newest.update(&state, shown, sinks);
         }
         if let Some(status) = &updates.status {
             sinks.publish(&Update::Status(&StatusRow::from(status)));
             self.status = Some(*status);
         }
+        run?;
         self.parameters = updates.parameters.or(self.parameters);
         self.publish_parameters(sinks);
         Ok(())
@@ -272,7 +274,7 @@ impl Link {
         let end_ns = monotonic_ns() + wait_ns;
         loop {
             self.dispatch.flush(&mut self.client, sinks);
-            let mut updates = Updates::default();
+            let mut updates = Updates::for_run(self.run_id);
             self.tap.latest_state(|update| updates.add(update));
             handle_outcomes(&mut self.dispatch, &mut self.client, &updates.outcomes, sinks);
             let left_ns = end_ns.saturating_sub(monotonic_ns());

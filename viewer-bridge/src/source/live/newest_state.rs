@@ -2,7 +2,6 @@
 
 use sim_contract::{LoadHeader, LoadedScene, ParticleState, SnapshotHeader, State as NodeState};
 
-use crate::message::Level;
 use crate::scene::load::{Load, LoadError};
 use crate::scene::summary::SceneSummary;
 use crate::sink::{Sinks, Update};
@@ -59,8 +58,7 @@ impl NewestState {
             }
             Err(error) => {
                 self.load = None;
-                let text = &error.to_string();
-                sinks.publish(&Update::Notice { level: Level::Error, text });
+                sinks.publish(&Update::LoadRefused { text: &error.to_string() });
             }
         }
     }

@@ -1,6 +1,6 @@
 //! A link and an owner in one process. The owner publishes in the order of each test.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::extract::ws::Message;
@@ -12,12 +12,12 @@ use sim_contract::{
     SnapshotHeader, TearsHeader, TornConstraint,
 };
 
-use super::link::Link;
+use super::link::{Link, LinkEnd};
 use crate::message::{Choice, Command, Mode};
 use crate::pages::connection::Connection;
 use crate::pages::hub::Hub;
 use crate::request::{ClientId, Request, RequestKind, Requests, requests};
-use crate::sink::Sinks;
+use crate::sink::{Demand, Sink, Sinks, Update};
 use crate::source::shown_state::ShownState;
 use crate::wire::{Message as Wire, decode};
 
@@ -31,6 +31,7 @@ struct Fixture {
     shown: ShownState,
     sinks: Sinks,
     requests: Requests,
+    hub: Arc<Hub>,
     page: Connection,
     owner: Owner,
     outcome_count: u64,
@@ -69,9 +70,10 @@ impl Fixture {
         let hub = Arc::new(Hub::new(Mode::Live, sender));
         let page = hub.join(Choice::F32);
         let (shown, mut sinks) = (ShownState::default(), Sinks::default());
-        sinks.add(hub);
+        sinks.add(Arc::<Hub>::clone(&hub));
+        let outcome_count = 0;
         let mut fixture =
-            Self { link, shown, sinks, requests, page, owner, outcome_count: 0, _domain: domain };
+            Self { link, shown, sinks, requests, hub, page, owner, outcome_count, _domain: domain };
         fixture.owner.refresh();
         fixture.publish(0, 0, 2);
         fixture.read();
@@ -99,12 +101,7 @@ impl Fixture {
 
     /// The newest message with parameters in the queue of the page.
     fn page_parameters(&mut self) -> Value {
-        let texts = std::iter::from_fn(|| self.page.queue.try_recv().ok());
-        let texts = texts.filter_map(|message| match message {
-            Message::Text(text) => serde_json::from_str::<Value>(&text).ok(),
-            _ => None,
-        });
-        texts.filter(|text| text["type"] == "parameters").last().unwrap()
+        newest_text(&mut self.page, "parameters").unwrap()
     }
 
     /// The radii of the colliders in the newest frame.
@@ -141,6 +138,35 @@ impl Fixture {
     /// Publishes that the reset of another client was applied.
     fn reset(&mut self) {
         self.answer(Sent::new(1, 1, Action::Reset));
+    }
+}
+
+/// Empties the queue of a page, and returns the newest text of a type.
+fn newest_text(page: &mut Connection, kind: &str) -> Option<Value> {
+    let texts = std::iter::from_fn(|| page.queue.try_recv().ok());
+    let texts = texts.filter_map(|message| match message {
+        Message::Text(text) => serde_json::from_str::<Value>(&text).ok(),
+        _ => None,
+    });
+    texts.filter(|text| text["type"] == kind).last()
+}
+
+/// A sink that keeps the steps of the outcomes and status messages.
+#[derive(Debug, Default)]
+struct RowLog(Mutex<Vec<(&'static str, u64)>>);
+
+impl Sink for RowLog {
+    fn has_demand(&self, _: Demand) -> bool {
+        false
+    }
+
+    fn publish(&self, update: &Update<'_>) {
+        let row = match update {
+            Update::Outcome(row) => ("outcome", row.step),
+            Update::Status(row) => ("status", row.step),
+            _ => return,
+        };
+        self.0.lock().unwrap().push(row);
     }
 }
 
@@ -282,4 +308,44 @@ fn a_release_waits_for_room_at_the_node_and_is_sent_without_another_request() {
     while fixture.requests.next(Duration::ZERO).is_some() {}
     fixture.link.exchange(&mut fixture.shown, &fixture.sinks, &fixture.requests).unwrap();
     assert_eq!(actions(&fixture.arrived()), [RELEASE]);
+}
+
+#[test]
+fn the_last_answers_and_the_last_status_of_a_run_are_published_before_the_next_run() {
+    let mut fixture = Fixture::start();
+    let log = Arc::new(RowLog::default());
+    fixture.sinks.add(Arc::<RowLog>::clone(&log));
+    let command = Command::Pin { particle: 1 };
+    fixture.request(RequestKind::Command { id: Some(9), command });
+    let sent = fixture.arrived();
+    fixture.answer(sent[0]);
+    let status = |run_id, step| NodeStatus { run_id, step, ..NodeStatus::default() };
+    fixture.owner.publish_status(&status(RUN_ID, 5)).unwrap();
+    let mut next = load(0, 0);
+    next.header.run_id = RUN_ID + 1;
+    fixture.owner.load(&next).unwrap();
+    fixture.owner.publish_status(&status(RUN_ID + 1, 0)).unwrap();
+    let end = fixture.link.read(&mut fixture.shown, &fixture.sinks);
+    assert_eq!(end, Err(LinkEnd::NewRun));
+    let answer = newest_text(&mut fixture.page, "outcome").unwrap();
+    assert_eq!((&answer["id"], &answer["status"]), (&json!(9), &json!("applied")));
+    assert_eq!(*log.0.lock().unwrap(), [("outcome", 1), ("status", 5)]);
+}
+
+#[test]
+fn a_page_that_joins_later_reads_why_the_newest_load_is_not_shown() {
+    let mut fixture = Fixture::start();
+    let outside = ConstraintState { a: 0, b: 9, ..ConstraintState::default() };
+    fixture.owner.load(&OwnerLoad { constraints: &[outside], ..load(1, 1) }).unwrap();
+    fixture.publish(1, 1, 2);
+    fixture.read();
+    let notice = newest_text(&mut fixture.page, "notice").unwrap();
+    assert_eq!(notice["level"], "error");
+    let mut late = fixture.hub.join(Choice::F32);
+    assert_eq!(newest_text(&mut late, "notice"), Some(notice));
+    fixture.owner.load(&load(2, 2)).unwrap();
+    fixture.publish(2, 2, 2);
+    fixture.read();
+    let mut latest = fixture.hub.join(Choice::F32);
+    assert_eq!(newest_text(&mut latest, "notice"), None);
 }

@@ -84,7 +84,7 @@ fn load_of(tape: &Tape) -> anyhow::Result<Load> {
     }
     let constraints = topology.constraints();
     let constraints =
-        constraints.with_context(|| malformed("/topology has columns of unequal length"))?;
+        constraints.with_context(|| malformed("the columns of /topology differ in length"))?;
     let triangles = surface.triangles();
     let triangles = triangles.with_context(|| malformed("/surface ends within a triangle"))?;
     let load = Load { header, summary, constraints, triangles };

@@ -10,6 +10,7 @@ use sim_contract::{ParameterValues, Reason};
 use super::check::Report;
 use super::open::Recording;
 use super::playhead::{Advanced, Playhead};
+use super::resets::ResetFinder;
 use super::statistics::statistics;
 use super::texts;
 use crate::limits::FRAMES_PER_SECOND_MAX;
@@ -39,6 +40,7 @@ pub(super) struct Player<'a> {
     playhead: Playhead,
     /// The state at the place of the playhead.
     state: TapeState,
+    resets: ResetFinder,
     /// The parameters that were published last.
     parameters: Option<ParametersText>,
     /// Applied commands, which are answered with the step that shows their effect.
@@ -78,6 +80,7 @@ impl<'a> Player<'a> {
             report,
             shown: ShownState::default(),
             playhead,
+            resets: ResetFinder::new(&state.row),
             state,
             parameters: None,
             answers: Vec::new(),
@@ -210,12 +213,10 @@ impl<'a> Player<'a> {
     }
 
     fn set_state(&mut self, state: TapeState) {
-        // The step at which the scene was at its beginning.
-        let beginning = |state: &TapeState| state.row.step.wrapping_sub(state.row.scene_step);
-        let is_after_reset = beginning(&state) != beginning(&self.state);
+        let passes_reset = self.resets.passes_reset(&state.row);
         self.state = state;
         self.publish_changes();
-        if is_after_reset {
+        if passes_reset {
             self.sinks.publish(&Update::Reset { step: self.state.row.step });
         }
     }

@@ -1,6 +1,6 @@
 // Types of the text messages that the page receives (viewer-bridge/PROTOCOL.md, section 3).
 
-/** @typedef {number | number[] | null} SettingValue */
+/** @typedef {number | number[] | null} ParameterValue */
 /**
  * @typedef {{
  *   type: "hello", protocol: number, version: string, client: number, mode: "live" | "replay", format: string,
@@ -11,7 +11,7 @@
  *   type: "node", state: "none" | "alive" | "lost", text: string, run_id: string | null, scene: string | null,
  *   method: string | null, rate_hz: number, is_paused: boolean, is_replay: boolean, time_scale: number, process_id: number | null,
  * }} NodeState
- * @typedef {Record<string, SettingValue | Record<string, SettingValue>>} Values
+ * @typedef {Record<string, ParameterValue | Record<string, ParameterValue>>} Values
  * @typedef {{ type: "parameters", is_complete: boolean, values: Values | null, initial: Values | null }} Parameters
  * @typedef {{ type: "outcome", id: number | null, kind: string, status: "applied" | "rejected" | "unanswered", step: number | null, applied: number, rejected: number, reason: string, text: string }} OutcomeMessage
  * @typedef {{ kind: "tear" | "pin" | "command" | "late", step: number, count: number }} Mark

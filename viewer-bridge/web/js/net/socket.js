@@ -32,7 +32,7 @@ export function closedText(code, reason) {
   if (code === 4401) return "This bridge requires a token. Open the full address that it printed, including everything after the “#”.";
   if (code === 4426) return `The page and the bridge have different versions (${reason}). Reload the page.`;
   if (code === 4400) return `The bridge could not read a message from this page (${reason}). Reload the page.`;
-  if (code === 1013) return "Too many pages are open already. Close one.";
+  if (code === 1013) return "Too many pages are already open. Close one.";
   if (code === 4429) return "The page sent too many messages per second.";
   if (code === 4408) return "The connection was too slow or timed out.";
   return "No connection to the bridge.";

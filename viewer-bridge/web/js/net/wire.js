@@ -28,7 +28,7 @@
  *
  * @typedef {Header & {
  *   kind: "stats", solveUsP50: number, solveUsP99: number, wakeLateUsP50: number, wakeLateUsP99: number,
- *   deadlineUs: number, realTimeFactor: number, timeScale: number,
+ *   periodUs: number, realTimeFactor: number, timeScale: number,
  *   stretchMean: number, stretchMax: number, stretchMaxConstraint: number,
  *   kineticJ: number, potentialJ: number, lateSteps: number, skippedPeriods: number,
  *   outcomes: number, rejected: number, frozenCount: number, tornCount: number,
@@ -203,7 +203,7 @@ function decodeStats(reader, header) {
     kind: /** @type {const} */ ("stats"), ...header,
     solveUsP50: reader.f32(), solveUsP99: reader.f32(),
     wakeLateUsP50: reader.f32(), wakeLateUsP99: reader.f32(),
-    deadlineUs: reader.f32(), realTimeFactor: reader.f32(), timeScale: reader.f32(),
+    periodUs: reader.f32(), realTimeFactor: reader.f32(), timeScale: reader.f32(),
     stretchMean: reader.f32(), stretchMax: reader.f32(), stretchMaxConstraint: reader.u32(),
     kineticJ: reader.f64(), potentialJ: reader.f64(),
     lateSteps: Number(reader.u64()), skippedPeriods: Number(reader.u64()),

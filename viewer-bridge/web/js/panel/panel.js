@@ -6,7 +6,7 @@ import { SLIDER_STEPS, positionOf, rangeOf, rowsOf, valueAt, valueOf, vectorOf }
 import { trim } from "../ui/format.js";
 
 /** @typedef {import("./parameters.js").Row} Row */
-/** @typedef {import("../net/messages.js").SettingValue} SettingValue */
+/** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 
 const KINDS = ["structural", "shear", "bend", "tether"];
 const AXES = ["x", "y", "z"];
@@ -68,7 +68,7 @@ export class Panel {
     this.unsent.clear();
   }
 
-  /** @param {string} name @param {SettingValue} value @param {string} [kind] */
+  /** @param {string} name @param {ParameterValue} value @param {string} [kind] */
   set(name, value, kind) {
     const forKind = kind === undefined || kind === "all" ? {} : { constraint_kind: kind };
     this.unsent.set(name, () => this.commands.run("set", { parameter: name, value, ...forKind }, (outcome) => {
@@ -129,14 +129,14 @@ export class Panel {
     const read = (/** @type {"values" | "initial"} */ which) => valueOf(simulation.parameters?.[which] ?? null, row.name, kind() === "all" ? "structural" : kind());
     const numbers = () => [read("values"), read("initial")].filter((value) => typeof value === "number");
     const range = () => rangeOf(row, .../** @type {number[]} */ (numbers()));
-    const send = (/** @type {SettingValue} */ value) => this.set(row.name, value, row.perKind ? kind() : undefined);
+    const send = (/** @type {ParameterValue} */ value) => this.set(row.name, value, row.perKind ? kind() : undefined);
     const button = this.undoButton(row, () => send(read("initial")));
     const title = make("span", { class: "title" }, ...(row.canBeOff ? [isOn] : []), make("label", { for: slider.id }, row.label));
     const shell = make("fieldset", { class: "row" }, title, slider, output, button);
     if (row.perKind) slider.before(kinds);
     if (row.perKind) shell.append(slider);
     slider.classList.toggle("all", row.perKind ?? false);
-    const showValue = (/** @type {SettingValue} */ value) => { output.textContent = typeof value === "number" && !(row.canBeOff && value === 0 && row.least === 0) ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
+    const showValue = (/** @type {ParameterValue} */ value) => { output.textContent = typeof value === "number" && !(row.canBeOff && value === 0 && row.least === 0) ? `${trim(value)} ${this.unit(row)}` : row.perKind ? "own" : "off"; };
     slider.addEventListener("input", () => {
       const value = valueAt(row, range(), slider.valueAsNumber);
       isOn.checked = true;

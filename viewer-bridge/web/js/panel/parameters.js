@@ -5,7 +5,7 @@ import { niceCeiling } from "../ui/format.js";
 import { toNumber } from "../net/messages.js";
 
 /** @typedef {import("../net/messages.js").Values} Values */
-/** @typedef {import("../net/messages.js").SettingValue} SettingValue */
+/** @typedef {import("../net/messages.js").ParameterValue} ParameterValue */
 /**
  * A row of the panel. A "log" slider is logarithmic, and starts with 0 if `hasZero`. `whenOn` is the value
  * of a parameter when it is switched on.
@@ -74,7 +74,7 @@ export function vectorOf(value) {
 }
 
 /** A parameter, for one kind of constraint if it is per kind. Null if it is off, or if each constraint has its own value.
- * @param {Values | null} values @param {string} name @param {string} kind @returns {SettingValue} */
+ * @param {Values | null} values @param {string} name @param {string} kind @returns {ParameterValue} */
 export function valueOf(values, name, kind) {
   const value = values?.[name] ?? null;
   if (value === null || typeof value !== "object" || Array.isArray(value)) return typeof value === "string" ? toNumber(value) : value;

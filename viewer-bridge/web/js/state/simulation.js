@@ -32,7 +32,7 @@ const FLOOR_COSINE = 0.99;
  * @typedef {{
  *   scene: Scene, frame: Frame, tear: void, pins: void, colliders: Collider[], stats: Stats,
  *   hello: Hello, node: NodeState, parameters: Parameters, timeline: TimelineMessage | null, playback: Playback | null,
- *   outcome: import("../net/messages.js").OutcomeMessage, reset: void, clients: number,
+ *   outcome: import("../net/messages.js").OutcomeMessage, reset: void,
  *   notice: { level: string, text: string }, ground: void,
  * }} Topics
  */
@@ -72,7 +72,6 @@ export class Simulation extends Emitter {
     this.timeline = null;
     /** @type {Playback | null} */
     this.playback = null;
-    this.clients = 0;
     /** @type {Plane | null} */
     this.ground = null;
     this.groundIsSettled = false;
@@ -160,10 +159,10 @@ export class Simulation extends Emitter {
 
   /** @param {Collider[]} colliders */
   receiveColliders(colliders) {
-    const hadFloor = this.colliders.length > 0;
+    const hadColliders = this.colliders.length > 0;
     this.colliders = colliders;
     this.emit("colliders", colliders);
-    if (!hadFloor) this.settleGround();
+    if (!hadColliders) this.settleGround();
   }
 
   /** Chooses the ground: a floor among the colliders, else a little below the lowest point that can be reached, else none. */
@@ -265,11 +264,10 @@ export class Simulation extends Emitter {
       case "parameters": this.parameters = message; return this.emit("parameters", message);
       case "timeline": this.timeline = message; return this.emit("timeline", message);
       case "playback": this.playback = message; return this.emit("playback", message);
-      case "clients": this.clients = message.count; return this.emit("clients", message.count);
       case "outcome": return this.emit("outcome", message);
       case "reset": return this.receiveReset();
       case "notice": return this.emit("notice", message);
-      default: // A message of a later bridge.
+      default: // The number of pages, which STATS has as well, or a message of a later bridge.
     }
   }
 }

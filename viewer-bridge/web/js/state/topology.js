@@ -5,8 +5,6 @@ import { CONSTRAINT } from "../net/wire.js";
 
 /** @typedef {import("../net/wire.js").Scene} Scene */
 
-/** No constraint joins these corners. */
-const NONE = -1;
 /** Words of a fan entry: two corners, the rest length to the first as f32 bits, and 0. */
 export const FAN_WORDS = 4;
 
@@ -22,13 +20,11 @@ export class Topology {
   /** @param {Scene} scene */
   constructor(scene) {
     this.scene = scene;
-    /** Constraint along each edge of each triangle, or NONE: 3 t. */
+    /** Constraints along the edge from each corner to the next, structural ones first. */
     this.edgeConstraints = edgeConstraints(scene);
-    const { starts, triangles } = trianglesOf(this.edgeConstraints, scene.constraintCount);
-    /** Triangles along constraint i: edgeTriangles[edgeStarts[i] .. edgeStarts[i + 1]]. */
-    this.edgeStarts = starts;
-    this.edgeTriangles = triangles;
-    const fans = buildFans(scene, this.edgeConstraints);
+    /** Corners whose edges lie along each constraint. */
+    this.edgeCorners = this.edgeConstraints.inverse(scene.constraintCount);
+    const fans = buildFans(scene);
     /** Start and length of the fan of each particle: 2 n. */
     this.fanRanges = fans.ranges;
     /** Entries of FAN_WORDS words, one per corner of each triangle. */
@@ -50,21 +46,25 @@ export class Topology {
     this.isDead.fill(0);
     this.isGone.fill(0);
     for (let i = 0; i < this.styles.length; i++) {
-      const isCovered = this.edgeStarts[i + 1] > this.edgeStarts[i];
+      const isCovered = this.edgeCorners.starts[i + 1] > this.edgeCorners.starts[i];
       this.styles[i] = this.scene.constraintKinds[i] | (isCovered ? STICK.isCovered : 0);
     }
     for (let corner = 0; corner < this.fanEntries.length; corner++) this.writeFanEntry(corner);
     this.indices.set(this.scene.triangles);
   }
 
-  /** Removes constraints, and the triangles along them. @param {ArrayLike<number>} constraints */
+  /** Removes constraints, and the triangles along structural ones. @param {ArrayLike<number>} constraints */
   remove(constraints) {
     for (let k = 0; k < constraints.length; k++) {
       const i = constraints[k];
       if (i >= this.isGone.length || this.isGone[i]) continue;
       this.isGone[i] = 1;
       this.styles[i] |= STICK.isGone;
-      for (let e = this.edgeStarts[i]; e < this.edgeStarts[i + 1]; e++) this.kill(this.edgeTriangles[e]);
+      const isStructural = this.scene.constraintKinds[i] === CONSTRAINT.structural;
+      for (const corner of this.edgeCorners.at(i)) {
+        if (isStructural) this.kill(triangleOf(corner));
+        else this.writeRestLength(corner);
+      }
     }
   }
 
@@ -91,32 +91,69 @@ export class Topology {
       // Equal corners have no area, so they do not contribute to a normal.
       const entry = this.fanEntries[corner] * FAN_WORDS;
       this.fans[entry + 1] = this.fans[entry];
-      this.fans[entry + 2] = 0;
-      this.dirtyFans.add(this.fanEntries[corner]);
-      this.uncover(this.edgeConstraints[corner]);
+      this.writeRestLength(corner);
+      for (const constraint of this.edgeConstraints.at(corner)) this.uncover(constraint);
     }
   }
 
   /** Draws a constraint as a stick once no triangle covers it. @param {number} constraint */
   uncover(constraint) {
-    if (constraint === NONE) return;
-    for (let e = this.edgeStarts[constraint]; e < this.edgeStarts[constraint + 1]; e++) {
-      if (!this.isDead[this.edgeTriangles[e]]) return;
-    }
+    for (const corner of this.edgeCorners.at(constraint)) if (!this.isDead[triangleOf(corner)]) return;
     this.styles[constraint] &= ~STICK.isCovered;
   }
 
   /** @param {number} corner */
   writeFanEntry(corner) {
-    const { triangles, restLengths } = this.scene;
-    const first = corner - (corner % 3);
+    const { triangles } = this.scene;
     const entry = this.fanEntries[corner] * FAN_WORDS;
-    const constraint = this.edgeConstraints[corner];
-    this.fans[entry] = triangles[first + ((corner + 1) % 3)];
-    this.fans[entry + 1] = triangles[first + ((corner + 2) % 3)];
-    this.fans[entry + 2] = constraint === NONE ? 0 : floatBits(restLengths[constraint]);
+    this.fans[entry] = triangles[nextCorner(corner)];
+    this.fans[entry + 1] = triangles[nextCorner(nextCorner(corner))];
     this.fans[entry + 3] = 0;
-    this.dirtyFans.add(this.fanEntries[corner]);
+    this.writeRestLength(corner);
+  }
+
+  /** Writes the rest length of the first intact constraint along an edge; 0 without one, or if the triangle is dead. @param {number} corner */
+  writeRestLength(corner) {
+    // This runs for every corner of a scene at once, so it creates no views.
+    const { starts, members } = this.edgeConstraints;
+    const end = this.isDead[triangleOf(corner)] ? starts[corner] : starts[corner + 1];
+    let k = starts[corner];
+    while (k < end && this.isGone[members[k]]) k++;
+    const entry = this.fanEntries[corner];
+    this.fans[entry * FAN_WORDS + 2] = k < end ? floatBits(this.scene.restLengths[members[k]]) : 0;
+    this.dirtyFans.add(entry);
+  }
+}
+
+/** @param {number} corner */
+const triangleOf = (corner) => Math.floor(corner / 3);
+/** The next corner of the same triangle. @param {number} corner */
+const nextCorner = (corner) => corner - (corner % 3) + ((corner + 1) % 3);
+
+/** Lists of numbers, concatenated. */
+class Lists {
+  /** @param {Uint32Array} starts one more than there are lists @param {Uint32Array} members */
+  constructor(starts, members) {
+    this.starts = starts;
+    this.members = members;
+  }
+
+  /** @param {number} list */
+  at(list) {
+    return this.members.subarray(this.starts[list], this.starts[list + 1]);
+  }
+
+  /** For each number below `count`, the lists that contain it. @param {number} count */
+  inverse(count) {
+    const starts = new Uint32Array(count + 1);
+    for (const member of this.members) starts[member + 1]++;
+    for (let i = 0; i < count; i++) starts[i + 1] += starts[i];
+    const next = starts.slice();
+    const members = new Uint32Array(this.members.length);
+    for (let list = 0; list + 1 < this.starts.length; list++) {
+      for (let k = this.starts[list]; k < this.starts[list + 1]; k++) members[next[this.members[k]]++] = list;
+    }
+    return new Lists(starts, members);
   }
 }
 
@@ -152,46 +189,47 @@ function floatBits(value) {
   return scratch.getUint32(0);
 }
 
-/** The constraint along each edge of each triangle. Edge k of a triangle runs from corner k to the next.
+/** The constraints along the edge from each corner of each triangle to the next. Structural ones come first, then by index.
  * @param {Scene} scene */
 function edgeConstraints(scene) {
-  const { ends, triangles, particleCount } = scene;
-  const constraintOf = new Map();
+  const { ends, triangles, constraintKinds, constraintCount, particleCount } = scene;
+  const NONE = -1;
   const key = (/** @type {number} */ a, /** @type {number} */ b) => Math.min(a, b) * particleCount + Math.max(a, b);
-  if (triangles.length > 0) for (let i = 0; i < ends.length / 2; i++) constraintOf.set(key(ends[2 * i], ends[2 * i + 1]), i);
-  const edges = new Int32Array(triangles.length);
-  for (let corner = 0; corner < triangles.length; corner++) {
-    const next = corner - (corner % 3) + ((corner + 1) % 3);
-    edges[corner] = constraintOf.get(key(triangles[corner], triangles[next])) ?? NONE;
+  // A linked list per edge: each constraint is put in front of those before it.
+  /** @type {Map<number, number>} */
+  const heads = new Map();
+  const following = new Int32Array(constraintCount).fill(NONE);
+  for (const isStructural of triangles.length > 0 ? [false, true] : []) {
+    for (let i = constraintCount - 1; i >= 0; i--) {
+      if ((constraintKinds[i] === CONSTRAINT.structural) !== isStructural) continue;
+      const edge = key(ends[2 * i], ends[2 * i + 1]);
+      following[i] = heads.get(edge) ?? NONE;
+      heads.set(edge, i);
+    }
   }
-  return edges;
+  const starts = new Uint32Array(triangles.length + 1);
+  /** @type {number[]} */
+  const members = [];
+  for (let corner = 0; corner < triangles.length; corner++) {
+    const head = heads.get(key(triangles[corner], triangles[nextCorner(corner)])) ?? NONE;
+    for (let i = head; i !== NONE; i = following[i]) members.push(i);
+    starts[corner + 1] = members.length;
+  }
+  return new Lists(starts, Uint32Array.from(members));
 }
 
-/** The triangles along each constraint, as concatenated lists with their starts. @param {Int32Array} edges @param {number} constraintCount */
-function trianglesOf(edges, constraintCount) {
-  const starts = new Uint32Array(constraintCount + 1);
-  for (const constraint of edges) if (constraint !== NONE) starts[constraint + 1]++;
-  for (let i = 0; i < constraintCount; i++) starts[i + 1] += starts[i];
-  const next = starts.slice();
-  const triangles = new Uint32Array(starts[constraintCount]);
-  edges.forEach((constraint, corner) => {
-    if (constraint !== NONE) triangles[next[constraint]++] = Math.floor(corner / 3);
-  });
-  return { starts, triangles };
-}
-
-/** Allocates a contiguous run of entries per particle, and an entry of it per corner. @param {Scene} scene @param {Int32Array} edges */
-function buildFans(scene, edges) {
+/** Allocates a contiguous run of entries per particle, and an entry of it per corner. @param {Scene} scene */
+function buildFans(scene) {
   const { triangles, particleCount } = scene;
   const ranges = new Uint32Array(2 * particleCount);
   for (const particle of triangles) ranges[2 * particle + 1]++;
   for (let p = 1; p < particleCount; p++) ranges[2 * p] = ranges[2 * p - 2] + ranges[2 * p - 1];
   const used = new Uint32Array(particleCount);
-  const entryByCorner = new Uint32Array(edges.length);
+  const entryByCorner = new Uint32Array(triangles.length);
   triangles.forEach((particle, corner) => {
     entryByCorner[corner] = ranges[2 * particle] + used[particle]++;
   });
-  return { ranges, entryByCorner, entries: new Uint32Array(edges.length * FAN_WORDS) };
+  return { ranges, entryByCorner, entries: new Uint32Array(triangles.length * FAN_WORDS) };
 }
 
 /**

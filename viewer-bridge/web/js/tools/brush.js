@@ -52,6 +52,8 @@ export class BrushTool {
 
   end() {}
 
+  cancel() {}
+
   describe() {
     return { circle: { at: this.pointer, radius: this.radius } };
   }

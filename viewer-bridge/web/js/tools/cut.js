@@ -58,6 +58,8 @@ export class CutTool {
     this.tick();
   }
 
+  cancel() {}
+
   describe() {
     return { stroke: this.stroke };
   }

@@ -68,15 +68,24 @@ export class GrabTool {
   end() {
     const { commands } = this.app;
     const { particle } = this;
-    const release = () => commands.run("release", { particle });
     const velocity = this.velocity(performance.now());
     if (length(velocity) === 0) {
       this.tick(performance.now());
-      release();
+      this.release();
       return;
     }
     const target = addScaled(this.targetAt(this.pointer), velocity, OVER_S.max);
-    commands.run("move", { particle, target, over_s: OVER_S.max }, release);
+    commands.run("move", { particle, target, over_s: OVER_S.max }, () => this.release());
+  }
+
+  /** Releases the particle where it is. A reset or load ends only grabs that the node applied before it,
+   * and the grab may have come later. */
+  cancel() {
+    this.release();
+  }
+
+  release() {
+    this.app.commands.run("release", { particle: this.particle });
   }
 
   describe() {

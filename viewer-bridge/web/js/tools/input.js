@@ -58,6 +58,8 @@ export class Input {
     canvas.addEventListener("dblclick", (event) => { if (this.mode !== "pin") this.pinAt(this.pixel(event), REACH.mouse); });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => this.turnWheel(event), { passive: false });
+    this.app.simulation.on("scene", () => this.cancel());
+    this.app.simulation.on("reset", () => this.cancel());
   }
 
   /** @param {MouseEvent} event @returns {Pixel} */
@@ -145,7 +147,13 @@ export class Input {
     this.app.renderer.isDirty = true;
   }
 
-  /** Drops the tool without ending it, when its connection or scene is gone. */
+  /** Ends the tool without its last motion: the scene that it acted on is gone. */
+  cancel() {
+    this.tool?.cancel();
+    this.abandon();
+  }
+
+  /** Drops the tool without a message: its connection is gone, which ends its grab. */
   abandon() {
     this.tool = null;
     this.hovered = null;

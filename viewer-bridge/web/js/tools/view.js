@@ -29,6 +29,8 @@ export class ViewTool {
 
   end() {}
 
+  cancel() {}
+
   describe() {
     return {};
   }
