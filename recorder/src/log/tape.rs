@@ -50,6 +50,8 @@ pub struct Tape {
 pub struct TapeState {
     /// The header of the snapshot. If it is unreadable, every field except the step is 0.
     pub row: StepRow,
+    /// The header was readable.
+    pub has_readable_row: bool,
     /// Shape: particle count.
     pub particles: Arc<Vec<ParticleState>>,
     /// The torn constraints.
@@ -60,6 +62,14 @@ pub struct TapeState {
     pub parameters: Option<ParametersRow>,
     /// The latest status of the node, if there is one.
     pub status: Option<StatusRow>,
+}
+
+impl TapeState {
+    /// Returns the step at which the scene was last loaded, reset or restored, if the header was
+    /// readable.
+    pub fn beginning(&self) -> Option<u64> {
+        self.has_readable_row.then(|| self.row.step.saturating_sub(self.row.scene_step))
+    }
 }
 
 impl Tape {
@@ -166,6 +176,7 @@ impl Tape {
         if let Some(row) = &row {
             torn.truncate(row.torn_count);
         }
+        let has_readable_row = row.is_some();
         let row = row.unwrap_or(StepRow { step, ..StepRow::default() });
         let colliders = self.reader.latest(Topic::Colliders, chunk, |digest| {
             digest.colliders.iter().rfind(|row| row.step <= step).cloned()
@@ -176,7 +187,7 @@ impl Tape {
         let status = self.reader.latest(Topic::Status, chunk, |digest| {
             digest.statuses.iter().rfind(|row| row.step <= step).cloned()
         })?;
-        Ok(TapeState { row, particles, torn, colliders, parameters, status })
+        Ok(TapeState { row, has_readable_row, particles, torn, colliders, parameters, status })
     }
 
     fn find(&mut self, step: u64) -> Result<Option<SnapshotPosition>, ReadError> {

@@ -55,7 +55,12 @@ impl Refusal {
     /// Sentence for the user.
     pub fn text(self) -> Cow<'static, str> {
         let text = match self {
-            Self::Node(reason) => reason_text(reason),
+            Self::Node(Reason::NoEffectHere) => {
+                "the command has no effect here: the particle is frozen, the parameter belongs to \
+                 the other method, the simulation is running, the scene has another rate, or a \
+                 recording is playing"
+            }
+            Self::Node(reason) => return reason.to_string().into(),
             Self::Unknown => "the node gave an unknown reason",
             Self::NoNode => "no node is running",
             Self::NoAnswer => "the node did not answer; the command may still take effect",
@@ -68,26 +73,6 @@ impl Refusal {
             Self::OnlyReplay => "only a recording can do this",
         };
         text.into()
-    }
-}
-
-fn reason_text(reason: Reason) -> &'static str {
-    match reason {
-        Reason::NonFinite => "a number is not finite",
-        Reason::OutOfRange => "a value is out of range",
-        Reason::UnknownParticle => "the scene has no such particle",
-        Reason::UnknownConstraint => "the scene has no such constraint",
-        Reason::UnknownAnchor => "the scene has no such anchor",
-        Reason::UnknownCollider => "the scene has no such collider",
-        Reason::UnknownParameter => "there is no such parameter",
-        Reason::AlreadyTorn => "the constraint is already torn",
-        Reason::NotGrabbed => "the particle is not grabbed",
-        Reason::GrabbedByOther => "another client has grabbed the particle",
-        Reason::NoEffectHere => {
-            "the command has no effect here: the particle is frozen, the parameter belongs to the \
-             other method, the simulation is running, the scene has another rate, or a recording \
-             is playing"
-        }
     }
 }
 

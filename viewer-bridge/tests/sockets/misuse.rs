@@ -91,7 +91,7 @@ fn a_value_out_of_range_is_rejected_and_the_page_stays_connected() {
         json!({
             "type": "outcome", "id": 5, "kind": "grab", "status": "rejected", "step": null,
             "applied": 0, "rejected": 1, "reason": "out_of_range",
-            "text": "a value is out of range",
+            "text": "a value is out of its range",
         })
     );
     page.send(r#"{"type":"pin","particle":1,"id":6}"#);

@@ -80,7 +80,7 @@ impl<'a> Player<'a> {
             report,
             shown: ShownState::default(),
             playhead,
-            resets: ResetFinder::new(&state.row),
+            resets: ResetFinder::new(state.beginning()),
             state,
             parameters: None,
             answers: Vec::new(),
@@ -213,7 +213,7 @@ impl<'a> Player<'a> {
     }
 
     fn set_state(&mut self, state: TapeState) {
-        let passes_reset = self.resets.passes_reset(&state.row);
+        let passes_reset = self.resets.passes_reset(state.beginning());
         self.state = state;
         self.publish_changes();
         if passes_reset {

@@ -1,58 +1,44 @@
 //! Finds recorded resets between two states.
 
-use recorder::StepRow;
-
-/// Finds recorded resets between the states on show.
+/// Finds recorded resets between the states on show. The beginning of a state is the step at which its
+/// scene was at its beginning; it is `None` if the header is unreadable.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ResetFinder {
-    /// Of the last state with a readable header: the step at which its scene was at its beginning.
+    /// Beginning of the last state with a readable header.
     beginning: Option<u64>,
 }
 
 impl ResetFinder {
-    pub(super) fn new(first: &StepRow) -> Self {
-        Self { beginning: beginning(first) }
+    pub(super) fn new(beginning: Option<u64>) -> Self {
+        Self { beginning }
     }
 
-    /// Returns whether a reset lies between the state before and this one, in either direction. A state
-    /// without a readable header is skipped, so a reset beside it is found with the next state.
-    pub(super) fn passes_reset(&mut self, row: &StepRow) -> bool {
-        let Some(beginning) = beginning(row) else { return false };
-        self.beginning.replace(beginning).is_some_and(|before| before != beginning)
+    /// Returns `true` if a reset lies between the state before and this one, in either direction. A
+    /// state without a readable header is skipped, so a reset beside it is found with the next state.
+    pub(super) fn passes_reset(&mut self, beginning: Option<u64>) -> bool {
+        let before = self.beginning;
+        self.beginning = beginning.or(before);
+        before.is_some() && self.beginning != before
     }
-}
-
-/// Returns the step at which the scene of a state was at its beginning, or `None` if the header is
-/// unreadable. Every field of such a header except the step is 0, even the hash.
-fn beginning(row: &StepRow) -> Option<u64> {
-    let unreadable = StepRow { step: row.step, ..StepRow::default() };
-    (*row != unreadable).then(|| row.step.wrapping_sub(row.scene_step))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn row(step: u64, scene_step: u64) -> StepRow {
-        StepRow { step, scene_step, state_hash: 7, ..StepRow::default() }
-    }
-
     #[test]
     fn a_reset_is_found_in_either_direction() {
-        let mut resets = ResetFinder::new(&row(10, 10));
-        let passes = [row(11, 11), row(12, 0), row(13, 1), row(11, 11), row(9, 9)]
-            .map(|row| resets.passes_reset(&row));
+        let mut resets = ResetFinder::new(Some(0));
+        let passes = [0, 12, 12, 0, 0].map(|beginning| resets.passes_reset(Some(beginning)));
         assert_eq!(passes, [false, true, false, true, false]);
     }
 
     #[test]
     fn a_state_without_a_readable_header_is_no_reset_and_hides_none() {
-        let unreadable = |step| StepRow { step, ..StepRow::default() };
-        let mut resets = ResetFinder::new(&row(10, 10));
-        let passes = [unreadable(11), row(12, 12), unreadable(13), row(14, 1), row(15, 2)]
-            .map(|row| resets.passes_reset(&row));
+        let mut resets = ResetFinder::new(Some(0));
+        let passes = [None, Some(0), None, Some(13), Some(13)]
+            .map(|beginning| resets.passes_reset(beginning));
         assert_eq!(passes, [false, false, false, true, false]);
-        let mut resets = ResetFinder::new(&unreadable(0));
-        assert!(!resets.passes_reset(&row(1, 1)));
+        assert!(!ResetFinder::new(None).passes_reset(Some(1)));
     }
 }
