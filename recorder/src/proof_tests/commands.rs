@@ -2,6 +2,7 @@
 //! the log. Missing and wrong commands are reported.
 
 use recorder::{Message, OutcomeRow};
+use sim_contract::ActionFields;
 use sim_solver::{PARAMETERS, Scene};
 
 use super::{check, rebuild, record};
@@ -147,6 +148,9 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     // A load belongs to another file, and this scene has no stiffness.
     assert_eq!(rejected, [(22, "no_effect_here"), (53, "no_effect_here")]);
     assert!(PARAMETERS.iter().all(|info| COMMANDS.contains(&format!("\"{}\"", info.name))));
+    for ActionFields { kind, .. } in ActionFields::ALL.iter().filter(|row| row.kind != "unknown") {
+        assert!(COMMANDS.contains(&format!("\"kind\":\"{kind}\"")), "{kind} is not proved");
+    }
 
     let lines: Vec<_> = rows.iter().map(|row| serde_json::to_string(row).unwrap()).collect();
     let (again, repeated) = record(&job(&lines.join("\n")));

@@ -1,4 +1,4 @@
-//! Applies actions. This is the only match over kinds of commands.
+//! Applies actions: the only way from a command to the state.
 
 use sim_types::{Action, KindFilter, Parameter, ParameterValue, Reason, Text};
 
