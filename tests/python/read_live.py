@@ -92,4 +92,6 @@ def main(prefix, root):
     del node
 
 
+if len(sys.argv) != 3:
+    sys.exit("usage: read_live.py PREFIX ROOT, such as: read_live.py iox2_ /tmp/iceoryx2")
 main(*sys.argv[1:])

@@ -57,4 +57,6 @@ def main(recording, published):
     print(json.dumps({"compared": compared, "counts": counts, **report}))
 
 
+if len(sys.argv) != 3:
+    sys.exit("usage: read_recording.py RECORDING PUBLISHED, where PUBLISHED has lines STEP HEX")
 main(*sys.argv[1:])
