@@ -13,6 +13,11 @@ fn assert_refused(finished: &Finished, words: &[&str]) {
     }
 }
 
+fn make_pipe(path: &str) {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+}
+
 #[test]
 fn a_file_that_is_not_a_recording_is_named() {
     let sandbox = Sandbox::new();
@@ -100,6 +105,43 @@ fn an_existing_file_is_overwritten_only_on_request() {
 }
 
 #[test]
+fn an_output_that_is_not_a_file_is_refused_at_the_start_even_with_overwrite() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "rope", "--steps", "3", "-o", &run]).success();
+    let (folder, pipe) = (sandbox.path("folder"), sandbox.path("pipe"));
+    std::fs::create_dir(&folder).unwrap();
+    make_pipe(&pipe);
+    let pictures = sandbox.path("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    let picture = format!("{pictures}/rope_00000003.png");
+    make_pipe(&picture);
+    for (args, problem) in [
+        (
+            vec!["simulate", "rope", "--steps", "3", "-o", &folder],
+            format!("{folder} is a directory"),
+        ),
+        (
+            vec!["simulate", "rope", "--steps", "3", "-o", &pipe],
+            format!("{pipe} is a named pipe (FIFO)"),
+        ),
+        (vec!["scene", &run, "-o", &folder], format!("{folder} is a directory")),
+        (vec!["scene", &run, "-o", &pipe], format!("{pipe} is a named pipe (FIFO)")),
+        (vec!["export", &run, "--png", &pictures], format!("{picture} is a named pipe (FIFO)")),
+    ] {
+        for overwrite in [&[][..], &["--overwrite"]] {
+            let refused = recorder(&sandbox, &[&args, overwrite].concat());
+            assert_eq!(refused.code, Some(1), "{}", refused.stdout);
+            assert_eq!(refused.stderr, format!("error: {problem}; name a file\n"));
+        }
+    }
+    assert_eq!(std::fs::read_dir(&pictures).unwrap().count(), 1, "no picture was drawn");
+    for part in [folder + ".part", pipe + ".part"] {
+        assert!(!std::path::Path::new(&part).exists(), "{part}");
+    }
+}
+
+#[test]
 fn an_invalid_command_file_is_refused_with_line_and_field_and_nothing_is_written() {
     let sandbox = Sandbox::new();
     let lines = "{\"step\":1,\"kind\":\"reset\"}\n{\"step\":2,\"kind\":\"pin\"}\n";
@@ -143,14 +185,7 @@ fn a_fifo_is_refused_without_waiting_for_a_writer() {
         ("pipe.mcap", ["info"].as_slice()),
     ] {
         let pipe = sandbox.path(name);
-        rustix::fs::mknodat(
-            rustix::fs::CWD,
-            &pipe,
-            rustix::fs::FileType::Fifo,
-            rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR,
-            0,
-        )
-        .unwrap();
+        make_pipe(&pipe);
         let args: Vec<_> = make.iter().copied().chain([pipe.as_str()]).collect();
         assert_refused(&recorder(&sandbox, &args), &[&pipe, "FIFO"]);
     }
