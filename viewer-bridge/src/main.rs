@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod refusal;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::process::ExitCode;
@@ -10,7 +11,6 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
-use clap::Parser;
 use sim_contract::Stop;
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
@@ -29,7 +29,8 @@ const SERVER_THREADS: usize = 2;
 
 #[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
+    let args = args::parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");

@@ -76,7 +76,7 @@ pub(crate) struct PlayArgs {
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate) if rate > 0.0 && rate <= 1000.0 => Ok(rate),
-        _ => Err("expected a number above 0 and up to 1000".to_owned()),
+        _ => Err("it must be a number above 0 and up to 1000".to_owned()),
     }
 }
 

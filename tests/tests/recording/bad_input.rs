@@ -211,10 +211,13 @@ fn the_scene_of_a_recording_simulates_to_the_same_states() {
 fn wrong_option_values_state_what_is_expected() {
     let sandbox = Sandbox::new();
     for (args, words) in [
-        (["simulate", "rope", "--steps", "-1"].as_slice(), "expected a whole number from 0"),
-        (&["record", "--duration", "-5s"], "expected a time with its unit"),
-        (&["play", "run.mcap", "--rate", "-1"], "expected a number above 0"),
-        (&["info", "run.mcap", "--jsn"], "there is no option --jsn"),
+        (["simulate", "rope", "--steps", "-1"].as_slice(), "it must be a whole number from 0"),
+        (&["record", "--duration", "-5s"], "it must be a time with its unit"),
+        (&["play", "run.mcap", "--rate", "-1"], "it must be a number above 0"),
+        (
+            &["info", "run.mcap", "--jsn"],
+            "there is no option '--jsn' here (did you mean '--json'?)",
+        ),
     ] {
         let refused = recorder(&sandbox, args);
         assert_eq!(refused.code, Some(2), "{}", refused.stderr);
