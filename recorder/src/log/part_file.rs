@@ -163,7 +163,8 @@ fn check_kind(path: &Path) -> Result<(), PartFileError> {
     }
 }
 
-fn part_path(path: &Path) -> PathBuf {
+/// Returns the path with the suffix `.part`.
+pub(super) fn part_path(path: &Path) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(".part");
     PathBuf::from(name)

@@ -32,6 +32,23 @@ fn a_file_that_is_not_a_recording_is_named() {
 }
 
 #[test]
+fn an_unfinished_recording_is_named_by_its_part_file() {
+    let sandbox = Sandbox::new();
+    let (file, part) = (sandbox.path("run.mcap"), sandbox.write("run.mcap.part", "half"));
+    let pictures = sandbox.path("pictures");
+    for args in [
+        &["info", &file][..],
+        &["verify", &file],
+        &["play", &file],
+        &["scene", &file],
+        &["export", &file, "--png", &pictures],
+    ] {
+        let expected = format!("{file}: no such file, but {part} exists");
+        assert_refused(&recorder(&sandbox, args), &[&expected]);
+    }
+}
+
+#[test]
 fn a_truncated_recording_is_read_to_its_end_and_reported_as_truncated() {
     let sandbox = Sandbox::new();
     let whole = sandbox.path("whole.mcap");
