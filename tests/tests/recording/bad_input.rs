@@ -100,6 +100,21 @@ fn export_names_a_file_that_it_cannot_draw_and_draws_a_truncated_one() {
 }
 
 #[test]
+fn a_start_after_the_end_is_refused_with_the_time_of_the_last_snapshot() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "pendulum", "--steps", "240", "-o", &run]).success();
+    let info = recorder(&sandbox, &["info", &run]).success();
+    let last = info.lines().find_map(|line| line.strip_prefix("steps ")?.rsplit(", ").next());
+    let last = last.unwrap();
+    let expected =
+        format!("error: {run}: --start 1h is after its last snapshot, which is at {last}\n");
+    let refused = recorder(&sandbox, &["play", &run, "--start", "1h"]);
+    assert_eq!((refused.code, refused.stderr), (Some(1), expected));
+    assert!(info.contains(": 2 particles, 1 constraint, "), "{info}");
+}
+
+#[test]
 fn a_missing_node_is_reported_with_its_domain_and_how_to_start_one() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
