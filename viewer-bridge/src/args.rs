@@ -1,5 +1,7 @@
 //! The command line. The doc comments are the help texts.
 
+mod refusal;
+
 use std::ffi::OsString;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
@@ -7,8 +9,6 @@ use std::path::PathBuf;
 use clap::{CommandFactory, Parser};
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
-
-use crate::refusal;
 
 /// Show a running simulation in a browser, and interact with it there.
 ///

@@ -3,7 +3,6 @@
 #![forbid(unsafe_code)]
 
 mod args;
-mod refusal;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::process::ExitCode;

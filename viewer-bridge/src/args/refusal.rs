@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::error::{ContextKind, ErrorKind};
 
 /// Replaces the text of clap for an argument that it does not know. All other errors stay.
-pub(crate) fn explain(error: clap::Error, command: &clap::Command) -> clap::Error {
+pub(super) fn explain(error: clap::Error, command: &clap::Command) -> clap::Error {
     let (ErrorKind::UnknownArgument, Some(argument)) =
         (error.kind(), error.get(ContextKind::InvalidArg))
     else {
