@@ -1,6 +1,7 @@
 //! The recording format, from the bytes of a message to the state at any step.
 
 mod encoding;
+mod file_kind;
 mod index;
 mod message;
 mod part_file;

@@ -75,9 +75,9 @@ fn explain(error: clap::Error) -> clap::Error {
         return error;
     };
     let suggestion = error.get(ContextKind::SuggestedArg);
-    let hint = suggestion.map_or_else(String::new, |name| format!(" (did you mean {name}?)"));
+    let hint = suggestion.map_or_else(String::new, |name| format!(" (did you mean '{name}'?)"));
     let text = if argument.to_string().starts_with('-') {
-        format!("there is no option {argument}{hint}")
+        format!("there is no option '{argument}' here{hint}")
     } else {
         format!("there is one argument too many: '{argument}'")
     };

@@ -81,6 +81,45 @@ fn both_files_are_replaced_with_overwrite() {
 }
 
 #[test]
+fn a_directory_and_a_named_pipe_are_never_replaced() {
+    let directory = Directory::new("kinds");
+    fs::create_dir(directory.file("folder")).unwrap();
+    make_pipe(&directory.file("pipe"));
+    make_pipe(&directory.file("a.mcap.part"));
+    std::os::unix::fs::symlink(directory.file("pipe"), directory.file("link")).unwrap();
+    for (target, named, kind) in [
+        ("folder", "folder", "directory"),
+        ("pipe", "pipe", "named pipe (FIFO)"),
+        ("link", "link", "named pipe (FIFO)"),
+        ("a.mcap", "a.mcap.part", "named pipe (FIFO)"),
+    ] {
+        for existing in [Existing::Refuse, Existing::Overwrite] {
+            let error = PartFile::create(&directory.file(target), existing).unwrap_err();
+            let path = directory.file(named);
+            let expected = format!("{} is a {kind}; name a file", path.display());
+            assert_eq!(error.to_string(), expected);
+        }
+    }
+    assert_eq!(fs::read_dir(&directory.0).unwrap().count(), 4, "nothing was added");
+}
+
+fn make_pipe(path: &Path) {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+}
+
+#[test]
+fn a_link_to_a_file_is_overwritten_like_a_file() {
+    let directory = Directory::new("link");
+    fs::write(directory.file("old"), "old").unwrap();
+    let link = directory.file("link.mcap");
+    std::os::unix::fs::symlink(directory.file("old"), &link).unwrap();
+    assert!(matches!(write(&link, Existing::Refuse, "x"), Err(PartFileError::Exists(_))));
+    write(&link, Existing::Overwrite, "new").unwrap().finish().unwrap();
+    assert_eq!(fs::read_to_string(&link).unwrap(), "new");
+}
+
+#[test]
 fn a_file_that_appears_in_the_meantime_is_not_replaced() {
     let directory = Directory::new("meanwhile");
     let path = directory.file("a.mcap");

@@ -1,9 +1,12 @@
 //! The command line. The doc comments are the help texts.
 
+mod refusal;
+
+use std::ffi::OsString;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 
@@ -29,7 +32,12 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 pub(crate) struct Args {
     /// Address and port to listen on; port 0 is any free port. Beyond loopback, pages need the token
     /// in the printed address. The connection is not encrypted
-    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:8080")]
+    #[arg(
+        long,
+        value_name = "ADDR:PORT",
+        default_value = "127.0.0.1:8080",
+        value_parser = page_address
+    )]
     pub(crate) listen: SocketAddr,
     /// Name by which browsers reach this host, besides its addresses and `localhost`; can be
     /// repeated
@@ -69,6 +77,13 @@ pub(crate) struct Args {
     pub(crate) assets: Option<PathBuf>,
 }
 
+/// Reads the command line.
+pub(crate) fn parse(
+    words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+) -> Result<Args, clap::Error> {
+    Args::try_parse_from(words).map_err(|error| refusal::explain(error, &Args::command()))
+}
+
 impl Args {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
         Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
@@ -89,11 +104,18 @@ impl Args {
     }
 }
 
+fn page_address(text: &str) -> Result<SocketAddr, String> {
+    address(text, "127.0.0.1:8080")
+}
+
 fn foxglove_address(text: &str) -> Result<SocketAddr, String> {
-    let address =
-        text.parse().map_err(|_| "expected an address and a port, as in 127.0.0.1:8765")?;
+    let address = address(text, "127.0.0.1:8765")?;
     FoxgloveOptions::check_address(address).map_err(|error| error.to_string())?;
     Ok(address)
+}
+
+fn address(text: &str, example: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| format!("it must be an address with a port, such as {example}"))
 }
 
 /// Accepts the host part of an address as browsers send it, without a scheme and a port.
@@ -106,7 +128,7 @@ fn host_name(text: &str) -> Result<String, String> {
     let is_allowed = |letter: char| letter.is_ascii_alphanumeric() || "-._".contains(letter);
     if text.is_empty() || !text.chars().all(is_allowed) {
         return Err(
-            "expected a name of letters, digits, '-' and '.', as in lab.example; the port \
+            "it must be a name of letters, digits, '-' and '.', as in lab.example; the port \
                     is that of --listen"
                 .to_owned(),
         );
@@ -120,7 +142,7 @@ mod tests {
 
     fn error(args: &[&str]) -> String {
         let args = ["viewer-bridge"].iter().chain(args);
-        Args::try_parse_from(args).unwrap_err().to_string()
+        parse(args).unwrap_err().to_string()
     }
 
     #[test]
@@ -128,6 +150,36 @@ mod tests {
         for option in ["--name", "--domain"] {
             let error = error(&["--replay", "run.mcap", option, "lab"]);
             assert!(error.contains("cannot be used with") && error.contains(option), "{error}");
+        }
+    }
+
+    #[test]
+    fn unknown_options_and_stray_arguments_are_refused_with_a_remedy() {
+        for (argument, problem) in [
+            ("--bogus", "there is no option '--bogus' here\n"),
+            ("--lisen", "there is no option '--lisen' here (did you mean '--listen'?)\n"),
+            ("curtain", "there is one argument too many: 'curtain'\n"),
+            (
+                "run.mcap",
+                "there is one argument too many: 'run.mcap' (to show a recording, use --replay \
+                 run.mcap)\n",
+            ),
+        ] {
+            let error = error(&[argument]);
+            assert!(error.starts_with(&format!("error: {problem}")), "{error}");
+            assert!(error.contains("--help") && !error.contains("tip:"), "{error}");
+        }
+    }
+
+    #[test]
+    fn an_address_has_a_port() {
+        for (option, example) in [("--listen", "127.0.0.1:8080"), ("--foxglove", "127.0.0.1:8765")]
+        {
+            for address in ["8080", "foo", "127.0.0.1", "127.0.0.1:99999", "localhost:8080"] {
+                let error = error(&[option, address]);
+                let expected = format!("it must be an address with a port, such as {example}\n");
+                assert!(error.contains(&expected), "{error}");
+            }
         }
     }
 

@@ -10,7 +10,6 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
-use clap::Parser;
 use sim_contract::Stop;
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
@@ -29,7 +28,8 @@ const SERVER_THREADS: usize = 2;
 
 #[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
+    let args = args::parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");

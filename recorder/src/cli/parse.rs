@@ -12,15 +12,15 @@ pub(crate) fn whole_number(text: &str) -> Result<u64, String> {
 pub(crate) fn whole_number_in(text: &str, range: &RangeInclusive<u64>) -> Result<u64, String> {
     let number = text.parse().ok().filter(|number| range.contains(number));
     number.ok_or_else(|| match *range.end() {
-        u64::MAX => format!("expected a whole number from {}", range.start()),
-        max => format!("expected a whole number from {} to {max}", range.start()),
+        u64::MAX => format!("it must be a whole number from {}", range.start()),
+        max => format!("it must be a whole number from {} to {max}", range.start()),
     })
 }
 
 /// Parses a duration such as `2s` or `500ms`.
 pub(crate) fn duration(text: &str) -> Result<Duration, String> {
     humantime::parse_duration(text)
-        .map_err(|_| "expected a time with its unit, such as 2s or 500ms".to_owned())
+        .map_err(|_| "it must be a time with its unit, such as 2s or 500ms".to_owned())
 }
 
 #[cfg(test)]
@@ -31,14 +31,14 @@ mod tests {
     fn errors_state_the_expected_value() {
         assert_eq!(whole_number("7"), Ok(7));
         for text in ["-1", "1.5", "", "many", "99999999999999999999"] {
-            assert_eq!(whole_number(text).unwrap_err(), "expected a whole number from 0");
+            assert_eq!(whole_number(text).unwrap_err(), "it must be a whole number from 0");
         }
         let error = whole_number_in("65", &(1..=64)).unwrap_err();
-        assert_eq!(error, "expected a whole number from 1 to 64");
+        assert_eq!(error, "it must be a whole number from 1 to 64");
         assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
         for text in ["-5s", "5", "soon"] {
             let error = duration(text).unwrap_err();
-            assert_eq!(error, "expected a time with its unit, such as 2s or 500ms");
+            assert_eq!(error, "it must be a time with its unit, such as 2s or 500ms");
         }
     }
 }

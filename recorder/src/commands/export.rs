@@ -232,12 +232,12 @@ fn size(text: &str) -> Result<Size, String> {
     let size = text
         .split_once('x')
         .and_then(|(width, height)| Some(Size { width: side(width)?, height: side(height)? }));
-    size.ok_or_else(|| format!("expected WIDTHxHEIGHT with sides from {SIDE_MIN} to {SIDE_MAX}"))
+    size.ok_or_else(|| format!("it must be WIDTHxHEIGHT with sides from {SIDE_MIN} to {SIDE_MAX}"))
 }
 
 fn period(text: &str) -> Result<Duration, String> {
     match parse::duration(text)? {
-        Duration::ZERO => Err("expected a time longer than 0s".to_owned()),
+        Duration::ZERO => Err("it must be a time longer than 0s".to_owned()),
         period => Ok(period),
     }
 }

@@ -135,8 +135,12 @@ impl fmt::Display for Info {
         writeln!(f, "file        {}, {} bytes, {}", self.file, self.size_bytes, self.file_end)?;
         writeln!(
             f,
-            "scene       {}: {} particles, {} constraints, {} Hz, {}",
-            self.scene, self.particle_count, self.constraint_count, self.rate_hz, self.method
+            "scene       {}: {}, {}, {} Hz, {}",
+            self.scene,
+            counted(self.particle_count, "particle"),
+            counted(self.constraint_count, "constraint"),
+            self.rate_hz,
+            self.method
         )?;
         writeln!(
             f,
@@ -155,4 +159,10 @@ impl fmt::Display for Info {
         writeln!(f, "lost        {}", none_if_empty(join(&self.lost)))?;
         write!(f, "stopped     {}", self.stop_reason.as_deref().unwrap_or("unknown"))
     }
+}
+
+/// Returns a number with its noun, such as "1 particle" or "2 particles".
+fn counted(count: u32, noun: &str) -> String {
+    let ending = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{ending}")
 }

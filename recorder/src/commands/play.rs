@@ -76,7 +76,7 @@ pub(crate) struct PlayArgs {
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate) if rate > 0.0 && rate <= 1000.0 => Ok(rate),
-        _ => Err("expected a number above 0 and up to 1000".to_owned()),
+        _ => Err("it must be a number above 0 and up to 1000".to_owned()),
     }
 }
 
@@ -143,7 +143,8 @@ impl Pass {
         let mut position = Position::new(torn, method);
         while run.time_of_step_ns(first.row.step) < start_ns {
             position.skip(&first.updates);
-            first = next_frame(&mut frames).context("--start is after its last snapshot")?;
+            let time_ns = run.time_of_step_ns(first.row.step).saturating_sub(origin_ns);
+            first = frames.next_frame()?.with_context(|| late_start(args, time_ns))?;
         }
         first.updates.iter().for_each(|update| position.apply_parameters(update));
         let recorded = Recorded {
@@ -230,6 +231,13 @@ impl Pass {
         }
         Ok(())
     }
+}
+
+/// Returns the error for a start after the last snapshot.
+fn late_start(args: &PlayArgs, last_ns: u64) -> String {
+    let start = humantime::format_duration(args.start.unwrap_or_default());
+    let last_s = last_ns as f64 / SECOND_NS as f64;
+    format!("--start {start} is after its last snapshot, which is at {last_s:.3} s")
 }
 
 fn next_frame(frames: &mut FrameReader<BufReader<File>>) -> anyhow::Result<Frame> {

@@ -53,7 +53,8 @@ pub(crate) struct RecordArgs {
     /// [default: NAME_<UTC time>.mcap]
     #[arg(short, long, value_name = "OUT.mcap")]
     output: Option<PathBuf>,
-    /// End after this time, such as 10s or 500ms [default: no limit]
+    /// End after this time, such as 10s or 500ms. It counts from the start of the program, so it
+    /// includes the wait for the first step that can be recorded [default: no limit]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true,
         value_parser = parse::duration)]
     duration: Option<Duration>,

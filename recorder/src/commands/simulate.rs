@@ -25,10 +25,13 @@ use crate::simulation::{Job, SimulationResult, simulate};
 const STEPS_PER_CHECK: u64 = 256;
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    after_help = "Exit codes: 0 all steps computed; 1 failed; 3 interrupted before the last \
+    step.\n\nExamples:\n  \
     recorder simulate curtain --steps 24000\n  \
     recorder simulate curtain --steps 2400 -o drag.mcap --commands drag.jsonl\n  \
-    recorder simulate live.mcap --steps 2400 --commands live.mcap -o again.mcap")]
+    recorder simulate live.mcap --steps 2400 --commands live.mcap -o again.mcap"
+)]
 pub(crate) struct SimulateArgs {
     /// A built-in scene, a TOML file (a path with / or ending in .toml), or a recording with a
     /// scene (ending in .mcap)

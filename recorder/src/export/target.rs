@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use recorder::{Existing, PartFile};
 
 use super::shape::Picture;
@@ -44,14 +44,9 @@ impl<'a> Target<'a> {
         self.folder.join(format!("{}_{step:08}.{extension}", self.stem))
     }
 
-    /// Creates the folder. Fails if a file exists that may not be replaced.
+    /// Creates the folder. Fails if one of the files may not be created.
     pub(crate) fn prepare(&self, steps: &[u64]) -> anyhow::Result<()> {
-        if self.existing == Existing::Refuse {
-            let existing = steps.iter().map(|step| self.path(*step)).find(|path| path.exists());
-            if let Some(path) = existing {
-                bail!("{} exists (use --overwrite to replace it)", path.display());
-            }
-        }
+        steps.iter().try_for_each(|step| self.existing.check(&self.path(*step)))?;
         let folder = self.folder;
         fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the folder {}", folder.display()))

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
+use super::file_kind::kind_of_non_file;
+
 /// Bytes to buffer before a write to the operating system.
 const BUFFER_SIZE_BYTES: usize = 1 << 18;
 
@@ -18,6 +20,20 @@ pub enum Existing {
     Refuse,
     /// Replace the files.
     Overwrite,
+}
+
+impl Existing {
+    /// Checks that a file with this name may be created.
+    ///
+    /// # Errors
+    /// If the name belongs to a file that may not be replaced, or to something that is not a file.
+    pub fn check(self, path: &Path) -> Result<(), PartFileError> {
+        check_kind(path)?;
+        if self == Self::Refuse && path.exists() {
+            return Err(PartFileError::Exists(path.to_owned()));
+        }
+        Ok(())
+    }
 }
 
 /// The reason why a file cannot be created or finished.
@@ -32,6 +48,14 @@ pub enum PartFileError {
         .0.display()
     )]
     PartExists(PathBuf),
+    /// The name belongs to a directory or a device, for example. It is never replaced.
+    #[error("{} is {kind}; name a file", path.display())]
+    NotAFile {
+        /// The name.
+        path: PathBuf,
+        /// The kind of the thing with this name, with its article.
+        kind: &'static str,
+    },
     /// The operating system reports an error.
     #[error("cannot write {}: {cause}", path.display())]
     Io {
@@ -56,12 +80,12 @@ impl PartFile {
     /// Creates the file `path` with the suffix `.part`.
     ///
     /// # Errors
-    /// If either file exists and may not be replaced, or the operating system reports an error.
+    /// If either file exists and may not be replaced, if either name belongs to something that is
+    /// not a file, or if the operating system reports an error.
     pub fn create(path: &Path, existing: Existing) -> Result<Self, PartFileError> {
-        if existing == Existing::Refuse && path.exists() {
-            return Err(PartFileError::Exists(path.to_owned()));
-        }
+        existing.check(path)?;
         let part_path = part_path(path);
+        check_kind(&part_path)?;
         let mut options = OpenOptions::new();
         match existing {
             Existing::Refuse => options.write(true).create_new(true),
@@ -130,7 +154,17 @@ impl Write for PartFile {
     }
 }
 
-fn part_path(path: &Path) -> PathBuf {
+/// Refuses a name that belongs to something other than a regular file or a link to one. Later errors
+/// report a name that cannot be looked up.
+fn check_kind(path: &Path) -> Result<(), PartFileError> {
+    match fs::metadata(path).ok().and_then(|metadata| kind_of_non_file(metadata.file_type())) {
+        Some(kind) => Err(PartFileError::NotAFile { path: path.to_owned(), kind }),
+        None => Ok(()),
+    }
+}
+
+/// Returns the path with the suffix `.part`.
+pub(super) fn part_path(path: &Path) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(".part");
     PathBuf::from(name)

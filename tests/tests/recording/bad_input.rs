@@ -13,6 +13,11 @@ fn assert_refused(finished: &Finished, words: &[&str]) {
     }
 }
 
+fn make_pipe(path: &str) {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+}
+
 #[test]
 fn a_file_that_is_not_a_recording_is_named() {
     let sandbox = Sandbox::new();
@@ -23,6 +28,23 @@ fn a_file_that_is_not_a_recording_is_named() {
         for file in [&text, &empty, &missing] {
             assert_refused(&recorder(&sandbox, &[verb, file]), &[file]);
         }
+    }
+}
+
+#[test]
+fn an_unfinished_recording_is_named_by_its_part_file() {
+    let sandbox = Sandbox::new();
+    let (file, part) = (sandbox.path("run.mcap"), sandbox.write("run.mcap.part", "half"));
+    let pictures = sandbox.path("pictures");
+    for args in [
+        &["info", &file][..],
+        &["verify", &file],
+        &["play", &file],
+        &["scene", &file],
+        &["export", &file, "--png", &pictures],
+    ] {
+        let expected = format!("{file}: no such file, but {part} exists");
+        assert_refused(&recorder(&sandbox, args), &[&expected]);
     }
 }
 
@@ -78,6 +100,21 @@ fn export_names_a_file_that_it_cannot_draw_and_draws_a_truncated_one() {
 }
 
 #[test]
+fn a_start_after_the_end_is_refused_with_the_time_of_the_last_snapshot() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "pendulum", "--steps", "240", "-o", &run]).success();
+    let info = recorder(&sandbox, &["info", &run]).success();
+    let last = info.lines().find_map(|line| line.strip_prefix("steps ")?.rsplit(", ").next());
+    let last = last.unwrap();
+    let expected =
+        format!("error: {run}: --start 1h is after its last snapshot, which is at {last}\n");
+    let refused = recorder(&sandbox, &["play", &run, "--start", "1h"]);
+    assert_eq!((refused.code, refused.stderr), (Some(1), expected));
+    assert!(info.contains(": 2 particles, 1 constraint, "), "{info}");
+}
+
+#[test]
 fn a_missing_node_is_reported_with_its_domain_and_how_to_start_one() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
@@ -97,6 +134,43 @@ fn an_existing_file_is_overwritten_only_on_request() {
     let args: Vec<_> = args.into_iter().chain(["--overwrite"]).collect();
     recorder(&sandbox, &args).success();
     recorder(&sandbox, &["info", &file]).success();
+}
+
+#[test]
+fn an_output_that_is_not_a_file_is_refused_at_the_start_even_with_overwrite() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "rope", "--steps", "3", "-o", &run]).success();
+    let (folder, pipe) = (sandbox.path("folder"), sandbox.path("pipe"));
+    std::fs::create_dir(&folder).unwrap();
+    make_pipe(&pipe);
+    let pictures = sandbox.path("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    let picture = format!("{pictures}/rope_00000003.png");
+    make_pipe(&picture);
+    for (args, problem) in [
+        (
+            vec!["simulate", "rope", "--steps", "3", "-o", &folder],
+            format!("{folder} is a directory"),
+        ),
+        (
+            vec!["simulate", "rope", "--steps", "3", "-o", &pipe],
+            format!("{pipe} is a named pipe (FIFO)"),
+        ),
+        (vec!["scene", &run, "-o", &folder], format!("{folder} is a directory")),
+        (vec!["scene", &run, "-o", &pipe], format!("{pipe} is a named pipe (FIFO)")),
+        (vec!["export", &run, "--png", &pictures], format!("{picture} is a named pipe (FIFO)")),
+    ] {
+        for overwrite in [&[][..], &["--overwrite"]] {
+            let refused = recorder(&sandbox, &[&args, overwrite].concat());
+            assert_eq!(refused.code, Some(1), "{}", refused.stdout);
+            assert_eq!(refused.stderr, format!("error: {problem}; name a file\n"));
+        }
+    }
+    assert_eq!(std::fs::read_dir(&pictures).unwrap().count(), 1, "no picture was drawn");
+    for part in [folder + ".part", pipe + ".part"] {
+        assert!(!std::path::Path::new(&part).exists(), "{part}");
+    }
 }
 
 #[test]
@@ -143,14 +217,7 @@ fn a_fifo_is_refused_without_waiting_for_a_writer() {
         ("pipe.mcap", ["info"].as_slice()),
     ] {
         let pipe = sandbox.path(name);
-        rustix::fs::mknodat(
-            rustix::fs::CWD,
-            &pipe,
-            rustix::fs::FileType::Fifo,
-            rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR,
-            0,
-        )
-        .unwrap();
+        make_pipe(&pipe);
         let args: Vec<_> = make.iter().copied().chain([pipe.as_str()]).collect();
         assert_refused(&recorder(&sandbox, &args), &[&pipe, "FIFO"]);
     }
@@ -176,10 +243,13 @@ fn the_scene_of_a_recording_simulates_to_the_same_states() {
 fn wrong_option_values_state_what_is_expected() {
     let sandbox = Sandbox::new();
     for (args, words) in [
-        (["simulate", "rope", "--steps", "-1"].as_slice(), "expected a whole number from 0"),
-        (&["record", "--duration", "-5s"], "expected a time with its unit"),
-        (&["play", "run.mcap", "--rate", "-1"], "expected a number above 0"),
-        (&["info", "run.mcap", "--jsn"], "there is no option --jsn"),
+        (["simulate", "rope", "--steps", "-1"].as_slice(), "it must be a whole number from 0"),
+        (&["record", "--duration", "-5s"], "it must be a time with its unit"),
+        (&["play", "run.mcap", "--rate", "-1"], "it must be a number above 0"),
+        (
+            &["info", "run.mcap", "--jsn"],
+            "there is no option '--jsn' here (did you mean '--json'?)",
+        ),
     ] {
         let refused = recorder(&sandbox, args);
         assert_eq!(refused.code, Some(2), "{}", refused.stderr);

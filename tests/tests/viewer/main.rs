@@ -232,6 +232,7 @@ fn the_server_reports_errors_and_signals_by_its_exit_code() {
     let second = Process::run(Program::ViewerBridge, &sandbox, &["--listen", &taken]);
     assert_eq!(second.code, Some(1));
     assert!(second.stderr.starts_with("error: cannot listen at"), "{}", second.stderr);
+    assert!(second.stderr.contains("with --listen 127.0.0.1:0"), "{}", second.stderr);
     let wrong = Process::run(Program::ViewerBridge, &sandbox, &["--listen", "nowhere"]);
     assert_eq!(wrong.code, Some(2));
     bridge.process.signal(Signal::TERM);

@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use foxglove::FoxgloveError;
 use thiserror::Error;
 
+use crate::socket::listen::remedy;
 use crate::source::recording_times::RecordingTimes;
 
 /// Options of a Foxglove server.
@@ -58,7 +59,7 @@ pub enum FoxgloveServerError {
         address: SocketAddr,
     },
     /// The address cannot be used.
-    #[error("cannot listen at {address}: {cause}")]
+    #[error("cannot listen at {address}: {cause}{}", remedy(cause, "--foxglove", address))]
     Listen {
         /// The address.
         address: SocketAddr,

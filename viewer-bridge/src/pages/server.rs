@@ -19,7 +19,7 @@ use super::session::{self, Sessions};
 use crate::limits::WAITING_MAX;
 use crate::shutdown::Shutdown;
 use crate::socket::guard::{Guard, guarded};
-use crate::socket::listen::{HttpListener, client_permits};
+use crate::socket::listen::{HttpListener, client_permits, remedy};
 use crate::socket::peer::limit;
 
 /// Options of a server.
@@ -37,7 +37,7 @@ pub struct ServerOptions {
 #[derive(Debug, Error)]
 pub enum ServerError {
     /// The address cannot be used.
-    #[error("cannot listen at {address}: {cause}")]
+    #[error("cannot listen at {address}: {cause}{}", remedy(cause, "--listen", address))]
     Listen {
         /// The address.
         address: SocketAddr,

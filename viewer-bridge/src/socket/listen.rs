@@ -33,6 +33,17 @@ pub(crate) fn client_permits() -> ClientPermits {
     Arc::new(Semaphore::new(CLIENTS_MAX))
 }
 
+/// Returns the remedy for an address in use, to append to the error. `option` sets the address.
+pub(crate) fn remedy(cause: &io::Error, option: &str, address: &SocketAddr) -> String {
+    match cause.kind() {
+        io::ErrorKind::AddrInUse => {
+            let free = SocketAddr::new(address.ip(), 0);
+            format!("; choose another port, or any free one with {option} {free}")
+        }
+        _ => String::new(),
+    }
+}
+
 impl HttpListener {
     /// Binds an address; port 0 is any free port.
     pub(crate) async fn bind(address: SocketAddr) -> io::Result<Self> {

@@ -282,10 +282,10 @@ fn the_error_names_a_wrong_option() {
         ("a.mcap", "--png"),
         ("a.mcap --png d --svg d", "cannot be used with"),
         ("a.mcap --png d --every 1s --frames 3", "cannot be used with"),
-        ("a.mcap --png d --every 0s", "expected a time longer than 0s"),
+        ("a.mcap --png d --every 0s", "it must be a time longer than 0s"),
         ("a.mcap --png d --frames 0", "--frames"),
-        ("a.mcap --png d --size 960", "expected WIDTHxHEIGHT with sides from 16 to 8192"),
-        ("a.mcap --png d --size 960x9000", "expected WIDTHxHEIGHT"),
+        ("a.mcap --png d --size 960", "it must be WIDTHxHEIGHT with sides from 16 to 8192"),
+        ("a.mcap --png d --size 960x9000", "it must be WIDTHxHEIGHT"),
         ("a.mcap --png d --view below", "front, side, top, iso"),
     ] {
         let error = parse(line).unwrap_err();

@@ -2,10 +2,12 @@
 
 use std::fs::{self, File, FileType, OpenOptions};
 use std::io;
-use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use rustix::fs::OFlags;
+
+use crate::log::file_kind::kind_of_non_file;
 
 /// Opens a regular file for reading.
 ///
@@ -23,14 +25,8 @@ pub fn open_regular_file(path: &Path) -> io::Result<File> {
 }
 
 fn check_type(file_type: FileType) -> io::Result<()> {
-    let name = match file_type {
-        _ if file_type.is_file() => return Ok(()),
-        _ if file_type.is_dir() => "a directory",
-        _ if file_type.is_fifo() => "a FIFO",
-        _ if file_type.is_socket() => "a socket",
-        _ => "a device",
-    };
-    Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {name}, not a regular file")))
+    let Some(kind) = kind_of_non_file(file_type) else { return Ok(()) };
+    Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {kind}, not a regular file")))
 }
 
 #[cfg(test)]
@@ -48,7 +44,7 @@ mod tests {
         let error_text = |path: &Path| open_regular_file(path).unwrap_err().to_string();
         let pipe_error = error_text(&pipe);
         fs::remove_file(&pipe).unwrap();
-        assert_eq!(pipe_error, "it is a FIFO, not a regular file");
+        assert_eq!(pipe_error, "it is a named pipe (FIFO), not a regular file");
         let folder = error_text(&std::env::temp_dir());
         assert_eq!(folder, "it is a directory, not a regular file");
         let device = error_text(Path::new("/dev/null"));

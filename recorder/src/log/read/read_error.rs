@@ -1,6 +1,7 @@
 //! The end of a file, and the reasons why a file cannot be read as a recording.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use crate::log::run::{FORMAT_VERSION, FORMAT_VERSION_MIN};
 
@@ -41,6 +42,16 @@ pub enum ReadError {
     /// The operating system reports an error.
     #[error("cannot read the file")]
     Io(#[from] std::io::Error),
+    /// The file does not exist, but its unfinished part does.
+    #[error(
+        "no such file, but {} exists: a recorder is writing it, or one was killed. You can read it \
+         as far as it goes",
+        part.display()
+    )]
+    Unfinished {
+        /// The unfinished part.
+        part: PathBuf,
+    },
     /// The file is not an MCAP file.
     #[error("is not an MCAP file")]
     NotMcap,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use mcap::records::Record;
@@ -11,6 +11,7 @@ use super::decode::{LoggedMessage, decode_message};
 use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
 use super::records::{READ_SIZE_BYTES_MAX, RecordReader};
+use crate::log::part_file::part_path;
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
     SCENE_ATTACHMENT,
@@ -37,7 +38,18 @@ impl LogReader<BufReader<File>> {
     /// # Errors
     /// If the file is not a recording or has no readable header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::new(BufReader::with_capacity(READ_SIZE_BYTES_MAX, open_regular_file(path)?))
+        let file = open_regular_file(path).map_err(|cause| open_error(path, cause))?;
+        Self::new(BufReader::with_capacity(READ_SIZE_BYTES_MAX, file))
+    }
+}
+
+/// Names the unfinished part of a recording that does not exist yet.
+fn open_error(path: &Path, cause: io::Error) -> ReadError {
+    let part = part_path(path);
+    if cause.kind() == io::ErrorKind::NotFound && part.exists() {
+        ReadError::Unfinished { part }
+    } else {
+        cause.into()
     }
 }
 
