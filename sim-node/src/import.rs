@@ -9,10 +9,9 @@ use sim_contract::read_scene_file;
 use sim_solver::{Scene, SceneError};
 
 use crate::args::ImportArgs;
+use crate::output;
 
 /// Writes a scene that contains the mesh, and so does not need its file.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
-#[allow(clippy::print_stderr, reason = "messages to the user")]
 pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
     let mesh = read_scene_file(&args.mesh)
         .with_context(|| format!("{}: cannot read the mesh", args.mesh))?;
@@ -21,7 +20,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         .map_err(import_error)?;
     let counts = scene.counts();
     for warning in scene.warnings() {
-        eprintln!("warning: {warning}");
+        output::note(&format!("warning: {warning}"));
     }
     let result = format!(
         "# Converted from {} by sim-node import.\n{}",
@@ -29,18 +28,17 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         scene.to_toml()
     );
     let Some(path) = &args.output else {
-        print!("{result}");
-        return Ok(());
+        return output::text(&result);
     };
     write(path, &result, args)?;
-    eprintln!(
+    output::note(&format!(
         "{}: {} particles, {} constraints, {} pins, {} triangles",
         path.display(),
         counts.particles,
         counts.constraints,
         counts.pins,
         counts.triangles
-    );
+    ));
     Ok(())
 }
 

@@ -9,6 +9,7 @@ use sim_contract::{Action, Client, OUTCOME_FLAG_CONTROL, Outcome};
 use super::{hint, rejection};
 use crate::args::CtlArgs;
 use crate::exit::Exit;
+use crate::output;
 
 /// An outcome in JSON: the command with its result.
 #[derive(Serialize)]
@@ -22,8 +23,6 @@ struct OutcomeRow {
 }
 
 /// Sends a command and prints its outcome. Waits for the last step of `step`.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
-#[allow(clippy::print_stderr, reason = "messages to the user")]
 pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyhow::Result<Exit> {
     let outcome = client.request(action, args.timeout)?;
     if let Action::Step { count } = action
@@ -40,21 +39,21 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
     };
     let (step, reason) = (row.step, row.reason);
     if args.json {
-        println!("{}", serde_json::to_string(&row)?);
+        output::json(&row)?;
     } else if outcome.is_applied() {
-        println!("applied at step {step}");
+        output::line(&format!("applied at step {step}"))?;
     } else {
         let explanation = outcome
             .reason()
             .map(|reason| rejection::explain(client, args.timeout, &row.action, reason))
             .map_or_else(String::new, |explanation| format!(": {explanation}"));
-        println!("rejected at step {step}: {reason}{explanation}");
+        output::line(&format!("rejected at step {step}: {reason}{explanation}"))?;
     }
     if !outcome.is_applied() {
         return Ok(Exit::Rejected);
     }
     if let Some(hint) = hint::for_applied(client, args.timeout, &row.action) {
-        eprintln!("hint: {hint}");
+        output::note(&format!("hint: {hint}"));
     }
     Ok(Exit::Done)
 }
