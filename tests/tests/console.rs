@@ -42,10 +42,27 @@ fn a_rejection_names_the_remedy() {
         ("move-collider 0 0 0 0", "unknown_collider: the scene has no such collider (it has none)"),
         ("release 3", "not_grabbed: the particle is not grabbed (`ctl grab` grabs it)"),
         ("grab 90 nan 0 0", "non_finite: a number is not finite (allowed: finite numbers)"),
-        ("step 0", "out_of_range: a value is out of its range (allowed: 1 or more)"),
     ] {
         let rejected = run(&sandbox, &format!("ctl {command}"));
         assert_eq!(rejected.stdout, format!("rejected at step 1: {expected}\n"));
+    }
+}
+
+#[test]
+fn a_wait_for_steps_ends_with_the_timeout_and_a_pause_ends_the_steps() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let late = run(&sandbox, "ctl step 100000000 --timeout 100ms");
+    assert_eq!((late.code, late.stdout.as_str()), (Some(1), ""), "{}", late.stderr);
+    assert!(late.stderr.contains("step 100000000 has not come within"), "{}", late.stderr);
+    assert!(late.stderr.contains("`ctl pause` ends that"), "{}", late.stderr);
+    let next = ctl(&sandbox, &["pause"])["step"].as_u64();
+    assert_eq!(ctl(&sandbox, &["step"])["step"].as_u64(), next);
+    for count in ["0", "1.5", "4294967296"] {
+        let refused = run(&sandbox, &format!("ctl step {count}"));
+        assert_eq!(refused.code, Some(2));
+        let range = "it must be a whole number from 1 to 4294967295";
+        assert!(refused.stderr.contains(range), "{}", refused.stderr);
     }
 }
 
