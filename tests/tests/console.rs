@@ -104,6 +104,11 @@ fn nearest_names_the_particle_at_a_point() {
     assert_eq!(nearest["position"], position);
     let text = run(&sandbox, "ctl nearest -100 -2e1 -.5").success();
     assert!(text.starts_with("particle ") && text.contains(" m away (step 0)"), "{text}");
+    for number in ["nan", "inf", "1e300", "-1.1e7"] {
+        let refused = run(&sandbox, &format!("ctl nearest {number} 0 0"));
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{number}");
+        assert!(refused.stderr.contains("(allowed: -1e7 to 1e7)"), "{}", refused.stderr);
+    }
 }
 
 #[test]
@@ -197,4 +202,24 @@ fn import_names_a_broken_mesh_once() {
     let refused = run(&sandbox, &format!("import {mesh} --bend nan"));
     assert_eq!(refused.code, Some(2));
     assert!(refused.stderr.contains("it must be a number from 0 to 1e20"), "{}", refused.stderr);
+}
+
+#[test]
+fn import_says_which_densities_and_pins_it_accepts() {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let pins = "(allowed: none, 'y > 1.9', 'x < 0 and y >= 1', 'group NAME')";
+    for (options, expected) in [
+        ("--density 0", "(allowed: a number > 0)"),
+        ("--pin [0,1]", pins),
+        ("--pin up", pins),
+        ("--pin y>high", pins),
+    ] {
+        let refused = run(&sandbox, &format!("import {mesh} {options}"));
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{options}");
+        assert!(refused.stderr.contains(expected), "{}", refused.stderr);
+    }
+    let unpinned = run(&sandbox, &format!("import {mesh} --pin y>5"));
+    assert_eq!(unpinned.code, Some(0));
+    assert_eq!(unpinned.stderr, "warning: --pin matches no particle of the shape\n");
 }
