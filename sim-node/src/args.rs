@@ -22,6 +22,8 @@ pub(crate) use lesson::LessonArgs;
 pub(crate) use run::RunArgs;
 pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 
+use crate::output;
+
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
 /// The node publishes every state in shared memory, where other processes read it without copying,
@@ -71,11 +73,11 @@ pub(crate) enum Verb {
 }
 
 /// Reads the command line. Exits with code 2 and the usage if it is invalid.
-#[allow(clippy::print_stderr, clippy::exit, reason = "clap ends the program in the same way")]
+#[allow(clippy::exit, reason = "clap ends the program in the same way")]
 pub(crate) fn parse() -> Args {
     try_parse(std::env::args_os()).unwrap_or_else(|error| {
         let Some(text) = refusal::text(&error) else { error.exit() };
-        eprint!("{text}");
+        output::note(text.trim_end());
         std::process::exit(error.exit_code())
     })
 }

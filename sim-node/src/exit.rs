@@ -2,6 +2,8 @@
 
 use std::process::{ExitCode, Termination};
 
+use crate::output;
+
 /// End of a subcommand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
@@ -24,10 +26,9 @@ impl Termination for Exit {
 }
 
 /// Prints an error as one line on stderr, followed by its causes.
-#[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
 pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        output::note(&format!("error: {error:#}"));
         Exit::Failed
     })
 }

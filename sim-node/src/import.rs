@@ -9,10 +9,9 @@ use sim_contract::read_scene_file;
 use sim_solver::{Scene, SceneError};
 
 use crate::args::ImportArgs;
+use crate::output;
 
 /// Writes a scene that contains the mesh, and so does not need its file.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
-#[allow(clippy::print_stderr, reason = "messages to the user")]
 pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
     let mesh = read_scene_file(&args.mesh)
         .with_context(|| format!("{}: cannot read the mesh", args.mesh))?;
@@ -21,7 +20,9 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         .map_err(import_error)?;
     let counts = scene.counts();
     for warning in scene.warnings() {
-        eprintln!("warning: {warning}");
+        // The user knows the only generator by the options.
+        let warning = warning.replace("generate[0].pinned", "--pin");
+        output::note(&format!("warning: {warning}"));
     }
     let result = format!(
         "# Converted from {} by sim-node import.\n{}",
@@ -29,18 +30,17 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         scene.to_toml()
     );
     let Some(path) = &args.output else {
-        print!("{result}");
-        return Ok(());
+        return output::text(&result);
     };
     write(path, &result, args)?;
-    eprintln!(
+    output::note(&format!(
         "{}: {} particles, {} constraints, {} pins, {} triangles",
         path.display(),
         counts.particles,
         counts.constraints,
         counts.pins,
         counts.triangles
-    );
+    ));
     Ok(())
 }
 
@@ -118,10 +118,7 @@ mod tests {
             error("v 0 0 0\nf 1 1\n", &[]),
             "a.obj: line 2: a face has 2 corners (allowed: 3 or more)"
         );
-        assert_eq!(
-            error(triangle, &["--density", "0"]),
-            "--density: 0 is out of range (allowed: a number > 0)"
-        );
-        assert!(error(triangle, &["--pin", "up"]).starts_with("--pin: 'up' is not an expression"));
+        let expected = "--pin: the mesh has no group 'rim' (it has no groups)";
+        assert_eq!(error(triangle, &["--pin", "group rim"]), expected);
     }
 }

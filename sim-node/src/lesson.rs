@@ -5,9 +5,9 @@ use serde::Serialize;
 use sim_lessons::Lesson;
 
 use crate::args::LessonArgs;
+use crate::output;
 
 /// Prints a lesson, or lists all of them.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(crate) fn lesson(args: &LessonArgs) -> anyhow::Result<()> {
     let text = match (args.lesson, args.json) {
         (None, false) => list().map(|line| line.to_string()).collect(),
@@ -18,8 +18,7 @@ pub(crate) fn lesson(args: &LessonArgs) -> anyhow::Result<()> {
         }
         (Some(lesson), true) => json(&lesson.tables())?,
     };
-    print!("{text}");
-    Ok(())
+    output::text(&text)
 }
 
 /// One line of the list of lessons.

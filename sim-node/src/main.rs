@@ -8,6 +8,7 @@ mod exit;
 mod import;
 mod lesson;
 mod node;
+mod output;
 mod run;
 mod scene_source;
 mod scenes;

@@ -10,7 +10,7 @@ use sim_solver::Scene;
 
 use crate::args::RunArgs;
 use crate::node::{Node, Options};
-use crate::scene_source;
+use crate::{output, scene_source};
 
 /// Summary at the end of a run.
 #[derive(Debug, Serialize)]
@@ -68,18 +68,16 @@ fn steps_in(time: Duration, rate_hz: u32) -> u64 {
     u64::try_from(steps).unwrap_or(u64::MAX)
 }
 
-#[allow(clippy::print_stderr, reason = "messages to the user")]
 fn warn(scene: &Scene) {
     for warning in scene.warnings() {
-        eprintln!("warning: {warning}");
+        output::note(&format!("warning: {warning}"));
     }
 }
 
-#[allow(clippy::print_stderr, reason = "messages to the user")]
 fn print_ready(endpoint: &Endpoint, node: &Node) {
     let settings = &node.scene.solver;
     let threads = node.solver.threads();
-    eprintln!(
+    output::note(&format!(
         "ready: {endpoint}: scene {}, {} particles, {} constraints, {} Hz x {} substeps, \
          {threads} thread{}",
         node.scene.name,
@@ -88,7 +86,7 @@ fn print_ready(endpoint: &Endpoint, node: &Node) {
         settings.rate_hz,
         settings.substeps,
         if threads == 1 { "" } else { "s" },
-    );
+    ));
 }
 
 /// Prints one status line on the terminal, over the previous one.
@@ -129,20 +127,17 @@ impl Summary {
         }
     }
 
-    #[allow(clippy::print_stdout, reason = "the result of the command")]
-    #[allow(clippy::print_stderr, reason = "messages to the user")]
     fn print(&self, as_json: bool, is_after_status: bool) -> anyhow::Result<()> {
         if as_json {
-            println!("{}", serde_json::to_string(self)?);
-            return Ok(());
+            return output::json(self);
         }
         if is_after_status {
-            eprintln!();
+            output::note("");
         }
-        eprintln!(
+        output::note(&format!(
             "done: {} steps, x{:.3} real time, {} late, state hash {}",
             self.steps, self.real_time_factor, self.late_steps, self.state_hash
-        );
+        ));
         Ok(())
     }
 }

@@ -1,13 +1,12 @@
 //! `scenes`, `show` and `check`: scenes without a simulation.
 
-use anyhow::Context;
 use serde::Serialize;
 use sim_solver::builtin;
 use sim_solver::scene::SceneCounts;
 
 use crate::args::{CheckArgs, ScenesArgs, ShowArgs};
-use crate::scene_source;
 use crate::table::{Align, Table};
+use crate::{output, scene_source};
 
 /// One built-in scene in the list.
 #[derive(Serialize)]
@@ -30,12 +29,10 @@ impl SceneRow {
 }
 
 /// Lists the built-in scenes.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(crate) fn list(args: &ScenesArgs) -> anyhow::Result<()> {
     let rows: Vec<SceneRow> = builtin::names().map(SceneRow::new).collect::<Result<_, _>>()?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&rows)?);
-        return Ok(());
+        return output::line(&serde_json::to_string_pretty(&rows)?);
     }
     let mut table = Table::new([
         ("scene", Align::Left),
@@ -55,15 +52,12 @@ pub(crate) fn list(args: &ScenesArgs) -> anyhow::Result<()> {
             text.to_owned(),
         ]);
     }
-    print!("{}", table.text());
-    Ok(())
+    output::text(&table.text())
 }
 
 /// Prints the effective scene.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(crate) fn show(args: &ShowArgs) -> anyhow::Result<()> {
-    print!("{}", scene_source::load(&args.scene)?.to_toml());
-    Ok(())
+    output::text(&scene_source::load(&args.scene)?.to_toml())
 }
 
 /// Result of a check.
@@ -79,7 +73,6 @@ struct CheckedScene {
 }
 
 /// Checks a scene: an error fails, warnings are printed.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let scene = scene_source::load(&args.scene)?;
     let checked = CheckedScene {
@@ -91,18 +84,16 @@ pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
         name: scene.name,
     };
     if args.json {
-        let text = serde_json::to_string(&checked).context("encoding the result")?;
-        println!("{text}");
-        return Ok(());
+        return output::json(&checked);
     }
     let CheckedScene { name, counts, rate_hz, substeps, iterations, warnings } = checked;
-    println!(
+    output::line(&format!(
         "{name}: {} particles, {} constraints, {} pins, {} triangles; {rate_hz} Hz x {substeps} \
          substeps x {iterations} iterations",
         counts.particles, counts.constraints, counts.pins, counts.triangles
-    );
+    ))?;
     for warning in warnings {
-        println!("warning: {warning}");
+        output::line(&format!("warning: {warning}"))?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Child processes that end with their guard.
 
 use std::fmt;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, empty};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -65,7 +65,7 @@ impl Process {
     /// # Panics
     /// If the program does not start.
     pub fn start(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
-        Self::spawn(program, sandbox.domain(), args)
+        Self::spawn(program, sandbox.domain(), args, Stdio::piped())
     }
 
     /// Starts a program in a domain given by name; "" is the default domain.
@@ -73,19 +73,19 @@ impl Process {
     /// # Panics
     /// If the program does not start.
     pub fn start_in(program: Program, domain: &str, args: &[&str]) -> Self {
-        Self::spawn(program, domain, args)
+        Self::spawn(program, domain, args, Stdio::piped())
     }
 
     #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
-    fn spawn(program: Program, domain: &str, args: &[&str]) -> Self {
+    fn spawn(program: Program, domain: &str, args: &[&str], stdout: Stdio) -> Self {
         let mut command = Command::new(program.path());
         // A process group of its own, so that Ctrl-C in the terminal reaches only the parent, which
         // ends its children in order.
         command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.stdin(Stdio::null()).stdout(stdout).stderr(Stdio::piped());
         let title = format!("{program:?} {}", args.join(" "));
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{title}: {error}"));
-        let stdout = Captured::new(child.stdout.take().expect("a piped stdout"));
+        let stdout = child.stdout.take().map_or_else(|| Captured::new(empty()), Captured::new);
         let stderr = Captured::new(child.stderr.take().expect("a piped stderr"));
         Self { title, child, stdout, stderr }
     }
@@ -106,6 +106,19 @@ impl Process {
     /// If the program does not end before the deadline.
     pub fn run(program: Program, sandbox: &Sandbox, args: &[&str]) -> Finished {
         Self::start(program, sandbox, args).wait()
+    }
+
+    /// Runs a program to its end, with its stdout written to a file or pipe.
+    ///
+    /// # Panics
+    /// If the program does not end before the deadline.
+    pub fn run_into(
+        stdout: impl Into<Stdio>,
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+    ) -> Finished {
+        Self::spawn(program, sandbox.domain(), args, stdout.into()).wait()
     }
 
     /// Waits for a line on stderr that starts with "ready".

@@ -42,10 +42,27 @@ fn a_rejection_names_the_remedy() {
         ("move-collider 0 0 0 0", "unknown_collider: the scene has no such collider (it has none)"),
         ("release 3", "not_grabbed: the particle is not grabbed (`ctl grab` grabs it)"),
         ("grab 90 nan 0 0", "non_finite: a number is not finite (allowed: finite numbers)"),
-        ("step 0", "out_of_range: a value is out of its range (allowed: 1 or more)"),
     ] {
         let rejected = run(&sandbox, &format!("ctl {command}"));
         assert_eq!(rejected.stdout, format!("rejected at step 1: {expected}\n"));
+    }
+}
+
+#[test]
+fn a_wait_for_steps_ends_with_the_timeout_and_a_pause_ends_the_steps() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let late = run(&sandbox, "ctl step 100000000 --timeout 100ms");
+    assert_eq!((late.code, late.stdout.as_str()), (Some(1), ""), "{}", late.stderr);
+    assert!(late.stderr.contains("step 100000000 has not come within"), "{}", late.stderr);
+    assert!(late.stderr.contains("`ctl pause` ends that"), "{}", late.stderr);
+    let next = ctl(&sandbox, &["pause"])["step"].as_u64();
+    assert_eq!(ctl(&sandbox, &["step"])["step"].as_u64(), next);
+    for count in ["0", "1.5", "4294967296"] {
+        let refused = run(&sandbox, &format!("ctl step {count}"));
+        assert_eq!(refused.code, Some(2));
+        let range = "it must be a whole number from 1 to 4294967295";
+        assert!(refused.stderr.contains(range), "{}", refused.stderr);
     }
 }
 
@@ -87,6 +104,11 @@ fn nearest_names_the_particle_at_a_point() {
     assert_eq!(nearest["position"], position);
     let text = run(&sandbox, "ctl nearest -100 -2e1 -.5").success();
     assert!(text.starts_with("particle ") && text.contains(" m away (step 0)"), "{text}");
+    for number in ["nan", "inf", "1e300", "-1.1e7"] {
+        let refused = run(&sandbox, &format!("ctl nearest {number} 0 0"));
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{number}");
+        assert!(refused.stderr.contains("(allowed: -1e7 to 1e7)"), "{}", refused.stderr);
+    }
 }
 
 #[test]
@@ -180,4 +202,24 @@ fn import_names_a_broken_mesh_once() {
     let refused = run(&sandbox, &format!("import {mesh} --bend nan"));
     assert_eq!(refused.code, Some(2));
     assert!(refused.stderr.contains("it must be a number from 0 to 1e20"), "{}", refused.stderr);
+}
+
+#[test]
+fn import_says_which_densities_and_pins_it_accepts() {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let pins = "(allowed: none, 'y > 1.9', 'x < 0 and y >= 1', 'group NAME')";
+    for (options, expected) in [
+        ("--density 0", "(allowed: a number > 0)"),
+        ("--pin [0,1]", pins),
+        ("--pin up", pins),
+        ("--pin y>high", pins),
+    ] {
+        let refused = run(&sandbox, &format!("import {mesh} {options}"));
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""), "{options}");
+        assert!(refused.stderr.contains(expected), "{}", refused.stderr);
+    }
+    let unpinned = run(&sandbox, &format!("import {mesh} --pin y>5"));
+    assert_eq!(unpinned.code, Some(0));
+    assert_eq!(unpinned.stderr, "warning: --pin matches no particle of the shape\n");
 }

@@ -33,4 +33,5 @@ pub use generate::rope::Rope;
 pub use generate::web::Web;
 pub use generate::{Generator, Shape};
 pub use mesh::{Mesh, ParsedMesh};
+pub use read::pins::check_pin_expression;
 pub use source::{LoadError, is_path};

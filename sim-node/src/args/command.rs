@@ -88,10 +88,13 @@ pub(crate) enum CommandVerb {
     /// Resume a paused node
     Resume,
     /// Run COUNT steps of a paused node, and wait for the last one
+    ///
+    /// The wait ends after --timeout and the time of one step. The node goes on to the last step all
+    /// the same, or until `ctl pause`.
     #[command(after_help = "Example: sim-node ctl step 10")]
     Step {
-        /// Number of steps, at least 1
-        #[arg(default_value_t = 1, value_parser = whole::<u32>(0..=u64::from(u32::MAX)))]
+        /// Number of steps, 1 to 4294967295
+        #[arg(default_value_t = 1, value_parser = whole::<u32>(1..=u64::from(u32::MAX)))]
         count: u32,
     },
     /// Restore the initial state in the next step; the step number continues

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use clap::{Args as ClapArgs, Subcommand};
-use sim_contract::{PARAMETERS, Parameter};
+use sim_contract::{NumberRange, PARAMETERS, Parameter};
 
-use super::command::{CommandVerb, PointArgs};
+use super::command::CommandVerb;
 use super::endpoint::EndpointArgs;
-use super::value::{index, time};
+use super::value::{index, number_within, time};
 
 #[derive(Debug, ClapArgs)]
 #[command(
@@ -83,7 +83,27 @@ pub(crate) enum QueryVerb {
         allow_negative_numbers = true,
         after_help = "Example: sim-node ctl nearest 0.5 -0.2 0"
     )]
-    Nearest(PointArgs),
+    Nearest(NearestArgs),
+}
+
+/// A point that no node judges.
+#[derive(Debug, Clone, Copy, ClapArgs)]
+pub(crate) struct NearestArgs {
+    /// Point in m, relative to the origin of the scene, -1e7 to 1e7
+    #[arg(value_parser = number_within(NumberRange::COORDINATE))]
+    x: f32,
+    /// Point in m, relative to the origin of the scene, -1e7 to 1e7
+    #[arg(value_parser = number_within(NumberRange::COORDINATE))]
+    y: f32,
+    /// Point in m, relative to the origin of the scene, -1e7 to 1e7
+    #[arg(value_parser = number_within(NumberRange::COORDINATE))]
+    z: f32,
+}
+
+impl NearestArgs {
+    pub(crate) fn vector(self) -> [f32; 3] {
+        [self.x, self.y, self.z]
+    }
 }
 
 fn parameter(text: &str) -> Result<Parameter, String> {

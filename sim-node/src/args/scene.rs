@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use sim_contract::NumberRange;
+use sim_solver::scene::check_pin_expression;
 
-use super::value::number_in;
+use super::value::{number_in, number_within};
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
@@ -57,12 +58,12 @@ pub(crate) struct ImportArgs {
     /// Replace an existing file
     #[arg(long)]
     pub(crate) overwrite: bool,
-    /// Mass per area, in kg per square unit
+    /// Mass per area, in kg per square unit, > 0
     #[arg(long, value_name = "KG", default_value_t = 0.2, allow_negative_numbers = true,
-        value_parser = number_in(0.0..=f32::MAX))]
+        value_parser = number_within(NumberRange::POSITIVE))]
     pub(crate) density: f32,
     /// Vertices to pin: 'y > 1.9', 'x < 0 and z >= 1', 'group NAME', or none
-    #[arg(long, value_name = "CHOICE", default_value = "none")]
+    #[arg(long, value_name = "CHOICE", default_value = "none", value_parser = pin_choice)]
     pub(crate) pin: String,
     /// Compliance of structural constraints, in m/N
     #[arg(long, value_name = "M/N", default_value_t = 0.0, allow_negative_numbers = true,
@@ -76,4 +77,9 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "M/N", default_value_t = 1e-2, allow_negative_numbers = true,
         value_parser = number_in(0.0..=NumberRange::COMPLIANCE.max))]
     pub(crate) bend: f32,
+}
+
+/// Parses the choice of pinned vertices.
+fn pin_choice(text: &str) -> Result<String, String> {
+    check_pin_expression(text).map(|()| text.to_owned())
 }

@@ -3,6 +3,8 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
+use sim_contract::NumberRange;
+
 /// Parser of whole numbers in a range.
 pub(super) fn whole<T: TryFrom<u64>>(
     range: RangeInclusive<u64>,
@@ -35,10 +37,15 @@ pub(super) fn number_in(
     move |text| {
         let number = text.parse().ok().filter(|number| range.contains(number));
         let (min, max) = (range.start(), range.end());
-        number.ok_or_else(|| match *max {
-            f32::MAX => format!("it must be a number from {min}"),
-            max => format!("it must be a number from {min} to {max:?}"),
-        })
+        number.ok_or_else(|| format!("it must be a number from {min} to {max:?}"))
+    }
+}
+
+/// Parser of numbers in a range that has a text of its own.
+pub(super) fn number_within(range: NumberRange) -> impl Fn(&str) -> Result<f32, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(*number));
+        number.ok_or_else(|| format!("it is not a number in range (allowed: {})", range.text))
     }
 }
 
@@ -64,7 +71,12 @@ mod tests {
         for text in ["-1", "1e21", "nan", "soft"] {
             assert_eq!(compliance(text).unwrap_err(), "it must be a number from 0 to 1e20");
         }
-        assert_eq!(number_in(0.0..=f32::MAX)("inf").unwrap_err(), "it must be a number from 0");
+        let density = number_within(NumberRange::POSITIVE);
+        assert_eq!(density("0.2"), Ok(0.2));
+        for text in ["0", "-1", "inf", "heavy"] {
+            let expected = "it is not a number in range (allowed: a number > 0)";
+            assert_eq!(density(text).unwrap_err(), expected);
+        }
         assert!(time("10").unwrap_err().contains("such as 500ms"));
     }
 }

@@ -4,11 +4,13 @@ use std::time::Duration;
 
 use anyhow::bail;
 use serde::Serialize;
+use sim_contract::clock::monotonic_ns;
 use sim_contract::{Action, Client, OUTCOME_FLAG_CONTROL, Outcome};
 
 use super::{hint, rejection};
 use crate::args::CtlArgs;
 use crate::exit::Exit;
+use crate::output;
 
 /// An outcome in JSON: the command with its result.
 #[derive(Serialize)]
@@ -22,8 +24,6 @@ struct OutcomeRow {
 }
 
 /// Sends a command and prints its outcome. Waits for the last step of `step`.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
-#[allow(clippy::print_stderr, reason = "messages to the user")]
 pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyhow::Result<Exit> {
     let outcome = client.request(action, args.timeout)?;
     if let Action::Step { count } = action
@@ -40,21 +40,21 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
     };
     let (step, reason) = (row.step, row.reason);
     if args.json {
-        println!("{}", serde_json::to_string(&row)?);
+        output::json(&row)?;
     } else if outcome.is_applied() {
-        println!("applied at step {step}");
+        output::line(&format!("applied at step {step}"))?;
     } else {
         let explanation = outcome
             .reason()
             .map(|reason| rejection::explain(client, args.timeout, &row.action, reason))
             .map_or_else(String::new, |explanation| format!(": {explanation}"));
-        println!("rejected at step {step}: {reason}{explanation}");
+        output::line(&format!("rejected at step {step}: {reason}{explanation}"))?;
     }
     if !outcome.is_applied() {
         return Ok(Exit::Rejected);
     }
     if let Some(hint) = hint::for_applied(client, args.timeout, &row.action) {
-        eprintln!("hint: {hint}");
+        output::note(&format!("hint: {hint}"));
     }
     Ok(Exit::Done)
 }
@@ -67,17 +67,25 @@ fn wait_for_steps(
     count: u32,
 ) -> anyhow::Result<()> {
     let last = outcome.step + u64::from(count) - 1;
+    let is_replay = outcome.flags & OUTCOME_FLAG_CONTROL != 0;
     let timeout = timeout + period(client, timeout)?;
-    while let Some(snapshot) = client.next_snapshot(timeout)? {
-        if snapshot.header().step >= last {
-            return Ok(());
+    let start_ns = monotonic_ns();
+    let remaining = || timeout.saturating_sub(Duration::from_nanos(monotonic_ns() - start_ns));
+    while !remaining().is_zero() {
+        let silence_max = if is_replay { timeout } else { remaining() };
+        match client.next_snapshot(silence_max)? {
+            Some(snapshot) if snapshot.header().step >= last => return Ok(()),
+            Some(_) => {}
+            // A replay may end before it has shown all of them.
+            None if is_replay => return Ok(()),
+            None if client.is_owner_alive() => {}
+            None => bail!("the node ended before step {last}"),
         }
     }
-    // A replay may end before it has shown all of them.
-    if outcome.flags & OUTCOME_FLAG_CONTROL != 0 {
-        return Ok(());
-    }
-    bail!("the node began the steps up to {last}, but published no snapshot for {timeout:?}")
+    bail!(
+        "step {last} has not come within {timeout:?}: the node is still stepping (`ctl pause` ends \
+         that, a longer --timeout waits for it)"
+    )
 }
 
 /// Wall-clock time between two steps, which is long at a small time scale.

@@ -5,10 +5,10 @@ use serde_json::{Map, Value};
 use sim_contract::{Client, OffMeaning, Parameter, ParameterValue, Setting};
 
 use crate::args::CtlArgs;
+use crate::output;
 use crate::table::{Align, Table};
 
 /// Prints one parameter, or all of them.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(super) fn print(
     client: &mut Client,
     args: &CtlArgs,
@@ -24,8 +24,7 @@ pub(super) fn print(
         if let Value::Object(values) = serde_json::to_value(parameters.values)? {
             object.extend(values.into_iter().filter(|(name, _)| is_asked(name)));
         }
-        println!("{}", Value::Object(object));
-        return Ok(());
+        return output::json(&Value::Object(object));
     }
     let mut table = Table::new([
         ("parameter", Align::Left),
@@ -37,8 +36,7 @@ pub(super) fn print(
     for setting in settings.iter().filter(|setting| is_asked(setting.parameter.name())) {
         table.add(cells(setting));
     }
-    print!("since step {step}\n{}", table.text());
-    Ok(())
+    output::text(&format!("since step {step}\n{}", table.text()))
 }
 
 /// Name, kind of constraints, value and unit.

@@ -5,6 +5,7 @@ use serde::Serialize;
 use sim_contract::{Client, ParticleFlags, ParticleState, Snapshot};
 
 use crate::args::CtlArgs;
+use crate::output;
 use crate::table::{Align, Table};
 
 /// A particle in JSON.
@@ -46,7 +47,6 @@ struct ParticleRows {
 }
 
 /// Prints the particles with these indices, or all of them.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(super) fn print(client: &mut Client, args: &CtlArgs, indices: &[u32]) -> anyhow::Result<()> {
     let snapshot = latest_snapshot(client, args)?;
     let states = snapshot.particles();
@@ -64,8 +64,7 @@ pub(super) fn print(client: &mut Client, args: &CtlArgs, indices: &[u32]) -> any
     };
     let step = snapshot.header().step;
     if args.json {
-        println!("{}", serde_json::to_string(&ParticleRows { step, particles })?);
-        return Ok(());
+        return output::json(&ParticleRows { step, particles });
     }
     let number = |title| (title, Align::Right);
     let mut table = Table::new([
@@ -82,8 +81,7 @@ pub(super) fn print(client: &mut Client, args: &CtlArgs, indices: &[u32]) -> any
     for particle in &particles {
         table.add(particle.cells());
     }
-    print!("step {step}\n{}", table.text());
-    Ok(())
+    output::text(&format!("step {step}\n{}", table.text()))
 }
 
 /// The particle nearest to a point, in JSON.
@@ -96,7 +94,6 @@ struct NearestRow {
 }
 
 /// Prints the particle nearest to a point; of several, the one with the lowest index.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(super) fn print_nearest(
     client: &mut Client,
     args: &CtlArgs,
@@ -108,12 +105,12 @@ pub(super) fn print_nearest(
     let position = snapshot.particles()[index].position;
     let step = snapshot.header().step;
     if args.json {
-        println!("{}", serde_json::to_string(&NearestRow { step, index, position, distance })?);
-        return Ok(());
+        return output::json(&NearestRow { step, index, position, distance });
     }
     let [x, y, z] = position;
-    println!("particle {index} at {x:.4} {y:.4} {z:.4}, {distance:.4} m away (step {step})");
-    Ok(())
+    output::line(&format!(
+        "particle {index} at {x:.4} {y:.4} {z:.4}, {distance:.4} m away (step {step})"
+    ))
 }
 
 /// Index of the nearest particle and its distance in m; `None` without particles.
@@ -136,17 +133,14 @@ struct HashRow {
 }
 
 /// Prints the state hash of the newest snapshot.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(super) fn print_hash(client: &mut Client, args: &CtlArgs) -> anyhow::Result<()> {
     let snapshot = latest_snapshot(client, args)?;
     let (step, hash) = (snapshot.header().step, snapshot.header().state_hash);
     let row = HashRow { step, state_hash: format!("{hash:016x}") };
     if args.json {
-        println!("{}", serde_json::to_string(&row)?);
-    } else {
-        println!("step {} state hash {}", row.step, row.state_hash);
+        return output::json(&row);
     }
-    Ok(())
+    output::line(&format!("step {} state hash {}", row.step, row.state_hash))
 }
 
 fn latest_snapshot(client: &mut Client, args: &CtlArgs) -> anyhow::Result<Snapshot> {

@@ -5,6 +5,7 @@ use serde::Serialize;
 use sim_contract::{Client, NodeStatus};
 
 use crate::args::CtlArgs;
+use crate::output;
 
 /// A status in JSON.
 #[derive(Serialize)]
@@ -92,18 +93,16 @@ impl StatusRow {
 }
 
 /// Prints the newest status.
-#[allow(clippy::print_stdout, reason = "the result of the command")]
 pub(super) fn print(client: &mut Client, args: &CtlArgs) -> anyhow::Result<()> {
     let Some(status) = client.status(args.timeout)? else {
         bail!("the node published no status within {:?}; is it stopped?", args.timeout);
     };
     let row = StatusRow::new(&status);
     if args.json {
-        println!("{}", serde_json::to_string(&row)?);
-        return Ok(());
+        return output::json(&row);
     }
     for (key, value) in row.lines() {
-        println!("{key:<14} {value}");
+        output::line(&format!("{key:<14} {value}"))?;
     }
     Ok(())
 }

@@ -77,6 +77,7 @@ mod tests {
         assert_eq!(apply(Control::Pause), Ok(progress(true, 0, false)));
         assert_eq!(apply(Control::Step { count: 0 }), Err(Reason::OutOfRange));
         assert_eq!(apply(Control::Step { count: 3 }), Ok(progress(true, 3, false)));
+        assert_eq!(apply(Control::Pause), Ok(progress(true, 0, false)), "it cancels the steps");
         assert_eq!(apply(Control::Resume), Ok(progress(false, 0, false)));
     }
 

@@ -8,7 +8,7 @@ mod generator_fields;
 mod generator_file;
 mod limits;
 mod mesh;
-mod pins;
+pub(super) mod pins;
 mod reader;
 mod settings;
 mod syntax;

@@ -7,14 +7,42 @@ pub(super) fn matching_vertices(expression: &str, mesh: &Mesh) -> Result<Vec<u32
     if let Some(name) = expression.trim().strip_prefix("group ") {
         return mesh.groups.get(name.trim()).cloned().ok_or_else(|| {
             let names: Vec<_> = mesh.groups.keys().map(String::as_str).collect();
-            format!("the mesh has no group '{}' (allowed: {})", name.trim(), names.join(", "))
+            let cure = match names.join(", ").as_str() {
+                "" => "it has no groups".to_owned(),
+                names => format!("allowed: {names}"),
+            };
+            format!("the mesh has no group '{}' ({cure})", name.trim())
         });
     }
-    let terms: Result<Vec<_>, _> = expression.split(" and ").map(Comparison::parse).collect();
-    let terms = terms?;
+    let terms = parse_terms(expression)
+        .map_err(|term| unknown_expression(term, "none, a list of indices"))?;
     let all = (0_u32..).zip(&mesh.vertices);
     let pinned = all.filter(|(_, vertex)| terms.iter().all(|term| term.matches(vertex)));
     Ok(pinned.map(|(index, _)| index).collect())
+}
+
+/// Checks the form of the choice of pinned vertices that a command line gives for a mesh: `none` or
+/// an expression. The names of groups are left to the mesh.
+///
+/// # Errors
+/// The text is neither.
+pub fn check_pin_expression(text: &str) -> Result<(), String> {
+    if text == "none" || text.trim().starts_with("group ") {
+        return Ok(());
+    }
+    parse_terms(text).map(|_| ()).map_err(|term| unknown_expression(term, "none"))
+}
+
+/// Parses the comparisons of an expression. The error is the term that is none.
+fn parse_terms(expression: &str) -> Result<Vec<Comparison>, &str> {
+    expression.split(" and ").map(|term| Comparison::parse(term).ok_or(term.trim())).collect()
+}
+
+fn unknown_expression(term: &str, others: &str) -> String {
+    format!(
+        "'{term}' is not an expression for vertices (allowed: {others}, 'y > 1.9', \
+         'x < 0 and y >= 1', 'group NAME')"
+    )
 }
 
 /// A comparison of a coordinate with a number.
@@ -28,21 +56,11 @@ struct Comparison {
 const OPERATORS: [&str; 4] = ["<=", ">=", "<", ">"];
 
 impl Comparison {
-    fn parse(term: &str) -> Result<Self, String> {
-        let problem = || {
-            format!(
-                "'{}' is not an expression for vertices (allowed: none, a list of indices, 'y > 1.9', \
-                 'x < 0 and y >= 1', 'group NAME')",
-                term.trim()
-            )
-        };
-        let (operator, (axis, number)) = OPERATORS
-            .iter()
-            .find_map(|operator| Some((operator, term.split_once(operator)?)))
-            .ok_or_else(problem)?;
-        let axis = ["x", "y", "z"].iter().position(|name| *name == axis.trim());
-        let number: f32 = number.trim().parse().map_err(|_| problem())?;
-        Ok(Self { axis: axis.ok_or_else(problem)?, operator, number })
+    fn parse(term: &str) -> Option<Self> {
+        let (operator, (axis, number)) =
+            OPERATORS.iter().find_map(|operator| Some((operator, term.split_once(operator)?)))?;
+        let axis = ["x", "y", "z"].iter().position(|name| *name == axis.trim())?;
+        Some(Self { axis, operator, number: number.trim().parse().ok()? })
     }
 
     fn matches(&self, vertex: &[f32; 3]) -> bool {
