@@ -96,7 +96,7 @@ fn show_status(node: &Node) {
     // A failure to show the status is no reason to stop.
     let _ignored = write!(
         stderr(),
-        "\r\x1b[Kstep {} {} x{:.3} real time | step time p50 {:.1} us p99 {:.1} us | {} late | {} readers",
+        "\r\x1b[Kstep {} {} x{:.3} real time | step time p50 {:.1} µs p99 {:.1} µs | {} late | {} readers",
         status.step,
         if status.is_paused() { "paused" } else { "at" },
         status.real_time_factor,

@@ -79,6 +79,10 @@ fn invalid_options_exit_with_2_and_invalid_rates_name_the_range() {
     );
     assert_refused(&run(&sandbox, &["run", "--name", "a/b"]), 2, &["a/b"]);
     assert_refused(&run(&sandbox, &["run", "--domain", "Big Domain"]), 2, &["Big Domain"]);
+    for empty in [&["run", "--domain", ""][..], &["run", "--domain="]] {
+        assert_eq!(run(&sandbox, empty).code, Some(2), "{empty:?}");
+    }
+    assert_refused(&run(&sandbox, &["run", "--domain", ""]), 2, &["1 to 24 characters"]);
 }
 
 #[test]

@@ -41,10 +41,30 @@ fn a_rejection_names_the_remedy() {
         ("move-anchor 7 0 0 0", "unknown_anchor: the scene has no such anchor (it has none)"),
         ("move-collider 0 0 0 0", "unknown_collider: the scene has no such collider (it has none)"),
         ("release 3", "not_grabbed: the particle is not grabbed (`ctl grab` grabs it)"),
+        (
+            "set tear_force inf",
+            "non_finite: a number is not finite (allowed: finite numbers, or off for no limit)",
+        ),
         ("grab 90 nan 0 0", "non_finite: a number is not finite (allowed: finite numbers)"),
     ] {
         let rejected = run(&sandbox, &format!("ctl {command}"));
         assert_eq!(rejected.stdout, format!("rejected at step 1: {expected}\n"));
+    }
+}
+
+#[test]
+fn a_rejected_load_names_both_rates_and_the_cure() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "rope", "--paused"]);
+    let scene = sandbox.write("fast.toml", "version = 1\n[solver]\nrate_hz = 777\n");
+    let rejected = run(&sandbox, &format!("ctl load {scene}"));
+    assert_eq!(rejected.code, Some(4), "{}", rejected.stderr);
+    let rate_hz = ctl(&sandbox, &["status"])["rate_hz"].clone();
+    for part in [
+        format!("the scene runs at 777 Hz, the node at {rate_hz} Hz"),
+        format!("`sim-node run --rate {rate_hz}`"),
+    ] {
+        assert!(rejected.stdout.contains(&part), "{part} is not in: {}", rejected.stdout);
     }
 }
 
@@ -54,7 +74,7 @@ fn a_wait_for_steps_ends_with_the_timeout_and_a_pause_ends_the_steps() {
     let _node = node(&sandbox, &["run", "curtain", "--paused"]);
     let late = run(&sandbox, "ctl step 100000000 --timeout 100ms");
     assert_eq!((late.code, late.stdout.as_str()), (Some(1), ""), "{}", late.stderr);
-    assert!(late.stderr.contains("step 100000000 has not come within"), "{}", late.stderr);
+    assert!(late.stderr.contains("step 100000000 has not come in time"), "{}", late.stderr);
     assert!(late.stderr.contains("`ctl pause` ends that"), "{}", late.stderr);
     let next = ctl(&sandbox, &["pause"])["step"].as_u64();
     assert_eq!(ctl(&sandbox, &["step"])["step"].as_u64(), next);

@@ -99,8 +99,8 @@ impl Endpoint {
     }
 
     /// Returns the endpoint for the options `--domain` and `--name` of a program. Without `--domain`, the
-    /// environment variable [`DOMAIN_VARIABLE`] gives the domain. An empty domain stands for
-    /// iceoryx2's own.
+    /// environment variable [`DOMAIN_VARIABLE`] gives the domain. An empty variable stands
+    /// for iceoryx2's own domain.
     ///
     /// # Errors
     /// Same as [`Endpoint::new`], or the environment variable is not a valid domain.
@@ -118,16 +118,16 @@ impl Endpoint {
         {
             return Err(EndpointError::Variable { domain: domain.to_owned() });
         }
-        let domain = domain.or(variable).filter(|domain| !domain.is_empty());
+        let domain = domain.or(variable.filter(|domain| !domain.is_empty()));
         Self::new(domain, name.unwrap_or(NAME_DEFAULT))
     }
 
-    /// Parses the value of an option `--domain`, which may be empty.
+    /// Parses the value of an option `--domain`.
     ///
     /// # Errors
     /// Same as [`Endpoint::new`].
     pub fn parse_domain(text: &str) -> Result<String, EndpointError> {
-        Self::resolve(Some(text), None, None).map(|_| text.to_owned())
+        Self::new(Some(text), NAME_DEFAULT).map(|_| text.to_owned())
     }
 
     /// Parses the value of an option `--name`.
@@ -240,7 +240,8 @@ mod tests {
     fn the_option_overrides_the_variable() {
         assert_eq!(parse(Some("lab"), &[]).unwrap().0.domain(), Some("lab"));
         assert_eq!(parse(Some("lab"), &["--domain", "home"]).unwrap().0.domain(), Some("home"));
-        assert_eq!(parse(Some("lab"), &["--domain="]).unwrap().0.domain(), None);
+        let error = parse(Some("lab"), &["--domain="]).unwrap_err().to_string();
+        assert!(error.starts_with("'' is not a valid domain (allowed: 1 to 24 "), "{error}");
         assert_eq!(parse(Some(""), &[]).unwrap().0.domain(), None);
     }
 

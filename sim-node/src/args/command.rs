@@ -89,8 +89,8 @@ pub(crate) enum CommandVerb {
     Resume,
     /// Run COUNT steps of a paused node, and wait for the last one
     ///
-    /// The wait ends after --timeout and the time of one step. The node goes on to the last step all
-    /// the same, or until `ctl pause`.
+    /// With --timeout, the wait ends after this time and that of one step. The node goes on to the last
+    /// step all the same, or until `ctl pause`.
     #[command(after_help = "Example: sim-node ctl step 10")]
     Step {
         /// Number of steps, 1 to 4294967295

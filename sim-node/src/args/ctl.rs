@@ -9,6 +9,8 @@ use super::command::CommandVerb;
 use super::endpoint::EndpointArgs;
 use super::value::{index, number_within, time};
 
+const TIMEOUT_DEFAULT: Duration = Duration::from_secs(5);
+
 #[derive(Debug, ClapArgs)]
 #[command(
     arg_required_else_help = true,
@@ -17,7 +19,7 @@ use super::value::{index, number_within, time};
     after_help = "A command takes effect at a step boundary; its outcome names the first step that \
         shows it.\nAll calls of `ctl` are one client: what one call grabs, a later call can \
         release.\n\n\
-        Exit codes: 0 applied or answered, 1 no answer, 2 usage error, 4 rejected.\n\n\
+        Exit codes: 0 applied or answered, 1 failed, 2 usage error, 4 rejected.\n\n\
         Examples:\n  \
         sim-node ctl nearest 0.5 0.5 0\n  \
         sim-node ctl particles 90\n  \
@@ -35,15 +37,21 @@ use super::value::{index, number_within, time};
 pub(crate) struct CtlArgs {
     #[command(subcommand)]
     pub(crate) verb: CtlVerb,
-    /// Wait at most this long for the node's answer
-    #[arg(long, value_name = "TIME", default_value = "5s",
-        value_parser = time)]
-    pub(crate) timeout: Duration,
+    /// Wait at most this long for the node's answer [default: 5s]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub(crate) timeout: Option<Duration>,
     /// Print one JSON object on stdout
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) endpoint: EndpointArgs,
+}
+
+impl CtlArgs {
+    /// Longest wait for an answer of the node.
+    pub(crate) fn timeout(&self) -> Duration {
+        self.timeout.unwrap_or(TIMEOUT_DEFAULT)
+    }
 }
 
 #[derive(Debug, Subcommand)]

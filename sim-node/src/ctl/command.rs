@@ -25,11 +25,11 @@ struct OutcomeRow {
 
 /// Sends a command and prints its outcome. Waits for the last step of `step`.
 pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyhow::Result<Exit> {
-    let outcome = client.request(action, args.timeout)?;
+    let outcome = client.request(action, args.timeout())?;
     if let Action::Step { count } = action
         && outcome.is_applied()
     {
-        wait_for_steps(client, args.timeout, &outcome, count)?;
+        wait_for_steps(client, args, &outcome, count)?;
     }
     let row = OutcomeRow {
         index: outcome.index,
@@ -46,45 +46,53 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
     } else {
         let explanation = outcome
             .reason()
-            .map(|reason| rejection::explain(client, args.timeout, &row.action, reason))
+            .map(|reason| rejection::explain(client, args.timeout(), &row.action, reason))
             .map_or_else(String::new, |explanation| format!(": {explanation}"));
         output::line(&format!("rejected at step {step}: {reason}{explanation}"))?;
     }
     if !outcome.is_applied() {
         return Ok(Exit::Rejected);
     }
-    if let Some(hint) = hint::for_applied(client, args.timeout, &row.action) {
+    if let Some(hint) = hint::for_applied(client, args.timeout(), &row.action) {
         output::note(&format!("hint: {hint}"));
     }
     Ok(Exit::Done)
 }
 
-/// Waits until the steps are made, so that a query after this call shows them.
+/// Waits until the steps are made, so that a query after this call shows them. Without `--timeout`,
+/// waits as long as the node makes steps.
 fn wait_for_steps(
     client: &mut Client,
-    timeout: Duration,
+    args: &CtlArgs,
     outcome: &Outcome,
     count: u32,
 ) -> anyhow::Result<()> {
     let last = outcome.step + u64::from(count) - 1;
-    let is_replay = outcome.flags & OUTCOME_FLAG_CONTROL != 0;
-    let timeout = timeout + period(client, timeout)?;
+    let silence_max = args.timeout() + period(client, args.timeout())?;
     let start_ns = monotonic_ns();
-    let remaining = || timeout.saturating_sub(Duration::from_nanos(monotonic_ns() - start_ns));
-    while !remaining().is_zero() {
-        let silence_max = if is_replay { timeout } else { remaining() };
-        match client.next_snapshot(silence_max)? {
-            Some(snapshot) if snapshot.header().step >= last => return Ok(()),
-            Some(_) => {}
-            // A replay may end before it has shown all of them.
-            None if is_replay => return Ok(()),
-            None if client.is_owner_alive() => {}
-            None => bail!("the node ended before step {last}"),
+    let passed = || Duration::from_nanos(monotonic_ns() - start_ns);
+    let remaining = || match args.timeout {
+        Some(_) => silence_max.saturating_sub(passed()),
+        None => silence_max,
+    };
+    while let Some(snapshot) = client.next_snapshot(remaining())? {
+        if snapshot.header().step >= last {
+            return Ok(());
+        }
+        if remaining().is_zero() {
+            break;
         }
     }
+    // A replay may end before it has shown all of them.
+    if outcome.flags & OUTCOME_FLAG_CONTROL != 0 {
+        return Ok(());
+    }
+    if !client.is_owner_alive() {
+        bail!("the node ended before step {last}");
+    }
     bail!(
-        "step {last} has not come within {timeout:?}: the node is still stepping (`ctl pause` ends \
-         that, a longer --timeout waits for it)"
+        "step {last} has not come in time: the node is still stepping (`ctl pause` ends that, a \
+         longer --timeout waits for it)"
     )
 }
 

@@ -14,8 +14,8 @@ pub(super) fn print(
     args: &CtlArgs,
     parameter: Option<Parameter>,
 ) -> anyhow::Result<()> {
-    let Some(parameters) = client.parameters(args.timeout)? else {
-        bail!("the node published no parameters within {:?}; is it stopped?", args.timeout);
+    let Some(parameters) = client.parameters(args.timeout())? else {
+        bail!("the node published no parameters within {:?}; is it stopped?", args.timeout());
     };
     let is_asked = |name: &str| parameter.is_none_or(|parameter| parameter.name() == name);
     let step = parameters.header.step;

@@ -144,9 +144,9 @@ pub(super) fn print_hash(client: &mut Client, args: &CtlArgs) -> anyhow::Result<
 }
 
 fn latest_snapshot(client: &mut Client, args: &CtlArgs) -> anyhow::Result<Snapshot> {
-    match client.latest_snapshot(args.timeout)? {
+    match client.latest_snapshot(args.timeout())? {
         Some(snapshot) => Ok(snapshot),
-        None => bail!("the node published no snapshot within {:?}; is it stopped?", args.timeout),
+        None => bail!("the node published no snapshot within {:?}; is it stopped?", args.timeout()),
     }
 }
 

@@ -8,6 +8,8 @@ use sim_contract::{
 };
 use sim_solver::Scene;
 
+use crate::scene_source;
+
 /// Explains a rejection: the meaning of its reason, and the remedy in parentheses where one is known.
 pub(super) fn explain(
     client: &mut Client,
@@ -39,6 +41,10 @@ fn remedy(
         {
             return Some("a recording accepts only pause, resume and step".to_owned());
         }
+        Reason::NoEffectHere if let Action::Load { scene } = action => {
+            let scene_rate_hz = scene_source::load(scene.as_str()).ok()?.solver.rate_hz;
+            return Some(load_remedy(scene_rate_hz, status()?.rate_hz));
+        }
         _ => return fixed_remedy(action, reason),
     };
     Some(allowed_indices(count))
@@ -69,6 +75,7 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
             return Some(format!("allowed: {}", PARAMETERS.map(|info| info.name).join(", ")));
         }
         Reason::OutOfRange => return Some(format!("allowed: {}", allowed_values(action)?)),
+        Reason::NonFinite if has_no_limit(action) => "allowed: finite numbers, or off for no limit",
         Reason::NonFinite => "allowed: finite numbers",
         Reason::AlreadyTorn => "`ctl reset` restores it",
         Reason::NotGrabbed => "`ctl grab` grabs it",
@@ -82,14 +89,30 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
     Some(remedy.to_owned())
 }
 
+/// Returns `true` if a parameter of this action can be without a limit, which scenes write as `inf`.
+fn has_no_limit(action: &Action) -> bool {
+    let Action::Set { parameter, .. } = action else { return false };
+    Parameter::from_name(parameter.as_str())
+        .is_some_and(|parameter| parameter.info().off == OffMeaning::NoLimit)
+}
+
+/// Remedy of a rejected load.
+fn load_remedy(scene_rate_hz: u32, node_rate_hz: u32) -> String {
+    let memory = "it needs more memory than is available; see the node's messages";
+    if scene_rate_hz == node_rate_hz {
+        return memory.to_owned();
+    }
+    format!(
+        "the scene runs at {scene_rate_hz} Hz, the node at {node_rate_hz} Hz: start the node with \
+         `sim-node run --rate {node_rate_hz}`, or set rate_hz = {node_rate_hz} in the scene; or \
+         {memory}"
+    )
+}
+
 /// Condition under which a command has an effect.
 fn missing_condition(action: &Action) -> Option<&'static str> {
     Some(match action {
         Action::Set { .. } => "method \"xpbd\" has compliance, method \"pbd\" has stiffness",
-        Action::Load { .. } => {
-            "the scene runs at another rate than the node, or needs more memory than is available; \
-             see the node's messages"
-        }
         Action::Step { .. } => "the node is not paused",
         Action::Pin { .. }
         | Action::Unpin { .. }

@@ -64,7 +64,7 @@ impl StatusRow {
     fn lines(&self) -> [(&'static str, String); 12] {
         let times = |p50_ns: u64, p99_ns: u64| {
             let micros = |ns: u64| ns as f64 / 1000.0;
-            format!("{:.1} us median, {:.1} us 99th percentile", micros(p50_ns), micros(p99_ns))
+            format!("{:.1} µs median, {:.1} µs 99th percentile", micros(p50_ns), micros(p99_ns))
         };
         let state = if self.paused { "paused" } else { "running" };
         let frozen = match self.frozen_particles {
@@ -94,8 +94,8 @@ impl StatusRow {
 
 /// Prints the newest status.
 pub(super) fn print(client: &mut Client, args: &CtlArgs) -> anyhow::Result<()> {
-    let Some(status) = client.status(args.timeout)? else {
-        bail!("the node published no status within {:?}; is it stopped?", args.timeout);
+    let Some(status) = client.status(args.timeout())? else {
+        bail!("the node published no status within {:?}; is it stopped?", args.timeout());
     };
     let row = StatusRow::new(&status);
     if args.json {
