@@ -158,8 +158,11 @@ impl StateAssembler {
         let Some((later, list)) = self.pending_changes.tears(snapshot) else { return };
         let list = list[..snapshot.torn_count as usize].to_vec();
         let header = TearsHeader { step: snapshot.step, count: snapshot.torn_count, ..*later };
+        let is_first = self.torn.header.run_id != header.run_id;
         let new = self.torn.replace(header, &list);
-        self.torn.header.new_count = u32::try_from(new.len()).unwrap_or(u32::MAX);
+        // The constraints of a first list tore before this reader attached, in unknown steps.
+        let new_count = if is_first { 0 } else { new.len() };
+        self.torn.header.new_count = u32::try_from(new_count).unwrap_or(u32::MAX);
         self.changes.push(Change::Tears(self.torn.header, new));
     }
 
@@ -300,6 +303,19 @@ mod tests {
         add_tears(&mut assembler, Interval { since_step: 0, step: 4 }, &[5, 1, 2]);
         assert_eq!(torn_at(&mut assembler, &snapshot(3, 2)), torn(&[5, 1], &[5, 1]));
         assert_eq!(torn_at(&mut assembler, &snapshot(4, 3)), torn(&[5, 1, 2], &[2]));
+    }
+
+    #[test]
+    fn tears_before_the_first_state_are_not_new_in_it_and_overwritten_later_ones_are() {
+        let mut assembler = StateAssembler::default();
+        add_load(&mut assembler, 0);
+        add_tears(&mut assembler, Interval { since_step: 0, step: 4 }, &[5, 1, 2, 3]);
+        let first = snapshot(2, 2);
+        let state = assembler.assemble(&first, &[]).unwrap();
+        assert_eq!((state.torn.header.count, state.torn.header.new_count), (2, 0));
+        let second = snapshot(3, 3);
+        let state = assembler.assemble(&second, &[]).unwrap();
+        assert_eq!((state.torn.header.count, state.torn.header.new_count), (3, 1));
     }
 
     #[test]
