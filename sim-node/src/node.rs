@@ -69,6 +69,8 @@ pub(crate) struct Node {
     /// CLOCK_MONOTONIC up to which `paused_ns` is counted.
     mark_ns: u64,
     next_status_ns: u64,
+    /// Whether a file of the services is gone.
+    is_file_missing: bool,
     warnings: Warnings,
 }
 
@@ -96,6 +98,7 @@ impl Node {
             paused_ns: 0,
             mark_ns: now_ns,
             next_status_ns: now_ns,
+            is_file_missing: false,
             warnings: Warnings::default(),
             scene,
             solver,
@@ -266,6 +269,7 @@ impl Node {
             self.mark_ns = now_ns;
         }
         if self.statistics.end_second(now_ns, self.scene.solver.rate_hz) {
+            self.check_files();
             observer(self);
         }
         if now_ns >= self.next_status_ns {
@@ -273,6 +277,20 @@ impl Node {
             self.publisher.publish_status(&self.status())?;
         }
         Ok(())
+    }
+
+    /// Warns once if a file of the services is gone.
+    fn check_files(&mut self) {
+        if !self.is_file_missing
+            && let Some(path) = self.publisher.missing_file()
+        {
+            self.is_file_missing = true;
+            self.warnings.print(&format!(
+                "{} is gone, perhaps removed by a cleaner of /tmp: connected programs continue, but \
+                 no other program can attach until this node is restarted",
+                path.display()
+            ));
+        }
     }
 
     pub(crate) fn status(&self) -> sim_contract::NodeStatus {

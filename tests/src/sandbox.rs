@@ -41,6 +41,11 @@ impl Sandbox {
         self.domain.endpoint()
     }
 
+    /// Returns the root directory of the domain.
+    pub fn root(&self) -> PathBuf {
+        self.domain.root()
+    }
+
     /// Returns a path in the folder, as text for command lines.
     ///
     /// # Panics

@@ -1,5 +1,7 @@
 //! The clocks. Outside the node, programs of this workspace read a clock only through this module.
 
+use std::fs::Metadata;
+use std::os::unix::fs::MetadataExt;
 use std::time::{Duration, Instant};
 
 use rustix::thread::clock_nanosleep_absolute;
@@ -54,6 +56,14 @@ impl Deadline {
     pub(crate) fn remaining(self) -> Duration {
         self.end.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()))
     }
+}
+
+/// Time since a file was last written; zero if that lies in the future.
+pub(crate) fn age(file: &Metadata) -> Duration {
+    let written_ns =
+        i128::from(file.mtime()) * i128::from(SECOND_NS) + i128::from(file.mtime_nsec());
+    let age_ns = (i128::from(realtime_ns()) - written_ns).max(0);
+    Duration::from_nanos(u64::try_from(age_ns).unwrap_or(u64::MAX))
 }
 
 /// Microseconds since the Unix epoch, below 2^53 until 2255.

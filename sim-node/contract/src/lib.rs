@@ -75,6 +75,7 @@ pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
 pub use ports::reader::ReadError;
+pub use ports::root::RootError;
 pub use ports::service::ServiceError;
 pub use ports::services::AttachError;
 pub use ports::wake::Wake;

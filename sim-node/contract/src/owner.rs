@@ -4,13 +4,15 @@ pub(crate) mod error;
 pub(crate) mod load;
 
 use std::cell::Cell;
+use std::path::PathBuf;
 
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
 
+use crate::clock;
 use crate::endpoint::Endpoint;
-use crate::limits::{CLIENTS_MAX, COMMANDS_BUFFERED};
+use crate::limits::{CLIENTS_MAX, COMMANDS_BUFFERED, CONTRACT_VERSION};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
@@ -20,14 +22,17 @@ use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::KeyframeHeader;
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_shared_memory};
+use crate::ports::owner_lock::{LockError, OwnerLock};
 use crate::ports::port::{PortLimit, create_port, reader_count};
 use crate::ports::reader::subscribe;
+use crate::ports::root::RootError;
 use crate::ports::service::{OUTCOMES, STATUS, ServiceError, WAKE};
 use crate::ports::services::{Services, owner};
 use crate::ports::session::{Access, Events, Session, Values};
 use crate::ports::wake::{Wake, WakeSender};
 use crate::ports::writer::PublishError;
 use crate::ports::writer::ValueWriter;
+use crate::ports::{domain, root, unfinished};
 use sim_types::ParameterValues;
 
 /// The process that owns a name: it publishes everything and receives the commands.
@@ -43,6 +48,7 @@ pub struct Owner {
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc::Service, Command, ()>,
     status: ValueWriter<NodeStatus>,
+    lock: OwnerLock,
     wake: WakeSender,
     /// Number of readers at the last refresh, to notice new readers.
     last_reader_count: Cell<usize>,
@@ -51,7 +57,7 @@ pub struct Owner {
     services: Services,
     status_service: Values<NodeStatus>,
     // Dropped last: the services belong to its node.
-    _session: Session,
+    session: Session,
 }
 
 /// Number of refreshes that wake a new reader. A reader is counted shortly before it can receive a
@@ -60,6 +66,12 @@ pub struct Owner {
 const WAKES_PER_READER: u32 = 2;
 /// Most commands received at once: all that the clients together can have waiting.
 const COMMANDS_RECEIVED_MAX: usize = CLIENTS_MAX * COMMANDS_BUFFERED;
+
+/// Most attempts to take the lock of a name: clients hold it for a moment when they remove what a
+/// killed owner left, and an owner that ends frees it shortly before its process is gone.
+const LOCK_ATTEMPTS_MAX: usize = 20;
+/// Pause between two attempts to take the lock.
+const LOCK_PAUSE_NS: u64 = clock::SECOND_NS / 200;
 
 impl Owner {
     /// Claims the name, creates its services and publishes scene, topology, surface, parameters and an
@@ -70,10 +82,17 @@ impl Owner {
     /// service could not be created.
     pub fn create(endpoint: &Endpoint, load: &Load<'_>) -> Result<Self, OwnerError> {
         check_limits(load)?;
-        Self::create_in(Session::join(endpoint)?, load)
+        Self::create_with_version(endpoint, CONTRACT_VERSION, load)
     }
 
-    pub(crate) fn create_in(session: Session, load: &Load<'_>) -> Result<Self, OwnerError> {
+    pub(crate) fn create_with_version(
+        endpoint: &Endpoint,
+        contract_version: u32,
+        load: &Load<'_>,
+    ) -> Result<Self, OwnerError> {
+        let lock = take_lock(endpoint)?;
+        let session = Session::join_with_version(endpoint, contract_version)?;
+        unfinished::remove_nodes(session.config());
         let status_service = session.values(&STATUS, Access::Create)?;
         let status = claim_name(&session, &status_service)?;
         // Now the memory of a killed predecessor is free.
@@ -85,11 +104,12 @@ impl Owner {
             outcomes: ValueWriter::create(&services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
+            lock,
             last_reader_count: Cell::new(0),
             wakes_due: Cell::new(0),
             services,
             status_service,
-            _session: session,
+            session,
         };
         owner.writers.publish(load)?;
         owner.wake(Wake::Load);
@@ -243,6 +263,17 @@ impl Owner {
         self.wake.wake(event);
     }
 
+    /// Returns the first file of this owner that is missing in the root of the domain, because a cleaner
+    /// or a person removed it. Connected clients do not notice, but no other can attach.
+    pub fn missing_file(&self) -> Option<PathBuf> {
+        let config = self.session.config();
+        if self.lock.is_removed() {
+            return Some(self.lock.path().to_owned());
+        }
+        let files = unfinished::static_files(config, self.session.endpoint.name());
+        files.into_iter().find(|path| !path.exists())
+    }
+
     fn total_reader_count(&self) -> usize {
         let services = &self.services;
         reader_count(&services.particles)
@@ -255,6 +286,36 @@ impl Owner {
             + reader_count(&services.colliders)
             + reader_count(&services.outcomes)
             + reader_count(&self.status_service)
+    }
+}
+
+/// Takes the lock of the name, and removes what killed owners of the name left unfinished.
+fn take_lock(endpoint: &Endpoint) -> Result<OwnerLock, OwnerError> {
+    let config = domain::configuration(endpoint.domain()).map_err(|error| {
+        ServiceError::Domain { endpoint: endpoint.clone(), cause: format!("{error:?}") }
+    })?;
+    let root = root::path(&config);
+    root::prepare(&root)
+        .map_err(|cause| ServiceError::Root { endpoint: endpoint.clone(), cause })?;
+    let mut attempt_count = 1;
+    loop {
+        match OwnerLock::take(&config, endpoint.name()) {
+            Ok(lock) => {
+                unfinished::remove_services(&config, endpoint.name());
+                return Ok(lock);
+            }
+            Err(LockError::Held(_)) if attempt_count < LOCK_ATTEMPTS_MAX => {
+                attempt_count += 1;
+                clock::sleep_until(clock::monotonic_ns() + LOCK_PAUSE_NS);
+            }
+            Err(LockError::Held(process_id)) => {
+                return Err(OwnerError::NameTaken { endpoint: endpoint.clone(), process_id });
+            }
+            Err(LockError::System(error)) => {
+                let cause = RootError::System { path: root, cause: error.to_string() };
+                return Err(ServiceError::Root { endpoint: endpoint.clone(), cause }.into());
+            }
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Domains for tests.
 
 use std::fs;
+use std::path::PathBuf;
 use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -25,6 +26,11 @@ impl TestDomain {
     /// Name of the domain, for `--domain`.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Root directory of the domain.
+    pub fn root(&self) -> PathBuf {
+        domain::directory(&self.name)
     }
 
     /// Endpoint of the default simulation in this domain.
@@ -52,6 +58,6 @@ impl Drop for TestDomain {
                 let _ = fs::remove_file(entry.path());
             }
         }
-        let _ = fs::remove_dir_all(domain::directory(&self.name));
+        let _ = fs::remove_dir_all(self.root());
     }
 }

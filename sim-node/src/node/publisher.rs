@@ -3,6 +3,8 @@
 mod load;
 mod status;
 
+use std::path::PathBuf;
+
 use anyhow::Context;
 use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -305,6 +307,11 @@ impl Publisher {
     /// Gives late subscribers the latest message of each service that is seldom written.
     pub(crate) fn refresh(&self) {
         self.owner.refresh();
+    }
+
+    /// Same as [`Owner::missing_file`].
+    pub(crate) fn missing_file(&self) -> Option<PathBuf> {
+        self.owner.missing_file()
     }
 
     pub(crate) fn publish_status(&self, status: &NodeStatus) -> anyhow::Result<()> {

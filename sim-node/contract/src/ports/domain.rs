@@ -1,6 +1,7 @@
 //! Separation of domains: the prefix and the directory of iceoryx2's files.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString, SemanticStringError};
 
@@ -8,15 +9,22 @@ use iceoryx2::prelude::{Config, FileName, Path, SemanticString, SemanticStringEr
 /// `<directory>/<prefix><id>.event`. Its path has at most 107 bytes, up to 39 of them for the id.
 const DIRECTORY_AND_PREFIX_MAX: usize = 60;
 
+/// Time that iceoryx2 waits for a service which another process is creating or removing. Both take
+/// milliseconds.
+pub(crate) const CREATION_TIMEOUT: Duration = Duration::from_millis(200);
+
 /// Returns the iceoryx2 configuration of a domain; `None` is iceoryx2's own.
 ///
 /// Each domain has its own prefix and its own directory: the prefix separates shared memory, the
 /// directory separates nodes and services.
 pub(crate) fn configuration(domain: Option<&str>) -> Result<Config, SemanticStringError> {
     let Some(domain) = domain else {
-        return Ok(Config::global_config().clone());
+        let mut config = Config::global_config().clone();
+        config.global.creation_timeout = CREATION_TIMEOUT;
+        return Ok(config);
     };
     let mut config = Config::default();
+    config.global.creation_timeout = CREATION_TIMEOUT;
     config.global.prefix = FileName::new(prefix(domain).as_bytes())?;
     let directory = directory(domain);
     config.global.set_root_path(&Path::new(directory.as_os_str().as_encoded_bytes())?);

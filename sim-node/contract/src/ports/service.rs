@@ -13,6 +13,7 @@ use crate::limits::{
     OUTCOME_READERS_MAX, OUTCOMES_BUFFERED, OWNER_PUBLISHERS_MAX, READERS_MAX, SNAPSHOTS_BUFFERED,
     STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
 };
+use crate::ports::root::RootError;
 
 /// The service attribute that holds the version of the contract.
 pub(crate) const VERSION_KEY: &str = "contract_version";
@@ -93,6 +94,22 @@ pub(crate) const WAKE: ServiceSpec = ServiceSpec {
     ..LATCHED
 };
 
+/// All services of a name.
+pub(crate) const SERVICES: [&ServiceSpec; 12] = [
+    &PARTICLES,
+    &KEYFRAME,
+    &TOPOLOGY,
+    &SURFACE,
+    &SCENE,
+    &TEARS,
+    &PARAMETERS,
+    &COLLIDERS,
+    &COMMANDS,
+    &OUTCOMES,
+    &STATUS,
+    &WAKE,
+];
+
 impl ServiceSpec {
     /// Returns the full name of the service for the simulation `name`.
     pub(crate) fn service_name(&self, name: &str) -> String {
@@ -126,6 +143,14 @@ pub enum ServiceError {
         endpoint: Endpoint,
         /// Error of iceoryx2.
         cause: String,
+    },
+    /// The root directory of the domain is not this user's own.
+    #[error("cannot join {endpoint}: {cause}")]
+    Root {
+        /// The simulation to join.
+        endpoint: Endpoint,
+        /// The problem and its cure.
+        cause: RootError,
     },
     /// The service does not exist.
     #[error("service '{service}' of {endpoint} does not exist")]
@@ -323,22 +348,8 @@ mod tests {
 
     #[test]
     fn the_service_names_and_qualities_of_service_are_frozen() {
-        let specs = [
-            &PARTICLES,
-            &KEYFRAME,
-            &TOPOLOGY,
-            &SURFACE,
-            &SCENE,
-            &TEARS,
-            &PARAMETERS,
-            &COLLIDERS,
-            &COMMANDS,
-            &OUTCOMES,
-            &STATUS,
-            &WAKE,
-        ];
         let mut text = String::new();
-        for spec in specs {
+        for spec in SERVICES {
             let ServiceSpec { pattern, publishers_max, readers_max, history, .. } = spec;
             let ServiceSpec { buffered, when_full, .. } = spec;
             writeln!(

@@ -195,7 +195,8 @@ mod tests {
     #[test]
     fn a_client_of_another_contract_version_is_refused_with_both_versions() {
         let domain = TestDomain::new();
-        let _owner = Owner::create_in(join(&domain, CONTRACT_VERSION), &EMPTY).unwrap();
+        let _owner =
+            Owner::create_with_version(&domain.endpoint(), CONTRACT_VERSION, &EMPTY).unwrap();
         let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
@@ -207,10 +208,10 @@ mod tests {
     #[test]
     fn an_owner_is_refused_while_clients_keep_services_of_another_version() {
         let domain = TestDomain::new();
-        let old = Owner::create_in(join(&domain, CONTRACT_VERSION), &EMPTY).unwrap();
+        let old = Owner::create_with_version(&domain.endpoint(), CONTRACT_VERSION, &EMPTY).unwrap();
         let client = Attachment::open(join(&domain, CONTRACT_VERSION)).unwrap();
         drop(old);
-        let new = Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY);
+        let new = Owner::create_with_version(&domain.endpoint(), CONTRACT_VERSION + 1, &EMPTY);
         let error = ServiceError::Version {
             service: "sim/status".to_owned(),
             actual: "3".to_owned(),
@@ -219,7 +220,7 @@ mod tests {
         assert_eq!(new.unwrap_err(), OwnerError::Service(error));
         // Without clients, the services of the other version are gone.
         drop(client);
-        Owner::create_in(join(&domain, CONTRACT_VERSION + 1), &EMPTY).unwrap();
+        Owner::create_with_version(&domain.endpoint(), CONTRACT_VERSION + 1, &EMPTY).unwrap();
     }
 
     #[test]

@@ -2,11 +2,12 @@
 
 use std::error::Error;
 use std::fmt::Debug;
+use std::fs::File;
 use std::sync::Once;
 use std::time::Duration;
 
 use iceoryx2::prelude::{
-    AttributeVerifier, IceoryxSend, LogLevel, Node, NodeBuilder, Service, ServiceName,
+    AttributeVerifier, Config, IceoryxSend, LogLevel, Node, NodeBuilder, Service, ServiceName,
     SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
@@ -14,9 +15,10 @@ use iceoryx2::service::port_factory;
 
 use crate::endpoint::Endpoint;
 use crate::limits::{BORROWED_SAMPLES_MAX, CONTRACT_VERSION, PARTICIPANTS_MAX};
-use crate::ports::domain;
+use crate::ports::owner_lock::OwnerLock;
 use crate::ports::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE, WhenFull};
 use crate::ports::wake::Wake;
+use crate::ports::{counter, domain, root, unfinished};
 
 /// A publish-subscribe service whose messages are slices of `T` with the header `H`.
 pub(crate) type Slices<T, H> = port_factory::publish_subscribe::PortFactory<ipc::Service, [T], H>;
@@ -27,7 +29,7 @@ pub(crate) type Events = port_factory::event::PortFactory<ipc::Service>;
 
 /// Pause before another attempt, while another process creates or removes the same service.
 const RETRY_PAUSE: Duration = Duration::from_millis(5);
-/// Most attempts: 100 ms of pauses, in addition to the second that iceoryx2 itself waits.
+/// Most attempts. In each of them, iceoryx2 waits for [`domain::CREATION_TIMEOUT`].
 const ATTEMPTS_MAX: usize = 20;
 /// Longest wait for another process that cleans up after a dead process.
 pub(crate) const CLEANUP_TIMEOUT: Duration = Duration::from_millis(100);
@@ -41,6 +43,8 @@ pub(crate) struct Session {
     contract_version: u32,
     /// The version as an attribute of services.
     version: AttributeVerifier,
+    /// The root of the domain, locked against cleaners.
+    _root: File,
 }
 
 /// Mode of access to a service.
@@ -48,7 +52,8 @@ pub(crate) struct Session {
 pub(crate) enum Access {
     /// For clients: the service must exist.
     Open,
-    /// For the owner: the service is created, unless clients have kept it.
+    /// For the owner, which holds the lock of the name: the service is created, unless clients have
+    /// kept it.
     Create,
 }
 
@@ -70,13 +75,29 @@ impl Session {
             cause: format!("{cause:?}"),
         };
         let config = domain::configuration(endpoint.domain()).map_err(|error| refused(&error))?;
+        let private = |cause| ServiceError::Root { endpoint: endpoint.clone(), cause };
+        let root = root::prepare(&root::path(&config)).map_err(private)?;
+        unfinished::remove_segments(&config);
+        let is_named = endpoint.domain().is_some();
+        if is_named {
+            counter::check(&config).map_err(private)?;
+        }
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| refused(&error))?;
+        if is_named {
+            counter::narrow(&config);
+        }
         let version = version_attribute(contract_version).map_err(|error| refused(&error))?;
-        Ok(Self { endpoint: endpoint.clone(), node, contract_version, version })
+        Ok(Self { endpoint: endpoint.clone(), node, contract_version, version, _root: root })
+    }
+
+    /// Returns `true` if no process holds the lock of the name. What is left of its services is then
+    /// for the next owner to remove.
+    fn is_abandoned(&self) -> bool {
+        OwnerLock::take(self.node.config(), self.endpoint.name()).is_ok()
     }
 
     /// Opens or creates a service of slices of `T` with the header `H`.
@@ -89,7 +110,7 @@ impl Session {
         T: Debug + ZeroCopySend,
         H: Debug + ZeroCopySend,
     {
-        self.retry(spec, |name| {
+        self.retry(spec, access, |name| {
             let builder = self.node.service_builder(name).publish_subscribe::<[T]>();
             let builder = builder.user_header::<H>();
             match access {
@@ -110,7 +131,7 @@ impl Session {
     where
         T: Debug + ZeroCopySend,
     {
-        self.retry(spec, |name| {
+        self.retry(spec, access, |name| {
             let builder = self.node.service_builder(name).publish_subscribe::<T>();
             match access {
                 Access::Open => Ok(builder.open_with_attributes(&self.version)?),
@@ -123,7 +144,7 @@ impl Session {
 
     /// Opens or creates the event service [`WAKE`].
     pub(crate) fn events(&self, access: Access) -> Result<Events, ServiceError> {
-        self.retry(&WAKE, |name| {
+        self.retry(&WAKE, access, |name| {
             let builder = self.node.service_builder(name).event();
             match access {
                 Access::Open => Ok(builder.open_with_attributes(&self.version)?),
@@ -137,6 +158,10 @@ impl Session {
                     .open_or_create_with_attributes(&self.version)?),
             }
         })
+    }
+
+    pub(crate) fn config(&self) -> &Config {
+        self.node.config()
     }
 
     /// Waits a moment for a process that is creating or removing a service.
@@ -154,6 +179,7 @@ impl Session {
     fn retry<S>(
         &self,
         spec: &ServiceSpec,
+        access: Access,
         attempt: impl Fn(&ServiceName) -> Result<S, Cause>,
     ) -> Result<S, ServiceError> {
         let service = self.service_name(spec);
@@ -168,8 +194,16 @@ impl Session {
                     has_cleaned_up = true;
                     self.node.blocking_cleanup_dead_nodes(CLEANUP_TIMEOUT);
                 }
+                Err(Cause::InTransition(_)) if access == Access::Open && self.is_abandoned() => {
+                    return Err(self.service_error(spec, service, Cause::Missing));
+                }
                 Err(Cause::InTransition(_)) if attempt_count < ATTEMPTS_MAX => {
                     attempt_count += 1;
+                    if access == Access::Create {
+                        // Only the owner creates services, and the process that was removing this
+                        // one had all the time of an attempt, so it is dead.
+                        unfinished::remove_service(self.node.config(), spec, self.endpoint.name());
+                    }
                     self.pause();
                 }
                 Err(cause) => return Err(self.service_error(spec, service, cause)),

@@ -1,0 +1,173 @@
+//! The lock that decides who owns a name. Its holder alone creates the services of the name.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+use iceoryx2::prelude::Config;
+
+use crate::ports::root;
+
+/// The directory of shared memory.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+
+/// The owner's lock, until it is dropped or its process ends in any way.
+///
+/// It consists of two locked files. The one in the root of the domain decides. The one in shared
+/// memory keeps the name taken if a cleaner of `/tmp` removes the first.
+#[derive(Debug)]
+pub(crate) struct OwnerLock {
+    root: LockFile,
+    /// `None` if another user of the host has occupied its path.
+    _shared_memory: Option<LockFile>,
+}
+
+/// Reason why a lock could not be taken.
+#[derive(Debug)]
+pub(crate) enum LockError {
+    /// A living process holds it: the process with this id, if the file tells.
+    Held(Option<u32>),
+    System(io::Error),
+}
+
+impl OwnerLock {
+    /// Takes the lock of a name, without waiting. The root must exist.
+    pub(crate) fn take(config: &Config, name: &str) -> Result<Self, LockError> {
+        let prefix = &config.global.prefix;
+        let user = rustix::process::geteuid().as_raw();
+        let root = LockFile::take(&root::path(config).join(format!("{prefix}{name}.owner")))?;
+        let path = Path::new(SHARED_MEMORY).join(format!("{prefix}{user}_{name}.owner"));
+        let shared_memory = match LockFile::take(&path) {
+            Ok(file) => Some(file),
+            Err(error @ LockError::Held(_)) => return Err(error),
+            Err(LockError::System(_)) => None,
+        };
+        Ok(Self { root, _shared_memory: shared_memory })
+    }
+
+    /// Path of the file in the root.
+    pub(crate) fn path(&self) -> &Path {
+        &self.root.path
+    }
+
+    /// Returns `true` if the file in the root is no longer the locked one.
+    pub(crate) fn is_removed(&self) -> bool {
+        !self.root.is_in_place()
+    }
+}
+
+/// A locked file with the id of its process.
+#[derive(Debug)]
+struct LockFile {
+    path: PathBuf,
+    file: File,
+}
+
+impl LockFile {
+    fn take(path: &Path) -> Result<Self, LockError> {
+        loop {
+            let mut file = open(path).map_err(LockError::System)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Err(LockError::Held(read_id(&mut file))),
+                Err(TryLockError::Error(error)) => return Err(LockError::System(error)),
+            }
+            let mut taken = Self { path: path.to_owned(), file };
+            // The holder before may have removed the file between opening and locking.
+            if taken.is_in_place() {
+                taken.write_id().map_err(LockError::System)?;
+                return Ok(taken);
+            }
+        }
+    }
+
+    fn write_id(&mut self) -> io::Result<()> {
+        self.file.set_len(0)?;
+        writeln!(self.file, "{}", std::process::id())
+    }
+
+    fn is_in_place(&self) -> bool {
+        let inode = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+        let locked = self.file.metadata().map(inode);
+        matches!((locked, fs::symlink_metadata(&self.path).map(inode)), (Ok(a), Ok(b)) if a == b)
+    }
+}
+
+impl Drop for LockFile {
+    /// Removes the file while it is still locked.
+    fn drop(&mut self) {
+        if self.is_in_place() {
+            // A file that stays is taken over by the next owner.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+fn open(path: &Path) -> io::Result<File> {
+    let no_links = rustix::fs::OFlags::NOFOLLOW.bits().cast_signed();
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false);
+    options.mode(0o600).custom_flags(no_links).open(path)
+}
+
+fn read_id(file: &mut File) -> Option<u32> {
+    let mut text = String::new();
+    file.take(16).read_to_string(&mut text).ok()?;
+    text.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ports::domain;
+    use crate::testing::TestDomain;
+
+    fn config(domain: &TestDomain) -> Config {
+        let config = domain::configuration(Some(domain.name())).unwrap();
+        root::prepare(&root::path(&config)).unwrap();
+        config
+    }
+
+    fn holder(result: Result<OwnerLock, LockError>) -> Option<u32> {
+        match result {
+            Err(LockError::Held(id)) => id,
+            other => panic!("the lock is held, but take returned {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_name_has_one_holder_and_is_free_after_it() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        let lock = OwnerLock::take(&config, "sim").unwrap();
+        assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
+        let _other_name = OwnerLock::take(&config, "other").unwrap();
+        drop(lock);
+        OwnerLock::take(&config, "sim").unwrap();
+    }
+
+    #[test]
+    fn a_name_stays_taken_although_a_cleaner_removed_the_file_in_the_root() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        let lock = OwnerLock::take(&config, "sim").unwrap();
+        assert!(!lock.is_removed());
+        fs::remove_file(&lock.root.path).unwrap();
+        assert!(lock.is_removed());
+        assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
+    }
+
+    #[test]
+    fn a_file_left_by_a_killed_holder_is_taken_over() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        let path = root::path(&config).join(format!("{}sim.owner", config.global.prefix));
+        fs::write(&path, "4194304\n").unwrap();
+        let lock = OwnerLock::take(&config, "sim").unwrap();
+        let id = std::process::id();
+        assert_eq!(fs::read_to_string(&path).unwrap(), format!("{id}\n"));
+        drop(lock);
+        assert!(!path.exists());
+    }
+}

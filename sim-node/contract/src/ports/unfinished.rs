@@ -1,0 +1,327 @@
+//! Files of iceoryx2 that their process was killed in the middle of creating. iceoryx2 waits for them
+//! to be finished, and never removes them.
+
+use std::fs::{self, DirEntry, Metadata};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use iceoryx2::node::NodeView;
+use iceoryx2::prelude::{CallbackProgression, Config, FileName, Node, NodeState, ServiceName, ipc};
+use iceoryx2::service::Service;
+use iceoryx2::service::service_hash::ServiceHash;
+
+use crate::clock::{self, Deadline};
+use crate::ports::owner_lock::SHARED_MEMORY;
+use crate::ports::root;
+use crate::ports::service::{SERVICES, ServiceSpec};
+
+/// Permissions of a static configuration while it is written; afterwards nobody may write it.
+const STATIC_UNFINISHED_MODE: u32 = 0o600;
+/// Permission that a segment of shared memory, or the context of a node, receives once it is complete.
+const READABLE: u32 = 0o400;
+/// Time after which the creator of an unfinished file counts as dead. Creation takes microseconds,
+/// or milliseconds where files are written to a disk.
+const CREATION_MAX: Duration = Duration::from_secs(2);
+/// The same for a node, whose creation includes the cleanup after other nodes.
+const NODE_CREATION_MAX: Duration = Duration::from_secs(10);
+/// Time that a segment which counts nodes stays unfinished at most, unless its creator is dead. If
+/// that creator is only slow, two counters exist for a while, and ids of nodes still differ in their
+/// process and time.
+const COUNTER_CREATION_MAX: Duration = Duration::from_millis(20);
+/// Number of characters that name the type of a segment.
+const TYPE_HASH_LENGTH: usize = 40;
+/// Pause between two looks at an unfinished file.
+const PAUSE_NS: u64 = clock::SECOND_NS / 500;
+
+/// Removes unfinished segments that would keep a new process from joining the domain. Waits for those
+/// that another process may be about to finish.
+pub(crate) fn remove_segments(config: &Config) {
+    for path in segments(config, &config.global.node.global_mgmt_suffix) {
+        wait_or_remove(&path, COUNTER_CREATION_MAX);
+    }
+    for path in segments(config, &config.global.service.dynamic_config_storage_suffix) {
+        wait_or_remove(&path, CREATION_MAX);
+    }
+}
+
+/// Waits until a segment is finished or gone, and removes it if it stays unfinished for `limit`.
+fn wait_or_remove(path: &Path, limit: Duration) {
+    let deadline = Deadline::after(limit);
+    while let Ok(metadata) = fs::metadata(path)
+        && is_unfinished_segment(&metadata)
+    {
+        // The age alone would not do: the clock may have been set back since.
+        if clock::age(&metadata) > limit || deadline.remaining().is_zero() {
+            remove(path);
+            return;
+        }
+        clock::sleep_until(clock::monotonic_ns() + PAUSE_NS);
+    }
+}
+
+/// Removes the unfinished services of a name. The caller holds the lock of the name, so their creator
+/// is dead.
+pub(crate) fn remove_services(config: &Config, name: &str) {
+    for path in static_files(config, name) {
+        let Ok(file) = fs::metadata(&path) else { continue };
+        let segment = dynamic_segment(config, &path);
+        let is_unfinished =
+            |path| fs::metadata(path).is_ok_and(|file| is_unfinished_segment(&file));
+        if file.mode() & 0o777 == STATIC_UNFINISHED_MODE || segment.is_some_and(is_unfinished) {
+            remove_files(config, &path);
+        }
+    }
+}
+
+/// Removes a service, unfinished or not. The caller holds the lock of the name, and no process uses
+/// the service.
+pub(crate) fn remove_service(config: &Config, spec: &ServiceSpec, name: &str) {
+    if let Some(path) = static_file(config, spec, name) {
+        remove_files(config, &path);
+    }
+}
+
+/// Removes the files of a service, the one that names the other last.
+fn remove_files(config: &Config, static_file: &Path) {
+    if let Some(segment) = dynamic_segment(config, static_file) {
+        remove(&segment);
+    }
+    remove(static_file);
+}
+
+/// Returns the paths of the static configurations of all services of a name, existing or not.
+pub(crate) fn static_files(config: &Config, name: &str) -> Vec<PathBuf> {
+    SERVICES.iter().filter_map(|spec| static_file(config, spec, name)).collect()
+}
+
+fn static_file(config: &Config, spec: &ServiceSpec, name: &str) -> Option<PathBuf> {
+    let directory = root::to_std(&config.global.service_dir());
+    let service = ServiceName::new(&spec.service_name(name)).ok()?;
+    let hash =
+        ServiceHash::new::<<ipc::Service as Service>::ServiceNameHasher>(&service, spec.pattern);
+    let Config { global, .. } = config;
+    let suffix = &global.service.static_config_storage_suffix;
+    Some(directory.join(format!("{}{hash}{suffix}", global.prefix)))
+}
+
+/// Returns the segment of a service that its static configuration names: its file name ends in the
+/// id of the service.
+fn dynamic_segment(config: &Config, static_file: &Path) -> Option<PathBuf> {
+    let text = fs::read_to_string(static_file).ok()?;
+    let number = |key: &str| -> Option<u128> {
+        let (_, rest) = text.split_once(key)?;
+        rest.lines().next()?.trim().parse().ok()
+    };
+    let id = number("unique_value = ")? << 64 | number("payload_value = ")?;
+    let suffix = &config.global.service.dynamic_config_storage_suffix;
+    let ending = format!("_{id}{suffix}");
+    segments(config, suffix)
+        .find(|path| path.as_os_str().as_encoded_bytes().ends_with(ending.as_bytes()))
+}
+
+/// Removes what is left of nodes whose process was killed while it created or removed them. Call it
+/// after joining, which cleans up after all other dead nodes.
+pub(crate) fn remove_nodes(config: &Config) {
+    // iceoryx2 cannot clean up after a dead node without details: they hold its configuration.
+    let mut ids = Vec::new();
+    let listed = Node::<ipc::Service>::list(config, |node| {
+        if let NodeState::Dead(dead) = node
+            && dead.details().is_none()
+        {
+            ids.push(dead.id().value().to_string());
+        }
+        CallbackProgression::Continue
+    });
+    if listed.is_ok() {
+        for id in &ids {
+            remove_node(config, id);
+        }
+    }
+    let directory = root::to_std(&config.global.node_dir());
+    for entry in entries(&directory) {
+        let is_old = entry.metadata().is_ok_and(|file| clock::age(&file) > NODE_CREATION_MAX);
+        if let Some(id) = entry.file_name().to_str().and_then(|name| node_id(config, name))
+            && is_old
+            && !is_complete_node(config, &id)
+        {
+            remove_node(config, &id);
+        }
+    }
+}
+
+/// Returns the id of the node that a file in the directory of nodes belongs to: `<id>`, or
+/// `<prefix><id><suffix>`.
+fn node_id(config: &Config, file_name: &str) -> Option<String> {
+    let prefix = config.global.prefix.to_string();
+    let name = file_name.strip_prefix(&prefix).unwrap_or(file_name);
+    let id = name.split_once('.').map_or(name, |(id, _)| id);
+    id.bytes().all(|byte| byte.is_ascii_digit()).then(|| id.to_owned())
+}
+
+/// Returns `true` if a node has its details, and iceoryx2 can tell whether its process lives.
+fn is_complete_node(config: &Config, id: &str) -> bool {
+    let directory = root::to_std(&config.global.node_dir());
+    let Config { global, .. } = config;
+    let details = format!("{}node{}", global.prefix, global.node.static_config_suffix);
+    let mut files = monitor_files(config, id);
+    files.push(directory.join(id).join(details));
+    files.iter().all(|path| fs::metadata(path).is_ok_and(|file| file.mode() & READABLE != 0))
+}
+
+fn remove_node(config: &Config, id: &str) {
+    let _ = fs::remove_dir_all(root::to_std(&config.global.node_dir()).join(id));
+    for path in monitor_files(config, id) {
+        remove(&path);
+    }
+}
+
+/// Returns the paths of the files that tell whether the process of a node lives.
+fn monitor_files(config: &Config, id: &str) -> Vec<PathBuf> {
+    let directory = root::to_std(&config.global.node_dir());
+    let Config { global, .. } = config;
+    let monitor = format!("{}{id}{}", global.prefix, global.node.monitor_suffix);
+    ["", "_context", "_owner_lock"]
+        .map(|ending| directory.join(format!("{monitor}{ending}")))
+        .into()
+}
+
+/// Returns `true` for a segment of shared memory without its final size or permissions.
+fn is_unfinished_segment(metadata: &Metadata) -> bool {
+    metadata.len() == 0 || metadata.mode() & READABLE == 0
+}
+
+/// Returns the files of a kind in shared memory: `<prefix><hash of the type>_<id><suffix>`.
+pub(crate) fn segments(config: &Config, suffix: &FileName) -> impl Iterator<Item = PathBuf> {
+    let prefix = config.global.prefix.to_string();
+    let suffix = suffix.to_string();
+    let is_segment = move |entry: &DirEntry| {
+        let name = entry.file_name();
+        let hash = name.to_str().and_then(|name| {
+            name.strip_prefix(&prefix)?.strip_suffix(&suffix)?.split_once('_').map(|(hash, _)| hash)
+        });
+        // Another domain may have a prefix that begins with this one.
+        hash.is_some_and(|hash| hash.len() == TYPE_HASH_LENGTH)
+    };
+    entries(Path::new(SHARED_MEMORY)).filter(is_segment).map(|entry| entry.path())
+}
+
+fn entries(directory: &Path) -> impl Iterator<Item = DirEntry> {
+    fs::read_dir(directory).into_iter().flatten().flatten()
+}
+
+/// Removes a file. Another process of the domain may have removed it first.
+fn remove(path: &Path) {
+    let _ = fs::remove_file(path);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::{File, Permissions};
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+    use crate::client::Client;
+    use crate::messages::topology::LoadHeader;
+    use crate::owner::Owner;
+    use crate::owner::load::Load;
+    use crate::ports::domain;
+    use crate::ports::service::STATUS;
+    use crate::testing::TestDomain;
+
+    const NAME: &str = "sim";
+
+    fn config(domain: &TestDomain) -> Config {
+        domain::configuration(Some(domain.name())).unwrap()
+    }
+
+    fn create_owner(domain: &TestDomain) -> Owner {
+        let load = Load {
+            header: LoadHeader::default(),
+            scene: b"",
+            constraints: &[],
+            triangles: &[],
+            collider_count: 0,
+            keyframe_size_bytes_max: 0,
+            parameters: sim_types::ParameterValues::DEFAULT,
+        };
+        Owner::create(&domain.endpoint(), &load).unwrap()
+    }
+
+    fn assert_works(domain: &TestDomain) {
+        let owner = create_owner(domain);
+        Client::attach(&domain.endpoint()).unwrap();
+        drop(owner);
+    }
+
+    #[test]
+    fn a_service_whose_configuration_is_unwritten_does_not_keep_an_owner_from_its_name() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        drop(create_owner(&domain));
+        for path in static_files(&config, NAME) {
+            File::create_new(&path).unwrap();
+            fs::set_permissions(&path, Permissions::from_mode(STATIC_UNFINISHED_MODE)).unwrap();
+        }
+        let error = Client::attach(&domain.endpoint()).unwrap_err().to_string();
+        assert!(error.starts_with("no node runs as"), "{error}");
+        assert_works(&domain);
+    }
+
+    #[test]
+    fn a_service_whose_segment_is_unwritten_does_not_keep_an_owner_from_its_name() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        let owner = create_owner(&domain);
+        let path = static_file(&config, &STATUS, NAME).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        let segment = dynamic_segment(&config, &path).unwrap();
+        drop(owner);
+        for (size_bytes, mode) in [(0, 0o200), (4096, 0o200)] {
+            fs::write(&path, &text).unwrap();
+            fs::set_permissions(&path, Permissions::from_mode(0o400)).unwrap();
+            File::create_new(&segment).unwrap().set_len(size_bytes).unwrap();
+            fs::set_permissions(&segment, Permissions::from_mode(mode)).unwrap();
+            assert_works(&domain);
+            assert!(!segment.exists());
+        }
+    }
+
+    #[test]
+    fn an_unwritten_counter_of_nodes_keeps_nobody_from_the_domain() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        drop(create_owner(&domain));
+        let suffix = &config.global.node.global_mgmt_suffix;
+        let path = segments(&config, suffix).next().unwrap();
+        for size_bytes in [0, 16] {
+            fs::remove_file(&path).unwrap();
+            File::create_new(&path).unwrap().set_len(size_bytes).unwrap();
+            fs::set_permissions(&path, Permissions::from_mode(0o200)).unwrap();
+            assert_works(&domain);
+        }
+        // Only this user can write to the finished counter.
+        assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, 0o600);
+    }
+
+    #[test]
+    fn a_half_created_node_is_removed_once_it_is_old_and_a_living_one_stays() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        let _owner = create_owner(&domain);
+        let directory = root::to_std(&config.global.node_dir());
+        let living: Vec<_> = entries(&directory).map(|entry| entry.path()).collect();
+        let half = directory.join("4294967297");
+        fs::create_dir(&half).unwrap();
+        remove_nodes(&config);
+        assert!(half.exists());
+        let old = std::time::SystemTime::UNIX_EPOCH;
+        for path in living.iter().chain([&half]) {
+            // A file without the permission to write needs none for its times.
+            File::open(path).unwrap().set_modified(old).unwrap();
+        }
+        remove_nodes(&config);
+        assert!(!half.exists());
+        assert!(living.iter().all(|path| path.exists()));
+    }
+}

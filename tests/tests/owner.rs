@@ -1,0 +1,96 @@
+//! The name of a node after kills, cleaners and other users.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::fs::{self, Permissions};
+use std::os::unix::fs::PermissionsExt;
+
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
+use sim_contract::Client;
+
+/// A node creates this many services, each with a file.
+const SERVICE_COUNT: usize = 12;
+
+fn service_count(sandbox: &Sandbox) -> usize {
+    fs::read_dir(sandbox.root().join("services")).into_iter().flatten().count()
+}
+
+/// A node killed while it creates its services leaves some of them unfinished, and which of them
+/// depends on the moment. So there are several rounds, and each kills in another phase.
+#[test]
+fn a_node_starts_after_another_one_was_killed_in_any_phase_of_its_start() {
+    let sandbox = Sandbox::new();
+    for phase in 0..=2 * SERVICE_COUNT {
+        let mut killed = Process::start(Program::SimNode, &sandbox, &["run", "curtain"]);
+        let phase_count = phase % (SERVICE_COUNT + 1);
+        wait_for("the services", || {
+            let has_reached = service_count(&sandbox) >= phase_count;
+            (has_reached || !killed.is_running()).then_some(())
+        });
+        killed.signal(Signal::KILL);
+        killed.wait();
+        let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+        assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain", "phase {phase}");
+        assert_eq!(node.interrupt().code, Some(0));
+        assert_eq!(service_count(&sandbox), 0, "phase {phase}");
+    }
+}
+
+#[test]
+fn a_client_finds_no_node_after_one_was_killed_in_any_phase_of_its_start() {
+    let sandbox = Sandbox::new();
+    for phase in 0..=SERVICE_COUNT {
+        let mut killed = Process::start(Program::SimNode, &sandbox, &["run", "curtain"]);
+        wait_for("the services", || {
+            (service_count(&sandbox) >= phase || !killed.is_running()).then_some(())
+        });
+        killed.signal(Signal::KILL);
+        killed.wait();
+        let finished = Process::run(Program::SimNode, &sandbox, &["ctl", "status"]);
+        assert_eq!(finished.code, Some(1));
+        assert!(finished.stderr.contains("no node runs as"), "phase {phase}: {}", finished.stderr);
+    }
+}
+
+#[test]
+fn a_cleaner_that_removes_the_files_of_a_node_is_noticed_and_frees_no_name() {
+    let sandbox = Sandbox::new();
+    let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let step = client.next_snapshot(DEADLINE).unwrap().unwrap().header().step;
+    for entry in fs::read_dir(sandbox.root()).unwrap().flatten() {
+        let _ = fs::remove_dir_all(entry.path()).or_else(|_| fs::remove_file(entry.path()));
+    }
+    let warning = node.wait_for_line("warning: ");
+    assert!(warning.contains("removed by a cleaner of /tmp"), "{warning}");
+
+    let second = Process::run(Program::SimNode, &sandbox, &["run", "curtain"]);
+    assert_eq!(second.code, Some(1));
+    assert!(second.stderr.contains("is already running, as process"), "{}", second.stderr);
+    // The connected client still receives new states.
+    wait_for("a later step", || {
+        let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
+        (snapshot.header().step > step + 10).then_some(())
+    });
+    assert_eq!(node.interrupt().code, Some(0));
+    let third = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain");
+    assert_eq!(third.interrupt().code, Some(0));
+}
+
+#[test]
+fn programs_refuse_a_domain_whose_files_others_could_change() {
+    let sandbox = Sandbox::new();
+    let root = sandbox.root();
+    fs::create_dir(&root).unwrap();
+    fs::set_permissions(&root, Permissions::from_mode(0o777)).unwrap();
+    for (program, args) in [
+        (Program::SimNode, &["run", "curtain"][..]),
+        (Program::SimNode, &["ctl", "status"]),
+        (Program::Recorder, &["record", "-o", &sandbox.path("run.mcap")]),
+    ] {
+        let finished = Process::run(program, &sandbox, args);
+        assert_eq!(finished.code, Some(1));
+        let expected = format!("other users can write to {} (mode 777)", root.display());
+        assert!(finished.stderr.contains(&expected), "{}", finished.stderr);
+    }
+}
