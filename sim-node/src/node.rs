@@ -69,7 +69,7 @@ pub(crate) struct Node {
     /// CLOCK_MONOTONIC up to which `paused_ns` is counted.
     mark_ns: u64,
     next_status_ns: u64,
-    /// Whether a file of the services is gone.
+    /// Set once a file of the services is gone.
     is_file_missing: bool,
     warnings: Warnings,
 }

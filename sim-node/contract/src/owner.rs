@@ -22,17 +22,17 @@ use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::KeyframeHeader;
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_shared_memory};
-use crate::ports::owner_lock::{LockError, OwnerLock};
+use crate::ports::domain::owner_lock::{LockError, OwnerLock};
+use crate::ports::domain::root::RootError;
+use crate::ports::domain::{self, root, unfinished};
 use crate::ports::port::{PortLimit, create_port, reader_count};
 use crate::ports::reader::subscribe;
-use crate::ports::root::RootError;
 use crate::ports::service::{OUTCOMES, STATUS, ServiceError, WAKE};
 use crate::ports::services::{Services, owner};
 use crate::ports::session::{Access, Events, Session, Values};
 use crate::ports::wake::{Wake, WakeSender};
 use crate::ports::writer::PublishError;
 use crate::ports::writer::ValueWriter;
-use crate::ports::{domain, root, unfinished};
 use sim_types::ParameterValues;
 
 /// The process that owns a name: it publishes everything and receives the commands.

@@ -1,16 +1,12 @@
 //! Services, readers and writers. Beside the derives of the messages, only these files, `owner.rs`
 //! and `client/watch.rs` name iceoryx2.
 
-pub(crate) mod counter;
 pub(crate) mod domain;
 pub(crate) mod latch;
-pub(crate) mod owner_lock;
 pub(crate) mod port;
 pub(crate) mod reader;
-pub(crate) mod root;
 pub(crate) mod service;
 pub(crate) mod services;
 pub(crate) mod session;
-pub(crate) mod unfinished;
 pub(crate) mod wake;
 pub(crate) mod writer;

@@ -1,5 +1,10 @@
 //! Separation of domains: the prefix and the directory of iceoryx2's files.
 
+pub(crate) mod counter;
+pub(crate) mod owner_lock;
+pub(crate) mod root;
+pub(crate) mod unfinished;
+
 use std::path::PathBuf;
 use std::time::Duration;
 

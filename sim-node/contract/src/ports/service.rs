@@ -13,7 +13,7 @@ use crate::limits::{
     OUTCOME_READERS_MAX, OUTCOMES_BUFFERED, OWNER_PUBLISHERS_MAX, READERS_MAX, SNAPSHOTS_BUFFERED,
     STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
 };
-use crate::ports::root::RootError;
+use crate::ports::domain::root::RootError;
 
 /// The service attribute that holds the version of the contract.
 pub(crate) const VERSION_KEY: &str = "contract_version";

@@ -15,10 +15,10 @@ use iceoryx2::service::port_factory;
 
 use crate::endpoint::Endpoint;
 use crate::limits::{BORROWED_SAMPLES_MAX, CONTRACT_VERSION, PARTICIPANTS_MAX};
-use crate::ports::owner_lock::OwnerLock;
+use crate::ports::domain::owner_lock::OwnerLock;
+use crate::ports::domain::{self, counter, root, unfinished};
 use crate::ports::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE, WhenFull};
 use crate::ports::wake::Wake;
-use crate::ports::{counter, domain, root, unfinished};
 
 /// A publish-subscribe service whose messages are slices of `T` with the header `H`.
 pub(crate) type Slices<T, H> = port_factory::publish_subscribe::PortFactory<ipc::Service, [T], H>;

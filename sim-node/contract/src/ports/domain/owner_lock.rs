@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::Config;
 
-use crate::ports::root;
+use crate::ports::domain::root;
 
 /// The directory of shared memory.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";

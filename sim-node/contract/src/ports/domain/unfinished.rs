@@ -12,8 +12,8 @@ use iceoryx2::service::Service;
 use iceoryx2::service::service_hash::ServiceHash;
 
 use crate::clock::{self, Deadline};
-use crate::ports::owner_lock::SHARED_MEMORY;
-use crate::ports::root;
+use crate::ports::domain::owner_lock::SHARED_MEMORY;
+use crate::ports::domain::root;
 use crate::ports::service::{SERVICES, ServiceSpec};
 
 /// Permissions of a static configuration while it is written; afterwards nobody may write it.
