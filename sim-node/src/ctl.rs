@@ -8,13 +8,14 @@ mod particles;
 mod rejection;
 mod status;
 
-use sim_contract::{CONSOLE_CLIENT_ID, Client};
+use sim_contract::{CONSOLE_CLIENT_ID, Client, report_bus_errors};
 
 use crate::args::{CtlArgs, CtlVerb, QueryVerb};
 use crate::exit::Exit;
 
 /// Sends one command, or answers one query.
 pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {
+    report_bus_errors()?;
     let mut client = Client::attach_as(&args.endpoint.endpoint()?, CONSOLE_CLIENT_ID)?;
     match &args.verb {
         CtlVerb::Command(verb) => command::send(&mut client, args, action::from_verb(verb)?),

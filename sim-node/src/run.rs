@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use serde::Serialize;
-use sim_contract::{Endpoint, Stop};
+use sim_contract::{Endpoint, Stop, report_bus_errors};
 use sim_solver::Scene;
 
 use crate::args::RunArgs;
@@ -46,6 +46,7 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     };
     warn(&scene);
     let stop = Stop::install()?;
+    report_bus_errors()?;
     let mut node = Node::new(&endpoint, scene, options)?;
     print_ready(&endpoint, &node);
     let is_terminal = stderr().is_terminal();

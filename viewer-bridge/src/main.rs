@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
-use sim_contract::Stop;
+use sim_contract::{Stop, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::pages::assets::Assets;
@@ -40,6 +40,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = Stop::install()?;
+    report_bus_errors()?;
     let source = open_source(args)?;
     let foxglove = args.foxglove(source.recording());
     let assets = match &args.assets {

@@ -18,7 +18,7 @@ use recorder::{
     torn_before_first,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Endpoint, Method, Stop};
+use sim_contract::{Endpoint, Method, Stop, report_bus_errors};
 use sim_solver::Solver;
 
 use crate::cli::endpoint_args::EndpointArgs;
@@ -82,6 +82,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
+    report_bus_errors()?;
     let endpoint = args.endpoint.endpoint()?;
     let path = output::path_text(&args.file);
     if args.end.is_some_and(|end| end < args.start.unwrap_or_default()) {

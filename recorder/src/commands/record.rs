@@ -16,7 +16,7 @@ use std::time::Duration;
 use anyhow::{Context, anyhow, bail};
 use recorder::{Closing, Message, PartFile, WriteError};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
-use sim_contract::{Endpoint, ReadError, SNAPSHOTS_BUFFERED, Stop, Tap};
+use sim_contract::{Endpoint, ReadError, SNAPSHOTS_BUFFERED, Stop, Tap, report_bus_errors};
 
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
@@ -78,6 +78,7 @@ fn queue_bytes(text: &str) -> Result<u64, String> {
 
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
+    report_bus_errors()?;
     let endpoint = args.endpoint.endpoint()?;
     let tap = Tap::attach(&endpoint)?;
     let path = args.output.clone().unwrap_or_else(|| default_path(endpoint.name(), realtime_ns()));

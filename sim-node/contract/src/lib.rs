@@ -41,6 +41,7 @@
 //! This crate knows no solver, and no other crate knows iceoryx2.
 #![forbid(unsafe_code)]
 
+mod bus_error;
 mod client;
 pub mod clock;
 mod endpoint;
@@ -52,6 +53,7 @@ mod stop;
 pub mod testing;
 mod text_file;
 
+pub use bus_error::report_bus_errors;
 pub use client::Client;
 pub use client::change::{Change, LostChanges};
 pub use client::loaded_scene::LoadedScene;
@@ -75,6 +77,7 @@ pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
 pub use ports::domain::root::RootError;
+pub use ports::memory::MemoryError;
 pub use ports::reader::ReadError;
 pub use ports::service::ServiceError;
 pub use ports::services::AttachError;

@@ -14,11 +14,14 @@ pub const COMMANDS_PER_STEP_MAX: usize = 1024;
 pub const OWNER_PUBLISHERS_MAX: usize = 3;
 /// Most readers of a service at the same time.
 pub const READERS_MAX: usize = 16;
-/// Samples that one reader may hold at the same time. It receives no more until it drops one.
+/// Snapshots that one reader may hold at the same time. It receives no more until it drops one.
 pub const BORROWED_SAMPLES_MAX: usize = 4;
-/// Snapshots that wait for one reader before the oldest is overwritten: 64 ms at 1 kHz. The same
-/// number of keyframes waits, because each step with commands has one.
+/// Messages of any other service that one reader may hold at the same time.
+pub const BORROWED_UPDATES_MAX: usize = 2;
+/// Snapshots that wait for one reader before the oldest is overwritten: 64 ms at 1 kHz.
 pub const SNAPSHOTS_BUFFERED: usize = 64;
+/// Keyframes that wait for one reader. Each step with commands other than `move` has one.
+pub const KEYFRAMES_BUFFERED: usize = 16;
 /// Messages that wait for one reader at a service without a limit of its own, such as tears.
 pub const UPDATES_BUFFERED: usize = 4;
 /// Outcomes that wait for one reader: twice the most that one poll can produce.

@@ -21,7 +21,7 @@ use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::KeyframeHeader;
 use crate::owner::error::OwnerError;
-use crate::owner::load::{Load, LoadWriters, check_limits, check_shared_memory};
+use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
 use crate::ports::domain::{self, root, unfinished};
@@ -94,14 +94,14 @@ impl Owner {
         let session = Session::join_with_version(endpoint, contract_version)?;
         unfinished::remove_nodes(session.config());
         let status_service = session.values(&STATUS, Access::Create)?;
+        // The memory of a killed predecessor is free now.
+        check_memory(load)?;
         let status = claim_name(&session, &status_service)?;
-        // Now the memory of a killed predecessor is free.
-        check_shared_memory(load)?;
         let services = Services::access(&session, Access::Create)?;
         let owner = Self {
             wake: wake_sender(&services.wake)?,
             commands: subscribe(&services.commands)?,
-            outcomes: ValueWriter::create(&services.outcomes, &OUTCOMES)?,
+            outcomes: ValueWriter::create(&services.config, &services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
             lock,
@@ -127,7 +127,7 @@ impl Owner {
     /// cannot continue, because its writers are gone.
     pub fn load(&mut self, load: &Load<'_>) -> Result<(), OwnerError> {
         check_limits(load)?;
-        check_shared_memory(load)?;
+        check_memory(load)?;
         // All new writers exist before the old ones are dropped, so an error leaves the old load as
         // it was. The old ones are dropped before the new ones publish: readers empty the buffers of
         // dropped writers first, so they never see the new load before the old.
@@ -324,7 +324,7 @@ fn claim_name(
     session: &Session,
     service: &Values<NodeStatus>,
 ) -> Result<ValueWriter<NodeStatus>, OwnerError> {
-    match ValueWriter::create(service, &STATUS) {
+    match ValueWriter::create(session.config(), service, &STATUS) {
         Err(ServiceError::Full { .. }) => Err(OwnerError::NameTaken {
             endpoint: session.endpoint.clone(),
             process_id: owner(service).and_then(|process| process.id),

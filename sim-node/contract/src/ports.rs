@@ -3,6 +3,7 @@
 
 pub(crate) mod domain;
 pub(crate) mod latch;
+pub(crate) mod memory;
 pub(crate) mod port;
 pub(crate) mod reader;
 pub(crate) mod service;

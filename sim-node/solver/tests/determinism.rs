@@ -324,3 +324,31 @@ fn damaged_keyframes_are_refused() {
         assert!(Keyframe::decode(damaged).is_err());
     }
 }
+
+/// Every particle is pinned and grabbed, and every constraint is torn, in a scene with tethers and in
+/// one without.
+#[test]
+fn the_largest_keyframe_of_a_scene_fits_into_the_announced_size() {
+    for name in ["curtain", "tearable-cloth"] {
+        let scene = Scene::from_toml(builtin::text(name).unwrap(), name).unwrap();
+        let mut solver = Solver::new(&scene);
+        let apply = |solver: &mut Solver, action: &sim_types::Action| {
+            solver.apply(u64::MAX, action).unwrap();
+        };
+        for particle in 0..u32::try_from(solver.particle_count()).unwrap() {
+            apply(&mut solver, &sim_types::Action::Pin { particle });
+            let target = [0.5, 0.5, 0.0];
+            apply(&mut solver, &sim_types::Action::Grab { particle, target, over_s: 0.1 });
+        }
+        for constraint in 0..u32::try_from(solver.constraint_count()).unwrap() {
+            apply(&mut solver, &sim_types::Action::Cut { constraint });
+        }
+        solver.finish_boundary();
+        solver.step();
+        let size_bytes = solver.keyframe().encode().len();
+        let size_bytes_max = solver.keyframe_size_bytes_max();
+        assert!(size_bytes <= size_bytes_max, "{name}: {size_bytes} > {size_bytes_max}");
+        // The bound is not much larger: it decides how much shared memory a node takes.
+        assert!(2 * size_bytes > size_bytes_max, "{name}: {size_bytes} of {size_bytes_max}");
+    }
+}

@@ -136,7 +136,7 @@ impl Commander {
             unanswered: VecDeque::new(),
             answered: VecDeque::new(),
             outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?,
-            commands: ValueWriter::create(&services.commands, &COMMANDS)?,
+            commands: ValueWriter::create(&services.config, &services.commands, &COMMANDS)?,
         })
     }
 

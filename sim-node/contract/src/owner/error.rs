@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::endpoint::Endpoint;
+use crate::ports::memory::MemoryError;
 use crate::ports::service::ServiceError;
 use crate::ports::writer::PublishError;
 
@@ -21,19 +22,18 @@ pub enum OwnerError {
         /// Id of the process that owns the name, if it is known.
         process_id: Option<u32>,
     },
-    /// The snapshots do not fit into shared memory.
+    /// The messages of the load do not fit into shared memory.
     #[error(
-        "{particle_count} particles need {needed_mib} MiB of shared memory ({samples} snapshots for one stalled reader), but /dev/shm has only {available_mib} MiB left: choose a smaller scene, or enlarge /dev/shm (mount -o remount,size=... /dev/shm; docker run --shm-size ...)"
+        "{particle_count} particles and {constraint_count} constraints: {memory}, or choose a smaller \
+         scene"
     )]
     NotEnoughSharedMemory {
         /// Number of particles in the scene.
         particle_count: u32,
-        /// Number of snapshots that one stalled reader keeps from being overwritten.
-        samples: usize,
-        /// Size of these snapshots in MiB, rounded up.
-        needed_mib: u64,
-        /// Available memory in MiB, rounded down.
-        available_mib: u64,
+        /// Number of constraints in the scene.
+        constraint_count: usize,
+        /// Needed and available memory.
+        memory: MemoryError,
     },
     /// The load exceeds a limit of the contract.
     #[error(

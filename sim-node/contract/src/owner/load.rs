@@ -1,12 +1,12 @@
 //! The data that an owner publishes per load, and the writers whose sizes follow from it.
 
-use crate::limits::{BORROWED_SAMPLES_MAX, SNAPSHOTS_BUFFERED};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::owner::error::OwnerError;
+use crate::ports::memory;
 use crate::ports::service::{
     COLLIDERS, KEYFRAME, PARAMETERS, PARTICLES, ServiceError, ServiceSpec, TEARS,
 };
@@ -50,27 +50,61 @@ pub(crate) struct LoadWriters {
     colliders: SliceWriter<ColliderState, CollidersHeader>,
 }
 
-impl LoadWriters {
-    pub(crate) fn create(services: &Services, load: &Load<'_>) -> Result<Self, ServiceError> {
+/// Memory of the writers of a load.
+#[derive(Debug)]
+struct Capacities {
+    particles: Capacity,
+    keyframe: Capacity,
+    scene: Capacity,
+    topology: Capacity,
+    surface: Capacity,
+    tears: Capacity,
+    parameters: Capacity,
+    colliders: Capacity,
+}
+
+impl Capacities {
+    fn of(load: &Load<'_>) -> Self {
         let single = |len_max| Capacity { len_max, samples: 1 };
         let many =
             |spec: &ServiceSpec, len_max| Capacity { len_max, samples: spec.samples_in_use_max() };
-        let (particle_count, constraint_count) =
-            (load.header.particle_count as usize, load.constraints.len());
-        let keyframe = many(&KEYFRAME, load.keyframe_size_bytes_max);
-        let colliders = many(&COLLIDERS, load.collider_count);
+        Self {
+            particles: many(&PARTICLES, load.header.particle_count as usize),
+            keyframe: many(&KEYFRAME, load.keyframe_size_bytes_max),
+            scene: single(load.scene.len()),
+            topology: single(load.constraints.len()),
+            surface: single(load.triangles.len()),
+            tears: many(&TEARS, load.constraints.len()),
+            parameters: many(&PARAMETERS, SETTINGS_COUNT),
+            colliders: many(&COLLIDERS, load.collider_count),
+        }
+    }
+
+    fn size_bytes(&self) -> u64 {
+        self.particles.size_bytes::<ParticleState, SnapshotHeader>()
+            + self.keyframe.size_bytes::<u8, KeyframeHeader>()
+            + self.scene.size_bytes::<u8, LoadHeader>()
+            + self.topology.size_bytes::<ConstraintState, LoadHeader>()
+            + self.surface.size_bytes::<Triangle, LoadHeader>()
+            + self.tears.size_bytes::<TornConstraint, TearsHeader>()
+            + self.parameters.size_bytes::<ParameterState, ParametersHeader>()
+            + self.colliders.size_bytes::<ColliderState, CollidersHeader>()
+    }
+}
+
+impl LoadWriters {
+    pub(crate) fn create(services: &Services, load: &Load<'_>) -> Result<Self, ServiceError> {
+        let capacities = Capacities::of(load);
+        let config = &services.config;
         Ok(Self {
-            particles: SliceWriter::create(&services.particles, many(&PARTICLES, particle_count))?,
-            keyframe: SliceWriter::create(&services.keyframe, keyframe)?,
-            scene: SliceWriter::create(&services.scene, single(load.scene.len()))?,
-            topology: SliceWriter::create(&services.topology, single(constraint_count))?,
-            surface: SliceWriter::create(&services.surface, single(load.triangles.len()))?,
-            tears: SliceWriter::create(&services.tears, many(&TEARS, constraint_count))?,
-            parameters: SliceWriter::create(
-                &services.parameters,
-                many(&PARAMETERS, SETTINGS_COUNT),
-            )?,
-            colliders: SliceWriter::create(&services.colliders, colliders)?,
+            particles: SliceWriter::create(config, &services.particles, capacities.particles)?,
+            keyframe: SliceWriter::create(config, &services.keyframe, capacities.keyframe)?,
+            scene: SliceWriter::create(config, &services.scene, capacities.scene)?,
+            topology: SliceWriter::create(config, &services.topology, capacities.topology)?,
+            surface: SliceWriter::create(config, &services.surface, capacities.surface)?,
+            tears: SliceWriter::create(config, &services.tears, capacities.tears)?,
+            parameters: SliceWriter::create(config, &services.parameters, capacities.parameters)?,
+            colliders: SliceWriter::create(config, &services.colliders, capacities.colliders)?,
         })
     }
 
@@ -155,36 +189,18 @@ pub(crate) fn check_limits(load: &Load<'_>) -> Result<(), OwnerError> {
     }
 }
 
-/// Number of snapshots that one stalled reader keeps from being overwritten: its full buffer and the
-/// samples it holds, beside the latched one, the one being written and the one being handed over.
-const STALLED_SNAPSHOTS: usize = SNAPSHOTS_BUFFERED + BORROWED_SAMPLES_MAX + 3;
-/// Size of iceoryx2's own header of a message, in bytes.
-const MESSAGE_HEADER_SIZE_BYTES: usize = 48;
+/// Shared memory of everything that an owner creates beside the writers of a load: outcomes, status,
+/// and the ports and connections of iceoryx2.
+const SERVICES_SIZE_BYTES: u64 = 4 << 20;
 
-/// Checks that the snapshots fit into shared memory. Creating shared memory does not reserve it, and
-/// SIGBUS kills a writer that runs out of it. The memory of the load before does not count as free,
-/// because a reader that holds one of its snapshots keeps it.
-pub(crate) fn check_shared_memory(load: &Load<'_>) -> Result<(), OwnerError> {
-    match rustix::fs::statvfs("/dev/shm") {
-        Ok(memory) => check_fits(load.header.particle_count, memory.f_bavail * memory.f_frsize),
-        // If the size is unknown, it may still be large enough.
-        Err(_) => Ok(()),
-    }
-}
-
-fn check_fits(particle_count: u32, available_bytes: u64) -> Result<(), OwnerError> {
-    let snapshot_size_bytes = MESSAGE_HEADER_SIZE_BYTES
-        + size_of::<SnapshotHeader>()
-        + particle_count as usize * size_of::<ParticleState>();
-    let needed_bytes = (STALLED_SNAPSHOTS * snapshot_size_bytes) as u64;
-    if needed_bytes <= available_bytes {
-        return Ok(());
-    }
-    Err(OwnerError::NotEnoughSharedMemory {
-        particle_count,
-        samples: STALLED_SNAPSHOTS,
-        needed_mib: needed_bytes.div_ceil(1 << 20),
-        available_mib: available_bytes >> 20,
+/// Checks that the messages of a load fit into shared memory, before any of it is allocated. The memory
+/// of the load before does not count as free, because readers hold its messages.
+pub(crate) fn check_memory(load: &Load<'_>) -> Result<(), OwnerError> {
+    let needed_bytes = Capacities::of(load).size_bytes() + SERVICES_SIZE_BYTES;
+    memory::check(needed_bytes).map_err(|memory| OwnerError::NotEnoughSharedMemory {
+        particle_count: load.header.particle_count,
+        constraint_count: load.constraints.len(),
+        memory,
     })
 }
 
@@ -193,15 +209,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scene_whose_snapshots_could_fill_shared_memory_is_refused_with_the_numbers() {
+    fn a_scene_whose_messages_could_fill_shared_memory_is_refused_with_the_numbers() {
+        let load = Load {
+            header: LoadHeader { particle_count: 100_000, ..LoadHeader::default() },
+            scene: b"",
+            constraints: &[],
+            triangles: &[],
+            collider_count: 0,
+            keyframe_size_bytes_max: 0,
+            parameters: ParameterValues::DEFAULT,
+        };
+        // A full buffer, the samples that all readers hold, the latched one and the one being written.
+        let samples = 64 + 16 * 4 + 1 + 1;
+        let needed_bytes = Capacities::of(&load).size_bytes();
+        let snapshots_bytes = samples * 100_000 * 32;
+        assert!((snapshots_bytes..snapshots_bytes + (1 << 20)).contains(&needed_bytes));
         let docker_default = 64 << 20;
-        assert_eq!(check_fits(20_000, docker_default), Ok(()));
-        let error = check_fits(100_000, docker_default).unwrap_err().to_string();
+        let memory = memory::check_fits(needed_bytes, docker_default).unwrap_err();
+        let (particle_count, constraint_count) = (100_000, 0);
+        let error = OwnerError::NotEnoughSharedMemory { particle_count, constraint_count, memory };
         assert_eq!(
-            error,
-            "100000 particles need 217 MiB of shared memory (71 snapshots for one stalled \
-             reader), but /dev/shm has only 64 MiB left: choose a smaller scene, or enlarge \
-             /dev/shm (mount -o remount,size=... /dev/shm; docker run --shm-size ...)"
+            error.to_string(),
+            "100000 particles and 0 constraints: 397 MiB of shared memory are needed, but /dev/shm \
+             has only 64 MiB left: free some, or enlarge it (mount -o remount,size=... /dev/shm; \
+             docker run --shm-size ...), or choose a smaller scene"
         );
     }
 }

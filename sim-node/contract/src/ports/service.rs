@@ -9,11 +9,12 @@ use thiserror::Error;
 
 use crate::endpoint::Endpoint;
 use crate::limits::{
-    BORROWED_SAMPLES_MAX, CLIENTS_MAX, COMMAND_READERS_MAX, COMMANDS_BUFFERED, LISTENERS_MAX,
-    OUTCOME_READERS_MAX, OUTCOMES_BUFFERED, OWNER_PUBLISHERS_MAX, READERS_MAX, SNAPSHOTS_BUFFERED,
-    STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
+    BORROWED_SAMPLES_MAX, BORROWED_UPDATES_MAX, CLIENTS_MAX, COMMAND_READERS_MAX,
+    COMMANDS_BUFFERED, KEYFRAMES_BUFFERED, LISTENERS_MAX, OUTCOME_READERS_MAX, OUTCOMES_BUFFERED,
+    OWNER_PUBLISHERS_MAX, READERS_MAX, SNAPSHOTS_BUFFERED, STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
 };
 use crate::ports::domain::root::RootError;
+use crate::ports::memory::MemoryError;
 
 /// The service attribute that holds the version of the contract.
 pub(crate) const VERSION_KEY: &str = "contract_version";
@@ -40,6 +41,8 @@ pub(crate) struct ServiceSpec {
     pub(crate) history: usize,
     /// Most messages that wait for one reader.
     pub(crate) buffered: usize,
+    /// Most messages that one reader may hold.
+    pub(crate) borrowed: usize,
     pub(crate) when_full: WhenFull,
 }
 
@@ -51,12 +54,17 @@ const LATCHED: ServiceSpec = ServiceSpec {
     readers_max: READERS_MAX,
     history: 1,
     buffered: UPDATES_BUFFERED,
+    borrowed: BORROWED_UPDATES_MAX,
     when_full: WhenFull::DropOldest,
 };
-pub(crate) const PARTICLES: ServiceSpec =
-    ServiceSpec { suffix: "particles", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
+pub(crate) const PARTICLES: ServiceSpec = ServiceSpec {
+    suffix: "particles",
+    buffered: SNAPSHOTS_BUFFERED,
+    borrowed: BORROWED_SAMPLES_MAX,
+    ..LATCHED
+};
 pub(crate) const KEYFRAME: ServiceSpec =
-    ServiceSpec { suffix: "keyframe", buffered: SNAPSHOTS_BUFFERED, ..LATCHED };
+    ServiceSpec { suffix: "keyframe", buffered: KEYFRAMES_BUFFERED, ..LATCHED };
 pub(crate) const TOPOLOGY: ServiceSpec = ServiceSpec { suffix: "topology", ..LATCHED };
 pub(crate) const SURFACE: ServiceSpec = ServiceSpec { suffix: "surface", ..LATCHED };
 pub(crate) const SCENE: ServiceSpec = ServiceSpec { suffix: "scene", ..LATCHED };
@@ -126,7 +134,7 @@ impl ServiceSpec {
             WhenFull::DropOldest => 1,
             WhenFull::RefuseNewest => self.readers_max,
         };
-        buffers * self.buffered + self.readers_max * BORROWED_SAMPLES_MAX + self.history + 1
+        buffers * self.buffered + self.readers_max * self.borrowed + self.history + 1
     }
 }
 
@@ -152,6 +160,14 @@ pub enum ServiceError {
         /// The problem and its cure.
         cause: RootError,
     },
+    /// Not enough shared memory for the ports of this process.
+    #[error("cannot join {endpoint}: {memory}")]
+    NoMemory {
+        /// The simulation to join.
+        endpoint: Endpoint,
+        /// Needed and available memory.
+        memory: MemoryError,
+    },
     /// The service does not exist.
     #[error("service '{service}' of {endpoint} does not exist")]
     Missing {
@@ -159,6 +175,14 @@ pub enum ServiceError {
         service: String,
         /// The simulation.
         endpoint: Endpoint,
+    },
+    /// Not enough shared memory for the messages of the service.
+    #[error("service '{service}': {memory}")]
+    Memory {
+        /// Full name of the service.
+        service: String,
+        /// Needed and available memory.
+        memory: MemoryError,
     },
     /// The service has another version of the contract.
     #[error(
@@ -351,11 +375,11 @@ mod tests {
         let mut text = String::new();
         for spec in SERVICES {
             let ServiceSpec { pattern, publishers_max, readers_max, history, .. } = spec;
-            let ServiceSpec { buffered, when_full, .. } = spec;
+            let ServiceSpec { buffered, borrowed, when_full, .. } = spec;
             writeln!(
                 text,
                 "{}: {pattern:?}, publishers {publishers_max}, readers {readers_max}, history \
-                 {history}, buffered {buffered}, when full {when_full:?}",
+                 {history}, buffered {buffered}, borrowed {borrowed}, when full {when_full:?}",
                 spec.service_name("sim")
             )
             .unwrap();

@@ -1,7 +1,7 @@
 //! All services of a name, and the process that owns the name.
 
 use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory};
+use iceoryx2::prelude::{CallbackProgression, Config, NodeState, PortFactory};
 use thiserror::Error;
 
 use crate::endpoint::Endpoint;
@@ -22,6 +22,8 @@ use crate::ports::session::{Access, Events, Session, Slices, Values};
 /// The services of a name, except `status`.
 #[derive(Debug)]
 pub(crate) struct Services {
+    /// Configuration of the domain.
+    pub(crate) config: Config,
     pub(crate) particles: Slices<ParticleState, SnapshotHeader>,
     pub(crate) keyframe: Slices<u8, KeyframeHeader>,
     pub(crate) topology: Slices<ConstraintState, LoadHeader>,
@@ -40,6 +42,7 @@ impl Services {
     /// others.
     pub(crate) fn access(session: &Session, access: Access) -> Result<Self, ServiceError> {
         Ok(Self {
+            config: session.config().clone(),
             particles: session.slices(&PARTICLES, access)?,
             keyframe: session.slices(&KEYFRAME, access)?,
             topology: session.slices(&TOPOLOGY, access)?,

@@ -14,9 +14,10 @@ use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
 
 use crate::endpoint::Endpoint;
-use crate::limits::{BORROWED_SAMPLES_MAX, CONTRACT_VERSION, PARTICIPANTS_MAX};
+use crate::limits::{CONTRACT_VERSION, PARTICIPANTS_MAX};
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::{self, counter, root, unfinished};
+use crate::ports::memory;
 use crate::ports::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE, WhenFull};
 use crate::ports::wake::Wake;
 
@@ -33,6 +34,10 @@ const RETRY_PAUSE: Duration = Duration::from_millis(5);
 const ATTEMPTS_MAX: usize = 20;
 /// Longest wait for another process that cleans up after a dead process.
 pub(crate) const CLEANUP_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// Shared memory for the ports and connections of one process. iceoryx2 writes to them without
+/// allocating them first.
+const PORTS_SIZE_BYTES: u64 = 2 << 20;
 
 /// An iceoryx2 node in the domain of an endpoint. It handles no signals; programs do.
 #[derive(Debug)]
@@ -78,6 +83,8 @@ impl Session {
         let private = |cause| ServiceError::Root { endpoint: endpoint.clone(), cause };
         let root = root::prepare(&root::path(&config)).map_err(private)?;
         unfinished::remove_segments(&config);
+        memory::check(PORTS_SIZE_BYTES)
+            .map_err(|memory| ServiceError::NoMemory { endpoint: endpoint.clone(), memory })?;
         let is_named = endpoint.domain().is_some();
         if is_named {
             counter::check(&config).map_err(private)?;
@@ -260,6 +267,6 @@ where
         .max_nodes(PARTICIPANTS_MAX)
         .history_size(spec.history)
         .subscriber_max_buffer_size(spec.buffered)
-        .subscriber_max_borrowed_samples(BORROWED_SAMPLES_MAX)
+        .subscriber_max_borrowed_samples(spec.borrowed)
         .enable_safe_overflow(spec.when_full == WhenFull::DropOldest)
 }

@@ -2,12 +2,16 @@
 
 use std::fmt::Debug;
 
+use iceoryx2::identifiers::UniquePublisherId;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::{BackpressureStrategy, IceoryxSend, PortFactory, ZeroCopySend, ipc};
+use iceoryx2::prelude::{
+    BackpressureStrategy, Config, IceoryxSend, PortFactory, ZeroCopySend, ipc,
+};
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
 
+use crate::ports::memory::{self, AllocateError};
 use crate::ports::port::{PortLimit, SliceHeader, create_port};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::session::{Slices, Values};
@@ -53,6 +57,21 @@ pub(crate) struct Capacity {
     pub(crate) samples: usize,
 }
 
+/// Size of iceoryx2's own header of a message, in bytes.
+const MESSAGE_HEADER_SIZE_BYTES: usize = 48;
+/// Most bytes that a segment has beside its messages, and a message beside its headers and elements.
+const PADDING_SIZE_BYTES: usize = 64;
+
+impl Capacity {
+    /// Returns the most bytes of shared memory that a writer of messages of `T` with the header `H`
+    /// takes.
+    pub(crate) fn size_bytes<T, H>(self) -> u64 {
+        let message = MESSAGE_HEADER_SIZE_BYTES + size_of::<H>() + self.len_max * size_of::<T>();
+        let messages = self.samples * (message + PADDING_SIZE_BYTES) + PADDING_SIZE_BYTES;
+        messages as u64
+    }
+}
+
 /// A writer of a service of slices.
 #[derive(Debug)]
 pub(crate) struct SliceWriter<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
@@ -62,7 +81,12 @@ pub(crate) struct SliceWriter<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
 }
 
 impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H> {
-    pub(crate) fn create(service: &Slices<T, H>, capacity: Capacity) -> Result<Self, ServiceError> {
+    /// Creates the writer and allocates the memory of all its messages.
+    pub(crate) fn create(
+        config: &Config,
+        service: &Slices<T, H>,
+        capacity: Capacity,
+    ) -> Result<Self, ServiceError> {
         let Capacity { len_max, samples } = capacity;
         let publisher = create_publisher(service, || {
             service
@@ -73,7 +97,9 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
                 .backpressure_strategy(BackpressureStrategy::DiscardData)
                 .create()
         })?;
-        Ok(Self { publisher, service: service.name().to_string(), len_max })
+        let service = service.name().to_string();
+        allocate(config, publisher.id(), &service)?;
+        Ok(Self { publisher, service, len_max })
     }
 
     /// Publishes `element(0)`, `element(1)`, ... as one message of `header.element_count()` elements.
@@ -111,7 +137,12 @@ pub(crate) struct ValueWriter<T: Debug + Copy + ZeroCopySend + 'static> {
 }
 
 impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
-    pub(crate) fn create(service: &Values<T>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
+    /// Creates the writer and allocates the memory of all its messages.
+    pub(crate) fn create(
+        config: &Config,
+        service: &Values<T>,
+        spec: &ServiceSpec,
+    ) -> Result<Self, ServiceError> {
         let samples = spec.samples_in_use_max();
         let publisher = create_publisher(service, || {
             service
@@ -121,7 +152,9 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
                 .backpressure_strategy(BackpressureStrategy::DiscardData)
                 .create()
         })?;
-        Ok(Self { publisher, service: service.name().to_string() })
+        let service = service.name().to_string();
+        allocate(config, publisher.id(), &service)?;
+        Ok(Self { publisher, service })
     }
 
     /// Publishes a value. Returns the number of readers that received it.
@@ -134,6 +167,15 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
     pub(crate) fn refresh(&self) {
         let _ = self.publisher.update_connections();
     }
+}
+
+/// Allocates the memory of a publisher, so that writing a message never ends in SIGBUS.
+fn allocate(config: &Config, id: UniquePublisherId, service: &str) -> Result<(), ServiceError> {
+    let service = service.to_owned();
+    memory::allocate(config, id.value()).map_err(|error| match error {
+        AllocateError::Full(memory) => ServiceError::Memory { service, memory },
+        AllocateError::System(error) => ServiceError::Failed { service, detail: error.to_string() },
+    })
 }
 
 fn create_publisher<P, H, W>(

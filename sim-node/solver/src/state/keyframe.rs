@@ -167,6 +167,11 @@ impl Keyframe {
     }
 }
 
+/// Returns the size of an integer up to `max` in postcard's encoding: seven bits in each byte.
+fn encoded_size_bytes(max: usize) -> usize {
+    max.checked_ilog2().map_or(1, |bits| bits as usize / 7 + 1)
+}
+
 impl Solver {
     /// Returns the state beside the particles after the last step. Call it at a boundary, before any
     /// command.
@@ -192,9 +197,15 @@ impl Solver {
 
     /// Returns the largest size of an encoded keyframe of this scene, in bytes.
     pub fn keyframe_size_bytes_max(&self) -> usize {
-        // Integers have variable length: a u32 at most 5 bytes, a u64 or a length at most 10.
-        let (fixed, grab, root) = (5 + 4, 5 + 10 + 12 + 5, 5);
-        let (torn, cause, basis, moved) = (5, 5, 5, 5 + 12 + 16);
+        // Integers have variable length: an index as many bytes as the largest one needs, another u32
+        // at most 5, a u64 or a length at most 10.
+        let (index, link) = (
+            encoded_size_bytes(self.particle_count()),
+            encoded_size_bytes(self.constraint_count()),
+        );
+        let (fixed, grab) = (index + 4, index + 10 + 12 + 5);
+        let (torn, cause, moved) = (link, 1, 5 + 12 + 16);
+        let (root, basis) = if self.settings.tethers { (index, link) } else { (0, 0) };
         let parameters = 2 * 12 + 4 * 4 + 2 * 5 + 8 * 5;
         let head = 4 + 1 + 10 + 8 * 10 + parameters;
         head + self.particle_count() * (fixed + grab + root)

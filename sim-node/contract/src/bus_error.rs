@@ -1,0 +1,31 @@
+//! Report of SIGBUS. The kernel sends it to a process that writes to shared memory of which no page is
+//! left, or reads behind the end of a segment that another process has cut.
+
+use std::io::{self, Write, stderr};
+use std::process;
+use std::thread;
+
+use signal_hook::consts::SIGBUS;
+use signal_hook::iterator::Signals;
+
+const MESSAGE: &str = "error: a page of shared memory is missing (SIGBUS): /dev/shm is full, or another \
+     process has cut a segment; free memory there, and start again";
+
+/// Makes SIGBUS end the process with a message and exit code 1. Everything that a program itself writes
+/// is allocated before; this covers what iceoryx2 writes when it connects two processes.
+///
+/// # Errors
+/// The system refused the handler or the thread that prints the message.
+#[allow(clippy::exit, reason = "the thread that caused the signal cannot continue")]
+pub fn report_bus_errors() -> io::Result<()> {
+    let mut signals = Signals::new([SIGBUS])?;
+    // The thread that caused the signal repeats its access, and the signal, until this one exits.
+    let report = move || {
+        if signals.forever().next().is_some() {
+            // A closed stderr changes nothing.
+            let _ = writeln!(stderr(), "{MESSAGE}");
+            process::exit(1);
+        }
+    };
+    thread::Builder::new().name("bus-error".to_owned()).spawn(report).map(|_| ())
+}

@@ -1,0 +1,124 @@
+//! Shared memory. Creating a segment does not reserve its memory: pages are taken when they are first
+//! written, and SIGBUS ends a process that writes to one when none is left. So every segment is
+//! allocated before its first use.
+
+use std::fs::OpenOptions;
+use std::io;
+
+use iceoryx2::prelude::Config;
+use rustix::fs::{FallocateFlags, fallocate, statvfs};
+use rustix::io::Errno;
+use thiserror::Error;
+
+use crate::ports::domain::owner_lock::SHARED_MEMORY;
+use crate::ports::domain::unfinished::segments;
+
+/// Not enough memory in `/dev/shm`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error(
+    "{needed_mib} MiB of shared memory are needed, but /dev/shm has only {available_mib} MiB left: \
+     free some, or enlarge it (mount -o remount,size=... /dev/shm; docker run --shm-size ...)"
+)]
+pub struct MemoryError {
+    /// Needed memory in MiB, rounded up.
+    pub needed_mib: u64,
+    /// Available memory in MiB, rounded down.
+    pub available_mib: u64,
+}
+
+/// Checks that a number of bytes are free in `/dev/shm`.
+pub(crate) fn check(needed_bytes: u64) -> Result<(), MemoryError> {
+    match available_bytes() {
+        Some(available_bytes) => check_fits(needed_bytes, available_bytes),
+        // If the size is unknown, it may still be large enough.
+        None => Ok(()),
+    }
+}
+
+pub(crate) fn check_fits(needed_bytes: u64, available_bytes: u64) -> Result<(), MemoryError> {
+    if needed_bytes <= available_bytes {
+        return Ok(());
+    }
+    Err(MemoryError {
+        needed_mib: needed_bytes.div_ceil(1 << 20),
+        available_mib: available_bytes >> 20,
+    })
+}
+
+fn available_bytes() -> Option<u64> {
+    let memory = statvfs(SHARED_MEMORY).ok()?;
+    Some(memory.f_bavail * memory.f_frsize)
+}
+
+/// Error of allocating a segment.
+#[derive(Debug)]
+pub(crate) enum AllocateError {
+    Full(MemoryError),
+    System(io::Error),
+}
+
+/// Allocates all pages of the segment that holds the messages of a publisher.
+pub(crate) fn allocate(config: &Config, publisher_id: u128) -> Result<(), AllocateError> {
+    let suffix = &config.global.service.data_segment_suffix;
+    let ending = format!("_{publisher_id}{suffix}");
+    let is_its = |path: &std::path::PathBuf| {
+        path.as_os_str().as_encoded_bytes().ends_with(ending.as_bytes())
+    };
+    let Some(path) = segments(config, suffix).find(is_its) else {
+        let missing = io::Error::new(io::ErrorKind::NotFound, "its segment is missing");
+        return Err(AllocateError::System(missing));
+    };
+    let file = OpenOptions::new().write(true).open(&path).map_err(AllocateError::System)?;
+    let size_bytes = file.metadata().map_err(AllocateError::System)?.len();
+    match fallocate(&file, FallocateFlags::empty(), 0, size_bytes) {
+        Ok(()) => Ok(()),
+        Err(Errno::NOSPC) => Err(AllocateError::Full(MemoryError {
+            needed_mib: size_bytes.div_ceil(1 << 20),
+            available_mib: available_bytes().unwrap_or_default() >> 20,
+        })),
+        Err(error) => Err(AllocateError::System(error.into())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::MetadataExt;
+
+    use super::*;
+    use crate::client::Client;
+    use crate::messages::topology::{ConstraintState, LoadHeader};
+    use crate::owner::Owner;
+    use crate::owner::load::Load;
+    use crate::ports::domain;
+    use crate::testing::TestDomain;
+
+    #[test]
+    fn no_message_of_an_owner_or_client_needs_another_page() {
+        let domain = TestDomain::new();
+        let constraints = vec![ConstraintState::default(); 3000];
+        let load = |particle_count| Load {
+            header: LoadHeader { particle_count, ..LoadHeader::default() },
+            scene: b"version = 1",
+            constraints: &constraints,
+            triangles: &[],
+            collider_count: 2,
+            keyframe_size_bytes_max: 20_000,
+            parameters: sim_types::ParameterValues::DEFAULT,
+        };
+        let mut owner = Owner::create(&domain.endpoint(), &load(1000)).unwrap();
+        owner.load(&load(2000)).unwrap();
+        let mut client = Client::attach(&domain.endpoint()).unwrap();
+        // Creates the writer of commands.
+        client.send(sim_types::Action::Pause).unwrap();
+        let config = domain::configuration(Some(domain.name())).unwrap();
+        let mut segment_count = 0;
+        for path in segments(&config, &config.global.service.data_segment_suffix) {
+            let file = std::fs::metadata(&path).unwrap();
+            let allocated_bytes = file.blocks() * 512;
+            assert!(allocated_bytes >= file.len(), "{}: {allocated_bytes} bytes", path.display());
+            segment_count += 1;
+        }
+        // Eight of the load, outcomes, status, and the client's commands.
+        assert_eq!(segment_count, 11);
+    }
+}
