@@ -32,6 +32,7 @@
 //!     outcome_count: 0,
 //!     wake_late_ns: 0,
 //!     solve_ns: 0,
+//!     snapshot_index: Some(0),
 //! };
 //! log.write(&Message::Step(row), 0)?;
 //! log.write(&Message::Particles { step: 0, particles: vec![ParticleState::default()] }, 0)?;

@@ -2,6 +2,7 @@
 
 mod encoding;
 mod file_kind;
+mod gaps;
 mod index;
 mod message;
 mod part_file;
@@ -15,6 +16,7 @@ mod topic;
 mod writer;
 
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
+pub use gaps::GapCounter;
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};

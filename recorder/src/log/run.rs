@@ -12,8 +12,9 @@ use super::topic::{AllCounts, Topic};
 /// Version of the topics, rows and metadata in a file.
 ///
 /// Version 2 added `/colliders`, the causes of tears, and the previously torn constraints in
-/// `/topology`. Version 3 added `/parameters`.
-pub const FORMAT_VERSION: u32 = 3;
+/// `/topology`. Version 3 added `/parameters`. Version 4 added the index of each snapshot in `/steps`,
+/// and the number of unreadable messages at the end.
+pub const FORMAT_VERSION: u32 = 4;
 /// Oldest version that this recorder reads. Missing fields have defaults.
 pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 

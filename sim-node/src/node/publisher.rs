@@ -47,6 +47,8 @@ pub(crate) struct Publisher {
     times: StepTimes,
     /// Header of the newest published snapshot.
     last: SnapshotHeader,
+    /// Number of published snapshots, modulo 2^32.
+    snapshot_count: u32,
     /// The next snapshot needs a keyframe.
     is_keyframe_due: bool,
     keyframe_step: u64,
@@ -82,6 +84,7 @@ impl Publisher {
             every,
             times: StepTimes::default(),
             last: SnapshotHeader::default(),
+            snapshot_count: 0,
             is_keyframe_due: true,
             keyframe_step: 0,
             keyframe_readers: 0,
@@ -173,6 +176,7 @@ impl Publisher {
         self.last = self.header(solver, position);
         let particles: &[ParticleState] = cast_slice(solver.particles());
         self.owner.publish_particles(&self.last, |index| particles[index])?;
+        self.snapshot_count = self.snapshot_count.wrapping_add(1);
         self.owner.wake(Wake::Frame);
         Ok(())
     }
@@ -298,7 +302,7 @@ impl Publisher {
             particle_count: count(solver.particle_count()),
             flags: if position.is_paused { SnapshotFlags::PAUSED } else { 0 },
             stride: u32::try_from(self.every).unwrap_or(u32::MAX),
-            spare: 0,
+            snapshot_index: self.snapshot_count,
         }
     }
 

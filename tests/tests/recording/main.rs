@@ -3,5 +3,6 @@
 
 mod bad_input;
 mod end_to_end;
+mod losses;
 mod physics;
 mod threads;

@@ -40,6 +40,8 @@ pub(crate) struct Replay {
     published_parameters: ParameterValues,
     /// The last published step; `None` before the first.
     step: Option<u64>,
+    /// The index of the next snapshot; `None` before the first, which keeps its recorded index.
+    next_index: Option<u32>,
     /// The latest recorded status of the node.
     status: Option<StatusRow>,
     /// Reused for each batch of commands.
@@ -84,6 +86,7 @@ impl Replay {
             published_parameters: position.parameters,
             position,
             step: None,
+            next_index: None,
             status: None,
             commands: Vec::new(),
         })
@@ -122,7 +125,9 @@ impl Replay {
         for update in &frame.updates {
             self.publish_update(update)?;
         }
-        self.owner.publish_particles(&self.header(frame), |index| frame.particles[index])?;
+        let header = self.header(frame);
+        self.owner.publish_particles(&header, |index| frame.particles[index])?;
+        self.next_index = Some(header.snapshot_index.wrapping_add(1));
         self.owner.wake(Wake::Frame);
         self.step = Some(frame.row.step);
         self.control.count_step();
@@ -200,12 +205,12 @@ impl Replay {
             particle_count: self.run.particle_count,
             flags: SnapshotFlags::REPLAY | paused,
             stride: self.stride(row.step),
-            spare: 0,
+            snapshot_index: self.next_index.unwrap_or(row.snapshot_index.unwrap_or(0)),
         }
     }
 
-    /// Returns the distance of a step from the last published step. A file does not contain the stride of
-    /// its node, but a reader that receives every snapshot must not count missing ones.
+    /// Returns the distance of a step from the last published step, because a file does not contain the
+    /// stride of its node.
     fn stride(&self, step: u64) -> u32 {
         let distance = step.saturating_sub(self.step.unwrap_or(step));
         u32::try_from(distance).unwrap_or(u32::MAX).max(1)

@@ -64,7 +64,7 @@ fn write_state_layouts(text: &mut String) {
             particle_count,
             flags,
             stride,
-            spare,
+            snapshot_index,
         }
     );
     layout!(text, ConstraintState { a, b, rest_length, compliance, kind });

@@ -24,6 +24,8 @@ pub(super) struct Started {
     end_step: u64,
     /// The last recorded state.
     last: SnapshotHeader,
+    /// Number of the next snapshot, modulo 2^32.
+    next_snapshot: u32,
     next_outcome: u64,
     /// Step of the newest keyframe that a state refers to.
     keyframe_step: u64,
@@ -55,6 +57,7 @@ impl Started {
             topology_revision: header.topology_revision,
             first_step: header.step,
             last: *header,
+            next_snapshot: header.snapshot_index,
             // Earlier outcomes are part of the first state.
             next_outcome: header.outcome_count,
             keyframe_step: 0,
@@ -152,11 +155,8 @@ impl Started {
 
     /// Counts the states and keyframes that are missing before a state.
     fn count_gaps(&mut self, header: &SnapshotHeader) {
-        // A node that pauses also publishes the step before the pause, so the distance may be less
-        // than the stride.
-        let distance = header.step.saturating_sub(self.last.step);
-        let stride = u64::from(header.stride.max(1));
-        self.state_gaps += distance.div_ceil(stride).saturating_sub(1);
+        self.state_gaps += u64::from(header.snapshot_index.wrapping_sub(self.next_snapshot));
+        self.next_snapshot = header.snapshot_index.wrapping_add(1);
         if header.keyframe_step > self.keyframe_step && header.keyframe_step >= self.first_step {
             self.keyframe_step = header.keyframe_step;
             let is_missing = self.recorded_keyframe_step < Some(header.keyframe_step);
