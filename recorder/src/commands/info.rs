@@ -50,8 +50,8 @@ pub(crate) struct Info {
     duration_s: f64,
     /// Number of messages in the file, by topic.
     messages: BTreeMap<&'static str, u64>,
-    /// Messages that the recorder lost or that never reached it, for topics with such messages. In a
-    /// file without an end, only those that are missing between recorded ones.
+    /// Messages that the recorder lost or that never reached it, for topics with such messages, and
+    /// "unreadable" ones. In a file without an end, only those that are missing between recorded ones.
     lost: BTreeMap<&'static str, u64>,
     /// Reason why the recorder stopped. Absent if it was killed.
     stop_reason: Option<String>,
@@ -122,11 +122,11 @@ impl Info {
     /// Sets the losses: those that the end of the file states, or more if the file shows more.
     fn count_lost(&mut self, closing: Option<&Closing>, shown: &AllCounts) {
         self.stop_reason = closing.map(|closing| closing.stop_reason.clone());
-        let stated = closing.map(|closing| closing.counts).unwrap_or_default();
-        let missing = stated.iter().zip(shown.iter()).map(|((topic, stated), (_, shown))| {
-            (topic.name(), stated.lost.saturating_add(stated.gaps).max(shown.gaps))
-        });
-        self.lost = missing.filter(|(_, count)| *count > 0).collect();
+        self.lost = closing.map(Closing::missing).unwrap_or_default();
+        for (topic, shown) in shown.iter().filter(|(_, shown)| shown.gaps > 0) {
+            let lost = self.lost.entry(topic.name()).or_default();
+            *lost = shown.gaps.max(*lost);
+        }
     }
 }
 

@@ -14,9 +14,9 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::{Closing, Message, PartFile, WriteError};
+use recorder::{Message, PartFile, WriteError};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
-use sim_contract::{Endpoint, ReadError, SNAPSHOTS_BUFFERED, Stop, Tap};
+use sim_contract::{Endpoint, SNAPSHOTS_BUFFERED, Stop, Tap};
 
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
@@ -95,7 +95,6 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         begin_ns: monotonic_ns(),
         next_owner_check_ns: 0,
         is_owner_alive: true,
-        unreadable: 0,
     };
     let result = recording.run(args, &stop);
     let report = recording.finish(result, &endpoint)?;
@@ -142,8 +141,6 @@ struct Recording {
     begin_ns: u64,
     next_owner_check_ns: u64,
     is_owner_alive: bool,
-    /// Number of messages that arrived but could not be read.
-    unreadable: u64,
 }
 
 impl Recording {
@@ -196,18 +193,9 @@ impl Recording {
         }
         self.intake.accept_messages(messages, Now::read(), &mut accepted);
         self.intake.set_lost(self.tap.lost_changes());
-        let errors = self.tap.drain_errors();
-        self.note_unreadable(&errors);
+        self.intake.count_unreadable(&self.tap.drain_errors());
         accepted.sort();
         Ok(accepted)
-    }
-
-    /// Counts messages that could not be read, and reports the first one.
-    fn note_unreadable(&mut self, errors: &[ReadError]) {
-        if let (Some(error), 0) = (errors.first(), self.unreadable) {
-            output::note(&format!("warning: a message was not recorded: {error}"));
-        }
-        self.unreadable += errors.len() as u64;
     }
 
     /// Passes a batch to the writing thread.
@@ -273,7 +261,7 @@ impl Recording {
             Ok(reason) => reason.text().to_owned(),
             Err(error) => format!("{error:#}"),
         };
-        let mut closing = Closing { stop_reason, counts: self.intake.counts() };
+        let mut closing = self.intake.closing(stop_reason);
         closing.counts.set_written(log.counts());
         closing.counts.set_lost(&self.queue.lost());
         let kept =
@@ -281,7 +269,7 @@ impl Recording {
         let path = log.finish(&closing).context(kept)?.finish().context(kept)?;
         result?;
         let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
-        Ok(Report::new(path, closing, steps).with_unreadable(self.unreadable))
+        Ok(Report::new(path, closing, steps))
     }
 }
 

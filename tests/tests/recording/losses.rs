@@ -1,9 +1,10 @@
 //! Recordings declare exactly the messages that are missing in them.
 
+use std::fs::File;
 use std::path::Path;
 
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, wait_for};
-use recorder::{LogReader, Message};
+use recorder::{Closing, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::{Action, Client, SNAPSHOTS_BUFFERED};
 
 /// Single steps that a stopped recorder misses, beyond those that its buffer holds.
@@ -120,4 +121,21 @@ fn a_stopped_recorder_declares_exactly_the_snapshots_that_it_missed_even_if_it_i
         assert!(text.contains(&lost), "no \"{lost}\" in: {text}");
         assert_eq!(text.contains("as far as the file goes"), file == &parts[1], "{text}");
     }
+}
+
+#[test]
+fn a_file_with_unreadable_messages_is_not_complete() {
+    let sandbox = Sandbox::new();
+    let (file, other) = (sandbox.path("run.mcap"), sandbox.path("other.mcap"));
+    recorder(&sandbox, &["simulate", "rope", "--steps", "3", "-o", &file]).success();
+    let mut log = LogReader::open(Path::new(&file)).unwrap();
+    let out = File::create(&other).unwrap();
+    let mut copy =
+        LogWriter::create(out, LogOptions::default(), log.run(), log.scene(), 0).unwrap();
+    while let Some(logged) = log.next_message().unwrap() {
+        copy.write(&logged.message, logged.log_time_ns).unwrap();
+    }
+    copy.finish(&Closing { unreadable: 2, ..Closing::default() }).unwrap();
+    let info = recorder(&sandbox, &["info", "--json", &other]);
+    assert_eq!((info.code, lost(&info.stdout)), (Some(3), serde_json::json!({ "unreadable": 2 })));
 }

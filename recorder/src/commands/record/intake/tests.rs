@@ -13,6 +13,7 @@ use recorder::{Message, Topic};
 use super::*;
 use crate::commands::record::accepted::RunEnd;
 use crate::commands::record::queue::Content;
+use crate::commands::record::report::Report;
 
 const RUN_ID: u64 = 77;
 const NOW: Now = Now { realtime_ns: 5_000_000_000, monotonic_ns: 2_000_000_000 };
@@ -480,4 +481,18 @@ fn tears_that_never_arrived_are_counted() {
     assert_eq!(intake.counts()[Topic::Tears].gaps, 2);
     publish(&mut intake, header(7, 3), &[tears(7, &[], 0)]);
     assert_eq!(intake.counts()[Topic::Tears].gaps, 0, "after a reset");
+}
+
+#[test]
+fn unreadable_messages_are_counted_from_the_start_on_and_make_the_report_incomplete() {
+    let error = || ReadError::Malformed { service: "sim/tears".to_owned(), detail: String::new() };
+    let mut intake = Intake::default();
+    intake.count_unreadable(&[error()]);
+    assert_eq!(intake.unreadable, 0, "before the start");
+    let mut intake = started();
+    intake.count_unreadable(&[error(), error()]);
+    intake.count_unreadable(&[error()]);
+    let closing = intake.closing("signal".to_owned());
+    assert_eq!(closing.missing(), [("unreadable", 3)].into());
+    assert!(!Report::new("run.mcap", closing, 4..=4).is_complete());
 }
