@@ -51,3 +51,4 @@
 mod log;
 
 pub use log::*;
+pub use sim_contract::{Existing, PartFile, PartFileError};

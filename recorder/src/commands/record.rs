@@ -8,13 +8,14 @@ mod messages;
 mod queue;
 mod report;
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::{Message, PartFile, WriteError};
+use recorder::{LogWriter, Message, PartFile, WriteError};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{Endpoint, SNAPSHOTS_BUFFERED, Stop, Tap};
 
@@ -34,7 +35,7 @@ use report::Report;
 const WAIT_MAX: Duration = Duration::from_millis(50);
 /// Period of the check whether the owner is alive.
 const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
-/// Flush period: the most that a killed recorder loses.
+/// Flush period: the most that a killed recorder or a power cut loses.
 const FLUSH_NS: u64 = SECOND_NS;
 
 #[derive(Debug, clap::Args)]
@@ -66,6 +67,10 @@ pub(crate) struct RecordArgs {
     #[arg(long, value_name = "BYTES", default_value_t = 256 << 20,
         allow_hyphen_values = true, value_parser = queue_bytes)]
     queue_bytes: u64,
+    /// Do not wait each second until the recording is on the disk. A power cut may then lose much
+    /// more than the last second
+    #[arg(long)]
+    no_sync: bool,
     #[command(flatten)]
     file: FileArgs,
     #[command(flatten)]
@@ -82,6 +87,8 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let tap = Tap::attach(&endpoint)?;
     let path = args.output.clone().unwrap_or_else(|| default_path(endpoint.name(), realtime_ns()));
     let file = args.file.create(&path)?;
+    let part_path = file.part_path().to_owned();
+    let file = if args.no_sync { file } else { file.with_sync_on_flush() };
     output::note(&format!("ready recording {endpoint} into {}", output::path_text(&path)));
 
     let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
@@ -90,6 +97,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         intake: Intake::new(args.steps),
         queue: Arc::new(Queue::new(queue_bytes)),
         file: Some(file),
+        part_path,
         writing: None,
         last_step: 0,
         begin_ns: monotonic_ns(),
@@ -134,6 +142,7 @@ struct Recording {
     queue: Arc<Queue>,
     /// The file, until its header is written.
     file: Option<PartFile>,
+    part_path: PathBuf,
     /// The writing thread, once the recording has started.
     writing: Option<JoinHandle<anyhow::Result<LogFile>>>,
     /// The last step in the queue.
@@ -254,9 +263,9 @@ impl Recording {
             );
         };
         let written = writing.join().map_err(|_| anyhow!("the writing thread panicked"))?;
-        let log = written.context(
-            "the recording is incomplete; its readable part is the file with the suffix .part",
-        )?;
+        let part = output::path_text(&self.part_path);
+        let log = written
+            .with_context(|| format!("the recording is incomplete; its readable part is {part}"))?;
         let stop_reason = match &result {
             Ok(reason) => reason.text().to_owned(),
             Err(error) => format!("{error:#}"),
@@ -264,9 +273,8 @@ impl Recording {
         let mut closing = self.intake.closing(stop_reason);
         closing.counts.set_written(log.counts());
         closing.counts.set_lost(&self.queue.lost());
-        let kept =
-            "the recording is complete except for its end, in the file with the suffix .part";
-        let path = log.finish(&closing).context(kept)?.finish().context(kept)?;
+        let kept = || format!("the recording is complete except for its end, in {part}");
+        let path = log.finish(&closing).with_context(kept)?.finish().with_context(kept)?;
         result?;
         let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
         Ok(Report::new(path, closing, steps))
@@ -282,8 +290,8 @@ impl Drop for CloseOnDrop {
     }
 }
 
-/// The writing thread: writes every item and flushes every second.
-fn write(queue: &Queue, mut log: LogFile) -> Result<LogFile, WriteError> {
+/// The writing thread: writes every item, flushes every second, and waits until that is on the disk.
+fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> Result<LogWriter<W>, WriteError> {
     let mut next_flush_ns = monotonic_ns() + FLUSH_NS;
     loop {
         match queue.pop(WAIT_MAX) {

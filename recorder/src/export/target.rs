@@ -1,7 +1,6 @@
 //! The files of the pictures, named after the scene and the step.
 
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -59,9 +58,8 @@ impl<'a> Target<'a> {
             Format::Svg => svg::encode(picture).into_bytes(),
         };
         let path = self.path(step);
-        let mut file = PartFile::create(&path, self.existing)?;
-        file.write_all(&bytes).with_context(|| format!("cannot write {}", path.display()))?;
-        Ok(file.finish()?)
+        PartFile::write_whole(&path, self.existing, &bytes)?;
+        Ok(path)
     }
 }
 
