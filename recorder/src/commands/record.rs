@@ -312,3 +312,6 @@ fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> Result<LogWriter<W>,
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
