@@ -62,6 +62,8 @@ pub(crate) struct Publisher {
     /// Number of torn constraints, and the colliders, as last published.
     torn_count: usize,
     colliders: Vec<PlacedCollider>,
+    /// Number of published lists of colliders, modulo 2^32.
+    collider_list_count: u32,
 }
 
 impl Publisher {
@@ -94,6 +96,7 @@ impl Publisher {
             parameters,
             torn_count: 0,
             colliders: Vec::new(),
+            collider_list_count: 0,
         })
     }
 
@@ -189,8 +192,11 @@ impl Publisher {
         self.colliders.clear();
         self.colliders.extend(solver.colliders());
         let states: Vec<_> = self.colliders.iter().map(to_collider_state).collect();
-        let header = CollidersHeader { run_id: self.run_id, step, ..CollidersHeader::default() };
-        Ok(self.owner.publish_colliders(header, &states)?)
+        let list_index = self.collider_list_count;
+        let header = CollidersHeader { run_id: self.run_id, step, count: 0, list_index };
+        self.owner.publish_colliders(header, &states)?;
+        self.collider_list_count = list_index.wrapping_add(1);
+        Ok(())
     }
 
     /// Publishes all torn constraints if a constraint tore or was restored in this step.

@@ -123,6 +123,32 @@ fn a_stopped_recorder_declares_exactly_the_snapshots_that_it_missed_even_if_it_i
     }
 }
 
+/// A scene with a collider that moves in every step.
+const MOVING_COLLIDER: &str = "version = 1\n\
+    [[particle]]\nposition = [0, 9, 0]\n\
+    [[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\nvelocity = [0.01, 0, 0]\n";
+
+#[test]
+fn a_stopped_recorder_declares_the_poses_of_colliders_between_two_snapshots() {
+    let sandbox = Sandbox::new();
+    let scene = sandbox.write("moving.toml", MOVING_COLLIDER);
+    let file = sandbox.path("run.mcap");
+    let args = ["run", &scene, "--every", "1000", "--paused"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let args = ["record", "-o", &file, "--json"];
+    let recording = Process::start_ready(Program::Recorder, &sandbox, &args);
+    let part = format!("{file}.part");
+    wait_for("step 0 in the file", || recorded_steps(&part).contains(&0).then_some(()));
+    recording.signal(Signal::STOP);
+    let count = (SNAPSHOTS_BUFFERED as u64 + MISSED).to_string();
+    assert_eq!(ctl(&sandbox, &["step", &count])["status"], "applied");
+    recording.signal(Signal::CONT);
+    let finished = recording.interrupt();
+    let expected = serde_json::json!({ "/colliders": MISSED });
+    assert_eq!((finished.code, lost(&finished.stdout)), (Some(3), expected));
+    assert_eq!(recorded_steps(&file).len(), 2, "no snapshot is missing");
+}
+
 #[test]
 fn a_file_with_unreadable_messages_is_not_complete() {
     let sandbox = Sandbox::new();

@@ -5,8 +5,8 @@ use recorder::{
     Topic,
 };
 use sim_contract::{
-    Change, ColliderState, KeyframeHeader, LostChanges, NodeStatus, Outcome, ParticleState,
-    SnapshotHeader,
+    Change, ColliderState, CollidersHeader, KeyframeHeader, LostChanges, NodeStatus, Outcome,
+    ParticleState, SnapshotHeader,
 };
 
 use crate::commands::record::accepted::{Accepted, RunEnd};
@@ -35,8 +35,8 @@ pub(super) struct Started {
     torn_count: u32,
     /// States that never arrived.
     state_gaps: u64,
-    /// Colliders of an unknown shape.
-    unknown_colliders: u64,
+    /// Number of the next list of colliders, modulo 2^32; `None` before the first.
+    next_collider_list: Option<u32>,
     /// The changes that the tap dropped before the start.
     lost_before: LostChanges,
     frozen: FrozenTracker,
@@ -64,7 +64,7 @@ impl Started {
             recorded_keyframe_step: None,
             torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
             state_gaps: 0,
-            unknown_colliders: 0,
+            next_collider_list: None,
             lost_before,
             frozen: FrozenTracker::default(),
             counts: AllCounts::default(),
@@ -123,7 +123,7 @@ impl Started {
     fn row(&mut self, change: &Change) -> Option<Message> {
         match change {
             Change::Load | Change::Outcome(_) => None,
-            Change::Colliders(header, list) => self.colliders_row(header.step, list),
+            Change::Colliders(header, list) => self.colliders_row(header, list),
             Change::Tears(header, new) => {
                 self.torn_count = header.count;
                 (!new.is_empty()).then(|| Message::Tears(TearsRow::new(header.step, new)))
@@ -136,9 +136,17 @@ impl Started {
     }
 
     /// Returns the row of a list of colliders. A scene without colliders has no rows.
-    fn colliders_row(&mut self, step: u64, list: &[ColliderState]) -> Option<Message> {
+    fn colliders_row(
+        &mut self,
+        header: &CollidersHeader,
+        list: &[ColliderState],
+    ) -> Option<Message> {
+        let CollidersHeader { step, list_index, .. } = *header;
+        let missing = list_index.wrapping_sub(self.next_collider_list.unwrap_or(list_index));
+        self.next_collider_list = Some(list_index.wrapping_add(1));
         let row = CollidersRow::new(step, list);
-        self.unknown_colliders += u64::from(row.is_none());
+        // A collider of an unknown shape cannot be recorded.
+        self.counts[Topic::Colliders].gaps += u64::from(missing) + u64::from(row.is_none());
         row.filter(|row| !row.colliders.is_empty()).map(Message::Colliders)
     }
 
@@ -201,8 +209,6 @@ impl Started {
         counts[Topic::Steps].gaps = self.state_gaps;
         counts[Topic::Outcomes].gaps += self.last.outcome_count.saturating_sub(self.next_outcome);
         counts[Topic::Tears].gaps = u64::from(self.last.torn_count.saturating_sub(self.torn_count));
-        counts[Topic::Colliders].gaps =
-            self.unknown_colliders + (lost.colliders - self.lost_before.colliders);
         counts[Topic::Parameters].gaps = lost.parameters - self.lost_before.parameters;
         counts
     }
