@@ -31,7 +31,7 @@ fn lost(report: &str) -> serde_json::Value {
 }
 
 #[test]
-fn a_node_that_publishes_every_tenth_step_loses_nothing_by_pauses_steps_and_resets() {
+fn a_node_that_publishes_every_tenth_step_loses_nothing_by_pauses_steps_resets_and_a_load() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let args = ["run", "rope", "--every", "10", "--paused"];
@@ -58,8 +58,11 @@ fn a_node_that_publishes_every_tenth_step_loses_nothing_by_pauses_steps_and_rese
             steps.push(ctl(&sandbox, &["status"])["step"].as_u64().unwrap());
         }
     }
-    let finished = recording.interrupt();
+    // The recording ends where another scene is loaded.
+    assert_eq!(ctl(&sandbox, &["load", "rope"])["status"], "applied");
+    let finished = recording.wait();
     assert_eq!(lost(&finished.stdout), serde_json::json!({}));
+    assert!(finished.stdout.contains("new scene loaded"), "{}", finished.stdout);
     assert_eq!(finished.code, Some(0), "{}", finished.stderr);
     let recorded = recorded_steps(&file);
     steps.extend((0..=recorded[recorded.len() - 1]).step_by(10));
