@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use recorder::{Existing, PartFile};
 
 use super::shape::Picture;
@@ -45,8 +45,11 @@ impl<'a> Target<'a> {
 
     /// Creates the folder. Fails if one of the files may not be created.
     pub(crate) fn prepare(&self, steps: &[u64]) -> anyhow::Result<()> {
-        steps.iter().try_for_each(|step| self.existing.check(&self.path(*step)))?;
         let folder = self.folder;
+        if folder.exists() && !folder.is_dir() {
+            bail!("{} is not a folder; name a folder for the pictures", folder.display());
+        }
+        steps.iter().try_for_each(|step| self.existing.check(&self.path(*step)))?;
         fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the folder {}", folder.display()))
     }
