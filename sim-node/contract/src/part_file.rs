@@ -88,10 +88,19 @@ pub enum PartFileError {
 #[derive(Debug)]
 pub struct PartFile<F: DiskFile = File> {
     out: BufWriter<F>,
-    syncs_on_flush: bool,
+    sync_on_flush: SyncOnFlush,
     path: PathBuf,
     part_path: PathBuf,
     existing: Existing,
+}
+
+/// The part of a file that the next flush syncs to disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SyncOnFlush {
+    Nothing,
+    Data,
+    /// The data, and the name of a file that is new.
+    DataAndName,
 }
 
 impl PartFile {
@@ -107,7 +116,7 @@ impl PartFile {
         let file = open_locked(&part_path, existing)?;
         // Only now, because the file may have belonged to another program until it was locked.
         file.set_len(0).map_err(|cause| io_error(&part_path, cause))?;
-        Self::begin(file, path, existing)
+        Ok(Self::begin(file, path, existing))
     }
 
     /// Writes a whole file. An existing file keeps its contents until the new ones are complete.
@@ -128,19 +137,17 @@ impl PartFile {
 
 impl<F: DiskFile> PartFile<F> {
     /// Begins with an empty file that has the suffix `.part`.
-    fn begin(file: F, path: &Path, existing: Existing) -> Result<Self, PartFileError> {
-        let part_path = part_path(path);
-        let synced = file.sync_folder_of(&part_path);
-        synced.map_err(|cause| io_error(&part_path, cause))?;
+    fn begin(file: F, path: &Path, existing: Existing) -> Self {
         let out = BufWriter::with_capacity(BUFFER_SIZE_BYTES, file);
-        Ok(Self { out, syncs_on_flush: false, path: path.to_owned(), part_path, existing })
+        let (path, part_path) = (path.to_owned(), part_path(path));
+        Self { out, sync_on_flush: SyncOnFlush::Nothing, path, part_path, existing }
     }
 
     /// Makes every flush wait until the data is on disk, so that a power cut loses only what was
-    /// written after the last flush.
+    /// written after the last flush. The caller of [`PartFile::create`] does not wait for the disk.
     #[must_use]
     pub fn with_sync_on_flush(mut self) -> Self {
-        self.syncs_on_flush = true;
+        self.sync_on_flush = SyncOnFlush::DataAndName;
         self
     }
 
@@ -197,7 +204,17 @@ impl<F: DiskFile> Write for PartFile<F> {
 
     fn flush(&mut self) -> io::Result<()> {
         self.out.flush()?;
-        if self.syncs_on_flush { self.out.get_ref().sync_data() } else { Ok(()) }
+        let file = self.out.get_ref();
+        match self.sync_on_flush {
+            SyncOnFlush::Nothing => {}
+            SyncOnFlush::Data => file.sync_data()?,
+            SyncOnFlush::DataAndName => {
+                file.sync_data()?;
+                file.sync_folder_of(&self.part_path)?;
+                self.sync_on_flush = SyncOnFlush::Data;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -56,16 +56,14 @@ fn calls(
     File::create_new(part_path(&path)).unwrap();
     let calls = Rc::default();
     let file = NotedFile { calls: Rc::clone(&calls), failing, path: path.clone() };
-    let result = PartFile::begin(file, &path, Existing::Refuse).and_then(|mut file| {
-        if syncs_on_flush {
-            file = file.with_sync_on_flush();
-        }
-        let written = file
-            .write_all(b"one")
-            .and_then(|()| file.write_all(b"two"))
-            .and_then(|()| file.flush())
-            .and_then(|()| file.write_all(b"three"));
-        written.map_err(|cause| io_error(&path, cause))?;
+    let mut file = PartFile::begin(file, &path, Existing::Refuse);
+    if syncs_on_flush {
+        file = file.with_sync_on_flush();
+    }
+    let mut write_and_flush = |text: &[u8]| file.write_all(text).and_then(|()| file.flush());
+    let written = write_and_flush(b"one").and_then(|()| write_and_flush(b"two"));
+    let result = written.map_err(|cause| io_error(&path, cause)).and_then(|()| {
+        file.write_all(b"three").map_err(|cause| io_error(&path, cause))?;
         file.finish()
     });
     fs::remove_dir_all(&folder).unwrap();
@@ -78,10 +76,19 @@ fn each_flush_and_the_end_and_both_names_are_synced() {
     result.unwrap();
     assert_eq!(
         calls_with_sync,
-        ["sync part name", "write", "sync data", "write", "sync all", "sync new name"]
+        [
+            "write",
+            "sync data",
+            "sync part name",
+            "write",
+            "sync data",
+            "write",
+            "sync all",
+            "sync new name"
+        ]
     );
     let (calls_without, _) = calls(false, None);
-    assert_eq!(calls_without, ["sync part name", "write", "write", "sync all", "sync new name"]);
+    assert_eq!(calls_without, ["write", "write", "write", "sync all", "sync new name"]);
 }
 
 #[test]
