@@ -32,6 +32,7 @@
 //!     outcome_count: 0,
 //!     wake_late_ns: 0,
 //!     solve_ns: 0,
+//!     snapshot_index: Some(0),
 //! };
 //! log.write(&Message::Step(row), 0)?;
 //! log.write(&Message::Particles { step: 0, particles: vec![ParticleState::default()] }, 0)?;
@@ -50,3 +51,4 @@
 mod log;
 
 pub use log::*;
+pub use sim_contract::{Existing, PartFile, PartFileError};

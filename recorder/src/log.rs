@@ -1,10 +1,9 @@
 //! The recording format, from the bytes of a message to the state at any step.
 
 mod encoding;
-mod file_kind;
+mod gaps;
 mod index;
 mod message;
-mod part_file;
 mod read;
 mod rows;
 mod run;
@@ -15,9 +14,9 @@ mod topic;
 mod writer;
 
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
+pub use gaps::GapCounter;
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
-pub use part_file::{Existing, PartFile, PartFileError};
 pub use read::decode::LoggedMessage;
 pub use read::frames::{Frame, FrameReader};
 pub use read::open::open_regular_file;

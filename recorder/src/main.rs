@@ -56,7 +56,12 @@ enum Command {
 
 fn main() -> Exit {
     let args = Args::try_parse().unwrap_or_else(|error| explain(error).exit());
-    exit::from_result(match &args.command {
+    exit::from_result(run(&args.command))
+}
+
+fn run(command: &Command) -> anyhow::Result<Exit> {
+    sim_contract::report_file_size_limit()?;
+    match command {
         Command::Export(args) => export_command::run(args),
         Command::Info(args) => info::run(args),
         Command::Play(args) => play::run(args),
@@ -64,7 +69,7 @@ fn main() -> Exit {
         Command::Scene(args) => scene::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Verify(args) => verify::run(args),
-    })
+    }
 }
 
 /// Replaces the text of clap for an unknown option, which speaks of an "unexpected argument".

@@ -43,6 +43,7 @@ fn step_row(step: u64) -> StepRow {
         outcome_count: 2,
         wake_late_ns: u64::MAX,
         solve_ns: 5,
+        snapshot_index: Some(7),
     }
 }
 
@@ -174,7 +175,7 @@ fn rows_have_the_documented_form() {
     );
     assert_eq!(
         serde_json::to_string(&step_row(12)).unwrap(),
-        r#"{"step":12,"scene_step":12,"state_hash":"00ab00000000000c","topology_revision":0,"torn_count":0,"outcome_count":2,"wake_late_ns":18446744073709551615,"solve_ns":5}"#
+        r#"{"step":12,"scene_step":12,"state_hash":"00ab00000000000c","topology_revision":0,"torn_count":0,"outcome_count":2,"wake_late_ns":18446744073709551615,"solve_ns":5,"snapshot_index":7}"#
     );
     let Message::Topology(topology) = &messages()[0] else { panic!("not the topology") };
     assert_eq!(
@@ -203,15 +204,15 @@ fn the_other_rows_have_the_documented_form() {
 fn recordings_of_older_formats_are_read_and_those_of_the_next_are_refused() {
     let with_version = |version: &str| {
         let mut file = write(LogOptions::default());
-        let needle = b"format_version\x01\0\0\x003";
+        let needle = b"format_version\x01\0\0\x004";
         let place = file.windows(needle.len()).position(|window| window == needle).unwrap();
         file[place + needle.len() - 1] = version.as_bytes()[0];
         LogReader::new(Cursor::new(file)).map(|_| ())
     };
-    assert!(with_version("1").is_ok() && with_version("2").is_ok());
+    assert!(["1", "2", "3"].iter().all(|version| with_version(version).is_ok()));
     assert_eq!(
-        with_version("4").unwrap_err().to_string(),
-        "has format version 4; this recorder reads versions 1 to 3"
+        with_version("5").unwrap_err().to_string(),
+        "has format version 5; this recorder reads versions 1 to 4"
     );
 }
 

@@ -1,11 +1,9 @@
 //! `import`: converts a mesh to a scene.
 
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use anyhow::{Context, anyhow};
-use sim_contract::read_scene_file;
+use sim_contract::{Existing, PartFile, read_scene_file};
 use sim_solver::{Scene, SceneError};
 
 use crate::args::ImportArgs;
@@ -32,7 +30,8 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
     let Some(path) = &args.output else {
         return output::text(&result);
     };
-    write(path, &result, args)?;
+    let existing = if args.overwrite { Existing::Overwrite } else { Existing::Refuse };
+    PartFile::write_whole(path, existing, result.as_bytes())?;
     output::note(&format!(
         "{}: {} particles, {} constraints, {} pins, {} triangles",
         path.display(),
@@ -76,21 +75,6 @@ fn quoted_text(text: &str) -> String {
 
 fn file_name(path: &str) -> String {
     Path::new(path).file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// Writes the scene. An existing file is replaced only if [`ImportArgs::overwrite`] is set.
-fn write(path: &Path, text: &str, args: &ImportArgs) -> anyhow::Result<()> {
-    let mut options = OpenOptions::new();
-    options.write(true).truncate(true);
-    let options = if args.overwrite { options.create(true) } else { options.create_new(true) };
-    let mut file = options.open(path).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => {
-            anyhow!("{} exists (use --overwrite to replace it)", path.display())
-        }
-        _ => anyhow!("{}: cannot create the file: {error}", path.display()),
-    })?;
-    file.write_all(text.as_bytes())
-        .with_context(|| format!("{}: cannot write the scene", path.display()))
 }
 
 #[cfg(test)]

@@ -19,6 +19,9 @@ use exit::Exit;
 
 fn main() -> Exit {
     let args = args::parse();
+    if let Err(error) = sim_contract::report_file_size_limit() {
+        return exit::from_result(Err(error.into()));
+    }
     let result = match args.verb {
         None => run::run(&args.run),
         Some(Verb::Run(run)) => run::run(&run),

@@ -31,7 +31,7 @@ SnapshotHeader = struct(
     (UINT32, "contract_version solver_version"),
     (UINT64, "run_id step scene_step keyframe_step sim_time_ns publish_monotonic_ns state_hash"),
     (UINT64, "outcome_count wake_late_ns solve_ns"),
-    (UINT32, "topology_revision torn_count particle_count flags stride spare"),
+    (UINT32, "topology_revision torn_count particle_count flags stride snapshot_index"),
 )
 TornConstraint = struct("TornConstraint", (UINT32, "constraint cause"))
 TearsHeader = struct(

@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
 use sim_contract::DOMAIN_VARIABLE;
 
 use crate::programs::Program;
@@ -162,6 +162,17 @@ impl Process {
     pub fn signal(&self, signal: Signal) {
         let pid = Pid::from_child(&self.child);
         kill_process(pid, signal).unwrap_or_else(|error| panic!("{}: {error}", self.title));
+    }
+
+    /// Limits the size of the files that the program writes from now on, as `ulimit -f` does.
+    ///
+    /// # Panics
+    /// If the process has ended.
+    pub fn limit_file_size(&self, size_bytes: u64) {
+        let pid = Pid::from_child(&self.child);
+        let limit = Rlimit { current: Some(size_bytes), maximum: Some(size_bytes) };
+        prlimit(Some(pid), Resource::Fsize, limit)
+            .unwrap_or_else(|error| panic!("{}: {error}", self.title));
     }
 
     /// Sends SIGINT, as Ctrl-C does, unless the program has ended, and waits for its end.

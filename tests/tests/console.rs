@@ -209,7 +209,23 @@ fn import_names_the_option_that_replaces_an_existing_file() {
         (refused.code, refused.stderr),
         (Some(1), format!("error: {scene} exists (use --overwrite to replace it)\n"))
     );
+    // Importing replaces the file as a whole: a second name keeps the old contents.
+    let old = sandbox.path("old.toml");
+    std::fs::hard_link(&scene, &old).unwrap();
     run(&sandbox, &format!("import {mesh} -o {scene} --overwrite")).success();
+    assert_eq!(std::fs::read_to_string(&old).unwrap(), "version = 1\n");
+    assert!(std::fs::read_to_string(&scene).unwrap().starts_with("# Converted from mesh.obj"));
+}
+
+#[test]
+fn import_refuses_an_output_that_is_not_a_file() {
+    let sandbox = Sandbox::new();
+    let mesh = sandbox.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for options in ["", " --overwrite"] {
+        let refused = run(&sandbox, &format!("import {mesh} -o /dev/null{options}"));
+        let expected = "error: /dev/null is a device; name a file\n".to_owned();
+        assert_eq!((refused.code, refused.stderr), (Some(1), expected));
+    }
 }
 
 #[test]

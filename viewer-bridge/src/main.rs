@@ -39,6 +39,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    sim_contract::report_file_size_limit()?;
     let stop = Stop::install()?;
     report_bus_errors()?;
     let source = open_source(args)?;

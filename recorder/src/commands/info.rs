@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use recorder::{Closing, LogEnd, LogReader, Message, RunDescription, Topic};
+use recorder::{AllCounts, Closing, GapCounter, LogEnd, LogReader, Message, RunDescription, Topic};
 use serde::Serialize;
 
 use crate::cli::exit::Exit;
@@ -50,7 +50,8 @@ pub(crate) struct Info {
     duration_s: f64,
     /// Number of messages in the file, by topic.
     messages: BTreeMap<&'static str, u64>,
-    /// Messages that the recorder lost or that never reached it, for topics with such messages.
+    /// Messages that the recorder lost or that never reached it, for topics with such messages, and
+    /// "unreadable" ones. In a file without an end, only those that are missing between recorded ones.
     lost: BTreeMap<&'static str, u64>,
     /// Reason why the recorder stopped. Absent if it was killed.
     stop_reason: Option<String>,
@@ -75,7 +76,9 @@ pub(crate) fn inspect<R: Read>(
     size_bytes: u64,
 ) -> Result<(Info, LogEnd), recorder::ReadError> {
     let mut info = Info::new(log.run(), file, size_bytes);
+    let mut gaps = GapCounter::default();
     while let Some(logged) = log.next_message()? {
+        gaps.add(&logged.message);
         *info.messages.entry(logged.message.topic().name()).or_default() += 1;
         if let Message::Particles { step, .. } = logged.message {
             info.first_step.get_or_insert(step);
@@ -87,9 +90,7 @@ pub(crate) fn inspect<R: Read>(
     if let (Some(first), Some(last)) = (info.first_step, info.last_step) {
         info.duration_s = last.saturating_sub(first) as f64 / f64::from(info.rate_hz);
     }
-    if let Some(closing) = log.closing() {
-        info.close(closing);
-    }
+    info.count_lost(log.closing(), &gaps.counts());
     Ok((info, end))
 }
 
@@ -118,10 +119,14 @@ impl Info {
         }
     }
 
-    fn close(&mut self, closing: &Closing) {
-        self.stop_reason = Some(closing.stop_reason.clone());
-        let missing = closing.counts.iter().map(|(topic, c)| (topic.name(), c.lost + c.gaps));
-        self.lost = missing.filter(|(_, count)| *count > 0).collect();
+    /// Sets the losses: those that the end of the file states, or more if the file shows more.
+    fn count_lost(&mut self, closing: Option<&Closing>, shown: &AllCounts) {
+        self.stop_reason = closing.map(|closing| closing.stop_reason.clone());
+        self.lost = closing.map(Closing::missing).unwrap_or_default();
+        for (topic, shown) in shown.iter().filter(|(_, shown)| shown.gaps > 0) {
+            let lost = self.lost.entry(topic.name()).or_default();
+            *lost = shown.gaps.max(*lost);
+        }
     }
 }
 
@@ -156,7 +161,8 @@ impl fmt::Display for Info {
             _ => writeln!(f, "steps       none")?,
         }
         writeln!(f, "messages    {}", none_if_empty(join(&self.messages)))?;
-        writeln!(f, "lost        {}", none_if_empty(join(&self.lost)))?;
+        let scope = if self.stop_reason.is_none() { ", as far as the file goes" } else { "" };
+        writeln!(f, "lost        {}{scope}", none_if_empty(join(&self.lost)))?;
         write!(f, "stopped     {}", self.stop_reason.as_deref().unwrap_or("unknown"))
     }
 }

@@ -8,15 +8,16 @@ mod messages;
 mod queue;
 mod report;
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::{Closing, Message, PartFile, WriteError};
+use recorder::{LogWriter, Message, PartFile, WriteError};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
-use sim_contract::{Endpoint, ReadError, SNAPSHOTS_BUFFERED, Stop, Tap, report_bus_errors};
+use sim_contract::{Endpoint, SNAPSHOTS_BUFFERED, Stop, Tap, report_bus_errors};
 
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
@@ -34,7 +35,7 @@ use report::Report;
 const WAIT_MAX: Duration = Duration::from_millis(50);
 /// Period of the check whether the owner is alive.
 const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
-/// Flush period: the most that a killed recorder loses.
+/// Flush period: the most that a killed recorder or a power cut loses.
 const FLUSH_NS: u64 = SECOND_NS;
 
 #[derive(Debug, clap::Args)]
@@ -66,6 +67,10 @@ pub(crate) struct RecordArgs {
     #[arg(long, value_name = "BYTES", default_value_t = 256 << 20,
         allow_hyphen_values = true, value_parser = queue_bytes)]
     queue_bytes: u64,
+    /// Do not wait each second until the recording is on the disk. A power cut may then lose much
+    /// more than the last second
+    #[arg(long)]
+    no_sync: bool,
     #[command(flatten)]
     file: FileArgs,
     #[command(flatten)]
@@ -83,6 +88,8 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let tap = Tap::attach(&endpoint)?;
     let path = args.output.clone().unwrap_or_else(|| default_path(endpoint.name(), realtime_ns()));
     let file = args.file.create(&path)?;
+    let part_path = file.part_path().to_owned();
+    let file = if args.no_sync { file } else { file.with_sync_on_flush() };
     output::note(&format!("ready recording {endpoint} into {}", output::path_text(&path)));
 
     let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
@@ -91,12 +98,12 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         intake: Intake::new(args.steps),
         queue: Arc::new(Queue::new(queue_bytes)),
         file: Some(file),
+        part_path,
         writing: None,
         last_step: 0,
         begin_ns: monotonic_ns(),
         next_owner_check_ns: 0,
         is_owner_alive: true,
-        unreadable: 0,
     };
     let result = recording.run(args, &stop);
     let report = recording.finish(result, &endpoint)?;
@@ -136,6 +143,7 @@ struct Recording {
     queue: Arc<Queue>,
     /// The file, until its header is written.
     file: Option<PartFile>,
+    part_path: PathBuf,
     /// The writing thread, once the recording has started.
     writing: Option<JoinHandle<anyhow::Result<LogFile>>>,
     /// The last step in the queue.
@@ -143,8 +151,6 @@ struct Recording {
     begin_ns: u64,
     next_owner_check_ns: u64,
     is_owner_alive: bool,
-    /// Number of messages that arrived but could not be read.
-    unreadable: u64,
 }
 
 impl Recording {
@@ -197,18 +203,9 @@ impl Recording {
         }
         self.intake.accept_messages(messages, Now::read(), &mut accepted);
         self.intake.set_lost(self.tap.lost_changes());
-        let errors = self.tap.drain_errors();
-        self.note_unreadable(&errors);
+        self.intake.count_unreadable(&self.tap.drain_errors());
         accepted.sort();
         Ok(accepted)
-    }
-
-    /// Counts messages that could not be read, and reports the first one.
-    fn note_unreadable(&mut self, errors: &[ReadError]) {
-        if let (Some(error), 0) = (errors.first(), self.unreadable) {
-            output::note(&format!("warning: a message was not recorded: {error}"));
-        }
-        self.unreadable += errors.len() as u64;
     }
 
     /// Passes a batch to the writing thread.
@@ -267,22 +264,21 @@ impl Recording {
             );
         };
         let written = writing.join().map_err(|_| anyhow!("the writing thread panicked"))?;
-        let log = written.context(
-            "the recording is incomplete; its readable part is the file with the suffix .part",
-        )?;
+        let part = output::path_text(&self.part_path);
+        let log = written
+            .with_context(|| format!("the recording is incomplete; its readable part is {part}"))?;
         let stop_reason = match &result {
             Ok(reason) => reason.text().to_owned(),
             Err(error) => format!("{error:#}"),
         };
-        let mut closing = Closing { stop_reason, counts: self.intake.counts() };
+        let mut closing = self.intake.closing(stop_reason);
         closing.counts.set_written(log.counts());
         closing.counts.set_lost(&self.queue.lost());
-        let kept =
-            "the recording is complete except for its end, in the file with the suffix .part";
-        let path = log.finish(&closing).context(kept)?.finish().context(kept)?;
+        let kept = || format!("the recording is complete except for its end, in {part}");
+        let path = log.finish(&closing).with_context(kept)?.finish().with_context(kept)?;
         result?;
         let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
-        Ok(Report::new(path, closing, steps).with_unreadable(self.unreadable))
+        Ok(Report::new(path, closing, steps))
     }
 }
 
@@ -295,8 +291,8 @@ impl Drop for CloseOnDrop {
     }
 }
 
-/// The writing thread: writes every item and flushes every second.
-fn write(queue: &Queue, mut log: LogFile) -> Result<LogFile, WriteError> {
+/// The writing thread: writes every item, flushes every second, and waits until that is on the disk.
+fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> Result<LogWriter<W>, WriteError> {
     let mut next_flush_ns = monotonic_ns() + FLUSH_NS;
     loop {
         match queue.pop(WAIT_MAX) {
@@ -317,3 +313,6 @@ fn write(queue: &Queue, mut log: LogFile) -> Result<LogFile, WriteError> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,7 +1,7 @@
 //! `recorder scene`: extracts the scene from a recording.
 
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use recorder::{LogReader, PartFile};
@@ -31,22 +31,16 @@ pub(crate) fn run(args: &SceneArgs) -> anyhow::Result<Exit> {
         bail!("{}: has no scene (attachment scene.toml)", path_text(&args.file));
     }
     match &args.output {
-        Some(path) => write_file(path, log.scene(), args.overwrite)?,
+        Some(path) => PartFile::write_whole(path, args.overwrite.existing(), log.scene())?,
         None => io::stdout().lock().write_all(log.scene()).context("cannot print the scene")?,
     }
     Ok(Exit::Done)
 }
 
-fn write_file(path: &Path, scene: &[u8], overwrite: OverwriteArgs) -> anyhow::Result<()> {
-    let mut file = PartFile::create(path, overwrite.existing())?;
-    file.write_all(scene).with_context(|| format!("cannot write {}", path_text(path)))?;
-    file.finish()?;
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;
+    use std::path::Path;
 
     use clap::Parser;
     use recorder::{LogOptions, LogWriter, RunDescription};

@@ -137,7 +137,8 @@ fn begin(args: &SimulateArgs, path: &Path, job: &Job, solver: &Solver) -> anyhow
 
 fn finish(log: LogFile, result: &SimulationResult, steps: u64) -> anyhow::Result<PathBuf> {
     let stop_reason = if result.steps < steps { "interrupted" } else { "steps reached" };
-    let mut closing = Closing { stop_reason: stop_reason.to_owned(), counts: *log.counts() };
+    let (stop_reason, counts) = (stop_reason.to_owned(), *log.counts());
+    let mut closing = Closing { stop_reason, counts, ..Closing::default() };
     closing.counts.set_received_to_written();
     Ok(log.finish(&closing)?.finish()?)
 }

@@ -1,10 +1,9 @@
 //! The files of the pictures, named after the scene and the step.
 
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use recorder::{Existing, PartFile};
 
 use super::shape::Picture;
@@ -46,8 +45,11 @@ impl<'a> Target<'a> {
 
     /// Creates the folder. Fails if one of the files may not be created.
     pub(crate) fn prepare(&self, steps: &[u64]) -> anyhow::Result<()> {
-        steps.iter().try_for_each(|step| self.existing.check(&self.path(*step)))?;
         let folder = self.folder;
+        if folder.exists() && !folder.is_dir() {
+            bail!("{} is not a folder; name a folder for the pictures", folder.display());
+        }
+        steps.iter().try_for_each(|step| self.existing.check(&self.path(*step)))?;
         fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the folder {}", folder.display()))
     }
@@ -59,9 +61,8 @@ impl<'a> Target<'a> {
             Format::Svg => svg::encode(picture).into_bytes(),
         };
         let path = self.path(step);
-        let mut file = PartFile::create(&path, self.existing)?;
-        file.write_all(&bytes).with_context(|| format!("cannot write {}", path.display()))?;
-        Ok(file.finish()?)
+        PartFile::write_whole(&path, self.existing, &bytes)?;
+        Ok(path)
     }
 }
 

@@ -53,7 +53,7 @@ mod tests {
         std::fs::remove_file(path).unwrap();
         assert_eq!(
             error,
-            format!("{path}: cannot read the scene: it is a FIFO, not a regular file")
+            format!("{path}: cannot read the scene: it is a named pipe (FIFO), not a regular file")
         );
     }
 

@@ -12,8 +12,9 @@ use super::topic::{AllCounts, Topic};
 /// Version of the topics, rows and metadata in a file.
 ///
 /// Version 2 added `/colliders`, the causes of tears, and the previously torn constraints in
-/// `/topology`. Version 3 added `/parameters`.
-pub const FORMAT_VERSION: u32 = 3;
+/// `/topology`. Version 3 added `/parameters`. Version 4 added the index of each snapshot in `/steps`,
+/// and the number of unreadable messages at the end.
+pub const FORMAT_VERSION: u32 = 4;
 /// Oldest version that this recorder reads. Missing fields have defaults.
 pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 
@@ -145,11 +146,20 @@ pub struct Closing {
     pub stop_reason: String,
     /// Message counts of each topic.
     pub counts: AllCounts,
+    /// Messages on any topic that reached the recorder but could not be read. A snapshot or an outcome
+    /// among them also counts as a gap of its topic.
+    pub unreadable: u64,
 }
+
+/// Key of [`Closing::unreadable`].
+const UNREADABLE: &str = "unreadable";
 
 impl Closing {
     pub(super) fn to_map(&self) -> BTreeMap<String, String> {
-        let mut map = BTreeMap::from([("stop_reason".to_owned(), self.stop_reason.clone())]);
+        let mut map = BTreeMap::from([
+            ("stop_reason".to_owned(), self.stop_reason.clone()),
+            (UNREADABLE.to_owned(), self.unreadable.to_string()),
+        ]);
         for (topic, counts) in self.counts.iter() {
             let mut put = |field, count: u64| map.insert(key(topic, field), count.to_string());
             put("received", counts.received);
@@ -160,11 +170,21 @@ impl Closing {
         map
     }
 
+    /// Returns the number of messages that should be in the file and are not, by topic, for topics
+    /// with such messages. The key "unreadable" stands for messages on any topic.
+    pub fn missing(&self) -> BTreeMap<&'static str, u64> {
+        let topics = self.counts.iter();
+        let topics = topics.map(|(topic, c)| (topic.name(), c.lost.saturating_add(c.gaps)));
+        let all = topics.chain([(UNREADABLE, self.unreadable)]);
+        all.filter(|(_, count)| *count > 0).collect()
+    }
+
     /// Parses the output of [`Closing::to_map`]. Missing counts are 0.
     pub(super) fn from_map(map: &BTreeMap<String, String>) -> Self {
         let mut closing = Self {
             stop_reason: map.get("stop_reason").cloned().unwrap_or_default(),
             counts: AllCounts::default(),
+            unreadable: parsed(map, UNREADABLE).unwrap_or(0),
         };
         for topic in Topic::ALL {
             let count = |field| parsed(map, &key(topic, field)).unwrap_or(0);
@@ -249,10 +269,12 @@ mod tests {
 
     #[test]
     fn a_closing_survives_a_round_trip_through_its_map() {
-        let mut closing = Closing { stop_reason: "owner gone".to_owned(), ..Closing::default() };
+        let stop_reason = "owner gone".to_owned();
+        let mut closing = Closing { stop_reason, unreadable: 6, ..Closing::default() };
         closing.counts[Topic::Particles].lost = 4;
         closing.counts[Topic::Outcomes].gaps = 5;
         assert_eq!(Closing::from_map(&closing.to_map()), closing);
         assert_eq!(closing.counts.missing(), 9);
+        assert_eq!(closing.missing()["unreadable"], 6);
     }
 }

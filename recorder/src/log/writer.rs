@@ -7,6 +7,7 @@ use std::io::Write;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
+use sim_contract::explain_write_error;
 
 use super::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use super::message::Message;
@@ -54,7 +55,7 @@ pub enum WriteError {
 impl From<mcap::McapError> for WriteError {
     fn from(error: mcap::McapError) -> Self {
         match error {
-            mcap::McapError::Io(cause) => Self::Failed(cause.to_string()),
+            mcap::McapError::Io(cause) => cause.into(),
             other => Self::Failed(other.to_string()),
         }
     }
@@ -62,7 +63,7 @@ impl From<mcap::McapError> for WriteError {
 
 impl From<std::io::Error> for WriteError {
     fn from(error: std::io::Error) -> Self {
-        Self::Failed(error.to_string())
+        Self::Failed(explain_write_error(&error))
     }
 }
 

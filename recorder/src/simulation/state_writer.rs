@@ -137,8 +137,15 @@ impl<'a, W: Write> StateWriter<'a, W> {
             outcome_count: self.outcome_count,
             wake_late_ns: 0,
             solve_ns: 0,
+            // Every step is recorded.
+            snapshot_index: Some(low_32_bits(step)),
         }
     }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "the low half is wanted")]
+fn low_32_bits(step: u64) -> u32 {
+    step as u32
 }
 
 fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {

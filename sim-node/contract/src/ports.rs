@@ -9,5 +9,6 @@ pub(crate) mod reader;
 pub(crate) mod service;
 pub(crate) mod services;
 pub(crate) mod session;
+pub(crate) mod source;
 pub(crate) mod wake;
 pub(crate) mod writer;

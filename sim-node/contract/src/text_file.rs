@@ -2,13 +2,15 @@
 
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read};
-use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use rustix::fs::OFlags;
 use thiserror::Error;
 
 use sim_types::SCENE_SIZE_BYTES_MAX;
+
+use crate::file_kind::kind_of_non_file;
 
 /// Error of reading a text file.
 #[derive(Debug, Error)]
@@ -45,16 +47,8 @@ pub fn read_scene_file(path: impl AsRef<Path>) -> Result<String, TextFileError> 
 }
 
 fn check_regular(metadata: &Metadata) -> Result<(), TextFileError> {
-    let kind = metadata.file_type();
-    if kind.is_file() {
-        return Ok(());
-    }
-    Err(TextFileError::NotRegular(match () {
-        () if kind.is_dir() => "a directory",
-        () if kind.is_fifo() => "a FIFO",
-        () if kind.is_socket() => "a socket",
-        () => "a device",
-    }))
+    kind_of_non_file(metadata.file_type())
+        .map_or(Ok(()), |kind| Err(TextFileError::NotRegular(kind)))
 }
 
 fn read_bounded(file: File) -> Result<String, TextFileError> {
@@ -105,7 +99,7 @@ mod tests {
     fn a_fifo_is_refused_without_waiting_for_a_writer() {
         let fifo = TemporaryPath::new("fifo.toml");
         mknodat(CWD, &fifo.0, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
-        assert_eq!(error(&fifo.0), "it is a FIFO, not a regular file");
+        assert_eq!(error(&fifo.0), "it is a named pipe (FIFO), not a regular file");
     }
 
     #[test]

@@ -49,6 +49,8 @@ pub(crate) struct Publisher {
     times: StepTimes,
     /// Header of the newest published snapshot.
     last: SnapshotHeader,
+    /// Number of published snapshots, modulo 2^32.
+    snapshot_count: u32,
     /// The next snapshot needs a keyframe.
     is_keyframe_due: bool,
     keyframe_step: u64,
@@ -62,6 +64,8 @@ pub(crate) struct Publisher {
     /// Number of torn constraints, and the colliders, as last published.
     torn_count: usize,
     colliders: Vec<PlacedCollider>,
+    /// Number of published lists of colliders, modulo 2^32.
+    collider_list_count: u32,
 }
 
 impl Publisher {
@@ -84,6 +88,7 @@ impl Publisher {
             every,
             times: StepTimes::default(),
             last: SnapshotHeader::default(),
+            snapshot_count: 0,
             is_keyframe_due: true,
             keyframe_step: 0,
             keyframe_readers: 0,
@@ -93,6 +98,7 @@ impl Publisher {
             parameters,
             torn_count: 0,
             colliders: Vec::new(),
+            collider_list_count: 0,
         })
     }
 
@@ -175,6 +181,7 @@ impl Publisher {
         self.last = self.header(solver, position);
         let particles: &[ParticleState] = cast_slice(solver.particles());
         self.owner.publish_particles(&self.last, |index| particles[index])?;
+        self.snapshot_count = self.snapshot_count.wrapping_add(1);
         self.owner.wake(Wake::Frame);
         Ok(())
     }
@@ -187,8 +194,11 @@ impl Publisher {
         self.colliders.clear();
         self.colliders.extend(solver.colliders());
         let states: Vec<_> = self.colliders.iter().map(to_collider_state).collect();
-        let header = CollidersHeader { run_id: self.run_id, step, ..CollidersHeader::default() };
-        Ok(self.owner.publish_colliders(header, &states)?)
+        let list_index = self.collider_list_count;
+        let header = CollidersHeader { run_id: self.run_id, step, count: 0, list_index };
+        self.owner.publish_colliders(header, &states)?;
+        self.collider_list_count = list_index.wrapping_add(1);
+        Ok(())
     }
 
     /// Publishes all torn constraints if a constraint tore or was restored in this step.
@@ -300,7 +310,7 @@ impl Publisher {
             particle_count: count(solver.particle_count()),
             flags: if position.is_paused { SnapshotFlags::PAUSED } else { 0 },
             stride: u32::try_from(self.every).unwrap_or(u32::MAX),
-            spare: 0,
+            snapshot_index: self.snapshot_count,
         }
     }
 

@@ -168,6 +168,11 @@ fn an_output_that_is_not_a_file_is_refused_at_the_start_even_with_overwrite() {
         }
     }
     assert_eq!(std::fs::read_dir(&pictures).unwrap().count(), 1, "no picture was drawn");
+    for not_a_folder in [&run, &pipe] {
+        let refused = recorder(&sandbox, &["export", &run, "--png", not_a_folder, "--overwrite"]);
+        let problem = format!("{not_a_folder} is not a folder; name a folder for the pictures");
+        assert_eq!((refused.code, refused.stderr), (Some(1), format!("error: {problem}\n")));
+    }
     for part in [folder + ".part", pipe + ".part"] {
         assert!(!std::path::Path::new(&part).exists(), "{part}");
     }

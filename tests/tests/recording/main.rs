@@ -3,5 +3,7 @@
 
 mod bad_input;
 mod end_to_end;
+mod losses;
+mod outputs;
 mod physics;
 mod threads;

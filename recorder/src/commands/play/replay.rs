@@ -40,6 +40,10 @@ pub(crate) struct Replay {
     published_parameters: ParameterValues,
     /// The last published step; `None` before the first.
     step: Option<u64>,
+    /// The index of the next snapshot; `None` before the first, which keeps its recorded index.
+    next_index: Option<u32>,
+    /// Number of published lists of colliders, modulo 2^32.
+    collider_list_count: u32,
     /// The latest recorded status of the node.
     status: Option<StatusRow>,
     /// Reused for each batch of commands.
@@ -84,6 +88,8 @@ impl Replay {
             published_parameters: position.parameters,
             position,
             step: None,
+            next_index: None,
+            collider_list_count: 0,
             status: None,
             commands: Vec::new(),
         })
@@ -122,7 +128,9 @@ impl Replay {
         for update in &frame.updates {
             self.publish_update(update)?;
         }
-        self.owner.publish_particles(&self.header(frame), |index| frame.particles[index])?;
+        let header = self.header(frame);
+        self.owner.publish_particles(&header, |index| frame.particles[index])?;
+        self.next_index = Some(header.snapshot_index.wrapping_add(1));
         self.owner.wake(Wake::Frame);
         self.step = Some(frame.row.step);
         self.control.count_step();
@@ -174,9 +182,12 @@ impl Replay {
         Ok(())
     }
 
-    fn publish_colliders(&self, row: &CollidersRow) -> anyhow::Result<()> {
-        let header = CollidersHeader { run_id: self.run_id, step: row.step, count: 0, spare: 0 };
-        Ok(self.owner.publish_colliders(header, &row.states())?)
+    fn publish_colliders(&mut self, row: &CollidersRow) -> anyhow::Result<()> {
+        let list_index = self.collider_list_count;
+        let header = CollidersHeader { run_id: self.run_id, step: row.step, count: 0, list_index };
+        self.owner.publish_colliders(header, &row.states())?;
+        self.collider_list_count = list_index.wrapping_add(1);
+        Ok(())
     }
 
     fn header(&self, frame: &Frame) -> SnapshotHeader {
@@ -200,12 +211,12 @@ impl Replay {
             particle_count: self.run.particle_count,
             flags: SnapshotFlags::REPLAY | paused,
             stride: self.stride(row.step),
-            spare: 0,
+            snapshot_index: self.next_index.unwrap_or(row.snapshot_index.unwrap_or(0)),
         }
     }
 
-    /// Returns the distance of a step from the last published step. A file does not contain the stride of
-    /// its node, but a reader that receives every snapshot must not count missing ones.
+    /// Returns the distance of a step from the last published step, because a file does not contain the
+    /// stride of its node.
     fn stride(&self, step: u64) -> u32 {
         let distance = step.saturating_sub(self.step.unwrap_or(step));
         u32::try_from(distance).unwrap_or(u32::MAX).max(1)

@@ -50,6 +50,7 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
         outcome_count: 4,
         wake_late_ns: 6,
         solve_ns: 7,
+        snapshot_index: Some(40),
     };
     let particle = ParticleState { position: [-0.0, step as f32, 0.0], ..Default::default() };
     Frame { updates, row, particles: vec![particle; 2] }
@@ -110,7 +111,7 @@ fn snapshots_equal_those_of_the_node_except_run_id_time_and_flag() {
         particle_count: 2,
         flags: SnapshotFlags::REPLAY,
         stride: 1,
-        spare: 0,
+        snapshot_index: 40,
     };
     assert_eq!(header, expected);
     assert_ne!(header.run_id, run().run_id);

@@ -2,13 +2,14 @@
 
 mod started;
 
-use recorder::AllCounts;
-use sim_contract::{Change, LostChanges, Outcome, State};
+use recorder::{AllCounts, Closing};
+use sim_contract::{Change, LostChanges, Outcome, ReadError, State};
 
 use super::accepted::Accepted;
 use super::first_state::FirstState;
 use super::load::{Load, LoadError, Now};
 use super::messages::Messages;
+use crate::cli::output;
 use started::Started;
 
 /// Most outcomes to keep before the first state. Beyond it the oldest are dropped.
@@ -27,6 +28,8 @@ pub(crate) struct Intake {
     outcomes: Vec<Outcome>,
     started: Option<Started>,
     lost: LostChanges,
+    /// Messages that arrived but could not be read.
+    unreadable: u64,
 }
 
 impl Intake {
@@ -102,6 +105,17 @@ impl Intake {
         self.started = Some(started);
     }
 
+    /// Counts messages that could not be read, and reports the first one. Those before the start are
+    /// not missing in the recording.
+    pub(crate) fn count_unreadable(&mut self, errors: &[ReadError]) {
+        if let (Some(error), 0) = (errors.first(), self.unreadable) {
+            output::note(&format!("warning: a message was not recorded: {error}"));
+        }
+        if self.started.is_some() {
+            self.unreadable += errors.len() as u64;
+        }
+    }
+
     /// Returns the first recorded step, once the recording has started.
     pub(crate) fn first_step(&self) -> Option<u64> {
         self.started.as_ref().map(|started| started.first_step)
@@ -112,8 +126,12 @@ impl Intake {
         self.lost = lost;
     }
 
-    /// Returns the numbers of received and missing messages.
-    pub(crate) fn counts(&self) -> AllCounts {
+    /// Returns the end of the file, with the numbers of received and missing messages.
+    pub(crate) fn closing(&self, stop_reason: String) -> Closing {
+        Closing { stop_reason, counts: self.counts(), unreadable: self.unreadable }
+    }
+
+    fn counts(&self) -> AllCounts {
         self.started.as_ref().map_or_else(AllCounts::default, |started| started.counts(&self.lost))
     }
 }

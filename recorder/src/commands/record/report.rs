@@ -19,7 +19,7 @@ pub(crate) struct Report {
     snapshots: u64,
     /// Number of outcomes in the file.
     outcomes: u64,
-    /// Number of missing messages, for topics that have any.
+    /// Number of missing messages, for topics that have any, and "unreadable" ones.
     lost: BTreeMap<&'static str, u64>,
     stop_reason: String,
 }
@@ -31,24 +31,15 @@ impl Report {
         steps: RangeInclusive<u64>,
     ) -> Self {
         let counts = &closing.counts;
-        let lost = counts.iter().map(|(topic, c)| (topic.name(), c.lost + c.gaps));
         Self {
             output: output::path_text(path.as_ref()),
             first_step: *steps.start(),
             last_step: *steps.end(),
             snapshots: counts[Topic::Particles].written,
             outcomes: counts[Topic::Outcomes].written,
-            lost: lost.filter(|(_, count)| *count > 0).collect(),
+            lost: closing.missing(),
             stop_reason: closing.stop_reason,
         }
-    }
-
-    /// Adds messages that arrived but could not be read, on any topic.
-    pub(crate) fn with_unreadable(mut self, count: u64) -> Self {
-        if count > 0 {
-            self.lost.insert("unreadable", count);
-        }
-        self
     }
 
     /// Returns `true` if every published message is in the file.

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use rustix::fs::OFlags;
 
-use crate::log::file_kind::kind_of_non_file;
+use sim_contract::kind_of_non_file;
 
 /// Opens a regular file for reading.
 ///

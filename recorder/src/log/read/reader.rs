@@ -11,12 +11,12 @@ use super::decode::{LoggedMessage, decode_message};
 use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
 use super::records::{READ_SIZE_BYTES_MAX, RecordReader};
-use crate::log::part_file::part_path;
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
     SCENE_ATTACHMENT,
 };
 use crate::log::topic::Topic;
+use sim_contract::part_path;
 
 /// The entry of the metadata `run` that distinguishes our recordings from other MCAP files.
 const FORMAT_VERSION_KEY: &str = "format_version";

@@ -25,6 +25,10 @@ pub struct StepRow {
     pub wake_late_ns: u64,
     /// Computing time of the solver, in nanoseconds.
     pub solve_ns: u64,
+    /// Number of snapshots that the run has published before this one, modulo 2^32. Numbers that are
+    /// left out are missing snapshots. Absent in recordings of format version 3 and earlier.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub snapshot_index: Option<u32>,
 }
 
 impl From<&SnapshotHeader> for StepRow {
@@ -38,6 +42,7 @@ impl From<&SnapshotHeader> for StepRow {
             outcome_count: header.outcome_count,
             wake_late_ns: header.wake_late_ns,
             solve_ns: header.solve_ns,
+            snapshot_index: Some(header.snapshot_index),
         }
     }
 }

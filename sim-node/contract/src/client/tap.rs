@@ -1,5 +1,6 @@
 //! The tap: reads everything that an owner publishes.
 
+use std::rc::Rc;
 use std::time::Duration;
 
 use crate::client::change::LostChanges;
@@ -22,13 +23,14 @@ use crate::ports::service::{
 };
 use crate::ports::services::{AttachError, Attachment};
 use crate::ports::session::Session;
+use crate::ports::source::Source;
 use crate::ports::wake::WakeListener;
 
 /// Most reads of every service for one state. Each read receives at most one buffer.
 const READS_MAX: usize = 8;
 
 /// Reads everything that an owner publishes, as a sequence of coherent states. The particles are not
-/// copied.
+/// copied. Messages of processes that do not own the name are ignored.
 #[derive(Debug)]
 pub struct Tap {
     listener: WakeListener,
@@ -47,7 +49,7 @@ pub struct Tap {
     held: Option<SliceSample<ParticleState, SnapshotHeader>>,
     errors: Vec<ReadError>,
     // Dropped last: the ports belong to its services and its node.
-    attachment: Attachment,
+    attachment: Rc<Attachment>,
 }
 
 impl Tap {
@@ -63,20 +65,22 @@ impl Tap {
     }
 
     fn subscribe(attachment: Attachment) -> Result<Self, ServiceError> {
-        let services = &attachment.services;
+        let attachment = Rc::new(attachment);
+        let (services, source) = (&attachment.services, &Rc::new(Source::new(&attachment)));
         // Fields are evaluated in the order written here.
         Ok(Self {
             listener: listen(&services.wake)?,
-            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?,
-            status: ValueReader::create(&attachment.status, &STATUS)?,
-            colliders: SliceReader::create(&services.colliders, &COLLIDERS)?,
-            tears: SliceReader::create(&services.tears, &TEARS)?,
-            parameters: SliceReader::create(&services.parameters, &PARAMETERS)?,
-            scene: SliceReader::create(&services.scene, &SCENE)?,
-            topology: SliceReader::create(&services.topology, &TOPOLOGY)?,
-            surface: SliceReader::create(&services.surface, &SURFACE)?,
-            keyframe: SliceReader::create(&services.keyframe, &KEYFRAME)?,
-            particles: SliceReader::create(&services.particles, &PARTICLES)?,
+            outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?.restricted_to(source),
+            status: ValueReader::create(&attachment.status, &STATUS)?.restricted_to(source),
+            colliders: SliceReader::create(&services.colliders, &COLLIDERS)?.restricted_to(source),
+            tears: SliceReader::create(&services.tears, &TEARS)?.restricted_to(source),
+            parameters: SliceReader::create(&services.parameters, &PARAMETERS)?
+                .restricted_to(source),
+            scene: SliceReader::create(&services.scene, &SCENE)?.restricted_to(source),
+            topology: SliceReader::create(&services.topology, &TOPOLOGY)?.restricted_to(source),
+            surface: SliceReader::create(&services.surface, &SURFACE)?.restricted_to(source),
+            keyframe: SliceReader::create(&services.keyframe, &KEYFRAME)?.restricted_to(source),
+            particles: SliceReader::create(&services.particles, &PARTICLES)?.restricted_to(source),
             assembler: StateAssembler::default(),
             held: None,
             errors: Vec::new(),
@@ -171,5 +175,79 @@ impl Tap {
     /// times per second at most.
     pub fn is_owner_alive(&self) -> bool {
         self.attachment.owner().is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_types::ParameterValues;
+
+    use super::*;
+    use crate::owner::Owner;
+    use crate::owner::load::Load;
+    use crate::ports::session::{Access, Slices};
+    use crate::testing::TestDomain;
+
+    fn create_owner(endpoint: &Endpoint, run_id: u64) -> Owner {
+        let load = Load {
+            header: LoadHeader { run_id, ..LoadHeader::default() },
+            scene: b"",
+            constraints: &[],
+            triangles: &[],
+            collider_count: 0,
+            keyframe_size_bytes_max: 0,
+            parameters: ParameterValues::DEFAULT,
+        };
+        Owner::create(endpoint, &load).unwrap()
+    }
+
+    fn publish(owner: &Owner, run_id: u64, step: u64) {
+        let header = SnapshotHeader { run_id, step, ..SnapshotHeader::default() };
+        owner.publish_particles(&header, |_| ParticleState::default()).unwrap();
+    }
+
+    /// Returns the runs and steps of all unread states.
+    fn read_all(tap: &mut Tap) -> Vec<(u64, u64)> {
+        let next = || tap.next_state(|_| {}).map(|state| (state.header.run_id, state.header.step));
+        std::iter::from_fn(next).collect()
+    }
+
+    #[test]
+    fn messages_of_processes_that_do_not_own_the_name_are_ignored() {
+        let domain = TestDomain::new();
+        let owner = create_owner(&domain.endpoint(), 7);
+        let mut tap = Tap::attach(&domain.endpoint()).unwrap();
+        owner.refresh();
+        let session = Session::join(&domain.endpoint()).unwrap();
+        let service: Slices<ParticleState, SnapshotHeader> =
+            session.slices(&PARTICLES, Access::Open).unwrap();
+        let stranger = service.publisher_builder().initial_max_slice_len(1).create().unwrap();
+        let intrude = |header: SnapshotHeader| {
+            let mut sample = stranger.loan_slice(1).unwrap();
+            *sample.user_header_mut() = header;
+            sample.send().unwrap();
+        };
+        publish(&owner, 7, 1);
+        let run_of_the_owner = SnapshotHeader { run_id: 7, step: 50, ..SnapshotHeader::default() };
+        intrude(SnapshotHeader { particle_count: 1, ..run_of_the_owner });
+        intrude(SnapshotHeader { run_id: 8, particle_count: 1, ..SnapshotHeader::default() });
+        // Not even a message with a wrong length counts, because the owner has lost none.
+        intrude(SnapshotHeader { particle_count: 3, ..SnapshotHeader::default() });
+        publish(&owner, 7, 2);
+        assert_eq!(read_all(&mut tap), [(7, 1), (7, 2)]);
+        assert_eq!(tap.drain_errors(), []);
+    }
+
+    #[test]
+    fn unread_states_of_an_earlier_owner_precede_those_of_the_next() {
+        let domain = TestDomain::new();
+        let first = create_owner(&domain.endpoint(), 7);
+        let mut tap = Tap::attach(&domain.endpoint()).unwrap();
+        first.refresh();
+        publish(&first, 7, 1);
+        drop(first);
+        let second = create_owner(&domain.endpoint(), 8);
+        publish(&second, 8, 0);
+        assert_eq!(read_all(&mut tap), [(7, 1), (8, 0)]);
     }
 }

@@ -52,8 +52,9 @@ pub struct CollidersHeader {
     pub step: u64,
     /// Length of the payload.
     pub count: u32,
-    /// Always 0.
-    pub spare: u32,
+    /// Number of lists that the run has published before this one, modulo 2^32. A reader that finds a
+    /// number left out has missed that list.
+    pub list_index: u32,
 }
 
 const _: () = assert!(size_of::<CollidersHeader>() == 24 && align_of::<CollidersHeader>() == 8);

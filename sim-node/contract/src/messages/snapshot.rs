@@ -65,8 +65,9 @@ pub struct SnapshotHeader {
     /// `--every`. A node that pauses also publishes the step before the pause. In a replay, the distance
     /// from the snapshot before.
     pub stride: u32,
-    /// Always 0.
-    pub spare: u32,
+    /// Number of snapshots that the run has published before this one, modulo 2^32. A reader that finds
+    /// a number left out has missed that snapshot, whatever the steps between them.
+    pub snapshot_index: u32,
 }
 
 const _: () = assert!(size_of::<SnapshotHeader>() == 112 && align_of::<SnapshotHeader>() == 8);

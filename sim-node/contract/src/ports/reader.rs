@@ -1,11 +1,13 @@
 //! Readers of the publish-subscribe services. They check each message.
 
 use std::fmt::Debug;
+use std::rc::Rc;
 
 use iceoryx2::port::ReceiveError;
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc};
 use iceoryx2::sample::Sample;
+use iceoryx2::service::header::payload_header::PayloadHeader;
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
 
@@ -13,6 +15,11 @@ use crate::limits::BORROWED_SAMPLES_MAX;
 use crate::ports::port::{PortLimit, SliceHeader, create_port};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::session::{Slices, Values};
+use crate::ports::source::Source;
+
+/// Most refused messages to skip in one read, so that another process cannot keep a reader from
+/// returning.
+const REFUSALS_MAX: usize = 1024;
 
 /// Error of reading a message.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -57,17 +64,25 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
     subscriber: Subscriber<ipc::Service, [T], H>,
     service: String,
     buffered: usize,
+    /// Accepted publishers; `None` accepts all.
+    source: Option<Rc<Source>>,
 }
 
 impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     pub(crate) fn create(service: &Slices<T, H>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
         let subscriber = subscribe(service)?;
-        Ok(Self { subscriber, service: service.name().to_string(), buffered: spec.buffered })
+        let (service, buffered) = (service.name().to_string(), spec.buffered);
+        Ok(Self { subscriber, service, buffered, source: None })
+    }
+
+    /// Drops messages of other publishers without a trace.
+    pub(crate) fn restricted_to(self, source: &Rc<Source>) -> Self {
+        Self { source: Some(Rc::clone(source)), ..self }
     }
 
     /// Returns the next message; `None` if all were read.
     pub(crate) fn next(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
-        let received = self.subscriber.receive();
+        let received = next_accepted(self.source.as_deref(), || self.subscriber.receive());
         let Some(sample) = received.map_err(|error| read_error(&self.service, error))? else {
             return Ok(None);
         };
@@ -113,17 +128,25 @@ pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
     subscriber: Subscriber<ipc::Service, T, ()>,
     service: String,
     buffered: usize,
+    /// Accepted publishers; `None` accepts all.
+    source: Option<Rc<Source>>,
 }
 
 impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
     pub(crate) fn create(service: &Values<T>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
         let subscriber = subscribe(service)?;
-        Ok(Self { subscriber, service: service.name().to_string(), buffered: spec.buffered })
+        let (service, buffered) = (service.name().to_string(), spec.buffered);
+        Ok(Self { subscriber, service, buffered, source: None })
+    }
+
+    /// Drops messages of other publishers without a trace.
+    pub(crate) fn restricted_to(self, source: &Rc<Source>) -> Self {
+        Self { source: Some(Rc::clone(source)), ..self }
     }
 
     /// Returns the next value; `None` if all were read.
     pub(crate) fn next(&self) -> Result<Option<T>, ReadError> {
-        let received = self.subscriber.receive();
+        let received = next_accepted(self.source.as_deref(), || self.subscriber.receive());
         let sample = received.map_err(|error| read_error(&self.service, error))?;
         Ok(sample.map(|sample| *sample))
     }
@@ -163,6 +186,27 @@ where
     let full = SubscriberCreateError::ExceedsMaxSupportedSubscribers;
     let limit = PortLimit { ports: "readers", max: service.static_config().max_subscribers() };
     create_port(service, &full, limit, || service.subscriber_builder().create())
+}
+
+/// Receives the next message of an accepted publisher.
+fn next_accepted<P, H>(
+    source: Option<&Source>,
+    receive: impl Fn() -> Result<Option<Sample<ipc::Service, P, H>>, ReceiveError>,
+) -> Result<Option<Sample<ipc::Service, P, H>>, ReceiveError>
+where
+    P: Debug + IceoryxSend + ?Sized,
+    H: Debug + ZeroCopySend,
+{
+    for _ in 0..REFUSALS_MAX {
+        let received = receive()?;
+        let is_refused = |sample: &Sample<ipc::Service, P, H>| {
+            source.is_some_and(|source| !source.accepts(sample.header().node_id()))
+        };
+        if !received.as_ref().is_some_and(is_refused) {
+            return Ok(received);
+        }
+    }
+    Ok(None)
 }
 
 fn read_error(service: &str, error: ReceiveError) -> ReadError {

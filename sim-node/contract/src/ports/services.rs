@@ -203,7 +203,7 @@ mod tests {
         let error = Attachment::open(join(&domain, CONTRACT_VERSION + 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "service 'sim/status' has contract version 3, but this program has 4: stop every \
+            "service 'sim/status' has contract version 4, but this program has 5: stop every \
              program of the other version, or start this one with another --domain"
         );
     }
@@ -217,8 +217,8 @@ mod tests {
         let new = Owner::create_with_version(&domain.endpoint(), CONTRACT_VERSION + 1, &EMPTY);
         let error = ServiceError::Version {
             service: "sim/status".to_owned(),
-            actual: "3".to_owned(),
-            expected: 4,
+            actual: "4".to_owned(),
+            expected: 5,
         };
         assert_eq!(new.unwrap_err(), OwnerError::Service(error));
         // Without clients, the services of the other version are gone.

@@ -64,7 +64,7 @@ fn write_state_layouts(text: &mut String) {
             particle_count,
             flags,
             stride,
-            spare,
+            snapshot_index,
         }
     );
     layout!(text, ConstraintState { a, b, rest_length, compliance, kind });
@@ -105,7 +105,7 @@ fn write_state_layouts(text: &mut String) {
             angular_velocity,
         }
     );
-    layout!(text, CollidersHeader { run_id, step, count, spare });
+    layout!(text, CollidersHeader { run_id, step, count, list_index });
     layout!(text, KeyframeHeader { run_id, step, size_bytes });
 }
 

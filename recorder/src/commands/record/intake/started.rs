@@ -5,8 +5,8 @@ use recorder::{
     Topic,
 };
 use sim_contract::{
-    Change, ColliderState, KeyframeHeader, LostChanges, NodeStatus, Outcome, ParticleState,
-    SnapshotHeader,
+    Change, ColliderState, CollidersHeader, KeyframeHeader, LostChanges, NodeStatus, Outcome,
+    ParticleState, SnapshotHeader,
 };
 
 use crate::commands::record::accepted::{Accepted, RunEnd};
@@ -24,6 +24,8 @@ pub(super) struct Started {
     end_step: u64,
     /// The last recorded state.
     last: SnapshotHeader,
+    /// Number of the next snapshot, modulo 2^32.
+    next_snapshot: u32,
     next_outcome: u64,
     /// Step of the newest keyframe that a state refers to.
     keyframe_step: u64,
@@ -33,8 +35,8 @@ pub(super) struct Started {
     torn_count: u32,
     /// States that never arrived.
     state_gaps: u64,
-    /// Colliders of an unknown shape.
-    unknown_colliders: u64,
+    /// Number of the next list of colliders, modulo 2^32; `None` before the first.
+    next_collider_list: Option<u32>,
     /// The changes that the tap dropped before the start.
     lost_before: LostChanges,
     frozen: FrozenTracker,
@@ -55,13 +57,14 @@ impl Started {
             topology_revision: header.topology_revision,
             first_step: header.step,
             last: *header,
+            next_snapshot: header.snapshot_index,
             // Earlier outcomes are part of the first state.
             next_outcome: header.outcome_count,
             keyframe_step: 0,
             recorded_keyframe_step: None,
             torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
             state_gaps: 0,
-            unknown_colliders: 0,
+            next_collider_list: None,
             lost_before,
             frozen: FrozenTracker::default(),
             counts: AllCounts::default(),
@@ -120,7 +123,7 @@ impl Started {
     fn row(&mut self, change: &Change) -> Option<Message> {
         match change {
             Change::Load | Change::Outcome(_) => None,
-            Change::Colliders(header, list) => self.colliders_row(header.step, list),
+            Change::Colliders(header, list) => self.colliders_row(header, list),
             Change::Tears(header, new) => {
                 self.torn_count = header.count;
                 (!new.is_empty()).then(|| Message::Tears(TearsRow::new(header.step, new)))
@@ -133,9 +136,17 @@ impl Started {
     }
 
     /// Returns the row of a list of colliders. A scene without colliders has no rows.
-    fn colliders_row(&mut self, step: u64, list: &[ColliderState]) -> Option<Message> {
+    fn colliders_row(
+        &mut self,
+        header: &CollidersHeader,
+        list: &[ColliderState],
+    ) -> Option<Message> {
+        let CollidersHeader { step, list_index, .. } = *header;
+        let missing = list_index.wrapping_sub(self.next_collider_list.unwrap_or(list_index));
+        self.next_collider_list = Some(list_index.wrapping_add(1));
         let row = CollidersRow::new(step, list);
-        self.unknown_colliders += u64::from(row.is_none());
+        // A collider of an unknown shape cannot be recorded.
+        self.counts[Topic::Colliders].gaps += u64::from(missing) + u64::from(row.is_none());
         row.filter(|row| !row.colliders.is_empty()).map(Message::Colliders)
     }
 
@@ -152,11 +163,8 @@ impl Started {
 
     /// Counts the states and keyframes that are missing before a state.
     fn count_gaps(&mut self, header: &SnapshotHeader) {
-        // A node that pauses also publishes the step before the pause, so the distance may be less
-        // than the stride.
-        let distance = header.step.saturating_sub(self.last.step);
-        let stride = u64::from(header.stride.max(1));
-        self.state_gaps += distance.div_ceil(stride).saturating_sub(1);
+        self.state_gaps += u64::from(header.snapshot_index.wrapping_sub(self.next_snapshot));
+        self.next_snapshot = header.snapshot_index.wrapping_add(1);
         if header.keyframe_step > self.keyframe_step && header.keyframe_step >= self.first_step {
             self.keyframe_step = header.keyframe_step;
             let is_missing = self.recorded_keyframe_step < Some(header.keyframe_step);
@@ -201,8 +209,6 @@ impl Started {
         counts[Topic::Steps].gaps = self.state_gaps;
         counts[Topic::Outcomes].gaps += self.last.outcome_count.saturating_sub(self.next_outcome);
         counts[Topic::Tears].gaps = u64::from(self.last.torn_count.saturating_sub(self.torn_count));
-        counts[Topic::Colliders].gaps =
-            self.unknown_colliders + (lost.colliders - self.lost_before.colliders);
         counts[Topic::Parameters].gaps = lost.parameters - self.lost_before.parameters;
         counts
     }

@@ -14,6 +14,8 @@ use super::*;
 use crate::commands::record::accepted::RunEnd;
 use crate::commands::record::queue::Content;
 
+mod gaps;
+
 const RUN_ID: u64 = 77;
 const NOW: Now = Now { realtime_ns: 5_000_000_000, monotonic_ns: 2_000_000_000 };
 
@@ -97,6 +99,7 @@ fn header(step: u64, outcome_count: u64) -> SnapshotHeader {
         step,
         outcome_count,
         particle_count: 1,
+        snapshot_index: u32::try_from(step).unwrap(),
         // One second ago.
         publish_monotonic_ns: 1_000_000_000,
         ..SnapshotHeader::default()
@@ -127,7 +130,7 @@ fn cut(constraint: u32) -> TornConstraint {
 }
 
 fn colliders_header(step: u64) -> CollidersHeader {
-    CollidersHeader { run_id: RUN_ID, step, ..CollidersHeader::default() }
+    CollidersHeader { run_id: RUN_ID, step, count: 0, list_index: 0 }
 }
 
 fn parameters_header(step: u64) -> ParametersHeader {
@@ -306,55 +309,6 @@ fn outcomes_of_the_first_state_of_other_runs_and_of_a_replay_are_skipped() {
 }
 
 #[test]
-fn missing_outcomes_are_counted() {
-    let mut intake = started();
-    publish(&mut intake, header(5, 4), &[]);
-    send(&mut intake, &[Update::Outcome(&outcome(3, 5))]);
-    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 1);
-    publish(&mut intake, header(6, 9), &[]);
-    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 6, "including those at the end");
-}
-
-#[test]
-fn missing_states_are_counted_by_the_stride_of_the_node() {
-    let mut intake = started();
-    // The node paused at step 30. Steps 20, 24 and 36 are missing.
-    for step in [8, 12, 16, 28, 30, 32, 40] {
-        publish(&mut intake, SnapshotHeader { stride: 4, ..header(step, 2) }, &[]);
-    }
-    let counts = intake.counts();
-    assert_eq!(counts[Topic::Particles].gaps, 3);
-    assert_eq!((counts[Topic::Particles].received, counts[Topic::Steps].received), (8, 8));
-}
-
-#[test]
-fn missing_keyframes_are_counted() {
-    let mut intake = started();
-    let mut publish = |step, keyframe_step, changes: &[Change]| {
-        publish(&mut intake, SnapshotHeader { keyframe_step, ..header(step, 2) }, changes);
-        intake.counts()[Topic::Keyframe].gaps
-    };
-    assert_eq!(publish(5, 4, &[]), 0);
-    assert_eq!(publish(6, 6, &[]), 1);
-    assert_eq!(publish(7, 7, &[keyframe(7)]), 1);
-    assert_eq!(publish(8, 7, &[]), 1);
-    assert_eq!(publish(9, 9, &[]), 2);
-}
-
-#[test]
-fn dropped_changes_are_counted_from_the_start_on() {
-    let mut intake = Intake::default();
-    let lost =
-        |count| LostChanges { colliders: count, parameters: 2 * count, ..Default::default() };
-    intake.set_lost(lost(5));
-    publish(&mut intake, header(4, 2), &[Change::Load, keyframe(4)]);
-    assert_eq!(intake.counts().missing(), 0);
-    intake.set_lost(lost(6));
-    let counts = intake.counts();
-    assert_eq!((counts[Topic::Colliders].gaps, counts[Topic::Parameters].gaps), (1, 2));
-}
-
-#[test]
 fn another_run_ends_the_recording_and_is_not_part_of_it() {
     let (mut intake, node) = (started(), Node::new());
     let mut accepted = Accepted::default();
@@ -448,7 +402,8 @@ fn parameters_of_the_next_step_follow_with_its_state() {
 fn tears_colliders_and_events_precede_their_snapshot() {
     let (mut intake, mut node) = (started(), Node::new());
     node.particles[0].flags = ParticleFlags::FROZEN;
-    let colliders = Change::Colliders(colliders_header(5), vec![ColliderState::default()]);
+    let second = CollidersHeader { list_index: 1, ..colliders_header(5) };
+    let colliders = Change::Colliders(second, vec![ColliderState::default()]);
     let changes = [colliders, tears(5, &[0], 1), keyframe(5)];
     let header = SnapshotHeader { torn_count: 1, ..header(5, 2) };
     let mut accepted = Accepted::default();
@@ -462,15 +417,4 @@ fn tears_colliders_and_events_precede_their_snapshot() {
     for topic in [Topic::Colliders, Topic::Tears, Topic::Events] {
         assert_eq!((counts[topic].received, counts[topic].gaps), (1, 0), "{topic:?}");
     }
-}
-
-#[test]
-fn tears_that_never_arrived_are_counted() {
-    let mut intake = started();
-    publish(&mut intake, SnapshotHeader { torn_count: 1, ..header(5, 2) }, &[tears(5, &[0], 1)]);
-    assert_eq!(intake.counts()[Topic::Tears].gaps, 0);
-    publish(&mut intake, SnapshotHeader { torn_count: 3, ..header(6, 2) }, &[]);
-    assert_eq!(intake.counts()[Topic::Tears].gaps, 2);
-    publish(&mut intake, header(7, 3), &[tears(7, &[], 0)]);
-    assert_eq!(intake.counts()[Topic::Tears].gaps, 0, "after a reset");
 }

@@ -4,7 +4,7 @@ use std::fs::FileType;
 use std::os::unix::fs::FileTypeExt;
 
 /// Returns the kind with its article, or `None` for a regular file.
-pub(super) fn kind_of_non_file(file_type: FileType) -> Option<&'static str> {
+pub fn kind_of_non_file(file_type: FileType) -> Option<&'static str> {
     match file_type {
         _ if file_type.is_file() => None,
         _ if file_type.is_dir() => Some("a directory"),

@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use recorder::{Existing, PartFile, PartFileError};
+use sim_contract::{Existing, PartFile, PartFileError};
 
 /// The directory of a test, which is removed at its end.
 struct Directory(PathBuf);
@@ -67,6 +67,7 @@ fn the_part_file_of_a_killed_recorder_is_refused_and_unchanged() {
     drop(write(&path, Existing::Refuse, "half").unwrap());
     let error = write(&path, Existing::Refuse, "new").unwrap_err();
     assert!(matches!(error, PartFileError::PartExists(_)), "{error}");
+    assert!(error.to_string().contains("was killed (use --overwrite to replace it)"), "{error}");
     assert_eq!(fs::read_to_string(directory.file("a.mcap.part")).unwrap(), "half");
 }
 
@@ -143,4 +144,42 @@ fn the_error_names_a_missing_directory() {
     let directory = Directory::new("missing");
     let error = write(&directory.file("no/a.mcap"), Existing::Refuse, "x").unwrap_err();
     assert!(error.to_string().contains("no/a.mcap.part: No such file"), "{error}");
+}
+
+#[test]
+fn a_file_that_another_program_writes_is_refused_even_with_overwrite() {
+    let directory = Directory::new("locked");
+    let path = directory.file("a.mcap");
+    let mut first = write(&path, Existing::Overwrite, "one, ").unwrap();
+    first.flush().unwrap();
+    for existing in [Existing::Refuse, Existing::Overwrite] {
+        let error = write(&path, existing, "other").unwrap_err();
+        let part = directory.file("a.mcap.part");
+        assert_eq!(
+            error.to_string(),
+            format!(
+                "{} is being written by process {}: wait for its end, or name another file",
+                part.display(),
+                std::process::id()
+            )
+        );
+        assert_eq!(fs::read_to_string(part).unwrap(), "one, ");
+    }
+    first.write_all(b"two").unwrap();
+    first.finish().unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "one, two");
+    write(&path, Existing::Overwrite, "three").unwrap().finish().unwrap();
+}
+
+#[test]
+fn the_old_file_is_replaced_as_a_whole() {
+    let directory = Directory::new("whole");
+    let (path, old) = (directory.file("a.toml"), directory.file("old.toml"));
+    fs::write(&path, "old").unwrap();
+    // A second name of the old file: writing into the file would change its contents too.
+    fs::hard_link(&path, &old).unwrap();
+    PartFile::write_whole(&path, Existing::Overwrite, b"new").unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+    assert_eq!(fs::read_to_string(&old).unwrap(), "old");
+    assert_eq!(fs::read_dir(&directory.0).unwrap().count(), 2);
 }

@@ -1,0 +1,95 @@
+//! The counts of missing messages.
+
+use super::*;
+use crate::commands::record::report::Report;
+
+#[test]
+fn missing_outcomes_are_counted() {
+    let mut intake = started();
+    publish(&mut intake, header(5, 4), &[]);
+    send(&mut intake, &[Update::Outcome(&outcome(3, 5))]);
+    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 1);
+    publish(&mut intake, header(6, 9), &[]);
+    assert_eq!(intake.counts()[Topic::Outcomes].gaps, 6, "including those at the end");
+}
+
+#[test]
+fn missing_states_are_counted_by_their_numbers_whatever_their_steps() {
+    let mut intake = started();
+    let mut gaps = |steps_and_indices: &[(u64, u32)]| {
+        for &(step, snapshot_index) in steps_and_indices {
+            publish(&mut intake, SnapshotHeader { snapshot_index, ..header(step, 2) }, &[]);
+        }
+        let counts = intake.counts();
+        assert_eq!(counts[Topic::Particles].gaps, counts[Topic::Steps].gaps);
+        counts[Topic::Particles].gaps
+    };
+    // A node that publishes every tenth step pauses at step 13, makes two single steps and resumes.
+    assert_eq!(gaps(&[(10, 5), (13, 6), (14, 7), (15, 8), (20, 9)]), 0);
+    // It makes single steps again while the reader waits: steps 30, 31 and 32 never arrive.
+    assert_eq!(gaps(&[(40, 13)]), 3);
+    assert_eq!(intake.counts()[Topic::Steps].received, 7);
+}
+
+#[test]
+fn missing_keyframes_are_counted() {
+    let mut intake = started();
+    let mut publish = |step, keyframe_step, changes: &[Change]| {
+        publish(&mut intake, SnapshotHeader { keyframe_step, ..header(step, 2) }, changes);
+        intake.counts()[Topic::Keyframe].gaps
+    };
+    assert_eq!(publish(5, 4, &[]), 0);
+    assert_eq!(publish(6, 6, &[]), 1);
+    assert_eq!(publish(7, 7, &[keyframe(7)]), 1);
+    assert_eq!(publish(8, 7, &[]), 1);
+    assert_eq!(publish(9, 9, &[]), 2);
+}
+
+#[test]
+fn dropped_changes_are_counted_from_the_start_on() {
+    let mut intake = Intake::default();
+    let lost = |count| LostChanges { parameters: count, ..Default::default() };
+    intake.set_lost(lost(5));
+    publish(&mut intake, header(4, 2), &[Change::Load, keyframe(4)]);
+    assert_eq!(intake.counts().missing(), 0);
+    intake.set_lost(lost(6));
+    assert_eq!(intake.counts()[Topic::Parameters].gaps, 1);
+}
+
+#[test]
+fn missing_lists_of_colliders_are_counted_by_their_numbers() {
+    let mut intake = started();
+    let list = |step, list_index| {
+        let header = CollidersHeader { list_index, ..colliders_header(step) };
+        Change::Colliders(header, vec![ColliderState::default()])
+    };
+    publish(&mut intake, header(5, 2), &[list(5, 1)]);
+    assert_eq!(intake.counts()[Topic::Colliders].gaps, 0);
+    publish(&mut intake, header(6, 2), &[list(6, 5), list(6, 6)]);
+    assert_eq!(intake.counts()[Topic::Colliders].gaps, 3);
+}
+
+#[test]
+fn tears_that_never_arrived_are_counted() {
+    let mut intake = started();
+    publish(&mut intake, SnapshotHeader { torn_count: 1, ..header(5, 2) }, &[tears(5, &[0], 1)]);
+    assert_eq!(intake.counts()[Topic::Tears].gaps, 0);
+    publish(&mut intake, SnapshotHeader { torn_count: 3, ..header(6, 2) }, &[]);
+    assert_eq!(intake.counts()[Topic::Tears].gaps, 2);
+    publish(&mut intake, header(7, 3), &[tears(7, &[], 0)]);
+    assert_eq!(intake.counts()[Topic::Tears].gaps, 0, "after a reset");
+}
+
+#[test]
+fn unreadable_messages_are_counted_from_the_start_on_and_make_the_report_incomplete() {
+    let error = || ReadError::Malformed { service: "sim/tears".to_owned(), detail: String::new() };
+    let mut intake = Intake::default();
+    intake.count_unreadable(&[error()]);
+    assert_eq!(intake.unreadable, 0, "before the start");
+    let mut intake = started();
+    intake.count_unreadable(&[error(), error()]);
+    intake.count_unreadable(&[error()]);
+    let closing = intake.closing("signal".to_owned());
+    assert_eq!(closing.missing(), [("unreadable", 3)].into());
+    assert!(!Report::new("run.mcap", closing, 4..=4).is_complete());
+}

@@ -1,0 +1,142 @@
+//! A disk that stalls: what is recorded and what is declared as lost add up to what was received.
+
+use std::sync::{Condvar, Mutex};
+
+use recorder::{
+    Closing, Compression, GapCounter, LogEnd, LogOptions, LogReader, RunDescription, StepRow, Topic,
+};
+use sim_contract::ParticleState;
+
+use super::*;
+
+const SEEDS: u64 = 20;
+const MESSAGES: u64 = 400;
+/// Room for a few of the snapshots below.
+const QUEUE_BYTES: usize = 100_000;
+
+/// A deterministic pseudo-random generator (Marsaglia's xorshift64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % limit
+    }
+}
+
+/// The disk: while it stalls, every write waits.
+#[derive(Debug, Default)]
+struct Disk {
+    is_stalled: Mutex<bool>,
+    changed: Condvar,
+}
+
+impl Disk {
+    fn set_stalled(&self, is_stalled: bool) {
+        *self.is_stalled.lock().unwrap() = is_stalled;
+        self.changed.notify_all();
+    }
+}
+
+#[derive(Debug)]
+struct StallingFile {
+    disk: Arc<Disk>,
+    bytes: Vec<u8>,
+}
+
+impl Write for StallingFile {
+    fn write(&mut self, data: &[u8]) -> std::io::Result<usize> {
+        let stalled = self.disk.is_stalled.lock().unwrap();
+        drop(self.disk.changed.wait_while(stalled, |is_stalled| *is_stalled).unwrap());
+        self.bytes.write(data)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+fn description() -> RunDescription {
+    RunDescription {
+        run_id: 7,
+        epoch_ns: 0,
+        scene_name: "points".to_owned(),
+        origin: [0.0; 3],
+        rate_hz: 240,
+        method: 0,
+        particle_count: 1000,
+        constraint_count: 0,
+        solver_version: 1,
+        contract_version: 1,
+        recorder_version: "0".to_owned(),
+    }
+}
+
+fn snapshot(index: u32) -> Content {
+    let row = StepRow { step: index.into(), snapshot_index: Some(index), ..StepRow::default() };
+    Content::Snapshot(row, vec![ParticleState::default(); 1000])
+}
+
+fn keyframe(index: u32) -> Content {
+    Content::Update(Message::Keyframe { step: index.into(), bytes: vec![0; 20_000] })
+}
+
+/// Receives snapshots and keyframes while the disk stalls at times. Returns the finished file, and the
+/// numbers of received messages.
+fn record(seed: u64) -> (Vec<u8>, Closing) {
+    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let (disk, queue) = (Arc::new(Disk::default()), Queue::new(QUEUE_BYTES));
+    let file = StallingFile { disk: Arc::clone(&disk), bytes: Vec::new() };
+    let options = LogOptions { compression: Compression::None, chunk_size_bytes: 1 };
+    let log = LogWriter::create(file, options, &description(), b"version = 1", 0).unwrap();
+    let mut closing = Closing::default();
+    let log = thread::scope(|scope| {
+        let writing = scope.spawn(|| write(&queue, log));
+        let mut index = 0;
+        for _ in 0..MESSAGES {
+            let is_snapshot = random.below(3) > 0;
+            let content = if is_snapshot { snapshot(index) } else { keyframe(index) };
+            index += u32::from(is_snapshot);
+            for topic in [Topic::Steps, Topic::Particles, Topic::Keyframe] {
+                let is_received = is_snapshot != (topic == Topic::Keyframe);
+                closing.counts[topic].received += u64::from(is_received);
+            }
+            queue.push(Item { content, log_time_ns: 0 });
+            if random.below(30) == 0 {
+                disk.set_stalled(random.below(3) > 0);
+            }
+        }
+        disk.set_stalled(false);
+        queue.close();
+        writing.join().unwrap().unwrap()
+    });
+    closing.counts.set_written(log.counts());
+    closing.counts.set_lost(&queue.lost());
+    (log.finish(&closing).unwrap().bytes, closing)
+}
+
+#[test]
+fn what_is_recorded_and_what_is_declared_lost_add_up_to_what_was_received() {
+    let mut lost_in_all = 0;
+    for seed in 1..=SEEDS {
+        let (bytes, closing) = record(seed);
+        let mut log = LogReader::new(bytes.as_slice()).unwrap();
+        let (mut recorded, mut gaps) = ([0; Topic::ALL.len()], GapCounter::default());
+        while let Some(logged) = log.next_message().unwrap() {
+            recorded[logged.message.topic().index()] += 1;
+            gaps.add(&logged.message);
+        }
+        assert_eq!((log.end(), log.closing()), (Some(&LogEnd::Complete), Some(&closing)));
+        for (topic, counts) in closing.counts.iter() {
+            let found = recorded[topic.index()];
+            assert_eq!(found, counts.written, "seed {seed}: {topic:?}");
+            assert_eq!(found + counts.lost, counts.received, "seed {seed}: {topic:?}");
+        }
+        let (shown, lost) = (gaps.counts()[Topic::Steps].gaps, closing.counts[Topic::Steps].lost);
+        assert!(shown <= lost, "seed {seed}: {shown} gaps of {lost} lost snapshots");
+        lost_in_all += lost;
+    }
+    assert!(lost_in_all > 0, "no stall was long enough");
+}

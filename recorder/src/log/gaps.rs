@@ -1,0 +1,112 @@
+//! Messages that are missing between the recorded ones, counted by their numbers.
+
+use super::message::Message;
+use super::topic::{AllCounts, Topic};
+
+/// Counts the snapshots and outcomes that are missing in a recording, from the messages in it.
+///
+/// The end of a file states all losses. A recorder that is killed writes no end, but its file shows
+/// the losses up to its last message: each snapshot and each outcome has a number, and none is left
+/// out. Files of format version 3 and earlier do not number their snapshots.
+#[derive(Debug, Default)]
+pub struct GapCounter {
+    next_snapshot: Option<u32>,
+    /// `None` before the first snapshot, which contains all earlier outcomes.
+    next_outcome: Option<u64>,
+    /// Outcomes that the newest snapshot contains.
+    outcome_count: u64,
+    counts: AllCounts,
+}
+
+impl GapCounter {
+    /// Processes the next message of the file.
+    pub fn add(&mut self, message: &Message) {
+        match message {
+            Message::Step(row) => {
+                self.next_outcome.get_or_insert(row.outcome_count);
+                self.outcome_count = row.outcome_count;
+                if let Some(index) = row.snapshot_index {
+                    self.add_snapshot(index);
+                }
+            }
+            Message::Outcome(row) => {
+                let Some(next) = &mut self.next_outcome else { return };
+                self.counts[Topic::Outcomes].gaps += row.index.saturating_sub(*next);
+                *next = row.index.saturating_add(1).max(*next);
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds the numbers that are left out before a snapshot. Numbers count modulo 2^32.
+    fn add_snapshot(&mut self, index: u32) {
+        let missing = index.wrapping_sub(self.next_snapshot.unwrap_or(index));
+        for topic in [Topic::Steps, Topic::Particles] {
+            self.counts[topic].gaps += u64::from(missing);
+        }
+        self.next_snapshot = Some(index.wrapping_add(1));
+    }
+
+    /// Returns the numbers of missing messages so far, as `gaps`. The other counts are 0.
+    pub fn counts(&self) -> AllCounts {
+        let mut counts = self.counts;
+        let next = self.next_outcome.unwrap_or(self.outcome_count);
+        counts[Topic::Outcomes].gaps += self.outcome_count.saturating_sub(next);
+        counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_contract::{Action, Command, Outcome};
+
+    use super::*;
+    use crate::log::rows::{OutcomeRow, StepRow};
+
+    fn snapshot(index: u32, outcome_count: u64) -> Message {
+        let snapshot_index = Some(index);
+        Message::Step(StepRow { outcome_count, snapshot_index, ..StepRow::default() })
+    }
+
+    fn outcome(index: u64) -> Message {
+        let outcome = Outcome::new(index, 1, Command::new(1, index, Action::Reset), Ok(()));
+        Message::Outcome(OutcomeRow::from(&outcome))
+    }
+
+    /// Numbers of missing snapshots and outcomes.
+    #[derive(Debug, PartialEq)]
+    struct Missing {
+        snapshots: u64,
+        outcomes: u64,
+    }
+
+    fn missing(messages: &[Message]) -> Missing {
+        let mut counter = GapCounter::default();
+        for message in messages {
+            counter.add(message);
+        }
+        let counts = counter.counts();
+        assert_eq!(counts[Topic::Steps], counts[Topic::Particles]);
+        Missing { snapshots: counts[Topic::Steps].gaps, outcomes: counts[Topic::Outcomes].gaps }
+    }
+
+    #[test]
+    fn numbers_that_are_left_out_are_missing_and_those_before_the_first_snapshot_are_not() {
+        let complete = [snapshot(7, 3), outcome(3), snapshot(8, 4), snapshot(9, 4)];
+        assert_eq!(missing(&complete), Missing { snapshots: 0, outcomes: 0 });
+        let lossy = [snapshot(7, 3), outcome(5), snapshot(12, 9), snapshot(14, 9)];
+        assert_eq!(missing(&lossy), Missing { snapshots: 5, outcomes: 5 });
+    }
+
+    #[test]
+    fn the_number_of_a_snapshot_wraps() {
+        let messages = [snapshot(u32::MAX, 0), snapshot(0, 0), snapshot(2, 0)];
+        assert_eq!(missing(&messages).snapshots, 1);
+    }
+
+    #[test]
+    fn a_file_without_numbers_has_no_known_gaps() {
+        let rows = [0, 9].map(|step| Message::Step(StepRow { step, ..StepRow::default() }));
+        assert_eq!(missing(&rows), Missing { snapshots: 0, outcomes: 0 });
+    }
+}

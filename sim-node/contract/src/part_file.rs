@@ -1,0 +1,285 @@
+//! A file that gets its name only when it is finished.
+
+mod disk;
+mod lock;
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{CWD, RenameFlags, renameat_with};
+use rustix::io::Errno;
+
+use crate::file_kind::kind_of_non_file;
+use disk::DiskFile;
+use lock::Lock;
+
+/// Bytes to buffer before a write to the operating system.
+const BUFFER_SIZE_BYTES: usize = 1 << 18;
+
+/// The handling of files that exist.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// Fail and leave the files unchanged.
+    Refuse,
+    /// Replace the files.
+    Overwrite,
+}
+
+impl Existing {
+    /// Checks that a file with this name may be created.
+    ///
+    /// # Errors
+    /// If the name belongs to a file that may not be replaced, or to something that is not a file.
+    pub fn check(self, path: &Path) -> Result<(), PartFileError> {
+        check_kind(path)?;
+        if self == Self::Refuse && path.exists() {
+            return Err(PartFileError::Exists(path.to_owned()));
+        }
+        Ok(())
+    }
+}
+
+/// The reason why a file cannot be created or finished.
+#[derive(Debug, thiserror::Error)]
+pub enum PartFileError {
+    /// A file with this name exists.
+    #[error("{} exists (use --overwrite to replace it)", .0.display())]
+    Exists(PathBuf),
+    /// A `.part` file exists. It may be the only trace of a recording whose recorder was killed.
+    #[error(
+        "{} exists: the program that wrote it was killed (use --overwrite to replace it)",
+        .0.display()
+    )]
+    PartExists(PathBuf),
+    /// Another program is writing the `.part` file. It is never replaced.
+    #[error(
+        "{} is being written by {}: wait for its end, or name another file",
+        path.display(),
+        process_id.map_or("another program".to_owned(), |id| format!("process {id}"))
+    )]
+    InUse {
+        /// The `.part` file.
+        path: PathBuf,
+        /// The process, if the system names it.
+        process_id: Option<u32>,
+    },
+    /// The name belongs to a directory or a device, for example. It is never replaced.
+    #[error("{} is {kind}; name a file", path.display())]
+    NotAFile {
+        /// The name.
+        path: PathBuf,
+        /// The kind of the thing with this name, with its article.
+        kind: &'static str,
+    },
+    /// The operating system reports an error.
+    #[error("cannot write {}: {}", path.display(), explain_write_error(cause))]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The error.
+        cause: io::Error,
+    },
+}
+
+/// `NAME.part`, which [`PartFile::finish`] renames to `NAME`. It is locked, so no other program that
+/// uses this type writes it. If it is dropped earlier, the file `NAME.part` stays.
+#[derive(Debug)]
+pub struct PartFile<F: DiskFile = File> {
+    out: BufWriter<F>,
+    sync_on_flush: SyncOnFlush,
+    path: PathBuf,
+    part_path: PathBuf,
+    existing: Existing,
+}
+
+/// The part of a file that the next flush syncs to disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SyncOnFlush {
+    Nothing,
+    Data,
+    /// The data, and the name of a file that is new.
+    DataAndName,
+}
+
+impl PartFile {
+    /// Creates the file `path` with the suffix `.part`.
+    ///
+    /// # Errors
+    /// If either file exists and may not be replaced, if either name belongs to something that is
+    /// not a file, if another program is writing it, or if the operating system reports an error.
+    pub fn create(path: &Path, existing: Existing) -> Result<Self, PartFileError> {
+        existing.check(path)?;
+        let part_path = part_path(path);
+        check_kind(&part_path)?;
+        let file = open_locked(&part_path, existing)?;
+        // Only now, because the file may have belonged to another program until it was locked.
+        file.set_len(0).map_err(|cause| io_error(&part_path, cause))?;
+        Ok(Self::begin(file, path, existing))
+    }
+
+    /// Writes a whole file. An existing file keeps its contents until the new ones are complete.
+    ///
+    /// # Errors
+    /// Same as [`PartFile::create`] and [`PartFile::finish`]. After an error, nothing is left.
+    pub fn write_whole(path: &Path, existing: Existing, bytes: &[u8]) -> Result<(), PartFileError> {
+        let mut file = Self::create(path, existing)?;
+        if let Err(cause) = file.write_all(bytes).and_then(|()| file.flush()) {
+            let error = io_error(&file.part_path, cause);
+            file.discard()?;
+            return Err(error);
+        }
+        file.finish()?;
+        Ok(())
+    }
+}
+
+impl<F: DiskFile> PartFile<F> {
+    /// Begins with an empty file that has the suffix `.part`.
+    fn begin(file: F, path: &Path, existing: Existing) -> Self {
+        let out = BufWriter::with_capacity(BUFFER_SIZE_BYTES, file);
+        let (path, part_path) = (path.to_owned(), part_path(path));
+        Self { out, sync_on_flush: SyncOnFlush::Nothing, path, part_path, existing }
+    }
+
+    /// Makes every flush wait until the data is on disk, so that a power cut loses only what was
+    /// written after the last flush. The caller of [`PartFile::create`] does not wait for the disk.
+    #[must_use]
+    pub fn with_sync_on_flush(mut self) -> Self {
+        self.sync_on_flush = SyncOnFlush::DataAndName;
+        self
+    }
+
+    /// Returns the path with the suffix `.part`.
+    pub fn part_path(&self) -> &Path {
+        &self.part_path
+    }
+
+    /// Syncs the file to disk, renames it to its final name, and syncs the name to disk.
+    ///
+    /// # Errors
+    /// If a file with that name exists by now, or the operating system reports an error.
+    pub fn finish(mut self) -> Result<PathBuf, PartFileError> {
+        let written = self.out.flush().and_then(|()| self.out.get_ref().sync_all());
+        written.map_err(|cause| io_error(&self.part_path, cause))?;
+        self.rename()?;
+        let synced = self.out.get_ref().sync_folder_of(&self.path);
+        synced.map_err(|cause| io_error(&self.path, cause))?;
+        Ok(self.path)
+    }
+
+    /// Deletes the unfinished file.
+    ///
+    /// # Errors
+    /// If the operating system reports an error.
+    pub fn discard(self) -> Result<(), PartFileError> {
+        fs::remove_file(&self.part_path).map_err(|cause| io_error(&self.part_path, cause))
+    }
+
+    fn rename(&self) -> Result<(), PartFileError> {
+        let path_error = |cause| io_error(&self.path, cause);
+        if self.existing == Existing::Overwrite {
+            return fs::rename(&self.part_path, &self.path).map_err(path_error);
+        }
+        match renameat_with(CWD, &self.part_path, CWD, &self.path, RenameFlags::NOREPLACE) {
+            Ok(()) => Ok(()),
+            Err(Errno::EXIST) => Err(PartFileError::Exists(self.path.clone())),
+            // Some file systems do not support NOREPLACE. Test for the file once more instead.
+            Err(Errno::INVAL | Errno::NOSYS) if self.path.exists() => {
+                Err(PartFileError::Exists(self.path.clone()))
+            }
+            Err(Errno::INVAL | Errno::NOSYS) => {
+                fs::rename(&self.part_path, &self.path).map_err(path_error)
+            }
+            Err(error) => Err(path_error(error.into())),
+        }
+    }
+}
+
+impl<F: DiskFile> Write for PartFile<F> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()?;
+        let file = self.out.get_ref();
+        match self.sync_on_flush {
+            SyncOnFlush::Nothing => {}
+            SyncOnFlush::Data => file.sync_data()?,
+            SyncOnFlush::DataAndName => {
+                file.sync_data()?;
+                file.sync_folder_of(&self.part_path)?;
+                self.sync_on_flush = SyncOnFlush::Data;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns the text of an error of writing, with the remedy for a limit.
+pub fn explain_write_error(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::FileTooLarge => {
+            format!("{error}: the limit on the size of files is reached (see `ulimit -f`)")
+        }
+        ErrorKind::StorageFull => format!("{error}: free space, or name a file on another disk"),
+        ErrorKind::QuotaExceeded => format!("{error}: your quota of this disk is used up"),
+        _ => error.to_string(),
+    }
+}
+
+/// Most attempts to open a file that other programs finish in the meantime.
+const ATTEMPTS_MAX: u32 = 100;
+
+/// Opens and locks a file with its old contents.
+fn open_locked(path: &Path, existing: Existing) -> Result<File, PartFileError> {
+    let io_error = |cause| io_error(path, cause);
+    let mut options = OpenOptions::new();
+    options.write(true);
+    for _ in 0..ATTEMPTS_MAX {
+        let (file, is_new) = match options.clone().create_new(true).open(path) {
+            Ok(file) => (file, true),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => match options.open(path) {
+                Ok(file) => (file, false),
+                // Finished or removed in the meantime.
+                Err(error) if error.kind() == ErrorKind::NotFound => continue,
+                Err(error) => return Err(io_error(error)),
+            },
+            Err(error) => return Err(io_error(error)),
+        };
+        match lock::lock(&file, path).map_err(io_error)? {
+            Lock::Taken { process_id } => {
+                return Err(PartFileError::InUse { path: path.to_owned(), process_id });
+            }
+            Lock::Held if is_new || existing == Existing::Overwrite => return Ok(file),
+            Lock::Held => return Err(PartFileError::PartExists(path.to_owned())),
+            Lock::Moved => {}
+        }
+    }
+    Err(PartFileError::InUse { path: path.to_owned(), process_id: None })
+}
+
+/// Refuses a name that belongs to something other than a regular file or a link to one. Later errors
+/// report a name that cannot be looked up.
+fn check_kind(path: &Path) -> Result<(), PartFileError> {
+    match fs::metadata(path).ok().and_then(|metadata| kind_of_non_file(metadata.file_type())) {
+        Some(kind) => Err(PartFileError::NotAFile { path: path.to_owned(), kind }),
+        None => Ok(()),
+    }
+}
+
+/// Returns the path with the suffix `.part`.
+pub fn part_path(path: &Path) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(".part");
+    PathBuf::from(name)
+}
+
+fn io_error(path: &Path, cause: io::Error) -> PartFileError {
+    PartFileError::Io { path: path.to_owned(), cause }
+}
+
+#[cfg(test)]
+mod tests;

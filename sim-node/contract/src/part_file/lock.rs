@@ -1,0 +1,78 @@
+//! The lock that keeps two programs from writing the same file.
+
+use std::fs::{self, File, Metadata, TryLockError};
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use rustix::fs::{major, minor};
+
+/// Result of locking a file that is open for writing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lock {
+    /// This process holds the lock until it closes the file.
+    Held,
+    /// Another open file holds the lock.
+    Taken {
+        /// Its process, if the system names one.
+        process_id: Option<u32>,
+    },
+    /// The path names another file by now, or none: the lock is useless.
+    Moved,
+}
+
+/// Locks a file that was opened as `path`. A file system without locks cannot refuse a second writer.
+pub(super) fn lock(file: &File, path: &Path) -> io::Result<Lock> {
+    let metadata = file.metadata()?;
+    if let Err(TryLockError::WouldBlock) = file.try_lock() {
+        return Ok(Lock::Taken { process_id: lock_holder(&metadata) });
+    }
+    // The writer that held the lock before may have renamed the file when it finished.
+    let is_same = |named: Metadata| (named.dev(), named.ino()) == (metadata.dev(), metadata.ino());
+    Ok(if fs::metadata(path).is_ok_and(is_same) { Lock::Held } else { Lock::Moved })
+}
+
+/// Returns the process that holds the lock of a file.
+fn lock_holder(file: &Metadata) -> Option<u32> {
+    let device = file.dev();
+    let id = format!("{:02x}:{:02x}:{}", major(device), minor(device), file.ino());
+    find_holder(&fs::read_to_string("/proc/locks").ok()?, &id)
+}
+
+/// Returns the process of the lock on a file in the text of `/proc/locks`, whose lines read
+/// `NUMBER: FLOCK ADVISORY WRITE PROCESS MAJOR:MINOR:INODE START END`.
+fn find_holder(locks: &str, id: &str) -> Option<u32> {
+    locks.lines().find_map(|line| {
+        let fields: Vec<_> = line.split_whitespace().collect();
+        let [_, "FLOCK", _, _, process_id, file, ..] = fields[..] else { return None };
+        if file == id { process_id.parse().ok() } else { None }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_was_renamed_before_it_could_be_locked_is_noticed() {
+        let path = std::env::temp_dir().join(format!("moved-{}", getrandom::u64().unwrap()));
+        let renamed = path.with_extension("finished");
+        let file = File::create_new(&path).unwrap();
+        fs::rename(&path, &renamed).unwrap();
+        assert_eq!(lock(&file, &path).unwrap(), Lock::Moved);
+        fs::rename(&renamed, &path).unwrap();
+        assert_eq!(lock(&file, &path).unwrap(), Lock::Held);
+        fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn the_holder_of_a_lock_is_found_by_its_file() {
+        let locks = "1: POSIX  ADVISORY  READ 77 08:02:12 128 128\n\
+                     2: FLOCK  ADVISORY  WRITE 1234 fd:01:12 0 EOF\n\
+                     2: -> FLOCK  ADVISORY  WRITE 99 08:02:12 0 EOF\n\
+                     3: FLOCK  ADVISORY  WRITE 4321 08:02:12 0 EOF\n";
+        assert_eq!(find_holder(locks, "08:02:12"), Some(4321), "not a waiter or another kind");
+        assert_eq!(find_holder(locks, "fd:01:12"), Some(1234));
+        assert_eq!(find_holder(locks, "08:02:13"), None);
+    }
+}

@@ -1,0 +1,55 @@
+//! The processes whose messages a reader accepts.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use iceoryx2::identifiers::UniqueNodeId;
+use iceoryx2::prelude::{CallbackProgression, PortFactory};
+
+use crate::ports::services::Attachment;
+
+/// Most owners to remember: the present one, and earlier ones with unread messages.
+const OWNERS_MAX: usize = 8;
+
+/// Accepts the messages of the owner of a name, and refuses those of every other process.
+///
+/// A service has room for more publishers than the owner needs, and iceoryx2 lets any process publish.
+/// Only one process can publish `status`, so that process is the owner. Messages of an earlier owner
+/// may still be unread when another one has taken the name, so it is remembered.
+#[derive(Debug)]
+pub(crate) struct Source {
+    attachment: Rc<Attachment>,
+    /// Newest last.
+    owners: RefCell<VecDeque<UniqueNodeId>>,
+}
+
+impl Source {
+    /// Accepts the present owner, even if it is gone when its messages are read, and later owners.
+    pub(crate) fn new(attachment: &Rc<Attachment>) -> Self {
+        let source = Self { attachment: Rc::clone(attachment), owners: RefCell::default() };
+        source.remember_owner();
+        source
+    }
+
+    /// Returns `true` if a message of this iceoryx2 node comes from an owner of the name.
+    pub(crate) fn accepts(&self, node: UniqueNodeId) -> bool {
+        if !self.owners.borrow().contains(&node) {
+            self.remember_owner();
+        }
+        self.owners.borrow().contains(&node)
+    }
+
+    fn remember_owner(&self) {
+        let mut owners = self.owners.borrow_mut();
+        self.attachment.status.dynamic_config().list_publishers(|publisher| {
+            if !owners.contains(&publisher.node_id) {
+                owners.push_back(publisher.node_id);
+            }
+            CallbackProgression::Continue
+        });
+        while owners.len() > OWNERS_MAX {
+            owners.pop_front();
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Output files: two programs never write the same one, and a limit on their size ends with a message.
+
+use std::path::Path;
+
+use integration_tests::{Finished, Process, Program, Sandbox, ctl, wait_for};
+use recorder::{LogEnd, LogReader};
+
+/// Limit on the size of files: several chunks, and less than any of the recordings here.
+const SIZE_LIMIT_BYTES: u64 = 4_000_000;
+
+fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
+    Process::run(Program::Recorder, sandbox, args)
+}
+
+#[test]
+fn a_second_writer_of_a_file_is_refused_and_the_first_one_finishes() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let part = format!("{file}.part");
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope", "--paused"]);
+    let first = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    ctl(&sandbox, &["step", "20"]);
+    for args in [
+        &["record", "-o", &file][..],
+        &["record", "-o", &file, "--overwrite"],
+        &["simulate", "rope", "--steps", "5", "-o", &file, "--overwrite"],
+    ] {
+        let refused = recorder(&sandbox, args);
+        assert_eq!(refused.code, Some(1), "{}", refused.stderr);
+        let expected = format!("error: {part} is being written by ");
+        assert!(refused.stderr.contains(&expected), "no \"{expected}\" in: {}", refused.stderr);
+    }
+    ctl(&sandbox, &["step", "20"]);
+    assert_eq!(first.interrupt().code, Some(0));
+    let verified = recorder(&sandbox, &["verify", &file]).success();
+    assert!(verified.contains("40 steps bit-identical"), "{verified}");
+}
+
+/// Asserts that a program failed at the limit, and left the readable part of its recording.
+fn assert_ended_at_the_limit(finished: &Finished, file: &str) {
+    assert_eq!(finished.code, Some(1), "{}", finished.stderr);
+    let part = format!("{file}.part");
+    for words in [&part, "File too large", "ulimit -f"] {
+        assert!(finished.stderr.contains(words), "no \"{words}\" in: {}", finished.stderr);
+    }
+    assert!(!Path::new(file).exists());
+    assert!(std::fs::metadata(&part).unwrap().len() <= SIZE_LIMIT_BYTES);
+    let mut log = LogReader::open(Path::new(&part)).unwrap();
+    let messages = std::iter::from_fn(|| log.next_message().unwrap()).count();
+    assert!(messages > 0);
+    assert!(matches!(log.end(), Some(LogEnd::Truncated { .. })), "{:?}", log.end());
+}
+
+#[test]
+fn a_limit_on_the_size_of_files_ends_a_recording_with_a_message() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let args = ["record", "-o", &file, "--compression", "none"];
+    let mut recording = Process::start_ready(Program::Recorder, &sandbox, &args);
+    recording.limit_file_size(SIZE_LIMIT_BYTES);
+    wait_for("the end of the recording", || (!recording.is_running()).then_some(()));
+    assert_ended_at_the_limit(&recording.wait(), &file);
+}
+
+#[test]
+fn a_limit_on_the_size_of_files_ends_a_simulation_with_a_message() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let args = ["simulate", "curtain", "--steps", "100000000", "-o", &file];
+    let simulation = Process::start(Program::Recorder, &sandbox, &args);
+    simulation.limit_file_size(SIZE_LIMIT_BYTES);
+    assert_ended_at_the_limit(&simulation.wait(), &file);
+}
