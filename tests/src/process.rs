@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, setrlimit};
 use sim_contract::DOMAIN_VARIABLE;
 
 use crate::programs::Program;
@@ -74,6 +74,27 @@ impl Process {
     /// If the program does not start.
     pub fn start_in(program: Program, domain: &str, args: &[&str]) -> Self {
         Self::spawn(program, domain, args, Stdio::piped())
+    }
+
+    /// Starts a program that can open this many files. Other threads of this process have the same limit
+    /// meanwhile.
+    ///
+    /// # Panics
+    /// If the program does not start, or the limit is higher than that of the system.
+    pub fn start_with_open_files(
+        open_file_count_max: u64,
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+    ) -> Self {
+        // The first call may build the programs.
+        let _path = program.path();
+        let limit = getrlimit(Resource::Nofile);
+        let current = Some(open_file_count_max);
+        setrlimit(Resource::Nofile, Rlimit { current, ..limit }).expect("a lower limit");
+        let process = Self::start(program, sandbox, args);
+        setrlimit(Resource::Nofile, limit).expect("the limit before");
+        process
     }
 
     #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]

@@ -31,7 +31,11 @@ impl Bridge {
     /// Starts a bridge with additional arguments.
     pub(crate) fn start_with(sandbox: &Sandbox, more: &[&str]) -> Self {
         let args: Vec<_> = ["--listen", "127.0.0.1:0"].iter().chain(more).copied().collect();
-        let mut process = Process::start(Program::ViewerBridge, sandbox, &args);
+        Self::ready(Process::start(Program::ViewerBridge, sandbox, &args))
+    }
+
+    /// Waits until a bridge serves pages.
+    pub(crate) fn ready(mut process: Process) -> Self {
         let line = process.wait_for_line("ready http://");
         let host = line.trim_start_matches("ready http://").trim_end_matches('/').to_owned();
         Self { process, host }

@@ -8,6 +8,7 @@ use bytemuck::cast_slice;
 use serde_json::{Value, json};
 use sim_contract::{ParameterValues, ParticleState, Reason, TearCause, TornConstraint};
 use tokio::runtime::Runtime;
+use viewer_bridge::limits::{CLIENTS_MAX, VISITORS_MAX};
 use viewer_bridge::message::{Command, OutcomeText, ParametersText, Playback, Status};
 use viewer_bridge::request::{ClientId, RequestKind, Requests, requests};
 use viewer_bridge::sink::{Demand, Update};
@@ -20,9 +21,6 @@ use viewer_bridge::{
 
 use crate::foxglove_client::{Binary, Client, connect};
 use crate::support::{state, wait_for};
-
-/// Limit on simultaneous connections.
-const CLIENTS_MAX: usize = viewer_bridge::limits::CLIENTS_MAX;
 
 /// A running Foxglove server. Dropping it ends the server.
 struct Site {
@@ -66,6 +64,14 @@ impl Site {
 
     fn show(&mut self, step: u64, particles: &[ParticleState]) {
         self.shown.show(&self.sinks, state(step, particles));
+    }
+
+    /// Connects a client that subscribes to `/particles`.
+    fn subscriber(&self) -> Client {
+        let (mut client, _) = Client::start(&self.url);
+        client.subscribe(1, "/particles");
+        self.wait_for_subscription();
+        client
     }
 
     /// Waits until a subscription has reached the source.
@@ -368,10 +374,29 @@ fn an_address_other_than_loopback_is_refused() {
 #[test]
 fn a_client_over_the_limit_is_refused_until_another_disconnects() {
     let site = Site::start(options());
-    let mut clients: Vec<_> = (0..CLIENTS_MAX).map(|_| Client::start(&site.url)).collect();
+    let mut clients: Vec<_> = (0..CLIENTS_MAX).map(|_| site.subscriber()).collect();
     assert_eq!(connect(&site.url, None).err(), Some(503));
     clients.pop();
     wait_for("a free slot", || connect(&site.url, None).ok());
+}
+
+#[test]
+fn clients_that_never_send_a_valid_message_make_room_and_subscribers_stay() {
+    let mut site = Site::start(options());
+    let mut old = site.subscriber();
+    let mut idle: Vec<_> =
+        (0..2 * VISITORS_MAX).map(|_| connect(&site.url, None).unwrap()).collect();
+    for client in &mut idle {
+        // The evicted ones have closed their connections.
+        client.flood(&json!({ "op": "dance" }), 1);
+    }
+    let mut new = site.subscriber();
+    site.begin(2);
+    site.show(1, &particles(2, 0.25));
+    for client in [&mut old, &mut new] {
+        assert!(has_bits(&client.message(1).1, &particles(2, 0.25)));
+    }
+    idle[0].read_to_end();
 }
 
 #[test]

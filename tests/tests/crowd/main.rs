@@ -1,0 +1,178 @@
+//! Crowds of connections that never become clients: they keep no newcomer out and disturb no client,
+//! even if the bridge has few file descriptors.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
+
+#[path = "../../../viewer-bridge/tests/sockets/foxglove_client.rs"]
+#[allow(dead_code, reason = "its other half is used by the tests that have no node")]
+mod foxglove_client;
+#[path = "../viewer/page.rs"]
+#[allow(dead_code, reason = "its other half is used by the tests of the viewer")]
+mod page;
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+
+use integration_tests::{Process, Program, Sandbox, wait_for};
+use tungstenite::WebSocket;
+
+use foxglove_client::{Client, connect};
+use page::{Bridge, Page};
+
+/// A node, and a bridge for pages and Foxglove clients.
+struct Setup {
+    bridge: Bridge,
+    foxglove: String,
+    _node: Process,
+}
+
+/// The tests run one after the other: a limit on open files holds for the whole process while it starts
+/// a program.
+static TURN: Mutex<()> = Mutex::new(());
+
+const BRIDGE_ARGS: [&str; 4] = ["--listen", "127.0.0.1:0", "--foxglove", "127.0.0.1:0"];
+
+impl Setup {
+    fn start(sandbox: &Sandbox, mut bridge: Process) -> Self {
+        let node = Process::start_ready(Program::SimNode, sandbox, &["run", "curtain"]);
+        let foxglove = bridge.wait_for_line("foxglove ws://").replace("foxglove ", "");
+        Self { bridge: Bridge::ready(bridge), foxglove, _node: node }
+    }
+
+    /// Connects a Foxglove client that has received a state.
+    fn foxglove_client(&self) -> Client {
+        let (mut client, _) = Client::start(&self.foxglove);
+        assert_eq!(client.topics().len(), 7);
+        client.subscribe(1, "/particles");
+        client.message(1);
+        client
+    }
+
+    /// Opens connections that send the beginning of a request.
+    fn half_open(&self, count: usize) -> Vec<TcpStream> {
+        let open = |_| {
+            let mut stream = TcpStream::connect(&self.bridge.host).unwrap();
+            stream.write_all(b"GET / HTTP/1.1\r\nHost:").unwrap();
+            stream
+        };
+        (0..count).map(open).collect()
+    }
+
+    /// Opens sockets of pages that never send a message. The server can close them during the handshake.
+    fn silent_sockets(&self, count: usize) -> Vec<WebSocket<TcpStream>> {
+        let open = |_| {
+            let stream = TcpStream::connect(&self.bridge.host).unwrap();
+            let url = format!("ws://{}/socket", self.bridge.host);
+            Some(tungstenite::client(url, stream).ok()?.0)
+        };
+        (0..count).filter_map(open).collect()
+    }
+}
+
+/// Connections that request the page again and again. Dropping it closes them.
+struct KeptAlive {
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl KeptAlive {
+    fn start(host: &str, count: usize) -> Self {
+        let request = format!("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n").into_bytes();
+        let open = |_| {
+            let mut stream = TcpStream::connect(host).unwrap();
+            stream.write_all(&request).unwrap();
+            stream.set_nonblocking(true).unwrap();
+            stream
+        };
+        let streams: Vec<_> = (0..count).map(open).collect();
+        let is_over = Arc::new(AtomicBool::new(false));
+        let end = Arc::clone(&is_over);
+        let thread = thread::spawn(move || {
+            let mut buffer = vec![0; 1 << 16];
+            let mut turns = streams.iter().cycle();
+            wait_for("the end of the test", || {
+                // Each connection has its turn several times a second.
+                turns.by_ref().take(8).for_each(|stream| renew(stream, &request, &mut buffer));
+                end.load(Ordering::Relaxed).then_some(())
+            });
+        });
+        Self { is_over, thread: Some(thread) }
+    }
+}
+
+/// Repeats a request once it is answered. The server may have closed the connection.
+fn renew(mut stream: &TcpStream, request: &[u8], buffer: &mut [u8]) {
+    if stream.read(buffer).is_ok_and(|size| size > 0) {
+        let _closed = stream.write(request);
+    }
+}
+
+impl Drop for KeptAlive {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        let _panicked = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+/// Waits for a frame after those that the page has received.
+fn next_frame(page: &mut Page) -> u64 {
+    let step = page.frame(|_| true).head.stamp.step;
+    page.frame(|frame| frame.head.stamp.step > step).head.stamp.step
+}
+
+#[test]
+fn a_crowd_keeps_no_newcomer_out_and_disturbs_no_client() {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let sandbox = Sandbox::new();
+    let bridge = Process::start(Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
+    let setup = Setup::start(&sandbox, bridge);
+    let mut page = setup.bridge.page();
+    let mut client = setup.foxglove_client();
+    let _kept_alive = KeptAlive::start(&setup.bridge.host, 300);
+    next_frame(&mut page);
+    let _half_open = setup.half_open(300);
+    next_frame(&mut page);
+    let idle: Vec<_> = (0..64).map(|_| connect(&setup.foxglove, None)).collect();
+    assert_eq!(idle.iter().filter(|client| client.is_ok()).count(), 64);
+    next_frame(&mut page);
+    let _silent = setup.silent_sockets(80);
+    let mut newcomer = setup.bridge.page();
+    assert_eq!(newcomer.scene().positions.len(), 168);
+    next_frame(&mut newcomer);
+    let _foxglove_newcomer = setup.foxglove_client();
+    // A page that loads its files gets all of them.
+    assert!(get(&setup.bridge.host, "/js/main.js").contains("import"));
+    next_frame(&mut page);
+    client.message(1);
+}
+
+#[test]
+fn a_bridge_with_few_file_descriptors_serves_its_clients_and_newcomers() {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let sandbox = Sandbox::new();
+    // The link to the node needs about a hundred.
+    let bridge = Process::start_with_open_files(256, Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
+    let setup = Setup::start(&sandbox, bridge);
+    let mut page = setup.bridge.page();
+    let mut client = setup.foxglove_client();
+    for _ in 0..2 {
+        let _half_open = setup.half_open(150);
+        let _idle: Vec<_> = (0..16).map(|_| connect(&setup.foxglove, None)).collect();
+        next_frame(&mut page);
+        assert_eq!(setup.bridge.page().scene().positions.len(), 168);
+        setup.foxglove_client();
+        client.message(1);
+    }
+}
+
+/// Requests a file and returns the answer.
+fn get(host: &str, path: &str) -> String {
+    let mut stream = TcpStream::connect(host).unwrap();
+    let request = format!("GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer
+}
