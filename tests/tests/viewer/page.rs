@@ -55,6 +55,11 @@ impl Bridge {
 }
 
 impl Page {
+    /// Resets the connection: the system does so if bytes of a closed connection are unread.
+    pub(crate) fn reset(self) {
+        assert_eq!(self.socket.get_ref().peek(&mut [0]).unwrap(), 1);
+    }
+
     /// Sends a message without waiting for an outcome.
     pub(crate) fn send(&mut self, message: &Value) {
         self.socket.send(Message::text(message.to_string())).unwrap();

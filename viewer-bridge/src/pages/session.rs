@@ -65,12 +65,25 @@ async fn greet<'a>(peer: &mut Peer, sessions: &'a Sessions) -> Result<Greeting<'
 }
 
 async fn serve_page(mut peer: Peer, sessions: &Sessions, hello: &Hello) {
-    let hub = &sessions.hub;
-    let connection = hub.join(hello.format);
-    let client = connection.client;
+    let connection = sessions.hub.join(hello.format);
+    let membership = Membership { hub: &sessions.hub, client: connection.client };
     let end = converse(&mut peer, sessions, connection).await;
-    hub.leave(client);
+    // The grabs of the page end at once, however slowly it closes.
+    drop(membership);
     peer.close(end).await;
+}
+
+/// The membership of a page in the hub. It ends even if the task of the page panics, because no other
+/// client can end the page's grabs.
+struct Membership<'a> {
+    hub: &'a Hub,
+    client: ClientId,
+}
+
+impl Drop for Membership<'_> {
+    fn drop(&mut self) {
+        self.hub.leave(self.client);
+    }
 }
 
 /// Waits for the first message of a page and checks it.
