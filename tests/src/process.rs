@@ -185,6 +185,18 @@ impl Process {
         kill_process(pid, signal).unwrap_or_else(|error| panic!("{}: {error}", self.title));
     }
 
+    /// Returns the largest memory that the process has had, in bytes.
+    ///
+    /// # Panics
+    /// If the process has ended.
+    pub fn memory_peak_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id()));
+        let status = status.expect("a running process");
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let peak = peak.and_then(|text| text.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+        peak.expect("a size in KiB") << 10
+    }
+
     /// Sends SIGINT, as Ctrl-C does, unless the program has ended, and waits for its end.
     ///
     /// # Panics

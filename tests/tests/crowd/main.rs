@@ -17,6 +17,7 @@ use std::thread::{self, JoinHandle};
 
 use integration_tests::{Process, Program, Sandbox, wait_for};
 use tungstenite::WebSocket;
+use viewer_bridge::limits::{HEAD_SIZE_BYTES_MAX, MESSAGE_SIZE_BYTES_MAX, VISITORS_MAX};
 
 use foxglove_client::{Client, connect};
 use page::{Bridge, Page};
@@ -165,6 +166,60 @@ fn a_bridge_with_few_file_descriptors_serves_its_clients_and_newcomers() {
         setup.foxglove_client();
         client.message(1);
     }
+}
+
+#[test]
+fn heads_and_messages_that_never_end_use_little_memory() {
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let sandbox = Sandbox::new();
+    let bridge = Process::start(Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
+    let setup = Setup::start(&sandbox, bridge);
+    let mut page = setup.bridge.page();
+    let mut client = setup.foxglove_client();
+    let before_bytes = setup.bridge.process.memory_peak_bytes();
+    let foxglove = setup.foxglove.trim_start_matches("ws://").to_owned();
+    let (mut sent_bytes, mut open) = (0, Vec::new());
+    for host in [&setup.bridge.host, &foxglove] {
+        for round in 0..256 {
+            let mut stream = TcpStream::connect(host).unwrap();
+            stream.set_nonblocking(true).unwrap();
+            let endless = if round % 2 == 0 { endless_head() } else { endless_message(host) };
+            // The server may have closed the connection, or read no more of it.
+            sent_bytes += stream.write(&endless).unwrap_or(0) as u64;
+            open.push(stream);
+        }
+        next_frame(&mut page);
+    }
+    client.message(1);
+    let used_bytes = setup.bridge.process.memory_peak_bytes() - before_bytes;
+    // A head and a message for each visitor of both servers, and the same again for the copies while
+    // they grow.
+    let visitor_bytes = (HEAD_SIZE_BYTES_MAX + MESSAGE_SIZE_BYTES_MAX) as u64;
+    let limit_bytes = 2 * 2 * VISITORS_MAX as u64 * visitor_bytes;
+    assert!(sent_bytes > 2 * limit_bytes, "{sent_bytes} bytes were sent, not {limit_bytes}");
+    assert!(used_bytes < limit_bytes, "{used_bytes} bytes, not {limit_bytes}");
+}
+
+/// The head of a request, without an end.
+fn endless_head() -> Vec<u8> {
+    [b"GET / HTTP/1.1\r\nHost: ".to_vec(), vec![b'x'; 1 << 20]].concat()
+}
+
+/// A handshake, and a message in fragments without an end.
+fn endless_message(host: &str) -> Vec<u8> {
+    let mut bytes = format!(
+        "GET /socket HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\
+         Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
+    )
+    .into_bytes();
+    // 500 masked fragments of a text, and pings.
+    for first in std::iter::once(0x01).chain(std::iter::repeat_n(0x00, 499)) {
+        bytes.extend([first, 0x80 | 0x64, 0, 0, 0, 0]);
+        bytes.extend([b' '; 100]);
+    }
+    bytes.extend([0x89, 0x80, 0, 0, 0, 0].repeat(1 << 17));
+    bytes
 }
 
 /// Requests a file and returns the answer.
