@@ -42,6 +42,9 @@ pub const RELIABLE_QUEUED_MAX: usize = 256;
 pub const FOXGLOVE_QUEUED_MAX: usize = 8;
 /// Requests of all clients that wait for the source.
 pub const REQUESTS_QUEUED_MAX: usize = 4096;
+/// Requests for a state that wait for the source: one of each client. A Foxglove client can cause more
+/// than a thousand per second, each with its subscriptions.
+pub const DEMANDS_QUEUED_MAX: usize = 2 * CLIENTS_MAX;
 /// Commands that wait for room in the node's queue.
 pub const COMMANDS_QUEUED_MAX: usize = 4096;
 /// Constraints in one cut.

@@ -1,6 +1,6 @@
 //! The rules that every WebSocket keeps, whichever protocol it carries.
 
-mod descriptors;
+pub(crate) mod descriptors;
 pub(crate) mod guard;
 pub(crate) mod listen;
 pub(crate) mod lobby;

@@ -154,7 +154,9 @@ fn a_bridge_with_few_file_descriptors_serves_its_clients_and_newcomers() {
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let sandbox = Sandbox::new();
     // The link to the node needs about a hundred.
-    let bridge = Process::start_with_open_files(256, Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
+    let mut bridge =
+        Process::start_with_open_files(256, Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
+    assert!(bridge.wait_for_line("warning: ").contains("ulimit -n"));
     let setup = Setup::start(&sandbox, bridge);
     let mut page = setup.bridge.page();
     let mut client = setup.foxglove_client();

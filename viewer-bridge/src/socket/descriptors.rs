@@ -9,10 +9,25 @@ use rustix::process::{Resource, getrlimit};
 
 use crate::limits::{DESCRIPTORS_PER_VISITOR, DESCRIPTORS_RESERVED, VISITORS_MAX, VISITORS_MIN};
 
+/// Number of open files with which connections never fail for lack of a descriptor.
+const OPEN_FILES_MIN: usize = DESCRIPTORS_RESERVED + VISITORS_MIN * DESCRIPTORS_PER_VISITOR;
+
 /// Returns the number of visitors that each server can have under the limit of the system.
 pub(super) fn visitor_count_max() -> usize {
-    let limit = getrlimit(Resource::Nofile).current.and_then(|limit| usize::try_from(limit).ok());
-    limit.map_or(VISITORS_MAX, visitor_count_for)
+    open_file_limit().map_or(VISITORS_MAX, visitor_count_for)
+}
+
+/// Returns a warning for the user if the system allows too few open files for all clients.
+pub fn open_files_warning() -> Option<String> {
+    let limit = open_file_limit().filter(|limit| *limit < OPEN_FILES_MIN)?;
+    Some(format!(
+        "warning: the system allows only {limit} open files, too few for all clients; raise the limit \
+         with `ulimit -n {OPEN_FILES_MIN}`"
+    ))
+}
+
+fn open_file_limit() -> Option<usize> {
+    getrlimit(Resource::Nofile).current.and_then(|limit| usize::try_from(limit).ok())
 }
 
 fn visitor_count_for(limit: usize) -> usize {
@@ -39,6 +54,7 @@ mod tests {
             assert!(count * DESCRIPTORS_PER_VISITOR + DESCRIPTORS_RESERVED <= limit, "{limit}");
         }
         assert_eq!(visitor_count_for(1024), VISITORS_MAX);
-        assert_eq!(visitor_count_for(100), VISITORS_MIN);
+        assert_eq!(visitor_count_for(OPEN_FILES_MIN), VISITORS_MIN);
+        assert_eq!(visitor_count_for(0), VISITORS_MIN);
     }
 }

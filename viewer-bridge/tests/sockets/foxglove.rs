@@ -26,7 +26,7 @@ use crate::support::{state, wait_for};
 pub(crate) struct FoxgloveSite {
     sinks: Sinks,
     shutdown: Shutdown,
-    requests: Requests,
+    pub(crate) requests: Requests,
     pub(crate) url: String,
     shown: ShownState,
     _runtime: Runtime,

@@ -2,13 +2,15 @@
 //! and garbage. Each ends its own connection at most, no task panics, and clients do not notice.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use serde_json::json;
 use viewer_bridge::limits::MESSAGE_SIZE_BYTES_MAX;
+use viewer_bridge::request::RequestKind;
 use viewer_bridge::sink::Update;
 
 use crate::foxglove::{FoxgloveSite, options};
-use crate::foxglove_client::connect;
+use crate::foxglove_client::{Client, connect};
 use crate::raw_socket::{
     BINARY, CLOSE, CONTINUATION, FIN, PING, RawSocket, TEXT, frame, panic_count, watch_panics,
 };
@@ -176,6 +178,20 @@ fn garbage_does_not_disturb_foxglove_clients() {
     site.begin(2);
     site.show(1, &[sim_contract::ParticleState::default(); 2]);
     client.message(1);
+}
+
+#[test]
+fn channels_without_commands_cause_no_requests() {
+    let site = FoxgloveSite::start(options());
+    let (mut client, _) = Client::start(&site.url);
+    for channel in 0..100 {
+        client.advertise(channel, "/commands");
+        client.unadvertise(channel);
+    }
+    client.advertise(100, "/commands");
+    client.publish(100, &json!({ "kind": "pause" }));
+    let first = wait_for("a request", || site.requests.next(Duration::ZERO));
+    assert!(matches!(first.kind, RequestKind::Command { .. }), "{first:?}");
 }
 
 /// Binary messages that end within each of their fields, or whose lengths are false.
