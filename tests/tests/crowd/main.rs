@@ -42,12 +42,17 @@ impl Setup {
         Self { bridge: Bridge::ready(bridge), foxglove, _node: node }
     }
 
-    /// Connects a Foxglove client that has received a state.
+    /// Connects a page and a Foxglove client.
+    fn clients(&self) -> Clients {
+        Clients { page: self.bridge.page(), foxglove: self.foxglove_client() }
+    }
+
+    /// Connects a Foxglove client that has received a step.
     fn foxglove_client(&self) -> Client {
         let (mut client, _) = Client::start(&self.foxglove);
         assert_eq!(client.topics().len(), 7);
-        client.subscribe(1, "/particles");
-        client.message(1);
+        client.subscribe(1, "/steps");
+        client.json(1);
         client
     }
 
@@ -117,7 +122,22 @@ impl Drop for KeptAlive {
     }
 }
 
-/// Waits for a frame after those that the page has received.
+/// Clients that were there before the crowd. They must read again and again, because the server
+/// disconnects a client that answers no pings.
+struct Clients {
+    page: Page,
+    foxglove: Client,
+}
+
+impl Clients {
+    /// Waits for a frame after those that the page has received, and for its step at the other client.
+    fn receive(&mut self) {
+        let step = next_frame(&mut self.page);
+        while self.foxglove.json(1)["step"].as_u64().unwrap() < step {}
+    }
+}
+
+/// Waits for a frame after those that the page has received, and returns its step.
 fn next_frame(page: &mut Page) -> u64 {
     let step = page.frame(|_| true).head.stamp.step;
     page.frame(|frame| frame.head.stamp.step > step).head.stamp.step
@@ -129,15 +149,14 @@ fn a_crowd_keeps_no_newcomer_out_and_disturbs_no_client() {
     let sandbox = Sandbox::new();
     let bridge = Process::start(Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
     let setup = Setup::start(&sandbox, bridge);
-    let mut page = setup.bridge.page();
-    let mut client = setup.foxglove_client();
+    let mut clients = setup.clients();
     let _kept_alive = KeptAlive::start(&setup.bridge.host, 300);
-    next_frame(&mut page);
+    clients.receive();
     let _half_open = setup.half_open(300);
-    next_frame(&mut page);
+    clients.receive();
     let idle: Vec<_> = (0..64).map(|_| connect(&setup.foxglove, None)).collect();
     assert_eq!(idle.iter().filter(|client| client.is_ok()).count(), 64);
-    next_frame(&mut page);
+    clients.receive();
     let _silent = setup.silent_sockets(80);
     let mut newcomer = setup.bridge.page();
     assert_eq!(newcomer.scene().positions.len(), 168);
@@ -145,8 +164,7 @@ fn a_crowd_keeps_no_newcomer_out_and_disturbs_no_client() {
     let _foxglove_newcomer = setup.foxglove_client();
     // A page that loads its files gets all of them.
     assert!(get(&setup.bridge.host, "/js/main.js").contains("import"));
-    next_frame(&mut page);
-    client.message(1);
+    clients.receive();
 }
 
 #[test]
@@ -158,15 +176,14 @@ fn a_bridge_with_few_file_descriptors_serves_its_clients_and_newcomers() {
         Process::start_with_open_files(256, Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
     assert!(bridge.wait_for_line("warning: ").contains("ulimit -n"));
     let setup = Setup::start(&sandbox, bridge);
-    let mut page = setup.bridge.page();
-    let mut client = setup.foxglove_client();
+    let mut clients = setup.clients();
     for _ in 0..2 {
         let _half_open = setup.half_open(150);
         let _idle: Vec<_> = (0..16).map(|_| connect(&setup.foxglove, None)).collect();
-        next_frame(&mut page);
+        clients.receive();
         assert_eq!(setup.bridge.page().scene().positions.len(), 168);
         setup.foxglove_client();
-        client.message(1);
+        clients.receive();
     }
 }
 
@@ -176,8 +193,7 @@ fn heads_and_messages_that_never_end_use_little_memory() {
     let sandbox = Sandbox::new();
     let bridge = Process::start(Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
     let setup = Setup::start(&sandbox, bridge);
-    let mut page = setup.bridge.page();
-    let mut client = setup.foxglove_client();
+    let mut clients = setup.clients();
     let before_bytes = setup.bridge.process.memory_peak_bytes();
     let foxglove = setup.foxglove.trim_start_matches("ws://").to_owned();
     let (mut sent_bytes, mut open) = (0, Vec::new());
@@ -189,10 +205,11 @@ fn heads_and_messages_that_never_end_use_little_memory() {
             // The server may have closed the connection, or read no more of it.
             sent_bytes += stream.write(&endless).unwrap_or(0) as u64;
             open.push(stream);
+            if round % 64 == 0 {
+                clients.receive();
+            }
         }
-        next_frame(&mut page);
     }
-    client.message(1);
     let used_bytes = setup.bridge.process.memory_peak_bytes() - before_bytes;
     // A head and a message for each visitor of both servers, and the same again for the copies while
     // they grow.
