@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
+use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit, setrlimit};
 use sim_contract::DOMAIN_VARIABLE;
 
 use crate::programs::Program;
@@ -74,6 +74,27 @@ impl Process {
     /// If the program does not start.
     pub fn start_in(program: Program, domain: &str, args: &[&str]) -> Self {
         Self::spawn(program, domain, args, Stdio::piped())
+    }
+
+    /// Starts a program that can open this many files. Other threads of this process have the same limit
+    /// meanwhile.
+    ///
+    /// # Panics
+    /// If the program does not start, or the limit is higher than that of the system.
+    pub fn start_with_open_files(
+        open_file_count_max: u64,
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+    ) -> Self {
+        // The first call may build the programs.
+        let _path = program.path();
+        let limit = getrlimit(Resource::Nofile);
+        let current = Some(open_file_count_max);
+        setrlimit(Resource::Nofile, Rlimit { current, ..limit }).expect("a lower limit");
+        let process = Self::start(program, sandbox, args);
+        setrlimit(Resource::Nofile, limit).expect("the limit before");
+        process
     }
 
     #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
@@ -173,6 +194,18 @@ impl Process {
         let limit = Rlimit { current: Some(size_bytes), maximum: Some(size_bytes) };
         prlimit(Some(pid), Resource::Fsize, limit)
             .unwrap_or_else(|error| panic!("{}: {error}", self.title));
+    }
+
+    /// Returns the largest memory that the process has had, in bytes.
+    ///
+    /// # Panics
+    /// If the process has ended.
+    pub fn memory_peak_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id()));
+        let status = status.expect("a running process");
+        let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let peak = peak.and_then(|text| text.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+        peak.expect("a size in KiB") << 10
     }
 
     /// Sends SIGINT, as Ctrl-C does, unless the program has ended, and waits for its end.

@@ -20,6 +20,8 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
     name = "viewer-bridge",
     version,
     after_help = "Stop it with Ctrl-C or SIGTERM.\n\n\
+        Limits: 16 pages and 16 Foxglove clients at a time. Other connections make \
+        room for newcomers.\n\n\
         Exit codes: 0 success, 1 failure, 2 usage error.\n\nExamples:\n  \
         viewer-bridge                               show the node `sim` at http://127.0.0.1:8080/\n  \
         viewer-bridge --listen 127.0.0.1:0          use any free port; the address is printed\n  \

@@ -21,4 +21,5 @@ mod sink;
 mod tests;
 
 pub use options::{FoxgloveOptions, FoxglovePermission, FoxgloveServerError};
+pub use published_command::parse as parse_published_command;
 pub use server::FoxgloveServer;

@@ -30,10 +30,12 @@ pub mod wire;
 
 pub use foxglove_server::{
     FoxgloveOptions, FoxglovePermission, FoxgloveServer, FoxgloveServerError,
+    parse_published_command,
 };
 pub use pages::hub::Hub;
 pub use pages::server::{Server, ServerOptions};
 pub use shutdown::Shutdown;
 pub use sink::Sinks;
+pub use socket::descriptors::open_files_warning;
 pub use source::Source;
 pub use source::recording_times::RecordingTimes;

@@ -6,10 +6,19 @@ use std::time::Duration;
 pub const PROTOCOL: u32 = 2;
 /// Pages at a time, and Foxglove clients at a time: each costs memory and a share of the network.
 pub const CLIENTS_MAX: usize = 16;
-/// HTTP connections at a time that request files or await their upgrade to a socket.
-pub const CONNECTIONS_MAX: usize = 128;
-/// Sockets at a time that have not sent a valid `hello`.
-pub const WAITING_MAX: usize = 64;
+/// Connections at a time that are not clients: they request files, or have not sent a valid first
+/// message. One more evicts the one that has been inactive for the longest time. A browser opens six
+/// for a page, so twenty pages can load at once.
+pub const VISITORS_MAX: usize = 128;
+/// Such connections at a time where the system allows few files: those of one browser.
+pub const VISITORS_MIN: usize = 8;
+/// File descriptors of everything else: four for a pair of clients (a page one, a Foxglove client three),
+/// about 100 for the link to a node, and a margin for the files of a node with many readers.
+pub const DESCRIPTORS_RESERVED: usize = 4 * CLIENTS_MAX + 256;
+/// File descriptors of a visitor of each server: one of the pages, and three of the Foxglove server.
+pub const DESCRIPTORS_PER_VISITOR: usize = 4;
+/// Size of the head of a request. Browsers send the cookies of every port of a host.
+pub const HEAD_SIZE_BYTES_MAX: usize = 64 << 10;
 /// Size of a message from a client. A cut of 256 constraints needs a few KiB.
 pub const MESSAGE_SIZE_BYTES_MAX: usize = 64 << 10;
 /// Messages of a client per second: one target and one acknowledgement per frame of a 120 Hz display.
@@ -33,6 +42,9 @@ pub const RELIABLE_QUEUED_MAX: usize = 256;
 pub const FOXGLOVE_QUEUED_MAX: usize = 8;
 /// Requests of all clients that wait for the source.
 pub const REQUESTS_QUEUED_MAX: usize = 4096;
+/// Requests for a state that wait for the source: one of each client. A Foxglove client can cause more
+/// than a thousand per second, each with its subscriptions.
+pub const DEMANDS_QUEUED_MAX: usize = 2 * CLIENTS_MAX;
 /// Commands that wait for room in the node's queue.
 pub const COMMANDS_QUEUED_MAX: usize = 4096;
 /// Constraints in one cut.
@@ -53,7 +65,8 @@ pub const SILENCE_MAX: Duration = Duration::from_secs(10);
 pub const PING_PERIOD: Duration = Duration::from_secs(3);
 /// Time for the head of a request, and for the first message of a page.
 pub const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
-/// Lifetime of a connection that does not become a WebSocket. Browsers open another one.
+/// Lifetime of a connection that does not become a WebSocket; browsers open another one. Time for the
+/// first message of a Foxglove client.
 pub const CONNECTION_TIMEOUT: Duration = Duration::from_mins(1);
 /// Time in which the node must answer a command.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);

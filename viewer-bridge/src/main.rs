@@ -19,6 +19,7 @@ use viewer_bridge::source::live::Live;
 use viewer_bridge::source::replay::Replay;
 use viewer_bridge::{
     FoxgloveOptions, FoxgloveServer, Hub, Server, ServerOptions, Shutdown, Sinks, Source,
+    open_files_warning,
 };
 
 use args::Args;
@@ -141,6 +142,9 @@ fn start_source(
 /// Prints the addresses.
 fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
     let url = server.url();
+    if let Some(warning) = open_files_warning() {
+        note(&warning);
+    }
     if let Some(foxglove) = foxglove {
         note(&format!("foxglove {}", foxglove.url()));
     }

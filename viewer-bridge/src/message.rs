@@ -6,7 +6,7 @@ mod refusal;
 mod timeline;
 mod to_page;
 
-pub(crate) use check::check;
+pub use check::check;
 pub use from_page::{Choice, Command, FromPage, Hello, Malformed};
 pub use refusal::Refusal;
 pub use timeline::{Hashes, Mark, MarkKind, Playback, Timeline};

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::Duration;
 
-use crate::limits::REQUESTS_QUEUED_MAX;
+use crate::limits::{DEMANDS_QUEUED_MAX, REQUESTS_QUEUED_MAX};
 use crate::message::Command;
 
 /// The sender of a request. A source treats each as a client of its own.
@@ -48,11 +48,26 @@ pub enum RequestKind {
     },
 }
 
+impl RequestKind {
+    /// Returns whether the client needs a state.
+    fn is_demand(&self) -> bool {
+        matches!(self, Self::State | Self::Credit)
+    }
+}
+
 /// The requests of all clients, in the order of arrival.
 #[derive(Debug)]
 pub struct Requests {
     receiver: Receiver<Request>,
-    queued_count: Arc<AtomicUsize>,
+    counts: Arc<Counts>,
+}
+
+/// Numbers of requests in the queue.
+#[derive(Debug, Default)]
+struct Counts {
+    all: AtomicUsize,
+    /// Requests for a state.
+    demands: AtomicUsize,
 }
 
 impl Requests {
@@ -60,7 +75,10 @@ impl Requests {
     pub fn next(&self, timeout: Duration) -> Option<Request> {
         match self.receiver.recv_timeout(timeout) {
             Ok(request) => {
-                self.queued_count.fetch_sub(1, Ordering::Relaxed);
+                self.counts.all.fetch_sub(1, Ordering::Relaxed);
+                if request.kind.is_demand() {
+                    self.counts.demands.fetch_sub(1, Ordering::Relaxed);
+                }
                 Some(request)
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
@@ -72,7 +90,7 @@ impl Requests {
 #[derive(Debug, Clone)]
 pub struct RequestSender {
     sender: Sender<Request>,
-    queued_count: Arc<AtomicUsize>,
+    counts: Arc<Counts>,
 }
 
 /// The queue is full: too many commands wait for the source.
@@ -82,20 +100,54 @@ pub(crate) struct QueueFull;
 /// Creates both ends of the queue.
 pub fn requests() -> (RequestSender, Requests) {
     let (sender, receiver) = channel();
-    let queued_count = Arc::new(AtomicUsize::new(0));
-    let requests = Requests { receiver, queued_count: Arc::clone(&queued_count) };
-    (RequestSender { sender, queued_count }, requests)
+    let counts = Arc::new(Counts::default());
+    let requests = Requests { receiver, counts: Arc::clone(&counts) };
+    (RequestSender { sender, counts }, requests)
 }
 
 impl RequestSender {
     /// Queues a request. Only commands are refused when the queue is full: a client that leaves must
-    /// always be noticed.
+    /// always be noticed. A request for a state is dropped if enough others wait, because the state that
+    /// they cause goes to every client.
     pub(crate) fn send(&self, client: ClientId, kind: RequestKind) -> Result<(), QueueFull> {
         let is_command = matches!(kind, RequestKind::Command { .. });
-        if is_command && self.queued_count.load(Ordering::Relaxed) >= REQUESTS_QUEUED_MAX {
+        if is_command && self.counts.all.load(Ordering::Relaxed) >= REQUESTS_QUEUED_MAX {
             return Err(QueueFull);
         }
-        self.queued_count.fetch_add(1, Ordering::Relaxed);
+        if kind.is_demand()
+            && self.counts.demands.fetch_add(1, Ordering::Relaxed) >= DEMANDS_QUEUED_MAX
+        {
+            self.counts.demands.fetch_sub(1, Ordering::Relaxed);
+            return Ok(());
+        }
+        self.counts.all.fetch_add(1, Ordering::Relaxed);
         self.sender.send(Request { client, kind }).map_err(|_| QueueFull)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flood_of_demands_leaves_room_for_commands_and_departures() {
+        let (sender, requests) = requests();
+        let client = ClientId::FoxgloveCaller(1);
+        let command = RequestKind::Command { id: None, command: Command::Pause {} };
+        for kind in [RequestKind::State, RequestKind::Credit] {
+            (0..100_000).for_each(|_| assert_eq!(sender.send(client, kind.clone()), Ok(())));
+        }
+        assert_eq!(sender.send(client, command.clone()), Ok(()));
+        assert_eq!(sender.send(client, RequestKind::Left), Ok(()));
+        let next = || requests.next(Duration::ZERO).map(|request| request.kind);
+        assert_eq!(next(), Some(RequestKind::State));
+        // There is room for one more, after the others.
+        assert_eq!(sender.send(client, RequestKind::Credit), Ok(()));
+        let rest: Vec<_> = std::iter::from_fn(next).collect();
+        assert_eq!(rest.len(), DEMANDS_QUEUED_MAX + 2);
+        assert_eq!(
+            rest[DEMANDS_QUEUED_MAX - 1..],
+            [command, RequestKind::Left, RequestKind::Credit]
+        );
     }
 }

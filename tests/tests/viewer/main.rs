@@ -2,8 +2,12 @@
 //! commands show in the snapshots of the node.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a panic is how a test fails")]
 
+#[path = "../../../viewer-bridge/tests/sockets/foxglove_client.rs"]
+#[allow(dead_code, reason = "its other half is used by the tests that have no node")]
+mod foxglove_client;
 mod page;
 mod replay;
+mod vanished;
 
 use std::time::Duration;
 

@@ -31,7 +31,11 @@ impl Bridge {
     /// Starts a bridge with additional arguments.
     pub(crate) fn start_with(sandbox: &Sandbox, more: &[&str]) -> Self {
         let args: Vec<_> = ["--listen", "127.0.0.1:0"].iter().chain(more).copied().collect();
-        let mut process = Process::start(Program::ViewerBridge, sandbox, &args);
+        Self::ready(Process::start(Program::ViewerBridge, sandbox, &args))
+    }
+
+    /// Waits until a bridge serves pages.
+    pub(crate) fn ready(mut process: Process) -> Self {
         let line = process.wait_for_line("ready http://");
         let host = line.trim_start_matches("ready http://").trim_end_matches('/').to_owned();
         Self { process, host }
@@ -51,6 +55,11 @@ impl Bridge {
 }
 
 impl Page {
+    /// Resets the connection: the system does so if bytes of a closed connection are unread.
+    pub(crate) fn reset(self) {
+        assert_eq!(self.socket.get_ref().peek(&mut [0]).unwrap(), 1);
+    }
+
     /// Sends a message without waiting for an outcome.
     pub(crate) fn send(&mut self, message: &Value) {
         self.socket.send(Message::text(message.to_string())).unwrap();

@@ -8,7 +8,10 @@ use crate::message::Command;
 pub(super) const TOPIC: &str = "/commands";
 
 /// Parses a command. A cut refers to the load on show, `epoch`. The error is for the user.
-pub(super) fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
+///
+/// # Errors
+/// The payload is not JSON, or not a command that clients may publish.
+pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
     let action: Action = serde_json::from_slice(payload).map_err(|error| error.to_string())?;
     Ok(match action {
         Action::Pin { particle } => Command::Pin { particle },

@@ -3,7 +3,7 @@
 //!
 //! The library calls it from the tasks of the clients. It only queues and never blocks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use foxglove::WebSocketServerHandle;
@@ -46,6 +46,8 @@ struct BridgeState {
     /// Requests to set parameters that are not complete.
     parameter_requests: BTreeMap<u32, ParameterRequest>,
     last_parameter_request: u32,
+    /// Clients that have published a command, and may therefore have grabs.
+    publishers: BTreeSet<u32>,
     /// Earliest time of the next complaint to a client.
     next_complaint_ns: BTreeMap<u32, u64>,
     parameters: Option<ParameterValues>,
@@ -160,6 +162,7 @@ impl RequestBridge {
         let epoch = self.state().epoch;
         match published_command::parse(payload, epoch) {
             Ok(command) => {
+                self.state().publishers.insert(client.id().into());
                 let sender = ClientId::FoxglovePublisher(client.id().into());
                 self.submit(sender, command, Waiting::Publisher(client));
             }
@@ -181,8 +184,12 @@ impl RequestBridge {
         }
     }
 
-    /// Releases the grabs of a client that publishes no more commands.
+    /// Releases the grabs of a client that publishes no more commands. One message can end hundreds of
+    /// channels, so those without a command cause no request.
     pub(super) fn remove_publisher(&self, client: LibraryClientId) {
+        if !self.state().publishers.remove(&client.into()) {
+            return;
+        }
         // Only commands are refused.
         let _sent =
             self.requests.send(ClientId::FoxglovePublisher(client.into()), RequestKind::Left);

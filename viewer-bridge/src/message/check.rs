@@ -14,7 +14,10 @@ const RATES: std::ops::RangeInclusive<f32> = 0.1..=10.0;
 const NAME_SIZE_BYTES_MAX: usize = sim_contract::Text::SIZE_BYTES_MAX;
 
 /// Checks that the numbers are finite and in range.
-pub(crate) fn check(command: &Command) -> Result<(), Reason> {
+///
+/// # Errors
+/// A number is not finite or out of its range, or a vector has no direction.
+pub fn check(command: &Command) -> Result<(), Reason> {
     match command {
         Command::Grab { target, over_s, .. } | Command::Move { target, over_s, .. } => {
             points(&[*target])?;

@@ -192,6 +192,15 @@ struct Ack {
 }
 
 impl FromPage {
+    /// Decodes a message from the bytes of a text.
+    ///
+    /// # Errors
+    /// The bytes are not UTF-8, or the text is not a message.
+    pub fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
+        let text = str::from_utf8(bytes).map_err(|error| Malformed(error.to_string()))?;
+        Self::parse(text)
+    }
+
     /// Parses a message.
     ///
     /// # Errors

@@ -4,22 +4,21 @@ use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
-use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, StatusCode};
-use axum::response::{IntoResponse, Response};
+use axum::http::HeaderMap;
+use axum::response::Response;
 use axum::routing::get;
+use axum::{Extension, Router};
 use thiserror::Error;
-use tokio::sync::Semaphore;
 
 use super::assets::Assets;
 use super::hub::Hub;
 use super::session::{self, Sessions};
-use crate::limits::WAITING_MAX;
 use crate::shutdown::Shutdown;
 use crate::socket::guard::{Guard, guarded};
 use crate::socket::listen::{HttpListener, client_permits, remedy};
+use crate::socket::lobby::Place;
 use crate::socket::peer::limit;
 
 /// Options of a server.
@@ -62,8 +61,6 @@ pub struct Server {
 struct ServerState {
     sessions: Sessions,
     assets: Assets,
-    /// A permit for each socket that has not sent a valid `hello`.
-    waiting: Arc<Semaphore>,
 }
 
 impl Server {
@@ -93,8 +90,7 @@ impl Server {
         let (guard, shutdown_of_pages) = (Arc::clone(&self.guard), shutdown.clone());
         let sessions =
             Sessions { hub, guard, shutdown: shutdown_of_pages, pages: Arc::clone(&pages) };
-        let waiting = Arc::new(Semaphore::new(WAITING_MAX));
-        let state = ServerState { sessions, assets: self.assets, waiting };
+        let state = ServerState { sessions, assets: self.assets };
         let router = guarded(router(Arc::new(state)), self.guard);
         self.listener.serve(router, pages, &shutdown).await;
     }
@@ -120,11 +116,11 @@ async fn file(
     state.assets.answer(&path, &headers)
 }
 
-async fn socket(State(state): State<Arc<ServerState>>, upgrade: WebSocketUpgrade) -> Response {
-    let Ok(waiting) = Arc::clone(&state.waiting).try_acquire_owned() else {
-        let text = format!("{WAITING_MAX} sockets have not sent hello; try again later\n");
-        return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
-    };
+async fn socket(
+    State(state): State<Arc<ServerState>>,
+    Extension(place): Extension<Arc<Place>>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
     limit(upgrade)
-        .on_upgrade(async move |socket| session::serve(socket, &state.sessions, waiting).await)
+        .on_upgrade(async move |socket| session::serve(socket, &state.sessions, place).await)
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use axum::extract::ws::{Message, WebSocket};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::time::timeout;
 
 use super::connection::{Acknowledged, Connection, NextFrame};
@@ -13,10 +13,9 @@ use crate::message::{Command, FromPage, Hello, OutcomeText, Refusal, ToPage, che
 use crate::request::{ClientId, RequestKind};
 use crate::shutdown::Shutdown;
 use crate::socket::guard::Guard;
-use crate::socket::peer::{End, GOING_AWAY, Peer, TOO_SLOW};
+use crate::socket::lobby::Place;
+use crate::socket::peer::{End, FULL, GOING_AWAY, Peer, TOO_SLOW};
 
-/// All places are taken.
-const FULL: u16 = 1013;
 /// A message is malformed.
 const MALFORMED: u16 = 4400;
 /// The token is missing or wrong.
@@ -35,31 +34,56 @@ pub(super) struct Sessions {
 }
 
 /// Serves a page until it leaves or breaks the rules. A page counts against the limit once it has sent
-/// a valid token; until then it only holds `waiting`. A page beyond the limit gets a close code, because
-/// browsers hide the status of a refused upgrade from the page.
-pub(super) async fn serve(socket: WebSocket, sessions: &Sessions, waiting: OwnedSemaphorePermit) {
+/// a valid token; until then it only holds its place in the lobby.
+pub(super) async fn serve(socket: WebSocket, sessions: &Sessions, place: Arc<Place>) {
     let mut peer = Peer::new(socket);
-    let end = match timeout(HELLO_TIMEOUT, receive_hello(&mut peer, &sessions.guard)).await {
-        Ok(Ok(hello)) => match sessions.pages.try_acquire() {
-            Ok(_place) => {
-                drop(waiting);
-                return serve_page(peer, sessions, &hello).await;
-            }
-            Err(_) => End::closed(FULL, "too many pages are already open; close one"),
-        },
-        Ok(Err(end)) => end,
-        Err(_) => End::closed(TOO_SLOW, "no hello arrived"),
+    let end = match place.while_held(greet(&mut peer, sessions)).await {
+        Some(Ok(Greeting { hello, _permit })) => {
+            drop(place);
+            return serve_page(peer, sessions, &hello).await;
+        }
+        Some(Err(end)) => end,
+        None => End::evicted(),
     };
-    peer.close(end).await;
+    place.while_held(peer.close(end)).await;
+}
+
+/// A valid first message of a page, and its permit.
+struct Greeting<'a> {
+    hello: Hello,
+    _permit: SemaphorePermit<'a>,
+}
+
+/// Waits for `hello`. A page beyond the limit gets a close code, because browsers hide the status of a
+/// refused upgrade from the page.
+async fn greet<'a>(peer: &mut Peer, sessions: &'a Sessions) -> Result<Greeting<'a>, End> {
+    let hello = timeout(HELLO_TIMEOUT, receive_hello(peer, &sessions.guard)).await;
+    let hello = hello.unwrap_or_else(|_| Err(End::closed(TOO_SLOW, "no hello arrived")))?;
+    let full = |_| End::closed(FULL, "too many pages are already open; close one");
+    let permit = sessions.pages.try_acquire().map_err(full)?;
+    Ok(Greeting { hello, _permit: permit })
 }
 
 async fn serve_page(mut peer: Peer, sessions: &Sessions, hello: &Hello) {
-    let hub = &sessions.hub;
-    let connection = hub.join(hello.format);
-    let client = connection.client;
+    let connection = sessions.hub.join(hello.format);
+    let membership = Membership { hub: &sessions.hub, client: connection.client };
     let end = converse(&mut peer, sessions, connection).await;
-    hub.leave(client);
+    // The grabs of the page end at once, however slowly it closes.
+    drop(membership);
     peer.close(end).await;
+}
+
+/// The membership of a page in the hub. It ends even if the task of the page panics, because no other
+/// client can end the page's grabs.
+struct Membership<'a> {
+    hub: &'a Hub,
+    client: ClientId,
+}
+
+impl Drop for Membership<'_> {
+    fn drop(&mut self) {
+        self.hub.leave(self.client);
+    }
 }
 
 /// Waits for the first message of a page and checks it.

@@ -5,16 +5,22 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use axum::Router;
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 
+use super::descriptors;
+use super::lobby::{Lobby, Place};
 use super::throttle::{BYTES, Throttled};
 use crate::limits::{
-    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, CONNECTIONS_MAX, HELLO_TIMEOUT, SHUTDOWN_TIMEOUT,
+    ACCEPT_PAUSE, CLIENTS_MAX, CONNECTION_TIMEOUT, HEAD_SIZE_BYTES_MAX, HELLO_TIMEOUT,
+    SHUTDOWN_TIMEOUT,
 };
 use crate::shutdown::Shutdown;
 
@@ -60,42 +66,55 @@ impl HttpListener {
     /// Serves until the shutdown begins. Then waits until every client has returned its permit, but
     /// not longer than [`SHUTDOWN_TIMEOUT`].
     pub(crate) async fn serve(self, router: Router, clients: ClientPermits, shutdown: &Shutdown) {
-        tokio::select! {
-            () = accept(&self.listener, &router) => {}
-            () = shutdown.begun() => {}
-        }
+        accept(&self.listener, &router, shutdown).await;
         let all = u32::try_from(CLIENTS_MAX).unwrap_or(u32::MAX);
         let _all_returned = timeout(SHUTDOWN_TIMEOUT, clients.acquire_many(all)).await;
     }
 }
 
-/// Accepts connections for as long as it is polled.
-async fn accept(listener: &TcpListener, router: &Router) {
-    let connections = Arc::new(Semaphore::new(CONNECTIONS_MAX));
-    // The semaphore is never closed.
-    while let Ok(permit) = Arc::clone(&connections).acquire_owned().await {
-        let Ok((stream, _)) = listener.accept().await else {
-            // The connection broke before it was accepted, or the process has no file handle left.
-            sleep(ACCEPT_PAUSE).await;
-            continue;
+/// Accepts connections until the shutdown begins.
+async fn accept(listener: &TcpListener, router: &Router, shutdown: &Shutdown) {
+    let lobby = Lobby::new(descriptors::visitor_count_max());
+    loop {
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            () = shutdown.begun() => return,
         };
-        let router = router.clone();
-        tokio::spawn(async move {
-            serve_connection(stream, router).await;
-            drop(permit);
-        });
+        let (stream, address) = match accepted {
+            Ok(accepted) => accepted,
+            Err(error) => {
+                // Otherwise the connection broke before it was accepted.
+                if descriptors::are_exhausted(&error) {
+                    lobby.make_room();
+                }
+                sleep(ACCEPT_PAUSE).await;
+                continue;
+            }
+        };
+        let place = lobby.admit(address.ip()).await;
+        tokio::spawn(serve_connection(stream, router.clone(), place));
     }
 }
 
-async fn serve_connection(stream: TcpStream, router: Router) {
+/// Serves the requests of one connection. Each of them carries the place in the lobby, which a request
+/// for a socket keeps until the socket belongs to a client.
+async fn serve_connection(stream: TcpStream, router: Router, place: Place) {
     // Without the option, small messages are only delayed.
     let _set = stream.set_nodelay(true);
-    let service = TowerToHyperService::new(router);
+    let place = Arc::new(place);
+    let place_of_requests = Arc::clone(&place);
+    let router = TowerToHyperService::new(router);
+    let service = service_fn(move |mut request: Request<Incoming>| {
+        place_of_requests.note_activity();
+        request.extensions_mut().insert(Arc::clone(&place_of_requests));
+        router.call(request)
+    });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(HELLO_TIMEOUT)
+        .max_buf_size(HEAD_SIZE_BYTES_MAX)
         .serve_connection(TokioIo::new(Throttled::new(stream, BYTES)), service)
         .with_upgrades();
     // A broken connection needs no report. A WebSocket is served by its own task after the upgrade.
-    let _ended = timeout(CONNECTION_TIMEOUT, connection).await;
+    let _ended = place.while_held(timeout(CONNECTION_TIMEOUT, connection)).await;
 }

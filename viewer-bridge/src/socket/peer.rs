@@ -16,6 +16,8 @@ use crate::limits::{
 
 /// The server ends.
 pub(crate) const GOING_AWAY: u16 = 1001;
+/// All clients are connected, or the connection made room for another one.
+pub(crate) const FULL: u16 = 1013;
 /// A message is too long.
 const MESSAGE_TOO_LONG: u16 = 1009;
 /// The client was silent, or too slow.
@@ -26,6 +28,8 @@ const TOO_MANY_MESSAGES: u16 = 4429;
 const MESSAGES: Rate = Rate { per_second: MESSAGES_PER_SECOND_MAX, burst: MESSAGES_BURST_MAX };
 /// Time for a client to read the close frame.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Size of the buffer that each socket reads into. Messages of clients have a few hundred bytes.
+const READ_BUFFER_SIZE_BYTES: usize = 8 << 10;
 /// Longest reason in a close frame, in bytes.
 const REASON_SIZE_BYTES_MAX: usize = 123;
 
@@ -46,6 +50,11 @@ pub(crate) enum End {
 impl End {
     pub(crate) fn closed(code: u16, reason: impl Into<String>) -> Self {
         Self::Closed { code, reason: reason.into() }
+    }
+
+    /// The end of a connection that made room for another one.
+    pub(crate) fn evicted() -> Self {
+        Self::closed(FULL, "too many connections wait; try again")
     }
 
     /// The end after a failed read. A message that is too long can be answered; a broken connection
@@ -75,6 +84,7 @@ pub(crate) fn limit(upgrade: WebSocketUpgrade) -> WebSocketUpgrade {
     upgrade
         .max_message_size(MESSAGE_SIZE_BYTES_MAX)
         .max_frame_size(MESSAGE_SIZE_BYTES_MAX)
+        .read_buffer_size(READ_BUFFER_SIZE_BYTES)
         .write_buffer_size(0)
 }
 

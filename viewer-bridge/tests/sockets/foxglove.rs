@@ -8,6 +8,7 @@ use bytemuck::cast_slice;
 use serde_json::{Value, json};
 use sim_contract::{ParameterValues, ParticleState, Reason, TearCause, TornConstraint};
 use tokio::runtime::Runtime;
+use viewer_bridge::limits::{CLIENTS_MAX, VISITORS_MAX};
 use viewer_bridge::message::{Command, OutcomeText, ParametersText, Playback, Status};
 use viewer_bridge::request::{ClientId, RequestKind, Requests, requests};
 use viewer_bridge::sink::{Demand, Update};
@@ -21,20 +22,17 @@ use viewer_bridge::{
 use crate::foxglove_client::{Binary, Client, connect};
 use crate::support::{state, wait_for};
 
-/// Limit on simultaneous connections.
-const CLIENTS_MAX: usize = viewer_bridge::limits::CLIENTS_MAX;
-
 /// A running Foxglove server. Dropping it ends the server.
-struct Site {
+pub(crate) struct FoxgloveSite {
     sinks: Sinks,
     shutdown: Shutdown,
-    requests: Requests,
-    url: String,
+    pub(crate) requests: Requests,
+    pub(crate) url: String,
     shown: ShownState,
     _runtime: Runtime,
 }
 
-fn options() -> FoxgloveOptions {
+pub(crate) fn options() -> FoxgloveOptions {
     FoxgloveOptions {
         listen: "127.0.0.1:0".parse().unwrap(),
         origins: vec!["https://viewer.example".to_owned()],
@@ -43,8 +41,8 @@ fn options() -> FoxgloveOptions {
     }
 }
 
-impl Site {
-    fn start(options: FoxgloveOptions) -> Self {
+impl FoxgloveSite {
+    pub(crate) fn start(options: FoxgloveOptions) -> Self {
         let runtime = Runtime::new().unwrap();
         let (sender, requests) = requests();
         let server = runtime.block_on(FoxgloveServer::start(options, sender)).unwrap();
@@ -57,15 +55,23 @@ impl Site {
     }
 
     /// Shows a scene with `count` particles, connected in a row.
-    fn begin(&mut self, count: u32) {
+    pub(crate) fn begin(&mut self, count: u32) {
         let positions = (0..count).map(|_| [0.0; 3]).collect();
         let ends = (1..count).map(|particle| [particle - 1, particle]).collect();
         let scene = Scene { positions, ends, rate_hz: 240, ..Scene::default() };
         self.shown.begin_load(&self.sinks, scene);
     }
 
-    fn show(&mut self, step: u64, particles: &[ParticleState]) {
+    pub(crate) fn show(&mut self, step: u64, particles: &[ParticleState]) {
         self.shown.show(&self.sinks, state(step, particles));
+    }
+
+    /// Connects a client that subscribes to `/particles`.
+    pub(crate) fn subscriber(&self) -> Client {
+        let (mut client, _) = Client::start(&self.url);
+        client.subscribe(1, "/particles");
+        self.wait_for_subscription();
+        client
     }
 
     /// Waits until a subscription has reached the source.
@@ -118,7 +124,7 @@ impl Site {
     }
 }
 
-impl Drop for Site {
+impl Drop for FoxgloveSite {
     fn drop(&mut self) {
         self.shutdown.begin();
     }
@@ -143,7 +149,7 @@ fn parameter(values: &Value, name: &str) -> Value {
 
 #[test]
 fn a_client_receives_only_the_topics_that_it_subscribed_to() {
-    let mut site = Site::start(options());
+    let mut site = FoxgloveSite::start(options());
     let (mut client, server) = Client::start(&site.url);
     assert_eq!(server["name"], "catenary");
     let topics =
@@ -183,7 +189,7 @@ fn a_client_receives_only_the_topics_that_it_subscribed_to() {
 
 #[test]
 fn there_is_no_demand_after_the_last_client_unsubscribed() {
-    let mut site = Site::start(options());
+    let mut site = FoxgloveSite::start(options());
     assert!(!site.has_demand());
     let (mut client, _) = Client::start(&site.url);
     let (mut other, _) = Client::start(&site.url);
@@ -201,7 +207,7 @@ fn there_is_no_demand_after_the_last_client_unsubscribed() {
 
 #[test]
 fn a_service_call_becomes_a_command_and_returns_the_outcome() {
-    let site = Site::start(options());
+    let site = FoxgloveSite::start(options());
     let (mut client, server) = Client::start(&site.url);
     let capabilities: Vec<String> = serde_json::from_value(server["capabilities"].clone()).unwrap();
     assert!(capabilities.iter().any(|one| one == "services"), "{capabilities:?}");
@@ -241,8 +247,10 @@ fn a_service_call_becomes_a_command_and_returns_the_outcome() {
 
 #[test]
 fn a_client_cannot_change_anything_without_permission() {
-    let site =
-        Site::start(FoxgloveOptions { permission: FoxglovePermission::ReadOnly, ..options() });
+    let site = FoxgloveSite::start(FoxgloveOptions {
+        permission: FoxglovePermission::ReadOnly,
+        ..options()
+    });
     site.set_parameters(ParameterValues::default());
     let (mut client, server) = Client::start(&site.url);
     for capability in server["capabilities"].as_array().unwrap() {
@@ -266,7 +274,7 @@ fn a_client_cannot_change_anything_without_permission() {
 
 #[test]
 fn a_client_can_read_set_and_subscribe_to_parameters() {
-    let site = Site::start(options());
+    let site = FoxgloveSite::start(options());
     site.set_parameters(ParameterValues::default());
     let (mut client, _) = Client::start(&site.url);
     let (mut other, _) = Client::start(&site.url);
@@ -286,7 +294,7 @@ fn a_client_can_read_set_and_subscribe_to_parameters() {
 
 #[test]
 fn published_commands_reach_the_source_and_grabs_end_with_the_client() {
-    let site = Site::start(options());
+    let site = FoxgloveSite::start(options());
     let grab = json!({ "kind": "grab", "particle": 3, "target": [0, 1, 2], "over_s": 0.1 });
     let (mut client, _) = Client::start(&site.url);
     client.advertise(5, "/commands");
@@ -316,7 +324,7 @@ fn published_commands_reach_the_source_and_grabs_end_with_the_client() {
 
 #[test]
 fn an_invalid_command_is_refused_and_does_not_reach_the_source() {
-    let site = Site::start(options());
+    let site = FoxgloveSite::start(options());
     for wrong in [
         json!("pause"),
         json!({ "kind": "dance" }),
@@ -344,7 +352,7 @@ fn an_invalid_command_is_refused_and_does_not_reach_the_source() {
 
 #[test]
 fn other_pages_and_other_protocols_are_refused() {
-    let site = Site::start(options());
+    let site = FoxgloveSite::start(options());
     assert!(connect(&site.url, Some("https://viewer.example")).is_ok());
     for origin in ["null", "http://evil.example", &site.url.replace("ws", "http")] {
         assert_eq!(connect(&site.url, Some(origin)).err(), Some(403), "{origin}");
@@ -367,16 +375,35 @@ fn an_address_other_than_loopback_is_refused() {
 
 #[test]
 fn a_client_over_the_limit_is_refused_until_another_disconnects() {
-    let site = Site::start(options());
-    let mut clients: Vec<_> = (0..CLIENTS_MAX).map(|_| Client::start(&site.url)).collect();
+    let site = FoxgloveSite::start(options());
+    let mut clients: Vec<_> = (0..CLIENTS_MAX).map(|_| site.subscriber()).collect();
     assert_eq!(connect(&site.url, None).err(), Some(503));
     clients.pop();
     wait_for("a free slot", || connect(&site.url, None).ok());
 }
 
 #[test]
+fn clients_that_never_send_a_valid_message_make_room_and_subscribers_stay() {
+    let mut site = FoxgloveSite::start(options());
+    let mut old = site.subscriber();
+    let mut idle: Vec<_> =
+        (0..2 * VISITORS_MAX).map(|_| connect(&site.url, None).unwrap()).collect();
+    for client in &mut idle {
+        // The evicted ones have closed their connections.
+        client.flood(&json!({ "op": "dance" }), 1);
+    }
+    let mut new = site.subscriber();
+    site.begin(2);
+    site.show(1, &particles(2, 0.25));
+    for client in [&mut old, &mut new] {
+        assert!(has_bits(&client.message(1).1, &particles(2, 0.25)));
+    }
+    idle[0].read_to_end();
+}
+
+#[test]
 fn a_client_that_sends_too_much_is_disconnected_and_others_stay() {
-    let mut site = Site::start(options());
+    let mut site = FoxgloveSite::start(options());
     let (mut other, _) = Client::start(&site.url);
     let (mut long, _) = Client::start(&site.url);
     // The server may close the connection before all of it is sent.
@@ -398,7 +425,7 @@ fn a_client_that_does_not_read_delays_no_other_and_then_receives_the_newest_stat
     // One megabyte per state, far more than socket buffers hold.
     const PARTICLES: u32 = 1 << 15;
     const STATES: u32 = 80;
-    let mut site = Site::start(options());
+    let mut site = FoxgloveSite::start(options());
     let (mut slow, _) = Client::start(&site.url);
     let (mut quick, _) = Client::start(&site.url);
     site.begin(PARTICLES);
@@ -423,7 +450,7 @@ fn a_client_can_observe_and_control_playback() {
     let second_ns = 1_000_000_000;
     let recording =
         RecordingTimes { epoch_ns: 5 * second_ns, rate_hz: 240, first_step: 0, last_step: 480 };
-    let mut site = Site::start(FoxgloveOptions { recording: Some(recording), ..options() });
+    let mut site = FoxgloveSite::start(FoxgloveOptions { recording: Some(recording), ..options() });
     let (mut client, server) = Client::start(&site.url);
     let capabilities: Vec<String> = serde_json::from_value(server["capabilities"].clone()).unwrap();
     assert!(capabilities.iter().any(|one| one == "playbackControl"), "{capabilities:?}");

@@ -69,6 +69,12 @@ impl Client {
         (client, server)
     }
 
+    /// Resets the connection: the system does so if bytes of a closed connection are unread.
+    #[allow(dead_code, reason = "only the tests with a node reset connections")]
+    pub(crate) fn reset(self) {
+        assert_eq!(self.socket.get_ref().peek(&mut [0]).unwrap(), 1);
+    }
+
     /// Returns the advertisement of a topic.
     pub(crate) fn channel(&self, topic: &str) -> &Value {
         self.channels.iter().find(|channel| channel["topic"] == topic).unwrap()

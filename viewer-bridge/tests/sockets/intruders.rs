@@ -2,6 +2,8 @@
 
 use tungstenite::Message;
 use tungstenite::http::{HeaderValue, header};
+use viewer_bridge::limits::VISITORS_MAX;
+use viewer_bridge::sink::Update;
 
 use crate::support::{Site, wait_for};
 
@@ -104,9 +106,14 @@ fn silent_sockets_do_not_count_against_the_limit_on_pages() {
 }
 
 #[test]
-fn the_limit_on_silent_sockets_refuses_the_upgrade() {
+fn the_oldest_silent_sockets_make_room_and_pages_stay() {
     let site = Site::start();
-    let silent: Vec<_> = (0..64).map(|_| site.silent_page()).collect();
-    assert_eq!(site.open(site.request(None)).err(), Some(503));
-    drop(silent);
+    let mut page = site.page();
+    let mut silent: Vec<_> = (0..3 * VISITORS_MAX).map(|_| site.silent_page()).collect();
+    let mut newcomer = site.page();
+    site.publish(&Update::Reset { step: 3 });
+    for page in [&mut page, &mut newcomer] {
+        assert_eq!(page.text_with_type("reset")["step"], 3);
+    }
+    assert_eq!(silent[0].close_code(), Some(1013));
 }

@@ -5,6 +5,8 @@
 mod delivery;
 mod foxglove;
 mod foxglove_client;
+mod hostile;
 mod intruders;
 mod misuse;
+mod raw_socket;
 mod support;
