@@ -19,6 +19,7 @@ pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
 pub use read::decode::LoggedMessage;
+pub use read::file_source::FileSource;
 pub use read::frames::{Frame, FrameReader};
 pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};

@@ -40,7 +40,10 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     let stop = Stop::install()?;
-    let source = open_source(args)?;
+    let source = match open_source(args, &stop) {
+        Err(_) if stop.is_requested() => return Ok(()),
+        source => source?,
+    };
     let foxglove = args.foxglove(source.recording());
     let assets = match &args.assets {
         None => Assets::Embedded,
@@ -56,9 +59,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     runtime.block_on(serve(source, options, foxglove, stop))
 }
 
-fn open_source(args: &Args) -> anyhow::Result<Box<dyn Source>> {
+fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     Ok(match &args.replay {
-        Some(path) => Box::new(Replay::open(path, &mut note)?),
+        Some(path) => Box::new(Replay::open(path, stop, &mut note)?),
         None => Box::new(Live::new(args.endpoint()?)),
     })
 }

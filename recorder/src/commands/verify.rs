@@ -9,7 +9,7 @@ use std::io::Read;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use recorder::{FrameReader, LogEnd, LogReader};
+use recorder::{FrameReader, LogEnd, LogReader, ReadError};
 use serde::Serialize;
 use sim_contract::Stop;
 use sim_solver::SOLVER_VERSION;
@@ -21,9 +21,6 @@ use crate::cli::thread_args::ThreadArgs;
 use crate::input::scene_source::scene_in_recording;
 use difference::Difference;
 use resimulation::{Finding, Resimulation};
-
-/// Snapshots between two checks for signals and updates of the progress bar.
-const SNAPSHOTS_PER_CHECK: u64 = 64;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes \
@@ -70,7 +67,7 @@ pub(crate) enum Verdict {
 pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     let path = output::path_text(&args.file);
-    let log = LogReader::open(&args.file).with_context(|| path.clone())?;
+    let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
     let bar = progress_spinner();
     let (report, end) = verify(log, &path, args.threads.count(), |step| {
         bar.set_message(format!("step {step}"));
@@ -88,7 +85,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     })
 }
 
-/// Re-simulates a recording with `threads` threads. Calls `is_stopped` periodically, with the step.
+/// Re-simulates a recording with `threads` threads. Calls `is_stopped` before each step.
 pub(crate) fn verify<R: Read>(
     log: LogReader<R>,
     path: &str,
@@ -106,8 +103,16 @@ pub(crate) fn verify<R: Read>(
     let mut frames = FrameReader::new(log);
     let mut simulation = None;
     let mut report = Report::new();
-    let mut count = 0;
-    while let Some(frame) = frames.next_frame().with_context(|| path.to_owned())? {
+    loop {
+        let frame = match frames.next_frame() {
+            Ok(Some(frame)) => frame,
+            Ok(None) => break,
+            Err(ReadError::Interrupted) => {
+                report.verdict = Verdict::Interrupted;
+                break;
+            }
+            Err(error) => return Err(error).with_context(|| path.to_owned()),
+        };
         let step = frame.row.step;
         let finding = match &mut simulation {
             None => {
@@ -117,19 +122,14 @@ pub(crate) fn verify<R: Read>(
                 report.first_step = step;
                 simulation.insert(start).compare_start(&frame)
             }
-            Some(simulation) => simulation.advance(&frame),
+            Some(simulation) => simulation.advance(&frame, &mut is_stopped),
         };
         if !report.add(finding, step) {
             break;
         }
-        count += 1;
-        if count % SNAPSHOTS_PER_CHECK == 0 && is_stopped(step) {
-            report.verdict = Verdict::Interrupted;
-            break;
-        }
     }
     let end = frames.end().cloned().filter(|end| *end != LogEnd::Complete);
-    if simulation.is_none() {
+    if simulation.is_none() && report.verdict != Verdict::Interrupted {
         let end = end.map_or_else(String::new, |end| format!(" (the file is {end})"));
         bail!("{path}: has no snapshot with a keyframe to start from{end}");
     }
@@ -163,6 +163,7 @@ impl Report {
                 self.verdict = Verdict::Diverged;
                 (self.step, self.what, self.difference) = (Some(step), Some(what), difference);
             }
+            Finding::Interrupted => self.verdict = Verdict::Interrupted,
             Finding::Incomplete { step, what } => {
                 self.verdict = Verdict::OutcomeLogIncomplete;
                 (self.step, self.what) = (Some(step), Some(what));

@@ -3,5 +3,8 @@
 
 mod bad_input;
 mod end_to_end;
+mod hostile;
+mod interrupt;
 mod physics;
+mod raw;
 mod threads;

@@ -15,6 +15,8 @@ use crate::simulation::apply::apply;
 pub(crate) enum Finding {
     /// Every bit is equal.
     Identical,
+    /// A signal ended the simulation before the snapshot.
+    Interrupted,
     /// The simulation differs from the recording.
     Diverged {
         /// The first step that differs.
@@ -99,8 +101,12 @@ impl Resimulation {
         Finding::Diverged { step: self.step, what, difference: None }
     }
 
-    /// Simulates up to the next snapshot and compares it.
-    pub(crate) fn advance(&mut self, frame: &Frame) -> Finding {
+    /// Simulates up to the next snapshot and compares it. Calls `is_stopped` before each step.
+    pub(crate) fn advance(
+        &mut self,
+        frame: &Frame,
+        is_stopped: &mut impl FnMut(u64) -> bool,
+    ) -> Finding {
         self.add_updates(frame);
         let row = &frame.row;
         if row.step <= self.step {
@@ -111,6 +117,9 @@ impl Resimulation {
             return finding;
         }
         while self.step < row.step {
+            if is_stopped(self.step) {
+                return Finding::Interrupted;
+            }
             if let Some(finding) = self.simulate_step() {
                 return finding;
             }

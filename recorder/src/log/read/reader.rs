@@ -1,16 +1,18 @@
 //! Reads a recording from its start, with every checksum verified, as far as the file goes.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, Read};
 use std::path::Path;
 
-use mcap::records::Record;
+use mcap::records::{Record, op};
+use sim_contract::Stop;
 
 use super::decode::{LoggedMessage, decode_message};
+use super::file_source::FileSource;
+use super::limits::SizeLimits;
 use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
-use super::records::{READ_SIZE_BYTES_MAX, RecordReader};
+use super::records::RecordReader;
 use crate::log::part_file::part_path;
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
@@ -26,20 +28,34 @@ const FORMAT_VERSION_KEY: &str = "format_version";
 /// A truncated or damaged file is read as far as it goes, and [`LogReader::end`] reports it.
 pub struct LogReader<R> {
     records: RecordReader<R>,
+    limits: SizeLimits,
     channels: BTreeMap<u16, Option<Topic>>,
     run: RunDescription,
     scene: Vec<u8>,
     closing: Option<Closing>,
 }
 
-impl LogReader<BufReader<File>> {
+impl LogReader<FileSource> {
     /// Opens a file and reads its header.
     ///
     /// # Errors
     /// If the file is not a recording or has no readable header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
+        Self::open_file(path, None)
+    }
+
+    /// Opens a file and reads its header. After a signal, this and every later read ends with
+    /// [`ReadError::Interrupted`].
+    ///
+    /// # Errors
+    /// Like [`LogReader::open`], and after a signal.
+    pub fn open_until(path: &Path, stop: &Stop) -> Result<Self, ReadError> {
+        Self::open_file(path, Some(stop.clone()))
+    }
+
+    pub(in crate::log) fn open_file(path: &Path, stop: Option<Stop>) -> Result<Self, ReadError> {
         let file = open_regular_file(path).map_err(|cause| open_error(path, cause))?;
-        Self::new(BufReader::with_capacity(READ_SIZE_BYTES_MAX, file))
+        Self::new(FileSource::new(file, stop))
     }
 }
 
@@ -71,8 +87,10 @@ impl<R: Read> LogReader<R> {
                         return Err(ReadError::Foreign { library });
                     }
                     let (run, scene) = (read_run(&map)?, scene.unwrap_or_default());
+                    let limits = SizeLimits::new(&run, scene.len());
+                    records.set_limits(limits);
                     let channels = BTreeMap::new();
-                    return Ok(Self { records, channels, run, scene, closing: None });
+                    return Ok(Self { records, limits, channels, run, scene, closing: None });
                 }
                 Some(HeaderRecord::Skipped) => {}
                 Some(HeaderRecord::Message) => return Err(ReadError::Foreign { library }),
@@ -85,6 +103,15 @@ impl<R: Read> LogReader<R> {
                 }
             }
         }
+    }
+
+    pub(in crate::log) fn limits(&self) -> SizeLimits {
+        self.limits
+    }
+
+    /// Returns the number of bytes of the file that are read and intact.
+    pub(in crate::log) fn intact_count(&self) -> u64 {
+        self.records.intact_count()
     }
 
     /// Returns the run that was recorded.
@@ -115,6 +142,7 @@ impl<R: Read> LogReader<R> {
     pub fn next_message(&mut self) -> Result<Option<LoggedMessage>, ReadError> {
         loop {
             let (channels, closing, run) = (&mut self.channels, &mut self.closing, &self.run);
+            let limits = &self.limits;
             let next = self.records.next(|record, byte| match record {
                 Record::Channel(channel) => {
                     channels.insert(channel.id, Topic::from_name(&channel.topic));
@@ -128,7 +156,7 @@ impl<R: Read> LogReader<R> {
                     let topic = channels.get(&header.channel_id).copied().flatten();
                     let Some(topic) = topic else { return Ok(None) };
                     let malformed = |what| ReadError::Malformed { topic: topic.name(), byte, what };
-                    decode_message(topic, &header, &data, run).map_err(malformed)
+                    decode_message(topic, &header, &data, run, limits).map_err(malformed)
                 }
                 _ => Ok(None),
             })?;
@@ -166,7 +194,7 @@ fn read_header_record(record: Record<'_>, _byte: u64) -> Result<HeaderRecord, Re
         Record::Metadata(metadata) if metadata.name == RUN_METADATA => {
             HeaderRecord::Run(metadata.metadata)
         }
-        Record::Message { .. } => HeaderRecord::Message,
+        Record::Message { .. } | Record::Unknown { opcode: op::CHUNK, .. } => HeaderRecord::Message,
         _ => HeaderRecord::Skipped,
     })
 }
