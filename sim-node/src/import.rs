@@ -30,7 +30,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         scene.to_toml()
     );
     let Some(path) = &args.output else {
-        return output::text(&result);
+        return output::file(&result);
     };
     write(path, &result, args)?;
     output::note(&format!(

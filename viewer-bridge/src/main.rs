@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
-use sim_contract::Stop;
+use sim_contract::{Stop, printable_line};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::pages::assets::Assets;
@@ -26,13 +26,12 @@ use args::Args;
 /// Threads of the servers. They only send; the thread of the source encodes.
 const SERVER_THREADS: usize = 2;
 
-#[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
 fn main() -> ExitCode {
     let args = args::parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            note(&format!("error: {error:#}"));
             ExitCode::FAILURE
         }
     }
@@ -153,5 +152,5 @@ fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
 
 #[allow(clippy::print_stderr, reason = "messages for the user")]
 fn note(text: &str) {
-    eprintln!("{text}");
+    eprintln!("{}", printable_line(text));
 }

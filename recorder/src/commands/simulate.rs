@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use recorder::{Closing, OutcomeRow};
 use serde::Serialize;
-use sim_contract::Stop;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{Stop, printable_line};
 use sim_solver::Solver;
 
 use crate::cli::exit::Exit;
@@ -175,7 +175,7 @@ fn summary(job: &Job, result: &SimulationResult, wall_ns: u64, path: Option<&Pat
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "scene       {}", self.scene)?;
+        writeln!(f, "scene       {}", printable_line(&self.scene))?;
         writeln!(f, "steps       {}", self.steps)?;
         writeln!(f, "state_hash  {}", self.state_hash)?;
         writeln!(f, "commands    {} applied, {} rejected", self.applied, self.rejected)?;

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use recorder::{FrameReader, LogEnd, LogReader, ReadError};
 use serde::Serialize;
-use sim_contract::Stop;
+use sim_contract::{Stop, printable_line};
 use sim_solver::SOLVER_VERSION;
 
 use crate::cli::exit::Exit;
@@ -176,7 +176,8 @@ impl Report {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.steps_identical;
-        let (step, what) = (self.step.unwrap_or(0), self.what.as_deref().unwrap_or(""));
+        let what = printable_line(self.what.as_deref().unwrap_or(""));
+        let step = self.step.unwrap_or(0);
         match self.verdict {
             Verdict::Identical => {
                 let last = self.last_identical_step.unwrap_or(self.first_step);
