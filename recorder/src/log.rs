@@ -18,6 +18,7 @@ pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
 pub use part_file::{Existing, PartFile, PartFileError};
+pub use read::audit::{Audit, AuditDifference};
 pub use read::decode::LoggedMessage;
 pub use read::file_source::FileSource;
 pub use read::frames::{Frame, FrameReader};

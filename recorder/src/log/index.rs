@@ -230,8 +230,9 @@ impl IndexedLog {
             Record::Message { header, data } => {
                 let topic = channels.get(&header.channel_id).copied().flatten();
                 let Some(topic) = topic else { return Ok(None) };
-                let byte = offset + size_bytes;
-                let malformed = |what| ReadError::Malformed { topic: topic.name(), byte, what };
+                let (byte, sequence) = (offset + size_bytes, header.sequence);
+                let malformed =
+                    |what| ReadError::Malformed { topic: topic.name(), sequence, byte, what };
                 decode_message(topic, &header, &data, run, limits).map_err(malformed)
             }
             _ => Ok(None),

@@ -23,8 +23,15 @@ pub(super) const RUN_METADATA: &str = "run";
 pub(super) const CLOSING_METADATA: &str = "recorder";
 /// Name of the attachment with the scene.
 pub(super) const SCENE_ATTACHMENT: &str = "scene.toml";
+/// Media type of the attachment with the scene.
+pub(super) const SCENE_MEDIA_TYPE: &str = "application/toml";
 
 const NS_PER_S: u128 = 1_000_000_000;
+
+/// Returns the start of the library in the header of a file. The name of the mcap crate follows.
+pub(super) fn header_library(recorder_version: &str) -> String {
+    format!("recorder/{recorder_version} ")
+}
 
 /// The recorded run: metadata `run`, at the start of the file.
 #[derive(Debug, Clone, PartialEq)]

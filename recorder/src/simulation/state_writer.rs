@@ -141,7 +141,8 @@ impl<'a, W: Write> StateWriter<'a, W> {
     }
 }
 
-fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
+/// Returns a constraint as it is published.
+pub(crate) fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
     ConstraintState {
         a: constraint.a,
         b: constraint.b,

@@ -86,10 +86,14 @@ pub enum ReadError {
         key: String,
     },
     /// A message with a correct checksum and invalid content.
-    #[error("the message on {topic} that ends before byte {byte} is invalid: {what}")]
+    #[error(
+        "step {sequence}: the message on {topic} that ends before byte {byte} is invalid: {what}"
+    )]
     Malformed {
         /// Name of the topic.
         topic: &'static str,
+        /// Low 32 bits of the step, as the file states it.
+        sequence: u32,
         /// Position in the file.
         byte: u64,
         /// The error in the content.
