@@ -27,10 +27,14 @@ use resimulation::Finding;
 use verification::{Verification, VerifyError};
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes \
-    missing, or file truncated or damaged.\n\nExamples:\n  \
+#[command(
+    after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
+    and lists the content that nothing else in the file can contradict.\n\n\
+    Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
+    or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
-    recorder verify run.mcap --json")]
+    recorder verify run.mcap --json"
+)]
 pub(crate) struct VerifyArgs {
     /// Recording to re-simulate, from its first snapshot with a keyframe
     file: PathBuf,

@@ -20,9 +20,9 @@ const MESSAGE_HEADER_SIZE_BYTES: u64 = 2 + 4 + 8 + 8;
 /// Uncompressed size of a chunk beside its largest message. A recorder closes a chunk at 1 MiB, and
 /// other tools rewrite files with chunks of 4 MiB.
 const CHUNK_SIZE_BYTES: u64 = 4 << 20;
-/// Memory for decoded messages beside the size of the scene: seconds of a long pause between two
-/// snapshots.
-const DECODED_SIZE_BYTES: u64 = 32 << 20;
+/// Memory for decoded messages beside the size of the scene: minutes between two snapshots with a dozen
+/// moving colliders, or seconds with a thousand.
+const DECODED_SIZE_BYTES: u64 = 64 << 20;
 
 /// Returns the most bytes by which data that does not compress grows: the headers of its blocks.
 pub(in crate::log) fn compression_growth(size_bytes: u64) -> u64 {
@@ -168,7 +168,7 @@ mod tests {
     fn a_small_scene_needs_little_memory() {
         let small = limits(2, 1, 1000);
         assert!(small.chunk_record_size_bytes_max() < 8 << 20);
-        assert!(small.decoded_size_bytes_max() < 64 << 20);
+        assert!(small.decoded_size_bytes_max() < 128 << 20);
         let most_text = COLLIDERS_MAX as u64 * 32;
         assert!(limits(2, 1, most_text).message_size_bytes_max(Topic::Colliders) < 64 << 20);
     }
