@@ -17,7 +17,9 @@ pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode
 pub use gaps::GapCounter;
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
+pub use read::audit::{Audit, AuditDifference};
 pub use read::decode::LoggedMessage;
+pub use read::file_source::FileSource;
 pub use read::frames::{Frame, FrameReader};
 pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};

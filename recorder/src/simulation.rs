@@ -3,8 +3,9 @@
 pub(crate) mod apply;
 pub(crate) mod frozen;
 mod job;
+pub(crate) mod run_id;
 pub(crate) mod solver_rows;
-mod state_writer;
+pub(crate) mod state_writer;
 
 use std::io::Write;
 use std::ops::ControlFlow;

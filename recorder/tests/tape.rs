@@ -178,7 +178,7 @@ impl TestFile {
     }
 
     fn open(&self) -> Result<Tape, TapeError> {
-        Tape::open(&self.0, &mut |_, _| {})
+        Tape::open(&self.0, None, &mut |_, _| {})
     }
 }
 
@@ -264,7 +264,7 @@ fn a_file_without_an_end_is_shown_as_far_as_it_goes() {
     let (bytes, all) = written(PLAIN);
     let file = TestFile::new("cut", &bytes[..bytes.len() / 2]);
     let mut reports = Vec::new();
-    let mut tape = Tape::open(&file.0, &mut |at, of| reports.push((at, of))).unwrap();
+    let mut tape = Tape::open(&file.0, None, &mut |at, of| reports.push((at, of))).unwrap();
     assert!(matches!(tape.log().end(), LogEnd::Truncated { .. }) && !tape.log().has_index());
     assert!(reports.first().is_some_and(|(at, of)| at < of), "{reports:?}");
     let last_step = tape.last_step();

@@ -28,7 +28,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
         scene.to_toml()
     );
     let Some(path) = &args.output else {
-        return output::text(&result);
+        return output::file(&result);
     };
     let existing = if args.overwrite { Existing::Overwrite } else { Existing::Refuse };
     PartFile::write_whole(path, existing, result.as_bytes())?;

@@ -1,18 +1,26 @@
 //! Output of the program: results on stdout, everything else on stderr.
 
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 
 use anyhow::Context;
 use serde::Serialize;
+use sim_contract::{printable, printable_line};
 
 /// Prints a result that ends with a newline.
 pub(crate) fn text(text: &str) -> anyhow::Result<()> {
-    write(io::stdout().lock(), text).context("cannot write to stdout")
+    write(io::stdout().lock(), &printable(text)).context("cannot write to stdout")
 }
 
 /// Prints a result as a line.
 pub(crate) fn line(line: &str) -> anyhow::Result<()> {
-    text(&format!("{line}\n"))
+    text(&format!("{}\n", printable_line(line)))
+}
+
+/// Prints the content of a file. It is unchanged, unless it goes to a terminal.
+pub(crate) fn file(text: &str) -> anyhow::Result<()> {
+    let out = io::stdout().lock();
+    let text = if out.is_terminal() { printable(text) } else { text.into() };
+    write(out, &text).context("cannot write to stdout")
 }
 
 /// Prints a result as one line of JSON.
@@ -20,9 +28,9 @@ pub(crate) fn json(value: &impl Serialize) -> anyhow::Result<()> {
     line(&serde_json::to_string(value).context("encoding the result")?)
 }
 
-/// Prints a line on stderr. Ignores errors, because stderr may be closed.
+/// Prints text on stderr. Ignores errors, because stderr may be closed.
 pub(crate) fn note(text: &str) {
-    let _ignored = writeln!(io::stderr().lock(), "{text}");
+    let _ignored = writeln!(io::stderr().lock(), "{}", printable(text));
 }
 
 /// Writes a text to its end, past every buffer: the end of a program ignores errors. A pipe whose

@@ -32,7 +32,7 @@ impl SceneRow {
 pub(crate) fn list(args: &ScenesArgs) -> anyhow::Result<()> {
     let rows: Vec<SceneRow> = builtin::names().map(SceneRow::new).collect::<Result<_, _>>()?;
     if args.json {
-        return output::line(&serde_json::to_string_pretty(&rows)?);
+        return output::text(&(serde_json::to_string_pretty(&rows)? + "\n"));
     }
     let mut table = Table::new([
         ("scene", Align::Left),
@@ -57,7 +57,7 @@ pub(crate) fn list(args: &ScenesArgs) -> anyhow::Result<()> {
 
 /// Prints the effective scene.
 pub(crate) fn show(args: &ShowArgs) -> anyhow::Result<()> {
-    output::text(&scene_source::load(&args.scene)?.to_toml())
+    output::file(&scene_source::load(&args.scene)?.to_toml())
 }
 
 /// Result of a check.

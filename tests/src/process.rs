@@ -1,8 +1,10 @@
 //! Child processes that end with their guard.
 
 use std::fmt;
+use std::fs::DirEntry;
 use std::io::{BufRead, BufReader, Read, empty};
 use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -97,14 +99,42 @@ impl Process {
         process
     }
 
+    /// Runs a program to its end, with an address space of at most `size_bytes_max` bytes. Reserved
+    /// memory counts, even if it is never used.
+    ///
+    /// # Panics
+    /// If the program does not end before the deadline.
+    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
+    pub fn run_limited(
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+        size_bytes_max: u64,
+    ) -> Finished {
+        let mut command = Command::new("sh");
+        let limit_kib = (size_bytes_max >> 10).to_string();
+        command.args(["-c", r#"ulimit -v "$0" && exec "$@""#, &limit_kib]).arg(program.path());
+        let title = format!("{program:?} {}", args.join(" "));
+        Self::spawn_command(command, title, sandbox.domain(), args, Stdio::piped()).wait()
+    }
+
     #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
     fn spawn(program: Program, domain: &str, args: &[&str], stdout: Stdio) -> Self {
-        let mut command = Command::new(program.path());
+        let title = format!("{program:?} {}", args.join(" "));
+        Self::spawn_command(Command::new(program.path()), title, domain, args, stdout)
+    }
+
+    fn spawn_command(
+        mut command: Command,
+        title: String,
+        domain: &str,
+        args: &[&str],
+        stdout: Stdio,
+    ) -> Self {
         // A process group of its own, so that Ctrl-C in the terminal reaches only the parent, which
         // ends its children in order.
         command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
         command.stdin(Stdio::null()).stdout(stdout).stderr(Stdio::piped());
-        let title = format!("{program:?} {}", args.join(" "));
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{title}: {error}"));
         let stdout = child.stdout.take().map_or_else(|| Captured::new(empty()), Captured::new);
         let stderr = Captured::new(child.stderr.take().expect("a piped stderr"));
@@ -174,6 +204,22 @@ impl Process {
             }
             None
         })
+    }
+
+    /// Waits until the program has opened a file.
+    ///
+    /// # Panics
+    /// If the program ends before, or the deadline passes.
+    pub fn wait_until_open(&mut self, path: &str) {
+        let folder = format!("/proc/{}/fd", self.child.id());
+        let path = Path::new(path);
+        wait_for(&format!("{} to open {}", self.title, path.display()), || {
+            assert!(self.is_running(), "{} ended before it opened the file", self.title);
+            let mut links = std::fs::read_dir(&folder).ok()?.flatten();
+            let is_open =
+                |link: DirEntry| std::fs::read_link(link.path()).is_ok_and(|to| to == path);
+            links.any(is_open).then_some(())
+        });
     }
 
     /// Sends a signal.

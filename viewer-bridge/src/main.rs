@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
-use sim_contract::{Stop, report_bus_errors};
+use sim_contract::{Stop, printable_line, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::pages::assets::Assets;
@@ -27,13 +27,12 @@ use args::Args;
 /// Threads of the servers. They only send; the thread of the source encodes.
 const SERVER_THREADS: usize = 2;
 
-#[allow(clippy::print_stderr, reason = "the one place where errors reach the user")]
 fn main() -> ExitCode {
     let args = args::parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            note(&format!("error: {error:#}"));
             ExitCode::FAILURE
         }
     }
@@ -43,7 +42,10 @@ fn run(args: &Args) -> anyhow::Result<()> {
     sim_contract::report_file_size_limit()?;
     let stop = Stop::install()?;
     report_bus_errors()?;
-    let source = open_source(args)?;
+    let source = match open_source(args, &stop) {
+        Err(_) if stop.is_requested() => return Ok(()),
+        source => source?,
+    };
     let foxglove = args.foxglove(source.recording());
     let assets = match &args.assets {
         None => Assets::Embedded,
@@ -59,9 +61,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     runtime.block_on(serve(source, options, foxglove, stop))
 }
 
-fn open_source(args: &Args) -> anyhow::Result<Box<dyn Source>> {
+fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     Ok(match &args.replay {
-        Some(path) => Box::new(Replay::open(path, &mut note)?),
+        Some(path) => Box::new(Replay::open(path, stop, &mut note)?),
         None => Box::new(Live::new(args.endpoint()?)),
     })
 }
@@ -156,5 +158,5 @@ fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
 
 #[allow(clippy::print_stderr, reason = "messages for the user")]
 fn note(text: &str) {
-    eprintln!("{text}");
+    eprintln!("{}", printable_line(text));
 }

@@ -2,6 +2,8 @@
 
 use std::process::{ExitCode, Termination};
 
+use super::output;
+
 /// The exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
@@ -24,10 +26,9 @@ impl Termination for Exit {
 }
 
 /// Returns the exit code of a subcommand. Prints an error and its causes as one line on stderr.
-#[allow(clippy::print_stderr, reason = "the one place that prints errors for the user")]
 pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        output::note(&format!("error: {error:#}"));
         Exit::Failed
     })
 }

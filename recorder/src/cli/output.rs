@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use serde::Serialize;
+use sim_contract::{printable, printable_line};
 
 /// The option that selects the format of a result.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -17,16 +18,16 @@ pub(crate) struct AsJson {
 pub(crate) fn result<T: Serialize>(as_json: AsJson, value: &T, text: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     if as_json.json {
-        writeln!(out, "{}", serde_json::to_string(value)?)?;
+        writeln!(out, "{}", printable_line(&serde_json::to_string(value)?))?;
     } else {
-        writeln!(out, "{text}")?;
+        writeln!(out, "{}", printable(text))?;
     }
     Ok(())
 }
 
 /// Prints a line on stderr. Ignores errors, because stderr may be closed.
 pub(crate) fn note(text: &str) {
-    let _ = writeln!(io::stderr().lock(), "{text}");
+    let _ = writeln!(io::stderr().lock(), "{}", printable_line(text));
 }
 
 /// Returns a path as text for users.

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use recorder::{AllCounts, Closing, GapCounter, LogEnd, LogReader, Message, RunDescription, Topic};
 use serde::Serialize;
+use sim_contract::printable_line;
 
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
@@ -137,11 +138,12 @@ impl fmt::Display for Info {
             parts.map(|(topic, count)| format!("{topic} {count}")).collect::<Vec<_>>().join(", ")
         };
         let none_if_empty = |text: String| if text.is_empty() { "none".to_owned() } else { text };
-        writeln!(f, "file        {}, {} bytes, {}", self.file, self.size_bytes, self.file_end)?;
+        let (file, file_end) = (printable_line(&self.file), printable_line(&self.file_end));
+        writeln!(f, "file        {file}, {} bytes, {file_end}", self.size_bytes)?;
         writeln!(
             f,
             "scene       {}: {}, {}, {} Hz, {}",
-            self.scene,
+            printable_line(&self.scene),
             counted(self.particle_count, "particle"),
             counted(self.constraint_count, "constraint"),
             self.rate_hz,
@@ -150,7 +152,10 @@ impl fmt::Display for Info {
         writeln!(
             f,
             "run         {} (solver version {}, contract version {}, recorder {})",
-            self.run_id, self.solver_version, self.contract_version, self.recorder_version
+            self.run_id,
+            self.solver_version,
+            self.contract_version,
+            printable_line(&self.recorder_version)
         )?;
         match (self.first_step, self.last_step) {
             (Some(first), Some(last)) => {
@@ -163,7 +168,8 @@ impl fmt::Display for Info {
         writeln!(f, "messages    {}", none_if_empty(join(&self.messages)))?;
         let scope = if self.stop_reason.is_none() { ", as far as the file goes" } else { "" };
         writeln!(f, "lost        {}{scope}", none_if_empty(join(&self.lost)))?;
-        write!(f, "stopped     {}", self.stop_reason.as_deref().unwrap_or("unknown"))
+        let reason = self.stop_reason.as_deref().unwrap_or("unknown");
+        write!(f, "stopped     {}", printable_line(reason))
     }
 }
 

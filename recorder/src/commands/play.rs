@@ -7,15 +7,13 @@ mod replay;
 #[cfg(test)]
 mod tests;
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::{
-    CollidersRow, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow, TopologyRow,
-    torn_before_first,
+    CollidersRow, FileSource, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow,
+    TopologyRow, torn_before_first,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Endpoint, Method, Stop, report_bus_errors};
@@ -92,14 +90,20 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
     let mut is_first = true;
     let mut is_paused = args.paused;
     loop {
-        let mut pass = Pass::open(args, &endpoint).with_context(|| path.clone())?;
+        let mut pass = match Pass::open(args, &endpoint, &stop) {
+            Err(_) if stop.is_requested() => return Ok(Exit::Done),
+            pass => pass.with_context(|| path.clone())?,
+        };
         // A pause at the end of a pass also applies to the next one.
         pass.replay.control = Control::new(is_paused);
         let readers = if is_first { args.wait_for_readers } else { 0 };
         if is_first {
             output::note(&format!("ready playing {path} as {endpoint}"));
         }
-        let end = pass.play(readers, &stop).with_context(|| path.clone())?;
+        let end = match pass.play(readers, &stop) {
+            Err(_) if stop.is_requested() => return Ok(Exit::Done),
+            end => end.with_context(|| path.clone())?,
+        };
         is_paused = pass.replay.control.is_paused;
         is_first = false;
         if let Some(end) = &end
@@ -117,7 +121,7 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
 /// One pass over the file.
 #[derive(Debug)]
 struct Pass {
-    frames: FrameReader<BufReader<File>>,
+    frames: FrameReader<FileSource>,
     first: Frame,
     /// Recorded time of the last snapshot to play, in nanoseconds since 1970.
     end_ns: u64,
@@ -128,8 +132,8 @@ struct Pass {
 
 impl Pass {
     /// Skips to the first snapshot to play, and becomes the owner of the name.
-    fn open(args: &PlayArgs, endpoint: &Endpoint) -> anyhow::Result<Self> {
-        let log = LogReader::open(&args.file)?;
+    fn open(args: &PlayArgs, endpoint: &Endpoint, stop: &Stop) -> anyhow::Result<Self> {
+        let log = LogReader::open_until(&args.file, stop)?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let solver = Solver::new(&scene_in_recording(&log)?);
         let mut frames = FrameReader::new(log);
@@ -241,7 +245,7 @@ fn late_start(args: &PlayArgs, last_ns: u64) -> String {
     format!("--start {start} is after its last snapshot, which is at {last_s:.3} s")
 }
 
-fn next_frame(frames: &mut FrameReader<BufReader<File>>) -> anyhow::Result<Frame> {
+fn next_frame(frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {
     match frames.next_frame()? {
         Some(frame) => Ok(frame),
         None => match frames.end() {

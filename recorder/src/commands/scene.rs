@@ -1,10 +1,11 @@
 //! `recorder scene`: extracts the scene from a recording.
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use recorder::{LogReader, PartFile};
+use sim_contract::printable;
 
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
@@ -32,9 +33,18 @@ pub(crate) fn run(args: &SceneArgs) -> anyhow::Result<Exit> {
     }
     match &args.output {
         Some(path) => PartFile::write_whole(path, args.overwrite.existing(), log.scene())?,
-        None => io::stdout().lock().write_all(log.scene()).context("cannot print the scene")?,
+        None => print(log.scene()).context("cannot print the scene")?,
     }
     Ok(Exit::Done)
+}
+
+/// Prints the scene. It is unchanged, unless it goes to a terminal.
+fn print(scene: &[u8]) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    if out.is_terminal() {
+        return out.write_all(printable(&String::from_utf8_lossy(scene)).as_bytes());
+    }
+    out.write_all(scene)
 }
 
 #[cfg(test)]

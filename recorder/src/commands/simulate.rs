@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use recorder::{Closing, OutcomeRow};
 use serde::Serialize;
-use sim_contract::Stop;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{Stop, printable_line};
 use sim_solver::Solver;
 
 use crate::cli::exit::Exit;
@@ -21,8 +21,8 @@ use crate::input::command_source::load_commands;
 use crate::input::scene_source::load_scene;
 use crate::simulation::{Job, SimulationResult, simulate};
 
-/// Steps between two checks for signals and updates of the progress bar.
-const STEPS_PER_CHECK: u64 = 256;
+/// Steps between two updates of the progress bar.
+const STEPS_PER_UPDATE: u64 = 256;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -70,8 +70,9 @@ struct Summary {
 
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
-    let scene = load_scene(&args.scene)?;
-    let commands = args.commands.as_deref().map_or(Ok(Vec::new()), load_commands)?;
+    let scene = load_scene(&args.scene, &stop)?;
+    let commands =
+        args.commands.as_deref().map_or(Ok(Vec::new()), |source| load_commands(source, &stop))?;
     let job = Job { scene, commands, steps: args.steps };
     check_command_steps(&job).with_context(|| args.commands.clone().unwrap_or_default())?;
     let mut solver = Solver::new(&job.scene);
@@ -82,10 +83,9 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let bar = progress_bar(args.steps);
     let before_ns = monotonic_ns();
     let result = simulate(&job, solver, log.as_mut(), |step| {
-        if !step.is_multiple_of(STEPS_PER_CHECK) {
-            return ControlFlow::Continue(());
+        if step.is_multiple_of(STEPS_PER_UPDATE) {
+            bar.set_position(step);
         }
-        bar.set_position(step);
         if stop.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
     .with_context(|| truncation(args))?;
@@ -176,7 +176,7 @@ fn summary(job: &Job, result: &SimulationResult, wall_ns: u64, path: Option<&Pat
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "scene       {}", self.scene)?;
+        writeln!(f, "scene       {}", printable_line(&self.scene))?;
         writeln!(f, "steps       {}", self.steps)?;
         writeln!(f, "state_hash  {}", self.state_hash)?;
         writeln!(f, "commands    {} applied, {} rejected", self.applied, self.rejected)?;

@@ -1,17 +1,20 @@
 //! `recorder verify`: proves that a recording is complete and re-simulates bit for bit.
 
+mod coverage;
 mod difference;
+mod load;
 mod resimulation;
 mod side_rows;
+mod verification;
 
 use std::fmt;
 use std::io::Read;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use recorder::{FrameReader, LogEnd, LogReader};
+use recorder::{LogEnd, LogReader};
 use serde::Serialize;
-use sim_contract::Stop;
+use sim_contract::{Stop, printable_line};
 use sim_solver::SOLVER_VERSION;
 
 use crate::cli::exit::Exit;
@@ -20,16 +23,18 @@ use crate::cli::progress::progress_spinner;
 use crate::cli::thread_args::ThreadArgs;
 use crate::input::scene_source::scene_in_recording;
 use difference::Difference;
-use resimulation::{Finding, Resimulation};
-
-/// Snapshots between two checks for signals and updates of the progress bar.
-const SNAPSHOTS_PER_CHECK: u64 = 64;
+use resimulation::Finding;
+use verification::{Verification, VerifyError};
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes \
-    missing, or file truncated or damaged.\n\nExamples:\n  \
+#[command(
+    after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
+    and lists the content that nothing else in the file can contradict.\n\n\
+    Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
+    or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
-    recorder verify run.mcap --json")]
+    recorder verify run.mcap --json"
+)]
 pub(crate) struct VerifyArgs {
     /// Recording to re-simulate, from its first snapshot with a keyframe
     file: PathBuf,
@@ -56,6 +61,8 @@ pub(crate) struct Report {
     pub(crate) difference: Option<Difference>,
     /// The end of the file.
     pub(crate) file_end: String,
+    /// The content that is not compared.
+    pub(crate) not_covered: Vec<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -70,14 +77,14 @@ pub(crate) enum Verdict {
 pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     let path = output::path_text(&args.file);
-    let log = LogReader::open(&args.file).with_context(|| path.clone())?;
+    let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
     let bar = progress_spinner();
     let (report, end) = verify(log, &path, args.threads.count(), |step| {
         bar.set_message(format!("step {step}"));
         stop.is_requested()
     })?;
     bar.finish_and_clear();
-    output::result(args.as_json, &report, &report.to_string())?;
+    output::result(args.as_json, &report, &report.text())?;
     if let Some(end) = &end {
         output::note(&format!("warning: {path} is {end}; verified as far as it goes"));
     }
@@ -88,7 +95,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     })
 }
 
-/// Re-simulates a recording with `threads` threads. Calls `is_stopped` periodically, with the step.
+/// Re-simulates a recording with `threads` threads. Calls `is_stopped` before each step.
 pub(crate) fn verify<R: Read>(
     log: LogReader<R>,
     path: &str,
@@ -103,38 +110,43 @@ pub(crate) fn verify<R: Read>(
         );
     }
     let scene = scene_in_recording(&log).with_context(|| path.to_owned())?;
-    let mut frames = FrameReader::new(log);
-    let mut simulation = None;
+    let mut verification = Verification::new(log, scene, threads);
     let mut report = Report::new();
-    let mut count = 0;
-    while let Some(frame) = frames.next_frame().with_context(|| path.to_owned())? {
-        let step = frame.row.step;
-        let finding = match &mut simulation {
-            None => {
-                let start = Resimulation::start(&scene, &frame).with_context(|| path.to_owned())?;
-                let Some(mut start) = start else { continue };
-                start.set_threads(threads);
-                report.first_step = step;
-                simulation.insert(start).compare_start(&frame)
-            }
-            Some(simulation) => simulation.advance(&frame),
-        };
-        if !report.add(finding, step) {
-            break;
-        }
-        count += 1;
-        if count % SNAPSHOTS_PER_CHECK == 0 && is_stopped(step) {
-            report.verdict = Verdict::Interrupted;
-            break;
-        }
+    match verification.check_header() {
+        Finding::Identical => compare_states(&mut verification, &mut report, &mut is_stopped)
+            .with_context(|| path.to_owned())?,
+        finding => _ = report.add(finding, 0),
     }
-    let end = frames.end().cloned().filter(|end| *end != LogEnd::Complete);
-    if simulation.is_none() {
+    let end = verification.frames.end().cloned().filter(|end| *end != LogEnd::Complete);
+    if verification.simulation.is_none() && report.verdict == Verdict::Identical {
         let end = end.map_or_else(String::new, |end| format!(" (the file is {end})"));
         bail!("{path}: has no snapshot with a keyframe to start from{end}");
     }
-    report.file_end = frames.end().map_or_else(|| "not reached".to_owned(), ToString::to_string);
+    let end_text = verification.frames.end().map(ToString::to_string);
+    report.file_end = end_text.unwrap_or_else(|| "not reached".to_owned());
+    report.not_covered = verification.coverage.not_covered();
     Ok((report, end))
+}
+
+/// Compares every snapshot, up to the first finding, and then the end of the file.
+fn compare_states<R: Read>(
+    verification: &mut Verification<R>,
+    report: &mut Report,
+    is_stopped: &mut impl FnMut(u64) -> bool,
+) -> Result<(), VerifyError> {
+    while let Some((step, finding)) = verification.next(is_stopped)? {
+        if report.is_empty() {
+            report.first_step = step;
+        }
+        if !report.add(finding, step) {
+            return Ok(());
+        }
+    }
+    if verification.simulation.is_some() {
+        let finding = verification.check_end();
+        report.add_end(finding);
+    }
+    Ok(())
 }
 
 impl Report {
@@ -148,6 +160,25 @@ impl Report {
             what: None,
             difference: None,
             file_end: String::new(),
+            not_covered: Vec::new(),
+        }
+    }
+
+    /// Returns the report for people, with the content that is not compared.
+    fn text(&self) -> String {
+        let lines = self.not_covered.iter().map(|what| format!("\n  {}", printable_line(what)));
+        format!("{self}\nnot compared:{}", lines.collect::<String>())
+    }
+
+    /// Returns `true` before the first snapshot is compared.
+    fn is_empty(&self) -> bool {
+        self.last_identical_step.is_none()
+    }
+
+    /// Adds the finding at the end of the file.
+    fn add_end(&mut self, finding: Finding) {
+        if finding != Finding::Identical {
+            self.add(finding, 0);
         }
     }
 
@@ -163,6 +194,10 @@ impl Report {
                 self.verdict = Verdict::Diverged;
                 (self.step, self.what, self.difference) = (Some(step), Some(what), difference);
             }
+            Finding::OtherContent { what } => {
+                (self.verdict, self.what) = (Verdict::Diverged, Some(what));
+            }
+            Finding::Interrupted => self.verdict = Verdict::Interrupted,
             Finding::Incomplete { step, what } => {
                 self.verdict = Verdict::OutcomeLogIncomplete;
                 (self.step, self.what) = (Some(step), Some(what));
@@ -175,11 +210,15 @@ impl Report {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.steps_identical;
-        let (step, what) = (self.step.unwrap_or(0), self.what.as_deref().unwrap_or(""));
+        let what = printable_line(self.what.as_deref().unwrap_or(""));
+        let step = self.step.unwrap_or(0);
         match self.verdict {
             Verdict::Identical => {
                 let last = self.last_identical_step.unwrap_or(self.first_step);
                 write!(f, "{count} steps bit-identical ({}..={last})", self.first_step)
+            }
+            Verdict::Diverged if self.step.is_none() => {
+                write!(f, "the file differs: {what} ({count} steps bit-identical)")
             }
             Verdict::Diverged => {
                 write!(f, "step {step} differs: {what} ({count} steps before it bit-identical)")

@@ -25,8 +25,7 @@ impl Selection {
         let Some(last) = steps.len().checked_sub(1) else { return Ok(Vec::new()) };
         let time_ns =
             |step: &u64| RunDescription::duration_ns(step.saturating_sub(steps[0]), rate_hz);
-        let times_ns: Vec<u64> = steps.iter().map(time_ns).collect();
-        let first_at = |time_ns: u64| times_ns.partition_point(|one| *one < time_ns);
+        let first_at = |at_ns: u64| steps.partition_point(|step| time_ns(step) < at_ns);
         let mut places: Vec<usize> = match self {
             Self::Spread(1) => vec![last],
             Self::Spread(count) => {
@@ -36,7 +35,8 @@ impl Selection {
             Self::Every(period) => {
                 let period_ns = nanoseconds(*period).max(1);
                 let next = |place: &usize| {
-                    let time_ns = (times_ns[*place] / period_ns + 1).checked_mul(period_ns)?;
+                    let time_ns =
+                        (time_ns(&steps[*place]) / period_ns + 1).checked_mul(period_ns)?;
                     Some(first_at(time_ns)).filter(|place| *place <= last)
                 };
                 std::iter::successors(Some(0), next).collect()
@@ -46,7 +46,7 @@ impl Selection {
         if let (Self::At(times), true) = (self, places.iter().any(|place| *place > last)) {
             let latest =
                 humantime::format_duration(times.iter().copied().max().unwrap_or_default());
-            let end_s = times_ns[last] as f64 / 1e9;
+            let end_s = time_ns(&steps[last]) as f64 / 1e9;
             bail!("--at {latest} is after its last snapshot, which is at {end_s:.3} s");
         }
         places.sort_unstable();

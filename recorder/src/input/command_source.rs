@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use recorder::{LogEnd, LogReader, Message, OutcomeRow};
+use sim_contract::Stop;
 
 use super::command_file::{self, TimedCommand};
 use super::scene_source::has_extension;
@@ -12,25 +13,31 @@ use super::text_file::read_text_file;
 /// Largest command file, in bytes: several hours of commands at 60 Hz.
 const COMMAND_FILE_SIZE_BYTES_MAX: u64 = 1 << 30;
 
+/// Most commands of a recording to repeat: hours of a drag at 60 Hz. They take about 250 MB of memory.
+const COMMANDS_MAX: usize = 1 << 20;
+
 /// Reads commands and sorts them in the order of application. They are the outcomes of a recording
 /// if `source` ends in `.mcap`, else the lines of a command file.
-pub(crate) fn load_commands(source: &str) -> anyhow::Result<Vec<TimedCommand>> {
+pub(crate) fn load_commands(source: &str, stop: &Stop) -> anyhow::Result<Vec<TimedCommand>> {
     if has_extension(source, ".mcap") {
-        return commands_in_recording(Path::new(source)).with_context(|| source.to_owned());
+        return commands_in_recording(Path::new(source), stop).with_context(|| source.to_owned());
     }
     let text = read_text_file(Path::new(source), COMMAND_FILE_SIZE_BYTES_MAX)
         .with_context(|| format!("{source}: cannot read the commands"))?;
     Ok(command_file::parse(&text, source)?)
 }
 
-fn commands_in_recording(path: &Path) -> anyhow::Result<Vec<TimedCommand>> {
-    let mut log = LogReader::open(path)?;
+fn commands_in_recording(path: &Path, stop: &Stop) -> anyhow::Result<Vec<TimedCommand>> {
+    let mut log = LogReader::open_until(path, stop)?;
     let mut first_row = None;
-    let mut outcomes = Vec::new();
+    let mut commands = Vec::new();
     while let Some(logged) = log.next_message()? {
         match logged.message {
             Message::Step(row) => _ = first_row.get_or_insert(row),
-            Message::Outcome(row) => outcomes.push(row),
+            Message::Outcome(_) if commands.len() == COMMANDS_MAX => {
+                bail!("it has more than {COMMANDS_MAX} commands; prove it with `recorder verify`");
+            }
+            Message::Outcome(row) => commands.push(timed_command(&row)),
             _ => {}
         }
     }
@@ -48,7 +55,6 @@ fn commands_in_recording(path: &Path) -> anyhow::Result<Vec<TimedCommand>> {
             row.outcome_count
         );
     }
-    let mut commands: Vec<_> = outcomes.iter().map(timed_command).collect();
     command_file::sort(&mut commands);
     Ok(commands)
 }
@@ -93,7 +99,7 @@ mod tests {
             let row = StepRow { step: 120, outcome_count, ..StepRow::default() };
             log.write(&Message::Step(row), 0).unwrap();
             fs::write(&path, log.finish(&Closing::default()).unwrap()).unwrap();
-            load_commands(&path.display().to_string())
+            load_commands(&path.display().to_string(), &Stop::default())
         };
         assert_eq!(load(0).unwrap(), []);
         let error = format!("{:#}", load(3).unwrap_err());

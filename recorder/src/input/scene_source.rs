@@ -5,15 +5,16 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use recorder::LogReader;
-use sim_contract::read_scene_file;
+use sim_contract::{Stop, read_scene_file};
 use sim_solver::Scene;
 use sim_solver::scene::LoadError;
 
 /// Reads and validates a scene. `source` is a recording if it ends in `.mcap`, else a scene file if
 /// it contains `/` or ends in `.toml`, else the name of a built-in scene.
-pub(crate) fn load_scene(source: &str) -> anyhow::Result<Scene> {
+pub(crate) fn load_scene(source: &str, stop: &Stop) -> anyhow::Result<Scene> {
     if has_extension(source, ".mcap") {
-        let log = LogReader::open(Path::new(source)).with_context(|| source.to_owned())?;
+        let log =
+            LogReader::open_until(Path::new(source), stop).with_context(|| source.to_owned())?;
         return scene_in_recording(&log).with_context(|| source.to_owned());
     }
     let read = |path: &Path| read_scene_file(path).map_err(|error| error.to_string());
@@ -49,7 +50,7 @@ mod tests {
         let path = std::env::temp_dir().join(name);
         mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
         let path = path.to_str().unwrap();
-        let error = load_scene(path).unwrap_err().to_string();
+        let error = load_scene(path, &Stop::default()).unwrap_err().to_string();
         std::fs::remove_file(path).unwrap();
         assert_eq!(
             error,
@@ -59,7 +60,7 @@ mod tests {
 
     #[test]
     fn an_unknown_scene_is_refused_with_the_known_ones_and_the_recordings() {
-        let error = load_scene("knot").unwrap_err().to_string();
+        let error = load_scene("knot", &Stop::default()).unwrap_err().to_string();
         assert!(
             error.starts_with("there is no built-in scene 'knot' (allowed: curtain,"),
             "{error}"

@@ -16,11 +16,15 @@ use std::path::Path;
 
 use mcap::records::{Record, op};
 
+use sim_contract::Stop;
+
 use super::read::decode::{LoggedMessage, decode_message};
+use super::read::file_source::check_stop;
+use super::read::limits::SizeLimits;
 use super::read::open::open_regular_file;
 use super::read::read_error::{LogEnd, ReadError};
 use super::read::reader::LogReader;
-use super::read::records::{RECORD_SIZE_BYTES_MAX, RecordReader};
+use super::read::records::RecordReader;
 use super::run::RunDescription;
 use super::topic::Topic;
 use chunk::{LocatedChunk, record_size_bytes};
@@ -31,6 +35,9 @@ pub struct IndexedLog {
     file: File,
     run: RunDescription,
     scene: Vec<u8>,
+    limits: SizeLimits,
+    /// `None` if the program does not handle signals.
+    stop: Option<Stop>,
     channels: BTreeMap<u16, Option<Topic>>,
     chunks: Vec<ChunkEntry>,
     end: LogEnd,
@@ -73,30 +80,34 @@ impl IndexedLog {
     /// # Errors
     /// If the file is not a recording or has no readable header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::open_with_progress(path, &mut |_, _| {})
+        Self::open_with_progress(path, None, &mut |_, _| {})
     }
 
     /// Opens a file. A scan of a file without an index calls `on_progress` with the bytes scanned
-    /// and the size of the file.
+    /// and the size of the file. After a signal, this and every later read ends with
+    /// [`ReadError::Interrupted`].
     ///
     /// # Errors
     /// Like [`Self::open`].
     pub fn open_with_progress(
         path: &Path,
+        stop: Option<&Stop>,
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, ReadError> {
-        let log = LogReader::open(path)?;
+        let log = LogReader::open_file(path, stop.cloned())?;
+        let limits = log.limits();
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
-        let mut file = open_regular_file(path)?;
+        let file = open_regular_file(path)?;
         let size_bytes = file.metadata()?.len();
-        let summary = summary::read(&mut file, size_bytes)?;
+        let summary = summary::read(&file, size_bytes, stop)?;
         let has_index = summary.is_some();
         let (located, end) = match summary {
             Some(located) => (located, LogEnd::Complete),
-            None => scan::read(&file, size_bytes, on_progress)?,
+            None => scan::read(&file, size_bytes, stop, on_progress)?,
         };
         let channels = BTreeMap::new();
-        let mut log = Self { file, run, scene, channels, chunks: Vec::new(), end, has_index };
+        let (stop, chunks) = (stop.cloned(), Vec::new());
+        let mut log = Self { file, run, scene, limits, stop, channels, chunks, end, has_index };
         log.resolve_topics(&located)?;
         Ok(log)
     }
@@ -124,9 +135,9 @@ impl IndexedLog {
             }
         }
         for (chunk, located) in self.chunks.iter_mut().zip(located) {
-            let known: Option<Vec<_>> =
-                located.channels.iter().map(|id| self.channels.get(id)).collect();
-            if let Some(known) = known.filter(|known| !known.is_empty()) {
+            let Some(ids) = located.channels.known_ids() else { continue };
+            let known: Option<Vec<_>> = ids.map(|id| self.channels.get(&id)).collect();
+            if let Some(known) = known {
                 chunk.topics = TopicSet::default();
                 known.into_iter().flatten().for_each(|topic| chunk.topics.add(*topic));
             }
@@ -143,6 +154,8 @@ impl IndexedLog {
             file: self.file.try_clone()?,
             run: self.run.clone(),
             scene: self.scene.clone(),
+            limits: self.limits,
+            stop: self.stop.clone(),
             channels: self.channels.clone(),
             chunks: self.chunks.clone(),
             end: self.end.clone(),
@@ -178,16 +191,20 @@ impl IndexedLog {
     /// Reads all messages of a chunk except `/tf` and foreign topics, and verifies its checksum.
     ///
     /// # Errors
-    /// If the operating system reports an error, the chunk is damaged, or the content of a message
-    /// is invalid.
+    /// If the operating system reports an error, a signal has arrived, the chunk is damaged, or the
+    /// content of a message is invalid.
     ///
     /// # Panics
     /// If there is no such chunk.
     pub fn read_chunk(&mut self, index: usize) -> Result<Vec<LoggedMessage>, ReadError> {
         let ChunkEntry { offset, size_bytes, .. } = self.chunks[index];
         let damaged = |cause: String| ReadError::DamagedChunk { byte: offset, cause };
-        if size_bytes > RECORD_SIZE_BYTES_MAX as u64 {
-            return Err(damaged("its length exceeds the limit".to_owned()));
+        check_stop(self.stop.as_ref())?;
+        let size_bytes_max = self.limits.chunk_record_size_bytes_max();
+        if size_bytes > size_bytes_max {
+            return Err(damaged(format!(
+                "it has {size_bytes} bytes (allowed: up to {size_bytes_max} for its scene)"
+            )));
         }
         let mut bytes = vec![0; usize::try_from(size_bytes).unwrap_or(usize::MAX)];
         // Independent of the file position, which a clone shares.
@@ -200,8 +217,10 @@ impl IndexedLog {
         if bytes.first() != Some(&op::CHUNK) || record_size_bytes(&bytes) != Some(size_bytes) {
             return Err(damaged("no chunk starts here".to_owned()));
         }
-        let mut records = RecordReader::without_magic(bytes.as_slice());
-        let (channels, run) = (&mut self.channels, &self.run);
+        let mut records = RecordReader::without_magic(bytes.as_slice(), self.limits);
+        let (channels, run, limits) = (&mut self.channels, &self.run, &self.limits);
+        let memory_max = limits.decoded_size_bytes_max();
+        let mut memory = 0;
         let mut messages = Vec::new();
         while let Some(message) = records.next(|record, _| match record {
             Record::Channel(channel) => {
@@ -211,13 +230,21 @@ impl IndexedLog {
             Record::Message { header, data } => {
                 let topic = channels.get(&header.channel_id).copied().flatten();
                 let Some(topic) = topic else { return Ok(None) };
-                let byte = offset + size_bytes;
-                let malformed = |what| ReadError::Malformed { topic: topic.name(), byte, what };
-                decode_message(topic, &header, &data, run).map_err(malformed)
+                let (byte, sequence) = (offset + size_bytes, header.sequence);
+                let malformed =
+                    |what| ReadError::Malformed { topic: topic.name(), sequence, byte, what };
+                decode_message(topic, &header, &data, run, limits).map_err(malformed)
             }
             _ => Ok(None),
         })? {
-            messages.extend(message);
+            let Some(message) = message else { continue };
+            memory += message.size_bytes();
+            if memory > memory_max {
+                return Err(damaged(format!(
+                    "its messages take more than {memory_max} bytes of memory"
+                )));
+            }
+            messages.push(message);
         }
         match records.end {
             Some(LogEnd::Complete) | None => Ok(messages),

@@ -91,17 +91,18 @@ impl Message {
     /// Returns the approximate memory use, in bytes.
     pub fn size_bytes(&self) -> usize {
         let heap_size_bytes = match self {
-            Self::Topology(row) => row.a.len() * (4 * size_of::<u32>() + size_of::<f32>()),
+            Self::Topology(row) => row.size_bytes(),
             Self::Surface(row) => size_of_val(row.triangles.as_slice()),
             Self::Colliders(row) => row.colliders.len() * size_of::<ColliderRow>(),
-            Self::Tears(row) => row.constraints.len() * (size_of::<u32>() + TEAR_CAUSE_SIZE_BYTES),
+            Self::Tears(row) => {
+                size_of_val(row.constraints.as_slice()) + row.causes.len() * TEAR_CAUSE_SIZE_BYTES
+            }
             Self::Keyframe { bytes, .. } => bytes.len(),
             Self::Particles { particles, .. } => size_of_val(particles.as_slice()),
-            Self::Parameters(_)
-            | Self::Outcome(_)
-            | Self::Status(_)
-            | Self::Event(_)
-            | Self::Step(_) => 0,
+            Self::Outcome(row) => row.status.len() + row.reason.len(),
+            Self::Status(row) => row.scene_name.len(),
+            Self::Event(row) => row.kind.len() + row.text.len(),
+            Self::Parameters(_) | Self::Step(_) => 0,
         };
         size_of::<Self>() + heap_size_bytes
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::str::FromStr;
 
-use sim_contract::LoadHeader;
+use sim_contract::{ELEMENTS_MAX, LoadHeader};
 
 use super::rows::TopologyRow;
 use super::topic::{AllCounts, Topic};
@@ -24,8 +24,15 @@ pub(super) const RUN_METADATA: &str = "run";
 pub(super) const CLOSING_METADATA: &str = "recorder";
 /// Name of the attachment with the scene.
 pub(super) const SCENE_ATTACHMENT: &str = "scene.toml";
+/// Media type of the attachment with the scene.
+pub(super) const SCENE_MEDIA_TYPE: &str = "application/toml";
 
 const NS_PER_S: u128 = 1_000_000_000;
+
+/// Returns the start of the library in the header of a file. The name of the mcap crate follows.
+pub(super) fn header_library(recorder_version: &str) -> String {
+    format!("recorder/{recorder_version} ")
+}
 
 /// The recorded run: metadata `run`, at the start of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,8 +137,8 @@ impl RunDescription {
             origin: origin(text(map, "origin")?).ok_or_else(|| "origin".to_owned())?,
             rate_hz,
             method: u32::from(text(map, "method")? != "xpbd"),
-            particle_count: parsed(map, "particle_count")?,
-            constraint_count: parsed(map, "constraint_count")?,
+            particle_count: element_count(map, "particle_count")?,
+            constraint_count: element_count(map, "constraint_count")?,
             solver_version: parsed(map, "solver_version")?,
             contract_version: parsed(map, "contract_version")?,
             recorder_version: text(map, "recorder_version")?.to_owned(),
@@ -212,6 +219,12 @@ fn parsed<T: FromStr<Err: Display>>(
     key: &str,
 ) -> Result<T, String> {
     text(map, key)?.parse().map_err(|_| key.to_owned())
+}
+
+/// Returns a number of particles or constraints. It decides how much memory a reader may use.
+fn element_count(map: &BTreeMap<String, String>, key: &str) -> Result<u32, String> {
+    let count = parsed(map, key)?;
+    if count > ELEMENTS_MAX { Err(key.to_owned()) } else { Ok(count) }
 }
 
 fn origin(text: &str) -> Option<[f64; 3]> {

@@ -9,7 +9,7 @@ mod search;
 use std::path::Path;
 use std::sync::Arc;
 
-use sim_contract::{ParticleState, Torn};
+use sim_contract::{ParticleState, Stop, Torn};
 
 use super::index::IndexedLog;
 use super::read::read_error::{LogEnd, ReadError};
@@ -74,12 +74,17 @@ impl TapeState {
 
 impl Tape {
     /// Opens a recording. A scan of a file without an index calls `on_progress` with the bytes
-    /// scanned and the size of the file.
+    /// scanned and the size of the file. After a signal, this and every later read ends with
+    /// [`ReadError::Interrupted`].
     ///
     /// # Errors
     /// If the file is not a recording or has no snapshot.
-    pub fn open(path: &Path, on_progress: &mut dyn FnMut(u64, u64)) -> Result<Self, TapeError> {
-        let mut log = IndexedLog::open_with_progress(path, on_progress)?;
+    pub fn open(
+        path: &Path,
+        stop: Option<&Stop>,
+        on_progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<Self, TapeError> {
+        let mut log = IndexedLog::open_with_progress(path, stop, on_progress)?;
         let load = read_load(&mut log)?;
         let topology = load.topology.ok_or(TapeError::NoLoad("/topology"))?;
         let surface = load.surface.ok_or(TapeError::NoLoad("/surface"))?;

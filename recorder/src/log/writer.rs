@@ -11,7 +11,10 @@ use sim_contract::explain_write_error;
 
 use super::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use super::message::Message;
-use super::run::{CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT};
+use super::run::{
+    CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
+    header_library,
+};
 use super::topic::{AllCounts, Topic};
 
 /// Compression of the chunks of a file.
@@ -207,7 +210,7 @@ fn write_options(options: LogOptions) -> WriteOptions {
     let level = u32::from(options.compression == Compression::Zstd);
     WriteOptions::new()
         .profile("")
-        .library(format!("recorder/{} {}", env!("CARGO_PKG_VERSION"), mcap::LIBRARY_IDENTIFIER))
+        .library(header_library(env!("CARGO_PKG_VERSION")) + mcap::LIBRARY_IDENTIFIER)
         // Chunks are written completely or not at all, so every reader understands the file.
         .disable_seeking(true)
         .chunk_size(Some(options.chunk_size_bytes))
@@ -227,7 +230,7 @@ fn write_header<W: Write>(
         log_time: log_time_ns,
         create_time: run.epoch_ns,
         name: SCENE_ATTACHMENT.to_owned(),
-        media_type: "application/toml".to_owned(),
+        media_type: SCENE_MEDIA_TYPE.to_owned(),
         data: Cow::Borrowed(scene),
     })?;
     file.write_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_map() })?;

@@ -14,6 +14,11 @@ pub(crate) struct FrozenTracker {
 }
 
 impl FrozenTracker {
+    /// Returns `true` before the first snapshot.
+    pub(crate) fn is_new(&self) -> bool {
+        self.known.is_none()
+    }
+
     /// Returns the events of a snapshot. The first snapshot has none, because its frozen particles
     /// froze earlier. After a reset a particle can freeze again.
     pub(crate) fn new_events(&mut self, step: u64, particles: &[ParticleState]) -> Vec<EventRow> {

@@ -1,10 +1,10 @@
 //! The inputs of a simulation.
 
 use recorder::RunDescription;
-use sim_contract::{CONTRACT_VERSION, Command};
+use sim_contract::CONTRACT_VERSION;
 use sim_solver::{SOLVER_VERSION, Scene, Solver};
-use xxhash_rust::xxh3::Xxh3;
 
+use super::run_id::RunId;
 use crate::input::command_file::TimedCommand;
 
 /// The inputs of a simulation.
@@ -40,16 +40,13 @@ impl Job {
         }
     }
 
-    /// Returns a hash of the scene and the commands, so that equal inputs have equal ids.
+    /// Returns the id of the run. Commands after the last step have no part in it.
     fn run_id(&self) -> u64 {
-        let mut hash = Xxh3::new();
-        hash.update(self.scene.to_toml().as_bytes());
-        for command in &self.commands {
-            let wire = Command::new(command.client_id, command.sequence, command.action);
-            hash.update(&command.step.to_le_bytes());
-            hash.update(bytemuck::bytes_of(&wire));
+        let mut id = RunId::new(self.scene.to_toml().as_bytes());
+        for command in self.commands.iter().filter(|command| command.step <= self.steps) {
+            id.add(command.step, command.client_id, command.sequence, command.action);
         }
-        hash.digest()
+        id.value()
     }
 }
 

@@ -148,7 +148,8 @@ fn low_32_bits(step: u64) -> u32 {
     step as u32
 }
 
-fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
+/// Returns a constraint as it is published.
+pub(crate) fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
     ConstraintState {
         a: constraint.a,
         b: constraint.b,

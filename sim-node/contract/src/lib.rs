@@ -94,6 +94,7 @@ pub use sim_types::{
     ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS,
     Parameter, ParameterInfo, ParameterValue, ParameterValues, ParticleFlags, PerKind, PlainF32,
     Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, Setting, TearCause, Text, TextError, ValueForm,
+    printable, printable_line,
 };
 pub use stop::Stop;
 pub use text_file::{TextFileError, read_scene_file};

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Flag that SIGINT and SIGTERM set.
-#[derive(Debug, Clone)]
+/// Flag that SIGINT and SIGTERM set. The default one is not connected to a signal.
+#[derive(Debug, Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 /// Exit code of an abrupt end: 128 + SIGINT, as shells report it.

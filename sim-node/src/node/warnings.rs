@@ -3,6 +3,7 @@
 use std::io::{Write, stderr};
 
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::printable_line;
 
 /// Most warnings per second; further ones are only counted.
 const WARNINGS_PER_SECOND_MAX: u32 = 5;
@@ -32,6 +33,6 @@ impl Warnings {
             count => format!(" ({count} more before this one)"),
         };
         // A closed stderr is no reason to stop.
-        let _ignored = writeln!(stderr(), "warning: {text}{dropped}");
+        let _ignored = writeln!(stderr(), "warning: {}{dropped}", printable_line(text));
     }
 }

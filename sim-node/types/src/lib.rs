@@ -42,6 +42,7 @@ pub use particle_flags::ParticleFlags;
 pub use range::{COORDINATE_MAX, NumberRange};
 pub use reason::Reason;
 pub use tear_cause::TearCause;
+pub use text::printable::{printable, printable_line};
 pub use text::{Text, TextError};
 
 #[cfg(test)]

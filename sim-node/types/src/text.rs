@@ -1,5 +1,7 @@
 //! Short text of a fixed size, for commands in shared memory.
 
+pub(crate) mod printable;
+
 use std::error::Error;
 use std::fmt;
 

@@ -2,8 +2,12 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod bad_input;
+mod coverage;
 mod end_to_end;
+mod hostile;
+mod interrupt;
 mod losses;
 mod outputs;
 mod physics;
+mod raw;
 mod threads;

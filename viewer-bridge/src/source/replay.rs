@@ -18,6 +18,8 @@ use std::sync::mpsc::channel;
 use std::thread;
 
 use anyhow::Context;
+use recorder::ReadError;
+use sim_contract::Stop;
 
 use super::feed::Source;
 use crate::message::Mode;
@@ -33,12 +35,12 @@ use player::Player;
 pub struct Replay(Recording);
 
 impl Replay {
-    /// Opens a recording. `note` receives messages for the user.
+    /// Opens a recording, until a signal arrives. `note` receives messages for the user.
     ///
     /// # Errors
     /// The file is not a recording, or has no state to show. The message names the remedy.
-    pub fn open(path: &Path, note: &mut dyn FnMut(&str)) -> anyhow::Result<Self> {
-        open::open(path, note).map(Self).with_context(|| path.display().to_string())
+    pub fn open(path: &Path, stop: &Stop, note: &mut dyn FnMut(&str)) -> anyhow::Result<Self> {
+        open::open(path, stop, note).map(Self).with_context(|| path.display().to_string())
     }
 
     fn job(&self) -> anyhow::Result<Job> {
@@ -79,7 +81,11 @@ impl Source for Replay {
                 .context("starting the thread that checks the recording")?;
             let played = Player::new(&mut self.0, reports, sinks).run(requests);
             is_cancelled.store(true, Ordering::Relaxed);
-            played.context(file)
+            match played {
+                // The signal also ends the program.
+                Err(ReadError::Interrupted) => Ok(()),
+                played => played.context(file),
+            }
         })
     }
 }

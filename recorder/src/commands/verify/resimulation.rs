@@ -15,6 +15,10 @@ use crate::simulation::apply::apply;
 pub(crate) enum Finding {
     /// Every bit is equal.
     Identical,
+    /// Content that belongs to no step differs.
+    OtherContent { what: String },
+    /// A signal ended the simulation before the snapshot.
+    Interrupted,
     /// The simulation differs from the recording.
     Diverged {
         /// The first step that differs.
@@ -30,12 +34,19 @@ pub(crate) enum Finding {
     },
 }
 
+impl Finding {
+    /// Returns the finding for content that belongs to no step.
+    pub(crate) fn in_file(what: String) -> Self {
+        Self::OtherContent { what }
+    }
+}
+
 /// The reason why a recording cannot be re-simulated.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum StartError {
-    #[error("the keyframe of step {step}: {cause}")]
+    #[error("step {step}: the message on /keyframe: {cause}")]
     Keyframe { step: u64, cause: sim_solver::KeyframeError },
-    #[error("the state of step {step}: {cause}")]
+    #[error("step {step}: the state in /particles and /keyframe: {cause}")]
     State { step: u64, cause: sim_solver::RestoreError },
 }
 
@@ -82,35 +93,55 @@ impl Resimulation {
         self.solver.set_threads(threads);
     }
 
-    /// Compares the first snapshot with its own header and with the torn constraints in the file.
-    /// Compares step 0 with the scene.
+    /// Compares the first snapshot with its own header and with the rows before it. Compares step 0 with
+    /// the scene.
     pub(crate) fn compare_start(&self, frame: &Frame) -> Finding {
-        let finding = match self.step {
-            0 => compare(&Solver::new(&self.scene), frame),
-            _ => compare(&self.solver, frame),
-        };
-        let has_other_tears =
-            torn_in_first_frame(frame).is_some_and(|torn| torn != self.solver.torn());
-        if finding != Finding::Identical || !has_other_tears {
+        let scene_state = (self.step == 0).then(|| Solver::new(&self.scene));
+        let expected = scene_state.as_ref().unwrap_or(&self.solver);
+        let finding = compare(expected, frame);
+        if finding != Finding::Identical {
             return finding;
         }
-        let what =
-            "its torn constraints in /topology and /tears differ from its keyframe".to_owned();
-        Finding::Diverged { step: self.step, what, difference: None }
+        let mut rows = SideRows::of_start(&frame.updates, self.step);
+        if scene_state.is_none() {
+            rows.ignore_collider_velocities(expected);
+        }
+        let what = match rows.compare_all(expected) {
+            None if has_other_tears(frame, expected) => Some(
+                "its torn constraints in /topology and /tears differ from its keyframe".to_owned(),
+            ),
+            None if self.step == 0 && frame.row.outcome_count > 0 => {
+                let count = frame.row.outcome_count;
+                Some(format!("its row in /steps counts {count} outcomes before the first step"))
+            }
+            what => what,
+        };
+        what.map_or(Finding::Identical, |what| Finding::Diverged {
+            step: self.step,
+            what,
+            difference: None,
+        })
     }
 
-    /// Simulates up to the next snapshot and compares it.
-    pub(crate) fn advance(&mut self, frame: &Frame) -> Finding {
+    /// Simulates up to the next snapshot and compares it. Calls `is_stopped` before each step.
+    pub(crate) fn advance(
+        &mut self,
+        frame: &Frame,
+        is_stopped: &mut impl FnMut(u64) -> bool,
+    ) -> Finding {
         self.add_updates(frame);
         let row = &frame.row;
         if row.step <= self.step {
-            let what = format!("it follows step {} in the file", self.step);
+            let what = format!("its row in /steps follows step {} in the file", self.step);
             return Finding::Diverged { step: row.step, what, difference: None };
         }
         if let Some(finding) = self.find_gap(row) {
             return finding;
         }
         while self.step < row.step {
+            if is_stopped(self.step) {
+                return Finding::Interrupted;
+            }
             if let Some(finding) = self.simulate_step() {
                 return finding;
             }
@@ -126,37 +157,13 @@ impl Resimulation {
             return self.misplaced(row.step, "its step is after the snapshot that counts it");
         }
         match compare(&self.solver, frame) {
-            Finding::Identical => {
-                self.compare_side_rows().unwrap_or_else(|| self.compare_keyframe(frame))
-            }
+            Finding::Identical => self.compare_side_rows().unwrap_or(Finding::Identical),
             // The torn constraints may differ. The rows name the first one.
             different @ Finding::Diverged { difference: None, .. } => {
                 self.compare_side_rows().unwrap_or(different)
             }
             different => different,
         }
-    }
-
-    /// Compares the keyframe, if the snapshot has one.
-    fn compare_keyframe(&self, frame: &Frame) -> Finding {
-        let step = frame.row.step;
-        let recorded = frame.own_keyframe().map(Keyframe::decode);
-        let mut simulated = self.solver.keyframe();
-        let what = match recorded {
-            None => return Finding::Identical,
-            Some(Err(error)) => format!("its keyframe is damaged: {error}"),
-            Some(Ok(recorded)) => {
-                // The solver does not know whether the node was paused.
-                simulated.paused = recorded.paused;
-                if recorded == simulated {
-                    return Finding::Identical;
-                }
-                "its keyframe has another state: the masses, grabs, parameters, torn constraints, \
-                 or moved anchors or colliders differ"
-                    .to_owned()
-            }
-        };
-        Finding::Diverged { step, what, difference: None }
     }
 
     fn compare_side_rows(&mut self) -> Option<Finding> {
@@ -185,8 +192,8 @@ impl Resimulation {
         let before = index.checked_sub(1).and_then(|before| self.pending.get(&before));
         let step = before.map_or(self.step + 1, |before| before.step.max(self.step + 1));
         let what = format!(
-            "outcome {index} is missing; the snapshot of step {} counts {} outcomes",
-            row.step, row.outcome_count
+            "/outcomes: outcome {index} is missing; /steps counts {} outcomes up to step {}",
+            row.outcome_count, row.step
         );
         Some(Finding::Incomplete { step, what })
     }
@@ -227,28 +234,34 @@ impl Resimulation {
             return None;
         }
         let what = format!(
-            "outcome {}: recorded {} {}, simulated {} {}",
+            "/outcomes: outcome {}: recorded {} {}, simulated {} {}",
             row.index, row.status, row.reason, again.status, again.reason
         );
         Some(Finding::Diverged { step: row.step, what, difference: None })
     }
 
     fn misplaced(&self, step: u64, why: &str) -> Finding {
-        let what = format!("outcome {} is misplaced: {why}", self.next_index);
+        let what = format!("/outcomes: outcome {} is misplaced: {why}", self.next_index);
         Finding::Diverged { step, what, difference: None }
     }
 }
 
-/// Returns the torn constraints of the first snapshot, from its rows. Returns `None` for later
-/// snapshots.
-fn torn_in_first_frame(frame: &Frame) -> Option<Vec<u32>> {
+/// Returns `true` if the torn constraints of the first snapshot differ from its rows. Later snapshots
+/// have no `/topology`. An unknown cause equals any cause.
+fn has_other_tears(frame: &Frame, solver: &Solver) -> bool {
     let torn = frame.updates.iter().find_map(|update| match update {
         Message::Topology(row) => Some(row.torn_before()),
         _ => None,
-    })?;
+    });
+    let Some(torn) = torn else { return false };
     let mut tracker = TearTracker::new(torn);
     frame.updates.iter().for_each(|update| tracker.process(update));
-    tracker.at(frame.row.step).map(|torn| torn.indices().collect())
+    let Some(torn) = tracker.at(frame.row.step) else { return false };
+    let expected = solver.torn().iter().zip(solver.tear_causes());
+    torn.constraints.len() != solver.torn().len()
+        || torn.constraints.iter().zip(expected).any(|(found, (index, cause))| {
+            found.constraint != *index || found.cause().is_some_and(|found| found != *cause)
+        })
 }
 
 /// Compares the recorded header, the recorded payload and the simulated state.
@@ -258,7 +271,10 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
         |what: String, difference| Finding::Diverged { step: row.step, what, difference };
     let expected_count = solver.particle_count();
     if particles.len() != expected_count {
-        let what = format!("recorded {} particles, simulated {expected_count}", particles.len());
+        let what = format!(
+            "/particles: recorded {} particles, simulated {expected_count}",
+            particles.len()
+        );
         return diverged(what, None);
     }
     let simulated_hash = solver.state_hash();
@@ -266,9 +282,10 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
         let simulated: Vec<ParticleState> =
             (0..expected_count).map(|index| bytemuck::cast(solver.particle(index))).collect();
         let difference = first_difference(particles, &simulated);
-        let what = difference
-            .as_ref()
-            .map_or_else(|| "the torn constraints differ".to_owned(), ToString::to_string);
+        let what = difference.as_ref().map_or_else(
+            || "the torn constraints differ".to_owned(),
+            |difference| format!("/particles: {difference}"),
+        );
         return diverged(what, difference);
     }
     let counts = [
@@ -277,7 +294,10 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
     ];
     let differs = |(_, recorded, simulated): &(_, u64, u64)| recorded != simulated;
     if let Some((name, recorded, simulated)) = counts.into_iter().find(differs) {
-        return diverged(format!("{name}: recorded {recorded}, simulated {simulated}"), None);
+        return diverged(
+            format!("/steps: {name}: recorded {recorded}, simulated {simulated}"),
+            None,
+        );
     }
     if row.state_hash != simulated_hash {
         let what = format!(

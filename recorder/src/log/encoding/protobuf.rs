@@ -4,6 +4,7 @@
 //! declares the same messages for readers of a file.
 
 use prost::Message;
+use prost::encoding::{DecodeContext, WireType, decode_key, decode_varint, skip_field};
 use prost_types::Timestamp;
 use sim_contract::ParticleState;
 
@@ -17,8 +18,12 @@ const UINT32: i32 = 5;
 /// `type` of a [`PackedElementField`]: f32.
 const FLOAT32: i32 = 7;
 
-/// The key of the last field, `data`: number 6, length-delimited.
+/// Number of the last field, `data`.
+const DATA_NUMBER: u32 = 6;
+/// The key of `data`, which is length-delimited.
 const DATA_KEY: u8 = 6 << 3 | 2;
+/// Most bytes of a cloud beside its data. Ours have about 150.
+const REST_SIZE_BYTES_MAX: usize = 1 << 12;
 
 /// Name, offset in bytes and numeric type.
 type PackedField = (&'static str, u32, i32);
@@ -151,20 +156,41 @@ impl PointCloudEncoder {
 
 /// Decodes the particles of a cloud that [`PointCloudEncoder`] encoded.
 pub(crate) fn decode_particles(message: &[u8]) -> Result<Vec<ParticleState>, String> {
-    let cloud = PointCloud::decode(message).map_err(|error| error.to_string())?;
+    let (rest, data) = split_data(message).ok_or("it is not a point cloud")?;
+    if rest.len() > REST_SIZE_BYTES_MAX {
+        let problem = "bytes beside its data (allowed: up to";
+        return Err(format!("it has {} {problem} {REST_SIZE_BYTES_MAX})", rest.len()));
+    }
+    let cloud = PointCloud::decode(rest.as_slice()).map_err(|error| error.to_string())?;
     let fields = cloud.fields.iter().map(|f| (f.name.as_str(), f.offset, f.r#type));
     if cloud.point_stride != 32 || !fields.eq(FIELDS) {
         return Err("its points are not particle states of 32 bytes".to_owned());
     }
-    if cloud.data.len() % 32 != 0 {
-        return Err(format!(
-            "its data of {} bytes is not a multiple of 32 bytes",
-            cloud.data.len()
-        ));
+    if data.len() % 32 != 0 {
+        return Err(format!("its data of {} bytes is not a multiple of 32 bytes", data.len()));
     }
-    let mut particles = vec![ParticleState::default(); cloud.data.len() / 32];
-    bytemuck::cast_slice_mut(&mut particles).copy_from_slice(&cloud.data);
+    let mut particles = vec![ParticleState::default(); data.len() / 32];
+    bytemuck::cast_slice_mut(&mut particles).copy_from_slice(data);
     Ok(particles)
+}
+
+/// Splits a cloud into its field `data` and the bytes of all other fields. Decoding those costs many
+/// times their size.
+fn split_data(message: &[u8]) -> Option<(Vec<u8>, &[u8])> {
+    let (mut rest, mut data) = (Vec::new(), &[][..]);
+    let mut left = message;
+    while !left.is_empty() {
+        let field = left;
+        let (number, wire_type) = decode_key(&mut left).ok()?;
+        if (number, wire_type) == (DATA_NUMBER, WireType::LengthDelimited) {
+            let size = usize::try_from(decode_varint(&mut left).ok()?).ok()?;
+            (data, left) = left.split_at_checked(size)?;
+        } else {
+            skip_field(wire_type, number, &mut left, DecodeContext::default()).ok()?;
+            rest.extend_from_slice(&field[..field.len() - left.len()]);
+        }
+    }
+    Some((rest, data))
 }
 
 /// Returns the message on `/tf`: the scene's frame is at `origin` (m) of the map, without rotation.

@@ -6,7 +6,11 @@ use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use mcap::MAGIC;
 use mcap::records::op;
 
-use super::chunk::{CHUNK_COUNT_MAX, LocatedChunk, RECORD_HEADER_SIZE_BYTES, record_size_bytes};
+use sim_contract::Stop;
+
+use super::chunk::{CHUNK_COUNT_MAX, ChannelSet, LocatedChunk, record_size_bytes};
+use crate::log::read::file_source::check_stop;
+use crate::log::read::limits::RECORD_HEADER_SIZE_BYTES;
 use crate::log::read::read_error::{LogEnd, ReadError};
 
 /// Size of a record's header and of the channel id that follows it in a message index.
@@ -19,6 +23,7 @@ const PROGRESS_PERIOD_BYTES: u64 = 256 << 20;
 pub(super) fn read(
     file: &File,
     size_bytes: u64,
+    stop: Option<&Stop>,
     on_progress: &mut dyn FnMut(u64, u64),
 ) -> Result<(Vec<LocatedChunk>, LogEnd), ReadError> {
     let mut source = BufReader::new(file);
@@ -27,6 +32,7 @@ pub(super) fn read(
     source.seek(SeekFrom::Start(byte))?;
     let mut next_progress_byte = 0;
     loop {
+        check_stop(stop)?;
         if byte >= next_progress_byte {
             on_progress(byte, size_bytes);
             next_progress_byte = byte + PROGRESS_PERIOD_BYTES;
@@ -42,11 +48,11 @@ pub(super) fn read(
             op::CHUNK => chunks.push(LocatedChunk {
                 offset: byte,
                 size_bytes: record_size,
-                channels: Vec::new(),
+                channels: ChannelSet::default(),
             }),
             op::MESSAGE_INDEX => {
                 if let (Some(chunk), Some(channel)) = (chunks.last_mut(), channel_id(&header)) {
-                    chunk.channels.push(channel);
+                    chunk.channels.add(channel);
                 }
             }
             // The index follows. It is damaged or missing, or this scan would not run.
@@ -74,12 +80,12 @@ fn channel_id(header: &[u8]) -> Option<u16> {
 /// result is shorter at the end of the file.
 fn read_header(source: &mut impl Read) -> Result<Vec<u8>, ReadError> {
     let mut header = vec![0; RECORD_HEADER_SIZE_BYTES];
-    if !fill(source, &mut header)? {
+    if !read_exactly(source, &mut header)? {
         return Ok(Vec::new());
     }
     if header[0] == op::MESSAGE_INDEX {
         let mut id = [0; size_of::<u16>()];
-        if fill(source, &mut id)? {
+        if read_exactly(source, &mut id)? {
             header.extend(id);
         }
     }
@@ -87,7 +93,7 @@ fn read_header(source: &mut impl Read) -> Result<Vec<u8>, ReadError> {
 }
 
 /// Fills `bytes`. Returns `false` if the file ends before.
-fn fill(source: &mut impl Read, bytes: &mut [u8]) -> Result<bool, ReadError> {
+pub(super) fn read_exactly(source: &mut impl Read, bytes: &mut [u8]) -> Result<bool, ReadError> {
     match source.read_exact(bytes) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),

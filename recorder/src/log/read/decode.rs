@@ -3,6 +3,7 @@
 use mcap::records::MessageHeader;
 use serde::de::DeserializeOwned;
 
+use super::limits::SizeLimits;
 use crate::log::encoding::decode_particles;
 use crate::log::message::Message;
 use crate::log::run::RunDescription;
@@ -21,6 +22,13 @@ pub struct LoggedMessage {
     pub publish_time_ns: u64,
 }
 
+impl LoggedMessage {
+    /// Returns the approximate memory use, in bytes.
+    pub(in crate::log) fn size_bytes(&self) -> usize {
+        size_of::<Self>() - size_of::<Message>() + self.message.size_bytes()
+    }
+}
+
 /// Decodes a message. Returns `None` for `/tf`, which no reader of ours needs. `Err` describes the
 /// error in the content.
 pub(in crate::log) fn decode_message(
@@ -28,7 +36,15 @@ pub(in crate::log) fn decode_message(
     header: &MessageHeader,
     data: &[u8],
     run: &RunDescription,
+    limits: &SizeLimits,
 ) -> Result<Option<LoggedMessage>, String> {
+    let size_bytes_max = limits.message_size_bytes_max(topic);
+    if data.len() as u64 > size_bytes_max {
+        return Err(format!(
+            "it has {} bytes (allowed: up to {size_bytes_max} for its scene)",
+            data.len()
+        ));
+    }
     let step =
         || run.step_at(header.publish_time).ok_or("its time is not the time of a step".to_owned());
     let message = match topic {
@@ -109,8 +125,8 @@ mod tests {
         invalid type: integer `7`, expected an object at line 1 column 1
         invalid type: string "x", expected a whole number at line 1 column 11
         EOF while parsing an object at line 1 column 1
-        invalid type: sequence, expected an object at line 1 column 0
-        a field is missing or has the wrong type
+        invalid length 0, expected an object with 9 elements at line 1 column 2
+        expected one column: compliance or stiffness
         expected a number, three numbers or null at line 1 column 111
         "#);
     }

@@ -4,6 +4,7 @@ use std::io::Read;
 
 use sim_contract::ParticleState;
 
+use super::backlog::Backlog;
 use super::decode::LoggedMessage;
 use super::read_error::{LogEnd, ReadError};
 use super::reader::LogReader;
@@ -36,13 +37,14 @@ impl Frame {
 pub struct FrameReader<R> {
     log: LogReader<R>,
     updates: Vec<Message>,
+    backlog: Backlog,
     row: Option<StepRow>,
 }
 
 impl<R: Read> FrameReader<R> {
     /// Continues from the current position of `log`.
     pub fn new(log: LogReader<R>) -> Self {
-        Self { log, updates: Vec::new(), row: None }
+        Self { log, updates: Vec::new(), backlog: Backlog::default(), row: None }
     }
 
     /// Returns the recording.
@@ -58,7 +60,8 @@ impl<R: Read> FrameReader<R> {
     /// Returns the next snapshot, or `None` at the end of the readable part.
     ///
     /// # Errors
-    /// Like [`LogReader::next_message`], and if a snapshot has no row in `/steps`.
+    /// Like [`LogReader::next_message`], and if a snapshot has no row in `/steps` or the messages
+    /// before it need more memory than a recording of its scene can.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, ReadError> {
         while let Some(LoggedMessage { message, .. }) = self.log.next_message()? {
             match message {
@@ -67,12 +70,23 @@ impl<R: Read> FrameReader<R> {
                     let row = self.row.take().filter(|row| row.step == step);
                     let row = row.ok_or(ReadError::NoRow { step })?;
                     let updates = std::mem::take(&mut self.updates);
+                    self.backlog.remove_to(step);
                     return Ok(Some(Frame { updates, row, particles }));
                 }
-                update => self.updates.push(update),
+                update => self.add_update(update)?,
             }
         }
         Ok(None)
+    }
+
+    fn add_update(&mut self, update: Message) -> Result<(), ReadError> {
+        let size_bytes_max = self.log.limits().decoded_size_bytes_max();
+        if self.backlog.add(&update) > size_bytes_max {
+            let byte = self.log.intact_count();
+            return Err(ReadError::TooManyMessages { byte, size_bytes_max });
+        }
+        self.updates.push(update);
+        Ok(())
     }
 
     /// Returns the messages after the last snapshot, once [`FrameReader::next_frame`] has returned

@@ -1,8 +1,10 @@
 //! The end of a file, and the reasons why a file cannot be read as a recording.
 
 use std::fmt;
+use std::io;
 use std::path::PathBuf;
 
+use super::file_source::Interrupted;
 use crate::log::run::{FORMAT_VERSION, FORMAT_VERSION_MIN};
 
 /// The end of a file.
@@ -41,7 +43,10 @@ impl fmt::Display for LogEnd {
 pub enum ReadError {
     /// The operating system reports an error.
     #[error("cannot read the file")]
-    Io(#[from] std::io::Error),
+    Io(#[source] io::Error),
+    /// A signal ended the reading.
+    #[error("interrupted")]
+    Interrupted,
     /// The file does not exist, but its unfinished part does.
     #[error(
         "no such file, but {} exists: a recorder is writing it, or one was killed. You can read it \
@@ -81,10 +86,14 @@ pub enum ReadError {
         key: String,
     },
     /// A message with a correct checksum and invalid content.
-    #[error("the message on {topic} that ends before byte {byte} is invalid: {what}")]
+    #[error(
+        "step {sequence}: the message on {topic} that ends before byte {byte} is invalid: {what}"
+    )]
     Malformed {
         /// Name of the topic.
         topic: &'static str,
+        /// Low 32 bits of the step, as the file states it.
+        sequence: u32,
         /// Position in the file.
         byte: u64,
         /// The error in the content.
@@ -98,10 +107,28 @@ pub enum ReadError {
         /// The error in the chunk.
         cause: String,
     },
+    /// More messages without a snapshot than any recorder writes.
+    #[error(
+        "the messages before byte {byte} that belong to no snapshot yet take more than \
+         {size_bytes_max} bytes of memory; no recorder writes such a file"
+    )]
+    TooManyMessages {
+        /// Position in the file.
+        byte: u64,
+        /// The limit for the scene of the file.
+        size_bytes_max: usize,
+    },
     /// A snapshot without a header.
     #[error("the snapshot of step {step} is not preceded by its row in /steps")]
     NoRow {
         /// The step of the snapshot.
         step: u64,
     },
+}
+
+impl From<io::Error> for ReadError {
+    fn from(error: io::Error) -> Self {
+        let cause = error.get_ref().and_then(|inner| inner.downcast_ref());
+        if let Some(Interrupted) = cause { Self::Interrupted } else { Self::Io(error) }
+    }
 }

@@ -1,16 +1,19 @@
 //! Reads a recording from its start, with every checksum verified, as far as the file goes.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, Read};
 use std::path::Path;
 
-use mcap::records::Record;
+use mcap::records::{AttachmentHeader, Header, MessageHeader, Record, op};
+use sim_contract::Stop;
 
+use super::audit::{Audit, HeaderText, is_current_format};
 use super::decode::{LoggedMessage, decode_message};
+use super::file_source::FileSource;
+use super::limits::SizeLimits;
 use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
-use super::records::{READ_SIZE_BYTES_MAX, RecordReader};
+use super::records::RecordReader;
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
     SCENE_ATTACHMENT,
@@ -26,20 +29,36 @@ const FORMAT_VERSION_KEY: &str = "format_version";
 /// A truncated or damaged file is read as far as it goes, and [`LogReader::end`] reports it.
 pub struct LogReader<R> {
     records: RecordReader<R>,
+    limits: SizeLimits,
     channels: BTreeMap<u16, Option<Topic>>,
     run: RunDescription,
     scene: Vec<u8>,
     closing: Option<Closing>,
+    header: HeaderText,
+    audit: Option<Box<Audit>>,
 }
 
-impl LogReader<BufReader<File>> {
+impl LogReader<FileSource> {
     /// Opens a file and reads its header.
     ///
     /// # Errors
     /// If the file is not a recording or has no readable header.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
+        Self::open_file(path, None)
+    }
+
+    /// Opens a file and reads its header. After a signal, this and every later read ends with
+    /// [`ReadError::Interrupted`].
+    ///
+    /// # Errors
+    /// Like [`LogReader::open`], and after a signal.
+    pub fn open_until(path: &Path, stop: &Stop) -> Result<Self, ReadError> {
+        Self::open_file(path, Some(stop.clone()))
+    }
+
+    pub(in crate::log) fn open_file(path: &Path, stop: Option<Stop>) -> Result<Self, ReadError> {
         let file = open_regular_file(path).map_err(|cause| open_error(path, cause))?;
-        Self::new(BufReader::with_capacity(READ_SIZE_BYTES_MAX, file))
+        Self::new(FileSource::new(file, stop))
     }
 }
 
@@ -60,31 +79,60 @@ impl<R: Read> LogReader<R> {
     /// If the source is not a recording or has no readable header.
     pub fn new(source: R) -> Result<Self, ReadError> {
         let mut records = RecordReader::new(source);
-        let mut library = String::new();
+        let mut header = HeaderText::default();
         let mut scene = None;
         loop {
             match records.next(read_header_record)? {
-                Some(HeaderRecord::Library(name)) => library = name,
-                Some(HeaderRecord::Scene(bytes)) => scene = Some(bytes),
+                Some(HeaderRecord::File { profile, library }) => {
+                    (header.profile, header.library) = (profile, library);
+                }
+                Some(HeaderRecord::Scene(attachment, bytes)) => {
+                    (header.scene, scene) = (Some(attachment), Some(bytes));
+                }
                 Some(HeaderRecord::Run(map)) => {
                     if scene.is_none() && !map.contains_key(FORMAT_VERSION_KEY) {
-                        return Err(ReadError::Foreign { library });
+                        return Err(ReadError::Foreign { library: header.library });
                     }
                     let (run, scene) = (read_run(&map)?, scene.unwrap_or_default());
+                    let limits = SizeLimits::new(&run, scene.len());
+                    records.set_limits(limits);
                     let channels = BTreeMap::new();
-                    return Ok(Self { records, channels, run, scene, closing: None });
+                    header.run = map;
+                    return Ok(Self {
+                        records,
+                        limits,
+                        channels,
+                        run,
+                        scene,
+                        closing: None,
+                        header,
+                        audit: None,
+                    });
                 }
                 Some(HeaderRecord::Skipped) => {}
-                Some(HeaderRecord::Message) => return Err(ReadError::Foreign { library }),
+                Some(HeaderRecord::Message) => {
+                    return Err(ReadError::Foreign { library: header.library });
+                }
                 None => {
                     return Err(match records.end {
-                        Some(LogEnd::Complete) | None => ReadError::Foreign { library },
+                        Some(LogEnd::Complete) | None => {
+                            ReadError::Foreign { library: header.library }
+                        }
                         Some(end) if records.is_mcap => ReadError::NoHeader(end),
                         Some(_) => ReadError::NotMcap,
                     });
                 }
             }
         }
+    }
+
+    pub(in crate::log) fn limits(&self) -> SizeLimits {
+        self.limits
+    }
+
+    /// Returns the number of bytes of the file that are read and intact.
+    pub(in crate::log) fn intact_count(&self) -> u64 {
+        self.records.intact_count()
     }
 
     /// Returns the run that was recorded.
@@ -95,6 +143,28 @@ impl<R: Read> LogReader<R> {
     /// Returns the text of the complete effective scene. It is empty if the file has none.
     pub fn scene(&self) -> &[u8] {
         &self.scene
+    }
+
+    /// Compares the file with the bytes that a recorder writes for the same content, while it is read.
+    /// Messages of older formats lack fields, so they are not compared.
+    #[must_use]
+    pub fn with_audit(mut self) -> Self {
+        if self.is_current_format() {
+            let mut audit = Box::<Audit>::default();
+            audit.check_header(&self.header, &self.run);
+            self.audit = Some(audit);
+        }
+        self
+    }
+
+    /// Returns the comparison so far. `None` without [`LogReader::with_audit`], and for older formats.
+    pub fn audit(&self) -> Option<&Audit> {
+        self.audit.as_deref()
+    }
+
+    /// Returns `true` if the file has the format that this recorder writes.
+    pub fn is_current_format(&self) -> bool {
+        is_current_format(&self.header.run)
     }
 
     /// Returns the closing metadata, once the last message has been read.
@@ -113,31 +183,91 @@ impl<R: Read> LogReader<R> {
     /// # Errors
     /// If the operating system reports an error or the content of a message is invalid.
     pub fn next_message(&mut self) -> Result<Option<LoggedMessage>, ReadError> {
+        let Self { records, limits, channels, run, closing, audit, .. } = self;
+        let mut content = Content { limits, channels, run, closing, audit };
         loop {
-            let (channels, closing, run) = (&mut self.channels, &mut self.closing, &self.run);
-            let next = self.records.next(|record, byte| match record {
-                Record::Channel(channel) => {
-                    channels.insert(channel.id, Topic::from_name(&channel.topic));
-                    Ok(None)
-                }
-                Record::Metadata(metadata) if metadata.name == CLOSING_METADATA => {
-                    *closing = Some(Closing::from_map(&metadata.metadata));
-                    Ok(None)
-                }
-                Record::Message { header, data } => {
-                    let topic = channels.get(&header.channel_id).copied().flatten();
-                    let Some(topic) = topic else { return Ok(None) };
-                    let malformed = |what| ReadError::Malformed { topic: topic.name(), byte, what };
-                    decode_message(topic, &header, &data, run).map_err(malformed)
-                }
-                _ => Ok(None),
-            })?;
-            match next {
+            match records.next(|record, byte| content.read(record, byte))? {
                 Some(Some(logged)) => return Ok(Some(logged)),
                 Some(None) => {}
-                None => return Ok(None),
+                None => break,
             }
         }
+        if let (Some(LogEnd::Complete), Some(audit)) = (&records.end, audit) {
+            audit.check_end(closing.as_ref());
+        }
+        Ok(None)
+    }
+}
+
+/// The records after the header, and the parts of a reader that they change.
+struct Content<'a> {
+    limits: &'a SizeLimits,
+    channels: &'a mut BTreeMap<u16, Option<Topic>>,
+    run: &'a RunDescription,
+    closing: &'a mut Option<Closing>,
+    audit: &'a mut Option<Box<Audit>>,
+}
+
+impl Content<'_> {
+    fn read(&mut self, record: Record<'_>, byte: u64) -> Result<Option<LoggedMessage>, ReadError> {
+        match record {
+            Record::Schema { header, data } => {
+                if let Some(audit) = self.audit {
+                    audit.add_schema(header, &data);
+                }
+            }
+            Record::Channel(channel) => {
+                if let Some(audit) = self.audit {
+                    audit.check_channel(&channel);
+                }
+                self.channels.insert(channel.id, Topic::from_name(&channel.topic));
+            }
+            Record::Metadata(metadata) if metadata.name == CLOSING_METADATA => {
+                let closing = Closing::from_map(&metadata.metadata);
+                if let Some(audit) = self.audit {
+                    audit.check_closing(&metadata.metadata, &closing);
+                }
+                *self.closing = Some(closing);
+            }
+            Record::Metadata(metadata) => {
+                if let Some(audit) = self.audit {
+                    audit.add_metadata(&metadata.name);
+                }
+            }
+            Record::Attachment { header, .. } => {
+                if let Some(audit) = self.audit {
+                    audit.add_attachment(&header.name);
+                }
+            }
+            Record::Message { header, data } => return self.read_message(&header, &data, byte),
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    fn read_message(
+        &mut self,
+        header: &MessageHeader,
+        data: &[u8],
+        byte: u64,
+    ) -> Result<Option<LoggedMessage>, ReadError> {
+        let channel = self.channels.get(&header.channel_id).copied();
+        let Some(topic) = channel.flatten() else {
+            if let (None, Some(audit)) = (channel, &mut self.audit) {
+                audit.report_unknown_channel(header.channel_id);
+            }
+            return Ok(None);
+        };
+        let sequence = header.sequence;
+        let malformed = |what| ReadError::Malformed { topic: topic.name(), sequence, byte, what };
+        let logged = decode_message(topic, header, data, self.run, self.limits);
+        let logged = logged.map_err(malformed)?;
+        match (&logged, &mut self.audit) {
+            (_, None) => {}
+            (Some(logged), Some(audit)) => audit.check_message(logged, data, self.run),
+            (None, Some(audit)) => audit.check_transform(header, data, self.run),
+        }
+        Ok(logged)
     }
 }
 
@@ -149,8 +279,8 @@ impl<R> std::fmt::Debug for LogReader<R> {
 
 /// A record before the first message, reduced to what the reader uses.
 enum HeaderRecord {
-    Library(String),
-    Scene(Vec<u8>),
+    File { profile: String, library: String },
+    Scene(AttachmentHeader, Vec<u8>),
     Run(BTreeMap<String, String>),
     Message,
     Skipped,
@@ -159,14 +289,14 @@ enum HeaderRecord {
 #[allow(clippy::unnecessary_wraps, reason = "the signature that RecordReader requires")]
 fn read_header_record(record: Record<'_>, _byte: u64) -> Result<HeaderRecord, ReadError> {
     Ok(match record {
-        Record::Header(header) => HeaderRecord::Library(header.library),
+        Record::Header(Header { profile, library }) => HeaderRecord::File { profile, library },
         Record::Attachment { header, data, .. } if header.name == SCENE_ATTACHMENT => {
-            HeaderRecord::Scene(data.into_owned())
+            HeaderRecord::Scene(header, data.into_owned())
         }
         Record::Metadata(metadata) if metadata.name == RUN_METADATA => {
             HeaderRecord::Run(metadata.metadata)
         }
-        Record::Message { .. } => HeaderRecord::Message,
+        Record::Message { .. } | Record::Unknown { opcode: op::CHUNK, .. } => HeaderRecord::Message,
         _ => HeaderRecord::Skipped,
     })
 }

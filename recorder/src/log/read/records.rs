@@ -1,27 +1,38 @@
 //! The records of an MCAP file, one by one, with every checksum verified.
+//!
+//! This reader owns the framing of the file, so that it can compare each length with the limits of
+//! the scene before anything is allocated. The mcap crate decompresses the chunks and parses records.
 
-use std::io::{ErrorKind, Read};
+use std::io::Read;
 
 use mcap::McapError;
 use mcap::records::{Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::sans_io::linear_reader::LinearReadEvent;
 
+use super::chunk_data::ChunkData;
+use super::fault::Fault;
+use super::lengths::check_lengths;
+use super::limits::{
+    HEADER_RECORD_SIZE_BYTES_MAX, RECORD_HEADER_SIZE_BYTES, SizeLimits, TEXT_SIZE_BYTES_MAX,
+};
 use super::read_error::{LogEnd, ReadError};
+use super::source::Source;
 
-/// Longest record and largest chunk to read, in bytes. The largest possible snapshot and topology
-/// are smaller, and a damaged length does not cause a huge allocation.
-pub(in crate::log) const RECORD_SIZE_BYTES_MAX: usize = 1 << 30;
-/// Most bytes to request from the file at a time.
-pub(in crate::log) const READ_SIZE_BYTES_MAX: usize = 1 << 20;
+/// Bytes of a footer that its checksum includes, and the checksum.
+const FOOTER_SIZE_BYTES: (usize, usize) = (16, 4);
 
 /// Reads the records one by one and remembers how far the file is intact.
 pub(in crate::log) struct RecordReader<R> {
-    linear: LinearReader,
-    source: R,
-    /// Bytes read from the source.
-    read_count: u64,
-    /// End of the last intact record, or of the chunk that contains it. The linear reader never
-    /// gets more than it requests, so this is exact.
+    source: Source<R>,
+    /// `None` until the size of the scene is known.
+    limits: Option<SizeLimits>,
+    /// The source is a part of a file, without magic.
+    is_part: bool,
+    /// The record of the file that was read last.
+    body: Vec<u8>,
+    /// The chunk that is being read.
+    chunk: Option<ChunkData>,
+    /// End of the last intact record, or of the chunk that contains it.
     intact_count: u64,
     /// The file starts as an MCAP file does.
     pub(in crate::log) is_mcap: bool,
@@ -29,27 +40,47 @@ pub(in crate::log) struct RecordReader<R> {
     pub(in crate::log) end: Option<LogEnd>,
 }
 
+/// The part of a file that was read last.
+enum Part {
+    /// A record, in [`RecordReader::body`].
+    Record(u8),
+    /// A record that no reader of ours needs, or the header of a chunk.
+    Other,
+    End,
+}
+
 impl<R: Read> RecordReader<R> {
     pub(in crate::log) fn new(source: R) -> Self {
-        let options =
-            options().with_validate_data_section_crc(true).with_validate_summary_section_crc(true);
-        Self::with_options(source, options)
+        Self::with_source(Source::with_checksum(source), None)
     }
 
     /// Reads records from the middle of a file.
-    pub(in crate::log) fn without_magic(source: R) -> Self {
-        Self::with_options(source, options().with_skip_start_magic(true).with_skip_end_magic(true))
+    pub(in crate::log) fn without_magic(source: R, limits: SizeLimits) -> Self {
+        let reader = Self::with_source(Source::without_checksum(source), Some(limits));
+        Self { is_part: true, is_mcap: true, ..reader }
     }
 
-    fn with_options(source: R, options: LinearReaderOptions) -> Self {
+    fn with_source(source: Source<R>, limits: Option<SizeLimits>) -> Self {
         Self {
-            linear: LinearReader::new_with_options(options),
             source,
-            read_count: 0,
+            limits,
+            is_part: false,
+            body: Vec::new(),
+            chunk: None,
             intact_count: 0,
             is_mcap: false,
             end: None,
         }
+    }
+
+    /// Returns the position up to which the file is intact.
+    pub(in crate::log) fn intact_count(&self) -> u64 {
+        self.intact_count
+    }
+
+    /// Sets the limits, once the size of the scene is known. Until then no chunk is read.
+    pub(in crate::log) fn set_limits(&mut self, limits: SizeLimits) {
+        self.limits = Some(limits);
     }
 
     /// Passes the next record to `read`, with the position up to which the file is intact.
@@ -59,67 +90,189 @@ impl<R: Read> RecordReader<R> {
         read: impl FnOnce(Record<'_>, u64) -> Result<T, ReadError>,
     ) -> Result<Option<T>, ReadError> {
         while self.end.is_none() {
-            let error = match self.linear.next_event() {
-                None => {
-                    self.end = Some(LogEnd::Complete);
-                    break;
-                }
-                Some(Ok(LinearReadEvent::ReadRequest(wanted_count))) => {
-                    let buffer = self.linear.insert(wanted_count.min(READ_SIZE_BYTES_MAX));
-                    let count = read_some(&mut self.source, buffer)?;
-                    self.linear.notify_read(count);
-                    self.read_count += count as u64;
-                    continue;
-                }
-                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
-                    self.is_mcap = true;
-                    self.intact_count = self.read_count;
-                    match parse(opcode, data) {
-                        Ok(record) => return read(record, self.intact_count).map(Some),
-                        Err(error) => error,
+            let fault = if let Some(chunk) = &mut self.chunk {
+                match chunk.next_event() {
+                    Some(Ok(LinearReadEvent::ReadRequest(count))) => {
+                        match chunk.load(&mut self.source, count) {
+                            Ok(()) => continue,
+                            Err(fault) => fault,
+                        }
+                    }
+                    Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                        self.intact_count = self.source.position();
+                        match parse(opcode, data) {
+                            Ok(record) => return read(record, self.intact_count).map(Some),
+                            Err(fault) => fault,
+                        }
+                    }
+                    Some(Err(error)) => chunk.fault(error),
+                    None => {
+                        self.chunk = None;
+                        continue;
                     }
                 }
-                Some(Err(error)) => error,
+            } else {
+                match self.read_part() {
+                    Ok(Part::Record(opcode)) => {
+                        self.intact_count = self.source.position();
+                        match parse(opcode, &self.body) {
+                            Ok(record) => return read(record, self.intact_count).map(Some),
+                            Err(fault) => fault,
+                        }
+                    }
+                    Ok(Part::Other) => continue,
+                    Ok(Part::End) => {
+                        self.end = Some(LogEnd::Complete);
+                        break;
+                    }
+                    Err(fault) => fault,
+                }
             };
-            self.stop(&error);
+            self.stop(fault)?;
         }
         Ok(None)
     }
 
-    fn stop(&mut self, error: &McapError) {
+    fn stop(&mut self, fault: Fault) -> Result<(), ReadError> {
         let byte = self.intact_count;
-        self.end = Some(match error {
-            McapError::UnexpectedEof => LogEnd::Truncated { byte },
-            other => LogEnd::Damaged { byte, cause: other.to_string() },
+        self.end = Some(match fault {
+            Fault::Io(error) => return Err(error.into()),
+            Fault::Truncated => LogEnd::Truncated { byte },
+            Fault::Damaged(cause) => LogEnd::Damaged { byte, cause },
         });
+        Ok(())
+    }
+
+    fn read_part(&mut self) -> Result<Part, Fault> {
+        if !self.is_mcap {
+            self.read_magic()?;
+            self.is_mcap = true;
+        }
+        let checksum_before = self.source.checksum();
+        let mut header = [0; RECORD_HEADER_SIZE_BYTES];
+        match self.source.fill(&mut header)? {
+            RECORD_HEADER_SIZE_BYTES => {}
+            0 if self.is_part => return Ok(Part::End),
+            _ => return Err(Fault::Truncated),
+        }
+        let [opcode, length @ ..] = header;
+        let length = u64::from_le_bytes(length);
+        match opcode {
+            op::CHUNK => self.open_chunk(header, length),
+            op::DATA_END => self.read_data_end(length, checksum_before),
+            op::FOOTER => self.read_footer(length),
+            op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA => {
+                self.read_record(opcode, length, TEXT_SIZE_BYTES_MAX)
+            }
+            op::ATTACHMENT => self.read_record(opcode, length, HEADER_RECORD_SIZE_BYTES_MAX),
+            op::MESSAGE => {
+                let limits = self.limits.as_ref();
+                let limit = limits.map_or(TEXT_SIZE_BYTES_MAX, SizeLimits::record_size_bytes_max);
+                if length > limit {
+                    return Err(Fault::too_large("a message", length, limit));
+                }
+                self.read_record(opcode, length, limit)
+            }
+            0 => Err(Fault::Damaged("a record with opcode 0".to_owned())),
+            _ => self.skip_record(length),
+        }
+    }
+
+    fn read_magic(&mut self) -> Result<(), Fault> {
+        let mut magic = [0; mcap::MAGIC.len()];
+        if self.source.fill(&mut magic)? < magic.len() {
+            return Err(Fault::Truncated);
+        }
+        if magic == *mcap::MAGIC { Ok(()) } else { Err(McapError::BadMagic.into()) }
+    }
+
+    /// Reads a record into [`Self::body`]. Other tools may have added longer records than ours after
+    /// the header of a recording. They are skipped.
+    fn read_record(&mut self, opcode: u8, length: u64, limit: u64) -> Result<Part, Fault> {
+        if length <= limit {
+            self.source.read_exactly(length, &mut self.body)?;
+            return Ok(Part::Record(opcode));
+        }
+        match self.limits {
+            Some(_) => self.skip_record(length),
+            None => Err(Fault::too_large("a record before the first message", length, limit)),
+        }
+    }
+
+    fn skip_record(&mut self, length: u64) -> Result<Part, Fault> {
+        self.source.skip(length)?;
+        self.intact_count = self.source.position();
+        Ok(Part::Other)
+    }
+
+    /// Reads the header of a chunk. A chunk before the metadata of the run is not one of ours. It is
+    /// reported, but not read.
+    fn open_chunk(
+        &mut self,
+        header: [u8; RECORD_HEADER_SIZE_BYTES],
+        length: u64,
+    ) -> Result<Part, Fault> {
+        let Some(limits) = &self.limits else {
+            self.body.clear();
+            return Ok(Part::Record(op::CHUNK));
+        };
+        self.chunk = Some(ChunkData::open(&mut self.source, header, length, limits)?);
+        Ok(Part::Other)
+    }
+
+    fn read_data_end(&mut self, length: u64, calculated: Option<u32>) -> Result<Part, Fault> {
+        self.read_short(length)?;
+        let saved = self.body.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
+        let saved =
+            saved.ok_or_else(|| Fault::Damaged("the end of the data is too short".into()))?;
+        if let Some(calculated) = calculated.filter(|calculated| saved != 0 && *calculated != saved)
+        {
+            return Err(McapError::BadDataCrc { saved, calculated }.into());
+        }
+        self.source.restart_checksum();
+        self.intact_count = self.source.position();
+        Ok(Part::Other)
+    }
+
+    fn read_footer(&mut self, length: u64) -> Result<Part, Fault> {
+        let (checked_size, crc_size) = FOOTER_SIZE_BYTES;
+        let mut checked = vec![0; checked_size];
+        if self.source.fill(&mut checked)? < checked_size {
+            return Err(Fault::Truncated);
+        }
+        let calculated = self.source.checksum();
+        let mut saved = [0; size_of::<u32>()];
+        if self.source.fill(&mut saved)? < crc_size {
+            return Err(Fault::Truncated);
+        }
+        if length != (checked_size + crc_size) as u64 {
+            return Err(Fault::Damaged("the footer has another length".to_owned()));
+        }
+        let saved = u32::from_le_bytes(saved);
+        if let Some(calculated) = calculated.filter(|calculated| saved != 0 && *calculated != saved)
+        {
+            return Err(McapError::BadSummaryCrc { saved, calculated }.into());
+        }
+        self.read_magic()?;
+        self.intact_count = self.source.position();
+        Ok(Part::End)
+    }
+
+    fn read_short(&mut self, length: u64) -> Result<(), Fault> {
+        if length > TEXT_SIZE_BYTES_MAX {
+            return Err(Fault::too_large("the end of the data", length, TEXT_SIZE_BYTES_MAX));
+        }
+        self.source.read_exactly(length, &mut self.body)
     }
 }
 
-fn options() -> LinearReaderOptions {
-    LinearReaderOptions::default()
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(RECORD_SIZE_BYTES_MAX)
-}
-
-/// Parses the records that this reader uses. Index records and statistics stay unknown, so that a
-/// damaged one does not end the reading.
-fn parse(opcode: u8, data: &[u8]) -> mcap::McapResult<Record<'_>> {
+/// Parses the records that this reader uses.
+fn parse(opcode: u8, data: &[u8]) -> Result<Record<'_>, Fault> {
     match opcode {
-        op::HEADER | op::CHANNEL | op::MESSAGE | op::ATTACHMENT | op::METADATA => {
-            mcap::parse_record(opcode, data)
+        op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::ATTACHMENT | op::METADATA => {
+            check_lengths(opcode, data).map_err(Fault::Damaged)?;
+            Ok(mcap::parse_record(opcode, data)?)
         }
         _ => Ok(Record::Unknown { opcode, data: data.into() }),
-    }
-}
-
-pub(in crate::log) fn read_some(
-    source: &mut impl Read,
-    buffer: &mut [u8],
-) -> std::io::Result<usize> {
-    loop {
-        match source.read(buffer) {
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            other => return other,
-        }
     }
 }

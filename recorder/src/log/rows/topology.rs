@@ -8,6 +8,8 @@ use super::json::JsonNumber;
 
 /// The constraints of a scene in columns. The position in a column is the constraint's index.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Columns")]
+#[schemars(!try_from)]
 pub struct TopologyRow {
     /// The first step that shows this load.
     pub step: u64,
@@ -32,13 +34,42 @@ pub struct TopologyRow {
 }
 
 /// The column of [`TopologyRow`] whose name depends on the method.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Softness {
     /// Method xpbd, in m/N.
     Compliance(Vec<PlainF32>),
     /// Method pbd, 0..=1.
     Stiffness(Vec<PlainF32>),
+}
+
+/// The columns as they are read. A flattened enum would keep every number in 32 bytes meanwhile.
+#[derive(Deserialize)]
+struct Columns {
+    step: u64,
+    revision: u32,
+    a: Vec<u32>,
+    b: Vec<u32>,
+    rest_length: Vec<PlainF32>,
+    compliance: Option<Vec<PlainF32>>,
+    stiffness: Option<Vec<PlainF32>>,
+    kind: Vec<u32>,
+    torn: Vec<u32>,
+}
+
+impl TryFrom<Columns> for TopologyRow {
+    type Error = &'static str;
+
+    fn try_from(columns: Columns) -> Result<Self, Self::Error> {
+        let Columns { step, revision, a, b, rest_length, compliance, stiffness, kind, torn } =
+            columns;
+        let softness = match (compliance, stiffness) {
+            (Some(compliance), None) => Softness::Compliance(compliance),
+            (None, Some(stiffness)) => Softness::Stiffness(stiffness),
+            _ => return Err("expected one column: compliance or stiffness"),
+        };
+        Ok(Self { step, revision, a, b, rest_length, softness, kind, torn })
+    }
 }
 
 #[derive(JsonSchema)]
@@ -67,6 +98,15 @@ impl TopologyRow {
             kind: constraints.iter().map(|c| c.kind).collect(),
             torn: Vec::new(),
         }
+    }
+
+    /// Returns the memory of the columns, in bytes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        let (Softness::Compliance(softness) | Softness::Stiffness(softness)) = &self.softness;
+        let columns = [&self.a, &self.b, &self.kind, &self.torn].map(|one| size_of_val(&one[..]));
+        columns.iter().sum::<usize>()
+            + size_of_val(&self.rest_length[..])
+            + size_of_val(&softness[..])
     }
 
     /// Returns the constraints that were torn before the recording, with unknown causes.

@@ -58,9 +58,12 @@ impl Digest {
                 self.size_bytes += message.size_bytes();
                 self.colliders.push(row.clone());
             }
-            Message::Tears(_) => self.size_bytes += message.size_bytes(),
+            Message::Tears(_) | Message::Outcome(_) => self.size_bytes += message.size_bytes(),
             Message::Parameters(row) => self.parameters.push(row.clone()),
-            Message::Status(row) => self.statuses.push(row.clone()),
+            Message::Status(row) => {
+                self.size_bytes += message.size_bytes();
+                self.statuses.push(row.clone());
+            }
             _ => {}
         }
     }
@@ -96,16 +99,16 @@ impl DigestCache {
 
     /// Stores a digest and drops the least recently used ones beyond the limit.
     pub(super) fn insert(&mut self, chunk: usize, digest: Digest) {
-        self.size_bytes += digest.size_bytes;
+        self.size_bytes += size_of::<Digest>() + digest.size_bytes;
         self.clock += 1;
         if let Some((_, replaced)) = self.by_chunk.insert(chunk, (self.clock, digest)) {
-            self.size_bytes -= replaced.size_bytes;
+            self.size_bytes -= size_of::<Digest>() + replaced.size_bytes;
         }
         while self.size_bytes > CACHE_SIZE_BYTES_MAX && self.by_chunk.len() > 1 {
             let oldest = self.by_chunk.iter().min_by_key(|(_, (used, _))| *used);
             let Some(oldest) = oldest.map(|(chunk, _)| *chunk) else { break };
             if let Some((_, dropped)) = self.by_chunk.remove(&oldest) {
-                self.size_bytes -= dropped.size_bytes;
+                self.size_bytes -= size_of::<Digest>() + dropped.size_bytes;
             }
         }
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use recorder::{LogEnd, ReadError, Tape, TapeError, TapeState};
+use sim_contract::Stop;
 
 use crate::scene::load::Load;
 use crate::scene::summary::SceneSummary;
@@ -34,7 +35,11 @@ impl Recording {
 }
 
 /// Opens a recording. The errors do not name the file.
-pub(super) fn open(path: &Path, note: &mut dyn FnMut(&str)) -> anyhow::Result<Recording> {
+pub(super) fn open(
+    path: &Path,
+    stop: &Stop,
+    note: &mut dyn FnMut(&str),
+) -> anyhow::Result<Recording> {
     let metadata = fs::metadata(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound => anyhow!("no such file; {GIVE_A_RECORDING}"),
         _ => anyhow!("cannot read it: {error}"),
@@ -52,7 +57,7 @@ pub(super) fn open(path: &Path, note: &mut dyn FnMut(&str)) -> anyhow::Result<Re
             path.display()
         ));
     };
-    let mut tape = Tape::open(path, &mut on_walk).map_err(with_remedy)?;
+    let mut tape = Tape::open(path, Some(stop), &mut on_walk).map_err(with_remedy)?;
     if *tape.log().end() != LogEnd::Complete {
         let (end, last) = (tape.log().end(), tape.last_step());
         note(&format!("warning: {} is {end}; shown up to step {last}", path.display()));

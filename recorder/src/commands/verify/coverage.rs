@@ -1,0 +1,62 @@
+//! The content of a recording that a verification does not compare.
+
+/// Content that a file has only once, so that nothing in it can contradict an edit.
+const ALWAYS: [&str; 9] = [
+    "the times of reception (log_time) of messages and of the scene",
+    "wake_late_ns and solve_ns in /steps, which the node measured",
+    "the values of /status, which the node measured",
+    "time_scale in /parameters and the paused flag of keyframes, which belong to the node",
+    "the outcomes of pause, resume, step and load beyond their order",
+    "run_id, epoch_ns, contract_version and recorder_version in the metadata 'run', as far as other \
+     parts agree with them",
+    "stop_reason and the numbers of received, lost and missing messages in the metadata 'recorder'",
+    "the name of the mcap library in the header of the file",
+    "the indexes and the statistics of the file",
+];
+/// Content that a recording of a node has only once.
+const LIVE: [&str; 2] = [
+    "values of the scene that no recorded state depends on",
+    "fields of commands in /outcomes that have no effect on a state, such as client_id and sequence",
+];
+
+/// The extent of a verification.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Coverage {
+    /// The id of the run is the hash of the scene and all commands, and it was compared.
+    pub(super) has_run_hash: bool,
+    /// The messages have the form of an older recorder.
+    pub(super) is_older_format: bool,
+    /// Snapshots before the first one with a keyframe.
+    pub(super) skipped_count: u64,
+    /// The first state was restored from the recording, not computed from the scene.
+    pub(super) is_restored: bool,
+    /// Messages after the last snapshot.
+    pub(super) trailing_count: usize,
+    /// Names of content of other programs.
+    pub(super) foreign: Vec<String>,
+}
+
+impl Coverage {
+    /// Describes the content that was not compared.
+    pub(super) fn not_covered(&self) -> Vec<String> {
+        let mut all: Vec<String> = ALWAYS.map(ToOwned::to_owned).into();
+        if !self.has_run_hash {
+            all.extend(LIVE.map(ToOwned::to_owned));
+        }
+        if self.is_older_format {
+            all.push("the exact form of messages, because the format is older".to_owned());
+        }
+        if self.is_restored {
+            all.push("the first state, from which the simulation started".to_owned());
+        }
+        if self.skipped_count > 0 {
+            let count = self.skipped_count;
+            all.push(format!("{count} snapshots before the first one with a keyframe"));
+        }
+        if self.trailing_count > 0 {
+            all.push(format!("{} messages after the last snapshot", self.trailing_count));
+        }
+        all.extend(self.foreign.iter().map(|name| format!("{name}, which no recorder writes")));
+        all
+    }
+}

@@ -1,0 +1,82 @@
+//! The copies of the scene in a recording, compared with the scene itself.
+
+use recorder::{Message, RunDescription, SurfaceRow, TopologyRow};
+use sim_contract::{LoadHeader, Triangle};
+use sim_solver::{Scene, Solver};
+
+use crate::simulation::state_writer::constraint_state;
+
+/// Compares the metadata of the run with the scene. Returns a description of the first difference.
+pub(super) fn compare_run(run: &RunDescription, text: &[u8], scene: &Scene) -> Option<String> {
+    if text != scene.to_toml().as_bytes() {
+        return Some(
+            "the attachment scene.toml is not the complete scene of a recorder".to_owned(),
+        );
+    }
+    let is_same_origin = run.origin.map(f64::to_bits) == scene.origin.map(f64::to_bits);
+    let fields = [
+        ("scene", run.scene_name == scene.name),
+        ("origin", is_same_origin),
+        ("rate_hz", run.rate_hz == scene.solver.rate_hz),
+        ("method", run.method == scene.solver.method as u32),
+    ];
+    let (name, _) = fields.into_iter().find(|(_, is_same)| !is_same)?;
+    Some(format!("the metadata 'run': its '{name}' is not that of the scene"))
+}
+
+/// Compares the metadata of the run with the elements of the scene.
+pub(super) fn compare_counts(run: &RunDescription, solver: &Solver) -> Option<String> {
+    let counts = [
+        ("particle_count", run.particle_count, solver.particle_count()),
+        ("constraint_count", run.constraint_count, solver.constraint_count()),
+    ];
+    let is_other = |(_, recorded, expected): &(_, u32, usize)| *recorded as usize != *expected;
+    let (name, recorded, expected) = counts.into_iter().find(is_other)?;
+    Some(format!("the metadata 'run': its {name} is {recorded}, but the scene has {expected}"))
+}
+
+/// Compares `/topology` and `/surface` with the elements of the scene.
+pub(super) fn compare_load(
+    message: &Message,
+    run: &RunDescription,
+    solver: &Solver,
+) -> Option<String> {
+    match message {
+        Message::Topology(row) => compare_topology(row, run, solver),
+        Message::Surface(row) => {
+            let triangles: Vec<_> =
+                solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
+            let expected = SurfaceRow::new(&LoadHeader::default(), &triangles).triangles;
+            let place = first_difference(&row.triangles, &expected)?;
+            Some(format!("/surface: triangle {} is not that of the scene", place / 3))
+        }
+        _ => None,
+    }
+}
+
+fn compare_topology(row: &TopologyRow, run: &RunDescription, solver: &Solver) -> Option<String> {
+    let header = LoadHeader {
+        step: row.step,
+        topology_revision: row.revision,
+        method: run.method,
+        ..LoadHeader::default()
+    };
+    let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+    let expected =
+        TopologyRow { torn: row.torn.clone(), ..TopologyRow::new(&header, &constraints) };
+    if *row == expected {
+        return None;
+    }
+    let (found, expected) = (row.constraints(), expected.constraints());
+    let (Some(found), Some(expected)) = (found, expected) else {
+        return Some("/topology: its columns differ in length".to_owned());
+    };
+    let place = first_difference(&found, &expected).unwrap_or_default();
+    Some(format!("/topology: constraint {place} is not that of the scene"))
+}
+
+/// Returns the first place where two lists differ.
+fn first_difference<T: PartialEq>(one: &[T], other: &[T]) -> Option<usize> {
+    let place = one.iter().zip(other).position(|(one, other)| one != other);
+    place.or_else(|| (one.len() != other.len()).then_some(one.len().min(other.len())))
+}

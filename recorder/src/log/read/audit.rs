@@ -1,0 +1,239 @@
+//! Compares the bytes of a file with those that a recorder writes for the same content.
+//!
+//! A reader takes from each message what it needs, so an edit of the rest would go unnoticed where
+//! the checksums are gone: a key that it does not know, a time, the definition of a channel.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mcap::records::{AttachmentHeader, Channel, MessageHeader, SchemaHeader};
+
+use super::decode::LoggedMessage;
+use crate::log::encoding::{MessageEncoder, TopicFormat, TopicSchema, encode_transform};
+use crate::log::run::{
+    Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE, header_library,
+};
+use crate::log::topic::{AllCounts, Topic};
+
+/// Most names of foreign content to keep.
+const FOREIGN_MAX: usize = 16;
+
+/// A part of a file that differs from what a recorder writes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditDifference {
+    /// The step of the message, if the part belongs to one.
+    pub step: Option<u64>,
+    /// The part and its difference, for people.
+    pub what: String,
+}
+
+/// The result of the comparison so far.
+#[derive(Debug, Default)]
+pub struct Audit {
+    /// The first difference.
+    difference: Option<AuditDifference>,
+    /// Content of other programs, which is not compared.
+    foreign: BTreeSet<String>,
+    encoder: MessageEncoder,
+    /// By id.
+    schemas: BTreeMap<u16, Schema>,
+    /// Only `written` is set.
+    counts: AllCounts,
+    tf_count: u64,
+}
+
+/// A schema of a file.
+#[derive(Debug, PartialEq, Eq)]
+struct Schema {
+    name: String,
+    encoding: String,
+    data: Vec<u8>,
+}
+
+/// The header of a file, as it was read.
+#[derive(Debug, Clone, Default)]
+pub(super) struct HeaderText {
+    pub(super) profile: String,
+    pub(super) library: String,
+    pub(super) run: BTreeMap<String, String>,
+    /// `None` if the file has no scene.
+    pub(super) scene: Option<AttachmentHeader>,
+}
+
+impl Audit {
+    /// Returns the first difference.
+    pub fn difference(&self) -> Option<&AuditDifference> {
+        self.difference.as_ref()
+    }
+
+    /// Returns the names of content of other programs. It is not compared.
+    pub fn foreign(&self) -> impl Iterator<Item = &str> {
+        self.foreign.iter().map(String::as_str)
+    }
+
+    fn report(&mut self, step: Option<u64>, what: String) {
+        self.difference.get_or_insert(AuditDifference { step, what });
+    }
+
+    fn add_foreign(&mut self, name: String) {
+        if self.foreign.len() < FOREIGN_MAX {
+            self.foreign.insert(name);
+        } else {
+            self.foreign.insert("more content of other programs".to_owned());
+        }
+    }
+
+    pub(super) fn check_header(&mut self, text: &HeaderText, run: &RunDescription) {
+        if text.run != run.to_map() {
+            let expected = run.to_map();
+            let key = first_other_key(&text.run, &expected);
+            self.report(None, format!("the metadata 'run': its entry '{key}' has another form"));
+        }
+        let library = header_library(&run.recorder_version);
+        if !text.library.starts_with(&library) || !text.profile.is_empty() {
+            let what = format!("the header of the file is not that of '{}'", library.trim_end());
+            self.report(None, what);
+        }
+        if let Some(scene) = &text.scene
+            && (scene.media_type != SCENE_MEDIA_TYPE || scene.create_time != run.epoch_ns)
+        {
+            self.report(
+                None,
+                format!("the attachment {SCENE_ATTACHMENT} has another type or time"),
+            );
+        }
+    }
+
+    pub(super) fn add_attachment(&mut self, name: &str) {
+        self.add_foreign(format!("attachment '{name}'"));
+    }
+
+    pub(super) fn add_metadata(&mut self, name: &str) {
+        self.add_foreign(format!("metadata '{name}'"));
+    }
+
+    pub(super) fn add_schema(&mut self, header: SchemaHeader, data: &[u8]) {
+        let SchemaHeader { id, name, encoding } = header;
+        let schema = Schema { name, encoding, data: data.to_vec() };
+        if self.schemas.get(&id).is_some_and(|known| *known != schema) {
+            self.report(None, format!("the file has two schemas with id {id}"));
+        }
+        self.schemas.insert(id, schema);
+    }
+
+    pub(super) fn check_channel(&mut self, channel: &Channel) {
+        let Some(topic) = Topic::from_name(&channel.topic) else {
+            self.add_foreign(format!("topic '{}'", channel.topic));
+            return;
+        };
+        let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
+        let is_same_schema = match (&schema, self.schemas.get(&channel.schema_id)) {
+            (None, _) => channel.schema_id == 0,
+            (Some(expected), Some(found)) => found.is(expected),
+            (Some(_), None) => false,
+        };
+        if !is_same_schema {
+            self.report(None, format!("the schema of {} has another definition", topic.name()));
+        }
+        if channel.message_encoding != encoding || !channel.metadata.is_empty() {
+            self.report(None, format!("the channel of {} has another definition", topic.name()));
+        }
+    }
+
+    pub(super) fn report_unknown_channel(&mut self, id: u16) {
+        self.report(None, format!("a message on channel {id}, which the file does not declare"));
+    }
+
+    pub(super) fn check_message(
+        &mut self,
+        logged: &LoggedMessage,
+        data: &[u8],
+        run: &RunDescription,
+    ) {
+        let LoggedMessage { message, sequence, publish_time_ns, .. } = logged;
+        let (topic, step) = (message.topic(), message.step());
+        self.counts[topic].written += 1;
+        if *publish_time_ns != run.time_of_step_ns(step)
+            || u64::from(*sequence) != step & 0xffff_ffff
+        {
+            let what = format!("the message on {} has the time of another step", topic.name());
+            self.report(Some(step), what);
+        }
+        if self.encoder.encode(message, *publish_time_ns).ok() != Some(data) {
+            let what = format!(
+                "the message on {} has bytes that a recorder does not write: an unknown or missing \
+                 field, or another form of a value",
+                topic.name()
+            );
+            self.report(Some(step), what);
+        }
+    }
+
+    pub(super) fn check_transform(
+        &mut self,
+        header: &MessageHeader,
+        data: &[u8],
+        run: &RunDescription,
+    ) {
+        self.tf_count += 1;
+        let time_ns = run.time_of_step_ns(0);
+        let is_same = data == encode_transform(time_ns, run.origin)
+            && (header.sequence, header.publish_time) == (0, time_ns);
+        if !is_same || self.tf_count > 1 {
+            let what = "the message on /tf does not have the origin of the run".to_owned();
+            self.report(Some(0), what);
+        }
+    }
+
+    pub(super) fn check_closing(&mut self, map: &BTreeMap<String, String>, closing: &Closing) {
+        if *map != closing.to_map() {
+            let expected = closing.to_map();
+            let key = first_other_key(map, &expected);
+            let what = format!("the metadata 'recorder': its entry '{key}' has another form");
+            self.report(None, what);
+        }
+        let other = closing.counts.iter().zip(self.counts.iter()).find_map(|(claimed, found)| {
+            let (topic, claimed, found) = (claimed.0, claimed.1.written, found.1.written);
+            (claimed != found).then_some((topic.name(), claimed, found))
+        });
+        if let Some((topic, claimed, found)) = other {
+            self.report(
+                None,
+                format!(
+                    "the metadata 'recorder' counts {claimed} messages on {topic}, but the file has \
+                     {found}"
+                ),
+            );
+        }
+    }
+
+    /// Checks that a complete file has the parts that every file has once.
+    pub(super) fn check_end(&mut self, closing: Option<&Closing>) {
+        if closing.is_none() {
+            self.report(None, "the file ends without its metadata 'recorder'".to_owned());
+        }
+        if self.tf_count == 0 {
+            self.report(None, "the file has no message on /tf".to_owned());
+        }
+    }
+}
+
+impl Schema {
+    fn is(&self, expected: &TopicSchema) -> bool {
+        (self.name.as_str(), self.encoding.as_str()) == (expected.name, expected.encoding)
+            && self.data == expected.data
+    }
+}
+
+/// Returns `true` if messages of this file have the form that this recorder writes.
+pub(super) fn is_current_format(map: &BTreeMap<String, String>) -> bool {
+    map.get("format_version").is_some_and(|version| *version == FORMAT_VERSION.to_string())
+}
+
+/// Returns the first key whose value differs.
+fn first_other_key<'a>(
+    found: &'a BTreeMap<String, String>,
+    expected: &'a BTreeMap<String, String>,
+) -> &'a str {
+    let mut keys = found.keys().chain(expected.keys());
+    keys.find(|key| found.get(*key) != expected.get(*key)).map_or("", String::as_str)
+}

@@ -1,0 +1,53 @@
+//! A file that is read until a signal arrives.
+
+use std::fmt;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+
+use sim_contract::Stop;
+
+/// Bytes that the file is read ahead.
+const BUFFER_SIZE_BYTES: usize = 1 << 20;
+
+/// A file that is read until a signal arrives.
+#[derive(Debug)]
+pub struct FileSource {
+    file: BufReader<File>,
+    /// `None` if the program does not handle signals.
+    stop: Option<Stop>,
+}
+
+/// The content of the error of a read after a signal.
+#[derive(Debug)]
+pub(super) struct Interrupted;
+
+impl fmt::Display for Interrupted {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("interrupted")
+    }
+}
+
+impl std::error::Error for Interrupted {}
+
+impl FileSource {
+    pub(super) fn new(file: File, stop: Option<Stop>) -> Self {
+        Self { file: BufReader::with_capacity(BUFFER_SIZE_BYTES, file), stop }
+    }
+}
+
+impl Read for FileSource {
+    /// Checks for a signal in each call, not in each read from the disk: a few bytes of a compressed
+    /// file can take seconds to process.
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        check_stop(self.stop.as_ref())?;
+        self.file.read(buffer)
+    }
+}
+
+/// Returns an error after a signal.
+pub(in crate::log) fn check_stop(stop: Option<&Stop>) -> io::Result<()> {
+    match stop {
+        Some(stop) if stop.is_requested() => Err(io::Error::other(Interrupted)),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,383 @@
+//! No edit of a recording goes unnoticed, even if every checksum and the index are gone.
+//!
+//! Each content of a small recording is changed in turn: every value of every JSON message, bytes of
+//! the other messages, and the bytes of the header, the metadata, the scene, the schemas and the
+//! channels. Every edit is found, or the report says that the content is not compared.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use mcap::records::op;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
+use recorder::{Closing, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic};
+use serde_json::{Value, json};
+use sim_contract::NodeStatus;
+use sim_solver::{Keyframe, Scene, Solver};
+
+use crate::commands::verify::{Verdict, verify};
+use crate::input::command_file;
+use crate::simulation::{Job, simulate};
+
+/// A scene whose recording has every topic: a particle that freezes, a cut, and a moving collider.
+const SCENE: &str = "
+    version = 1
+    name = 'edits'
+    origin = [1, 2, 3]
+    [solver]
+    rate_hz = 2
+    max_speed = 3e38
+    [[particle]]
+    position = [0, 9, 0]
+    [[particle]]
+    position = [1, 9, 0]
+    [[constraint]]
+    particles = [0, 1]
+    rest_length = 1e30
+    [[generate]]
+    shape = 'cloth'
+    columns = 2
+    rows = 2
+    spacing = 0.5
+    pinned = 'top'
+    [[collider]]
+    shape = 'sphere'
+    center = [0, 20, 0]
+    radius = 0.5
+    velocity = [0.1, 0, 0]";
+const COMMANDS: &str = r#"
+    {"step":1,"kind":"cut","constraint":2}
+    {"step":1,"kind":"pin","particle":4000}
+    {"step":2,"kind":"set","parameter":"damping","value":0.5}
+    {"step":2,"kind":"pin","particle":5}
+    {"step":3,"kind":"pause"}"#;
+const STEPS: u64 = 4;
+
+/// A record of a file: its opcode and its bytes.
+type Record = (u8, Vec<u8>);
+
+/// A change of one record.
+struct Edit {
+    /// The topic, or the kind of record.
+    place: String,
+    /// The value that was changed.
+    what: String,
+    original: Vec<u8>,
+    bytes: Vec<u8>,
+}
+
+fn written() -> Vec<u8> {
+    let scene = Scene::from_toml(SCENE, "edits.toml").unwrap();
+    let commands = command_file::parse(COMMANDS, "test").unwrap();
+    let job = Job { scene, commands, steps: STEPS };
+    let solver = Solver::new(&job.scene);
+    let (run, scene) = (job.description(&solver), job.scene.to_toml());
+    let mut log =
+        LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0).unwrap();
+    let status = StatusRow::from(&NodeStatus { step: 0, ..NodeStatus::default() });
+    log.write(&Message::Status(status), 0).unwrap();
+    simulate(&job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    let stop_reason = "steps reached".to_owned();
+    let mut closing = Closing { stop_reason, unreadable: 0, counts: *log.counts() };
+    closing.counts.set_received_to_written();
+    log.finish(&closing).unwrap()
+}
+
+/// Returns the records of the data section, without chunks.
+fn records(file: &[u8]) -> Vec<Record> {
+    let mut reader = LinearReader::new();
+    let (mut records, mut rest) = (Vec::new(), file);
+    while let Some(event) = reader.next_event() {
+        match event.unwrap() {
+            LinearReadEvent::ReadRequest(count) => {
+                let count = count.min(rest.len());
+                reader.insert(count).copy_from_slice(&rest[..count]);
+                reader.notify_read(count);
+                rest = &rest[count..];
+            }
+            LinearReadEvent::Record { opcode: op::DATA_END, .. } => break,
+            LinearReadEvent::Record { opcode: op::MESSAGE_INDEX, .. } => {}
+            LinearReadEvent::Record { opcode, data } => records.push((opcode, data.to_vec())),
+        }
+    }
+    records
+}
+
+/// Writes a file without chunks, checksums and index.
+fn file_of(records: &[Record]) -> Vec<u8> {
+    let mut file = mcap::MAGIC.to_vec();
+    let end = [(op::DATA_END, vec![0; 4]), (op::FOOTER, vec![0; 20])];
+    for (opcode, body) in records.iter().chain(&end) {
+        let mut body = body.clone();
+        if *opcode == op::ATTACHMENT {
+            let crc = body.len() - 4;
+            body[crc..].fill(0);
+        }
+        file.push(*opcode);
+        file.extend((body.len() as u64).to_le_bytes());
+        file.extend(body);
+    }
+    file.extend(mcap::MAGIC);
+    file
+}
+
+/// Returns the result of a verification, and the content that it does not compare: `None` if it finds
+/// no difference.
+fn verified(file: &[u8]) -> (Option<String>, Vec<String>) {
+    let log = match LogReader::new(file) {
+        Ok(log) => log,
+        Err(error) => return (Some(error.to_string()), Vec::new()),
+    };
+    match verify(log, "x.mcap", 1, |_| false) {
+        Err(error) => (Some(format!("{error:#}")), Vec::new()),
+        Ok((_, Some(end))) => (Some(end.to_string()), Vec::new()),
+        Ok((report, None)) if report.verdict == Verdict::Identical => (None, report.not_covered),
+        Ok((report, None)) => (Some(report.to_string()), report.not_covered),
+    }
+}
+
+/// Returns every leaf of a value by its JSON pointer.
+fn leaves(value: &Value, pointer: &str, out: &mut Vec<String>) {
+    match value {
+        Value::Object(fields) => {
+            fields.iter().for_each(|(key, one)| leaves(one, &format!("{pointer}/{key}"), out));
+        }
+        Value::Array(all) => {
+            all.iter()
+                .enumerate()
+                .for_each(|(place, one)| leaves(one, &format!("{pointer}/{place}"), out));
+        }
+        _ => out.push(pointer.to_owned()),
+    }
+}
+
+fn other_value(value: &Value) -> Value {
+    match value {
+        Value::Bool(is_set) => json!(!is_set),
+        Value::Number(number) if number.is_u64() => json!(number.as_u64().unwrap() ^ 1),
+        Value::Number(number) => json!(number.as_f64().unwrap() + 0.25),
+        Value::String(text) if text.len() == 16 => json!(text.replace('0', "1").replace('f', "e")),
+        Value::String(text) => json!(format!("{text}x")),
+        _ => json!(1.5),
+    }
+}
+
+/// Returns the edits of a JSON message: each value, a missing key, and an unknown one.
+fn json_edits(header: &[u8], data: &[u8]) -> Vec<(String, Vec<u8>)> {
+    let value: Value = serde_json::from_slice(data).unwrap();
+    let bytes = |value: &Value| [header, serde_json::to_string(value).unwrap().as_bytes()].concat();
+    let mut all = Vec::new();
+    leaves(&value, "", &mut all);
+    let mut edits: Vec<_> = all
+        .iter()
+        .map(|pointer| {
+            let mut changed = value.clone();
+            let leaf = changed.pointer_mut(pointer).unwrap();
+            *leaf = other_value(leaf);
+            (pointer.clone(), bytes(&changed))
+        })
+        .collect();
+    let keys: Vec<_> = value.as_object().unwrap().keys().cloned().collect();
+    for key in keys {
+        let mut changed = value.clone();
+        changed.as_object_mut().unwrap().remove(&key);
+        edits.push((format!("no {key}"), bytes(&changed)));
+    }
+    let text = std::str::from_utf8(data).unwrap().strip_suffix('}').unwrap();
+    edits.push(("unknown".into(), [header, text.as_bytes(), b",\"unknown\":1}"].concat()));
+    edits.push(("space".into(), [header, text.as_bytes(), b" }"].concat()));
+    edits
+}
+
+/// Returns the edits of a record by its bytes, at most about fifty.
+fn byte_edits(body: &[u8], from: usize) -> Vec<(String, Vec<u8>)> {
+    let stride = (body.len() / 40).max(1);
+    let places = (from..body.len()).filter(|place| place % stride == 0 || body.len() - place < 8);
+    places
+        .map(|place| {
+            let mut changed = body.to_vec();
+            changed[place] ^= 1;
+            (format!("byte {place}"), changed)
+        })
+        .collect()
+}
+
+/// Returns the edits of a metadata record: each value, a missing entry, and an unknown one.
+fn metadata_edits(body: &[u8]) -> Vec<(String, Vec<u8>)> {
+    let Ok(mcap::records::Record::Metadata(metadata)) = mcap::parse_record(op::METADATA, body)
+    else {
+        panic!("metadata")
+    };
+    let text =
+        |text: &str| [&u32::try_from(text.len()).unwrap().to_le_bytes(), text.as_bytes()].concat();
+    let bytes = |map: &BTreeMap<String, String>| {
+        let all: Vec<_> =
+            map.iter().flat_map(|(key, one)| [text(key), text(one)].concat()).collect();
+        let size = u32::try_from(all.len()).unwrap().to_le_bytes();
+        [&text(&metadata.name)[..], &size, &all].concat()
+    };
+    let mut edits = Vec::new();
+    for (key, value) in &metadata.metadata {
+        let mut changed = metadata.metadata.clone();
+        let other =
+            value.parse::<u64>().map_or(format!("{value}x"), |number| (number ^ 1).to_string());
+        changed.insert(key.clone(), other);
+        edits.push((key.clone(), bytes(&changed)));
+        changed.remove(key);
+        edits.push((format!("no {key}"), bytes(&changed)));
+    }
+    let mut changed = metadata.metadata.clone();
+    changed.insert("unknown".to_owned(), "1".to_owned());
+    edits.push(("unknown".to_owned(), bytes(&changed)));
+    edits
+}
+
+/// Channel, sequence, time of reception, time of the step.
+const MESSAGE_HEADER: [(&str, usize); 4] =
+    [("channel", 0), ("sequence", 2), ("log_time", 6), ("publish_time", 14)];
+const MESSAGE_HEADER_SIZE_BYTES: usize = 22;
+
+/// Returns every edit of a record.
+fn edits(record: &Record, topics: &[Option<Topic>]) -> Vec<Edit> {
+    let (opcode, body) = record;
+    let (place, changes) = match *opcode {
+        op::MESSAGE => {
+            let topic = topics[usize::from(u16::from_le_bytes([body[0], body[1]]))].unwrap();
+            let (header, data) = body.split_at(MESSAGE_HEADER_SIZE_BYTES);
+            let mut changes = match topic {
+                Topic::Tf | Topic::Keyframe | Topic::Particles => {
+                    byte_edits(body, MESSAGE_HEADER_SIZE_BYTES)
+                }
+                _ => json_edits(header, data),
+            };
+            for (name, at) in MESSAGE_HEADER {
+                let mut changed = body.clone();
+                changed[at] ^= 0x20;
+                changes.push((name.to_owned(), changed));
+            }
+            (topic.name().to_owned(), changes)
+        }
+        // The checksum of an attachment is gone too.
+        op::ATTACHMENT => ("attachment".to_owned(), byte_edits(&body[..body.len() - 4], 0)),
+        op::METADATA => {
+            let name = body[4..4 + usize::from(body[0])].to_vec();
+            (format!("metadata '{}'", String::from_utf8(name).unwrap()), metadata_edits(body))
+        }
+        op::HEADER => ("header".to_owned(), byte_edits(body, 0)),
+        op::SCHEMA => ("schema".to_owned(), byte_edits(body, 0)),
+        _ => ("channel".to_owned(), byte_edits(body, 0)),
+    };
+    let pad = |bytes: Vec<u8>| {
+        if *opcode == op::ATTACHMENT { [bytes, vec![0; 4]].concat() } else { bytes }
+    };
+    changes
+        .into_iter()
+        .map(|(what, bytes)| Edit {
+            place: place.clone(),
+            what,
+            original: body.clone(),
+            bytes: pad(bytes),
+        })
+        .collect()
+}
+
+/// Returns the topic of each channel, by its id.
+fn topics(records: &[Record]) -> Vec<Option<Topic>> {
+    let mut topics = vec![None; 64];
+    for (_, body) in records.iter().filter(|(opcode, _)| *opcode == op::CHANNEL) {
+        let Ok(mcap::records::Record::Channel(channel)) = mcap::parse_record(op::CHANNEL, body)
+        else {
+            panic!("a channel")
+        };
+        topics[usize::from(channel.id)] = Topic::from_name(&channel.topic);
+    }
+    topics
+}
+
+/// Returns the step of a message, from its sequence.
+fn step_of(record: &Record) -> Option<u32> {
+    let (opcode, body) = record;
+    (*opcode == op::MESSAGE).then(|| u32::from_le_bytes([body[2], body[3], body[4], body[5]]))
+}
+
+/// Returns the words by which the report names the content as not compared, if it is such.
+fn not_compared(edit: &Edit) -> Option<&'static str> {
+    let Edit { place, what, original, bytes } = edit;
+    let keyframe = |bytes: &[u8]| Keyframe::decode(&bytes[MESSAGE_HEADER_SIZE_BYTES..]);
+    // An attachment starts with its time of reception.
+    let byte = what.strip_prefix("byte ").and_then(|place| place.parse::<usize>().ok());
+    if place == "attachment" && byte.is_some_and(|byte| byte < 8) {
+        return Some("(log_time)");
+    }
+    match (place.as_str(), what.as_str()) {
+        ("header", _) => Some("name of the mcap library"),
+        ("metadata 'run'", "contract_version") => Some("contract_version and recorder_version"),
+        ("metadata 'recorder'", "stop_reason") => Some("stop_reason and the numbers"),
+        ("metadata 'recorder'", key) if !key.contains(' ') && !key.ends_with("written") => {
+            Some("numbers of received, lost and missing")
+        }
+        ("/keyframe", _) => {
+            let (Ok(mut old), Ok(new)) = (keyframe(original), keyframe(bytes)) else { return None };
+            old.paused = new.paused;
+            (old == new).then_some("paused flag of keyframes")
+        }
+        (_, "log_time") => Some("(log_time)"),
+        ("/steps", "/wake_late_ns" | "/solve_ns") => Some("wake_late_ns and solve_ns in /steps"),
+        ("/parameters", "/time_scale") => Some("time_scale in /parameters"),
+        ("/status", what) if what.starts_with('/') && what != "/step" => Some("values of /status"),
+        ("/outcomes", "/status" | "/reason") => Some("outcomes of pause, resume, step and load"),
+        _ => None,
+    }
+}
+
+#[test]
+fn every_edit_is_found_or_named_as_not_compared() {
+    let records = records(&written());
+    let (finding, not_covered) = verified(&file_of(&records));
+    assert_eq!(finding, None);
+    let topics = topics(&records);
+    let present = |topic: Topic| {
+        let is_on = |(opcode, body): &Record| {
+            *opcode == op::MESSAGE && topics[usize::from(body[0])] == Some(topic)
+        };
+        assert!(records.iter().any(is_on), "no message on {}", topic.name());
+    };
+    Topic::ALL.into_iter().for_each(present);
+    let (mut unnoticed, mut unnamed) = (Vec::new(), Vec::new());
+    for (place, record) in records.iter().enumerate() {
+        for edit in edits(record, &topics) {
+            let mut changed = records.clone();
+            changed[place].1.clone_from(&edit.bytes);
+            let (finding, _) = verified(&file_of(&changed));
+            let name = format!("record {place} {}: {}", edit.place, edit.what);
+            match (finding, not_compared(&edit)) {
+                (Some(text), _) => {
+                    // These edits change the place or the step of a message.
+                    let is_moved = ["channel", "sequence", "publish_time", "/step", "/index"];
+                    let step = step_of(record).filter(|_| !is_moved.contains(&&*edit.what));
+                    let has_step = step.is_none_or(|step| text.contains(&format!("step {step}")));
+                    let is_message = record.0 == op::MESSAGE && edit.what != "channel";
+                    let has_place = !is_message || text.contains(&edit.place);
+                    if !has_place || !has_step {
+                        unnamed.push(format!("{name}: {text}"));
+                    }
+                }
+                (None, Some(words)) if not_covered.iter().any(|line| line.contains(words)) => {}
+                (None, _) => unnoticed.push(name),
+            }
+        }
+    }
+    assert!(unnoticed.is_empty(), "{unnoticed:#?}");
+    assert!(unnamed.is_empty(), "{unnamed:#?}");
+}
+
+#[test]
+fn every_missing_message_is_found() {
+    let records = records(&written());
+    for (place, (opcode, _)) in records.iter().enumerate() {
+        if *opcode == op::MESSAGE {
+            let mut changed = records.clone();
+            changed.remove(place);
+            assert!(verified(&file_of(&changed)).0.is_some(), "record {place}");
+        }
+    }
+}

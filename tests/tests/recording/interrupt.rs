@@ -1,0 +1,68 @@
+//! Ctrl-C ends every program while it reads a large recording.
+
+use integration_tests::{Process, Program, Sandbox};
+
+use super::raw::small;
+
+/// A program that reads a recording, and its answer to Ctrl-C.
+struct Reader<'a> {
+    args: Vec<&'a str>,
+    code: Option<i32>,
+    /// A part of its output.
+    output: &'static str,
+}
+
+/// Returns a recording that takes seconds to read.
+fn large_recording(sandbox: &Sandbox) -> String {
+    let file = sandbox.path("large.mcap");
+    let args = ["simulate", "curtain", "--steps", "9600", "--compression", "none", "-o", &file];
+    Process::run(Program::Recorder, sandbox, &args).success();
+    file
+}
+
+#[test]
+fn every_reader_of_a_recording_stops_at_a_signal() {
+    let sandbox = Sandbox::new();
+    let file = large_recording(&sandbox);
+    let pictures = sandbox.path("pictures");
+    let late = ["play", file.as_str(), "--start", "1h"];
+    let commands = ["simulate", "rope", "--steps", "1", "--commands", file.as_str()];
+    for Reader { args, code, output } in [
+        Reader { args: vec!["verify", &file], code: Some(1), output: "interrupted" },
+        Reader {
+            args: vec!["export", &file, "--png", &pictures],
+            code: Some(1),
+            output: "interrupted",
+        },
+        Reader { args: late.to_vec(), code: Some(0), output: "" },
+        Reader { args: commands.to_vec(), code: Some(1), output: "interrupted" },
+        // It has nothing to finish, so the signal ends it.
+        Reader { args: vec!["info", &file], code: None, output: "" },
+    ] {
+        let mut process = Process::start(Program::Recorder, &sandbox, &args);
+        process.wait_until_open(&file);
+        let finished = process.interrupt();
+        assert_eq!(finished.code, code, "{args:?}: {finished:?}");
+        let text = finished.stdout + &finished.stderr;
+        assert!(text.contains(output), "{args:?}: {text}");
+    }
+}
+
+#[test]
+fn a_scan_of_many_records_stops_at_a_signal() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("records.mcap");
+    let (_, mut bytes) = small(&sandbox);
+    // Private records without content. A file without an end is scanned.
+    bytes.extend([0x80, 0, 0, 0, 0, 0, 0, 0, 0].repeat(20_000_000));
+    std::fs::write(&file, &bytes).unwrap();
+    for (program, args, code) in [
+        (Program::ViewerBridge, vec!["--replay", &file, "--listen", "127.0.0.1:0"], Some(0)),
+        (Program::Recorder, vec!["verify", &file], Some(1)),
+    ] {
+        let mut process = Process::start(program, &sandbox, &args);
+        process.wait_until_open(&file);
+        let finished = process.interrupt();
+        assert_eq!(finished.code, code, "{args:?}: {finished:?}");
+    }
+}
