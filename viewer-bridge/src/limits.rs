@@ -68,6 +68,9 @@ pub const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 /// Lifetime of a connection that does not become a WebSocket; browsers open another one. Time for the
 /// first message of a Foxglove client.
 pub const CONNECTION_TIMEOUT: Duration = Duration::from_mins(1);
+/// Shortest time between two evictions of one server. However fast others reconnect, each of
+/// [`VISITORS_MAX`] has half a second to become a client, which is enough for a browser.
+pub const EVICTION_PERIOD: Duration = Duration::from_millis(4);
 /// Time in which the node must answer a command.
 pub const OUTCOME_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time in which the node must release the clients' grabs when the server ends.

@@ -10,6 +10,9 @@ use std::net::{IpAddr, Ipv6Addr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+use tokio::time::sleep;
+
+use crate::limits::EVICTION_PERIOD;
 
 /// The connections of one server that are not clients yet.
 #[derive(Debug)]
@@ -87,6 +90,7 @@ impl Lobby {
     pub(super) async fn admit(self: &Arc<Self>, address: IpAddr) -> Place {
         if self.places.available_permits() == 0 {
             self.make_room();
+            sleep(EVICTION_PERIOD).await;
         }
         // The semaphore is never closed.
         let permit = Arc::clone(&self.places).acquire_owned().await.ok();
@@ -144,7 +148,10 @@ fn network(address: IpAddr) -> IpAddr {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use futures_util::FutureExt;
+    use sim_contract::clock::monotonic_ns;
 
     use super::*;
 
@@ -175,8 +182,8 @@ mod tests {
         assert!(is_evicted(&third) && !is_evicted(&first));
     }
 
-    #[test]
-    fn the_network_with_the_most_connections_makes_room() {
+    #[tokio::test]
+    async fn the_network_with_the_most_connections_makes_room() {
         let lobby = Lobby::new(4);
         let lone = admit(&lobby, "10.0.0.1");
         // One machine has a whole /64 of addresses.
@@ -190,8 +197,23 @@ mod tests {
         );
     }
 
-    #[test]
-    fn a_connection_that_leaves_makes_room_without_an_eviction() {
+    #[tokio::test]
+    async fn evictions_leave_every_connection_time_to_become_a_client() {
+        const COUNT: u32 = 10;
+        let lobby = Lobby::new(1);
+        let mut place = admit(&lobby, "127.0.0.1");
+        let start_ns = monotonic_ns();
+        for _ in 0..COUNT {
+            // The evicted connection ends at once.
+            tokio::spawn(async move { place.evicted().await });
+            place = lobby.admit("127.0.0.1".parse().unwrap()).await;
+        }
+        let elapsed = Duration::from_nanos(monotonic_ns() - start_ns);
+        assert!(elapsed >= COUNT * EVICTION_PERIOD, "{elapsed:?}");
+    }
+
+    #[tokio::test]
+    async fn a_connection_that_leaves_makes_room_without_an_eviction() {
         let lobby = Lobby::new(1);
         drop(admit(&lobby, "127.0.0.1"));
         let place = admit(&lobby, "127.0.0.1");
