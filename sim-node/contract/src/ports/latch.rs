@@ -23,9 +23,7 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> Latch<T, H> {
 
     /// Returns the newest message; `None` if none has arrived yet.
     pub(crate) fn newest(&mut self) -> Result<Option<&SliceSample<T, H>>, ReadError> {
-        if let Some(sample) = self.reader.newest()? {
-            self.kept = Some(sample);
-        }
+        self.reader.replace_by_newest(&mut self.kept)?;
         Ok(self.kept.as_ref())
     }
 }

@@ -97,15 +97,24 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     /// Returns the newest message and drops older ones; `None` if all were read.
     pub(crate) fn newest(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
         let mut newest = None;
+        self.replace_by_newest(&mut newest)?;
+        Ok(newest)
+    }
+
+    /// Replaces a message by the newest one, if any has arrived. At most two messages are held at a time.
+    pub(crate) fn replace_by_newest(
+        &self,
+        kept: &mut Option<SliceSample<T, H>>,
+    ) -> Result<(), ReadError> {
         // The loop is bounded even if the writer is faster than it: there is at most a buffer of
         // the writer before the last load and a buffer of the present writer.
         for _ in 0..2 * self.buffered {
             match self.next()? {
-                Some(sample) => newest = Some(sample),
+                Some(sample) => *kept = Some(sample),
                 None => break,
             }
         }
-        Ok(newest)
+        Ok(())
     }
 
     /// Passes at most one buffer of messages to `sink`, oldest first.
