@@ -64,7 +64,9 @@ pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
 pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
 pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
-pub use messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus};
+pub use messages::outcome::{
+    OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus,
+};
 pub use messages::parameters::{ParameterState, ParametersHeader};
 pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use messages::status::{NodeStatus, StatusFlags};
@@ -74,6 +76,7 @@ pub use messages::update::Update;
 pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
+pub use ports::connection::{ConnectionId, ReceivedCommand};
 pub use ports::reader::ReadError;
 pub use ports::service::ServiceError;
 pub use ports::services::AttachError;

@@ -20,6 +20,7 @@ use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::KeyframeHeader;
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_shared_memory};
+use crate::ports::connection::{self, ConnectionId, ReceivedCommand};
 use crate::ports::port::{PortLimit, create_port, reader_count};
 use crate::ports::reader::subscribe;
 use crate::ports::service::{OUTCOMES, STATUS, ServiceError, WAKE};
@@ -198,18 +199,27 @@ impl Owner {
         self.status.write(*status).map(|_| ())
     }
 
-    /// Appends all commands that have arrived, those of each client in the order of sending. Returns
+    /// Appends all commands that have arrived, those of each connection in the order of sending. Returns
     /// their number. Ends early at a client with a broken connection, and returns no error: no other
     /// process can stop the owner.
-    pub fn receive_commands(&self, commands: &mut Vec<Command>) -> usize {
+    pub fn receive_commands(&self, commands: &mut Vec<ReceivedCommand>) -> usize {
         let before = commands.len();
         while commands.len() - before < COMMANDS_RECEIVED_MAX {
             match self.commands.receive() {
-                Ok(Some(command)) => commands.push(*command),
+                Ok(Some(command)) => commands.push(ReceivedCommand {
+                    connection: ConnectionId(command.origin().value()),
+                    command: *command,
+                }),
                 Ok(None) | Err(_) => break,
             }
         }
         commands.len() - before
+    }
+
+    /// Returns the connections through which living clients can send commands. It costs some system
+    /// calls for each of them: call it a few times a second at most.
+    pub fn connections(&self) -> Vec<ConnectionId> {
+        connection::living(&self.services.commands)
     }
 
     /// Returns the number of readers of `particles`. Killed readers count until their places are freed.

@@ -79,7 +79,7 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
         Reason::NonFinite => "allowed: finite numbers",
         Reason::AlreadyTorn => "`ctl reset` restores it",
         Reason::NotGrabbed => "`ctl grab` grabs it",
-        Reason::GrabbedByOther => "that client must release it first",
+        Reason::GrabbedByOther => "`ctl release --force` ends that grab",
         Reason::NoEffectHere => missing_condition(action)?,
         Reason::UnknownParticle
         | Reason::UnknownConstraint

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Bound;
 
-use sim_contract::{COMMANDS_PER_STEP_MAX, Command};
+use sim_contract::{COMMANDS_PER_STEP_MAX, ReceivedCommand};
 
 /// Commands that wait to be applied.
 ///
@@ -12,7 +12,7 @@ use sim_contract::{COMMANDS_PER_STEP_MAX, Command};
 /// can starve another.
 #[derive(Debug)]
 pub(super) struct Inbox {
-    waiting: BTreeMap<Place, Command>,
+    waiting: BTreeMap<Place, ReceivedCommand>,
     /// Number of commands that have arrived.
     arrived_count: u64,
     /// The client that was served last. The greatest id before the first one, so that the lowest
@@ -40,21 +40,22 @@ impl Inbox {
     }
 
     /// Adds commands in their order of arrival.
-    pub(super) fn add(&mut self, commands: impl IntoIterator<Item = Command>) {
-        for command in commands {
+    pub(super) fn add(&mut self, commands: impl IntoIterator<Item = ReceivedCommand>) {
+        for received in commands {
+            let command = &received.command;
             let place = (command.client_id, command.sequence, self.arrived_count);
-            self.waiting.insert(place, command);
+            self.waiting.insert(place, received);
             self.arrived_count += 1;
         }
     }
 
     /// Removes the commands of one turn, in the order of application.
-    pub(super) fn next_turn(&mut self) -> Vec<Command> {
+    pub(super) fn next_turn(&mut self) -> Vec<ReceivedCommand> {
         std::iter::from_fn(|| self.next()).take(COMMANDS_PER_STEP_MAX).collect()
     }
 
     /// Removes the first command of the next client.
-    fn next(&mut self) -> Option<Command> {
+    fn next(&mut self) -> Option<ReceivedCommand> {
         let end_of_last = Bound::Excluded((self.last_served, u64::MAX, u64::MAX));
         let after_last = self.waiting.range((end_of_last, Bound::Unbounded)).next();
         let (place, _) = after_last.or_else(|| self.waiting.first_key_value())?;
@@ -67,16 +68,18 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     //! Checks the order of a turn against lists of clients and sequence numbers.
-    use sim_contract::Action;
+    use sim_contract::{Action, Command, ConnectionId};
 
     use super::*;
 
-    fn pin(client_id: u64, sequence: u64) -> Command {
-        Command::new(client_id, sequence, Action::Pin { particle: 0 })
+    fn pin(client_id: u64, sequence: u64) -> ReceivedCommand {
+        let command = Command::new(client_id, sequence, Action::Pin { particle: 0 });
+        ReceivedCommand { command, connection: ConnectionId::default() }
     }
 
-    fn order(turn: &[Command]) -> Vec<(u64, u64)> {
-        turn.iter().map(|command| (command.client_id, command.sequence)).collect()
+    fn order(turn: &[ReceivedCommand]) -> Vec<(u64, u64)> {
+        let commands = turn.iter().map(|received| received.command);
+        commands.map(|command| (command.client_id, command.sequence)).collect()
     }
 
     #[test]

@@ -12,7 +12,7 @@ use sim_contract::{
 use crate::support::{DEADLINE, MOMENT, answer_commands, create_owner, publish_step};
 
 const PIN: Action = Action::Pin { particle: 3 };
-const RELEASE: Action = Action::Release { particle: 3 };
+const RELEASE: Action = Action::Release { particle: 3, force: false };
 
 /// Runs `client` beside an owner that answers all commands at step 9.
 fn run_beside_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send + 'static) -> T {
@@ -32,7 +32,8 @@ fn run_beside_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send
 fn receive(owner: &Owner) -> Vec<(u64, u64, Action)> {
     let mut commands = Vec::new();
     owner.receive_commands(&mut commands);
-    commands.iter().map(|command| (command.client_id, command.sequence, command.action())).collect()
+    let commands = commands.iter().map(|received| received.command);
+    commands.map(|command| (command.client_id, command.sequence, command.action())).collect()
 }
 
 #[test]
