@@ -116,17 +116,23 @@ impl Node {
             if stop.is_requested() {
                 break;
             }
-            self.apply_commands(due.is_some())?;
+            self.apply_commands(due.is_some(), stop)?;
+            if stop.is_requested() {
+                break;
+            }
             if let Some(wake_late_ns) = due
                 && self.progress.is_stepping()
             {
-                self.make_step(wake_late_ns)?;
+                if !self.make_step(wake_late_ns, stop)? {
+                    break;
+                }
             } else {
                 self.publisher.publish_between(&self.solver, self.position())?;
             }
             self.observe(&observer)?;
         }
-        Ok(())
+        // Those of the last boundary, if its step was not made.
+        self.publisher.publish_outcomes()
     }
 
     fn is_done(&self) -> bool {
@@ -163,10 +169,13 @@ impl Node {
         Some(self.pace.meet(monotonic_ns()))
     }
 
-    fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
+    /// Makes and publishes a step. Returns `false` if it was given up because of a request to stop.
+    fn make_step(&mut self, wake_late_ns: u64, stop: &Stop) -> anyhow::Result<bool> {
         let before_ns = monotonic_ns();
         let frozen_count = self.solver.frozen_count();
-        self.solver.step();
+        if !self.solver.step_unless(stop.flag()) {
+            return Ok(false);
+        }
         let solve_ns = monotonic_ns() - before_ns;
         if self.solver.frozen_count() > frozen_count {
             let count = self.solver.frozen_count() - frozen_count;
@@ -185,7 +194,8 @@ impl Node {
         self.statistics.record(wake_late_ns, solve_ns, self.pace.period_ns());
         self.statistics.skipped_periods = self.pace.skipped_periods;
         let times = StepTimes { wake_late_ns, solve_ns };
-        self.publisher.publish_step(&self.solver, self.position(), times)
+        self.publisher.publish_step(&self.solver, self.position(), times)?;
+        Ok(true)
     }
 
     /// Serves late subscribers, calls the observer, and publishes the status.

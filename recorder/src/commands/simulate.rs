@@ -1,7 +1,6 @@
 //! `recorder simulate`: simulates a scene in this process, without a node.
 
 use std::fmt;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -21,8 +20,8 @@ use crate::input::command_source::load_commands;
 use crate::input::scene_source::load_scene;
 use crate::simulation::{Job, SimulationResult, simulate};
 
-/// Steps between two checks for signals and updates of the progress bar.
-const STEPS_PER_CHECK: u64 = 256;
+/// Steps between two updates of the progress bar.
+const STEPS_PER_UPDATE: u64 = 256;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -81,12 +80,10 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
 
     let bar = progress_bar(args.steps);
     let before_ns = monotonic_ns();
-    let result = simulate(&job, solver, log.as_mut(), |step| {
-        if !step.is_multiple_of(STEPS_PER_CHECK) {
-            return ControlFlow::Continue(());
+    let result = simulate(&job, solver, log.as_mut(), stop.flag(), |step| {
+        if step.is_multiple_of(STEPS_PER_UPDATE) {
+            bar.set_position(step);
         }
-        bar.set_position(step);
-        if stop.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
     .with_context(|| truncation(args))?;
     bar.finish_and_clear();

@@ -7,6 +7,7 @@ mod side_rows;
 use std::fmt;
 use std::io::Read;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
 use recorder::{FrameReader, LogEnd, LogReader};
@@ -22,8 +23,8 @@ use crate::input::scene_source::scene_in_recording;
 use difference::Difference;
 use resimulation::{Finding, Resimulation};
 
-/// Snapshots between two checks for signals and updates of the progress bar.
-const SNAPSHOTS_PER_CHECK: u64 = 64;
+/// Snapshots between two updates of the progress bar.
+const SNAPSHOTS_PER_UPDATE: u64 = 64;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes \
@@ -72,9 +73,8 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let path = output::path_text(&args.file);
     let log = LogReader::open(&args.file).with_context(|| path.clone())?;
     let bar = progress_spinner();
-    let (report, end) = verify(log, &path, args.threads.count(), |step| {
+    let (report, end) = verify(log, &path, args.threads.count(), stop.flag(), |step| {
         bar.set_message(format!("step {step}"));
-        stop.is_requested()
     })?;
     bar.finish_and_clear();
     output::result(args.as_json, &report, &report.to_string())?;
@@ -88,12 +88,14 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     })
 }
 
-/// Re-simulates a recording with `threads` threads. Calls `is_stopped` periodically, with the step.
+/// Re-simulates a recording with `threads` threads. Calls `on_progress` periodically, with the step.
+/// Ends early, even within a step, if `stop` becomes true.
 pub(crate) fn verify<R: Read>(
     log: LogReader<R>,
     path: &str,
     threads: usize,
-    mut is_stopped: impl FnMut(u64) -> bool,
+    stop: &AtomicBool,
+    mut on_progress: impl FnMut(u64),
 ) -> anyhow::Result<(Report, Option<LogEnd>)> {
     let recorded_version = log.run().solver_version;
     if recorded_version != SOLVER_VERSION {
@@ -117,15 +119,14 @@ pub(crate) fn verify<R: Read>(
                 report.first_step = step;
                 simulation.insert(start).compare_start(&frame)
             }
-            Some(simulation) => simulation.advance(&frame),
+            Some(simulation) => simulation.advance(&frame, stop),
         };
         if !report.add(finding, step) {
             break;
         }
         count += 1;
-        if count % SNAPSHOTS_PER_CHECK == 0 && is_stopped(step) {
-            report.verdict = Verdict::Interrupted;
-            break;
+        if count % SNAPSHOTS_PER_UPDATE == 0 {
+            on_progress(step);
         }
     }
     let end = frames.end().cloned().filter(|end| *end != LogEnd::Complete);
@@ -163,6 +164,7 @@ impl Report {
                 self.verdict = Verdict::Diverged;
                 (self.step, self.what, self.difference) = (Some(step), Some(what), difference);
             }
+            Finding::Interrupted => self.verdict = Verdict::Interrupted,
             Finding::Incomplete { step, what } => {
                 self.verdict = Verdict::OutcomeLogIncomplete;
                 (self.step, self.what) = (Some(step), Some(what));

@@ -1,12 +1,14 @@
 //! Every kind of command, on a scene with every feature: recorded, re-simulated and repeated from
 //! the log. Missing and wrong commands are reported.
 
-use recorder::{Message, OutcomeRow};
+use std::sync::atomic::AtomicBool;
+
+use recorder::{LogReader, Message, OutcomeRow};
 use sim_contract::ActionFields;
 use sim_solver::{PARAMETERS, Scene};
 
 use super::{check, rebuild, record};
-use crate::commands::verify::Verdict;
+use crate::commands::verify::{Verdict, verify};
 use crate::input::command_file;
 use crate::simulation::Job;
 
@@ -160,6 +162,14 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     let (again, repeated) = record(&job(&lines.join("\n")));
     assert_eq!(repeated, summary);
     assert!(again == file, "the log reproduces its recording");
+}
+
+#[test]
+fn a_request_to_stop_interrupts_the_verification_within_a_step() {
+    let (file, _) = record(&job(COMMANDS));
+    let log = LogReader::new(file.as_slice()).unwrap();
+    let (report, _) = verify(log, "test.mcap", 1, &AtomicBool::new(true), |_| {}).unwrap();
+    assert_eq!((report.verdict, report.steps_identical), (Verdict::Interrupted, 0));
 }
 
 #[test]

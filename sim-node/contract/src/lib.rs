@@ -86,7 +86,8 @@ pub use sim_types::{
     Action, ActionFields, COLLIDERS_MAX, COORDINATE_MAX, ColliderShape, ConstraintKind,
     ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS,
     Parameter, ParameterInfo, ParameterValue, ParameterValues, ParticleFlags, PerKind, PlainF32,
-    Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, Setting, TearCause, Text, TextError, ValueForm,
+    Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text,
+    TextError, ValueForm,
 };
 pub use stop::Stop;
 pub use text_file::{TextFileError, read_scene_file};

@@ -30,6 +30,11 @@ impl Stop {
         Ok(Self(stop))
     }
 
+    /// Returns the flag itself, for work that checks it often, such as a step of the solver.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.0
+    }
+
     /// Returns `true` once a signal has arrived.
     pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)

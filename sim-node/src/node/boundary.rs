@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{Action, Command, OwnerError, Reason, ReceivedCommand};
+use sim_contract::{Action, Command, OwnerError, Reason, ReceivedCommand, Stop};
 use sim_solver::{Applied, Control, Scene, Solver};
 
 use super::threads::with_threads;
@@ -14,7 +14,7 @@ impl Node {
     ///
     /// If the node pauses here, the state before these commands must be published. A boundary of a
     /// step that is not due has further polls, and one of them may bring the pause.
-    pub(super) fn apply_commands(&mut self, is_step_due: bool) -> anyhow::Result<()> {
+    pub(super) fn apply_commands(&mut self, is_step_due: bool, stop: &Stop) -> anyhow::Result<()> {
         if self.inbox.has_room() {
             self.publisher.receive_commands(&mut self.arrived);
             self.inbox.add(self.arrived.drain(..));
@@ -32,7 +32,7 @@ impl Node {
             self.release_lost(release);
         }
         for received in turn {
-            self.apply(&received)?;
+            self.apply(&received, stop)?;
         }
         self.solver.finish_boundary();
         let time_scale = self.progress.time_scale;
@@ -40,13 +40,13 @@ impl Node {
         self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
     }
 
-    fn apply(&mut self, received: &ReceivedCommand) -> anyhow::Result<()> {
+    fn apply(&mut self, received: &ReceivedCommand, stop: &Stop) -> anyhow::Result<()> {
         // A fresh status follows, so that `ctl status` shows the effect.
         self.next_status_ns = 0;
         let command = received.command;
         let result = match self.solver.apply(command.client_id, &command.action()) {
             Ok(Applied::Control(Control::Load { scene })) => {
-                self.load(scene.as_str())?.map(|()| Applied::Reset)
+                self.load(scene.as_str(), stop)?.map(|()| Applied::Reset)
             }
             Ok(applied) => self.progress.apply(applied).map(|()| applied),
             Err(reason) => Err(reason),
@@ -68,7 +68,7 @@ impl Node {
 
     /// Replaces the scene; the next step shows the initial state of the new one. The rate must stay.
     /// The inner result is the outcome. An outer error leaves neither scene able to continue.
-    fn load(&mut self, source: &str) -> anyhow::Result<Result<(), Reason>> {
+    fn load(&mut self, source: &str, stop: &Stop) -> anyhow::Result<Result<(), Reason>> {
         let scene = match self.read_scene(source) {
             Ok(scene) => scene,
             Err((problem, reason)) => {
@@ -76,6 +76,10 @@ impl Node {
                 return Ok(Err(reason));
             }
         };
+        // Reading and building a large scene take seconds each.
+        if stop.is_requested() {
+            return Ok(Err(Reason::NoEffectHere));
+        }
         let solver = with_threads(Solver::new_in_run(&scene), self.options.threads);
         match self.publisher.load(&scene, &solver, self.step + 1, self.progress.time_scale) {
             Err(error @ OwnerError::Publish(_)) => {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Bound;
 
-use sim_contract::{COMMANDS_PER_STEP_MAX, ReceivedCommand};
+use sim_contract::{Action, COMMANDS_PER_STEP_MAX, ReceivedCommand};
 
 /// Commands that wait to be applied.
 ///
@@ -49,9 +49,19 @@ impl Inbox {
         }
     }
 
-    /// Removes the commands of one turn, in the order of application.
+    /// Removes the commands of one turn, in the order of application. A turn ends with the first load,
+    /// because a load takes long, and the node must notice a request to stop after it.
     pub(super) fn next_turn(&mut self) -> Vec<ReceivedCommand> {
-        std::iter::from_fn(|| self.next()).take(COMMANDS_PER_STEP_MAX).collect()
+        let mut turn = Vec::new();
+        while turn.len() < COMMANDS_PER_STEP_MAX
+            && let Some(received) = self.next()
+        {
+            turn.push(received);
+            if matches!(received.command.action(), Action::Load { .. }) {
+                break;
+            }
+        }
+        turn
     }
 
     /// Removes the first command of the next client.
@@ -68,7 +78,7 @@ impl Inbox {
 #[cfg(test)]
 mod tests {
     //! Checks the order of a turn against lists of clients and sequence numbers.
-    use sim_contract::{Action, Command, ConnectionId};
+    use sim_contract::{Command, ConnectionId, Text};
 
     use super::*;
 
@@ -111,6 +121,16 @@ mod tests {
         assert_eq!(inbox.next_turn().len(), COMMANDS_PER_STEP_MAX);
         inbox.add(flood(1));
         assert_eq!(order(&inbox.next_turn())[..2], [(u64::MAX - 1, 0), (0, 1)]);
+    }
+
+    #[test]
+    fn a_turn_ends_with_the_first_load() {
+        let mut inbox = Inbox::default();
+        let load = Command::new(1, 2, Action::Load { scene: Text::cut("rope") });
+        let load = ReceivedCommand { command: load, connection: ConnectionId::default() };
+        inbox.add([pin(1, 1), load, pin(1, 3)]);
+        assert_eq!(order(&inbox.next_turn()), [(1, 1), (1, 2)]);
+        assert_eq!(order(&inbox.next_turn()), [(1, 3)]);
     }
 
     #[test]

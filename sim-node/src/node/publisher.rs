@@ -263,7 +263,7 @@ impl Publisher {
         self.publish_outcomes()
     }
 
-    fn publish_outcomes(&mut self) -> anyhow::Result<()> {
+    pub(crate) fn publish_outcomes(&mut self) -> anyhow::Result<()> {
         if self.outcomes.is_empty() {
             return Ok(());
         }

@@ -1,6 +1,7 @@
 //! Re-simulates a recording and compares every recorded step, from the file alone.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 
 use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, state_hash};
 use sim_contract::{Action, Outcome, ParticleState};
@@ -22,6 +23,8 @@ pub(crate) enum Finding {
         what: String,
         difference: Option<Difference>,
     },
+    /// The simulation was given up within a step.
+    Interrupted,
     /// Outcomes are missing, so the states cannot be compared.
     Incomplete {
         /// The first step that may lack an outcome.
@@ -99,8 +102,8 @@ impl Resimulation {
         Finding::Diverged { step: self.step, what, difference: None }
     }
 
-    /// Simulates up to the next snapshot and compares it.
-    pub(crate) fn advance(&mut self, frame: &Frame) -> Finding {
+    /// Simulates up to the next snapshot and compares it, unless `stop` becomes true.
+    pub(crate) fn advance(&mut self, frame: &Frame, stop: &AtomicBool) -> Finding {
         self.add_updates(frame);
         let row = &frame.row;
         if row.step <= self.step {
@@ -111,7 +114,7 @@ impl Resimulation {
             return finding;
         }
         while self.step < row.step {
-            if let Some(finding) = self.simulate_step() {
+            if let Some(finding) = self.simulate_step(stop) {
                 return finding;
             }
             // In the step of the snapshot, the particles are compared first.
@@ -192,7 +195,7 @@ impl Resimulation {
     }
 
     /// Applies the outcomes of the next step in the order of their index, and computes the step.
-    fn simulate_step(&mut self) -> Option<Finding> {
+    fn simulate_step(&mut self, stop: &AtomicBool) -> Option<Finding> {
         let step = self.step + 1;
         while let Some(entry) = self.pending.first_entry().filter(|entry| entry.get().step <= step)
         {
@@ -205,7 +208,9 @@ impl Resimulation {
                 return Some(finding);
             }
         }
-        self.solver.step();
+        if !self.solver.step_unless(stop) {
+            return Some(Finding::Interrupted);
+        }
         self.step = step;
         None
     }
