@@ -55,7 +55,7 @@ enum Command {
 }
 
 fn main() -> Exit {
-    let args = Args::try_parse().unwrap_or_else(|error| explain(error).exit());
+    let args = Args::try_parse().unwrap_or_else(|error| exit::with_usage(&explain(error)));
     exit::from_result(match &args.command {
         Command::Export(args) => export_command::run(args),
         Command::Info(args) => info::run(args),

@@ -8,10 +8,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use rustix::process::{Pid, Signal, kill_process};
-use sim_contract::DOMAIN_VARIABLE;
+use sim_contract::{DOMAIN_VARIABLE, console};
 
 use crate::programs::Program;
 use crate::sandbox::Sandbox;
+use crate::streams::Streams;
 use crate::wait::wait_for;
 
 /// Exit code of `sim-node ctl` for a rejected command.
@@ -65,7 +66,22 @@ impl Process {
     /// # Panics
     /// If the program does not start.
     pub fn start(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
-        Self::spawn(program, sandbox.domain(), args, Stdio::piped())
+        Self::start_with(Streams::default(), program, sandbox, args)
+    }
+
+    /// Starts a program with other output streams than captured ones.
+    ///
+    /// # Panics
+    /// If the program does not start.
+    pub fn start_with(
+        streams: Streams,
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+    ) -> Self {
+        let [stdout, stderr] = [streams.stdout.stdio(), streams.stderr.stdio()];
+        let command = streams.command(program);
+        Self::spawn(command, (program, sandbox.domain()), args, [stdout, stderr])
     }
 
     /// Starts a program in a domain given by name; "" is the default domain.
@@ -73,20 +89,24 @@ impl Process {
     /// # Panics
     /// If the program does not start.
     pub fn start_in(program: Program, domain: &str, args: &[&str]) -> Self {
-        Self::spawn(program, domain, args, Stdio::piped())
+        let command = Streams::default().command(program);
+        Self::spawn(command, (program, domain), args, [Stdio::piped(), Stdio::piped()])
     }
 
-    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
-    fn spawn(program: Program, domain: &str, args: &[&str], stdout: Stdio) -> Self {
-        let mut command = Command::new(program.path());
+    fn spawn(
+        mut command: Command,
+        (program, domain): (Program, &str),
+        args: &[&str],
+        [stdout, stderr]: [Stdio; 2],
+    ) -> Self {
         // A process group of its own, so that Ctrl-C in the terminal reaches only the parent, which
         // ends its children in order.
         command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
-        command.stdin(Stdio::null()).stdout(stdout).stderr(Stdio::piped());
+        command.stdin(Stdio::null()).stdout(stdout).stderr(stderr);
         let title = format!("{program:?} {}", args.join(" "));
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{title}: {error}"));
         let stdout = child.stdout.take().map_or_else(|| Captured::new(empty()), Captured::new);
-        let stderr = Captured::new(child.stderr.take().expect("a piped stderr"));
+        let stderr = child.stderr.take().map_or_else(|| Captured::new(empty()), Captured::new);
         Self { title, child, stdout, stderr }
     }
 
@@ -106,19 +126,6 @@ impl Process {
     /// If the program does not end before the deadline.
     pub fn run(program: Program, sandbox: &Sandbox, args: &[&str]) -> Finished {
         Self::start(program, sandbox, args).wait()
-    }
-
-    /// Runs a program to its end, with its stdout written to a file or pipe.
-    ///
-    /// # Panics
-    /// If the program does not end before the deadline.
-    pub fn run_into(
-        stdout: impl Into<Stdio>,
-        program: Program,
-        sandbox: &Sandbox,
-        args: &[&str],
-    ) -> Finished {
-        Self::spawn(program, sandbox.domain(), args, stdout.into()).wait()
     }
 
     /// Waits for a line on stderr that starts with "ready".
@@ -210,9 +217,9 @@ impl Drop for Process {
     }
 }
 
-#[allow(clippy::print_stderr, reason = "the output of a failing test")]
 fn show_failure(title: &str, stdout: &str, stderr: &str) {
-    eprintln!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---");
+    // A panic within a panic would abort the test.
+    console::note(&format!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---"));
 }
 
 impl Finished {

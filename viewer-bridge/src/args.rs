@@ -19,7 +19,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 #[command(
     name = "viewer-bridge",
     version,
-    after_help = "Stop it with Ctrl-C or SIGTERM.\n\n\
+    after_help = "Stop it with Ctrl-C, SIGTERM or SIGHUP.\n\n\
         Exit codes: 0 success, 1 failure, 2 usage error.\n\nExamples:\n  \
         viewer-bridge                               show the node `sim` at http://127.0.0.1:8080/\n  \
         viewer-bridge --listen 127.0.0.1:0          use any free port; the address is printed\n  \

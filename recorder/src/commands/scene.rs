@@ -1,6 +1,6 @@
 //! `recorder scene`: extracts the scene from a recording.
 
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -8,7 +8,7 @@ use recorder::{LogReader, PartFile};
 
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
-use crate::cli::output::path_text;
+use crate::cli::output::{self, path_text};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &SceneArgs) -> anyhow::Result<Exit> {
     }
     match &args.output {
         Some(path) => write_file(path, log.scene(), args.overwrite)?,
-        None => io::stdout().lock().write_all(log.scene()).context("cannot print the scene")?,
+        None => output::bytes(log.scene())?,
     }
     Ok(Exit::Done)
 }

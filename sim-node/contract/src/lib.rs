@@ -43,6 +43,7 @@
 
 mod client;
 pub mod clock;
+pub mod console;
 mod endpoint;
 mod limits;
 mod messages;

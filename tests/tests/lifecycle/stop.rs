@@ -1,6 +1,6 @@
 //! Requests to stop are seen within a step, however long it takes.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use std::fs;
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox, Signal, wait_for};
@@ -40,4 +40,24 @@ fn simulate_gives_up_a_long_step_and_finishes_its_file() {
     assert_eq!(summary["steps"], 0);
     let info = Process::run(Program::Recorder, &sandbox, &["info", &file, "--json"]);
     assert_eq!(info.code, Some(0), "{}", info.stderr);
+}
+
+#[test]
+fn a_hangup_ends_every_program_as_sigterm_does() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let start = |program, args: &[&str]| Process::start_ready(program, &sandbox, args);
+    let node = start(Program::SimNode, &["run", "curtain"]);
+    let bridge = start(Program::ViewerBridge, &["--listen", "127.0.0.1:0"]);
+    let recorder = start(Program::Recorder, &["record", "-o", &file]);
+    wait_for("a recording", || {
+        let part = fs::metadata(format!("{file}.part")).ok()?;
+        (part.len() > 50_000).then_some(())
+    });
+    for process in [recorder, bridge, node] {
+        process.signal(Signal::HUP);
+        let finished = process.wait();
+        assert_eq!(finished.code, Some(0), "{}", finished.stderr);
+    }
+    Process::run(Program::Recorder, &sandbox, &["info", &file]).success();
 }

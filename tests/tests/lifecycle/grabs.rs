@@ -1,6 +1,5 @@
 //! A grab lasts as long as the connection of its client, and the node logs the release as such. The
 //! clients are processes that are killed, so nothing of theirs can release a particle.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::Path;
 use std::time::Duration;
