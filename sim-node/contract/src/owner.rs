@@ -4,13 +4,14 @@ pub(crate) mod error;
 pub(crate) mod load;
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
 
 use crate::endpoint::Endpoint;
-use crate::limits::{CLIENTS_MAX, COMMANDS_BUFFERED};
+use crate::limits::{BORROWED_SAMPLES_MAX, COMMANDS_BUFFERED};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
@@ -59,8 +60,6 @@ pub struct Owner {
 /// message, so the first wake may be too early. A reader that takes longer finds its messages at a
 /// later wake.
 const WAKES_PER_READER: u32 = 2;
-/// Most commands received at once: all that the clients together can have waiting.
-const COMMANDS_RECEIVED_MAX: usize = CLIENTS_MAX * COMMANDS_BUFFERED;
 
 impl Owner {
     /// Claims the name, creates its services and publishes scene, topology, surface, parameters and an
@@ -199,18 +198,23 @@ impl Owner {
         self.status.write(*status).map(|_| ())
     }
 
-    /// Appends all commands that have arrived, those of each connection in the order of sending. Returns
-    /// their number. Ends early at a client with a broken connection, and returns no error: no other
-    /// process can stop the owner.
+    /// Appends the commands that have arrived, those of each connection in the order of sending, and at
+    /// most one queue of each, so that a client that sends without a pause keeps no other waiting.
+    /// Returns their number. Ends early at a client with a broken connection, and returns no error: no
+    /// other process can stop the owner.
     pub fn receive_commands(&self, commands: &mut Vec<ReceivedCommand>) -> usize {
         let before = commands.len();
-        while commands.len() - before < COMMANDS_RECEIVED_MAX {
-            match self.commands.receive() {
-                Ok(Some(command)) => commands.push(ReceivedCommand {
-                    connection: ConnectionId(command.origin().value()),
-                    command: *command,
-                }),
-                Ok(None) | Err(_) => break,
+        let mut counts = BTreeMap::new();
+        // A subscriber skips the connections of which it holds the most samples that it may. Holding
+        // the last ones of a queue is the only way to reach the connections behind it.
+        let mut held = Vec::new();
+        while let Ok(Some(sample)) = self.commands.receive() {
+            let connection = ConnectionId(sample.origin().value());
+            commands.push(ReceivedCommand { command: *sample, connection });
+            let count = counts.entry(connection).or_insert(0);
+            *count += 1;
+            if *count > COMMANDS_BUFFERED - BORROWED_SAMPLES_MAX {
+                held.push(sample);
             }
         }
         commands.len() - before
