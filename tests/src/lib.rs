@@ -6,10 +6,12 @@
 mod process;
 mod programs;
 mod sandbox;
+mod streams;
 mod wait;
 
 pub use process::{Finished, Process, ctl};
 pub use programs::{Program, build_products};
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;
+pub use streams::{Stream, Streams};
 pub use wait::{DEADLINE, Deadline, wait_for};
