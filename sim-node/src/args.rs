@@ -80,7 +80,7 @@ pub(crate) fn parse() -> Args {
     try_parse(std::env::args_os()).unwrap_or_else(|error| {
         let printed = match refusal::text(&error) {
             Some(text) => {
-                output::note(text.trim_end());
+                console::note_lines(text.trim_end());
                 Ok(())
             }
             None => console::accept_closed_pipe(error.print()),

@@ -2,8 +2,6 @@
 
 use std::process::{ExitCode, Termination};
 
-use sim_contract::printable_line;
-
 use crate::output;
 
 /// End of a subcommand.
@@ -30,7 +28,7 @@ impl Termination for Exit {
 /// Prints an error as one line on stderr, followed by its causes.
 pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
-        output::note(&printable_line(&format!("error: {error:#}")));
+        output::note(&format!("error: {error:#}"));
         Exit::Failed
     })
 }

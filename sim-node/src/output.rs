@@ -27,7 +27,7 @@ pub(crate) fn json(value: &impl Serialize) -> anyhow::Result<()> {
     line(&serde_json::to_string(value).context("encoding the result")?)
 }
 
-/// Prints text on stderr, or drops it.
+/// Prints a line on stderr, or drops it.
 pub(crate) fn note(text: &str) {
-    console::note(&printable(text));
+    console::note(text);
 }

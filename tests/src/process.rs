@@ -278,7 +278,7 @@ impl Drop for Process {
 
 fn show_failure(title: &str, stdout: &str, stderr: &str) {
     // A panic within a panic would abort the test.
-    console::note(&format!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---"));
+    console::note_lines(&format!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---"));
 }
 
 impl Finished {

@@ -12,7 +12,7 @@ use std::task::Poll;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
-use sim_contract::{Stop, console, printable_line, report_bus_errors};
+use sim_contract::{Stop, console, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::pages::assets::Assets;
@@ -172,5 +172,5 @@ fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
 }
 
 fn note(text: &str) {
-    console::note(&printable_line(text));
+    console::note(text);
 }

@@ -41,23 +41,17 @@
 //! This crate knows no solver, and no other crate knows iceoryx2.
 #![forbid(unsafe_code)]
 
-mod bus_error;
 mod client;
 pub mod clock;
-pub mod console;
 mod endpoint;
-mod file_kind;
-mod file_size;
+mod files;
 mod limits;
 mod messages;
 mod owner;
-mod part_file;
 mod ports;
-mod stop;
+mod process;
 pub mod testing;
-mod text_file;
 
-pub use bus_error::report_bus_errors;
 pub use client::Client;
 pub use client::change::{Change, LostChanges};
 pub use client::loaded_scene::LoadedScene;
@@ -67,8 +61,9 @@ pub use client::tap::Tap;
 pub use client::torn::Torn;
 pub use client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
 pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
-pub use file_kind::kind_of_non_file;
-pub use file_size::report_file_size_limit;
+pub use files::kind::kind_of_non_file;
+pub use files::part_file::{Existing, PartFile, PartFileError, explain_write_error, part_path};
+pub use files::text_file::{TextFileError, read_scene_file};
 pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
 pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
@@ -84,7 +79,6 @@ pub use messages::update::Update;
 pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
-pub use part_file::{Existing, PartFile, PartFileError, explain_write_error, part_path};
 pub use ports::connection::{ConnectionId, ReceivedCommand};
 pub use ports::domain::root::RootError;
 pub use ports::memory::MemoryError;
@@ -93,6 +87,10 @@ pub use ports::service::ServiceError;
 pub use ports::services::AttachError;
 pub use ports::wake::Wake;
 pub use ports::writer::PublishError;
+pub use process::bus_error::report_bus_errors;
+pub use process::console;
+pub use process::file_size::report_file_size_limit;
+pub use process::stop::Stop;
 pub use sim_types::{
     Action, ActionFields, COLLIDERS_MAX, COORDINATE_MAX, ColliderShape, ConstraintKind,
     ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS,
@@ -100,8 +98,6 @@ pub use sim_types::{
     Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text,
     TextError, ValueForm, printable, printable_line,
 };
-pub use stop::Stop;
-pub use text_file::{TextFileError, read_scene_file};
 
 /// Compiles the programs in the README.
 #[cfg(doctest)]

@@ -1,7 +1,6 @@
 //! Warnings of a running node, limited so that no client can delay it by causing them.
 
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::printable_line;
 
 use crate::output;
 
@@ -32,6 +31,6 @@ impl Warnings {
             0 => String::new(),
             count => format!(" ({count} more before this one)"),
         };
-        output::note(&format!("warning: {}{dropped}", printable_line(text)));
+        output::note(&format!("warning: {text}{dropped}"));
     }
 }

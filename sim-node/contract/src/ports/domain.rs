@@ -1,6 +1,7 @@
 //! Separation of domains: the prefix and the directory of iceoryx2's files.
 
 pub(crate) mod counter;
+pub(crate) mod files;
 pub(crate) mod owner_lock;
 pub(crate) mod root;
 pub(crate) mod unfinished;

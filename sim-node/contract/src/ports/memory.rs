@@ -10,8 +10,7 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::io::Errno;
 use thiserror::Error;
 
-use crate::ports::domain::owner_lock::SHARED_MEMORY;
-use crate::ports::domain::unfinished::segments;
+use crate::ports::domain::files::{SHARED_MEMORY, segments};
 
 /// Not enough memory in `/dev/shm`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]

@@ -6,8 +6,8 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 
 use iceoryx2::prelude::Config;
 
+use crate::ports::domain::files::segments;
 use crate::ports::domain::root::RootError;
-use crate::ports::domain::unfinished::segments;
 
 /// Checks that the counter of a named domain is this user's own, or does not exist yet.
 ///

@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::Config;
 
+use crate::ports::domain::files::SHARED_MEMORY;
 use crate::ports::domain::root;
-
-/// The directory of shared memory.
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
 /// The owner's lock, until it is dropped or its process ends in any way.
 ///

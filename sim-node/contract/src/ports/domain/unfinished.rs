@@ -1,18 +1,18 @@
 //! Files of iceoryx2 that their process was killed in the middle of creating. iceoryx2 waits for them
 //! to be finished, and never removes them.
 
-use std::fs::{self, DirEntry, Metadata};
+use std::fs::{self, Metadata};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, Config, FileName, Node, NodeState, ServiceName, ipc};
+use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, ServiceName, ipc};
 use iceoryx2::service::Service;
 use iceoryx2::service::service_hash::ServiceHash;
 
 use crate::clock::{self, Deadline};
-use crate::ports::domain::owner_lock::SHARED_MEMORY;
+use crate::ports::domain::files::{entries, segments};
 use crate::ports::domain::root;
 use crate::ports::service::{SERVICES, ServiceSpec};
 
@@ -29,8 +29,6 @@ const NODE_CREATION_MAX: Duration = Duration::from_secs(10);
 /// that creator is only slow, two counters exist for a while, and ids of nodes still differ in their
 /// process and time.
 const COUNTER_CREATION_MAX: Duration = Duration::from_millis(20);
-/// Number of characters that name the type of a segment.
-const TYPE_HASH_LENGTH: usize = 40;
 /// Pause between two looks at an unfinished file.
 const PAUSE_NS: u64 = clock::SECOND_NS / 500;
 
@@ -189,25 +187,6 @@ fn monitor_files(config: &Config, id: &str) -> Vec<PathBuf> {
 /// Returns `true` for a segment of shared memory without its final size or permissions.
 fn is_unfinished_segment(metadata: &Metadata) -> bool {
     metadata.len() == 0 || metadata.mode() & READABLE == 0
-}
-
-/// Returns the files of a kind in shared memory: `<prefix><hash of the type>_<id><suffix>`.
-pub(crate) fn segments(config: &Config, suffix: &FileName) -> impl Iterator<Item = PathBuf> {
-    let prefix = config.global.prefix.to_string();
-    let suffix = suffix.to_string();
-    let is_segment = move |entry: &DirEntry| {
-        let name = entry.file_name();
-        let hash = name.to_str().and_then(|name| {
-            name.strip_prefix(&prefix)?.strip_suffix(&suffix)?.split_once('_').map(|(hash, _)| hash)
-        });
-        // Another domain may have a prefix that begins with this one.
-        hash.is_some_and(|hash| hash.len() == TYPE_HASH_LENGTH)
-    };
-    entries(Path::new(SHARED_MEMORY)).filter(is_segment).map(|entry| entry.path())
-}
-
-fn entries(directory: &Path) -> impl Iterator<Item = DirEntry> {
-    fs::read_dir(directory).into_iter().flatten().flatten()
 }
 
 /// Removes a file. Another process of the domain may have removed it first.

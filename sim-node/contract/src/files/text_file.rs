@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use sim_types::SCENE_SIZE_BYTES_MAX;
 
-use crate::file_kind::kind_of_non_file;
+use crate::files::kind::kind_of_non_file;
 
 /// Error of reading a text file.
 #[derive(Debug, Error)]

@@ -7,6 +7,8 @@
 
 use std::io::{self, ErrorKind, Write};
 
+use sim_types::{printable, printable_line};
+
 /// Writes a result to stdout, past every buffer: the end of a program ignores errors.
 ///
 /// # Errors
@@ -15,9 +17,14 @@ pub fn write_result(bytes: &[u8]) -> io::Result<()> {
     write(io::stdout().lock(), bytes)
 }
 
-/// Writes a line to stderr, or drops it.
+/// Writes a line to stderr, or drops it. Replaces line breaks and control characters in it.
 pub fn note(text: &str) {
-    let _dropped = writeln!(io::stderr().lock(), "{text}");
+    let _dropped = writeln!(io::stderr().lock(), "{}", printable_line(text));
+}
+
+/// Writes several lines to stderr, or drops them. Replaces control characters in them.
+pub fn note_lines(text: &str) {
+    let _dropped = writeln!(io::stderr().lock(), "{}", printable(text));
 }
 
 /// Accepts a write that failed because the reader of a pipe has gone: that reader wants no more.

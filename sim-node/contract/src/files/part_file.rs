@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
-use crate::file_kind::kind_of_non_file;
+use crate::files::kind::kind_of_non_file;
 use disk::DiskFile;
 use lock::Lock;
 

@@ -1,0 +1,31 @@
+//! The files of a domain.
+
+use std::fs::{self, DirEntry};
+use std::path::{Path, PathBuf};
+
+use iceoryx2::prelude::{Config, FileName};
+
+/// The directory of shared memory.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+/// Number of characters that name the type of a segment.
+const TYPE_HASH_LENGTH: usize = 40;
+
+/// Returns the files of a kind in shared memory: `<prefix><hash of the type>_<id><suffix>`.
+pub(crate) fn segments(config: &Config, suffix: &FileName) -> impl Iterator<Item = PathBuf> {
+    let prefix = config.global.prefix.to_string();
+    let suffix = suffix.to_string();
+    let is_segment = move |entry: &DirEntry| {
+        let name = entry.file_name();
+        let hash = name.to_str().and_then(|name| {
+            name.strip_prefix(&prefix)?.strip_suffix(&suffix)?.split_once('_').map(|(hash, _)| hash)
+        });
+        // Another domain may have a prefix that begins with this one.
+        hash.is_some_and(|hash| hash.len() == TYPE_HASH_LENGTH)
+    };
+    entries(Path::new(SHARED_MEMORY)).filter(is_segment).map(|entry| entry.path())
+}
+
+/// Returns the entries of a directory; none if it cannot be read.
+pub(crate) fn entries(directory: &Path) -> impl Iterator<Item = DirEntry> {
+    fs::read_dir(directory).into_iter().flatten().flatten()
+}
