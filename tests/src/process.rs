@@ -1,10 +1,8 @@
 //! Child processes that end with their guard.
 
 use std::fmt;
-use std::fs::DirEntry;
 use std::io::{BufRead, BufReader, Read, empty};
 use std::os::unix::process::CommandExt;
-use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -182,19 +180,19 @@ impl Process {
         })
     }
 
-    /// Waits until the program has opened a file.
+    /// Waits until the program handles a signal: from then on, the signal requests its end.
     ///
     /// # Panics
     /// If the program ends before, or the deadline passes.
-    pub fn wait_until_open(&mut self, path: &str) {
-        let folder = format!("/proc/{}/fd", self.child.id());
-        let path = Path::new(path);
-        wait_for(&format!("{} to open {}", self.title, path.display()), || {
-            assert!(self.is_running(), "{} ended before it opened the file", self.title);
-            let mut links = std::fs::read_dir(&folder).ok()?.flatten();
-            let is_open =
-                |link: DirEntry| std::fs::read_link(link.path()).is_ok_and(|to| to == path);
-            links.any(is_open).then_some(())
+    pub fn wait_until_it_handles(&mut self, signal: Signal) {
+        let path = format!("/proc/{}/status", self.child.id());
+        let bit = 1_u64 << (signal.as_raw() - 1);
+        wait_for(&format!("{} to handle {signal:?}", self.title), || {
+            assert!(self.is_running(), "{} ended before it handled the signal", self.title);
+            let status = std::fs::read_to_string(&path).ok()?;
+            let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"))?;
+            let mask = u64::from_str_radix(mask.trim(), 16).ok()?;
+            (mask & bit != 0).then_some(())
         });
     }
 
