@@ -55,7 +55,7 @@ enum Command {
 }
 
 fn main() -> Exit {
-    let args = Args::try_parse().unwrap_or_else(|error| explain(error).exit());
+    let args = Args::try_parse().unwrap_or_else(|error| exit::with_usage(&explain(error)));
     exit::from_result(run(&args.command))
 }
 

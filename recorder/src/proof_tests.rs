@@ -7,7 +7,7 @@ mod commands;
 mod edits;
 mod rows;
 
-use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 
 use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::Action;
@@ -40,12 +40,12 @@ fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
     // Small chunks, so that a truncated file still has some.
     let options = LogOptions { chunk_size_bytes: 100_000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
-    let outcomes = simulate(job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    let outcomes = simulate(job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     (finish(log), outcomes)
 }
 
 fn check(file: &[u8]) -> (Report, Option<LogEnd>) {
-    verify(LogReader::new(file).unwrap(), "test.mcap", 1, |_| false).unwrap()
+    verify(LogReader::new(file).unwrap(), "test.mcap", 1, &AtomicBool::new(false), |_| {}).unwrap()
 }
 
 /// Rebuilds a recording. `change` returns the new message, or `None` to leave it out.
@@ -265,7 +265,13 @@ fn a_recording_without_a_keyframe_is_an_error() {
     let (file, _) = record(&job("curtain", "", 10));
     let without =
         rebuild(&file, |message| (!matches!(message, Message::Keyframe { .. })).then_some(message));
-    let error = verify(LogReader::new(without.as_slice()).unwrap(), "x.mcap", 1, |_| false);
+    let error = verify(
+        LogReader::new(without.as_slice()).unwrap(),
+        "x.mcap",
+        1,
+        &AtomicBool::new(false),
+        |_| {},
+    );
     let error = error.unwrap_err().to_string();
     assert_eq!(error, "x.mcap: has no snapshot with a keyframe to start from");
 }
@@ -279,7 +285,13 @@ fn a_recording_of_another_solver_version_is_refused() {
     let scene = job.scene.to_toml();
     let log = LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0);
     let file = log.unwrap().finish(&Closing::default()).unwrap();
-    let error = verify(LogReader::new(file.as_slice()).unwrap(), "x.mcap", 1, |_| false);
+    let error = verify(
+        LogReader::new(file.as_slice()).unwrap(),
+        "x.mcap",
+        1,
+        &AtomicBool::new(false),
+        |_| {},
+    );
     let error = error.unwrap_err().to_string();
     let found = format!("recorded with solver version {}, but this program", SOLVER_VERSION + 1);
     assert!(error.contains(&found), "{error}");

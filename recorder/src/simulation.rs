@@ -8,7 +8,7 @@ pub(crate) mod solver_rows;
 pub(crate) mod state_writer;
 
 use std::io::Write;
-use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use recorder::{LogWriter, OutcomeRow, WriteError};
 use sim_contract::{Command, Outcome, Reason};
@@ -35,13 +35,14 @@ pub(crate) struct SimulationResult {
 /// Most rejected commands to report one by one.
 const REJECTIONS_SHOWN_MAX: usize = 5;
 
-/// Computes the steps of `job` and writes them to `log`. Calls `on_step` after each step, which may
-/// end the simulation early.
+/// Computes the steps of `job` and writes them to `log`. Calls `on_step` after each step. Ends early,
+/// even within a step, if `stop` becomes true.
 pub(crate) fn simulate<W: Write>(
     job: &Job,
     mut solver: Solver,
     log: Option<&mut LogWriter<W>>,
-    mut on_step: impl FnMut(u64) -> ControlFlow<()>,
+    stop: &AtomicBool,
+    mut on_step: impl FnMut(u64),
 ) -> Result<SimulationResult, WriteError> {
     let run = job.description(&solver);
     let mut writer = log.map(|log| StateWriter::new(log, run, &solver)).transpose()?;
@@ -62,13 +63,16 @@ pub(crate) fn simulate<W: Write>(
             rows.push(OutcomeRow::from(&outcome));
             pending = rest;
         }
-        solver.step();
+        if !solver.step_unless(stop) {
+            break;
+        }
         result.steps = step;
         if let Some(writer) = &mut writer {
             writer.outcomes = rows;
             writer.write_state(&solver, step, keyframe)?;
         }
-        if on_step(step).is_break() {
+        on_step(step);
+        if stop.load(Ordering::Relaxed) {
             break;
         }
     }

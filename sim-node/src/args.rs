@@ -14,6 +14,7 @@ use std::ffi::OsString;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use sim_contract::console;
 
 pub(crate) use command::{CommandVerb, PoseArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb};
@@ -72,13 +73,25 @@ pub(crate) enum Verb {
     Lesson(LessonArgs),
 }
 
-/// Reads the command line. Exits with code 2 and the usage if it is invalid.
+/// Reads the command line. Exits with code 2 and the usage if it is invalid, and with 0 after a help
+/// text, or 1 if that cannot be written.
 #[allow(clippy::exit, reason = "clap ends the program in the same way")]
 pub(crate) fn parse() -> Args {
     try_parse(std::env::args_os()).unwrap_or_else(|error| {
-        let Some(text) = refusal::text(&error) else { error.exit() };
-        output::note(text.trim_end());
-        std::process::exit(error.exit_code())
+        let printed = match refusal::text(&error) {
+            Some(text) => {
+                output::note(text.trim_end());
+                Ok(())
+            }
+            None => console::accept_closed_pipe(error.print()),
+        };
+        std::process::exit(match printed {
+            Err(problem) if !error.use_stderr() => {
+                output::note(&format!("error: cannot write to stdout: {problem}"));
+                1
+            }
+            _ => error.exit_code(),
+        })
     })
 }
 

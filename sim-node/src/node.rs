@@ -1,5 +1,7 @@
 //! The loop: wait for the deadline, apply commands, step, publish, observe.
 
+mod boundary;
+mod grab_connections;
 mod inbox;
 mod pace;
 mod progress;
@@ -8,12 +10,11 @@ mod statistics;
 mod threads;
 mod warnings;
 
-use anyhow::Context;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{Action, Command, Endpoint, OwnerError, Reason, Stop};
-use sim_solver::{Applied, Control, Scene, Solver};
+use sim_contract::{Endpoint, ReceivedCommand, Stop};
+use sim_solver::{Scene, Solver};
 
-use crate::scene_source;
+use grab_connections::GrabConnections;
 use inbox::Inbox;
 use pace::Pace;
 use progress::Progress;
@@ -57,7 +58,8 @@ pub(crate) struct Node {
     publisher: Publisher,
     inbox: Inbox,
     /// Buffer that every boundary reuses.
-    arrived: Vec<Command>,
+    arrived: Vec<ReceivedCommand>,
+    grab_connections: GrabConnections,
     progress: Progress,
     pace: Pace,
     pub(crate) statistics: Statistics,
@@ -85,6 +87,7 @@ impl Node {
             publisher,
             inbox: Inbox::default(),
             arrived: Vec::new(),
+            grab_connections: GrabConnections::default(),
             progress: Progress {
                 is_paused: options.starts_paused,
                 steps_due: 0,
@@ -118,17 +121,23 @@ impl Node {
             if stop.is_requested() {
                 break;
             }
-            self.apply_commands(due.is_some())?;
+            self.apply_commands(due.is_some(), stop)?;
+            if stop.is_requested() {
+                break;
+            }
             if let Some(wake_late_ns) = due
                 && self.progress.is_stepping()
             {
-                self.make_step(wake_late_ns)?;
+                if !self.make_step(wake_late_ns, stop)? {
+                    break;
+                }
             } else {
                 self.publisher.publish_between(&self.solver, self.position())?;
             }
             self.observe(&observer)?;
         }
-        Ok(())
+        // Those of the last boundary, if its step was not made.
+        self.publisher.publish_outcomes()
     }
 
     fn is_done(&self) -> bool {
@@ -165,83 +174,13 @@ impl Node {
         Some(self.pace.meet(monotonic_ns()))
     }
 
-    /// Applies the commands that have arrived, at the boundary before the next step.
-    ///
-    /// If the node pauses here, the state before these commands must be published. A boundary of a
-    /// step that is not due has further polls, and one of them may bring the pause.
-    fn apply_commands(&mut self, is_step_due: bool) -> anyhow::Result<()> {
-        if self.inbox.has_room() {
-            self.publisher.receive_commands(&mut self.arrived);
-            self.inbox.add(self.arrived.drain(..));
-        }
-        let turn = self.inbox.next_turn();
-        let is_pause = |command: &Command| command.action() == Action::Pause;
-        if turn.iter().any(|command| !is_step_due || is_pause(command)) {
-            self.publisher.publish_left_out(&self.solver, self.position())?;
-        }
-        for command in turn {
-            // A fresh status follows, so that `ctl status` shows the effect.
-            self.next_status_ns = 0;
-            let result = match self.solver.apply(command.client_id, &command.action()) {
-                Ok(Applied::Control(Control::Load { scene })) => {
-                    self.load(scene.as_str())?.map(|()| Applied::Reset)
-                }
-                Ok(applied) => self.progress.apply(applied).map(|()| applied),
-                Err(reason) => Err(reason),
-            };
-            self.publisher.add_outcome(self.step + 1, command, result);
-        }
-        self.solver.finish_boundary();
-        let time_scale = self.progress.time_scale;
-        self.pace.set_time_scale(time_scale, monotonic_ns());
-        self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
-    }
-
-    /// Replaces the scene; the next step shows the initial state of the new one. The rate must stay.
-    /// The inner result is the outcome. An outer error leaves neither scene able to continue.
-    fn load(&mut self, source: &str) -> anyhow::Result<Result<(), Reason>> {
-        let scene = match self.read_scene(source) {
-            Ok(scene) => scene,
-            Err((problem, reason)) => {
-                self.warnings.print(&format!("load {source}: {problem}"));
-                return Ok(Err(reason));
-            }
-        };
-        let solver = with_threads(Solver::new_in_run(&scene), self.options.threads);
-        match self.publisher.load(&scene, &solver, self.step + 1, self.progress.time_scale) {
-            Err(error @ OwnerError::Publish(_)) => {
-                Err(error).context("publishing the loaded scene")
-            }
-            Err(error) => {
-                self.warnings.print(&format!("load {source}: {error}"));
-                Ok(Err(Reason::NoEffectHere))
-            }
-            Ok(()) => {
-                (self.scene, self.solver) = (scene, solver);
-                self.progress.is_reset_due = true;
-                Ok(Ok(()))
-            }
-        }
-    }
-
-    /// Reads a scene that this run can continue with, or returns the problem and the reason.
-    fn read_scene(&self, source: &str) -> Result<Scene, (String, Reason)> {
-        let out_of_range = |problem| (problem, Reason::OutOfRange);
-        let mut scene =
-            scene_source::load(source).map_err(|error| out_of_range(format!("{error:#}")))?;
-        let Options { rate_hz, substeps, .. } = self.options;
-        scene.override_solver(rate_hz, substeps).map_err(out_of_range)?;
-        let (own, other) = (self.scene.solver.rate_hz, scene.solver.rate_hz);
-        if own == other {
-            return Ok(scene);
-        }
-        Err((format!("the scene runs at {other} Hz, this node at {own} Hz"), Reason::NoEffectHere))
-    }
-
-    fn make_step(&mut self, wake_late_ns: u64) -> anyhow::Result<()> {
+    /// Makes and publishes a step. Returns `false` if it was given up because of a request to stop.
+    fn make_step(&mut self, wake_late_ns: u64, stop: &Stop) -> anyhow::Result<bool> {
         let before_ns = monotonic_ns();
         let frozen_count = self.solver.frozen_count();
-        self.solver.step();
+        if !self.solver.step_unless(stop.flag()) {
+            return Ok(false);
+        }
         let solve_ns = monotonic_ns() - before_ns;
         if self.solver.frozen_count() > frozen_count {
             let count = self.solver.frozen_count() - frozen_count;
@@ -260,7 +199,8 @@ impl Node {
         self.statistics.record(wake_late_ns, solve_ns, self.pace.period_ns());
         self.statistics.skipped_periods = self.pace.skipped_periods;
         let times = StepTimes { wake_late_ns, solve_ns };
-        self.publisher.publish_step(&self.solver, self.position(), times)
+        self.publisher.publish_step(&self.solver, self.position(), times)?;
+        Ok(true)
     }
 
     /// Serves late subscribers, calls the observer, and publishes the status.

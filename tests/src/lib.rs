@@ -7,10 +7,12 @@ pub mod faults;
 mod process;
 mod programs;
 mod sandbox;
+mod streams;
 mod wait;
 
 pub use process::{Finished, Process, ctl};
 pub use programs::{Program, build_products};
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;
+pub use streams::{Stream, Streams};
 pub use wait::{DEADLINE, Deadline, wait_for};

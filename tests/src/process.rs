@@ -9,11 +9,12 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit, setrlimit};
-use sim_contract::DOMAIN_VARIABLE;
+use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
+use sim_contract::{DOMAIN_VARIABLE, console};
 
 use crate::programs::Program;
 use crate::sandbox::Sandbox;
+use crate::streams::Streams;
 use crate::wait::wait_for;
 
 /// Exit code of `sim-node ctl` for a rejected command.
@@ -69,7 +70,22 @@ impl Process {
     /// # Panics
     /// If the program does not start.
     pub fn start(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
-        Self::spawn(program, sandbox.domain(), args, Stdio::piped())
+        Self::start_with(Streams::default(), program, sandbox, args)
+    }
+
+    /// Starts a program with other output streams than captured ones.
+    ///
+    /// # Panics
+    /// If the program does not start.
+    pub fn start_with(
+        streams: Streams,
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+    ) -> Self {
+        let [stdout, stderr] = [streams.stdout.stdio(), streams.stderr.stdio()];
+        let command = streams.command(program);
+        Self::spawn(command, (program, sandbox.domain()), args, [stdout, stderr])
     }
 
     /// Starts a program in a domain given by name; "" is the default domain.
@@ -77,69 +93,42 @@ impl Process {
     /// # Panics
     /// If the program does not start.
     pub fn start_in(program: Program, domain: &str, args: &[&str]) -> Self {
-        Self::spawn(program, domain, args, Stdio::piped())
+        let command = Streams::default().command(program);
+        Self::spawn(command, (program, domain), args, [Stdio::piped(), Stdio::piped()])
     }
 
-    /// Starts a program that can open this many files. Other threads of this process have the same limit
-    /// meanwhile.
+    /// Starts a program under a limit of the shell, such as `-n 256`: at most 256 open files.
     ///
     /// # Panics
-    /// If the program does not start, or the limit is higher than that of the system.
-    pub fn start_with_open_files(
-        open_file_count_max: u64,
+    /// If the program does not start.
+    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
+    pub fn start_limited(
+        (option, value): (&str, u64),
         program: Program,
         sandbox: &Sandbox,
         args: &[&str],
     ) -> Self {
-        // The first call may build the programs.
-        let _path = program.path();
-        let limit = getrlimit(Resource::Nofile);
-        let current = Some(open_file_count_max);
-        setrlimit(Resource::Nofile, Rlimit { current, ..limit }).expect("a lower limit");
-        let process = Self::start(program, sandbox, args);
-        setrlimit(Resource::Nofile, limit).expect("the limit before");
-        process
-    }
-
-    /// Runs a program to its end, with an address space of at most `size_bytes_max` bytes. Reserved
-    /// memory counts, even if it is never used.
-    ///
-    /// # Panics
-    /// If the program does not end before the deadline.
-    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
-    pub fn run_limited(
-        program: Program,
-        sandbox: &Sandbox,
-        args: &[&str],
-        size_bytes_max: u64,
-    ) -> Finished {
         let mut command = Command::new("sh");
-        let limit_kib = (size_bytes_max >> 10).to_string();
-        command.args(["-c", r#"ulimit -v "$0" && exec "$@""#, &limit_kib]).arg(program.path());
-        let title = format!("{program:?} {}", args.join(" "));
-        Self::spawn_command(command, title, sandbox.domain(), args, Stdio::piped()).wait()
+        let limit = format!(r#"ulimit {option} {value} && exec "$0" "$@""#);
+        command.args(["-c", &limit]).arg(program.path());
+        let streams = [Stdio::piped(), Stdio::piped()];
+        Self::spawn(command, (program, sandbox.domain()), args, streams)
     }
 
-    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
-    fn spawn(program: Program, domain: &str, args: &[&str], stdout: Stdio) -> Self {
-        let title = format!("{program:?} {}", args.join(" "));
-        Self::spawn_command(Command::new(program.path()), title, domain, args, stdout)
-    }
-
-    fn spawn_command(
+    fn spawn(
         mut command: Command,
-        title: String,
-        domain: &str,
+        (program, domain): (Program, &str),
         args: &[&str],
-        stdout: Stdio,
+        [stdout, stderr]: [Stdio; 2],
     ) -> Self {
         // A process group of its own, so that Ctrl-C in the terminal reaches only the parent, which
         // ends its children in order.
         command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
-        command.stdin(Stdio::null()).stdout(stdout).stderr(Stdio::piped());
+        command.stdin(Stdio::null()).stdout(stdout).stderr(stderr);
+        let title = format!("{program:?} {}", args.join(" "));
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{title}: {error}"));
         let stdout = child.stdout.take().map_or_else(|| Captured::new(empty()), Captured::new);
-        let stderr = Captured::new(child.stderr.take().expect("a piped stderr"));
+        let stderr = child.stderr.take().map_or_else(|| Captured::new(empty()), Captured::new);
         Self { title, child, stdout, stderr }
     }
 
@@ -159,19 +148,6 @@ impl Process {
     /// If the program does not end before the deadline.
     pub fn run(program: Program, sandbox: &Sandbox, args: &[&str]) -> Finished {
         Self::start(program, sandbox, args).wait()
-    }
-
-    /// Runs a program to its end, with its stdout written to a file or pipe.
-    ///
-    /// # Panics
-    /// If the program does not end before the deadline.
-    pub fn run_into(
-        stdout: impl Into<Stdio>,
-        program: Program,
-        sandbox: &Sandbox,
-        args: &[&str],
-    ) -> Finished {
-        Self::spawn(program, sandbox.domain(), args, stdout.into()).wait()
     }
 
     /// Waits for a line on stderr that starts with "ready".
@@ -317,9 +293,9 @@ impl Drop for Process {
     }
 }
 
-#[allow(clippy::print_stderr, reason = "the output of a failing test")]
 fn show_failure(title: &str, stdout: &str, stderr: &str) {
-    eprintln!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---");
+    // A panic within a panic would abort the test.
+    console::note(&format!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---"));
 }
 
 impl Finished {

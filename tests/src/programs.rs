@@ -15,6 +15,8 @@ pub enum Program {
     ViewerBridge,
     /// A reader that borrows samples and never returns them.
     StubbornReader,
+    /// A client that grabs particles and never releases them.
+    Grabber,
     /// The demo that `cargo demo` runs.
     Demo,
     /// The contract's example that prints snapshots.
@@ -36,6 +38,7 @@ impl Program {
             Self::Recorder => built().join("recorder"),
             Self::ViewerBridge => built().join("viewer-bridge"),
             Self::StubbornReader => built().join("stubborn-reader"),
+            Self::Grabber => built().join("grabber"),
             Self::Demo => built().join("demo"),
             Self::Watch => built().join("examples/watch"),
             Self::Grab => built().join("examples/grab"),

@@ -1,9 +1,6 @@
 //! The node refuses bad input with an exit code, the place of the error and the remedy.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use std::fs::File;
-use std::io::pipe;
-
 use integration_tests::{Finished, Process, Program, Sandbox};
 
 fn run(sandbox: &Sandbox, args: &[&str]) -> Finished {
@@ -83,32 +80,6 @@ fn invalid_options_exit_with_2_and_invalid_rates_name_the_range() {
         assert_eq!(run(&sandbox, empty).code, Some(2), "{empty:?}");
     }
     assert_refused(&run(&sandbox, &["run", "--domain", ""]), 2, &["1 to 24 characters"]);
-}
-
-#[test]
-fn a_full_stdout_is_an_error_and_a_closed_pipe_ends_the_output_quietly() {
-    let sandbox = Sandbox::new();
-    let mesh = sandbox.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    for args in [
-        &["show", "curtain"][..],
-        &["scenes"],
-        &["scenes", "--json"],
-        &["check", "curtain"],
-        &["import", &mesh],
-        &["lesson"],
-        &["run", "rope", "--steps", "1", "--as-fast-as-possible", "--json"],
-    ] {
-        let full = File::options().write(true).open("/dev/full").unwrap();
-        let finished = Process::run_into(full, Program::SimNode, &sandbox, args);
-        let error = "error: cannot write to stdout: No space left on device";
-        assert_eq!(finished.code, Some(1), "{args:?}: {}", finished.stderr);
-        assert!(finished.stderr.contains(error), "{args:?}: {}", finished.stderr);
-        assert!(!finished.stderr.contains("panicked"), "{args:?}: {}", finished.stderr);
-        let (_, closed) = pipe().unwrap();
-        let finished = Process::run_into(closed, Program::SimNode, &sandbox, args);
-        assert_eq!(finished.code, Some(0), "{args:?}: {}", finished.stderr);
-        assert!(!finished.stderr.contains("error"), "{args:?}: {}", finished.stderr);
-    }
 }
 
 #[test]

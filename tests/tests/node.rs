@@ -252,7 +252,7 @@ fn a_client_cannot_release_a_particle_that_ctl_grabbed() {
     let _node = node(&sandbox, &["run", "curtain"]);
     ctl(&sandbox, &["grab", "90", "0", "0", "0"]);
     let mut client = attach(&sandbox);
-    let outcome = client.request(Action::Release { particle: 90 }, DEADLINE).unwrap();
+    let outcome = client.request(Action::Release { particle: 90, force: false }, DEADLINE).unwrap();
     assert_eq!(outcome.reason_name(), "grabbed_by_other");
 }
 

@@ -19,7 +19,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 #[command(
     name = "viewer-bridge",
     version,
-    after_help = "Stop it with Ctrl-C or SIGTERM.\n\n\
+    after_help = "Stop it with Ctrl-C, SIGTERM or SIGHUP.\n\n\
         Limits: 16 pages and 16 Foxglove clients at a time. Other connections make \
         room for newcomers.\n\n\
         Exit codes: 0 success, 1 failure, 2 usage error.\n\nExamples:\n  \

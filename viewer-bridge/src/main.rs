@@ -4,13 +4,15 @@
 
 mod args;
 
+use std::future::poll_fn;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::task::Poll;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
-use sim_contract::{Stop, printable_line, report_bus_errors};
+use sim_contract::{Stop, console, printable_line, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use viewer_bridge::pages::assets::Assets;
@@ -24,12 +26,22 @@ use viewer_bridge::{
 
 use args::Args;
 
+/// Exit code of an error in the command line.
+const EXIT_USAGE: u8 = 2;
+
 /// Threads of the servers. They only send; the thread of the source encodes.
 const SERVER_THREADS: usize = 2;
 
 fn main() -> ExitCode {
-    let args = args::parse(std::env::args_os()).unwrap_or_else(|error| error.exit());
-    match run(&args) {
+    let result = match args::parse(std::env::args_os()) {
+        Ok(args) => run(&args),
+        Err(error) => match console::accept_closed_pipe(error.print()) {
+            Err(problem) if !error.use_stderr() => Err(problem).context("cannot write to stdout"),
+            _ if error.use_stderr() => return ExitCode::from(EXIT_USAGE),
+            _ => Ok(()),
+        },
+    };
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             note(&format!("error: {error:#}"));
@@ -110,16 +122,19 @@ async fn serve(
 
 /// Waits for the signals that [`Stop`] handles. It has seen any that came earlier.
 fn stop_signal(stop: &Stop) -> anyhow::Result<impl Future<Output = ()> + use<>> {
-    let listen = |kind| signal(kind).context("listening for signals");
-    let (mut interrupt, mut terminate) =
-        (listen(SignalKind::interrupt())?, listen(SignalKind::terminate())?);
+    let listen = |number: &i32| signal(SignalKind::from_raw(*number));
+    let signals: Result<Vec<_>, _> = stop.signals().iter().map(listen).collect();
+    let mut signals = signals.context("listening for signals")?;
     let is_requested = stop.is_requested();
     Ok(async move {
         if !is_requested {
-            tokio::select! {
-                _ = interrupt.recv() => {}
-                _ = terminate.recv() => {}
-            }
+            poll_fn(|context| {
+                let mut polls = signals.iter_mut().map(|signal| signal.poll_recv(context));
+                // Every signal is polled, so that each of them wakes the task.
+                let arrived = polls.by_ref().filter(Poll::is_ready).count();
+                if arrived > 0 { Poll::Ready(()) } else { Poll::Pending }
+            })
+            .await;
         }
     })
 }
@@ -156,7 +171,6 @@ fn announce(server: &Server, foxglove: Option<&FoxgloveServer>) {
     }
 }
 
-#[allow(clippy::print_stderr, reason = "messages for the user")]
 fn note(text: &str) {
-    eprintln!("{}", printable_line(text));
+    console::note(&printable_line(text));
 }

@@ -2,7 +2,7 @@
 
 use std::process::{ExitCode, Termination};
 
-use super::output;
+use sim_contract::console;
 
 /// The exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,21 @@ impl Termination for Exit {
 /// Returns the exit code of a subcommand. Prints an error and its causes as one line on stderr.
 pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
-        output::note(&format!("error: {error:#}"));
+        console::note(&format!("error: {error:#}"));
         Exit::Failed
     })
+}
+
+/// Ends the program as clap does: with code 2 after an error of the command line, with 0 after a help
+/// text, or with 1 if that cannot be written.
+#[allow(clippy::exit, reason = "clap ends the program in the same way")]
+pub(crate) fn with_usage(error: &clap::Error) -> ! {
+    let code = match console::accept_closed_pipe(error.print()) {
+        Err(problem) if !error.use_stderr() => {
+            console::note(&format!("error: cannot write to stdout: {problem}"));
+            1
+        }
+        _ => error.exit_code(),
+    };
+    std::process::exit(code)
 }

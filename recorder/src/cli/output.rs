@@ -1,10 +1,10 @@
 //! Output of the program: results on stdout, everything else on stderr.
 
-use std::io::{self, Write};
 use std::path::Path;
 
+use anyhow::Context;
 use serde::Serialize;
-use sim_contract::{printable, printable_line};
+use sim_contract::{console, printable, printable_line};
 
 /// The option that selects the format of a result.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -16,18 +16,22 @@ pub(crate) struct AsJson {
 
 /// Prints a result: the value as one line of JSON, or the text.
 pub(crate) fn result<T: Serialize>(as_json: AsJson, value: &T, text: &str) -> anyhow::Result<()> {
-    let mut out = io::stdout().lock();
-    if as_json.json {
-        writeln!(out, "{}", printable_line(&serde_json::to_string(value)?))?;
+    let line = if as_json.json {
+        printable_line(&serde_json::to_string(value)?).into_owned()
     } else {
-        writeln!(out, "{}", printable(text))?;
-    }
-    Ok(())
+        printable(text).into_owned()
+    };
+    bytes(format!("{line}\n").as_bytes())
 }
 
-/// Prints a line on stderr. Ignores errors, because stderr may be closed.
+/// Prints the bytes of a result.
+pub(crate) fn bytes(bytes: &[u8]) -> anyhow::Result<()> {
+    console::write_result(bytes).context("cannot write to stdout")
+}
+
+/// Prints a line on stderr, or drops it.
 pub(crate) fn note(text: &str) {
-    let _ = writeln!(io::stderr().lock(), "{}", printable_line(text));
+    console::note(text);
 }
 
 /// Returns a path as text for users.

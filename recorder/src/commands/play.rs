@@ -20,7 +20,7 @@ use sim_contract::{Endpoint, Method, Stop, report_bus_errors};
 use sim_solver::Solver;
 
 use crate::cli::endpoint_args::EndpointArgs;
-use crate::cli::exit::Exit;
+use crate::cli::exit::{self, Exit};
 use crate::cli::output;
 use crate::cli::parse::{self, whole_number};
 use crate::input::scene_source::scene_in_recording;
@@ -85,7 +85,7 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
     let path = output::path_text(&args.file);
     if args.end.is_some_and(|end| end < args.start.unwrap_or_default()) {
         let problem = "--end is before --start: nothing would be played\n";
-        clap::Error::raw(clap::error::ErrorKind::ValueValidation, problem).exit();
+        exit::with_usage(&clap::Error::raw(clap::error::ErrorKind::ValueValidation, problem));
     }
     let mut is_first = true;
     let mut is_paused = args.paused;

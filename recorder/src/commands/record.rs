@@ -40,7 +40,7 @@ const FLUSH_NS: u64 = SECOND_NS;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Ends cleanly on Ctrl-C, on SIGTERM, at a limit, when the node ends, or when another run \
+    after_help = "Ends cleanly on Ctrl-C, on SIGTERM or SIGHUP, at a limit, when the node ends, or when another run \
     starts (as with play --loop).\n\n\
     Exit codes: 0 all recorded; 1 failed; 3 messages lost.\n\nExamples:\n  \
     recorder record -o run.mcap\n  \

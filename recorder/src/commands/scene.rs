@@ -1,6 +1,6 @@
 //! `recorder scene`: extracts the scene from a recording.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
@@ -9,7 +9,7 @@ use sim_contract::printable;
 
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
-use crate::cli::output::path_text;
+use crate::cli::output::{self, path_text};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -33,18 +33,17 @@ pub(crate) fn run(args: &SceneArgs) -> anyhow::Result<Exit> {
     }
     match &args.output {
         Some(path) => PartFile::write_whole(path, args.overwrite.existing(), log.scene())?,
-        None => print(log.scene()).context("cannot print the scene")?,
+        None => print(log.scene())?,
     }
     Ok(Exit::Done)
 }
 
 /// Prints the scene. It is unchanged, unless it goes to a terminal.
-fn print(scene: &[u8]) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    if out.is_terminal() {
-        return out.write_all(printable(&String::from_utf8_lossy(scene)).as_bytes());
+fn print(scene: &[u8]) -> anyhow::Result<()> {
+    if io::stdout().is_terminal() {
+        return output::bytes(printable(&String::from_utf8_lossy(scene)).as_bytes());
     }
-    out.write_all(scene)
+    output::bytes(scene)
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! `recorder simulate`: simulates a scene in this process, without a node.
 
 use std::fmt;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -82,11 +81,10 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
 
     let bar = progress_bar(args.steps);
     let before_ns = monotonic_ns();
-    let result = simulate(&job, solver, log.as_mut(), |step| {
+    let result = simulate(&job, solver, log.as_mut(), stop.flag(), |step| {
         if step.is_multiple_of(STEPS_PER_UPDATE) {
             bar.set_position(step);
         }
-        if stop.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
     .with_context(|| truncation(args))?;
     bar.finish_and_clear();

@@ -10,6 +10,7 @@ mod verification;
 use std::fmt;
 use std::io::Read;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
 use recorder::{LogEnd, LogReader};
@@ -25,6 +26,9 @@ use crate::input::scene_source::scene_in_recording;
 use difference::Difference;
 use resimulation::Finding;
 use verification::{Verification, VerifyError};
+
+/// Snapshots between two updates of the progress bar.
+const SNAPSHOTS_PER_UPDATE: u64 = 64;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -79,9 +83,8 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let path = output::path_text(&args.file);
     let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
     let bar = progress_spinner();
-    let (report, end) = verify(log, &path, args.threads.count(), |step| {
+    let (report, end) = verify(log, &path, args.threads.count(), stop.flag(), |step| {
         bar.set_message(format!("step {step}"));
-        stop.is_requested()
     })?;
     bar.finish_and_clear();
     output::result(args.as_json, &report, &report.text())?;
@@ -95,12 +98,14 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     })
 }
 
-/// Re-simulates a recording with `threads` threads. Calls `is_stopped` before each step.
+/// Re-simulates a recording with `threads` threads. Calls `on_progress` periodically, with the step.
+/// Ends early, even within a step, if `stop` becomes true.
 pub(crate) fn verify<R: Read>(
     log: LogReader<R>,
     path: &str,
     threads: usize,
-    mut is_stopped: impl FnMut(u64) -> bool,
+    stop: &AtomicBool,
+    on_progress: impl FnMut(u64),
 ) -> anyhow::Result<(Report, Option<LogEnd>)> {
     let recorded_version = log.run().solver_version;
     if recorded_version != SOLVER_VERSION {
@@ -113,8 +118,10 @@ pub(crate) fn verify<R: Read>(
     let mut verification = Verification::new(log, scene, threads);
     let mut report = Report::new();
     match verification.check_header() {
-        Finding::Identical => compare_states(&mut verification, &mut report, &mut is_stopped)
-            .with_context(|| path.to_owned())?,
+        Finding::Identical => {
+            compare_states(&mut verification, &mut report, stop, on_progress)
+                .with_context(|| path.to_owned())?;
+        }
         finding => _ = report.add(finding, 0),
     }
     let end = verification.frames.end().cloned().filter(|end| *end != LogEnd::Complete);
@@ -132,9 +139,15 @@ pub(crate) fn verify<R: Read>(
 fn compare_states<R: Read>(
     verification: &mut Verification<R>,
     report: &mut Report,
-    is_stopped: &mut impl FnMut(u64) -> bool,
+    stop: &AtomicBool,
+    mut on_progress: impl FnMut(u64),
 ) -> Result<(), VerifyError> {
-    while let Some((step, finding)) = verification.next(is_stopped)? {
+    let mut count = 0;
+    while let Some((step, finding)) = verification.next(stop)? {
+        count += 1;
+        if count % SNAPSHOTS_PER_UPDATE == 0 {
+            on_progress(step);
+        }
         if report.is_empty() {
             report.first_step = step;
         }

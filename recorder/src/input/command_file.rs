@@ -33,9 +33,9 @@ struct FieldError {
     allowed: String,
 }
 
-/// The fields of every line. `status` and `reason` come from logs and have no effect.
-const COMMON_FIELDS: [&str; 7] =
-    ["step", "kind", "client_id", "sequence", "index", "status", "reason"];
+/// The fields of every line. `status`, `reason` and `disconnected` come from logs and have no effect.
+const COMMON_FIELDS: [&str; 8] =
+    ["step", "kind", "client_id", "sequence", "index", "status", "reason", "disconnected"];
 
 /// Parses commands and sorts them in the order of application. `label` names the file in errors.
 pub(crate) fn parse(text: &str, label: &str) -> Result<Vec<TimedCommand>, CommandFileError> {
@@ -134,6 +134,7 @@ fn is_valid(name: &str, value: &Value) -> bool {
         "over_s" | "radius" | "limit" => is_number(value),
         "value" => value.is_null() || is_number(value) || are_numbers(3),
         "constraint_kind" => value.is_string(),
+        "force" => value.is_boolean(),
         "parameter" | "scene" => value.as_str().is_some_and(|text| Text::new(text).is_ok()),
         _ => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
     }
@@ -148,6 +149,7 @@ fn allowed_values(name: &str) -> &'static str {
         "radius" | "limit" => "a number in m",
         "value" => "a number, three numbers, or null for off",
         "parameter" => "the name of a parameter, at most 160 bytes",
+        "force" => "true or false",
         "constraint_kind" => "structural, shear, bend or tether",
         "scene" => "the name of a scene, at most 160 bytes",
         _ => "whole numbers 0..=4294967295",
@@ -246,7 +248,7 @@ mod tests {
         drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
-        drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason)
+        drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected)
         drag.jsonl:2: target: [0,1] is invalid (allowed: three numbers in m)
         drag.jsonl:2: over_s: "soon" is invalid (allowed: a number of seconds)
         drag.jsonl:2: radius: is missing (allowed: a number in m)

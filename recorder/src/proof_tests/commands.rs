@@ -1,12 +1,14 @@
 //! Every kind of command, on a scene with every feature: recorded, re-simulated and repeated from
 //! the log. Missing and wrong commands are reported.
 
-use recorder::{Message, OutcomeRow};
+use std::sync::atomic::AtomicBool;
+
+use recorder::{LogReader, Message, OutcomeRow};
 use sim_contract::ActionFields;
 use sim_solver::{PARAMETERS, Scene};
 
 use super::{check, rebuild, record};
-use crate::commands::verify::Verdict;
+use crate::commands::verify::{Verdict, verify};
 use crate::input::command_file;
 use crate::simulation::Job;
 
@@ -100,6 +102,9 @@ pub(super) const COMMANDS: &str = r#"
     {"step":52,"kind":"set","parameter":"compliance","value":1e-5}
     {"step":53,"kind":"set","parameter":"stiffness","value":0.5}
     {"step":60,"kind":"release","particle":60}
+    {"step":62,"kind":"grab","particle":61,"target":[0.5,0.2,0.3],"client_id":9}
+    {"step":66,"kind":"release","particle":61,"client_id":8}
+    {"step":67,"kind":"release","particle":61,"client_id":8,"force":true}
     {"step":70,"kind":"pin","particle":33}
     {"step":80,"kind":"unpin","particle":33}
     {"step":90,"kind":"cut","constraint":7}
@@ -145,8 +150,9 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     let rows = outcomes(&file);
     let rejected = rows.iter().filter(|row| !row.is_applied());
     let rejected: Vec<_> = rejected.map(|row| (row.step, row.reason.as_str())).collect();
-    // A load belongs to another file, and this scene has no stiffness.
-    assert_eq!(rejected, [(22, "no_effect_here"), (53, "no_effect_here")]);
+    // A load belongs to another file, this scene has no stiffness, and another client has grabbed 61.
+    let expected = [(22, "no_effect_here"), (53, "no_effect_here"), (66, "grabbed_by_other")];
+    assert_eq!(rejected, expected);
     assert!(PARAMETERS.iter().all(|info| COMMANDS.contains(&format!("\"{}\"", info.name))));
     for ActionFields { kind, .. } in ActionFields::ALL.iter().filter(|row| row.kind != "unknown") {
         assert!(COMMANDS.contains(&format!("\"kind\":\"{kind}\"")), "{kind} is not proved");
@@ -156,6 +162,14 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     let (again, repeated) = record(&job(&lines.join("\n")));
     assert_eq!(repeated, summary);
     assert!(again == file, "the log reproduces its recording");
+}
+
+#[test]
+fn a_request_to_stop_interrupts_the_verification_within_a_step() {
+    let (file, _) = record(&job(COMMANDS));
+    let log = LogReader::new(file.as_slice()).unwrap();
+    let (report, _) = verify(log, "test.mcap", 1, &AtomicBool::new(true), |_| {}).unwrap();
+    assert_eq!((report.verdict, report.steps_identical), (Verdict::Interrupted, 0));
 }
 
 #[test]

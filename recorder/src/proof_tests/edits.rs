@@ -5,7 +5,7 @@
 //! channels. Every edit is found, or the report says that the content is not compared.
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
@@ -75,7 +75,7 @@ fn written() -> Vec<u8> {
         LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0).unwrap();
     let status = StatusRow::from(&NodeStatus { step: 0, ..NodeStatus::default() });
     log.write(&Message::Status(status), 0).unwrap();
-    simulate(&job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    simulate(&job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     let stop_reason = "steps reached".to_owned();
     let mut closing = Closing { stop_reason, unreadable: 0, counts: *log.counts() };
     closing.counts.set_received_to_written();
@@ -127,7 +127,7 @@ fn verified(file: &[u8]) -> (Option<String>, Vec<String>) {
         Ok(log) => log,
         Err(error) => return (Some(error.to_string()), Vec::new()),
     };
-    match verify(log, "x.mcap", 1, |_| false) {
+    match verify(log, "x.mcap", 1, &AtomicBool::new(false), |_| {}) {
         Err(error) => (Some(format!("{error:#}")), Vec::new()),
         Ok((_, Some(end))) => (Some(end.to_string()), Vec::new()),
         Ok((report, None)) if report.verdict == Verdict::Identical => (None, report.not_covered),

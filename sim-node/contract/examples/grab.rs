@@ -41,7 +41,7 @@ fn run() -> Result<(), Box<dyn Error>> {
         let target = [start[0] + angle.sin(), start[1] + 1.0 - angle.cos(), start[2]];
         step = client.request(Action::Move { particle, target, over_s }, TIMEOUT)?.step;
     }
-    let release = client.request(Action::Release { particle }, TIMEOUT)?;
+    let release = client.request(Action::Release { particle, force: false }, TIMEOUT)?;
     println!("released at step {}", release.step);
     Ok(())
 }

@@ -44,6 +44,7 @@
 mod bus_error;
 mod client;
 pub mod clock;
+pub mod console;
 mod endpoint;
 mod file_kind;
 mod file_size;
@@ -71,7 +72,9 @@ pub use file_size::report_file_size_limit;
 pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
 pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
-pub use messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome, OutcomeStatus};
+pub use messages::outcome::{
+    OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus,
+};
 pub use messages::parameters::{ParameterState, ParametersHeader};
 pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use messages::status::{NodeStatus, StatusFlags};
@@ -82,6 +85,7 @@ pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
 pub use part_file::{Existing, PartFile, PartFileError, explain_write_error, part_path};
+pub use ports::connection::{ConnectionId, ReceivedCommand};
 pub use ports::domain::root::RootError;
 pub use ports::memory::MemoryError;
 pub use ports::reader::ReadError;
@@ -93,8 +97,8 @@ pub use sim_types::{
     Action, ActionFields, COLLIDERS_MAX, COORDINATE_MAX, ColliderShape, ConstraintKind,
     ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS,
     Parameter, ParameterInfo, ParameterValue, ParameterValues, ParticleFlags, PerKind, PlainF32,
-    Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, Setting, TearCause, Text, TextError, ValueForm,
-    printable, printable_line,
+    Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text,
+    TextError, ValueForm, printable, printable_line,
 };
 pub use stop::Stop;
 pub use text_file::{TextFileError, read_scene_file};

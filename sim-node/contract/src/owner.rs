@@ -4,6 +4,7 @@ pub(crate) mod error;
 pub(crate) mod load;
 
 use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use iceoryx2::port::notifier::NotifierCreateError;
@@ -12,7 +13,7 @@ use iceoryx2::prelude::ipc;
 
 use crate::clock;
 use crate::endpoint::Endpoint;
-use crate::limits::{CLIENTS_MAX, COMMANDS_BUFFERED, CONTRACT_VERSION};
+use crate::limits::{BORROWED_UPDATES_MAX, COMMANDS_BUFFERED, CONTRACT_VERSION};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
@@ -22,6 +23,7 @@ use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::KeyframeHeader;
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
+use crate::ports::connection::{self, ConnectionId, ReceivedCommand};
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
 use crate::ports::domain::{self, root, unfinished};
@@ -64,8 +66,6 @@ pub struct Owner {
 /// message, so the first wake may be too early. A reader that takes longer finds its messages at a
 /// later wake.
 const WAKES_PER_READER: u32 = 2;
-/// Most commands received at once: all that the clients together can have waiting.
-const COMMANDS_RECEIVED_MAX: usize = CLIENTS_MAX * COMMANDS_BUFFERED;
 
 /// Most attempts to take the lock of a name: clients hold it for a moment when they remove what a
 /// killed owner left, and an owner that ends frees it shortly before its process is gone.
@@ -218,18 +218,32 @@ impl Owner {
         self.status.write(*status).map(|_| ())
     }
 
-    /// Appends all commands that have arrived, those of each client in the order of sending. Returns
-    /// their number. Ends early at a client with a broken connection, and returns no error: no other
-    /// process can stop the owner.
-    pub fn receive_commands(&self, commands: &mut Vec<Command>) -> usize {
+    /// Appends the commands that have arrived, those of each connection in the order of sending, and at
+    /// most one queue of each, so that a client that sends without a pause keeps no other waiting.
+    /// Returns their number. Ends early at a client with a broken connection, and returns no error: no
+    /// other process can stop the owner.
+    pub fn receive_commands(&self, commands: &mut Vec<ReceivedCommand>) -> usize {
         let before = commands.len();
-        while commands.len() - before < COMMANDS_RECEIVED_MAX {
-            match self.commands.receive() {
-                Ok(Some(command)) => commands.push(*command),
-                Ok(None) | Err(_) => break,
+        let mut counts = BTreeMap::new();
+        // A subscriber skips the connections of which it holds the most samples that it may. Holding
+        // the last ones of a queue is the only way to reach the connections behind it.
+        let mut held = Vec::new();
+        while let Ok(Some(sample)) = self.commands.receive() {
+            let connection = ConnectionId(sample.origin().value());
+            commands.push(ReceivedCommand { command: *sample, connection });
+            let count = counts.entry(connection).or_insert(0);
+            *count += 1;
+            if *count > COMMANDS_BUFFERED - BORROWED_UPDATES_MAX {
+                held.push(sample);
             }
         }
         commands.len() - before
+    }
+
+    /// Returns the connections through which living clients can send commands. It costs some system
+    /// calls for each of them: call it a few times a second at most.
+    pub fn connections(&self) -> Vec<ConnectionId> {
+        connection::living(&self.services.commands)
     }
 
     /// Returns the number of readers of `particles`. Killed readers count until their places are freed.

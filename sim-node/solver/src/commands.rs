@@ -113,8 +113,18 @@ impl Solver {
     /// # Errors
     /// The particle is unknown or frozen, or this client has not grabbed it.
     pub fn release(&mut self, client_id: u64, particle: u32) -> Result<(), Reason> {
+        self.find_unfrozen(particle)?;
+        self.find_own_grab(client_id, particle)?;
+        self.release_of_any(particle)
+    }
+
+    /// Releases a grabbed particle as [`Self::release`] does, whichever client has grabbed it.
+    ///
+    /// # Errors
+    /// The particle is unknown or frozen, or no client has grabbed it.
+    pub fn release_of_any(&mut self, particle: u32) -> Result<(), Reason> {
         let index = self.find_unfrozen(particle)?;
-        let place = self.find_own_grab(client_id, particle)?;
+        let place = self.find_grab(particle).map_err(|_| Reason::NotGrabbed)?;
         self.grabs.remove(place);
         self.particles.change_flags(index, 0, ParticleFlags::GRABBED);
         if self.has_flag(index, ParticleFlags::PINNED) {

@@ -95,7 +95,13 @@ impl Parameters {
             return Err(Reason::NoEffectHere);
         }
         check_value(info, value, context)?;
-        self.store(parameter, value, kind);
+        let mut changed = *self;
+        changed.store(parameter, value, kind);
+        let is_pass_count = matches!(parameter, Parameter::Substeps | Parameter::Iterations);
+        if is_pass_count && !context.size.allows(changed.substeps, changed.iterations) {
+            return Err(Reason::OutOfRange);
+        }
+        *self = changed;
         Ok(match parameter {
             Parameter::Compliance | Parameter::Stiffness => Affected::RigidPaths,
             Parameter::Gravity
@@ -178,7 +184,7 @@ impl Parameters {
     /// Returns `true` if a scene of this method and dimension can have these values.
     pub(crate) fn is_valid(&self, context: Context) -> bool {
         let softness = softness_parameter(context.method);
-        self.values(context.method).settings().iter().all(|setting| {
+        let are_valid = self.values(context.method).settings().iter().all(|setting| {
             let is_own_softness = setting.parameter == softness;
             let is_other_softness = setting.parameter.info().is_per_kind && !is_own_softness;
             let is_unset = setting.value == ParameterValue::Off;
@@ -186,7 +192,8 @@ impl Parameters {
                 || (is_own_softness && is_unset)
                 || (check_finite(setting.value).is_ok()
                     && check_value(setting.parameter.info(), setting.value, context).is_ok())
-        })
+        });
+        are_valid && context.size.allows(self.substeps, self.iterations)
     }
 }
 

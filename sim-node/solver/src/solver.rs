@@ -2,7 +2,7 @@
 
 use sim_types::{ParameterValues, TearCause};
 
-use crate::checks::Context;
+use crate::checks::{Context, StepSize};
 use crate::constraints::Constraint;
 use crate::constraints::builder::{ConstraintBuilder, Setup};
 use crate::constraints::order::ProjectionOrder;
@@ -231,7 +231,12 @@ impl Solver {
 
     /// Properties against which parameters and poses are checked.
     pub(crate) fn context(&self) -> Context {
-        Context { method: self.settings.method, is_planar: self.is_planar }
+        let size = StepSize {
+            particles: self.particle_count() as u64,
+            constraints: self.constraint_count() as u64,
+            colliders: self.collider_count() as u64,
+        };
+        Context { method: self.settings.method, is_planar: self.is_planar, size }
     }
 
     /// Number of steps that a grab of `over_s` seconds takes, rounded up, at least one. A time that

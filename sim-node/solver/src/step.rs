@@ -11,6 +11,8 @@ pub(crate) mod stage;
 pub(crate) mod substep;
 pub(crate) mod wind;
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use sim_types::ParticleFlags;
 
 use drive::{count_step, drive_grabbed};
@@ -33,10 +35,21 @@ impl Solver {
     /// velocities: a substep works on the displacement d = h v beside the position, so that
     /// gravity survives where h^2 g is below the resolution of the position.
     pub fn step(&mut self) {
+        // Nothing sets this flag, so the step is made.
+        let _is_made = self.step_unless(&AtomicBool::new(false));
+    }
+
+    /// Makes a step as [`Self::step`] does, but gives it up soon after `stop` becomes true: a step of
+    /// a large scene can take seconds. `stop` must stay true.
+    ///
+    /// Returns `false` if the step was given up. Its state is neither the old nor the new one, so the
+    /// solver is of no further use.
+    #[must_use]
+    pub fn step_unless(&mut self, stop: &AtomicBool) -> bool {
         self.finish_boundary();
         if self.is_restored {
             self.publish_restored();
-            return;
+            return true;
         }
         self.begin_step();
         let mut is_marked = false;
@@ -45,7 +58,7 @@ impl Solver {
                 match stage {
                     Stage::Drive => self.drive(substep),
                     Stage::Wind => self.blow(substep),
-                    Stage::Predict => is_marked |= self.sweep(substep),
+                    Stage::Predict => is_marked |= self.sweep(substep, stop),
                     // The sweep that begins with `Predict` contains them.
                     Stage::Project
                     | Stage::LimitStretch
@@ -56,6 +69,9 @@ impl Solver {
                         unreachable!("{stage:?} is not a stage of a substep")
                     }
                 }
+            }
+            if stop.load(Ordering::Relaxed) {
+                return false;
             }
         }
         count_step(&mut self.grabs);
@@ -74,6 +90,7 @@ impl Solver {
                 | Stage::Advance => unreachable!("{stage:?} is a stage of a substep"),
             }
         }
+        true
     }
 
     fn publish_restored(&mut self) {
@@ -122,11 +139,11 @@ impl Solver {
     /// [`Stage::Predict`] to [`Stage::Advance`]. Each sheet and the graph run them on their own
     /// particles, in one sweep, because their particles share no constraint. Returns true if any
     /// constraint was marked as torn.
-    fn sweep(&mut self, substep: Substep) -> bool {
+    fn sweep(&mut self, substep: Substep, stop: &AtomicBool) -> bool {
         let contact_substep = self.contact_substep(substep);
         place_obstacles(&mut self.obstacles, &self.colliders, &contact_substep);
         let prediction = self.prediction(substep);
-        let inputs = SubstepInputs { prediction, obstacles: &self.obstacles };
+        let inputs = SubstepInputs { prediction, obstacles: &self.obstacles, stop };
         self.store.run_swept_stages(&inputs, self.parameters.iterations)
     }
 

@@ -228,11 +228,12 @@ impl ParticleStore {
     pub(crate) fn run_swept_stages(&mut self, inputs: &SubstepInputs<'_>, pass_count: u32) -> bool {
         let Self { workers, graph, patches, .. } = self;
         let mut is_marked = false;
-        for pass in Pass::all(pass_count) {
+        let passes = || Pass::all(pass_count).take_while(|_| !inputs.is_given_up());
+        for pass in passes() {
             is_marked |= graph.run_pass(workers, pass, inputs);
         }
         for patch in patches {
-            for pass in Pass::all(pass_count) {
+            for pass in passes() {
                 is_marked |= patch.run_pass(workers, pass, inputs);
             }
         }
@@ -330,7 +331,14 @@ fn find_sheet(sheets: &[Sheet], particle: u32) -> Option<Found> {
     Some(Found { sheet, place: sheets[sheet].find(particle)? })
 }
 
-/// Returns the sheets whose particles have only constraints of families.
+/// Number of columns below which the padding of a row is a multiple of its particles.
+const COLUMNS_MIN: u32 = 16;
+/// Number of rows from which that padding matters. A sheet of 16 million rows with one column would
+/// occupy 19 GB; the graph holds it in 2.
+const ROWS_OF_NARROW_MAX: u32 = 1 << 16;
+
+/// Returns the sheets that are stored in rows: their particles have only constraints of families, and
+/// they are not long and narrow.
 fn pure_sheets(model: &Model) -> Vec<Sheet> {
     let mut is_pure = vec![true; model.sheets.len()];
     for (index, family) in (0_u32..).zip(&model.families) {
@@ -343,7 +351,11 @@ fn pure_sheets(model: &Model) -> Vec<Sheet> {
         }
     }
     let sheets = model.sheets.iter().zip(is_pure);
-    sheets.filter(|(_, is_pure)| *is_pure).map(|(sheet, _)| *sheet).collect()
+    let is_padding = |sheet: &Sheet| sheet.columns < COLUMNS_MIN && sheet.rows > ROWS_OF_NARROW_MAX;
+    sheets
+        .filter(|(sheet, is_pure)| *is_pure && !is_padding(sheet))
+        .map(|(sheet, _)| *sheet)
+        .collect()
 }
 
 /// Returns the particles outside of the sheets, ascending.
@@ -366,4 +378,26 @@ fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<Vec<Family>> {
         all.filter(|(_, has)| *has).map(|(family, _)| family).collect()
     };
     has_family.into_iter().map(present).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    //! The choice between rows and the graph. That it changes no bit is tested with the kernels.
+    use super::*;
+    use crate::scene::Scene;
+
+    fn count_in_rows(columns: u32, rows: u32) -> usize {
+        let text = format!(
+            "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = {columns}\nrows = {rows}\n\
+             spacing = 0.01\n"
+        );
+        pure_sheets(&Scene::from_toml(&text, "test").unwrap().model()).len()
+    }
+
+    #[test]
+    fn a_long_sheet_whose_rows_would_be_mostly_padding_is_part_of_the_graph() {
+        assert_eq!([count_in_rows(1, 65_537), count_in_rows(15, 65_537)], [0, 0]);
+        assert_eq!([count_in_rows(16, 65_537), count_in_rows(1, 65_536)], [1, 1]);
+        assert_eq!(count_in_rows(65_537, 1), 1);
+    }
 }

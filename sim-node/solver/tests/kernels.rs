@@ -132,6 +132,11 @@ fn kernels_agree_on_sheets_of_every_size_around_a_vector() {
 }
 
 #[test]
+fn kernels_agree_on_a_sheet_that_is_too_narrow_for_rows() {
+    assert_same_bits(&sheet(3, 66_000, "", ""), "3 x 66000", 4);
+}
+
+#[test]
 fn kernels_agree_on_sheets_that_are_split_into_strips() {
     for (name, solver, generator) in VARIANTS {
         for columns in [127, 128, 129, 200, 255, 256, 257, 400] {

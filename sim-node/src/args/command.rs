@@ -32,11 +32,16 @@ pub(crate) enum CommandVerb {
     #[command(after_help = "Example: sim-node ctl move 90 0.6 -0.2 0.3")]
     Move(TargetArgs),
     /// Release a grabbed particle with the velocity of its last motion
-    #[command(after_help = "Example: sim-node ctl release 90")]
+    #[command(
+        after_help = "Examples:\n  sim-node ctl release 90\n  sim-node ctl release 90 --force"
+    )]
     Release {
         /// Index of the particle
         #[arg(value_parser = index)]
         particle: u32,
+        /// Release it even if another client has grabbed it
+        #[arg(long)]
+        force: bool,
     },
     /// Set the velocity of all free particles within a sphere, as a brush does
     Push(PushArgs),

@@ -23,7 +23,9 @@ pub(super) fn from_verb(verb: &CommandVerb) -> anyhow::Result<Action> {
             target: args.target.vector(),
             over_s: args.over,
         },
-        CommandVerb::Release { particle } => Action::Release { particle: *particle },
+        CommandVerb::Release { particle, force } => {
+            Action::Release { particle: *particle, force: *force }
+        }
         CommandVerb::Push(args) => Action::Push {
             center: args.center.vector(),
             radius: args.radius,

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use sim_contract::{
     Action, Client, NodeStatus, OffMeaning, PARAMETERS, Parameter, ParameterInfo, Reason,
-    StatusFlags, ValueForm,
+    STEP_WORK_MAX, StatusFlags, ValueForm,
 };
 use sim_solver::Scene;
 
@@ -79,7 +79,7 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
         Reason::NonFinite => "allowed: finite numbers",
         Reason::AlreadyTorn => "`ctl reset` restores it",
         Reason::NotGrabbed => "`ctl grab` grabs it",
-        Reason::GrabbedByOther => "that client must release it first",
+        Reason::GrabbedByOther => "`ctl release --force` ends that grab",
         Reason::NoEffectHere => missing_condition(action)?,
         Reason::UnknownParticle
         | Reason::UnknownConstraint
@@ -130,7 +130,14 @@ fn allowed_values(action: &Action) -> Option<String> {
             let info = Parameter::from_name(parameter.as_str())?.info();
             let kind =
                 if constraint_kind.is_some() && !info.is_per_kind { ", no --kind" } else { "" };
-            return Some(format!("{}{kind}", allowed_parameter(info)));
+            let work = match info.parameter {
+                Parameter::Substeps | Parameter::Iterations => format!(
+                    ", with substeps x (constraints x iterations + particles x (colliders + 1)) at \
+                     most {STEP_WORK_MAX}"
+                ),
+                _ => String::new(),
+            };
+            return Some(format!("{}{work}{kind}", allowed_parameter(info)));
         }
         Action::Grab { .. } | Action::Move { .. } => {
             "coordinates within 1e7, z 0 in 2-D, --over 0 to 0.25"

@@ -1,82 +1,97 @@
 //! Order in which the commands of several clients are applied.
 
-use std::collections::BTreeMap;
-use std::ops::Bound;
+use std::collections::{BTreeMap, BTreeSet};
 
-use sim_contract::{COMMANDS_PER_STEP_MAX, Command};
+use sim_contract::{Action, COMMANDS_PER_STEP_MAX, ReceivedCommand};
 
 /// Commands that wait to be applied.
 ///
-/// A turn is the commands of one poll. They are taken round-robin: one of each client by ascending id,
-/// in the client's sequence. A turn continues after the client that was served last, so that no client
-/// can starve another.
-#[derive(Debug)]
+/// A turn is the commands of one poll. They are taken in rounds: one of each client by ascending id,
+/// in the client's sequence. A turn continues the round of the turn before, so that a client with many
+/// commands cannot starve another. A client whose commands arrive during a round waits for the next
+/// one, so that a process with ever new client ids cannot either.
+#[derive(Debug, Default)]
 pub(super) struct Inbox {
-    waiting: BTreeMap<Place, Command>,
+    /// By client.
+    queues: BTreeMap<u64, ClientQueue>,
+    /// Clients that are still to be served in this round. Each has a command.
+    round: BTreeSet<u64>,
+    /// Number of commands that wait.
+    waiting_count: usize,
     /// Number of commands that have arrived.
     arrived_count: u64,
-    /// The client that was served last. The greatest id before the first one, so that the lowest
-    /// follows.
-    last_served: u64,
 }
 
-/// The key of a command: client, sequence, and order of arrival for equal sequences.
-type Place = (u64, u64, u64);
+/// The commands of a client, by sequence, and by order of arrival for equal sequences.
+type ClientQueue = BTreeMap<(u64, u64), ReceivedCommand>;
 
 /// Number of commands from which on the inbox accepts no more. The rest waits in shared memory, where
-/// each client has a bounded queue.
+/// each connection has a bounded queue.
 const INBOX_MAX: usize = 16 * COMMANDS_PER_STEP_MAX;
-
-impl Default for Inbox {
-    fn default() -> Self {
-        Self { waiting: BTreeMap::new(), arrived_count: 0, last_served: u64::MAX }
-    }
-}
 
 impl Inbox {
     /// Returns `true` if the inbox accepts more commands.
     pub(super) fn has_room(&self) -> bool {
-        self.waiting.len() < INBOX_MAX
+        self.waiting_count < INBOX_MAX
     }
 
     /// Adds commands in their order of arrival.
-    pub(super) fn add(&mut self, commands: impl IntoIterator<Item = Command>) {
-        for command in commands {
-            let place = (command.client_id, command.sequence, self.arrived_count);
-            self.waiting.insert(place, command);
+    pub(super) fn add(&mut self, commands: impl IntoIterator<Item = ReceivedCommand>) {
+        for received in commands {
+            let command = &received.command;
+            let queue = self.queues.entry(command.client_id).or_default();
+            queue.insert((command.sequence, self.arrived_count), received);
             self.arrived_count += 1;
+            self.waiting_count += 1;
         }
     }
 
-    /// Removes the commands of one turn, in the order of application.
-    pub(super) fn next_turn(&mut self) -> Vec<Command> {
-        std::iter::from_fn(|| self.next()).take(COMMANDS_PER_STEP_MAX).collect()
+    /// Removes the commands of one turn, in the order of application. A turn ends with the first load,
+    /// because a load takes long, and the node must notice a request to stop after it.
+    pub(super) fn next_turn(&mut self) -> Vec<ReceivedCommand> {
+        let mut turn = Vec::new();
+        while turn.len() < COMMANDS_PER_STEP_MAX
+            && let Some(received) = self.next()
+        {
+            turn.push(received);
+            if matches!(received.command.action(), Action::Load { .. }) {
+                break;
+            }
+        }
+        turn
     }
 
     /// Removes the first command of the next client.
-    fn next(&mut self) -> Option<Command> {
-        let end_of_last = Bound::Excluded((self.last_served, u64::MAX, u64::MAX));
-        let after_last = self.waiting.range((end_of_last, Bound::Unbounded)).next();
-        let (place, _) = after_last.or_else(|| self.waiting.first_key_value())?;
-        let place = *place;
-        self.last_served = place.0;
-        self.waiting.remove(&place)
+    fn next(&mut self) -> Option<ReceivedCommand> {
+        if self.round.is_empty() {
+            self.round.extend(self.queues.keys());
+        }
+        let client_id = self.round.pop_first()?;
+        let queue = self.queues.get_mut(&client_id)?;
+        let (_, received) = queue.pop_first()?;
+        if queue.is_empty() {
+            self.queues.remove(&client_id);
+        }
+        self.waiting_count -= 1;
+        Some(received)
     }
 }
 
 #[cfg(test)]
 mod tests {
     //! Checks the order of a turn against lists of clients and sequence numbers.
-    use sim_contract::Action;
+    use sim_contract::{Command, ConnectionId, Text};
 
     use super::*;
 
-    fn pin(client_id: u64, sequence: u64) -> Command {
-        Command::new(client_id, sequence, Action::Pin { particle: 0 })
+    fn pin(client_id: u64, sequence: u64) -> ReceivedCommand {
+        let command = Command::new(client_id, sequence, Action::Pin { particle: 0 });
+        ReceivedCommand { command, connection: ConnectionId::default() }
     }
 
-    fn order(turn: &[Command]) -> Vec<(u64, u64)> {
-        turn.iter().map(|command| (command.client_id, command.sequence)).collect()
+    fn order(turn: &[ReceivedCommand]) -> Vec<(u64, u64)> {
+        let commands = turn.iter().map(|received| received.command);
+        commands.map(|command| (command.client_id, command.sequence)).collect()
     }
 
     #[test]
@@ -108,6 +123,35 @@ mod tests {
         assert_eq!(inbox.next_turn().len(), COMMANDS_PER_STEP_MAX);
         inbox.add(flood(1));
         assert_eq!(order(&inbox.next_turn())[..2], [(u64::MAX - 1, 0), (0, 1)]);
+    }
+
+    #[test]
+    fn a_process_with_ever_new_client_ids_delays_a_client_by_one_round_at_most() {
+        let mut inbox = Inbox::default();
+        let mut next_id = 1..;
+        let mut flood = |count: usize| -> Vec<_> {
+            next_id.by_ref().take(count).map(|client_id| pin(client_id, 0)).collect()
+        };
+        // The inbox is as full as it becomes, and the honest client has the highest id.
+        inbox.add(flood(INBOX_MAX));
+        inbox.add([pin(u64::MAX, 0)]);
+        let is_served = |turn: &[ReceivedCommand]| order(turn).contains(&(u64::MAX, 0));
+        let turns = (1..=100).find(|_| {
+            let turn = inbox.next_turn();
+            inbox.add(flood(COMMANDS_PER_STEP_MAX));
+            is_served(&turn)
+        });
+        assert_eq!(turns, Some(INBOX_MAX / COMMANDS_PER_STEP_MAX + 1));
+    }
+
+    #[test]
+    fn a_turn_ends_with_the_first_load() {
+        let mut inbox = Inbox::default();
+        let load = Command::new(1, 2, Action::Load { scene: Text::cut("rope") });
+        let load = ReceivedCommand { command: load, connection: ConnectionId::default() };
+        inbox.add([pin(1, 1), load, pin(1, 3)]);
+        assert_eq!(order(&inbox.next_turn()), [(1, 1), (1, 2)]);
+        assert_eq!(order(&inbox.next_turn()), [(1, 3)]);
     }
 
     #[test]

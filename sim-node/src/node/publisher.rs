@@ -9,9 +9,9 @@ use anyhow::Context;
 use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, NodeStatus, Outcome,
-    Owner, OwnerError, ParameterValues, ParticleState, Reason, SnapshotFlags, SnapshotHeader,
-    TearsHeader, TornConstraint, Wake,
+    CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader, NodeStatus,
+    OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError, ParameterValues, ParticleState, Reason,
+    ReceivedCommand, SnapshotFlags, SnapshotHeader, TearsHeader, TornConstraint, Wake,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
@@ -125,8 +125,13 @@ impl Publisher {
     }
 
     /// Appends the commands that have arrived.
-    pub(crate) fn receive_commands(&self, commands: &mut Vec<Command>) {
+    pub(crate) fn receive_commands(&self, commands: &mut Vec<ReceivedCommand>) {
         self.owner.receive_commands(commands);
+    }
+
+    /// Connections of living clients.
+    pub(crate) fn connections(&self) -> Vec<ConnectionId> {
+        self.owner.connections()
     }
 
     /// Logs the result of a command at the boundary before `step`.
@@ -137,10 +142,21 @@ impl Publisher {
         result: Result<Applied, Reason>,
     ) {
         let outcome = Outcome::new(self.outcome_count, step, command, result.map(|_| ()));
-        self.outcomes.push(Outcome { run_id: self.run_id, ..outcome });
-        self.outcome_count += 1;
+        self.log(&outcome, 0);
         self.rejected_count += u64::from(result.is_err());
         self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
+    }
+
+    /// Logs a release that no client asked for, at the boundary before `step`.
+    pub(crate) fn add_disconnection(&mut self, step: u64, release: Command) {
+        let outcome = Outcome::new(self.outcome_count, step, release, Ok(()));
+        self.log(&outcome, OUTCOME_FLAG_DISCONNECTED);
+        self.is_keyframe_due = true;
+    }
+
+    fn log(&mut self, outcome: &Outcome, flags: u32) {
+        self.outcomes.push(Outcome { run_id: self.run_id, flags, ..*outcome });
+        self.outcome_count += 1;
     }
 
     /// Publishes everything that belongs to a step, the particles last, and wakes the readers.
@@ -259,7 +275,7 @@ impl Publisher {
         self.publish_outcomes()
     }
 
-    fn publish_outcomes(&mut self) -> anyhow::Result<()> {
+    pub(crate) fn publish_outcomes(&mut self) -> anyhow::Result<()> {
         if self.outcomes.is_empty() {
             return Ok(());
         }

@@ -1,9 +1,9 @@
 //! Warnings of a running node, limited so that no client can delay it by causing them.
 
-use std::io::{Write, stderr};
-
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::printable_line;
+
+use crate::output;
 
 /// Most warnings per second; further ones are only counted.
 const WARNINGS_PER_SECOND_MAX: u32 = 5;
@@ -32,7 +32,6 @@ impl Warnings {
             0 => String::new(),
             count => format!(" ({count} more before this one)"),
         };
-        // A closed stderr is no reason to stop.
-        let _ignored = writeln!(stderr(), "warning: {}{dropped}", printable_line(text));
+        output::note(&format!("warning: {}{dropped}", printable_line(text)));
     }
 }

@@ -50,6 +50,9 @@ pub enum Action {
     Release {
         /// Index of the particle.
         particle: u32,
+        /// Releases the grab of any client, not only one of this client.
+        #[serde(default, skip_serializing_if = "is_false")]
+        force: bool,
     },
     /// Pauses the node at this boundary.
     Pause,
@@ -167,7 +170,7 @@ impl ActionFields {
         Self::new("unpin", &["particle"], &[]),
         Self::new("grab", &["particle", "target"], &["over_s"]),
         Self::new("move", &["particle", "target"], &["over_s"]),
-        Self::new("release", &["particle"], &[]),
+        Self::new("release", &["particle"], &["force"]),
         Self::new("pause", &[], &[]),
         Self::new("resume", &[], &[]),
         Self::new("step", &["count"], &[]),
@@ -194,6 +197,11 @@ impl ActionFields {
 
 fn grab_over_s_default() -> f32 {
     GRAB_OVER_S_DEFAULT
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// No rotation.
@@ -269,7 +277,8 @@ impl Action {
             Self::Unpin { particle: 4 },
             Self::Grab { particle: 5, target, over_s: 0.1 },
             Self::Move { particle: 5, target, over_s: 0.0 },
-            Self::Release { particle: 5 },
+            Self::Release { particle: 5, force: false },
+            Self::Release { particle: 5, force: true },
             Self::Pause,
             Self::Resume,
             Self::Step { count: 7 },

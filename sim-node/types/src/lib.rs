@@ -34,7 +34,7 @@ pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter};
 pub use collider_shape::ColliderShape;
 pub use constraint_kind::ConstraintKind;
 pub use json_number::PlainF32;
-pub use limits::{COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX};
+pub use limits::{COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, STEP_WORK_MAX};
 pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
 pub use parameter_values::{ParameterValues, PerKind, SETTINGS_COUNT, Setting};

@@ -3,14 +3,16 @@
 //!
 //! Open the printed address in a browser and drag the curtain.
 #![forbid(unsafe_code)]
-#![allow(clippy::print_stderr, clippy::print_stdout, reason = "messages to the user")]
 
+use std::io::{Write, stderr};
 use std::net::TcpListener;
+use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use integration_tests::{Finished, Process, Program, build_products};
 use sim_contract::clock::{SECOND_NS, realtime_ns};
+use sim_contract::console::{note, write_result};
 use sim_contract::{Client, DOMAIN_VARIABLE, Endpoint, Stop};
 
 /// Limit on each wait for a status of the node, so that the demo notices Ctrl-C.
@@ -30,12 +32,21 @@ const LISTEN: &str = "127.0.0.1:8080";
 /// Fallback: any free port.
 const LISTEN_ANYWHERE: &str = "127.0.0.1:0";
 
-fn main() -> anyhow::Result<()> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            note(&format!("error: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> anyhow::Result<()> {
     match std::env::args().nth(1).as_deref() {
         None => {}
         Some("--help" | "-h") => {
-            println!("{HELP}");
-            return Ok(());
+            return result(&format!("{HELP}\n"));
         }
         Some(other) => bail!("unexpected argument '{other}'\n\n{HELP}"),
     }
@@ -45,23 +56,23 @@ fn main() -> anyhow::Result<()> {
         std::env::temp_dir().join(format!("catenary-demo-{}.mcap", realtime_ns() / SECOND_NS));
     let file = file.to_str().context("the temporary folder's path is not UTF-8")?;
 
-    eprintln!("building the programs");
+    note("building the programs");
     build_products();
-    eprintln!("starting the node");
+    note("starting the node");
     let mut node = Process::start_in(Program::SimNode, &domain, &["run", "curtain"]);
     node.wait_until_ready();
     let mut recorder = Process::start_in(Program::Recorder, &domain, &["record", "-o", file]);
     recorder.wait_until_ready();
     let mut viewer = start_viewer(&domain);
     let url = viewer.wait_for_line("ready ");
-    eprintln!("the node is running and being recorded; press Ctrl-C to end the demo");
-    eprintln!("open in a browser:  {}", url.trim_start_matches("ready "));
+    note("the node is running and being recorded; press Ctrl-C to end the demo");
+    note(&format!("open in a browser:  {}", url.trim_start_matches("ready ")));
 
     show_progress(&stop, &mut node, &domain)?;
     let recorded = recorder.interrupt();
     let shown = viewer.interrupt();
     let ended = node.interrupt();
-    eprint!("{}{}{}", recorded.stderr, shown.stderr, ended.stderr);
+    note(format!("{}{}{}", recorded.stderr, shown.stderr, ended.stderr).trim_end());
     // Exit code 3 means that the recording has gaps; the recorder has reported them.
     let is_ok = |ended: &Finished| ended.code == Some(0);
     if !matches!(recorded.code, Some(0 | 3)) || !is_ok(&shown) || !is_ok(&ended) {
@@ -70,10 +81,13 @@ fn main() -> anyhow::Result<()> {
             "the recorder ended with {recorder:?}, the viewer with {viewer:?}, the node with {node:?}"
         );
     }
-    println!("{file}");
     let info = Process::start_in(Program::Recorder, &domain, &["info", file]).wait();
-    print!("{}", info.stdout);
-    Ok(())
+    result(&format!("{file}\n{}", info.stdout))
+}
+
+/// Prints a result.
+fn result(text: &str) -> anyhow::Result<()> {
+    write_result(text.as_bytes()).context("cannot write to stdout")
 }
 
 /// Starts the viewer, on a free port if the usual one is in use.
@@ -90,9 +104,15 @@ fn show_progress(stop: &Stop, node: &mut Process, domain: &str) -> anyhow::Resul
     let mut client = Client::attach(&endpoint)?;
     while !stop.is_requested() && node.is_running() {
         if let Some(status) = client.status(POLL)? {
-            eprint!("\rstep {:>8}  x{:.3} real time ", status.step, status.real_time_factor);
+            // A failure to show the progress is no reason to stop.
+            let _ignored = write!(
+                stderr(),
+                "\rstep {:>8}  x{:.3} real time ",
+                status.step,
+                status.real_time_factor
+            );
         }
     }
-    eprintln!();
+    note("");
     Ok(())
 }

@@ -173,7 +173,7 @@ fn a_bridge_with_few_file_descriptors_serves_its_clients_and_newcomers() {
     let sandbox = Sandbox::new();
     // The link to the node needs about a hundred.
     let mut bridge =
-        Process::start_with_open_files(256, Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
+        Process::start_limited(("-n", 256), Program::ViewerBridge, &sandbox, &BRIDGE_ARGS);
     assert!(bridge.wait_for_line("warning: ").contains("ulimit -n"));
     let setup = Setup::start(&sandbox, bridge);
     let mut clients = setup.clients();

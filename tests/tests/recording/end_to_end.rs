@@ -65,7 +65,7 @@ impl Random {
         match self.below(6) {
             0 => Action::Pin { particle },
             1 => Action::Unpin { particle },
-            2 => Action::Release { particle },
+            2 => Action::Release { particle, force: false },
             3 => Action::Move { particle, target, over_s },
             _ => Action::Grab { particle, target, over_s },
         }

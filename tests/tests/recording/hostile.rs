@@ -112,7 +112,7 @@ fn hostile_files(sandbox: &Sandbox) -> Vec<Hostile> {
 
 /// Runs a program that reads a recording.
 fn read(sandbox: &Sandbox, program: Program, args: &[&str]) -> Finished {
-    Process::run_limited(program, sandbox, args, ADDRESS_SPACE_BYTES)
+    Process::start_limited(("-v", ADDRESS_SPACE_BYTES >> 10), program, sandbox, args).wait()
 }
 
 /// Returns the arguments of each program that reads a recording past its header.

@@ -109,6 +109,20 @@ fn grabs_of_pages_are_released_when_the_bridge_ends() {
 }
 
 #[test]
+fn grabs_of_pages_are_released_when_the_bridge_is_killed() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let bridge = Bridge::start(&sandbox);
+    let mut node = Client::attach(&sandbox.endpoint()).unwrap();
+    let mut page = bridge.page();
+    page.applied(grab("grab", [0.2, 0.5, 0.5]));
+    wait_for_particle(&mut node, 90, "the grab", is_grabbed);
+    bridge.process.signal(Signal::KILL);
+    assert_eq!(bridge.process.wait().code, None);
+    wait_for_particle(&mut node, 90, "the release", |one| !is_grabbed(one));
+}
+
+#[test]
 fn pages_can_pin_cut_brush_set_step_reset_and_load() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);

@@ -18,7 +18,11 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         Action::Unpin { particle } => Command::Unpin { particle },
         Action::Grab { particle, target, over_s } => Command::Grab { particle, target, over_s },
         Action::Move { particle, target, over_s } => Command::Move { particle, target, over_s },
-        Action::Release { particle } => Command::Release { particle },
+        Action::Release { particle, force: false } => Command::Release { particle },
+        // A client of the bridge ends only its own grabs.
+        Action::Release { force: true, .. } => {
+            return Err("release with force is not accepted here".to_owned());
+        }
         Action::Pause => Command::Pause {},
         Action::Resume => Command::Resume {},
         Action::Step { count } => Command::Step { count: i32::try_from(count).unwrap_or(i32::MAX) },
@@ -64,5 +68,7 @@ mod tests {
         }
         let push = br#"{"kind":"push","center":[0,0,0],"radius":1,"delta":[0,0,0]}"#;
         assert_eq!(parse(push, 1), Err("push is not accepted here".to_owned()));
+        let release = br#"{"kind":"release","particle":3,"force":true}"#;
+        assert_eq!(parse(release, 1), Err("release with force is not accepted here".to_owned()));
     }
 }

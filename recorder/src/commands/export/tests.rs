@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Cursor;
-use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
 use recorder::{Closing, LogOptions, LogWriter, Message, RunDescription, StepRow};
@@ -68,7 +68,7 @@ fn record(scene: &str, steps: u64) -> Vec<u8> {
     let run = job.description(&solver);
     let options = LogOptions { chunk_size_bytes: 2000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
-    simulate(&job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    simulate(&job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     log.finish(&Closing::default()).unwrap()
 }
 
@@ -218,7 +218,7 @@ fn a_reset_restores_torn_constraints() {
     let (run, toml) = (job.description(&solver), job.scene.to_toml());
     let options = LogOptions::default();
     let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
-    simulate(&job, solver, Some(&mut log), |_| ControlFlow::Continue(())).unwrap();
+    simulate(&job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     let file = log.finish(&Closing::default()).unwrap();
     let lines: Vec<_> =
         pictures(&file, &[9, 10, 19, 20], STYLE).iter().map(|one| counts(one)[1]).collect();

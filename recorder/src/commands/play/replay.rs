@@ -4,8 +4,8 @@ use anyhow::{Context, bail};
 use recorder::{CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, Load, LoadHeader,
-    NodeStatus, Outcome, Owner, ParameterValues, SnapshotFlags, SnapshotHeader, StatusFlags,
+    CONTRACT_VERSION, CollidersHeader, Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus,
+    Outcome, Owner, ParameterValues, ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags,
     TearsHeader, Torn, Wake,
 };
 
@@ -47,7 +47,7 @@ pub(crate) struct Replay {
     /// The latest recorded status of the node.
     status: Option<StatusRow>,
     /// Reused for each batch of commands.
-    commands: Vec<Command>,
+    commands: Vec<ReceivedCommand>,
 }
 
 impl Replay {
@@ -228,7 +228,7 @@ impl Replay {
         self.owner.refresh();
         self.owner.receive_commands(&mut self.commands);
         let has_any = !self.commands.is_empty();
-        for command in self.commands.drain(..) {
+        for ReceivedCommand { command, .. } in self.commands.drain(..) {
             let result = self.control.obey(command.action());
             let index = self.position.outcome_count;
             let mut outcome = Outcome::new(index, next_step, command, result);

@@ -1,6 +1,7 @@
 //! Re-simulates a recording and compares every recorded step, from the file alone.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 
 use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, state_hash};
 use sim_contract::{Action, Outcome, ParticleState};
@@ -123,12 +124,8 @@ impl Resimulation {
         })
     }
 
-    /// Simulates up to the next snapshot and compares it. Calls `is_stopped` before each step.
-    pub(crate) fn advance(
-        &mut self,
-        frame: &Frame,
-        is_stopped: &mut impl FnMut(u64) -> bool,
-    ) -> Finding {
+    /// Simulates up to the next snapshot and compares it, unless `stop` becomes true.
+    pub(crate) fn advance(&mut self, frame: &Frame, stop: &AtomicBool) -> Finding {
         self.add_updates(frame);
         let row = &frame.row;
         if row.step <= self.step {
@@ -139,10 +136,7 @@ impl Resimulation {
             return finding;
         }
         while self.step < row.step {
-            if is_stopped(self.step) {
-                return Finding::Interrupted;
-            }
-            if let Some(finding) = self.simulate_step() {
+            if let Some(finding) = self.simulate_step(stop) {
                 return finding;
             }
             // In the step of the snapshot, the particles are compared first.
@@ -199,7 +193,7 @@ impl Resimulation {
     }
 
     /// Applies the outcomes of the next step in the order of their index, and computes the step.
-    fn simulate_step(&mut self) -> Option<Finding> {
+    fn simulate_step(&mut self, stop: &AtomicBool) -> Option<Finding> {
         let step = self.step + 1;
         while let Some(entry) = self.pending.first_entry().filter(|entry| entry.get().step <= step)
         {
@@ -212,7 +206,9 @@ impl Resimulation {
                 return Some(finding);
             }
         }
-        self.solver.step();
+        if !self.solver.step_unless(stop) {
+            return Some(Finding::Interrupted);
+        }
         self.step = step;
         None
     }

@@ -1,6 +1,7 @@
 //! The checks of a recording, snapshot by snapshot.
 
 use std::io::Read;
+use std::sync::atomic::AtomicBool;
 
 use recorder::{EventRow, Frame, FrameReader, LogReader, Message, ReadError};
 use sim_contract::ParticleFlags;
@@ -68,7 +69,7 @@ impl<R: Read> Verification<R> {
     /// part.
     pub(super) fn next(
         &mut self,
-        is_stopped: &mut impl FnMut(u64) -> bool,
+        stop: &AtomicBool,
     ) -> Result<Option<(u64, Finding)>, VerifyError> {
         loop {
             let frame = match self.frames.next_frame() {
@@ -82,7 +83,7 @@ impl<R: Read> Verification<R> {
             if finding != Finding::Identical {
                 return Ok(Some((step, finding)));
             }
-            if let Some(finding) = self.check_state(&frame, is_stopped)? {
+            if let Some(finding) = self.check_state(&frame, stop)? {
                 return Ok(Some((step, finding)));
             }
             self.coverage.skipped_count += 1;
@@ -174,10 +175,10 @@ impl<R: Read> Verification<R> {
     fn check_state(
         &mut self,
         frame: &Frame,
-        is_stopped: &mut impl FnMut(u64) -> bool,
+        stop: &AtomicBool,
     ) -> Result<Option<Finding>, StartError> {
         if let Some(simulation) = &mut self.simulation {
-            return Ok(Some(simulation.advance(frame, is_stopped)));
+            return Ok(Some(simulation.advance(frame, stop)));
         }
         let Some(mut start) = Resimulation::start(&self.scene, frame)? else { return Ok(None) };
         start.set_threads(self.threads);

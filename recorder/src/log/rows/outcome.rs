@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{Action, Command, Outcome, OutcomeStatus, Reason};
+use sim_contract::{Action, Command, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus, Reason};
 
 use super::json::JsonNumber;
 
@@ -26,6 +26,15 @@ pub struct OutcomeRow {
     pub status: String,
     /// Reason of a rejection. "" if the command was applied.
     pub reason: String,
+    /// The row answers no command: the node released a particle, because the connection of the client
+    /// that grabbed it has ended. Absent from other rows.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub disconnected: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 const APPLIED: &str = "applied";
@@ -42,6 +51,7 @@ impl From<&Outcome> for OutcomeRow {
             action: outcome.command.action(),
             status: status.to_owned(),
             reason: outcome.reason_name().to_owned(),
+            disconnected: outcome.is_disconnection(),
         }
     }
 }
@@ -61,6 +71,9 @@ impl From<&OutcomeRow> for Outcome {
             outcome.status = OutcomeStatus::Rejected as u32;
             outcome.reason = Reason::from_name(&row.reason).map_or(0, |reason| reason as u32);
         }
+        if row.disconnected {
+            outcome.flags |= OUTCOME_FLAG_DISCONNECTED;
+        }
         outcome
     }
 }
@@ -72,6 +85,8 @@ struct ActionSchema {
     kind: String,
     #[schemars(default)]
     particle: Option<u32>,
+    #[schemars(default)]
+    force: Option<bool>,
     #[schemars(default)]
     target: Option<[JsonNumber; 3]>,
     #[schemars(default)]

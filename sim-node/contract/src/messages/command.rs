@@ -17,7 +17,8 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 ///
 /// | kind | `index` | `vectors` | other fields |
 /// |---|---|---|---|
-/// | 1 pin, 2 unpin, 5 release | particle | | |
+/// | 1 pin, 2 unpin | particle | | |
+/// | 5 release | particle | | [`CommandOptions::FORCE`] |
 /// | 3 grab, 4 move | particle | target | `number` over_s |
 /// | 6 pause, 7 resume, 9 reset | | | |
 /// | 8 step | | | `count` steps |
@@ -83,6 +84,8 @@ impl CommandOptions {
     pub const VALUE_OFF: u32 = 1 << 3;
     /// A set addresses the constraints of one kind.
     pub const CONSTRAINT_KIND: u32 = 1 << 4;
+    /// A release ends the grab of any client.
+    pub const FORCE: u32 = 1 << 5;
 
     const VALUE_ANY: u32 = Self::VALUE_NUMBER | Self::VALUE_VECTOR | Self::VALUE_OFF;
 }
@@ -128,7 +131,10 @@ impl Command {
             Action::Move { particle, target, over_s } => {
                 Self::with_kind(kind::MOVE, particle).with_vector(target, over_s)
             }
-            Action::Release { particle } => Self::with_kind(kind::RELEASE, particle),
+            Action::Release { particle, force } => Self {
+                options: if force { CommandOptions::FORCE } else { 0 },
+                ..Self::with_kind(kind::RELEASE, particle)
+            },
             Action::Pause => Self::with_kind(kind::PAUSE, 0),
             Action::Resume => Self::with_kind(kind::RESUME, 0),
             Action::Step { count } => Self { count, ..Self::with_kind(kind::STEP, 0) },
@@ -211,7 +217,9 @@ impl Command {
             kind::UNPIN => Action::Unpin { particle: index },
             kind::GRAB => Action::Grab { particle: index, target: first, over_s: number },
             kind::MOVE => Action::Move { particle: index, target: first, over_s: number },
-            kind::RELEASE => Action::Release { particle: index },
+            kind::RELEASE => {
+                Action::Release { particle: index, force: self.has(CommandOptions::FORCE) }
+            }
             kind::PAUSE => Action::Pause,
             kind::RESUME => Action::Resume,
             kind::STEP => Action::Step { count },

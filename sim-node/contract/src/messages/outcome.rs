@@ -22,7 +22,7 @@ pub struct Outcome {
     pub status: u32,
     /// A [`Reason`] as a number; 0 if applied.
     pub reason: u32,
-    /// [`OUTCOME_FLAG_CONTROL`] or 0.
+    /// [`OUTCOME_FLAG_CONTROL`] or [`OUTCOME_FLAG_DISCONNECTED`], else 0.
     pub flags: u32,
     /// Always 0.
     pub spare: u32,
@@ -36,6 +36,11 @@ const _: () = assert!(size_of::<Outcome>() == 296 && align_of::<Outcome>() == 8)
 /// ...). It is not part of the replayed run's log; its index is the number of outcomes replayed so
 /// far.
 pub const OUTCOME_FLAG_CONTROL: u32 = 1;
+
+/// Bit of [`Outcome::flags`]: the outcome answers no command. The owner released a particle, because
+/// the connection through which a client grabbed it has ended. The command is a release by that
+/// client, with sequence 0.
+pub const OUTCOME_FLAG_DISCONNECTED: u32 = 1 << 1;
 
 /// Effect of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +66,12 @@ impl Outcome {
     /// Returns `true` if the command took effect.
     pub fn is_applied(&self) -> bool {
         self.status == OutcomeStatus::Applied as u32
+    }
+
+    /// Returns `true` if the owner released a particle of a client that is gone; see
+    /// [`OUTCOME_FLAG_DISCONNECTED`].
+    pub fn is_disconnection(&self) -> bool {
+        self.flags & OUTCOME_FLAG_DISCONNECTED != 0
     }
 
     /// Returns the reason for the rejection; `None` if the command was applied, or for a number that

@@ -1,6 +1,8 @@
 //! Commands reach the owner, and outcomes reach their sender. If both sides have to act, the owner
 //! acts in the test's thread until the client's thread has ended.
 
+use std::sync::Barrier;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use sim_contract::testing::TestDomain;
@@ -12,7 +14,7 @@ use sim_contract::{
 use crate::support::{DEADLINE, MOMENT, answer_commands, create_owner, publish_step};
 
 const PIN: Action = Action::Pin { particle: 3 };
-const RELEASE: Action = Action::Release { particle: 3 };
+const RELEASE: Action = Action::Release { particle: 3, force: false };
 
 /// Runs `client` beside an owner that answers all commands at step 9.
 fn run_beside_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send + 'static) -> T {
@@ -32,7 +34,8 @@ fn run_beside_owner<T: Send + 'static>(client: impl FnOnce(Endpoint) -> T + Send
 fn receive(owner: &Owner) -> Vec<(u64, u64, Action)> {
     let mut commands = Vec::new();
     owner.receive_commands(&mut commands);
-    commands.iter().map(|command| (command.client_id, command.sequence, command.action())).collect()
+    let commands = commands.iter().map(|received| received.command);
+    commands.map(|command| (command.client_id, command.sequence, command.action())).collect()
 }
 
 #[test]
@@ -164,4 +167,36 @@ fn a_client_that_only_sends_is_no_reader_and_a_client_that_only_reads_is_no_send
     assert!(reader.next_snapshot(MOMENT).unwrap().is_none());
     assert_eq!(owner.reader_count(), 1);
     assert!(reader.next_outcome(MOMENT).unwrap().is_none());
+}
+
+#[test]
+fn a_client_that_sends_without_a_pause_does_not_keep_others_from_being_received() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let endpoint = domain.endpoint();
+    let (is_over, has_sent) = (AtomicBool::new(false), Barrier::new(2));
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            // It is the first to connect, so its commands come first.
+            let mut flooder = Client::attach_as(&endpoint, 1).unwrap();
+            flooder.send(PIN).unwrap();
+            has_sent.wait();
+            while !is_over.load(Ordering::Relaxed) {
+                let _full = flooder.send(PIN);
+            }
+        });
+        has_sent.wait();
+        let mut other = Client::attach_as(&endpoint, 2).unwrap();
+        let mut counts = Vec::new();
+        for _ in 0..100 {
+            other.send(RELEASE).unwrap();
+            let received = receive(&owner);
+            let count = |id| received.iter().filter(|(client, ..)| *client == id).count();
+            counts.push((count(1), count(2)));
+        }
+        // The thread ends before a failure can leave the scope.
+        is_over.store(true, Ordering::Relaxed);
+        let is_fair = |(flood, other): &(usize, usize)| *flood <= COMMANDS_BUFFERED && *other == 1;
+        assert!(counts.iter().all(is_fair), "{counts:?}");
+    });
 }

@@ -5,7 +5,8 @@ use std::time::Duration;
 use sim_contract::{
     CONTRACT_VERSION, ColliderShape, ColliderState, CollidersHeader, ConstraintState, Endpoint,
     KeyframeHeader, Load, LoadHeader, NodeStatus, Outcome, Owner, OwnerError, ParameterValues,
-    ParticleState, Reason, SnapshotHeader, TearCause, TearsHeader, TornConstraint, Triangle, Wake,
+    ParticleState, Reason, ReceivedCommand, SnapshotHeader, TearCause, TearsHeader, TornConstraint,
+    Triangle, Wake,
 };
 
 /// Longer than any operation here takes. Tests wait for events, not for this deadline.
@@ -116,7 +117,7 @@ pub(crate) fn publish_everything(owner: &Owner, step: u64) {
 pub(crate) fn answer_commands(owner: &Owner, step: u64, outcome_count: &mut u64) {
     let mut commands = Vec::new();
     owner.receive_commands(&mut commands);
-    for command in commands {
+    for ReceivedCommand { command, .. } in commands {
         let result = match command.action() {
             sim_contract::Action::Pin { .. } => Ok(()),
             _ => Err(Reason::NotGrabbed),

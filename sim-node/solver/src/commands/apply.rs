@@ -60,7 +60,8 @@ impl Solver {
                 self.move_grabbed(client_id, Grab { particle, target, over_s })?;
                 return Ok(Applied::Target);
             }
-            Action::Release { particle } => self.release(client_id, particle)?,
+            Action::Release { particle, force: false } => self.release(client_id, particle)?,
+            Action::Release { particle, force: true } => self.release_of_any(particle)?,
             Action::Push { center, radius, delta, limit } => {
                 self.push(Push { sphere: Sphere { center, radius }, delta, limit })?;
             }

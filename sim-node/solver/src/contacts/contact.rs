@@ -9,6 +9,7 @@ use super::path::SubstepPath;
 use super::solid::Hit;
 use crate::kernels::lanes::Wide;
 use crate::step::particle_block::ParticleBlock;
+use crate::step::substep::SubstepInputs;
 
 /// Contacts of a block of particles in one substep.
 #[derive(Debug, Clone, Default)]
@@ -49,9 +50,12 @@ impl Contacts {
     pub(crate) fn push_out<W: Wide>(
         &mut self,
         particles: &mut impl ParticleBlock,
-        obstacles: &[Obstacle],
+        inputs: &SubstepInputs<'_>,
     ) {
-        for obstacle in obstacles {
+        for obstacle in inputs.obstacles {
+            if inputs.is_given_up() {
+                return;
+            }
             for group in 0..particles.count().div_ceil(8) {
                 if particles.may_touch::<W>(group, &obstacle.zone) {
                     let last = particles.count().min(8 * group + 8);
@@ -121,16 +125,23 @@ impl Contacts {
     pub(crate) fn correct_touched(
         &mut self,
         particles: &mut impl ParticleBlock,
-        obstacles: &[Obstacle],
+        inputs: &SubstepInputs<'_>,
     ) {
         if !self.touched.is_empty() {
-            self.correct_all_touched(particles, obstacles);
+            self.correct_all_touched(particles, inputs);
         }
     }
 
     #[inline(never)]
-    fn correct_all_touched(&mut self, particles: &mut impl ParticleBlock, obstacles: &[Obstacle]) {
-        for Obstacle { solid, .. } in obstacles {
+    fn correct_all_touched(
+        &mut self,
+        particles: &mut impl ParticleBlock,
+        inputs: &SubstepInputs<'_>,
+    ) {
+        for Obstacle { solid, .. } in inputs.obstacles {
+            if inputs.is_given_up() {
+                return;
+            }
             for index in self.touched.iter().map(|index| *index as usize) {
                 let path = particles.path(index);
                 let at_end = SubstepPath { displacement: Vec3::ZERO, ..path };

@@ -10,9 +10,11 @@ pub(crate) mod softness;
 pub(crate) mod wind;
 
 use serde::Serialize;
+use sim_types::STEP_WORK_MAX;
 
-use super::generate::Generator;
+use super::generate::{Generator, Shape};
 use super::model::Model;
+use crate::checks::StepSize;
 use anchor::SceneAnchor;
 use collider::SceneCollider;
 use element::{SceneConstraint, SceneParticle};
@@ -79,7 +81,7 @@ impl Scene {
     /// Replaces the scene's rate and number of substeps where a value is given.
     ///
     /// # Errors
-    /// A value is out of range. The text names the field and the range.
+    /// A value is out of range, or a step exceeds [`STEP_WORK_MAX`]. The text names the field and the range.
     pub fn override_solver(
         &mut self,
         rate_hz: Option<u32>,
@@ -97,8 +99,35 @@ impl Scene {
         }
         if let Some(substeps) = substeps {
             self.solver.substeps = check("substeps", substeps, PASSES_MAX)?;
+            self.check_step_work().map_err(|problem| format!("substeps: {problem}"))?;
         }
         Ok(())
+    }
+
+    /// Checks that a step makes no more work than [`STEP_WORK_MAX`].
+    pub(crate) fn check_step_work(&self) -> Result<(), String> {
+        let SolverSettings { substeps, iterations, .. } = self.solver;
+        let size = self.step_size();
+        if size.allows(substeps, iterations) {
+            return Ok(());
+        }
+        let StepSize { particles, constraints, colliders } = size;
+        Err(format!(
+            "a step of {substeps} substeps x ({constraints} constraints x {iterations} iterations + \
+             {particles} particles x ({colliders} colliders + 1)) is {} projections and tests \
+             (allowed: {STEP_WORK_MAX})",
+            size.work(substeps, iterations)
+        ))
+    }
+
+    fn step_size(&self) -> StepSize {
+        let shapes = || self.generators.iter().map(|generator| &generator.shape);
+        let generated = |count: fn(&Shape) -> u64| shapes().map(count).sum::<u64>();
+        StepSize {
+            particles: self.particles.len() as u64 + generated(Shape::particle_count),
+            constraints: self.constraints.len() as u64 + generated(Shape::constraint_count),
+            colliders: self.colliders.len() as u64,
+        }
     }
 
     /// Counts particles, constraints and pinned particles, including the generated ones.

@@ -104,6 +104,9 @@ impl Scene {
         let model = scene.model();
         reader.check_generated(&scene, &file, &model)?;
         reader.read_references(&mut scene, &file, &model)?;
+        if let Err(problem) = scene.check_step_work() {
+            return reader.error(file.solver.place_of_passes(), "solver", problem);
+        }
         reader.check_text_size(&scene)?;
         scene.read_warnings = reader.warnings.take();
         Ok(scene)

@@ -18,10 +18,10 @@ pub(crate) fn run_stage<W: Wide>(
     match stage {
         Stage::Predict => particles.predict::<W>(&inputs.prediction),
         Stage::Tether => particles.pull_to_roots::<W>(),
-        Stage::Contact => contacts.push_out::<W>(particles, inputs.obstacles),
+        Stage::Contact => contacts.push_out::<W>(particles, inputs),
         Stage::Advance => {
             particles.advance::<W>();
-            contacts.correct_touched(particles, inputs.obstacles);
+            contacts.correct_touched(particles, inputs);
         }
         Stage::Drive
         | Stage::Wind

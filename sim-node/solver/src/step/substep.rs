@@ -1,5 +1,7 @@
 //! One substep of a step, and its inputs.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use super::prediction::Prediction;
 use crate::contacts::obstacle::Obstacle;
 
@@ -34,4 +36,15 @@ pub(crate) struct SubstepInputs<'a> {
     pub(crate) prediction: Prediction,
     /// In the order of contact.
     pub(crate) obstacles: &'a [Obstacle],
+    /// Gives the step up when it becomes true.
+    pub(crate) stop: &'a AtomicBool,
+}
+
+impl SubstepInputs<'_> {
+    /// Returns true if the step is given up. Long loops read it once per row, block or obstacle: a
+    /// load of a flag that nothing writes costs nothing there.
+    #[inline(always)]
+    pub(crate) fn is_given_up(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
 }

@@ -194,6 +194,9 @@ impl Graph {
         let mut is_marked = false;
         // Stages of single particles run together, block by block.
         for run in stages.chunk_by(|a, b| !a.stage.is_grouped() && !b.stage.is_grouped()) {
+            if inputs.is_given_up() {
+                break;
+            }
             let ScheduledStage { stage, group, .. } = run[0];
             match stage {
                 Stage::Project => is_marked |= self.project(workers, group, pass),
@@ -223,6 +226,9 @@ impl Graph {
         let parts = all.chunks(length).map(Some);
         let work = |part: &mut Option<GraphBlock<'_>>, scratch: &mut WorkerScratch| {
             for block in part.take().into_iter().flat_map(|part| part.chunks(BLOCK_PARTICLES)) {
+                if inputs.is_given_up() {
+                    return;
+                }
                 let contacts = &mut scratch.contacts;
                 kernels.run(BlockWork { block, stages, inputs, contacts });
             }

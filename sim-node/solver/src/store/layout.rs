@@ -79,12 +79,13 @@ impl Location {
         Self::new(sheet + 1, index)
     }
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "at most 2^24 particles of 100 numbers each"
-    )]
+    /// A sheet has at most 2^24 particles. With at most 66 fields in columns of up to 48 numbers for 17
+    /// particles, its indices stay below 2^32.
     fn new(part: usize, index: usize) -> Self {
-        Self { part: part as u32, index: index as u32 }
+        let (Ok(part), Ok(index)) = (u32::try_from(part), u32::try_from(index)) else {
+            unreachable!("place {index} in part {part} is beyond the limits of a scene")
+        };
+        Self { part, index }
     }
 
     pub(crate) fn index(self) -> usize {

@@ -15,7 +15,7 @@ pub(super) fn actions(
     let action = match command {
         Command::Grab { particle, target, over_s } => Action::Grab { particle, target, over_s },
         Command::Move { particle, target, over_s } => Action::Move { particle, target, over_s },
-        Command::Release { particle } => Action::Release { particle },
+        Command::Release { particle } => Action::Release { particle, force: false },
         Command::Brush { eye, ray, radius, delta, over_s, cap } => {
             let stroke = Stroke { eye, ray, radius, delta, over_s, cap };
             let push = stroke.push(context);

@@ -180,7 +180,7 @@ impl Dispatch {
                     grab.is_applied = true;
                 }
             }
-            Action::Release { particle } => {
+            Action::Release { particle, .. } => {
                 if let Some(grab) = self.grabs.get_mut(&particle) {
                     grab.is_applied = false;
                 }
@@ -202,11 +202,16 @@ impl Dispatch {
     /// Ends the grabs that the node had applied before a reset or a load. The node answers in the order
     /// of application, so a grab without an answer comes after it.
     pub(super) fn end_applied_grabs(&mut self) {
-        for grab in self.grabs.values_mut() {
-            grab.is_applied = false;
-        }
         let particles: Vec<_> = self.grabs.keys().copied().collect();
         for particle in particles {
+            self.end_applied_grab(particle);
+        }
+    }
+
+    /// Ends the grab of a particle that another client has released by force.
+    pub(super) fn end_applied_grab(&mut self, particle: u32) {
+        if let Some(grab) = self.grabs.get_mut(&particle) {
+            grab.is_applied = false;
             self.forget_lost_grab(particle);
         }
     }
@@ -294,5 +299,5 @@ impl OpenCommand {
 
 /// Releases a particle whose client cannot do it.
 fn release(particle: u32) -> Part {
-    Part { command: None, action: Action::Release { particle } }
+    Part { command: None, action: Action::Release { particle, force: false } }
 }

@@ -311,6 +311,11 @@ fn handle_outcomes(
                 sinks.publish(&Update::Reset { step: outcome.step });
             }
         }
+        if let Action::Release { particle, force: true } = action
+            && outcome.is_applied()
+        {
+            dispatch.end_applied_grab(particle);
+        }
         if outcome.command.client_id == client.client_id() {
             dispatch.on_outcome(sinks, outcome);
         }

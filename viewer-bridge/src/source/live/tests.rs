@@ -125,7 +125,7 @@ impl Fixture {
     fn arrived(&self) -> Vec<Sent> {
         let mut arrived = Vec::new();
         self.owner.receive_commands(&mut arrived);
-        arrived
+        arrived.iter().map(|received| received.command).collect()
     }
 
     /// Publishes that a command was applied.
@@ -183,7 +183,7 @@ fn actions(commands: &[Sent]) -> Vec<Action> {
 }
 
 const MOVE: Action = Action::Move { particle: 1, target: TARGET, over_s: 0.0 };
-const RELEASE: Action = Action::Release { particle: 1 };
+const RELEASE: Action = Action::Release { particle: 1, force: false };
 
 #[test]
 fn colliders_that_arrive_before_the_first_state_of_their_load_are_shown_with_it() {
@@ -274,6 +274,19 @@ fn a_grab_that_the_node_applied_before_a_reset_has_ended() {
     let sent = fixture.arrived();
     fixture.answer(sent[0]);
     fixture.reset();
+    fixture.read();
+    fixture.command(pull());
+    fixture.request(RequestKind::Left);
+    assert!(fixture.arrived().is_empty());
+}
+
+#[test]
+fn a_grab_that_another_client_has_released_by_force_has_ended() {
+    let mut fixture = Fixture::start();
+    fixture.command(grab());
+    let sent = fixture.arrived();
+    fixture.answer(sent[0]);
+    fixture.answer(Sent::new(1, 1, Action::Release { particle: 1, force: true }));
     fixture.read();
     fixture.command(pull());
     fixture.request(RequestKind::Left);

@@ -102,9 +102,10 @@ impl Obj {
     /// Returns the bends across each edge of exactly two faces. A bend joins the neighbours that an
     /// end of the edge has in the two faces. For two triangles, these are their third corners.
     fn bends(&self) -> Vec<[u32; 2]> {
-        let mut faces_at: BTreeMap<[u32; 2], Vec<&[u32]>> = BTreeMap::new();
-        for face in &self.faces {
-            for edge in edges(face) {
+        let faces: Vec<_> = self.faces.iter().map(|face| IndexedFace::new(face)).collect();
+        let mut faces_at: BTreeMap<[u32; 2], Vec<&IndexedFace<'_>>> = BTreeMap::new();
+        for face in &faces {
+            for edge in edges(face.corners) {
                 faces_at.entry(edge).or_default().push(face);
             }
         }
@@ -112,8 +113,8 @@ impl Obj {
         for (edge, faces) in faces_at {
             let [left, right] = faces.as_slice() else { continue };
             for (end, other) in [(edge[0], edge[1]), (edge[1], edge[0])] {
-                let (from, to) =
-                    (other_neighbour(left, end, other), other_neighbour(right, end, other));
+                let from = left.other_neighbour(end, other);
+                let to = right.other_neighbour(end, other);
                 bends.extend(from.zip(to).map(|(from, to)| [from, to]));
             }
         }
@@ -121,10 +122,49 @@ impl Obj {
     }
 }
 
-/// Returns the neighbour of a corner in a face that is not `other`.
-fn other_neighbour(face: &[u32], corner: u32, other: u32) -> Option<u32> {
-    let place = face.iter().position(|index| *index == corner)?;
-    let next = face[(place + 1) % face.len()];
-    let previous = face[(place + face.len() - 1) % face.len()];
-    if next == other { Some(previous) } else { Some(next) }
+/// A face whose corners are found without a search through all of them: a face can have as many
+/// corners as the mesh.
+struct IndexedFace<'a> {
+    corners: &'a [u32],
+    /// Places of the corners, ascending by vertex, then by place.
+    places: Vec<usize>,
+}
+
+impl<'a> IndexedFace<'a> {
+    fn new(corners: &'a [u32]) -> Self {
+        let mut places: Vec<_> = (0..corners.len()).collect();
+        places.sort_by_key(|place| corners[*place]);
+        Self { corners, places }
+    }
+
+    /// Returns the neighbour of a corner in the face that is not `other`. The first of equal corners
+    /// counts.
+    fn other_neighbour(&self, corner: u32, other: u32) -> Option<u32> {
+        let Self { corners, places } = self;
+        let index = places.partition_point(|place| corners[*place] < corner);
+        let place = *places.get(index).filter(|place| corners[**place] == corner)?;
+        let next = corners[(place + 1) % corners.len()];
+        let previous = corners[(place + corners.len() - 1) % corners.len()];
+        if next == other { Some(previous) } else { Some(next) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Bends of faces with many corners, against their number in closed form.
+    use super::*;
+
+    /// A quadratic search would take minutes.
+    #[test]
+    fn faces_with_as_many_corners_as_the_mesh_are_linked_in_time() {
+        let count = 300_000;
+        let corners: Vec<u32> = (0..count).collect();
+        let backwards: Vec<u32> = corners.iter().rev().copied().collect();
+        let vertices = vec![[0.0; 3]; corners.len()];
+        let obj = Obj { vertices, faces: vec![corners, backwards], density: None };
+        // n edges, n - 3 diagonals from the first corner of each face, of which the one between the two
+        // first corners is an edge; no bends, because both faces have the same neighbours.
+        let diagonals = 2 * (u64::from(count) - 3);
+        assert_eq!(obj.constraint_count(), u64::from(count) + diagonals);
+    }
 }

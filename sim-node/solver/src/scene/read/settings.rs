@@ -1,5 +1,7 @@
 //! The table `[solver]`.
 
+use std::ops::Range;
+
 use serde::Deserialize;
 use sim_types::{Method, Parameter};
 
@@ -31,6 +33,15 @@ pub(super) struct FileSolver {
 }
 
 impl TableKeys for FileSolver {}
+
+impl FileSolver {
+    /// Place of the counts of passes, for an error about the work of a step; the start of the text if
+    /// both are the defaults.
+    pub(super) fn place_of_passes(&self) -> Range<usize> {
+        let passes = self.iterations.as_ref().or(self.substeps.as_ref());
+        passes.map_or(0..0, Whole::span)
+    }
+}
 
 impl Reader<'_> {
     /// Returns the method, which decides the meaning of other keys.

@@ -73,6 +73,9 @@ impl Band<'_> {
         }
         let mut is_marked = false;
         for front in first..last {
+            if sweep.inputs.is_given_up() {
+                break;
+            }
             for (stage, rows) in stages.iter().zip(&rows) {
                 // Above the first row it wraps to an index that no range contains.
                 let row = front.wrapping_sub(stage.lag);

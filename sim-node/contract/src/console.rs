@@ -1,0 +1,61 @@
+//! Standard output and standard error of the programs.
+//!
+//! Results go to stdout. A result that cannot be written is an error, except that a pipe whose reader
+//! has gone ends the output quietly, as `| head` expects. Messages go to stderr; those that cannot be
+//! written are dropped, because no run must end for a message. A descriptor that is closed from the
+//! start is `/dev/null`.
+
+use std::io::{self, ErrorKind, Write};
+
+/// Writes a result to stdout, past every buffer: the end of a program ignores errors.
+///
+/// # Errors
+/// Stdout does not accept the bytes, for example because its disk is full.
+pub fn write_result(bytes: &[u8]) -> io::Result<()> {
+    write(io::stdout().lock(), bytes)
+}
+
+/// Writes a line to stderr, or drops it.
+pub fn note(text: &str) {
+    let _dropped = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Accepts a write that failed because the reader of a pipe has gone: that reader wants no more.
+///
+/// # Errors
+/// Every other error stays.
+pub fn accept_closed_pipe(result: io::Result<()>) -> io::Result<()> {
+    match result {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
+fn write(mut out: impl Write, bytes: &[u8]) -> io::Result<()> {
+    accept_closed_pipe(out.write_all(bytes).and_then(|()| out.flush()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An output that accepts text into its buffer and fails when it is flushed.
+    struct Failing(ErrorKind);
+
+    impl Write for Failing {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Err(self.0.into())
+        }
+    }
+
+    #[test]
+    fn a_full_output_is_an_error_and_a_closed_pipe_is_none() {
+        let full = write(Failing(ErrorKind::StorageFull), b"text").unwrap_err();
+        assert_eq!(full.kind(), ErrorKind::StorageFull);
+        write(Failing(ErrorKind::BrokenPipe), b"text").unwrap();
+    }
+}

@@ -1,0 +1,7 @@
+//! Processes under adversity: flooding and killed clients, requests to stop, streams that refuse output.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+mod fairness;
+mod grabs;
+mod stop;
+mod streams;
