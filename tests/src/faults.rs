@@ -25,7 +25,11 @@ pub struct Summary {
     pub actions: usize,
     /// Number of recordings that were read and verified.
     pub recordings: u32,
-    /// Number of snapshots in them.
+    /// Number of those that lack snapshots, and declare it.
+    pub lossy: u32,
+    /// Number of those without an end, because their recorder was killed or its disk was full.
+    pub unfinished: u32,
+    /// Number of snapshots in all.
     pub snapshots: u64,
 }
 
@@ -48,8 +52,13 @@ pub fn run(seed: u64, count: usize, mut goes_on: impl FnMut(usize, &str) -> bool
         world.check_lasting_programs();
     }
     world.check_remains();
-    let (recordings, snapshots) = (world.kept.checked_count, world.kept.snapshot_count);
-    Summary { actions, recordings, snapshots }
+    Summary {
+        actions,
+        recordings: world.kept.checked_count,
+        lossy: world.kept.lossy_count,
+        unfinished: world.kept.unfinished_count,
+        snapshots: world.kept.snapshot_count,
+    }
 }
 
 impl World {
@@ -72,6 +81,7 @@ impl World {
             Action::KillCtl { line, changes } => self.kill_ctl(&line, changes),
             Action::Request { client, command } => self.request(client, &command),
             Action::Flood { clients, count, command } => self.flood(clients, count, &command),
+            Action::Wait { steps } => self.wait_for_steps(steps),
             Action::KillGrabber { particle, changes } => self.kill_grabber(particle, changes),
             Action::StartStubbornReader => self.start_stubborn_reader(),
             Action::KillStubbornReader => self.kill_stubborn_reader(),

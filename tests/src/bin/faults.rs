@@ -56,9 +56,10 @@ fn main() -> anyhow::Result<()> {
         }
         !stop.is_requested()
     });
-    let faults::Summary { actions, recordings, snapshots } = summary;
+    let faults::Summary { actions, recordings, lossy, unfinished, snapshots } = summary;
     eprintln!(
-        "no fault in {actions} actions; {recordings} recordings of {snapshots} snapshots verified"
+        "no fault in {actions} actions; verified {recordings} recordings ({lossy} with declared losses, \
+         {unfinished} without an end) of {snapshots} snapshots"
     );
     Ok(())
 }

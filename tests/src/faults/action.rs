@@ -90,6 +90,10 @@ pub(super) enum Action {
         count: usize,
         command: String,
     },
+    /// Lets a running node make steps, so that recordings grow.
+    Wait {
+        steps: u64,
+    },
     KillGrabber {
         particle: u32,
         changes: u32,

@@ -98,6 +98,23 @@ impl World {
         }
     }
 
+    /// Waits until the node has made some steps, or is paused.
+    pub(super) fn wait_for_steps(&mut self, steps: u64) {
+        if self.node.is_none() {
+            return;
+        }
+        let client = self.client(0).expect("a client of a running node");
+        let mut last = None;
+        let deadline = Deadline::start();
+        loop {
+            deadline.check("steps of the node");
+            let status = client.status(DEADLINE).expect("a status").expect("a running node");
+            if status.is_paused() || status.step >= *last.get_or_insert(status.step + steps) {
+                return;
+            }
+        }
+    }
+
     /// Sends the load of a scene, and kills the node after some changes of the files of the domain, or when
     /// the load is done.
     pub(super) fn kill_node_in_load(&mut self, scene: &str, changes: u32) {

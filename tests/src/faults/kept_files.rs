@@ -15,6 +15,10 @@ pub(super) struct KeptFiles {
     recordings: VecDeque<String>,
     /// Number of checked recordings.
     pub(super) checked_count: u32,
+    /// Number of those that lack snapshots.
+    pub(super) lossy_count: u32,
+    /// Number of those without an end.
+    pub(super) unfinished_count: u32,
     /// Number of snapshots in them.
     pub(super) snapshot_count: u64,
 }
@@ -33,6 +37,8 @@ impl KeptFiles {
     /// Adds a recording that has passed its checks. Removes the oldest one.
     pub(super) fn add(&mut self, recording: Recording) {
         self.checked_count += 1;
+        self.lossy_count += u32::from(recording.has_losses());
+        self.unfinished_count += u32::from(!recording.is_finished());
         self.snapshot_count += recording.rows.len() as u64;
         let removed = if recording.is_finished() {
             self.recordings.push_back(recording.path);

@@ -72,6 +72,11 @@ impl Recording {
         self.has_final_name
     }
 
+    /// Returns true if snapshots are missing between those in the file.
+    pub(super) fn has_losses(&self) -> bool {
+        self.missing().is_some_and(|missing| missing > 0)
+    }
+
     /// Number of snapshots that were published from the first to the last recorded one, without those in
     /// the file.
     fn missing(&self) -> Option<u64> {

@@ -16,11 +16,11 @@ type Create = fn(&mut Rng) -> Action;
 
 /// The actions with their weights.
 const ACTIONS: &[(u32, Create)] = &[
-    (10, |rng| Action::StartNode { args: node_args(rng) }),
+    (13, |rng| Action::StartNode { args: node_args(rng) }),
     (3, |rng| Action::KillNodeAtStart { args: node_args(rng), changes: changes(rng) }),
     (4, |rng| Action::EndNode(ending(rng))),
     (2, |rng| Action::KillNodeInLoad { scene: scene(rng), changes: rng.u32(0..20) }),
-    (10, |rng| Action::StartRecorder { slot: rng.usize(..RECORDERS), args: recorder_args(rng) }),
+    (13, |rng| Action::StartRecorder { slot: rng.usize(..RECORDERS), args: recorder_args(rng) }),
     (2, |rng| Action::KillRecorderAtStart { changes: changes(rng) }),
     (7, |rng| Action::EndRecorder { slot: rng.usize(..RECORDERS), ending: ending(rng) }),
     (3, |rng| Action::StopRecorder { slot: rng.usize(..RECORDERS) }),
@@ -41,6 +41,7 @@ const ACTIONS: &[(u32, Create)] = &[
         count: rng.usize(..128),
         command: fill(rng, FLOODS),
     }),
+    (8, |rng| Action::Wait { steps: rng.u64(..500) }),
     (2, |rng| Action::KillGrabber { particle: rng.u32(..50), changes: changes(rng) }),
     (2, |_| Action::StartStubbornReader),
     (2, |_| Action::KillStubbornReader),
