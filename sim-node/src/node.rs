@@ -111,6 +111,8 @@ impl Node {
     /// Runs until the last step or a request to stop. Calls `observer` once a second.
     pub(crate) fn run(&mut self, stop: &Stop, observer: impl Fn(&Self)) -> anyhow::Result<()> {
         self.start_ns = monotonic_ns();
+        // Pauses count from here, or a run that ends paused would have paused for longer than it lasted.
+        self.mark_ns = self.start_ns;
         self.pace.restart(self.start_ns);
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.observe(&observer)?;

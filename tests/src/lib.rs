@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::expect_used, clippy::panic, reason = "a panic is how a test fails")]
 
+pub mod faults;
 mod process;
 mod programs;
 mod sandbox;

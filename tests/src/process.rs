@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io::{BufRead, BufReader, Read, empty};
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -31,6 +31,8 @@ pub struct Process {
 pub struct Finished {
     /// Exit code, or `None` if a signal ended the program.
     pub code: Option<i32>,
+    /// Number of the signal that ended the program, if one did.
+    pub signal: Option<i32>,
     /// Everything on stdout.
     pub stdout: String,
     /// Everything on stderr.
@@ -249,7 +251,12 @@ impl Process {
         });
         self.stdout.join();
         self.stderr.join();
-        Finished { code: status.code(), stdout: self.stdout.text(), stderr: self.stderr.text() }
+        Finished {
+            code: status.code(),
+            signal: status.signal(),
+            stdout: self.stdout.text(),
+            stderr: self.stderr.text(),
+        }
     }
 
     /// Returns true if the program is still running.
@@ -258,6 +265,16 @@ impl Process {
     /// If the state of the child cannot be read, which does not happen for a child of this process.
     pub fn is_running(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()
+    }
+
+    /// Returns true if a line on stderr starts with `start`. Does not wait for it.
+    pub(crate) fn has_written(&self, start: &str) -> bool {
+        self.stderr.text().lines().any(|line| line.starts_with(start))
+    }
+
+    /// Returns the program and its arguments.
+    pub(crate) fn title(&self) -> &str {
+        &self.title
     }
 }
 
