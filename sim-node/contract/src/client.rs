@@ -105,7 +105,7 @@ impl Client {
 
     /// Returns the oldest unread snapshot, or waits for the next one. The first call returns the
     /// latest published snapshot. A reader more than [`crate::SNAPSHOTS_BUFFERED`] snapshots behind
-    /// misses some; the step in the header shows it.
+    /// misses some; `snapshot_index` in the header shows it.
     ///
     /// # Errors
     /// The program already holds [`crate::BORROWED_SAMPLES_MAX`] snapshots, or a malformed one

@@ -34,7 +34,7 @@ pub const COMMANDS_BUFFERED: usize = 256;
 pub const OUTCOME_READERS_MAX: usize = CLIENTS_MAX + READERS_MAX;
 /// Readers of the commands: the owner, and one spare for a network tunnel.
 pub const COMMAND_READERS_MAX: usize = 2;
-/// Writers of the status: the owner alone. This limit keeps a second owner from the name.
+/// Writers of the status: the owner alone.
 pub const STATUS_PUBLISHERS_MAX: usize = 1;
 /// Most processes that wait for the wake event at the same time.
 pub const LISTENERS_MAX: usize = 32;

@@ -20,7 +20,7 @@ use crate::messages::outcome::Outcome;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
-use crate::messages::topology::KeyframeHeader;
+use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
 use crate::ports::connection::{self, ConnectionId, ReceivedCommand};
@@ -44,22 +44,24 @@ use sim_types::ParameterValues;
 /// owner frees the name and wakes all waiting processes with [`Wake::OwnerGone`].
 #[derive(Debug)]
 pub struct Owner {
-    // Dropped in this order: the writers go first, then the name is free, and then the readers wake
-    // and notice it.
+    // Dropped in this order: the writers go first, then `status`, so that readers notice that the owner
+    // is gone when they wake. The name is free once all services are removed.
     writers: LoadWriters,
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc::Service, Command, ()>,
     status: ValueWriter<NodeStatus>,
-    lock: OwnerLock,
     wake: WakeSender,
     /// Number of readers at the last refresh, to notice new readers.
     last_reader_count: Cell<usize>,
     /// Number of the next refreshes that wake the readers.
     wakes_due: Cell<u32>,
+    /// The run of the last list of colliders, and the number of lists that it has published.
+    collider_lists: Cell<(u64, u32)>,
     services: Services,
     status_service: Values<NodeStatus>,
-    // Dropped last: the services belong to its node.
+    // Dropped after the services, which belong to its node.
     session: Session,
+    lock: OwnerLock,
 }
 
 /// Number of refreshes that wake a new reader. A reader is counted shortly before it can receive a
@@ -67,9 +69,9 @@ pub struct Owner {
 /// later wake.
 const WAKES_PER_READER: u32 = 2;
 
-/// Most attempts to take the lock of a name: clients hold it for a moment when they remove what a
-/// killed owner left, and an owner that ends frees it shortly before its process is gone.
-const LOCK_ATTEMPTS_MAX: usize = 20;
+/// Most attempts to take the lock of a name, in half a second: an owner that ends frees it a moment
+/// after its clients have noticed.
+const LOCK_ATTEMPTS_MAX: usize = 100;
 /// Pause between two attempts to take the lock.
 const LOCK_PAUSE_NS: u64 = clock::SECOND_NS / 200;
 
@@ -104,14 +106,15 @@ impl Owner {
             outcomes: ValueWriter::create(&services.config, &services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
-            lock,
             last_reader_count: Cell::new(0),
             wakes_due: Cell::new(0),
+            collider_lists: Cell::new((0, 0)),
             services,
             status_service,
             session,
+            lock,
         };
-        owner.writers.publish(load)?;
+        owner.publish_load(load)?;
         owner.wake(Wake::Load);
         Ok(owner)
     }
@@ -132,7 +135,7 @@ impl Owner {
         // it was. The old ones are dropped before the new ones publish: readers empty the buffers of
         // dropped writers first, so they never see the new load before the old.
         self.writers = LoadWriters::create(&self.services, load)?;
-        self.writers.publish(load)?;
+        self.publish_load(load)?;
         self.wake(Wake::Load);
         Ok(())
     }
@@ -189,7 +192,8 @@ impl Owner {
         self.writers.publish_parameters(run_id, step, values)
     }
 
-    /// Publishes all colliders, by index, in their poses at the end of a step. Sets `count`. Call it
+    /// Publishes all colliders, by index, in their poses at the end of a step. Sets `count` and
+    /// `list_index`. Call it
     /// after a load with colliders, when a collider changes, and each step while a collider moves.
     ///
     /// # Errors
@@ -199,7 +203,27 @@ impl Owner {
         header: CollidersHeader,
         colliders: &[ColliderState],
     ) -> Result<(), PublishError> {
-        self.writers.publish_colliders(header, colliders)
+        let list_index = self.next_list_index(header.run_id);
+        self.writers.publish_colliders(CollidersHeader { list_index, ..header }, colliders)
+    }
+
+    /// Publishes what belongs to a load: its data, and for a scene without colliders an empty list of
+    /// them. Without that list, readers would keep the list of the load before.
+    fn publish_load(&self, load: &Load<'_>) -> Result<(), PublishError> {
+        self.writers.publish(load)?;
+        if load.collider_count > 0 {
+            return Ok(());
+        }
+        let LoadHeader { run_id, step, .. } = load.header;
+        self.publish_colliders(CollidersHeader { run_id, step, ..CollidersHeader::default() }, &[])
+    }
+
+    /// Returns the number of lists of colliders that the run has published, and counts one more.
+    fn next_list_index(&self, run_id: u64) -> u32 {
+        let (last_run_id, count) = self.collider_lists.get();
+        let index = if run_id == last_run_id { count } else { 0 };
+        self.collider_lists.set((run_id, index.wrapping_add(1)));
+        index
     }
 
     /// Publishes the outcome of a command.
@@ -325,15 +349,16 @@ fn take_lock(endpoint: &Endpoint) -> Result<OwnerLock, OwnerError> {
             Err(LockError::Held(process_id)) => {
                 return Err(OwnerError::NameTaken { endpoint: endpoint.clone(), process_id });
             }
-            Err(LockError::System(error)) => {
-                let cause = RootError::System { path: root, cause: error.to_string() };
+            Err(LockError::System { path, error }) => {
+                let cause = RootError::System { path, cause: format!("cannot lock it: {error}") };
                 return Err(ServiceError::Root { endpoint: endpoint.clone(), cause }.into());
             }
         }
     }
 }
 
-/// Claims the name by creating the one possible publisher of `status`.
+/// Creates the one possible publisher of `status`. It exists already where a process owns the name
+/// without its lock, such as one in a container with another root.
 fn claim_name(
     session: &Session,
     service: &Values<NodeStatus>,
@@ -361,7 +386,7 @@ mod tests {
     use super::*;
     use crate::client::Client;
     use crate::limits::OWNER_PUBLISHERS_MAX;
-    use crate::messages::topology::{LoadHeader, Triangle};
+    use crate::messages::topology::Triangle;
     use crate::ports::service::SURFACE;
     use crate::ports::session::Slices;
     use crate::testing::TestDomain;
@@ -408,5 +433,29 @@ mod tests {
         drop(other_publishers);
         owner.load(&load(2)).unwrap();
         assert_eq!(revision(&mut client), Some(2));
+    }
+
+    #[test]
+    fn lists_of_colliders_are_numbered_over_loads_with_and_without_colliders() {
+        let domain = TestDomain::new();
+        let mut owner = Owner::create(&domain.endpoint(), &load(1)).unwrap();
+        let mut client = Client::attach(&domain.endpoint()).unwrap();
+        let index = |client: &mut Client, owner: &Owner| {
+            client.colliders(Duration::ZERO).unwrap();
+            owner.refresh();
+            client.colliders(DEADLINE).unwrap().header.list_index
+        };
+        assert_eq!(index(&mut client, &owner), 0);
+        owner.load(&Load { collider_count: 1, ..load(2) }).unwrap();
+        for expected in [1, 2] {
+            let header = CollidersHeader::default();
+            owner.publish_colliders(header, &[ColliderState::default()]).unwrap();
+            assert_eq!(index(&mut client, &owner), expected);
+        }
+        owner.load(&load(3)).unwrap();
+        assert_eq!(index(&mut client, &owner), 3);
+        let header = CollidersHeader { run_id: 7, ..CollidersHeader::default() };
+        owner.publish_colliders(header, &[]).unwrap();
+        assert_eq!(index(&mut client, &owner), 0, "another run");
     }
 }

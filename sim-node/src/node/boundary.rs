@@ -2,7 +2,9 @@
 
 use anyhow::Context;
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{Action, Command, OwnerError, Reason, ReceivedCommand, Stop};
+use sim_contract::{
+    Action, COMMANDS_PER_STEP_MAX, Command, OwnerError, Reason, ReceivedCommand, Stop,
+};
 use sim_solver::{Applied, Control, Scene, Solver};
 
 use super::threads::with_threads;
@@ -19,10 +21,11 @@ impl Node {
             self.publisher.receive_commands(&mut self.arrived);
             self.inbox.add(self.arrived.drain(..));
         }
-        let turn = self.inbox.next_turn();
-        let has_pause = turn.iter().any(|received| received.command.action() == Action::Pause);
         let lost =
             self.grab_connections.remove_lost(monotonic_ns(), || self.publisher.connections());
+        // Together they are at most one turn, so that readers can keep up with the outcomes.
+        let turn = self.inbox.next_turn(COMMANDS_PER_STEP_MAX - lost.len());
+        let has_pause = turn.iter().any(|received| received.command.action() == Action::Pause);
         let has_any = !turn.is_empty() || !lost.is_empty();
         if has_pause || (has_any && !is_step_due) {
             self.publisher.publish_left_out(&self.solver, self.position())?;

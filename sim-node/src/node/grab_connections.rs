@@ -48,7 +48,7 @@ impl GrabConnections {
 
     /// Removes grabs whose connection has ended, and returns their releases. Calls `living` for the
     /// connections of living clients a few times a second, and only if there are grabs. Returns at
-    /// most one turn of releases at a time, so that readers can keep up with the outcomes.
+    /// most [`COMMANDS_PER_STEP_MAX`] releases at a time.
     pub(super) fn remove_lost(
         &mut self,
         now_ns: u64,

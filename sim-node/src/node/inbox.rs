@@ -46,11 +46,11 @@ impl Inbox {
         }
     }
 
-    /// Removes the commands of one turn, in the order of application. A turn ends with the first load,
+    /// Removes the commands of one turn, at most `count_max`, in the order of application. A turn ends with the first load,
     /// because a load takes long, and the node must notice a request to stop after it.
-    pub(super) fn next_turn(&mut self) -> Vec<ReceivedCommand> {
+    pub(super) fn next_turn(&mut self, count_max: usize) -> Vec<ReceivedCommand> {
         let mut turn = Vec::new();
-        while turn.len() < COMMANDS_PER_STEP_MAX
+        while turn.len() < count_max
             && let Some(received) = self.next()
         {
             turn.push(received);
@@ -98,8 +98,11 @@ mod tests {
     fn a_turn_alternates_between_clients_and_keeps_their_sequences() {
         let mut inbox = Inbox::default();
         inbox.add([pin(9, 1), pin(9, 2), pin(4, 7), pin(9, 3), pin(4, 6)]);
-        assert_eq!(order(&inbox.next_turn()), [(4, 6), (9, 1), (4, 7), (9, 2), (9, 3)]);
-        assert!(inbox.next_turn().is_empty());
+        assert_eq!(
+            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)),
+            [(4, 6), (9, 1), (4, 7), (9, 2), (9, 3)]
+        );
+        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX).is_empty());
     }
 
     #[test]
@@ -107,10 +110,10 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add((0..1500).map(|sequence| pin(1, sequence)));
         inbox.add([pin(2, 0)]);
-        let first = order(&inbox.next_turn());
+        let first = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX));
         assert_eq!(first.len(), COMMANDS_PER_STEP_MAX);
         assert_eq!(first[..3], [(1, 0), (2, 0), (1, 1)]);
-        let rest = order(&inbox.next_turn());
+        let rest = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX));
         assert_eq!((rest.len(), rest[0]), (1501 - COMMANDS_PER_STEP_MAX, (1, 1023)));
     }
 
@@ -120,9 +123,12 @@ mod tests {
         let flood = |round| (0..COMMANDS_PER_STEP_MAX as u64).map(move |id| pin(id, round));
         inbox.add([pin(u64::MAX - 1, 0)]);
         inbox.add(flood(0));
-        assert_eq!(inbox.next_turn().len(), COMMANDS_PER_STEP_MAX);
+        assert_eq!(inbox.next_turn(COMMANDS_PER_STEP_MAX).len(), COMMANDS_PER_STEP_MAX);
         inbox.add(flood(1));
-        assert_eq!(order(&inbox.next_turn())[..2], [(u64::MAX - 1, 0), (0, 1)]);
+        assert_eq!(
+            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX))[..2],
+            [(u64::MAX - 1, 0), (0, 1)]
+        );
     }
 
     #[test]
@@ -137,7 +143,7 @@ mod tests {
         inbox.add([pin(u64::MAX, 0)]);
         let is_served = |turn: &[ReceivedCommand]| order(turn).contains(&(u64::MAX, 0));
         let turns = (1..=100).find(|_| {
-            let turn = inbox.next_turn();
+            let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX);
             inbox.add(flood(COMMANDS_PER_STEP_MAX));
             is_served(&turn)
         });
@@ -150,8 +156,8 @@ mod tests {
         let load = Command::new(1, 2, Action::Load { scene: Text::cut("rope") });
         let load = ReceivedCommand { command: load, connection: ConnectionId::default() };
         inbox.add([pin(1, 1), load, pin(1, 3)]);
-        assert_eq!(order(&inbox.next_turn()), [(1, 1), (1, 2)]);
-        assert_eq!(order(&inbox.next_turn()), [(1, 3)]);
+        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 1), (1, 2)]);
+        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 3)]);
     }
 
     #[test]
@@ -159,7 +165,7 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add((0..INBOX_MAX as u64).map(|sequence| pin(1, sequence)));
         assert!(!inbox.has_room());
-        inbox.next_turn();
+        inbox.next_turn(COMMANDS_PER_STEP_MAX);
         assert!(inbox.has_room());
     }
 }

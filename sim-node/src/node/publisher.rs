@@ -64,8 +64,6 @@ pub(crate) struct Publisher {
     /// Number of torn constraints, and the colliders, as last published.
     torn_count: usize,
     colliders: Vec<PlacedCollider>,
-    /// Number of published lists of colliders, modulo 2^32.
-    collider_list_count: u32,
 }
 
 impl Publisher {
@@ -98,7 +96,6 @@ impl Publisher {
             parameters,
             torn_count: 0,
             colliders: Vec::new(),
-            collider_list_count: 0,
         })
     }
 
@@ -210,10 +207,8 @@ impl Publisher {
         self.colliders.clear();
         self.colliders.extend(solver.colliders());
         let states: Vec<_> = self.colliders.iter().map(to_collider_state).collect();
-        let list_index = self.collider_list_count;
-        let header = CollidersHeader { run_id: self.run_id, step, count: 0, list_index };
+        let header = CollidersHeader { run_id: self.run_id, step, ..CollidersHeader::default() };
         self.owner.publish_colliders(header, &states)?;
-        self.collider_list_count = list_index.wrapping_add(1);
         Ok(())
     }
 

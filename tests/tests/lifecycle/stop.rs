@@ -55,6 +55,8 @@ fn a_hangup_ends_every_program_as_sigterm_does() {
         (part.len() > 50_000).then_some(())
     });
     for process in [recorder, bridge, node] {
+        // A closed terminal sends it twice: from the shell, and from the kernel.
+        process.signal(Signal::HUP);
         process.signal(Signal::HUP);
         let finished = process.wait();
         assert_eq!(finished.code, Some(0), "{}", finished.stderr);

@@ -42,8 +42,6 @@ pub(crate) struct Replay {
     step: Option<u64>,
     /// The index of the next snapshot; `None` before the first, which keeps its recorded index.
     next_index: Option<u32>,
-    /// Number of published lists of colliders, modulo 2^32.
-    collider_list_count: u32,
     /// The latest recorded status of the node.
     status: Option<StatusRow>,
     /// Reused for each batch of commands.
@@ -89,7 +87,6 @@ impl Replay {
             position,
             step: None,
             next_index: None,
-            collider_list_count: 0,
             status: None,
             commands: Vec::new(),
         })
@@ -183,10 +180,9 @@ impl Replay {
     }
 
     fn publish_colliders(&mut self, row: &CollidersRow) -> anyhow::Result<()> {
-        let list_index = self.collider_list_count;
-        let header = CollidersHeader { run_id: self.run_id, step: row.step, count: 0, list_index };
+        let header =
+            CollidersHeader { run_id: self.run_id, step: row.step, ..CollidersHeader::default() };
         self.owner.publish_colliders(header, &row.states())?;
-        self.collider_list_count = list_index.wrapping_add(1);
         Ok(())
     }
 

@@ -108,8 +108,8 @@ impl LoadWriters {
         })
     }
 
-    /// Publishes the load, its parameters, an empty list of tears and, for a scene without colliders,
-    /// an empty list of colliders. Without these lists, readers would keep those of the load before.
+    /// Publishes the load, its parameters and an empty list of tears. Without that list, readers would
+    /// keep the list of the load before.
     pub(crate) fn publish(&self, load: &Load<'_>) -> Result<(), PublishError> {
         let header = |count| LoadHeader { count, ..load.header };
         self.scene.write(header(payload_count(load.scene)), |index| load.scene[index])?;
@@ -117,10 +117,6 @@ impl LoadWriters {
         self.topology.write(header(payload_count(constraints)), |index| constraints[index])?;
         self.surface.write(header(payload_count(load.triangles)), |index| load.triangles[index])?;
         let LoadHeader { run_id, step, .. } = load.header;
-        if load.collider_count == 0 {
-            let header = CollidersHeader { run_id, step, ..CollidersHeader::default() };
-            self.publish_colliders(header, &[])?;
-        }
         self.publish_parameters(run_id, step, &load.parameters)?;
         self.publish_tears(
             TearsHeader { run_id, step, since_step: step, ..TearsHeader::default() },

@@ -10,7 +10,7 @@ use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::io::Errno;
 use thiserror::Error;
 
-use crate::ports::domain::files::{SHARED_MEMORY, segments};
+use crate::ports::domain::files::{SHARED_MEMORY, segment};
 
 /// Not enough memory in `/dev/shm`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -58,12 +58,8 @@ pub(crate) enum AllocateError {
 
 /// Allocates all pages of the segment that holds the messages of a publisher.
 pub(crate) fn allocate(config: &Config, publisher_id: u128) -> Result<(), AllocateError> {
-    let suffix = &config.global.service.data_segment_suffix;
-    let ending = format!("_{publisher_id}{suffix}");
-    let is_its = |path: &std::path::PathBuf| {
-        path.as_os_str().as_encoded_bytes().ends_with(ending.as_bytes())
-    };
-    let Some(path) = segments(config, suffix).find(is_its) else {
+    let Some(path) = segment(config, &config.global.service.data_segment_suffix, publisher_id)
+    else {
         let missing = io::Error::new(io::ErrorKind::NotFound, "its segment is missing");
         return Err(AllocateError::System(missing));
     };
@@ -83,12 +79,12 @@ pub(crate) fn allocate(config: &Config, publisher_id: u128) -> Result<(), Alloca
 mod tests {
     use std::os::unix::fs::MetadataExt;
 
-    use super::*;
     use crate::client::Client;
     use crate::messages::topology::{ConstraintState, LoadHeader};
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::domain;
+    use crate::ports::domain::files::segments;
     use crate::testing::TestDomain;
 
     #[test]

@@ -11,7 +11,7 @@ use iceoryx2::service::header::payload_header::PayloadHeader;
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
 
-use crate::limits::BORROWED_SAMPLES_MAX;
+use crate::limits::BORROWED_UPDATES_MAX;
 use crate::ports::port::{PortLimit, SliceHeader, create_port};
 use crate::ports::service::{ServiceError, ServiceSpec};
 use crate::ports::session::{Slices, Values};
@@ -64,6 +64,7 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
     subscriber: Subscriber<ipc::Service, [T], H>,
     service: String,
     buffered: usize,
+    borrowed: usize,
     /// Accepted publishers; `None` accepts all.
     source: Option<Rc<Source>>,
 }
@@ -71,8 +72,9 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
 impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     pub(crate) fn create(service: &Slices<T, H>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
         let subscriber = subscribe(service)?;
-        let (service, buffered) = (service.name().to_string(), spec.buffered);
-        Ok(Self { subscriber, service, buffered, source: None })
+        let service = service.name().to_string();
+        let ServiceSpec { buffered, borrowed, .. } = *spec;
+        Ok(Self { subscriber, service, buffered, borrowed, source: None })
     }
 
     /// Drops messages of other publishers without a trace.
@@ -83,7 +85,9 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     /// Returns the next message; `None` if all were read.
     pub(crate) fn next(&self) -> Result<Option<SliceSample<T, H>>, ReadError> {
         let received = next_accepted(self.source.as_deref(), || self.subscriber.receive());
-        let Some(sample) = received.map_err(|error| read_error(&self.service, error))? else {
+        let Some(sample) =
+            received.map_err(|error| read_error(&self.service, self.borrowed, error))?
+        else {
             return Ok(None);
         };
         let (len, count) = (sample.payload().len(), sample.user_header().element_count());
@@ -109,9 +113,12 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
         // The loop is bounded even if the writer is faster than it: there is at most a buffer of
         // the writer before the last load and a buffer of the present writer.
         for _ in 0..2 * self.buffered {
-            match self.next()? {
-                Some(sample) => *kept = Some(sample),
-                None => break,
+            match self.next() {
+                Ok(Some(sample)) => *kept = Some(sample),
+                Ok(None) => break,
+                // The program holds so many that only one more can be read at a time.
+                Err(ReadError::TooManyHeld { .. }) if kept.is_some() => break,
+                Err(error) => return Err(error),
             }
         }
         Ok(())
@@ -156,7 +163,8 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
     /// Returns the next value; `None` if all were read.
     pub(crate) fn next(&self) -> Result<Option<T>, ReadError> {
         let received = next_accepted(self.source.as_deref(), || self.subscriber.receive());
-        let sample = received.map_err(|error| read_error(&self.service, error))?;
+        let sample =
+            received.map_err(|error| read_error(&self.service, BORROWED_UPDATES_MAX, error))?;
         Ok(sample.map(|sample| *sample))
     }
 
@@ -218,12 +226,10 @@ where
     Ok(None)
 }
 
-fn read_error(service: &str, error: ReceiveError) -> ReadError {
+fn read_error(service: &str, max: usize, error: ReceiveError) -> ReadError {
     let service = service.to_owned();
     match error {
-        ReceiveError::ExceedsMaxBorrows => {
-            ReadError::TooManyHeld { service, max: BORROWED_SAMPLES_MAX }
-        }
+        ReceiveError::ExceedsMaxBorrows => ReadError::TooManyHeld { service, max },
         ReceiveError::ConnectionFailure(error) => ServiceError::failed(&service, &error).into(),
     }
 }

@@ -263,7 +263,10 @@ impl ServiceError {
 pub(crate) enum Cause {
     Missing,
     Full,
+    /// Another process is creating or removing the service.
     InTransition(String),
+    /// The same for too long, or the files of the service are damaged.
+    Stuck(String),
     NoPermission,
     OtherIceoryx,
     Incompatible(String),
@@ -278,9 +281,9 @@ impl From<PublishSubscribeOpenError> for Cause {
             Open::DoesNotExist => Self::Missing,
             Open::ExceedsMaxNumberOfNodes => Self::Full,
             Open::HangsInCreation
-            | Open::ServiceInCorruptedState
             | Open::IsMarkedForDestruction
-            | Open::Interrupt => Self::InTransition(detail),
+            | Open::ServiceInCorruptedState => Self::Stuck(detail),
+            Open::Interrupt => Self::InTransition(detail),
             Open::InsufficientPermissions => Self::NoPermission,
             Open::VersionMismatch => Self::OtherIceoryx,
             Open::InternalFailure
@@ -327,9 +330,9 @@ impl From<EventOpenError> for Cause {
             Open::DoesNotExist => Self::Missing,
             Open::ExceedsMaxNumberOfNodes => Self::Full,
             Open::HangsInCreation
-            | Open::ServiceInCorruptedState
             | Open::IsMarkedForDestruction
-            | Open::Interrupt => Self::InTransition(detail),
+            | Open::ServiceInCorruptedState => Self::Stuck(detail),
+            Open::Interrupt => Self::InTransition(detail),
             Open::InsufficientPermissions => Self::NoPermission,
             Open::VersionMismatch => Self::OtherIceoryx,
             Open::InternalFailure | Open::UnableToCreateServiceTag => Self::Other(detail),

@@ -38,8 +38,8 @@ pub(crate) struct Services {
 }
 
 impl Services {
-    /// Opens or creates the services. `status` is separate: its publisher decides who may create the
-    /// others.
+    /// Opens or creates the services. `status` is separate: the owner takes it before the others, so
+    /// that readers can tell whether the name has an owner.
     pub(crate) fn access(session: &Session, access: Access) -> Result<Self, ServiceError> {
         Ok(Self {
             config: session.config().clone(),

@@ -104,7 +104,7 @@ impl Session {
     /// Returns `true` if no process holds the lock of the name. What is left of its services is then
     /// for the next owner to remove.
     fn is_abandoned(&self) -> bool {
-        OwnerLock::take(self.node.config(), self.endpoint.name()).is_ok()
+        !OwnerLock::is_held(self.node.config(), self.endpoint.name())
     }
 
     /// Opens or creates a service of slices of `T` with the header `H`.
@@ -201,14 +201,16 @@ impl Session {
                     has_cleaned_up = true;
                     self.node.blocking_cleanup_dead_nodes(CLEANUP_TIMEOUT);
                 }
-                Err(Cause::InTransition(_)) if access == Access::Open && self.is_abandoned() => {
+                Err(Cause::Stuck(_)) if access == Access::Open && self.is_abandoned() => {
                     return Err(self.service_error(spec, service, Cause::Missing));
                 }
-                Err(Cause::InTransition(_)) if attempt_count < ATTEMPTS_MAX => {
+                Err(cause @ (Cause::InTransition(_) | Cause::Stuck(_)))
+                    if attempt_count < ATTEMPTS_MAX =>
+                {
                     attempt_count += 1;
-                    if access == Access::Create {
-                        // Only the owner creates services, and the process that was removing this
-                        // one had all the time of an attempt, so it is dead.
+                    if access == Access::Create && matches!(cause, Cause::Stuck(_)) {
+                        // Only the owner creates services. A process that removes one has no use for
+                        // it any more, and had all the time of an attempt.
                         unfinished::remove_service(self.node.config(), spec, self.endpoint.name());
                     }
                     self.pause();
@@ -224,7 +226,9 @@ impl Session {
             Cause::Full => {
                 ServiceError::Full { service, ports: "processes", max: PARTICIPANTS_MAX }
             }
-            Cause::InTransition(detail) => ServiceError::InTransition { service, detail },
+            Cause::InTransition(detail) | Cause::Stuck(detail) => {
+                ServiceError::InTransition { service, detail }
+            }
             Cause::NoPermission => ServiceError::NoPermission { service },
             Cause::OtherIceoryx => ServiceError::OtherIceoryx { service },
             Cause::Incompatible(detail) => match self.existing_version(spec, &service) {

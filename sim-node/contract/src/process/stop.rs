@@ -1,5 +1,5 @@
 //! Handling of Ctrl-C, SIGTERM and SIGHUP. The first signal requests a clean end (ports dropped, files
-//! finished); a second signal exits at once.
+//! finished); a second one, unless it is SIGHUP, exits at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,9 +33,13 @@ impl Stop {
             signals.push(SIGHUP);
         }
         for signal in &signals {
-            // Handlers run in order of registration: this one reads the flag before the next sets it.
-            flag::register_conditional_shutdown(*signal, ABRUPT_EXIT, Arc::clone(&flag))
-                .and_then(|_| flag::register(*signal, Arc::clone(&flag)))?;
+            // A terminal that closes can send several SIGHUPs for one: the shell's and the kernel's.
+            if *signal != SIGHUP {
+                // Handlers run in order of registration: this one reads the flag before the next sets
+                // it.
+                flag::register_conditional_shutdown(*signal, ABRUPT_EXIT, Arc::clone(&flag))?;
+            }
+            flag::register(*signal, Arc::clone(&flag))?;
         }
         Ok(Self { flag, signals })
     }

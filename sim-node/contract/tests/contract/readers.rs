@@ -58,6 +58,24 @@ fn the_most_readers_holding_the_most_snapshots_leave_memory_for_the_owner() {
 }
 
 #[test]
+fn a_program_that_holds_all_but_one_of_its_snapshots_can_still_read_one() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert!(client.latest_snapshot(MOMENT).unwrap().is_none());
+    owner.refresh();
+    let mut held = Vec::new();
+    for step in 1..BORROWED_SAMPLES_MAX as u64 {
+        publish_step(&owner, step);
+        held.push(client.latest_snapshot(MOMENT).unwrap().unwrap());
+    }
+    for step in 10..13 {
+        publish_step(&owner, step);
+    }
+    assert_eq!(client.latest_snapshot(MOMENT).unwrap().unwrap().header().step, 10);
+}
+
+#[test]
 fn an_empty_scene_works() {
     let domain = TestDomain::new();
     let empty = Load {

@@ -11,7 +11,8 @@ use crate::ports::domain::root::RootError;
 
 /// Checks that the counter of a named domain is this user's own, or does not exist yet.
 ///
-/// The counter of iceoryx2's own domain is shared by all users, as iceoryx2 intends.
+/// The counter of iceoryx2's own domain stays open to all users: their other programs may share it under
+/// a root of their own.
 pub(crate) fn check(config: &Config) -> Result<(), RootError> {
     let user = rustix::process::geteuid().as_raw();
     for path in segments(config, &config.global.node.global_mgmt_suffix) {

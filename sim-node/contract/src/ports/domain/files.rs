@@ -25,6 +25,13 @@ pub(crate) fn segments(config: &Config, suffix: &FileName) -> impl Iterator<Item
     entries(Path::new(SHARED_MEMORY)).filter(is_segment).map(|entry| entry.path())
 }
 
+/// Returns the file of a kind in shared memory that belongs to a port or a service.
+pub(crate) fn segment(config: &Config, suffix: &FileName, id: u128) -> Option<PathBuf> {
+    let ending = format!("_{id}{suffix}");
+    segments(config, suffix)
+        .find(|path| path.as_os_str().as_encoded_bytes().ends_with(ending.as_bytes()))
+}
+
 /// Returns the entries of a directory; none if it cannot be read.
 pub(crate) fn entries(directory: &Path) -> impl Iterator<Item = DirEntry> {
     fs::read_dir(directory).into_iter().flatten().flatten()

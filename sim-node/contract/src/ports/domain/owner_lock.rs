@@ -26,22 +26,33 @@ pub(crate) struct OwnerLock {
 pub(crate) enum LockError {
     /// A living process holds it: the process with this id, if the file tells.
     Held(Option<u32>),
-    System(io::Error),
+    /// The system refused to open or lock a file.
+    System { path: PathBuf, error: io::Error },
 }
+
+/// Most attempts to lock a file that is removed between opening and locking.
+const ATTEMPTS_MAX: usize = 100;
 
 impl OwnerLock {
     /// Takes the lock of a name, without waiting. The root must exist.
     pub(crate) fn take(config: &Config, name: &str) -> Result<Self, LockError> {
-        let prefix = &config.global.prefix;
-        let user = rustix::process::geteuid().as_raw();
-        let root = LockFile::take(&root::path(config).join(format!("{prefix}{name}.owner")))?;
-        let path = Path::new(SHARED_MEMORY).join(format!("{prefix}{user}_{name}.owner"));
-        let shared_memory = match LockFile::take(&path) {
+        let [root, shared_memory] = paths(config, name);
+        let root = LockFile::take(&root)?;
+        let shared_memory = match LockFile::take(&shared_memory) {
             Ok(file) => Some(file),
             Err(error @ LockError::Held(_)) => return Err(error),
-            Err(LockError::System(_)) => None,
+            Err(LockError::System { .. }) => None,
         };
         Ok(Self { root, _shared_memory: shared_memory })
+    }
+
+    /// Returns `true` if a living process holds the lock of a name. Creates no file.
+    pub(crate) fn is_held(config: &Config, name: &str) -> bool {
+        let is_locked = |path| {
+            let file = File::open(path);
+            file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+        };
+        paths(config, name).iter().any(is_locked)
     }
 
     /// Path of the file in the root.
@@ -55,6 +66,16 @@ impl OwnerLock {
     }
 }
 
+/// Returns the paths of the files in the root and in shared memory.
+fn paths(config: &Config, name: &str) -> [PathBuf; 2] {
+    let prefix = &config.global.prefix;
+    let user = rustix::process::geteuid().as_raw();
+    [
+        root::path(config).join(format!("{prefix}{name}.owner")),
+        Path::new(SHARED_MEMORY).join(format!("{prefix}{user}_{name}.owner")),
+    ]
+}
+
 /// A locked file with the id of its process.
 #[derive(Debug)]
 struct LockFile {
@@ -64,20 +85,22 @@ struct LockFile {
 
 impl LockFile {
     fn take(path: &Path) -> Result<Self, LockError> {
-        loop {
-            let mut file = open(path).map_err(LockError::System)?;
+        let system = |error| LockError::System { path: path.to_owned(), error };
+        for _ in 0..ATTEMPTS_MAX {
+            let mut file = open(path).map_err(system)?;
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => return Err(LockError::Held(read_id(&mut file))),
-                Err(TryLockError::Error(error)) => return Err(LockError::System(error)),
+                Err(TryLockError::Error(error)) => return Err(system(error)),
             }
             let mut taken = Self { path: path.to_owned(), file };
             // The holder before may have removed the file between opening and locking.
             if taken.is_in_place() {
-                taken.write_id().map_err(LockError::System)?;
+                taken.write_id().map_err(system)?;
                 return Ok(taken);
             }
         }
+        Err(system(io::Error::other("the file is being replaced all the time")))
     }
 
     fn write_id(&mut self) -> io::Result<()> {
@@ -138,10 +161,13 @@ mod tests {
     fn a_name_has_one_holder_and_is_free_after_it() {
         let domain = TestDomain::new();
         let config = config(&domain);
+        assert!(!OwnerLock::is_held(&config, "sim"));
         let lock = OwnerLock::take(&config, "sim").unwrap();
+        assert!(OwnerLock::is_held(&config, "sim"));
         assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
         let _other_name = OwnerLock::take(&config, "other").unwrap();
         drop(lock);
+        assert!(!OwnerLock::is_held(&config, "sim"));
         OwnerLock::take(&config, "sim").unwrap();
     }
 

@@ -24,10 +24,10 @@ pub enum RootError {
         /// The root directory.
         path: PathBuf,
     },
-    /// Another user can replace its files.
+    /// The root directory, or the counter of nodes of the domain, belongs to another user.
     #[error("{path} belongs to user {owner}, not to you (user {user}): choose another --domain")]
     OtherOwner {
-        /// The root directory.
+        /// The root directory or the counter.
         path: PathBuf,
         /// Id of the user who owns it.
         owner: u32,

@@ -12,7 +12,7 @@ use iceoryx2::service::Service;
 use iceoryx2::service::service_hash::ServiceHash;
 
 use crate::clock::{self, Deadline};
-use crate::ports::domain::files::{entries, segments};
+use crate::ports::domain::files::{entries, segment, segments};
 use crate::ports::domain::root;
 use crate::ports::service::{SERVICES, ServiceSpec};
 
@@ -112,10 +112,7 @@ fn dynamic_segment(config: &Config, static_file: &Path) -> Option<PathBuf> {
         rest.lines().next()?.trim().parse().ok()
     };
     let id = number("unique_value = ")? << 64 | number("payload_value = ")?;
-    let suffix = &config.global.service.dynamic_config_storage_suffix;
-    let ending = format!("_{id}{suffix}");
-    segments(config, suffix)
-        .find(|path| path.as_os_str().as_encoded_bytes().ends_with(ending.as_bytes()))
+    segment(config, &config.global.service.dynamic_config_storage_suffix, id)
 }
 
 /// Removes what is left of nodes whose process was killed while it created or removed them. Call it
@@ -154,7 +151,8 @@ fn node_id(config: &Config, file_name: &str) -> Option<String> {
     let prefix = config.global.prefix.to_string();
     let name = file_name.strip_prefix(&prefix).unwrap_or(file_name);
     let id = name.split_once('.').map_or(name, |(id, _)| id);
-    id.bytes().all(|byte| byte.is_ascii_digit()).then(|| id.to_owned())
+    let is_id = !id.is_empty() && id.bytes().all(|byte| byte.is_ascii_digit());
+    is_id.then(|| id.to_owned())
 }
 
 /// Returns `true` if a node has its details, and iceoryx2 can tell whether its process lives.
@@ -292,15 +290,18 @@ mod tests {
         let living: Vec<_> = entries(&directory).map(|entry| entry.path()).collect();
         let half = directory.join("4294967297");
         fs::create_dir(&half).unwrap();
+        // A network file system renames a removed file that is still open to such a name.
+        let foreign = directory.join(".nfs0001");
+        File::create_new(&foreign).unwrap();
         remove_nodes(&config);
         assert!(half.exists());
         let old = std::time::SystemTime::UNIX_EPOCH;
-        for path in living.iter().chain([&half]) {
+        for path in living.iter().chain([&half, &foreign]) {
             // A file without the permission to write needs none for its times.
             File::open(path).unwrap().set_modified(old).unwrap();
         }
         remove_nodes(&config);
         assert!(!half.exists());
-        assert!(living.iter().all(|path| path.exists()));
+        assert!(living.iter().chain([&foreign]).all(|path| path.exists()));
     }
 }
