@@ -10,7 +10,7 @@ mod sandbox;
 mod streams;
 mod wait;
 
-pub use process::{Finished, Process, ctl};
+pub use process::{Finished, Process, allow_many_open_files, ctl};
 pub use programs::{Program, build_products};
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;

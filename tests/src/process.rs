@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
+use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit, setrlimit};
 use sim_contract::{DOMAIN_VARIABLE, console};
 
 use crate::programs::Program;
@@ -60,6 +60,16 @@ pub fn ctl(sandbox: &Sandbox, args: &[&str]) -> serde_json::Value {
     let answer = finished.json();
     assert_eq!(answer["status"] == "rejected", is_rejected, "{answer}");
     answer
+}
+
+/// Lets this process open as many files as the system allows, for tests with many sockets.
+///
+/// # Panics
+/// If the system refuses its own limit.
+pub fn allow_many_open_files() {
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit { current: limit.maximum, ..limit };
+    setrlimit(Resource::Nofile, raised).expect("the limit of the system");
 }
 
 impl Process {

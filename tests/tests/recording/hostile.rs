@@ -75,9 +75,8 @@ fn hostile_files(sandbox: &Sandbox) -> Vec<Hostile> {
         let longer = b"particle_count\x0a\0\0\x004294967295";
         bytes.splice(place..place + key.len(), longer.iter().copied());
         let start = position_of(&bytes, METADATA);
-        for (at, size) in [(start + 1, 8), (start + 9 + 4 + 3, 4)] {
-            bytes[at] += 9;
-            assert!(bytes[at] >= 9 && size > 0, "no carry");
+        for at in [start + 1, start + 9 + 4 + 3] {
+            bytes[at] = bytes[at].checked_add(9).unwrap();
         }
         bytes
     };

@@ -15,7 +15,7 @@ fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
 }
 
 /// Steps of the rows of `/steps` in the readable part of a file.
-fn recorded_steps(file: &str) -> Vec<u64> {
+pub(super) fn recorded_steps(file: &str) -> Vec<u64> {
     let Ok(mut log) = LogReader::open(Path::new(file)) else { return Vec::new() };
     let rows = std::iter::from_fn(|| log.next_message().ok().flatten());
     rows.filter_map(|row| match row.message {

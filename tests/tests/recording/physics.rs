@@ -3,8 +3,10 @@
 
 use std::path::Path;
 
-use integration_tests::{Process, Program, Sandbox};
+use integration_tests::{Process, Program, Sandbox, wait_for};
 use recorder::{Frame, FrameReader, LogReader, Message};
+
+use super::losses::recorded_steps;
 
 /// A cloth over a ball, always in motion.
 const SCENE: &str = r#"
@@ -92,10 +94,19 @@ fn a_late_recording_with_tears_a_reset_and_a_load_verifies_and_plays_back_row_fo
     let expected = [(10, vec![11, 20]), (reset_at + 1, vec![9]), (reset_at + 2, vec![4])];
     assert_eq!(tears(&one), expected);
 
-    // Slowly, because five lists of tears follow each other, and a late reader keeps the newest four.
-    let play = ["play", &first, "--wait-for-readers", "1", "--rate", "0.1"];
+    // Step by step, because five lists of tears follow each other, and a late reader keeps the newest
+    // four.
+    let play = ["play", &first, "--paused"];
     let player = Process::start_ready(Program::Recorder, &sandbox, &play);
     let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &second]);
+    let part = format!("{second}.part");
+    for frame in &one {
+        let step = frame.row.step;
+        wait_for("the step in the file", || recorded_steps(&part).contains(&step).then_some(()));
+        if Some(step) != one.last().map(|frame| frame.row.step) {
+            ctl(&sandbox, &["step"]);
+        }
+    }
     player.wait().success();
     recording.wait().success();
     let two = frames(&second);

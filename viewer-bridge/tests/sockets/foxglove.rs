@@ -20,7 +20,7 @@ use viewer_bridge::{
 };
 
 use crate::foxglove_client::{Binary, Client, connect};
-use crate::support::{state, wait_for};
+use crate::support::{allow_many_open_files, state, wait_for};
 
 /// A running Foxglove server. Dropping it ends the server.
 pub(crate) struct FoxgloveSite {
@@ -43,6 +43,7 @@ pub(crate) fn options() -> FoxgloveOptions {
 
 impl FoxgloveSite {
     pub(crate) fn start(options: FoxgloveOptions) -> Self {
+        allow_many_open_files();
         let runtime = Runtime::new().unwrap();
         let (sender, requests) = requests();
         let server = runtime.block_on(FoxgloveServer::start(options, sender)).unwrap();

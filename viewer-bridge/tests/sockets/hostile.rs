@@ -108,6 +108,8 @@ fn a_message_that_never_ends_counts_as_silence() {
     socket.frame(TEXT, b"{");
     // The server closes the connection, and not because of the number of frames.
     socket.write(&frame(CONTINUATION, b"").repeat(10_000));
+    let too_slow = 4408_u16.to_be_bytes();
+    assert!(socket.receives(&too_slow));
     socket.read_to_end();
     site.wait_for_clients(0);
 }

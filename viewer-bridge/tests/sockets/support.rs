@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use recorder::StepRow;
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use serde_json::Value;
 use sim_contract::ParticleState;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
@@ -37,12 +38,20 @@ pub(crate) struct Site {
     _runtime: Runtime,
 }
 
+/// Lets this process open as many files as the system allows: it has both ends of each connection.
+pub(crate) fn allow_many_open_files() {
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit { current: limit.maximum, ..limit };
+    setrlimit(Resource::Nofile, raised).unwrap();
+}
+
 impl Site {
     pub(crate) fn start() -> Self {
         Self::listen("127.0.0.1:0")
     }
 
     pub(crate) fn listen(address: &str) -> Self {
+        allow_many_open_files();
         let runtime = Runtime::new().unwrap();
         let options = ServerOptions {
             listen: address.parse().unwrap(),
