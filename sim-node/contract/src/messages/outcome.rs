@@ -7,7 +7,7 @@ use crate::messages::command::Command;
 use sim_types::Reason;
 
 /// Outcome of a command: 296 bytes, alignment 8. The owner of the name writes one for every command
-/// that it receives, in the order of application. Re-simulation follows that order.
+/// that it receives, and for every grab that ends with its connection, in the order of application. Re-simulation follows that order.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Outcome")]
@@ -16,7 +16,7 @@ pub struct Outcome {
     pub run_id: u64,
     /// Position in the run's log, from 0, without gaps.
     pub index: u64,
-    /// First step that shows the effect.
+    /// First step that shows the effect. A node that is asked to stop may give up this step.
     pub step: u64,
     /// An [`OutcomeStatus`] as a number.
     pub status: u32,
