@@ -3,5 +3,6 @@
 
 mod fairness;
 mod grabs;
+mod owner;
 mod stop;
 mod streams;

@@ -1,5 +1,4 @@
 //! The name of a node after kills, cleaners and other users.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;
