@@ -15,7 +15,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::{LogWriter, Message, PartFile, WriteError};
+use recorder::{Backlog, LogWriter, Message, PartFile, WriteError};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{Endpoint, SNAPSHOTS_BUFFERED, Stop, Tap, report_bus_errors};
 
@@ -216,6 +216,7 @@ impl Recording {
         log_time_ns: u64,
     ) -> anyhow::Result<()> {
         if let Some(mut header) = accepted.header {
+            self.queue.begin(Backlog::new(&header.run, header.scene.len()));
             for row in std::mem::take(&mut header.rows) {
                 self.queue.push(Item { content: Content::Update(row), log_time_ns });
             }
