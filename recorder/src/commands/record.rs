@@ -197,15 +197,22 @@ impl Recording {
             let state = self.tap.next_state(|message| messages.add(message));
             let Some(state) = state else { break };
             self.intake.accept_state(&state, Now::read(), &mut accepted)?;
+            self.count_unreadable();
             if accepted.end.is_some() {
                 break;
             }
         }
         self.intake.accept_messages(messages, Now::read(), &mut accepted);
         self.intake.set_lost(self.tap.lost_changes());
-        self.intake.count_unreadable(&self.tap.drain_errors());
+        self.count_unreadable();
         accepted.sort();
         Ok(accepted)
+    }
+
+    fn count_unreadable(&mut self) {
+        if let Some(warning) = self.intake.count_unreadable(&self.tap.drain_errors()) {
+            output::note(&warning);
+        }
     }
 
     /// Passes a batch to the writing thread.
