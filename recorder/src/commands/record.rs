@@ -283,7 +283,11 @@ impl Recording {
         closing.counts.set_written(log.counts());
         closing.counts.set_lost(&self.queue.lost());
         let kept = || format!("the recording is complete except for its end, in {part}");
-        let path = log.finish(&closing).with_context(kept)?.finish().with_context(kept)?;
+        let file = log.finish(&closing).with_context(kept)?;
+        let path = file.finish().map_err(|error| {
+            let is_complete = error.leaves_complete_file();
+            if is_complete { anyhow!(error) } else { anyhow!(error).context(kept()) }
+        })?;
         result?;
         let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
         Ok(Report::new(path, closing, steps))
