@@ -57,6 +57,11 @@ pub enum ReadError {
         /// The unfinished part.
         part: PathBuf,
     },
+    /// The file has no bytes.
+    #[error(
+        "is empty: a recorder that is killed before it has recorded a second leaves such a file"
+    )]
+    Empty,
     /// The file is not an MCAP file.
     #[error("is not an MCAP file")]
     NotMcap,
