@@ -1,5 +1,6 @@
 //! The recording format, from the bytes of a message to the state at any step.
 
+mod backlog;
 mod encoding;
 mod gaps;
 mod index;
@@ -13,6 +14,7 @@ mod tears;
 mod topic;
 mod writer;
 
+pub use backlog::Backlog;
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
 pub use gaps::GapCounter;
 pub use index::{ChunkEntry, IndexedLog};

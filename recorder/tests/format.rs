@@ -272,7 +272,8 @@ fn a_truncated_file_is_read_up_to_the_cut() {
                 assert!(*byte <= length as u64, "{byte} of {length}");
                 readable_counts.push(read.len());
             }
-            Err(ReadError::NotMcap) => assert!(length < 100, "{length}"),
+            Err(ReadError::Empty) => assert_eq!(length, 0),
+            Err(ReadError::NotMcap) => assert!((1..100).contains(&length), "{length}"),
             Err(ReadError::NoHeader(LogEnd::Truncated { .. })) => {
                 assert!(length < 1000, "{length}");
             }
@@ -337,7 +338,7 @@ fn a_flipped_bit_in_a_chunk_is_a_checksum_error() {
 
 #[test]
 fn files_that_are_not_recordings_are_named() {
-    for not_mcap in [&b""[..], b"x", b"particles = 3\nand so on and so on and so on"] {
+    for not_mcap in [&b"x"[..], b"particles = 3\nand so on and so on and so on"] {
         let error = LogReader::new(not_mcap).unwrap_err();
         assert_eq!(error.to_string(), "is not an MCAP file");
     }

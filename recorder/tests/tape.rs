@@ -299,7 +299,11 @@ fn a_file_without_a_state_reports_the_reason() {
     let open = |name: &str, bytes: &[u8]| {
         TestFile::new(name, bytes).open().err().map(|error| error.to_string()).unwrap()
     };
-    assert_eq!(open("empty", &[]), "is not an MCAP file");
+    assert_eq!(
+        open("empty", &[]),
+        "is empty: a recorder that is killed before it has recorded a second leaves such a file"
+    );
+    assert_eq!(open("short", &[0x89]), "is not an MCAP file");
     assert_eq!(open("other", b"version = 1\n[solver]\nrate_hz = 60\n"), "is not an MCAP file");
     let head = open("head", &bytes[..bytes.len() / 100]);
     assert!(head.contains("head") || head.contains("/topology"), "{head}");

@@ -23,8 +23,6 @@ pub(crate) use lesson::LessonArgs;
 pub(crate) use run::RunArgs;
 pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 
-use crate::output;
-
 /// Simulate particles and constraints at a fixed rate, for any process on this host.
 ///
 /// The node publishes every state in shared memory, where other processes read it without copying,
@@ -83,15 +81,10 @@ pub(crate) fn parse() -> Args {
                 console::note_lines(text.trim_end());
                 Ok(())
             }
-            None => console::accept_closed_pipe(error.print()),
+            None => error.print(),
         };
-        std::process::exit(match printed {
-            Err(problem) if !error.use_stderr() => {
-                output::note(&format!("error: cannot write to stdout: {problem}"));
-                1
-            }
-            _ => error.exit_code(),
-        })
+        let (is_error, code) = (error.use_stderr(), error.exit_code());
+        std::process::exit(console::usage_exit_code(printed, is_error, code))
     })
 }
 

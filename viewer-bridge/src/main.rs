@@ -26,28 +26,25 @@ use viewer_bridge::{
 
 use args::Args;
 
-/// Exit code of an error in the command line.
-const EXIT_USAGE: u8 = 2;
-
 /// Threads of the servers. They only send; the thread of the source encodes.
 const SERVER_THREADS: usize = 2;
 
 fn main() -> ExitCode {
-    let result = match args::parse(std::env::args_os()) {
-        Ok(args) => run(&args),
-        Err(error) => match console::accept_closed_pipe(error.print()) {
-            Err(problem) if !error.use_stderr() => Err(problem).context("cannot write to stdout"),
-            _ if error.use_stderr() => return ExitCode::from(EXIT_USAGE),
-            _ => Ok(()),
-        },
-    };
-    match result {
+    let args = args::parse(std::env::args_os()).unwrap_or_else(|error| exit_with_usage(&error));
+    match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             note(&format!("error: {error:#}"));
             ExitCode::FAILURE
         }
     }
+}
+
+/// Ends the program as clap does.
+#[allow(clippy::exit, reason = "clap ends the program in the same way")]
+fn exit_with_usage(error: &clap::Error) -> ! {
+    let (printed, code) = (error.print(), error.exit_code());
+    std::process::exit(console::usage_exit_code(printed, error.use_stderr(), code))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {

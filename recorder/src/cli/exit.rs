@@ -37,12 +37,6 @@ pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
 /// text, or with 1 if that cannot be written.
 #[allow(clippy::exit, reason = "clap ends the program in the same way")]
 pub(crate) fn with_usage(error: &clap::Error) -> ! {
-    let code = match console::accept_closed_pipe(error.print()) {
-        Err(problem) if !error.use_stderr() => {
-            console::note(&format!("error: cannot write to stdout: {problem}"));
-            1
-        }
-        _ => error.exit_code(),
-    };
-    std::process::exit(code)
+    let (printed, code) = (error.print(), error.exit_code());
+    std::process::exit(console::usage_exit_code(printed, error.use_stderr(), code))
 }

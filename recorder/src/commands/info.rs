@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use recorder::{AllCounts, Closing, GapCounter, LogEnd, LogReader, Message, RunDescription, Topic};
+use recorder::{Closing, GapCounter, LogEnd, LogReader, Message, RunDescription, Topic};
 use serde::Serialize;
 use sim_contract::printable_line;
 
@@ -54,6 +54,9 @@ pub(crate) struct Info {
     /// Messages that the recorder lost or that never reached it, for topics with such messages, and
     /// "unreadable" ones. In a file without an end, only those that are missing between recorded ones.
     lost: BTreeMap<&'static str, u64>,
+    /// Topics with an unknown number of missing messages: those of the snapshots in a file without an end,
+    /// of a format that does not number them.
+    lost_unknown: Vec<&'static str>,
     /// Reason why the recorder stopped. Absent if it was killed.
     stop_reason: Option<String>,
 }
@@ -91,7 +94,7 @@ pub(crate) fn inspect<R: Read>(
     if let (Some(first), Some(last)) = (info.first_step, info.last_step) {
         info.duration_s = last.saturating_sub(first) as f64 / f64::from(info.rate_hz);
     }
-    info.count_lost(log.closing(), &gaps.counts());
+    info.count_lost(log.closing(), &gaps);
     Ok((info, end))
 }
 
@@ -116,12 +119,17 @@ impl Info {
             duration_s: 0.0,
             messages: decoded.map(|topic| (topic.name(), 0)).collect(),
             lost: BTreeMap::new(),
+            lost_unknown: Vec::new(),
             stop_reason: None,
         }
     }
 
     /// Sets the losses: those that the end of the file states, or more if the file shows more.
-    fn count_lost(&mut self, closing: Option<&Closing>, shown: &AllCounts) {
+    fn count_lost(&mut self, closing: Option<&Closing>, gaps: &GapCounter) {
+        if closing.is_none() && gaps.has_unnumbered_snapshots() {
+            self.lost_unknown = [Topic::Steps, Topic::Particles].map(Topic::name).to_vec();
+        }
+        let shown = gaps.counts();
         self.stop_reason = closing.map(|closing| closing.stop_reason.clone());
         self.lost = closing.map(Closing::missing).unwrap_or_default();
         for (topic, shown) in shown.iter().filter(|(_, shown)| shown.gaps > 0) {
@@ -167,7 +175,10 @@ impl fmt::Display for Info {
         }
         writeln!(f, "messages    {}", none_if_empty(join(&self.messages)))?;
         let scope = if self.stop_reason.is_none() { ", as far as the file goes" } else { "" };
-        writeln!(f, "lost        {}{scope}", none_if_empty(join(&self.lost)))?;
+        let unknown = self.lost_unknown.iter().map(|topic| format!("{topic} unknown"));
+        let known = Some(join(&self.lost)).filter(|known| !known.is_empty());
+        let lost = unknown.chain(known).collect::<Vec<_>>().join(", ");
+        writeln!(f, "lost        {}{scope}", none_if_empty(lost))?;
         let reason = self.stop_reason.as_deref().unwrap_or("unknown");
         write!(f, "stopped     {}", printable_line(reason))
     }
@@ -177,4 +188,59 @@ impl fmt::Display for Info {
 fn counted(count: u32, noun: &str) -> String {
     let ending = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{ending}")
+}
+
+#[cfg(test)]
+mod tests {
+    use recorder::{LogOptions, LogWriter, StepRow};
+
+    use super::*;
+
+    /// Returns the report on a file with two snapshots.
+    fn report(indices: [Option<u32>; 2], closing: Option<&Closing>) -> (Info, String) {
+        let run = RunDescription {
+            run_id: 7,
+            epoch_ns: 0,
+            scene_name: "points".to_owned(),
+            origin: [0.0; 3],
+            rate_hz: 240,
+            method: 0,
+            particle_count: 0,
+            constraint_count: 0,
+            solver_version: 1,
+            contract_version: 1,
+            recorder_version: "0".to_owned(),
+        };
+        let mut bytes = Vec::new();
+        let mut log =
+            LogWriter::create(&mut bytes, LogOptions::default(), &run, b"version = 1", 0).unwrap();
+        for (step, snapshot_index) in (0..).zip(indices) {
+            let row = StepRow { step, snapshot_index, ..StepRow::default() };
+            log.write(&Message::Step(row), 0).unwrap();
+        }
+        log.flush().unwrap();
+        if let Some(closing) = closing {
+            log.finish(closing).unwrap();
+        } else {
+            drop(log);
+        }
+        let mut log = LogReader::new(bytes.as_slice()).unwrap();
+        let (info, _) = inspect(&mut log, "run.mcap".to_owned(), 0).unwrap();
+        let text = info.to_string();
+        let lost = text.lines().find(|line| line.starts_with("lost")).unwrap().to_owned();
+        (info, lost)
+    }
+
+    #[test]
+    fn the_losses_of_a_file_without_an_end_are_unknown_if_its_snapshots_have_no_numbers() {
+        let (info, lost) = report([None, None], None);
+        assert_eq!(info.lost_unknown, ["/steps", "/particles"]);
+        assert_eq!(lost, "lost        /steps unknown, /particles unknown, as far as the file goes");
+        let (_, lost) = report([Some(4), Some(5)], None);
+        assert_eq!(lost, "lost        none, as far as the file goes");
+        let (_, lost) = report([Some(4), Some(6)], None);
+        assert_eq!(lost, "lost        /particles 1, /steps 1, as far as the file goes");
+        let (_, lost) = report([None, None], Some(&Closing::default()));
+        assert_eq!(lost, "lost        none");
+    }
 }

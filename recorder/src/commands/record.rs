@@ -15,7 +15,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::{LogWriter, Message, PartFile, WriteError};
+use recorder::{Backlog, LogWriter, Message, PartFile, WriteError};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{Endpoint, SNAPSHOTS_BUFFERED, Stop, Tap, report_bus_errors};
 
@@ -197,15 +197,22 @@ impl Recording {
             let state = self.tap.next_state(|message| messages.add(message));
             let Some(state) = state else { break };
             self.intake.accept_state(&state, Now::read(), &mut accepted)?;
+            self.count_unreadable();
             if accepted.end.is_some() {
                 break;
             }
         }
         self.intake.accept_messages(messages, Now::read(), &mut accepted);
         self.intake.set_lost(self.tap.lost_changes());
-        self.intake.count_unreadable(&self.tap.drain_errors());
+        self.count_unreadable();
         accepted.sort();
         Ok(accepted)
+    }
+
+    fn count_unreadable(&mut self) {
+        if let Some(warning) = self.intake.count_unreadable(&self.tap.drain_errors()) {
+            output::note(&warning);
+        }
     }
 
     /// Passes a batch to the writing thread.
@@ -216,6 +223,7 @@ impl Recording {
         log_time_ns: u64,
     ) -> anyhow::Result<()> {
         if let Some(mut header) = accepted.header {
+            self.queue.begin(Backlog::new(&header.run, header.scene.len()));
             for row in std::mem::take(&mut header.rows) {
                 self.queue.push(Item { content: Content::Update(row), log_time_ns });
             }
@@ -275,7 +283,11 @@ impl Recording {
         closing.counts.set_written(log.counts());
         closing.counts.set_lost(&self.queue.lost());
         let kept = || format!("the recording is complete except for its end, in {part}");
-        let path = log.finish(&closing).with_context(kept)?.finish().with_context(kept)?;
+        let file = log.finish(&closing).with_context(kept)?;
+        let path = file.finish().map_err(|error| {
+            let is_complete = error.leaves_complete_file();
+            if is_complete { anyhow!(error) } else { anyhow!(error).context(kept()) }
+        })?;
         result?;
         let steps = self.intake.first_step().unwrap_or(0)..=self.last_step;
         Ok(Report::new(path, closing, steps))

@@ -11,6 +11,7 @@ use super::topic::{AllCounts, Topic};
 #[derive(Debug, Default)]
 pub struct GapCounter {
     next_snapshot: Option<u32>,
+    has_unnumbered_snapshots: bool,
     /// `None` before the first snapshot, which contains all earlier outcomes.
     next_outcome: Option<u64>,
     /// Outcomes that the newest snapshot contains.
@@ -25,8 +26,9 @@ impl GapCounter {
             Message::Step(row) => {
                 self.next_outcome.get_or_insert(row.outcome_count);
                 self.outcome_count = row.outcome_count;
-                if let Some(index) = row.snapshot_index {
-                    self.add_snapshot(index);
+                match row.snapshot_index {
+                    Some(index) => self.add_snapshot(index),
+                    None => self.has_unnumbered_snapshots = true,
                 }
             }
             Message::Outcome(row) => {
@@ -45,6 +47,11 @@ impl GapCounter {
             self.counts[topic].gaps += u64::from(missing);
         }
         self.next_snapshot = Some(index.wrapping_add(1));
+    }
+
+    /// Returns `true` if the file has snapshots without numbers, between which others may be missing.
+    pub fn has_unnumbered_snapshots(&self) -> bool {
+        self.has_unnumbered_snapshots
     }
 
     /// Returns the numbers of missing messages so far, as `gaps`. The other counts are 0.
@@ -108,5 +115,10 @@ mod tests {
     fn a_file_without_numbers_has_no_known_gaps() {
         let rows = [0, 9].map(|step| Message::Step(StepRow { step, ..StepRow::default() }));
         assert_eq!(missing(&rows), Missing { snapshots: 0, outcomes: 0 });
+        let mut counter = GapCounter::default();
+        counter.add(&snapshot(7, 3));
+        assert!(!counter.has_unnumbered_snapshots());
+        counter.add(&rows[0]);
+        assert!(counter.has_unnumbered_snapshots());
     }
 }

@@ -1,7 +1,6 @@
 //! Reading a recording from its start: records, messages and snapshots.
 
 pub(super) mod audit;
-mod backlog;
 mod chunk_data;
 pub(super) mod decode;
 mod fault;

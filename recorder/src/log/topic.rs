@@ -135,9 +135,4 @@ impl AllCounts {
             counts.lost = other.lost;
         }
     }
-
-    /// Returns the number of messages that should be in the file and are not, over all topics.
-    pub fn missing(&self) -> u64 {
-        self.0.iter().map(|counts| counts.lost + counts.gaps).sum()
-    }
 }

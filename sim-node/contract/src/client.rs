@@ -246,16 +246,20 @@ impl Client {
     ///
     /// # Errors
     /// Same as [`Client::send`], or no outcome arrived within `timeout`. Then the effect of the command
-    /// is unknown, and the error states whether the owner is alive.
+    /// is unknown, and the error states whether the owner is alive, or that outcomes were missed.
     pub fn request(&mut self, action: Action, timeout: Duration) -> Result<Outcome, RequestError> {
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         let sequence = commander.send(&self.attachment, action)?;
+        let missed_before = commander.missed_count();
         let poll = || commander.outcome_for(sequence);
         if let Some(outcome) = self.watch.wait_for(&self.attachment, timeout, poll)? {
             return Ok(outcome);
         }
         commander.forget(sequence);
-        Err(RequestError::timeout(&self.attachment, sequence, timeout))
+        Err(match commander.missed_count() - missed_before {
+            0 => RequestError::timeout(&self.attachment, sequence, timeout),
+            missed_count => RequestError::OutcomesMissed { sequence, timeout, missed_count },
+        })
     }
 
     /// Returns the next outcome of this client's commands, in the order of application. Outcomes that

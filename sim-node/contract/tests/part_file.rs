@@ -126,7 +126,15 @@ fn a_file_that_appears_in_the_meantime_is_not_replaced() {
     let path = directory.file("a.mcap");
     let file = write(&path, Existing::Refuse, "new").unwrap();
     fs::write(&path, "other").unwrap();
-    assert!(matches!(file.finish(), Err(PartFileError::Exists(_))));
+    let error = file.finish().unwrap_err();
+    assert!(error.leaves_complete_file());
+    assert_eq!(
+        error.to_string(),
+        format!(
+            "{path} exists (use --overwrite to replace it); the complete file is {path}.part",
+            path = path.display()
+        )
+    );
     assert_eq!(fs::read_to_string(&path).unwrap(), "other");
     assert_eq!(fs::read_to_string(directory.file("a.mcap.part")).unwrap(), "new");
 }

@@ -36,6 +36,24 @@ fn a_second_writer_of_a_file_is_refused_and_the_first_one_finishes() {
     assert!(verified.contains("40 steps bit-identical"), "{verified}");
 }
 
+#[test]
+fn a_recording_whose_name_is_taken_meanwhile_is_complete_under_its_unfinished_name() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope", "--paused"]);
+    let file = sandbox.path("run.mcap");
+    let args = ["record", "-o", &file, "--steps", "5"];
+    let recording = Process::start_ready(Program::Recorder, &sandbox, &args);
+    std::fs::write(&file, "other").unwrap();
+    ctl(&sandbox, &["step", "20"]);
+    let finished = recording.wait();
+    let complete = format!("; the complete file is {file}.part\n");
+    assert_eq!(finished.code, Some(1), "{finished:?}");
+    assert!(finished.stderr.ends_with(&complete), "{finished:?}");
+    assert!(!finished.stderr.contains("except for its end"), "{finished:?}");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "other");
+    recorder(&sandbox, &["info", &format!("{file}.part")]).success();
+}
+
 /// Asserts that a program failed at the limit, and left the readable part of its recording.
 fn assert_ended_at_the_limit(finished: &Finished, file: &str) {
     assert_eq!(finished.code, Some(1), "{}", finished.stderr);

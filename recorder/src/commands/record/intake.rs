@@ -9,7 +9,6 @@ use super::accepted::Accepted;
 use super::first_state::FirstState;
 use super::load::{Load, LoadError, Now};
 use super::messages::Messages;
-use crate::cli::output;
 use started::Started;
 
 /// Most outcomes to keep before the first state. Beyond it the oldest are dropped.
@@ -28,8 +27,12 @@ pub(crate) struct Intake {
     outcomes: Vec<Outcome>,
     started: Option<Started>,
     lost: LostChanges,
-    /// Messages that arrived but could not be read.
+    /// Messages after the first state or the candidate that arrived but could not be read.
     unreadable: u64,
+    /// The candidate or first state is new, and the errors of the messages before it have not been added.
+    follows_errors: bool,
+    /// An error was reported, and the recording had started then.
+    reported: Option<bool>,
 }
 
 impl Intake {
@@ -65,6 +68,7 @@ impl Intake {
             outcome.run_id != state.header.run_id || outcome.index >= state.header.outcome_count
         });
         self.candidate = FirstState::new(state);
+        (self.unreadable, self.follows_errors) = (0, true);
         self.start_if_ready(now, accepted);
         Ok(())
     }
@@ -105,15 +109,20 @@ impl Intake {
         self.started = Some(started);
     }
 
-    /// Counts messages that could not be read, and reports the first one. Those before the start are
-    /// not missing in the recording.
-    pub(crate) fn count_unreadable(&mut self, errors: &[ReadError]) {
-        if let (Some(error), 0) = (errors.first(), self.unreadable) {
-            output::note(&format!("warning: a message was not recorded: {error}"));
-        }
-        if self.started.is_some() {
+    /// Counts messages that could not be read since the last call. Those that a tap read with the first
+    /// state, or earlier, are not missing in the recording. Returns a warning for the first error
+    /// before the start, and for the first one after it.
+    #[must_use]
+    pub(crate) fn count_unreadable(&mut self, errors: &[ReadError]) -> Option<String> {
+        let is_missing = !std::mem::take(&mut self.follows_errors);
+        if is_missing && (self.candidate.is_some() || self.started.is_some()) {
             self.unreadable += errors.len() as u64;
         }
+        let error = errors.first()?;
+        let phase = self.started.is_some() && is_missing;
+        let is_first = self.reported.replace(phase) != Some(phase);
+        let effect = if phase { "was not recorded" } else { "before the start could not be read" };
+        is_first.then(|| format!("warning: a message {effect}: {error}"))
     }
 
     /// Returns the first recorded step, once the recording has started.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use recorder::{AllCounts, Message, StepRow, Topic};
+use recorder::{AllCounts, Backlog, Message, StepRow, Topic};
 use sim_contract::ParticleState;
 
 /// One or two messages to write.
@@ -27,7 +27,8 @@ pub(crate) struct Item {
 ///
 /// The limit applies to snapshots. Other messages are small, and later steps build on them, so their
 /// limit is twice as high. The load, without which a file is useless, and an item that finds the
-/// queue empty are always accepted.
+/// queue empty are always accepted. Beyond that, a reader must be able to collect the messages between
+/// two snapshots: the queue drops those for which the [`Backlog`] has no room.
 #[derive(Debug)]
 pub(crate) struct Queue {
     state: Mutex<State>,
@@ -39,6 +40,8 @@ pub(crate) struct Queue {
 struct State {
     items: VecDeque<Item>,
     size_bytes: usize,
+    /// The accepted messages without a snapshot; `None` before the start.
+    backlog: Option<Backlog>,
     lost: AllCounts,
     is_closed: bool,
 }
@@ -59,6 +62,11 @@ impl Queue {
         Self { state: Mutex::default(), changed: Condvar::new(), limit_bytes }
     }
 
+    /// Begins a recording, before its first item.
+    pub(crate) fn begin(&self, backlog: Backlog) {
+        self.lock().backlog = Some(backlog);
+    }
+
     /// Adds an item, or counts it as lost.
     pub(crate) fn push(&self, item: Item) {
         let size_bytes = item.content.size_bytes();
@@ -68,14 +76,16 @@ impl Queue {
             Content::Snapshot(..) => (self.limit_bytes, &[Topic::Steps, Topic::Particles][..]),
         };
         let is_load = [Topic::Topology, Topic::Surface].contains(&topics[0]);
-        let fits = state.size_bytes + size_bytes <= limit_bytes;
-        if state.is_closed || !(fits || is_load || state.items.is_empty()) {
+        let fits = state.size_bytes + size_bytes <= limit_bytes || state.items.is_empty();
+        let is_accepted = is_load || fits && state.can_be_read_with(&item.content);
+        if state.is_closed || !is_accepted {
             for topic in topics {
                 state.lost[*topic].lost += 1;
             }
             return;
         }
         state.size_bytes += size_bytes;
+        state.add_to_backlog(&item.content);
         state.items.push_back(item);
         drop(state);
         self.changed.notify_one();
@@ -115,6 +125,27 @@ impl Queue {
     /// Locks the state. A panic of the other thread cannot leave it inconsistent.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    /// Returns `true` if the file can be read with this content.
+    fn can_be_read_with(&self, content: &Content) -> bool {
+        match (content, &self.backlog) {
+            (Content::Update(message), Some(backlog)) => backlog.has_room_for(message),
+            _ => true,
+        }
+    }
+
+    fn add_to_backlog(&mut self, content: &Content) {
+        let Some(backlog) = &mut self.backlog else { return };
+        match content {
+            Content::Update(message) => {
+                // A load always fits: the limit includes it.
+                let _fits = backlog.add(message);
+            }
+            Content::Snapshot(row, _) => backlog.remove_to(row.step),
+        }
     }
 }
 

@@ -3,9 +3,10 @@
 use std::sync::{Condvar, Mutex};
 
 use recorder::{
-    Closing, Compression, GapCounter, LogEnd, LogOptions, LogReader, RunDescription, StepRow, Topic,
+    AllCounts, Closing, Compression, FrameReader, GapCounter, LogEnd, LogOptions, LogReader,
+    OutcomeRow, RunDescription, StepRow, Topic,
 };
-use sim_contract::ParticleState;
+use sim_contract::{Action, Command, Outcome, ParticleState};
 
 use super::*;
 
@@ -13,6 +14,7 @@ const SEEDS: u64 = 20;
 const MESSAGES: u64 = 400;
 /// Room for a few of the snapshots below.
 const QUEUE_BYTES: usize = 100_000;
+const SCENE: &[u8] = b"version = 1";
 
 /// A deterministic pseudo-random generator (Marsaglia's xorshift64).
 struct Random(u64);
@@ -83,14 +85,20 @@ fn keyframe(index: u32) -> Content {
     Content::Update(Message::Keyframe { step: index.into(), bytes: vec![0; 20_000] })
 }
 
+fn begun_queue(limit_bytes: usize) -> Queue {
+    let queue = Queue::new(limit_bytes);
+    queue.begin(Backlog::new(&description(), SCENE.len()));
+    queue
+}
+
 /// Receives snapshots and keyframes while the disk stalls at times. Returns the finished file, and the
 /// numbers of received messages.
 fn record(seed: u64) -> (Vec<u8>, Closing) {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-    let (disk, queue) = (Arc::new(Disk::default()), Queue::new(QUEUE_BYTES));
+    let (disk, queue) = (Arc::new(Disk::default()), begun_queue(QUEUE_BYTES));
     let file = StallingFile { disk: Arc::clone(&disk), bytes: Vec::new() };
     let options = LogOptions { compression: Compression::None, chunk_size_bytes: 1 };
-    let log = LogWriter::create(file, options, &description(), b"version = 1", 0).unwrap();
+    let log = LogWriter::create(file, options, &description(), SCENE, 0).unwrap();
     let mut closing = Closing::default();
     let log = thread::scope(|scope| {
         let writing = scope.spawn(|| write(&queue, log));
@@ -137,6 +145,46 @@ fn what_is_recorded_and_what_is_declared_lost_add_up_to_what_was_received() {
         let (shown, lost) = (gaps.counts()[Topic::Steps].gaps, closing.counts[Topic::Steps].lost);
         assert!(shown <= lost, "seed {seed}: {shown} gaps of {lost} lost snapshots");
         lost_in_all += lost;
+        assert_eq!(count_in_frames(&bytes), written_count(&closing.counts));
     }
     assert!(lost_in_all > 0, "no stall was long enough");
+}
+
+fn written_count(counts: &AllCounts) -> u64 {
+    counts.iter().map(|(_, counts)| counts.written).sum()
+}
+
+/// Returns the number of messages that a reader of snapshots finds in a file.
+fn count_in_frames(bytes: &[u8]) -> u64 {
+    let mut frames = FrameReader::new(LogReader::new(bytes).unwrap());
+    let mut count = 0;
+    while let Some(frame) = frames.next_frame().unwrap() {
+        count += frame.updates.len() + 2;
+    }
+    (count + frames.trailing_updates().len()) as u64
+}
+
+#[test]
+fn messages_of_a_stall_without_a_snapshot_can_be_read_and_outcomes_are_kept() {
+    const KEYFRAMES: u64 = 6000;
+    let queue = begun_queue(256 << 20);
+    let push = |content| queue.push(Item { content, log_time_ns: 0 });
+    push(snapshot(0));
+    for step in 1..=KEYFRAMES {
+        push(Content::Update(Message::Keyframe { step, bytes: vec![0; 1 << 16] }));
+        let outcome = Outcome::new(step - 1, step, Command::new(1, step, Action::Reset), Ok(()));
+        push(Content::Update(Message::Outcome(OutcomeRow::from(&outcome))));
+    }
+    push(snapshot(7000));
+    queue.close();
+    let options = LogOptions::default();
+    let log = LogWriter::create(Vec::new(), options, &description(), SCENE, 0).unwrap();
+    let log = write(&queue, log).unwrap();
+    let (written, lost) = (*log.counts(), queue.lost());
+    let bytes = log.finish(&Closing::default()).unwrap();
+    let sum = |topic| written[topic].written + lost[topic].lost;
+    assert!(lost[Topic::Keyframe].lost > 0);
+    assert_eq!((sum(Topic::Keyframe), written[Topic::Outcomes].written), (KEYFRAMES, KEYFRAMES));
+    assert_eq!(lost[Topic::Steps].lost, 0);
+    assert_eq!(count_in_frames(&bytes), written_count(&written));
 }

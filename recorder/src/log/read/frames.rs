@@ -4,10 +4,10 @@ use std::io::Read;
 
 use sim_contract::ParticleState;
 
-use super::backlog::Backlog;
 use super::decode::LoggedMessage;
 use super::read_error::{LogEnd, ReadError};
 use super::reader::LogReader;
+use crate::log::backlog::Backlog;
 use crate::log::message::Message;
 use crate::log::rows::StepRow;
 
@@ -44,7 +44,8 @@ pub struct FrameReader<R> {
 impl<R: Read> FrameReader<R> {
     /// Continues from the current position of `log`.
     pub fn new(log: LogReader<R>) -> Self {
-        Self { log, updates: Vec::new(), backlog: Backlog::default(), row: None }
+        let backlog = Backlog::new(log.run(), log.scene().len());
+        Self { log, updates: Vec::new(), backlog, row: None }
     }
 
     /// Returns the recording.
@@ -61,7 +62,7 @@ impl<R: Read> FrameReader<R> {
     ///
     /// # Errors
     /// Like [`LogReader::next_message`], and if a snapshot has no row in `/steps` or the messages
-    /// before it need more memory than a recording of its scene can.
+    /// before it need more memory than a [`Backlog`] may.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, ReadError> {
         while let Some(LoggedMessage { message, .. }) = self.log.next_message()? {
             match message {
@@ -80,9 +81,8 @@ impl<R: Read> FrameReader<R> {
     }
 
     fn add_update(&mut self, update: Message) -> Result<(), ReadError> {
-        let size_bytes_max = self.log.limits().decoded_size_bytes_max();
-        if self.backlog.add(&update) > size_bytes_max {
-            let byte = self.log.intact_count();
+        if !self.backlog.add(&update) {
+            let (byte, size_bytes_max) = (self.log.intact_count(), self.backlog.size_bytes_max());
             return Err(ReadError::TooManyMessages { byte, size_bytes_max });
         }
         self.updates.push(update);

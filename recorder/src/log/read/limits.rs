@@ -20,9 +20,11 @@ const MESSAGE_HEADER_SIZE_BYTES: u64 = 2 + 4 + 8 + 8;
 /// Uncompressed size of a chunk beside its largest message. A recorder closes a chunk at 1 MiB, and
 /// other tools rewrite files with chunks of 4 MiB.
 const CHUNK_SIZE_BYTES: u64 = 4 << 20;
-/// Memory for decoded messages beside the size of the scene: minutes between two snapshots with a dozen
-/// moving colliders, or seconds with a thousand.
+/// Memory for the decoded messages of a chunk beside the size of the scene: many times the chunk.
 const DECODED_SIZE_BYTES: u64 = 64 << 20;
+/// Memory for the decoded messages between two snapshots beside the size of the scene: 3000 steps of a
+/// thousand moving colliders, for nodes that publish few snapshots.
+const BACKLOG_SIZE_BYTES: u64 = 256 << 20;
 
 /// Returns the most bytes by which data that does not compress grows: the headers of its blocks.
 pub(in crate::log) fn compression_growth(size_bytes: u64) -> u64 {
@@ -93,12 +95,21 @@ impl SizeLimits {
         size_bytes + compression_growth(size_bytes) + TEXT_SIZE_BYTES_MAX
     }
 
-    /// Returns the most memory for decoded messages that wait: those of a chunk, and those between two
-    /// snapshots.
+    /// Returns the most memory for the decoded messages of a chunk.
     pub(in crate::log) fn decoded_size_bytes_max(&self) -> usize {
+        self.with_loads(DECODED_SIZE_BYTES)
+    }
+
+    /// Returns the most memory for the decoded messages between two snapshots.
+    pub(in crate::log) fn backlog_size_bytes_max(&self) -> usize {
+        self.with_loads(BACKLOG_SIZE_BYTES)
+    }
+
+    /// Adds the memory of a few loads with their states.
+    fn with_loads(&self, size_bytes: u64) -> usize {
         let load = [Topic::Topology, Topic::Surface, Topic::Keyframe, Topic::Particles];
         let load: u64 = load.into_iter().map(|topic| self.message_size_bytes_max(topic)).sum();
-        usize::try_from(DECODED_SIZE_BYTES + 4 * load).unwrap_or(usize::MAX)
+        usize::try_from(size_bytes + 4 * load).unwrap_or(usize::MAX)
     }
 }
 
@@ -169,6 +180,7 @@ mod tests {
         let small = limits(2, 1, 1000);
         assert!(small.chunk_record_size_bytes_max() < 8 << 20);
         assert!(small.decoded_size_bytes_max() < 128 << 20);
+        assert!(small.backlog_size_bytes_max() < 320 << 20);
         let most_text = COLLIDERS_MAX as u64 * 32;
         assert!(limits(2, 1, most_text).message_size_bytes_max(Topic::Colliders) < 64 << 20);
     }

@@ -57,6 +57,11 @@ pub enum ReadError {
         /// The unfinished part.
         part: PathBuf,
     },
+    /// The file has no bytes.
+    #[error(
+        "is empty: a recorder that is killed before it has recorded a second leaves such a file"
+    )]
+    Empty,
     /// The file is not an MCAP file.
     #[error("is not an MCAP file")]
     NotMcap,
@@ -107,10 +112,11 @@ pub enum ReadError {
         /// The error in the chunk.
         cause: String,
     },
-    /// More messages without a snapshot than any recorder writes.
+    /// More messages without a snapshot than a reader keeps, and than this recorder writes.
     #[error(
-        "the messages before byte {byte} that belong to no snapshot yet take more than \
-         {size_bytes_max} bytes of memory; no recorder writes such a file"
+        "the messages before byte {byte} that belong to no snapshot yet take more than the \
+         {size_bytes_max} bytes of memory that they may; `recorder info` and `viewer-bridge --replay`, \
+         which do not collect them, can read the file"
     )]
     TooManyMessages {
         /// Position in the file.

@@ -119,6 +119,7 @@ impl<R: Read> LogReader<R> {
                             ReadError::Foreign { library: header.library }
                         }
                         Some(end) if records.is_mcap => ReadError::NoHeader(end),
+                        Some(_) if records.is_empty() => ReadError::Empty,
                         Some(_) => ReadError::NotMcap,
                     });
                 }

@@ -78,6 +78,11 @@ impl<R: Read> RecordReader<R> {
         self.intact_count
     }
 
+    /// Returns `true` if the file had no bytes when its end was reached.
+    pub(in crate::log) fn is_empty(&self) -> bool {
+        self.source.position() == 0
+    }
+
     /// Sets the limits, once the size of the scene is known. Until then no chunk is read.
     pub(in crate::log) fn set_limits(&mut self, limits: SizeLimits) {
         self.limits = Some(limits);

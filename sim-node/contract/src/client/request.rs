@@ -11,7 +11,7 @@ use crate::clock::epoch_microseconds;
 use crate::endpoint::Endpoint;
 use crate::limits::{COMMANDS_BUFFERED, OUTCOMES_BUFFERED};
 use crate::messages::command::{CONSOLE_CLIENT_ID, Command};
-use crate::messages::outcome::Outcome;
+use crate::messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome};
 use crate::ports::port::reader_count;
 use crate::ports::reader::{Drained, ReadError, ValueReader};
 use crate::ports::service::{COMMANDS, OUTCOMES, ServiceError};
@@ -23,6 +23,21 @@ use sim_types::Action;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RequestError {
+    /// The command was sent, and other outcomes were overwritten before this client read them. One of
+    /// them may have been that of the command, which may have been applied.
+    #[error(
+        "no outcome of command {sequence} after at most {timeout:?}, but {missed_count} outcomes were \
+         overwritten before they were read, so the command may have been applied (other clients send \
+         many commands: read outcomes more often)"
+    )]
+    OutcomesMissed {
+        /// Sequence number of the command.
+        sequence: u64,
+        /// Longest wait.
+        timeout: Duration,
+        /// Number of outcomes that were missed since the command was sent.
+        missed_count: u64,
+    },
     /// The command was sent, but no outcome arrived in time. Its effect is unknown.
     #[error("no outcome of command {sequence} after at most {timeout:?}: {owner}")]
     Timeout {
@@ -124,6 +139,30 @@ pub(crate) struct Commander {
     answered: VecDeque<Outcome>,
     commands: ValueWriter<Command>,
     outcomes: ValueReader<Outcome>,
+    gaps: OutcomeGaps,
+}
+
+/// Counts outcomes that were overwritten before they were read. Their indices have no gaps in a run.
+#[derive(Debug, Default)]
+struct OutcomeGaps {
+    run_id: u64,
+    /// `None` before the first outcome.
+    next_index: Option<u64>,
+    missed_count: u64,
+}
+
+impl OutcomeGaps {
+    fn add(&mut self, outcome: &Outcome) {
+        // The index of an answer to a control of a replay is not its own.
+        if outcome.flags & OUTCOME_FLAG_CONTROL != 0 {
+            return;
+        }
+        let next = self.next_index.filter(|_| outcome.run_id == self.run_id);
+        let missed = outcome.index.saturating_sub(next.unwrap_or(outcome.index));
+        self.missed_count = self.missed_count.saturating_add(missed);
+        self.run_id = outcome.run_id;
+        self.next_index = Some(outcome.index.saturating_add(1));
+    }
 }
 
 impl Commander {
@@ -133,6 +172,7 @@ impl Commander {
         Ok(Self {
             client_id,
             sequence: 0,
+            gaps: OutcomeGaps::default(),
             unanswered: VecDeque::new(),
             answered: VecDeque::new(),
             outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?,
@@ -169,6 +209,7 @@ impl Commander {
     pub(crate) fn receive_outcomes(&mut self) -> Result<(), ReadError> {
         let mut drained = Drained::default();
         self.outcomes.drain(&mut drained, |outcome| {
+            self.gaps.add(outcome);
             // Processes that share the console's client id may use the same number, so the whole
             // commands are compared, as bytes because of NaN.
             let is_answered = |command: &Command| bytes_of(command) == bytes_of(&outcome.command);
@@ -206,6 +247,11 @@ impl Commander {
         {
             self.unanswered.remove(index);
         }
+    }
+
+    /// Returns the number of outcomes of all clients that were overwritten before they were read.
+    pub(crate) fn missed_count(&self) -> u64 {
+        self.gaps.missed_count
     }
 
     pub(crate) fn awaits_outcomes(&self) -> bool {

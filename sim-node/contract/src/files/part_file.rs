@@ -1,6 +1,7 @@
 //! A file that gets its name only when it is finished.
 
 mod disk;
+pub(crate) mod error;
 mod lock;
 
 use std::ffi::OsString;
@@ -13,6 +14,7 @@ use rustix::io::Errno;
 
 use crate::files::kind::kind_of_non_file;
 use disk::DiskFile;
+use error::{PartFileError, io_error};
 use lock::Lock;
 
 /// Bytes to buffer before a write to the operating system.
@@ -39,48 +41,6 @@ impl Existing {
         }
         Ok(())
     }
-}
-
-/// The reason why a file cannot be created or finished.
-#[derive(Debug, thiserror::Error)]
-pub enum PartFileError {
-    /// A file with this name exists.
-    #[error("{} exists (use --overwrite to replace it)", .0.display())]
-    Exists(PathBuf),
-    /// A `.part` file exists. It may be the only trace of a recording whose recorder was killed.
-    #[error(
-        "{} exists: the program that wrote it was killed (use --overwrite to replace it)",
-        .0.display()
-    )]
-    PartExists(PathBuf),
-    /// Another program is writing the `.part` file. It is never replaced.
-    #[error(
-        "{} is being written by {}: wait for its end, or name another file",
-        path.display(),
-        process_id.map_or("another program".to_owned(), |id| format!("process {id}"))
-    )]
-    InUse {
-        /// The `.part` file.
-        path: PathBuf,
-        /// The process, if the system names it.
-        process_id: Option<u32>,
-    },
-    /// The name belongs to a directory or a device, for example. It is never replaced.
-    #[error("{} is {kind}; name a file", path.display())]
-    NotAFile {
-        /// The name.
-        path: PathBuf,
-        /// The kind of the thing with this name, with its article.
-        kind: &'static str,
-    },
-    /// The operating system reports an error.
-    #[error("cannot write {}: {}", path.display(), explain_write_error(cause))]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        cause: io::Error,
-    },
 }
 
 /// `NAME.part`, which [`PartFile::finish`] renames to `NAME`. It is locked, so no other program that
@@ -122,16 +82,10 @@ impl PartFile {
     /// Writes a whole file. An existing file keeps its contents until the new ones are complete.
     ///
     /// # Errors
-    /// Same as [`PartFile::create`] and [`PartFile::finish`]. After an error, nothing is left.
+    /// Same as [`PartFile::create`] and [`PartFile::finish`]. After an error, nothing is left, except
+    /// after [`PartFileError::NameNotSynced`], which leaves the complete file.
     pub fn write_whole(path: &Path, existing: Existing, bytes: &[u8]) -> Result<(), PartFileError> {
-        let mut file = Self::create(path, existing)?;
-        if let Err(cause) = file.write_all(bytes).and_then(|()| file.flush()) {
-            let error = io_error(&file.part_path, cause);
-            file.discard()?;
-            return Err(error);
-        }
-        file.finish()?;
-        Ok(())
+        Self::create(path, existing)?.finish_with(bytes)
     }
 }
 
@@ -159,14 +113,38 @@ impl<F: DiskFile> PartFile<F> {
     /// Syncs the file to disk, renames it to its final name, and syncs the name to disk.
     ///
     /// # Errors
-    /// If a file with that name exists by now, or the operating system reports an error.
+    /// If a file with that name exists by now, or the operating system reports an error. The error
+    /// states which file is complete, if one is.
     pub fn finish(mut self) -> Result<PathBuf, PartFileError> {
-        let written = self.out.flush().and_then(|()| self.out.get_ref().sync_all());
-        written.map_err(|cause| io_error(&self.part_path, cause))?;
-        self.rename()?;
-        let synced = self.out.get_ref().sync_folder_of(&self.path);
-        synced.map_err(|cause| io_error(&self.path, cause))?;
+        self.sync()?;
+        self.rename().map_err(|error| PartFileError::NotRenamed {
+            part_path: self.part_path.clone(),
+            error: Box::new(error),
+        })?;
+        self.sync_name()?;
         Ok(self.path)
+    }
+
+    /// Writes the whole contents and finishes the file, or leaves nothing.
+    fn finish_with(mut self, bytes: &[u8]) -> Result<(), PartFileError> {
+        let written = self.write_all(bytes).map_err(|cause| io_error(&self.part_path, cause));
+        match written.and_then(|()| self.sync()).and_then(|()| self.rename()) {
+            Ok(()) => self.sync_name(),
+            Err(error) => {
+                self.discard()?;
+                Err(error)
+            }
+        }
+    }
+
+    fn sync(&mut self) -> Result<(), PartFileError> {
+        let synced = self.out.flush().and_then(|()| self.out.get_ref().sync_all());
+        synced.map_err(|cause| io_error(&self.part_path, cause))
+    }
+
+    fn sync_name(&self) -> Result<(), PartFileError> {
+        let synced = self.out.get_ref().sync_folder_of(&self.path);
+        synced.map_err(|cause| PartFileError::NameNotSynced { path: self.path.clone(), cause })
     }
 
     /// Deletes the unfinished file.
@@ -218,18 +196,6 @@ impl<F: DiskFile> Write for PartFile<F> {
     }
 }
 
-/// Returns the text of an error of writing, with the remedy for a limit.
-pub fn explain_write_error(error: &io::Error) -> String {
-    match error.kind() {
-        ErrorKind::FileTooLarge => {
-            format!("{error}: the limit on the size of files is reached (see `ulimit -f`)")
-        }
-        ErrorKind::StorageFull => format!("{error}: free space, or name a file on another disk"),
-        ErrorKind::QuotaExceeded => format!("{error}: your quota of this disk is used up"),
-        _ => error.to_string(),
-    }
-}
-
 /// Most attempts to open a file that other programs finish in the meantime.
 const ATTEMPTS_MAX: u32 = 100;
 
@@ -275,10 +241,6 @@ pub fn part_path(path: &Path) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(".part");
     PathBuf::from(name)
-}
-
-fn io_error(path: &Path, cause: io::Error) -> PartFileError {
-    PartFileError::Io { path: path.to_owned(), cause }
 }
 
 #[cfg(test)]

@@ -38,6 +38,20 @@ pub fn accept_closed_pipe(result: io::Result<()>) -> io::Result<()> {
     }
 }
 
+/// Returns the exit code of a program that ends with the text of its command line, a help text or an
+/// error: `code`, or 1 if the text is a result and could not be written. Reports that on stderr.
+/// `printed` is the result of printing the text, and `is_error` tells that it went to stderr.
+#[must_use]
+pub fn usage_exit_code(printed: io::Result<()>, is_error: bool, code: i32) -> i32 {
+    match accept_closed_pipe(printed) {
+        Err(problem) if !is_error => {
+            note(&format!("error: cannot write to stdout: {problem}"));
+            1
+        }
+        _ => code,
+    }
+}
+
 fn write(mut out: impl Write, bytes: &[u8]) -> io::Result<()> {
     accept_closed_pipe(out.write_all(bytes).and_then(|()| out.flush()))
 }
@@ -64,5 +78,17 @@ mod tests {
         let full = write(Failing(ErrorKind::StorageFull), b"text").unwrap_err();
         assert_eq!(full.kind(), ErrorKind::StorageFull);
         write(Failing(ErrorKind::BrokenPipe), b"text").unwrap();
+    }
+
+    #[test]
+    fn a_help_text_that_cannot_be_written_is_a_failure_and_an_error_of_usage_stays_one() {
+        let full = || Err(ErrorKind::StorageFull.into());
+        let closed = || Err(ErrorKind::BrokenPipe.into());
+        for (printed, code) in [(Ok(()), 0), (closed(), 0), (full(), 1)] {
+            assert_eq!(usage_exit_code(printed, false, 0), code);
+        }
+        for printed in [Ok(()), closed(), full()] {
+            assert_eq!(usage_exit_code(printed, true, 2), 2);
+        }
     }
 }

@@ -7,8 +7,8 @@ use std::thread;
 
 use sim_contract::testing::TestDomain;
 use sim_contract::{
-    Action, COMMANDS_BUFFERED, CONSOLE_CLIENT_ID, Client, Endpoint, Outcome, Owner, OwnerState,
-    RequestError,
+    Action, COMMANDS_BUFFERED, CONSOLE_CLIENT_ID, Client, Command, Endpoint, OUTCOMES_BUFFERED,
+    Outcome, Owner, OwnerState, RequestError,
 };
 
 use crate::support::{DEADLINE, MOMENT, answer_commands, create_owner, publish_step};
@@ -115,6 +115,42 @@ fn an_unanswered_command_times_out_and_the_error_states_whether_a_node_runs() {
              `sim-node run --domain {name}`)"
         )
     );
+}
+
+#[test]
+fn an_outcome_that_was_overwritten_is_reported_as_missed() {
+    let flood = 4 * OUTCOMES_BUFFERED as u64;
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    publish_step(&owner, 8);
+    let endpoint = domain.endpoint();
+    let client = thread::spawn(move || {
+        let mut client = Client::attach_as(&endpoint, 5).unwrap();
+        client.request(PIN, DEADLINE).unwrap();
+        client.request(RELEASE, DEADLINE).unwrap_err()
+    });
+    let mut outcome_count = 0;
+    while outcome_count == 0 {
+        answer_commands(&owner, 9, &mut outcome_count);
+        thread::yield_now();
+    }
+    while receive(&owner).is_empty() {
+        assert!(!client.is_finished());
+        thread::yield_now();
+    }
+    // The client sleeps meanwhile, because nothing wakes it until the owner goes.
+    for index in 1..=flood {
+        let client_id = if index == 1 { 5 } else { 6 };
+        let command = Command::new(client_id, 2, RELEASE);
+        owner.publish_outcome(&Outcome::new(index, 9, command, Ok(()))).unwrap();
+    }
+    drop(owner);
+    let error = client.join().unwrap();
+    let RequestError::OutcomesMissed { sequence: 2, missed_count, .. } = error else {
+        panic!("{error}");
+    };
+    assert!((1..=flood - OUTCOMES_BUFFERED as u64).contains(&missed_count), "{missed_count}");
+    assert!(error.to_string().contains("so the command may have been applied"), "{error}");
 }
 
 #[test]

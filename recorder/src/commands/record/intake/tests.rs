@@ -69,6 +69,11 @@ impl Node {
     }
 }
 
+/// Returns the number of missing messages on all topics.
+fn missing_count(intake: &Intake) -> u64 {
+    intake.closing(String::new()).missing().values().sum()
+}
+
 /// Publishes a state alone.
 fn publish(intake: &mut Intake, header: SnapshotHeader, changes: &[Change]) -> Accepted {
     let mut accepted = Accepted::default();
@@ -195,7 +200,7 @@ fn the_recording_starts_at_the_first_state_with_a_keyframe() {
     // Published at a wall-clock time of 4 s, in step 4 at 10 Hz.
     assert_eq!(run.epoch_ns, 4_000_000_000 - 400_000_000);
     assert_eq!(names(&publish(&mut intake, header(5, 0), &[])), ["snapshot 5"]);
-    assert_eq!((intake.first_step(), intake.counts().missing()), (Some(4), 0));
+    assert_eq!((intake.first_step(), missing_count(&intake)), (Some(4), 0));
 }
 
 #[test]
@@ -210,7 +215,7 @@ fn a_keyframe_that_a_paused_node_publishes_after_the_state_starts_the_recording(
     // The tap passes on the keyframe with the next state as well.
     let accepted = publish(&mut intake, header(10, 1), &[keyframe(9)]);
     assert_eq!(names(&accepted), ["snapshot 10"]);
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
 }
 
 #[test]
@@ -231,7 +236,7 @@ fn outcomes_that_the_first_state_does_not_contain_are_kept() {
     let mut accepted = publish(&mut intake, header(2, 1), &[Change::Load, keyframe(2)]);
     add(&mut intake, &[], &mut accepted);
     assert_eq!(names(&accepted)[1..], ["/keyframe 2", "snapshot 2", "/outcomes 3"]);
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
 }
 
 #[test]
@@ -258,7 +263,7 @@ fn the_recording_ends_with_the_last_requested_step_and_counts_nothing_after_it()
         "snapshot 2",
     ];
     assert_eq!(names(&accepted)[1..], expected);
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
     assert_eq!(intake.counts()[Topic::Particles].received, 3);
 }
 
@@ -268,7 +273,7 @@ fn a_state_beyond_the_last_requested_step_ends_the_recording() {
     publish(&mut intake, header(0, 0), &[Change::Load, keyframe(0)]);
     let accepted = publish(&mut intake, header(5, 0), &[keyframe(5)]);
     assert_eq!((names(&accepted).len(), accepted.end), (0, Some(RunEnd::EndStep)));
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
 }
 
 #[test]
@@ -294,7 +299,7 @@ fn messages_are_written_in_the_order_of_publication() {
         "/outcomes 7",
     ];
     assert_eq!(names(&accepted), expected);
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
 }
 
 #[test]
@@ -305,7 +310,7 @@ fn outcomes_of_the_first_state_of_other_runs_and_of_a_replay_are_skipped() {
     let outcomes = [outcome(1, 4), other, control];
     let accepted = send(&mut intake, &outcomes.each_ref().map(Update::Outcome));
     assert!(names(&accepted).is_empty());
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
 }
 
 #[test]
@@ -319,7 +324,7 @@ fn another_run_ends_the_recording_and_is_not_part_of_it() {
     add(&mut intake, &outcomes.each_ref().map(Update::Outcome), &mut accepted);
     assert_eq!(names(&accepted), ["/outcomes 5", "snapshot 5"]);
     assert_eq!(accepted.end, Some(RunEnd::NewRun));
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
 }
 
 #[test]
@@ -328,7 +333,7 @@ fn another_load_ends_the_recording() {
     let other = SnapshotHeader { topology_revision: 1, ..header(5, 2) };
     let accepted = publish(&mut intake, other, &[Change::Load, tears(5, &[], 0), keyframe(5)]);
     assert_eq!((names(&accepted).len(), accepted.end), (0, Some(RunEnd::NewLoad)));
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
 }
 
 #[test]
@@ -354,7 +359,7 @@ fn a_late_recording_starts_with_the_torn_constraints_and_the_colliders() {
         let changes = [Change::Load, keyframe(step)];
         node.publish(&mut intake, header, &changes, &mut accepted).unwrap();
         accepted.sort();
-        assert_eq!(intake.counts().missing(), 0);
+        assert_eq!(missing_count(&intake), 0);
         accepted
     };
     let first = start(6);

@@ -45,18 +45,44 @@ impl DiskFile for NotedFile {
     }
 }
 
+/// A folder for a file of a test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        let path = std::env::temp_dir().join(format!("synced-{}", getrandom::u64().unwrap()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    /// Creates `a.mcap.part`, which notes its calls.
+    fn create(&self, failing: Option<&'static str>) -> PartFile<NotedFile> {
+        let path = self.0.join("a.mcap");
+        File::create_new(part_path(&path)).unwrap();
+        let file = NotedFile { calls: Rc::default(), failing, path: path.clone() };
+        PartFile::begin(file, &path, Existing::Refuse)
+    }
+
+    fn names(&self) -> Vec<OsString> {
+        fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().file_name()).collect()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
 /// Writes, flushes, writes and finishes a file. Returns the calls and the result.
 fn calls(
     syncs_on_flush: bool,
     failing: Option<&'static str>,
 ) -> (Vec<&'static str>, Result<PathBuf, PartFileError>) {
-    let folder = std::env::temp_dir().join(format!("synced-{}", getrandom::u64().unwrap()));
-    fs::create_dir_all(&folder).unwrap();
-    let path = folder.join("a.mcap");
-    File::create_new(part_path(&path)).unwrap();
-    let calls = Rc::default();
-    let file = NotedFile { calls: Rc::clone(&calls), failing, path: path.clone() };
-    let mut file = PartFile::begin(file, &path, Existing::Refuse);
+    let folder = Folder::new();
+    let path = folder.0.join("a.mcap");
+    let mut file = folder.create(failing);
+    let calls = Rc::clone(&file.out.get_ref().calls);
     if syncs_on_flush {
         file = file.with_sync_on_flush();
     }
@@ -66,7 +92,6 @@ fn calls(
         file.write_all(b"three").map_err(|cause| io_error(&path, cause))?;
         file.finish()
     });
-    fs::remove_dir_all(&folder).unwrap();
     (calls.take(), result)
 }
 
@@ -100,4 +125,38 @@ fn an_error_of_any_call_is_returned() {
         let after = calls.iter().position(|noted| *noted == call).unwrap() + 1;
         assert!(calls[after..].iter().all(|later| *later == "write"), "{calls:?}");
     }
+}
+
+#[test]
+fn the_error_states_whether_the_file_is_complete_and_its_name() {
+    for (call, is_complete, name, text) in [
+        ("sync all", false, "a.mcap.part", "a.mcap.part: Input/output error"),
+        ("sync new name", true, "a.mcap", "a.mcap is complete, but its name may not survive"),
+    ] {
+        let folder = Folder::new();
+        let error = folder.create(Some(call)).finish().unwrap_err();
+        assert_eq!(
+            (error.leaves_complete_file(), folder.names()),
+            (is_complete, vec![name.into()])
+        );
+        assert!(error.to_string().contains(text), "{error}");
+    }
+}
+
+#[test]
+fn an_error_of_writing_a_whole_file_leaves_nothing_or_the_complete_file() {
+    for call in ["write", "sync all"] {
+        let folder = Folder::new();
+        folder.create(Some(call)).finish_with(b"new").unwrap_err();
+        assert_eq!(folder.names(), [""; 0], "{call}");
+    }
+    let folder = Folder::new();
+    let file = folder.create(None);
+    fs::write(folder.0.join("a.mcap"), "other").unwrap();
+    assert!(matches!(file.finish_with(b"new"), Err(PartFileError::Exists(_))));
+    assert_eq!(folder.names(), ["a.mcap"]);
+    let folder = Folder::new();
+    let error = folder.create(Some("sync new name")).finish_with(b"new").unwrap_err();
+    assert!(error.leaves_complete_file());
+    assert_eq!(folder.names(), ["a.mcap"]);
 }

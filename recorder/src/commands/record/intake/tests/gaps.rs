@@ -51,7 +51,7 @@ fn dropped_changes_are_counted_from_the_start_on() {
     let lost = |count| LostChanges { parameters: count, ..Default::default() };
     intake.set_lost(lost(5));
     publish(&mut intake, header(4, 2), &[Change::Load, keyframe(4)]);
-    assert_eq!(intake.counts().missing(), 0);
+    assert_eq!(missing_count(&intake), 0);
     intake.set_lost(lost(6));
     assert_eq!(intake.counts()[Topic::Parameters].gaps, 1);
 }
@@ -80,16 +80,52 @@ fn tears_that_never_arrived_are_counted() {
     assert_eq!(intake.counts()[Topic::Tears].gaps, 0, "after a reset");
 }
 
+fn unreadable() -> ReadError {
+    ReadError::Malformed { service: "sim/tears".to_owned(), detail: "no list".to_owned() }
+}
+
+/// Adds errors. Returns `true` if they are reported.
+fn add_errors(intake: &mut Intake, count: usize) -> bool {
+    intake.count_unreadable(&vec![unreadable(); count]).is_some()
+}
+
 #[test]
 fn unreadable_messages_are_counted_from_the_start_on_and_make_the_report_incomplete() {
-    let error = || ReadError::Malformed { service: "sim/tears".to_owned(), detail: String::new() };
     let mut intake = Intake::default();
-    intake.count_unreadable(&[error()]);
-    assert_eq!(intake.unreadable, 0, "before the start");
-    let mut intake = started();
-    intake.count_unreadable(&[error(), error()]);
-    intake.count_unreadable(&[error()]);
+    add_errors(&mut intake, 1);
+    // Without its keyframe, no recording starts at this state.
+    publish(&mut intake, header(4, 0), &[Change::Load]);
+    add_errors(&mut intake, 1);
+    add_errors(&mut intake, 1);
+    publish(&mut intake, header(5, 0), &[keyframe(5)]);
+    add_errors(&mut intake, 1);
+    assert!(intake.first_step() == Some(5) && intake.unreadable == 0, "{intake:?}");
+    add_errors(&mut intake, 2);
+    publish(&mut intake, header(6, 0), &[]);
+    add_errors(&mut intake, 1);
     let closing = intake.closing("signal".to_owned());
     assert_eq!(closing.missing(), [("unreadable", 3)].into());
-    assert!(!Report::new("run.mcap", closing, 4..=4).is_complete());
+    assert!(!Report::new("run.mcap", closing, 5..=6).is_complete());
+}
+
+#[test]
+fn unreadable_messages_between_the_first_state_and_its_keyframe_are_missing() {
+    let mut intake = Intake::default();
+    publish(&mut intake, header(4, 0), &[Change::Load]);
+    add_errors(&mut intake, 1);
+    add_errors(&mut intake, 1);
+    publish(&mut intake, header(5, 0), &[keyframe(4)]);
+    add_errors(&mut intake, 1);
+    assert_eq!((intake.first_step(), intake.unreadable), (Some(4), 2));
+}
+
+#[test]
+fn the_first_unreadable_message_before_the_start_and_the_first_after_it_are_reported() {
+    let mut intake = Intake::default();
+    assert_eq!([1, 0, 2].map(|count| add_errors(&mut intake, count)), [true, false, false]);
+    publish(&mut intake, header(4, 0), &[Change::Load, keyframe(4)]);
+    assert_eq!(
+        [1, 0, 1, 1].map(|count| add_errors(&mut intake, count)),
+        [false, false, true, false]
+    );
 }

@@ -1,0 +1,59 @@
+//! The memory of messages that wait for their snapshot.
+
+use std::collections::BTreeMap;
+
+use super::message::Message;
+use super::read::limits::SizeLimits;
+use super::run::RunDescription;
+use super::topic::Topic;
+
+/// The memory of the messages that belong to no snapshot yet: those since the last snapshot, and
+/// earlier ones with a later step.
+///
+/// A reader keeps these messages, so it needs a limit. A recorder that cannot write its snapshots,
+/// because its disk stalls, drops messages beyond the same limit. Every file that it writes can be read.
+#[derive(Debug)]
+pub struct Backlog {
+    size_bytes: usize,
+    size_bytes_max: usize,
+    /// By step.
+    by_step: BTreeMap<u64, usize>,
+}
+
+impl Backlog {
+    /// Begins before the first message of a recording. `scene_size_bytes` is the length of its scene
+    /// as text.
+    pub fn new(run: &RunDescription, scene_size_bytes: usize) -> Self {
+        let size_bytes_max = SizeLimits::new(run, scene_size_bytes).backlog_size_bytes_max();
+        Self { size_bytes: 0, size_bytes_max, by_step: BTreeMap::new() }
+    }
+
+    /// Returns the most memory that messages without a snapshot may take.
+    pub fn size_bytes_max(&self) -> usize {
+        self.size_bytes_max
+    }
+
+    /// Returns `true` if a recorder may write the message now. Keyframes leave half of the memory to
+    /// other messages: the next keyframe replaces a lost one, but nothing replaces a lost outcome.
+    pub fn has_room_for(&self, message: &Message) -> bool {
+        let is_keyframe = message.topic() == Topic::Keyframe;
+        let limit = if is_keyframe { self.size_bytes_max / 2 } else { self.size_bytes_max };
+        self.size_bytes + message.size_bytes() <= limit
+    }
+
+    /// Adds a message. Returns `false` if the messages now take more memory than they may.
+    #[must_use]
+    pub fn add(&mut self, message: &Message) -> bool {
+        let size_bytes = message.size_bytes();
+        *self.by_step.entry(message.step()).or_default() += size_bytes;
+        self.size_bytes += size_bytes;
+        self.size_bytes <= self.size_bytes_max
+    }
+
+    /// Removes the messages up to a snapshot.
+    pub fn remove_to(&mut self, step: u64) {
+        while let Some(entry) = self.by_step.first_entry().filter(|entry| *entry.key() <= step) {
+            self.size_bytes -= entry.remove();
+        }
+    }
+}
