@@ -5,6 +5,7 @@
 
 mod commands;
 mod edits;
+mod live;
 mod rows;
 
 use std::collections::BTreeMap;
