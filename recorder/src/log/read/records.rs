@@ -43,6 +43,8 @@ pub(in crate::log) struct RecordReader<R> {
 enum Part {
     /// A record, in [`RecordReader::body`].
     Record(u8),
+    /// A record that is longer than any of a recorder. It is not read.
+    TooLong(u8),
     /// A record that no reader of ours needs, or the header of a chunk.
     Other,
     End,
@@ -97,6 +99,11 @@ impl<R: Read> RecordReader<R> {
                         Err(fault) => self.stop(fault)?,
                     }
                 }
+                Ok(Part::TooLong(opcode)) => {
+                    self.intact_count = self.source.position();
+                    let record = Record::Unknown { opcode, data: (&[]).into() };
+                    return read(record, self.intact_count).map(Some);
+                }
                 Ok(Part::Other) => {}
                 Ok(Part::End) => self.end = Some(LogEnd::Complete),
                 Err(fault) => self.stop(fault)?,
@@ -109,7 +116,9 @@ impl<R: Read> RecordReader<R> {
     fn next_part(&mut self) -> Result<Part, Fault> {
         let Some(chunk) = &mut self.chunk else { return self.read_part() };
         if let Some(opcode) = chunk.next_record(&mut self.source, &mut self.body)? {
-            return Ok(Part::Record(opcode));
+            let is_text = matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA);
+            let is_too_long = is_text && self.body.len() as u64 > TEXT_SIZE_BYTES_MAX;
+            return Ok(if is_too_long { Part::TooLong(opcode) } else { Part::Record(opcode) });
         }
         self.chunk = None;
         Ok(Part::Other)
@@ -176,7 +185,7 @@ impl<R: Read> RecordReader<R> {
             return Ok(Part::Record(opcode));
         }
         match self.limits {
-            Some(_) => self.skip_record(length),
+            Some(_) => self.skip_record(length).map(|_| Part::TooLong(opcode)),
             None => Err(Fault::too_large("a record before the first message", length, limit)),
         }
     }

@@ -142,3 +142,22 @@ fn events_of_other_steps_are_compared_with_their_particles() {
         assert!(found.contains("its events in /events"), "{inserted:?}: {found}");
     }
 }
+
+#[test]
+fn content_of_other_programs_is_named_as_not_compared() {
+    let text = |text: &[u8]| [&u32::try_from(text.len()).unwrap().to_le_bytes(), text].concat();
+    let schema = |data: &[u8]| {
+        let parts = [vec![200, 0], text(b"other"), text(b"json"), text(data)];
+        (op::SCHEMA, parts.concat())
+    };
+    let long = "a record longer than any of a recorder";
+    let records = records(&written());
+    for (data, words) in [("{}".to_owned(), "schema 'other'"), (" ".repeat(70_000), long)] {
+        let mut changed = records.clone();
+        changed.insert(records.len() - 1, schema(data.as_bytes()));
+        let (finding, not_covered) = verified(&file_of(&changed));
+        assert_eq!(finding, None);
+        let expected = format!("{words}, which no recorder writes");
+        assert!(not_covered.contains(&expected), "{not_covered:?}");
+    }
+}
