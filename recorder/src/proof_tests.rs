@@ -5,11 +5,13 @@
 
 mod commands;
 mod edits;
+mod live;
 mod rows;
 
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message};
+use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, Topic};
 use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
@@ -41,7 +43,7 @@ fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
     let options = LogOptions { chunk_size_bytes: 100_000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
     let outcomes = simulate(job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
-    (finish(log), outcomes)
+    (finish(log, 0), outcomes)
 }
 
 fn check(file: &[u8]) -> (Report, Option<LogEnd>) {
@@ -58,13 +60,33 @@ fn rebuild(file: &[u8], mut change: impl FnMut(Message) -> Option<Message>) -> V
             new.write(&message, logged.log_time_ns).unwrap();
         }
     }
-    finish(new)
+    finish(new, 0)
 }
 
-/// Finishes a recording as `simulate` does, except for the reason.
-fn finish(log: LogWriter<Vec<u8>>) -> Vec<u8> {
+/// Rebuilds a recording that lacks snapshots and declares it. `change` returns the new messages.
+fn rebuild_with_gaps(
+    file: &[u8],
+    missing_count: u64,
+    mut change: impl FnMut(Message) -> Vec<Message>,
+) -> Vec<u8> {
+    let mut old = LogReader::new(file).unwrap();
+    let (run, scene) = (old.run().clone(), old.scene().to_vec());
+    let mut new = LogWriter::create(Vec::new(), LogOptions::default(), &run, &scene, 0).unwrap();
+    while let Some(logged) = old.next_message().unwrap() {
+        for message in change(logged.message) {
+            new.write(&message, logged.log_time_ns).unwrap();
+        }
+    }
+    finish(new, missing_count)
+}
+
+/// Finishes a recording as `simulate` does, except for the reason and the missing snapshots.
+fn finish(log: LogWriter<Vec<u8>>, missing_count: u64) -> Vec<u8> {
     let mut closing = Closing { counts: *log.counts(), ..Closing::default() };
     closing.counts.set_received_to_written();
+    for topic in [Topic::Steps, Topic::Particles] {
+        closing.counts[topic].gaps = missing_count;
+    }
     log.finish(&closing).unwrap()
 }
 
@@ -243,21 +265,31 @@ fn outcomes_out_of_order_in_the_file_are_applied_in_order() {
             new.write(&first.take().unwrap(), 0).unwrap();
         }
     }
-    let (report, _) = check(&finish(new));
+    let (report, _) = check(&finish(new, 0));
     assert_eq!(report.verdict, Verdict::Identical, "{report}");
 }
 
 #[test]
-fn a_recording_that_starts_late_and_lacks_snapshots_is_bit_identical() {
+fn a_recording_that_starts_late_and_declares_missing_snapshots_is_bit_identical() {
     let (file, _) = record(&job("curtain", COMMANDS, 400));
-    let partial = rebuild(&file, |message| {
-        let is_snapshot = matches!(message, Message::Step(_) | Message::Particles { .. });
-        let is_left_out = is_snapshot && message.step() % 5 != 0;
-        (message.step() >= 37 && !is_left_out).then_some(message)
-    });
-    let (report, _) = check(&partial);
+    // Of the snapshots from 40 to 400, every fifth one is in the file.
+    let missing_count = 72 * 4;
+    let partial = |declared_count| {
+        rebuild_with_gaps(&file, declared_count, |message| {
+            let is_snapshot = matches!(message, Message::Step(_) | Message::Particles { .. });
+            let is_left_out = is_snapshot && message.step() % 5 != 0;
+            let is_in_file = message.step() >= 37 && !is_left_out;
+            if is_in_file { vec![message] } else { Vec::new() }
+        })
+    };
+    let (report, _) = check(&partial(missing_count));
     // The first keyframe is that of the pin at step 50. Every fifth step follows.
     assert_eq!(report.to_string(), "70 steps bit-identical (50..=400)");
+    let lost = ["/particles", "/steps"].map(|topic| (topic, missing_count));
+    assert_eq!(report.lost, BTreeMap::from(lost));
+    let (report, _) = check(&partial(missing_count - 1));
+    let expected = "declares 287 missing snapshots, but the numbers in /steps leave out 288";
+    assert!(report.to_string().contains(expected), "{report}");
 }
 
 #[test]

@@ -1,12 +1,16 @@
-//! `recorder verify`: proves that a recording is complete and re-simulates bit for bit.
+//! `recorder verify`: proves that a recording re-simulates bit for bit, and reports
+//! the messages that it lacks.
 
 mod coverage;
 mod difference;
+mod events;
 mod load;
 mod resimulation;
 mod side_rows;
+mod snapshot_numbers;
 mod verification;
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::io::Read;
 use std::path::PathBuf;
@@ -33,8 +37,9 @@ const SNAPSHOTS_PER_UPDATE: u64 = 64;
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
-    and lists the content that nothing else in the file can contradict.\n\n\
-    Exit codes: 0 bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
+    and lists the messages that are missing and the content that nothing else in the file can \
+    contradict.\n\n\
+    Exit codes: 0 every recorded step is bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
     recorder verify run.mcap --json"
@@ -65,6 +70,9 @@ pub(crate) struct Report {
     pub(crate) difference: Option<Difference>,
     /// The end of the file.
     pub(crate) file_end: String,
+    /// Number of messages that the recording lacks, for topics with such messages, and "unreadable"
+    /// ones.
+    pub(crate) lost: BTreeMap<&'static str, u64>,
     /// The content that is not compared.
     pub(crate) not_covered: Vec<String>,
 }
@@ -131,6 +139,7 @@ pub(crate) fn verify<R: Read>(
     }
     let end_text = verification.frames.end().map(ToString::to_string);
     report.file_end = end_text.unwrap_or_else(|| "not reached".to_owned());
+    report.lost = verification.numbers.lost(verification.frames.log().closing());
     report.not_covered = verification.coverage.not_covered();
     Ok((report, end))
 }
@@ -173,6 +182,7 @@ impl Report {
             what: None,
             difference: None,
             file_end: String::new(),
+            lost: BTreeMap::new(),
             not_covered: Vec::new(),
         }
     }
@@ -180,7 +190,8 @@ impl Report {
     /// Returns the report for people, with the content that is not compared.
     fn text(&self) -> String {
         let lines = self.not_covered.iter().map(|what| format!("\n  {}", printable_line(what)));
-        format!("{self}\nnot compared:{}", lines.collect::<String>())
+        let lost = self.lost.iter().map(|(topic, count)| format!("\nmissing: {topic} {count}"));
+        format!("{self}{}\nnot compared:{}", lost.collect::<String>(), lines.collect::<String>())
     }
 
     /// Returns `true` before the first snapshot is compared.

@@ -36,19 +36,24 @@ impl FrozenTracker {
 }
 
 fn rows(step: u64, frozen: &[u32]) -> Vec<EventRow> {
-    let row = |particle, text| EventRow { step, kind: "frozen".to_owned(), particle, text };
     // Beyond the limit, the last event gives the number of particles without one.
     let is_over_limit = frozen.len() > EVENTS_PER_STEP_MAX;
     let named_count = if is_over_limit { EVENTS_PER_STEP_MAX - 1 } else { frozen.len() };
     let (named, others) = frozen.split_at(named_count);
-    let mut rows: Vec<_> = named
-        .iter()
-        .map(|index| row(Some(*index), format!("particle {index} was not finite and is frozen")))
-        .collect();
+    let mut rows: Vec<_> = named.iter().map(|index| frozen_event(step, *index)).collect();
     if is_over_limit {
-        rows.push(row(None, format!("{} more particles are frozen", others.len())));
+        rows.push(row(step, None, format!("{} more particles are frozen", others.len())));
     }
     rows
+}
+
+/// Returns the event of one particle.
+pub(crate) fn frozen_event(step: u64, particle: u32) -> EventRow {
+    row(step, Some(particle), format!("particle {particle} was not finite and is frozen"))
+}
+
+fn row(step: u64, particle: Option<u32>, text: String) -> EventRow {
+    EventRow { step, kind: "frozen".to_owned(), particle, text }
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ const ADDRESS_SPACE_BYTES: u64 = 1 << 30;
 const CLAIM_BYTES: usize = 1200 << 20;
 
 const HEADER: u8 = 1;
+const SCHEMA: u8 = 3;
 const CHUNK_INDEX: u8 = 8;
 const ATTACHMENT: u8 = 9;
 const METADATA: u8 = 12;
@@ -180,4 +181,48 @@ fn an_index_with_a_huge_list_is_replaced_by_a_scan() {
     let finished = read(&sandbox, Program::ViewerBridge, &args);
     assert_eq!(finished.code, Some(1), "{finished:?}");
     assert!(finished.stderr.contains("index.mcap: has no readable /topology"), "{finished:?}");
+}
+
+/// Size of a schema that is as long as a reader accepts one, nearly.
+const SCHEMA_SIZE_BYTES: u32 = 60_000;
+
+/// Returns a chunk of schemas with consecutive ids, compressed to almost nothing.
+fn schemas(first_id: u16, count: u16) -> Vec<u8> {
+    // A frame of zstd (RFC 8878): a window of 128 KiB, then blocks.
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0, 7 << 3];
+    let block = |size: u32, kind: u32, is_last: u32| {
+        (size << 3 | kind << 1 | is_last).to_le_bytes()[..3].to_vec()
+    };
+    let mut uncompressed = 0;
+    for id in first_id..first_id + count {
+        let text = |text: &[u8]| [&u32::try_from(text.len()).unwrap().to_le_bytes(), text].concat();
+        let fields = [&id.to_le_bytes()[..], &text(b"name"), &text(b"json")].concat();
+        let size = fields.len() as u64 + 4 + u64::from(SCHEMA_SIZE_BYTES);
+        let start = [&[SCHEMA], &size.to_le_bytes()[..], &fields, &SCHEMA_SIZE_BYTES.to_le_bytes()]
+            .concat();
+        frame.extend(block(u32::try_from(start.len()).unwrap(), 0, 0));
+        frame.extend(&start);
+        frame.extend(block(SCHEMA_SIZE_BYTES, 1, u32::from(id + 1 == first_id + count)));
+        frame.push(b' ');
+        uncompressed += size + 9;
+    }
+    let sizes = [&[0; 16][..], &uncompressed.to_le_bytes(), &[0; 4], &4_u32.to_le_bytes(), b"zstd"];
+    let body = [&sizes.concat()[..], &(frame.len() as u64).to_le_bytes(), &frame].concat();
+    record(CHUNK, &body)
+}
+
+#[test]
+fn a_verification_keeps_no_schemas_of_other_programs() {
+    let sandbox = Sandbox::new();
+    let (_, head) = small(&sandbox);
+    let file = sandbox.path("schemas.mcap");
+    // Together more than the address space.
+    let chunks: Vec<_> = (0..300).map(|chunk| schemas(1000 + chunk * 68, 68)).collect();
+    let size_bytes = 300 * 68 * u64::from(SCHEMA_SIZE_BYTES);
+    assert!(size_bytes > ADDRESS_SPACE_BYTES);
+    std::fs::write(&file, after(&head, &chunks.concat())).unwrap();
+    let finished = read(&sandbox, Program::Recorder, &["verify", &file]);
+    assert_eq!(finished.code, Some(1), "{finished:?}");
+    // The reader has reached the end.
+    assert!(finished.stderr.contains("a record with opcode 0"), "{finished:?}");
 }

@@ -4,7 +4,7 @@
 const ALWAYS: [&str; 9] = [
     "the times of reception (log_time) of messages and of the scene",
     "wake_late_ns and solve_ns in /steps, which the node measured",
-    "the values of /status, which the node measured",
+    "the number and the values of messages on /status, which the node measured",
     "time_scale in /parameters and the paused flag of keyframes, which belong to the node",
     "the outcomes of pause, resume, step and load beyond their order",
     "run_id, epoch_ns, contract_version and recorder_version in the metadata 'run', as far as other \
@@ -14,9 +14,11 @@ const ALWAYS: [&str; 9] = [
     "the indexes and the statistics of the file",
 ];
 /// Content that a recording of a node has only once.
-const LIVE: [&str; 2] = [
+const LIVE: [&str; 3] = [
     "values of the scene that no recorded state depends on",
-    "fields of commands in /outcomes that have no effect on a state, such as client_id and sequence",
+    "fields of commands in /outcomes that have no effect on a state, such as client_id and sequence, \
+     and \"disconnected\" of a release",
+    "snapshot_index in /steps beyond its order and the number of missing snapshots",
 ];
 
 /// The extent of a verification.
@@ -30,8 +32,12 @@ pub(super) struct Coverage {
     pub(super) skipped_count: u64,
     /// The first state was restored from the recording, not computed from the scene.
     pub(super) is_restored: bool,
-    /// Messages after the last snapshot.
+    /// Messages after the last snapshot, or of steps after it.
     pub(super) trailing_count: usize,
+    /// Messages before the first snapshot with a keyframe that describe no state of the simulation.
+    pub(super) earlier_count: usize,
+    /// Tears with a cause that the recorder did not know.
+    pub(super) unknown_cause_count: usize,
     /// Names of content of other programs.
     pub(super) foreign: Vec<String>,
 }
@@ -53,8 +59,15 @@ impl Coverage {
             let count = self.skipped_count;
             all.push(format!("{count} snapshots before the first one with a keyframe"));
         }
+        if self.earlier_count > 0 {
+            all.push(format!("{} messages that precede the first state", self.earlier_count));
+        }
         if self.trailing_count > 0 {
             all.push(format!("{} messages after the last snapshot", self.trailing_count));
+        }
+        if self.unknown_cause_count > 0 {
+            let count = self.unknown_cause_count;
+            all.push(format!("the causes of {count} tears that the recording calls unknown"));
         }
         all.extend(self.foreign.iter().map(|name| format!("{name}, which no recorder writes")));
         all

@@ -40,6 +40,11 @@ impl Finding {
     pub(crate) fn in_file(what: String) -> Self {
         Self::OtherContent { what }
     }
+
+    /// Returns the finding for content of a step.
+    fn at_step(step: u64, what: String) -> Self {
+        Self::Diverged { step, what, difference: None }
+    }
 }
 
 /// The reason why a recording cannot be re-simulated.
@@ -63,6 +68,8 @@ pub(crate) struct Resimulation {
     /// Outcomes that were read but not applied yet, by index.
     pending: BTreeMap<u64, OutcomeRow>,
     side_rows: SideRows,
+    /// Messages before the first state that do not describe it.
+    earlier_count: usize,
 }
 
 impl Resimulation {
@@ -77,16 +84,15 @@ impl Resimulation {
             .restore(bytemuck::cast_slice(&frame.particles), &keyframe)
             .map_err(|cause| StartError::State { step, cause })?;
         let next_index = frame.row.outcome_count;
-        let mut start = Self {
+        Ok(Some(Self {
             scene: scene.clone(),
             solver,
             step,
             next_index,
             pending: BTreeMap::new(),
-            side_rows: SideRows::default(),
-        };
-        start.add_updates(frame);
-        Ok(Some(start))
+            side_rows: SideRows::after_start(step),
+            earlier_count: 0,
+        }))
     }
 
     /// Sets the number of threads.
@@ -96,14 +102,33 @@ impl Resimulation {
 
     /// Compares the first snapshot with its own header and with the rows before it. Compares step 0 with
     /// the scene.
-    pub(crate) fn compare_start(&self, frame: &Frame) -> Finding {
+    pub(crate) fn compare_start(&mut self, frame: &Frame) -> Finding {
+        let mut rows = match SideRows::up_to_start(&frame.updates, self.step) {
+            Ok(rows) => rows,
+            Err(what) => return Finding::at_step(self.step, what),
+        };
+        self.earlier_count += rows.keep_newest(self.step);
+        let is_earlier = |update: &&Message| match update {
+            // Outcomes with a lower index are part of the first state.
+            Message::Outcome(row) => row.index < self.next_index,
+            update => update.step() <= self.step,
+        };
+        let (earlier, later): (Vec<_>, Vec<_>) = frame.updates.iter().partition(is_earlier);
+        let outcomes = earlier.iter().filter(|update| matches!(update, Message::Outcome(_)));
+        self.earlier_count += outcomes.count();
+        if let Some(finding) = self.add_updates(later) {
+            return finding;
+        }
+        self.compare_first(frame, rows)
+    }
+
+    fn compare_first(&self, frame: &Frame, mut rows: SideRows) -> Finding {
         let scene_state = (self.step == 0).then(|| Solver::new(&self.scene));
         let expected = scene_state.as_ref().unwrap_or(&self.solver);
         let finding = compare(expected, frame);
         if finding != Finding::Identical {
             return finding;
         }
-        let mut rows = SideRows::of_start(&frame.updates, self.step);
         if scene_state.is_none() {
             rows.ignore_collider_velocities(expected);
         }
@@ -117,20 +142,18 @@ impl Resimulation {
             }
             what => what,
         };
-        what.map_or(Finding::Identical, |what| Finding::Diverged {
-            step: self.step,
-            what,
-            difference: None,
-        })
+        what.map_or(Finding::Identical, |what| Finding::at_step(self.step, what))
     }
 
     /// Simulates up to the next snapshot and compares it, unless `stop` becomes true.
     pub(crate) fn advance(&mut self, frame: &Frame, stop: &AtomicBool) -> Finding {
-        self.add_updates(frame);
         let row = &frame.row;
         if row.step <= self.step {
             let what = format!("its row in /steps follows step {} in the file", self.step);
-            return Finding::Diverged { step: row.step, what, difference: None };
+            return Finding::at_step(row.step, what);
+        }
+        if let Some(finding) = self.add_updates(&frame.updates) {
+            return finding;
         }
         if let Some(finding) = self.find_gap(row) {
             return finding;
@@ -147,6 +170,11 @@ impl Resimulation {
             }
         }
         // All outcomes that the header counts are applied now, unless one has another step.
+        if self.next_index > row.outcome_count {
+            let (recorded, simulated) = (row.outcome_count, self.next_index);
+            let what = format!("/steps: outcome_count: recorded {recorded}, simulated {simulated}");
+            return Finding::at_step(row.step, what);
+        }
         if self.next_index != row.outcome_count {
             return self.misplaced(row.step, "its step is after the snapshot that counts it");
         }
@@ -163,18 +191,42 @@ impl Resimulation {
     fn compare_side_rows(&mut self) -> Option<Finding> {
         let step = self.step;
         let what = self.side_rows.compare(&self.solver, step)?;
-        Some(Finding::Diverged { step, what, difference: None })
+        Some(Finding::at_step(step, what))
     }
 
-    fn add_updates(&mut self, frame: &Frame) {
-        // The rows of the first state are restored, not simulated.
-        self.side_rows.add(&frame.updates, self.step + 1);
-        let outcomes = frame.updates.iter().filter_map(|update| match update {
-            // Outcomes with a lower index are part of the first state.
-            Message::Outcome(row) if row.index >= self.next_index => Some(row),
-            _ => None,
-        });
-        self.pending.extend(outcomes.map(|row| (row.index, row.clone())));
+    /// Adds messages that are compared with later steps. Returns a finding for one that the file has twice,
+    /// or whose step is past.
+    fn add_updates<'a>(
+        &mut self,
+        updates: impl IntoIterator<Item = &'a Message>,
+    ) -> Option<Finding> {
+        updates.into_iter().find_map(|update| {
+            let what = match update {
+                Message::Outcome(row) => self.add_outcome(row),
+                _ => self.side_rows.add(update, &self.solver, self.step),
+            }?;
+            Some(Finding::at_step(update.step(), what))
+        })
+    }
+
+    fn add_outcome(&mut self, row: &OutcomeRow) -> Option<String> {
+        let index = row.index;
+        let is_known = index < self.next_index || self.pending.contains_key(&index);
+        if is_known {
+            return Some(format!("/outcomes: outcome {index} is in the file twice"));
+        }
+        self.pending.insert(index, row.clone());
+        None
+    }
+
+    /// Returns the number of messages that belong to steps after the last snapshot.
+    pub(crate) fn waiting_count(&self) -> usize {
+        self.pending.len() + self.side_rows.count()
+    }
+
+    /// Returns the number of messages before the first state that do not describe it.
+    pub(crate) fn earlier_count(&self) -> usize {
+        self.earlier_count
     }
 
     /// Finds the first outcome that the snapshot counts and the log lacks.
@@ -205,6 +257,7 @@ impl Resimulation {
             if let Some(finding) = self.apply(&row) {
                 return Some(finding);
             }
+            self.side_rows.pass_parameters(&self.solver, step);
         }
         if !self.solver.step_unless(stop) {
             return Some(Finding::Interrupted);

@@ -1,9 +1,9 @@
 //! The tears, colliders, parameters and keyframes of a recording, compared with the re-simulation.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
-use recorder::{CollidersRow, Message, ParametersRow, TearsRow};
-use sim_contract::ParameterValues;
+use recorder::{CollidersRow, EventRow, Message, ParametersRow, TearsRow};
+use sim_contract::{ParameterValues, ParticleFlags, ParticleState};
 use sim_solver::{Keyframe, Solver};
 
 use crate::simulation::solver_rows::{colliders_row, newest_tears_row};
@@ -13,51 +13,121 @@ use crate::simulation::solver_rows::{colliders_row, newest_tears_row};
 pub(super) struct SideRows {
     tears: BTreeMap<u64, TearsRow>,
     colliders: BTreeMap<u64, CollidersRow>,
-    parameters: BTreeMap<u64, ParametersRow>,
+    /// A paused node may change parameters several times before a step.
+    parameters: BTreeMap<u64, VecDeque<ParametersRow>>,
     keyframes: BTreeMap<u64, Vec<u8>>,
+    events: BTreeMap<u64, Vec<EventRow>>,
+    /// Step of the newest compared keyframe.
+    keyframe_step: Option<u64>,
 }
 
 impl SideRows {
-    /// Adds the rows before a snapshot, from `first_step` on.
-    pub(super) fn add(&mut self, updates: &[Message], first_step: u64) {
-        for update in updates.iter().filter(|update| update.step() >= first_step) {
-            match update {
-                Message::Tears(row) => {
-                    self.tears.insert(row.step, row.clone());
-                }
-                Message::Colliders(row) => {
-                    self.colliders.insert(row.step, row.clone());
-                }
-                Message::Parameters(row) => {
-                    self.parameters.insert(row.step, row.clone());
-                }
-                Message::Keyframe { step, bytes } => {
-                    self.keyframes.insert(*step, bytes.clone());
-                }
-                _ => {}
+    /// Starts after `step`, whose keyframe is compared.
+    pub(super) fn after_start(step: u64) -> Self {
+        Self { keyframe_step: Some(step), ..Self::default() }
+    }
+
+    /// Adds a row. Returns a description of one that the file has twice, or whose step is past. The
+    /// solver has computed `last_step`.
+    pub(super) fn add(
+        &mut self,
+        update: &Message,
+        solver: &Solver,
+        last_step: u64,
+    ) -> Option<String> {
+        if update.step() <= last_step {
+            return self.compare_late(update, solver, last_step);
+        }
+        (!self.insert(update))
+            .then(|| format!("its message on {} is in the file twice", update.topic().name()))
+    }
+
+    /// Inserts a row. Returns `false` if there is one of its topic and step.
+    fn insert(&mut self, update: &Message) -> bool {
+        match update {
+            Message::Tears(row) => self.tears.insert(row.step, row.clone()).is_none(),
+            Message::Colliders(row) => self.colliders.insert(row.step, row.clone()).is_none(),
+            Message::Parameters(row) => {
+                let rows = self.parameters.entry(row.step).or_default();
+                let is_new = rows.back() != Some(row);
+                rows.push_back(row.clone());
+                is_new
             }
+            Message::Keyframe { step, bytes } => {
+                self.keyframes.insert(*step, bytes.clone()).is_none()
+            }
+            // Their order is compared with the particles of the snapshot.
+            Message::Event(row) => {
+                self.events.entry(row.step).or_default().push(row.clone());
+                true
+            }
+            _ => true,
         }
     }
 
-    /// Returns the newest rows up to the first snapshot, which describe it. Its tears are part of the
-    /// state.
-    pub(super) fn of_start(updates: &[Message], step: u64) -> Self {
-        let mut all = Self::default();
-        all.add(updates, 0);
-        let newest = |rows: &BTreeMap<u64, CollidersRow>| {
-            rows.range(..=step)
-                .next_back()
-                .map(|(_, row)| (step, row.clone()))
-                .into_iter()
-                .collect()
-        };
-        let parameters = all.parameters.range(..=step).next_back();
-        Self {
-            tears: BTreeMap::new(),
-            colliders: newest(&all.colliders),
-            parameters: parameters.map(|(_, row)| (step, row.clone())).into_iter().collect(),
-            keyframes: all.keyframes.remove(&step).map(|bytes| (step, bytes)).into_iter().collect(),
+    /// Compares a row after the snapshot of its step. Only a keyframe can be one: a paused node publishes it
+    /// for a new reader.
+    fn compare_late(
+        &mut self,
+        update: &Message,
+        solver: &Solver,
+        last_step: u64,
+    ) -> Option<String> {
+        match update {
+            Message::Keyframe { step, bytes }
+                if *step == last_step && self.keyframe_step != Some(*step) =>
+            {
+                self.keyframe_step = Some(*step);
+                compare_keyframe(bytes, solver)
+            }
+            Message::Tears(_)
+            | Message::Colliders(_)
+            | Message::Parameters(_)
+            | Message::Keyframe { .. } => {
+                let topic = update.topic().name();
+                Some(format!(
+                    "its message on {topic} follows its snapshot, or is in the file twice"
+                ))
+            }
+            _ => None,
         }
+    }
+
+    /// Returns the number of rows that are not compared.
+    pub(super) fn count(&self) -> usize {
+        self.tears.len()
+            + self.colliders.len()
+            + self.parameters.values().map(VecDeque::len).sum::<usize>()
+            + self.keyframes.len()
+            + self.events.values().map(Vec::len).sum::<usize>()
+    }
+
+    /// Returns the rows up to the first snapshot. `Err` describes one that the file has twice.
+    pub(super) fn up_to_start(updates: &[Message], step: u64) -> Result<Self, String> {
+        let mut all = Self::default();
+        for update in updates.iter().filter(|update| update.step() <= step) {
+            if !all.insert(update) {
+                return Err(format!(
+                    "its message on {} is in the file twice",
+                    update.topic().name()
+                ));
+            }
+        }
+        Ok(all)
+    }
+
+    /// Keeps the newest rows up to the first snapshot, which describe it. Its tears and events are part of
+    /// the state. Returns the number of the other rows.
+    pub(super) fn keep_newest(&mut self, step: u64) -> usize {
+        self.tears.clear();
+        self.events.clear();
+        let count = self.count();
+        let newest = self.colliders.pop_last();
+        self.colliders = newest.into_iter().map(|(_, row)| (step, row)).collect();
+        let newest = self.parameters.pop_last().and_then(|(_, mut rows)| rows.pop_back());
+        self.parameters = newest.into_iter().map(|row| (step, VecDeque::from([row]))).collect();
+        self.keyframes.retain(|one, _| *one == step);
+        count - self.count()
     }
 
     /// Replaces the velocities of colliders by those of a restored solver, which does not know the motion
@@ -80,18 +150,44 @@ impl SideRows {
         self.compare(solver, step)
     }
 
+    /// Removes the parameters of `step` that the solver has within its commands, except the last ones.
+    pub(super) fn pass_parameters(&mut self, solver: &Solver, step: u64) {
+        let Some(rows) = self.parameters.get_mut(&step) else { return };
+        while rows.len() > 1
+            && rows.front().is_some_and(|row| compare_parameters(row, solver).is_none())
+        {
+            rows.pop_front();
+        }
+    }
+
     /// Compares the rows of `step` with the solver after it. Returns a description of the first
     /// difference.
     pub(super) fn compare(&mut self, solver: &Solver, step: u64) -> Option<String> {
         let tears = self.tears.remove(&step).and_then(|row| compare_tears(&row, solver));
         let colliders = self.colliders.remove(&step);
-        let parameters = self.parameters.remove(&step);
+        let parameters = self.parameters.remove(&step).unwrap_or_default();
         let keyframe = self.keyframes.remove(&step);
+        let events = self.events.remove(&step).unwrap_or_default();
+        if keyframe.is_some() {
+            self.keyframe_step = Some(step);
+        }
         tears
             .or_else(|| colliders.and_then(|row| compare_colliders(&row, solver)))
-            .or_else(|| parameters.and_then(|row| compare_parameters(&row, solver)))
+            .or_else(|| parameters.iter().find_map(|row| compare_parameters(row, solver)))
             .or_else(|| keyframe.and_then(|bytes| compare_keyframe(&bytes, solver)))
+            .or_else(|| events.iter().find_map(|row| compare_event(row, solver)))
     }
+}
+
+/// Compares an event with the particle that it names.
+fn compare_event(recorded: &EventRow, solver: &Solver) -> Option<String> {
+    let index = recorded.particle? as usize;
+    let is_frozen = index < solver.particle_count() && {
+        let state: ParticleState = bytemuck::cast(solver.particle(index));
+        state.flags & ParticleFlags::FROZEN != 0
+    };
+    (!is_frozen)
+        .then(|| format!("its events in /events name particle {index}, which is not frozen"))
 }
 
 fn compare_keyframe(bytes: &[u8], solver: &Solver) -> Option<String> {

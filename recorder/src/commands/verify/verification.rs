@@ -3,14 +3,15 @@
 use std::io::Read;
 use std::sync::atomic::AtomicBool;
 
-use recorder::{EventRow, Frame, FrameReader, LogReader, Message, ReadError};
-use sim_contract::ParticleFlags;
+use recorder::{Frame, FrameReader, LogReader, Message, OutcomeRow, ReadError, TearsRow, Topic};
+use sim_contract::Action;
 use sim_solver::{Scene, Solver};
 
 use super::coverage::Coverage;
+use super::events::EventCheck;
 use super::load::{compare_counts, compare_load, compare_run};
 use super::resimulation::{Finding, Resimulation, StartError};
-use crate::simulation::frozen::FrozenTracker;
+use super::snapshot_numbers::SnapshotNumbers;
 use crate::simulation::run_id::RunId;
 
 /// The reason why a recording cannot be verified.
@@ -32,7 +33,12 @@ pub(super) struct Verification<R> {
     pub(super) coverage: Coverage,
     /// Number of scene loads, from `/topology`.
     revision: Option<u32>,
-    frozen: FrozenTracker,
+    /// The topics of the load that the file has.
+    load_topics: Vec<Topic>,
+    /// The file was simulated, not recorded from a node.
+    is_simulated: bool,
+    pub(super) numbers: SnapshotNumbers,
+    events: EventCheck,
     run_id: RunId,
     /// The file has every command of its run.
     has_all_commands: bool,
@@ -40,8 +46,9 @@ pub(super) struct Verification<R> {
 
 impl<R: Read> Verification<R> {
     pub(super) fn new(log: LogReader<R>, scene: Scene, threads: usize) -> Self {
-        let coverage =
-            Coverage { is_older_format: !log.is_current_format(), ..Coverage::default() };
+        let is_simulated = log.run().epoch_ns == 0;
+        let is_older_format = !log.is_current_format();
+        let coverage = Coverage { is_older_format, ..Coverage::default() };
         Self {
             run_id: RunId::new(log.scene()),
             frames: FrameReader::new(log.with_audit()),
@@ -50,7 +57,10 @@ impl<R: Read> Verification<R> {
             simulation: None,
             coverage,
             revision: None,
-            frozen: FrozenTracker::default(),
+            load_topics: Vec::new(),
+            is_simulated,
+            numbers: SnapshotNumbers::new(is_simulated, !is_older_format),
+            events: EventCheck::default(),
             has_all_commands: false,
         }
     }
@@ -111,7 +121,12 @@ impl<R: Read> Verification<R> {
         if frame.row.topology_revision != revision {
             return diverged("its topology_revision in /steps is not that of /topology".to_owned());
         }
-        self.check_events(frame).map_or(Finding::Identical, diverged)
+        if let Some(finding) = self.check_rows(frame) {
+            return finding;
+        }
+        let what = self.numbers.check(&frame.row);
+        let what = what.or_else(|| self.events.check(frame, self.numbers.is_after_gap()));
+        what.map_or(Finding::Identical, diverged)
     }
 
     fn check_load(&mut self, frame: &Frame) -> Option<String> {
@@ -121,6 +136,11 @@ impl<R: Read> Verification<R> {
         let run = self.frames.log().run();
         let solver = Solver::new(&self.scene);
         for row in rows {
+            let topic = row.topic();
+            if self.load_topics.contains(&topic) {
+                return Some(format!("the message on {} is in the file twice", topic.name()));
+            }
+            self.load_topics.push(topic);
             if let Message::Topology(row) = row {
                 self.revision = Some(row.revision);
             }
@@ -131,30 +151,41 @@ impl<R: Read> Verification<R> {
         compare_counts(run, &solver)
     }
 
-    /// Compares the events with the particles that froze since the last snapshot.
-    fn check_events(&mut self, frame: &Frame) -> Option<String> {
-        let (step, particles) = (frame.row.step, &frame.particles);
-        let expected = self.frozen.new_events(step, particles);
-        let events = frame.updates.iter().filter_map(|update| match update {
-            Message::Event(row) => Some(row),
-            _ => None,
-        });
-        let (own, earlier): (Vec<_>, Vec<_>) = events.partition(|row| row.step == step);
-        // Events of snapshots that are missing tell of particles that froze in those.
-        let is_frozen = |row: &&EventRow| {
-            let particle = row.particle.and_then(|index| particles.get(index as usize));
-            particle.is_none_or(|state| state.flags & ParticleFlags::FROZEN != 0)
-        };
-        let is_same = match earlier.as_slice() {
-            [] => own.iter().copied().eq(&expected),
-            _ => own.iter().all(is_frozen),
-        };
-        (!is_same).then(|| "its events in /events are not those of its particles".to_owned())
+    /// Checks the fields of tears and outcomes on which no state depends.
+    fn check_rows(&mut self, frame: &Frame) -> Option<Finding> {
+        frame.updates.iter().find_map(|update| {
+            let what = match update {
+                Message::Outcome(row) => self.check_disconnected(row),
+                Message::Tears(row) => self.check_causes(row),
+                _ => None,
+            }?;
+            Some(Finding::Diverged { step: update.step(), what, difference: None })
+        })
+    }
+
+    /// Only a node ends the grab of a client whose connection has ended, and it always can.
+    fn check_disconnected(&self, row: &OutcomeRow) -> Option<String> {
+        let is_release = matches!(row.action, Action::Release { .. }) && row.is_applied();
+        let is_wrong = row.disconnected && (self.is_simulated || !is_release);
+        is_wrong.then(|| {
+            let index = row.index;
+            format!("/outcomes: outcome {index}: it is no release of a node, but \"disconnected\"")
+        })
+    }
+
+    /// Older formats have no causes, and a node may have causes that its recorder did not know.
+    fn check_causes(&mut self, row: &TearsRow) -> Option<String> {
+        let is_complete = row.causes.len() == row.constraints.len();
+        let unknown_count = row.causes.iter().filter(|cause| *cause == "unknown").count();
+        self.coverage.unknown_cause_count += unknown_count;
+        let is_wrong = !self.coverage.is_older_format && !is_complete
+            || self.is_simulated && unknown_count > 0;
+        is_wrong.then(|| "/tears: it has no cause for one of its constraints".to_owned())
     }
 
     /// Adds the commands of a snapshot to the id of the run.
     fn add_commands(&mut self, frame: &Frame) {
-        if self.frozen.is_new() {
+        if self.events.is_new() {
             self.has_all_commands = frame.row.step == 0 && frame.row.outcome_count == 0;
         }
         let mut rows: Vec<_> = frame
@@ -188,7 +219,12 @@ impl<R: Read> Verification<R> {
 
     /// Checks the end of the file, once [`Self::next`] has returned `None`.
     pub(super) fn check_end(&mut self) -> Finding {
-        self.coverage.trailing_count = self.frames.trailing_updates().len();
+        let waiting_count = self.simulation.as_ref().map_or(0, Resimulation::waiting_count);
+        self.coverage.trailing_count = self.frames.trailing_updates().len()
+            + usize::from(self.frames.trailing_row().is_some())
+            + waiting_count;
+        self.coverage.earlier_count =
+            self.simulation.as_ref().map_or(0, Resimulation::earlier_count);
         let log = self.frames.log();
         let foreign = log.audit().into_iter().flat_map(recorder::Audit::foreign);
         self.coverage.foreign = foreign.map(ToOwned::to_owned).collect();
@@ -196,10 +232,13 @@ impl<R: Read> Verification<R> {
         if finding != Finding::Identical {
             return finding;
         }
+        if let Some(what) = log.closing().and_then(|one| self.numbers.check_declared(one)) {
+            return Finding::in_file(what);
+        }
         // A recording of a node has a random id. An interrupted simulation has fewer commands.
-        let is_simulated = log.run().epoch_ns == 0 && self.has_all_commands;
+        let has_inputs = self.is_simulated && self.has_all_commands;
         let is_whole = log.closing().is_some_and(|one| one.stop_reason == "steps reached");
-        self.coverage.has_run_hash = is_simulated && is_whole;
+        self.coverage.has_run_hash = has_inputs && is_whole;
         if self.coverage.has_run_hash && log.run().run_id != self.run_id.value() {
             return Finding::in_file(
                 "the metadata 'run': its run_id is not the hash of the scene and the commands in \

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use mcap::records::{AttachmentHeader, Channel, MessageHeader, SchemaHeader};
 
 use super::decode::LoggedMessage;
-use crate::log::encoding::{MessageEncoder, TopicFormat, TopicSchema, encode_transform};
+use crate::log::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use crate::log::run::{
     Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE, header_library,
 };
@@ -34,19 +34,33 @@ pub struct Audit {
     /// Content of other programs, which is not compared.
     foreign: BTreeSet<String>,
     encoder: MessageEncoder,
-    /// By id.
-    schemas: BTreeMap<u16, Schema>,
+    formats: Formats,
+    /// The topic that each schema defines, by id. `None` for a schema of another program.
+    schemas: BTreeMap<u16, Option<Topic>>,
     /// Only `written` is set.
     counts: AllCounts,
     tf_count: u64,
 }
 
-/// A schema of a file.
-#[derive(Debug, PartialEq, Eq)]
-struct Schema {
-    name: String,
-    encoding: String,
-    data: Vec<u8>,
+/// The format of each topic, in the order of [`Topic::ALL`].
+#[derive(Debug)]
+struct Formats([TopicFormat; Topic::ALL.len()]);
+
+impl Default for Formats {
+    fn default() -> Self {
+        Self(Topic::ALL.map(TopicFormat::for_topic))
+    }
+}
+
+impl Formats {
+    /// Returns the topic that a schema defines. The definitions of two topics differ.
+    fn topic_of_schema(&self, header: &SchemaHeader, data: &[u8]) -> Option<Topic> {
+        let found = (header.name.as_str(), header.encoding.as_str(), data);
+        Topic::ALL.into_iter().find(|topic| {
+            let schema = self.0[topic.index()].schema.as_ref();
+            schema.is_some_and(|one| (one.name, one.encoding, one.data.as_slice()) == found)
+        })
+    }
 }
 
 /// The header of a file, as it was read.
@@ -111,13 +125,19 @@ impl Audit {
         self.add_foreign(format!("metadata '{name}'"));
     }
 
-    pub(super) fn add_schema(&mut self, header: SchemaHeader, data: &[u8]) {
-        let SchemaHeader { id, name, encoding } = header;
-        let schema = Schema { name, encoding, data: data.to_vec() };
-        if self.schemas.get(&id).is_some_and(|known| *known != schema) {
-            self.report(None, format!("the file has two schemas with id {id}"));
+    pub(super) fn add_long_record(&mut self) {
+        self.add_foreign("a record longer than any of a recorder".to_owned());
+    }
+
+    pub(super) fn add_schema(&mut self, header: &SchemaHeader, data: &[u8]) {
+        let topic = self.formats.topic_of_schema(header, data);
+        let known = self.schemas.insert(header.id, topic);
+        if known.is_some_and(|known| known != topic) {
+            self.report(None, format!("the file has two schemas with id {}", header.id));
         }
-        self.schemas.insert(id, schema);
+        if topic.is_none() {
+            self.add_foreign(format!("schema '{}'", header.name));
+        }
     }
 
     pub(super) fn check_channel(&mut self, channel: &Channel) {
@@ -125,16 +145,16 @@ impl Audit {
             self.add_foreign(format!("topic '{}'", channel.topic));
             return;
         };
-        let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
-        let is_same_schema = match (&schema, self.schemas.get(&channel.schema_id)) {
-            (None, _) => channel.schema_id == 0,
-            (Some(expected), Some(found)) => found.is(expected),
-            (Some(_), None) => false,
+        let TopicFormat { encoding, schema } = &self.formats.0[topic.index()];
+        let has_own_schema = match schema {
+            None => channel.schema_id == 0,
+            Some(_) => self.schemas.get(&channel.schema_id) == Some(&Some(topic)),
         };
-        if !is_same_schema {
+        let has_own_encoding = channel.message_encoding == *encoding && channel.metadata.is_empty();
+        if !has_own_schema {
             self.report(None, format!("the schema of {} has another definition", topic.name()));
         }
-        if channel.message_encoding != encoding || !channel.metadata.is_empty() {
+        if !has_own_encoding {
             self.report(None, format!("the channel of {} has another definition", topic.name()));
         }
     }
@@ -214,13 +234,6 @@ impl Audit {
         if self.tf_count == 0 {
             self.report(None, "the file has no message on /tf".to_owned());
         }
-    }
-}
-
-impl Schema {
-    fn is(&self, expected: &TopicSchema) -> bool {
-        (self.name.as_str(), self.encoding.as_str()) == (expected.name, expected.encoding)
-            && self.data == expected.data
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::io::Read;
 
+use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::{McapError, McapResult};
 
 use super::fault::Fault;
 use super::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits, compression_growth};
@@ -64,17 +64,28 @@ impl ChunkData {
         })
     }
 
-    /// Returns the next event. The answer to a request is [`Self::load`].
-    pub(super) fn next_event(&mut self) -> Option<McapResult<LinearReadEvent<'_>>> {
-        self.linear.next_event()
+    /// Reads the next record into `body` and returns its opcode, or `None` at the end of the chunk.
+    pub(super) fn next_record<R: Read>(
+        &mut self,
+        source: &mut Source<R>,
+        body: &mut Vec<u8>,
+    ) -> Result<Option<u8>, Fault> {
+        loop {
+            match self.linear.next_event() {
+                Some(Ok(LinearReadEvent::ReadRequest(count))) => self.load(source, count)?,
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                    body.clear();
+                    body.extend_from_slice(data);
+                    return Ok(Some(opcode));
+                }
+                Some(Err(error)) => return Err(self.fault(error)),
+                None => return Ok(None),
+            }
+        }
     }
 
     /// Loads up to `count` bytes of the chunk, and none at its end.
-    pub(super) fn load<R: Read>(
-        &mut self,
-        source: &mut Source<R>,
-        count: usize,
-    ) -> Result<(), Fault> {
+    fn load<R: Read>(&mut self, source: &mut Source<R>, count: usize) -> Result<(), Fault> {
         if !self.head.is_empty() {
             self.linear.insert(self.head.len()).copy_from_slice(&self.head);
             self.linear.notify_read(self.head.len());
@@ -96,9 +107,9 @@ impl ChunkData {
         Ok(())
     }
 
-    /// Returns the fault for an error of [`Self::next_event`]. At the end of the chunk, the end of the
+    /// Returns the fault for an error of the linear reader. At the end of the chunk, the end of the
     /// data is not the end of the file.
-    pub(super) fn fault(&self, error: McapError) -> Fault {
+    fn fault(&self, error: McapError) -> Fault {
         match error {
             McapError::UnexpectedEof if self.head.is_empty() && self.remaining == 0 => {
                 damaged("a record that is longer than its chunk")

@@ -61,12 +61,16 @@ impl<R: Read> FrameReader<R> {
     /// Returns the next snapshot, or `None` at the end of the readable part.
     ///
     /// # Errors
-    /// Like [`LogReader::next_message`], and if a snapshot has no row in `/steps` or the messages
-    /// before it need more memory than a [`Backlog`] may.
+    /// Like [`LogReader::next_message`], and if a snapshot has no row in `/steps`, a row has no snapshot,
+    /// or the messages before a snapshot need more memory than a [`Backlog`] may.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, ReadError> {
         while let Some(LoggedMessage { message, .. }) = self.log.next_message()? {
             match message {
-                Message::Step(row) => self.row = Some(row),
+                Message::Step(row) => {
+                    if let Some(StepRow { step, .. }) = self.row.replace(row) {
+                        return Err(ReadError::NoSnapshot { step });
+                    }
+                }
                 Message::Particles { step, particles } => {
                     let row = self.row.take().filter(|row| row.step == step);
                     let row = row.ok_or(ReadError::NoRow { step })?;
@@ -87,6 +91,12 @@ impl<R: Read> FrameReader<R> {
         }
         self.updates.push(update);
         Ok(())
+    }
+
+    /// Returns the row of a snapshot that is not in the file, as at its truncated end, once
+    /// [`FrameReader::next_frame`] has returned `None`.
+    pub fn trailing_row(&self) -> Option<&StepRow> {
+        self.row.as_ref()
     }
 
     /// Returns the messages after the last snapshot, once [`FrameReader::next_frame`] has returned

@@ -124,6 +124,12 @@ pub enum ReadError {
         /// The limit for the scene of the file.
         size_bytes_max: usize,
     },
+    /// A header of a snapshot that another one follows.
+    #[error("the row of step {step} in /steps is not followed by its snapshot in /particles")]
+    NoSnapshot {
+        /// The step of the row.
+        step: u64,
+    },
     /// A snapshot without a header.
     #[error("the snapshot of step {step} is not preceded by its row in /steps")]
     NoRow {

@@ -214,7 +214,7 @@ impl Content<'_> {
         match record {
             Record::Schema { header, data } => {
                 if let Some(audit) = self.audit {
-                    audit.add_schema(header, &data);
+                    audit.add_schema(&header, &data);
                 }
             }
             Record::Channel(channel) => {
@@ -241,6 +241,14 @@ impl Content<'_> {
                 }
             }
             Record::Message { header, data } => return self.read_message(&header, &data, byte),
+            Record::Unknown {
+                opcode: op::SCHEMA | op::CHANNEL | op::METADATA | op::ATTACHMENT,
+                ..
+            } => {
+                if let Some(audit) = self.audit {
+                    audit.add_long_record();
+                }
+            }
             _ => {}
         }
         Ok(None)

@@ -7,7 +7,6 @@ use std::io::Read;
 
 use mcap::McapError;
 use mcap::records::{Record, op};
-use mcap::sans_io::linear_reader::LinearReadEvent;
 
 use super::chunk_data::ChunkData;
 use super::fault::Fault;
@@ -28,7 +27,7 @@ pub(in crate::log) struct RecordReader<R> {
     limits: Option<SizeLimits>,
     /// The source is a part of a file, without magic.
     is_part: bool,
-    /// The record of the file that was read last.
+    /// The record that was read last, in the file or in a chunk.
     body: Vec<u8>,
     /// The chunk that is being read.
     chunk: Option<ChunkData>,
@@ -44,6 +43,8 @@ pub(in crate::log) struct RecordReader<R> {
 enum Part {
     /// A record, in [`RecordReader::body`].
     Record(u8),
+    /// A record that is longer than any of a recorder. It is not read.
+    TooLong(u8),
     /// A record that no reader of ours needs, or the header of a chunk.
     Other,
     End,
@@ -95,47 +96,37 @@ impl<R: Read> RecordReader<R> {
         read: impl FnOnce(Record<'_>, u64) -> Result<T, ReadError>,
     ) -> Result<Option<T>, ReadError> {
         while self.end.is_none() {
-            let fault = if let Some(chunk) = &mut self.chunk {
-                match chunk.next_event() {
-                    Some(Ok(LinearReadEvent::ReadRequest(count))) => {
-                        match chunk.load(&mut self.source, count) {
-                            Ok(()) => continue,
-                            Err(fault) => fault,
-                        }
-                    }
-                    Some(Ok(LinearReadEvent::Record { opcode, data })) => {
-                        self.intact_count = self.source.position();
-                        match parse(opcode, data) {
-                            Ok(record) => return read(record, self.intact_count).map(Some),
-                            Err(fault) => fault,
-                        }
-                    }
-                    Some(Err(error)) => chunk.fault(error),
-                    None => {
-                        self.chunk = None;
-                        continue;
+            match self.next_part() {
+                Ok(Part::Record(opcode)) => {
+                    self.intact_count = self.source.position();
+                    match parse(opcode, &self.body) {
+                        Ok(record) => return read(record, self.intact_count).map(Some),
+                        Err(fault) => self.stop(fault)?,
                     }
                 }
-            } else {
-                match self.read_part() {
-                    Ok(Part::Record(opcode)) => {
-                        self.intact_count = self.source.position();
-                        match parse(opcode, &self.body) {
-                            Ok(record) => return read(record, self.intact_count).map(Some),
-                            Err(fault) => fault,
-                        }
-                    }
-                    Ok(Part::Other) => continue,
-                    Ok(Part::End) => {
-                        self.end = Some(LogEnd::Complete);
-                        break;
-                    }
-                    Err(fault) => fault,
+                Ok(Part::TooLong(opcode)) => {
+                    self.intact_count = self.source.position();
+                    let record = Record::Unknown { opcode, data: (&[]).into() };
+                    return read(record, self.intact_count).map(Some);
                 }
-            };
-            self.stop(fault)?;
+                Ok(Part::Other) => {}
+                Ok(Part::End) => self.end = Some(LogEnd::Complete),
+                Err(fault) => self.stop(fault)?,
+            }
         }
         Ok(None)
+    }
+
+    /// Reads the next record of the chunk that is being read, or else of the file.
+    fn next_part(&mut self) -> Result<Part, Fault> {
+        let Some(chunk) = &mut self.chunk else { return self.read_part() };
+        if let Some(opcode) = chunk.next_record(&mut self.source, &mut self.body)? {
+            let is_text = matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA);
+            let is_too_long = is_text && self.body.len() as u64 > TEXT_SIZE_BYTES_MAX;
+            return Ok(if is_too_long { Part::TooLong(opcode) } else { Part::Record(opcode) });
+        }
+        self.chunk = None;
+        Ok(Part::Other)
     }
 
     fn stop(&mut self, fault: Fault) -> Result<(), ReadError> {
@@ -199,7 +190,7 @@ impl<R: Read> RecordReader<R> {
             return Ok(Part::Record(opcode));
         }
         match self.limits {
-            Some(_) => self.skip_record(length),
+            Some(_) => self.skip_record(length).map(|_| Part::TooLong(opcode)),
             None => Err(Fault::too_large("a record before the first message", length, limit)),
         }
     }
