@@ -5,6 +5,7 @@
 //! channels. Every edit is found, or the report says that the content is not compared.
 
 mod bytes;
+mod edit;
 mod insertions;
 mod json;
 mod not_compared;
@@ -18,6 +19,7 @@ use sim_contract::NodeStatus;
 use sim_solver::{Scene, Solver};
 
 use bytes::{byte_edits, message_header_edits, metadata_edits};
+use edit::{Change, Edit, MESSAGE_HEADER_SIZE_BYTES};
 use json::json_edits;
 use not_compared::not_compared;
 
@@ -62,28 +64,6 @@ const STEPS: u64 = 4;
 
 /// A record of a file: its opcode and its bytes.
 type Record = (u8, Vec<u8>);
-
-/// A change of one record.
-struct Edit {
-    /// The topic, or the kind of record.
-    place: String,
-    /// The value that was changed.
-    what: String,
-    original: Vec<u8>,
-    bytes: Vec<u8>,
-}
-
-/// A change within a record.
-struct Change {
-    what: String,
-    bytes: Vec<u8>,
-}
-
-impl Change {
-    fn new(what: &str, bytes: Vec<u8>) -> Self {
-        Self { what: what.to_owned(), bytes }
-    }
-}
 
 fn written() -> Vec<u8> {
     let scene = Scene::from_toml(SCENE, "edits.toml").unwrap();
@@ -165,8 +145,6 @@ fn verified(file: &[u8]) -> (Option<String>, Vec<String>) {
         Ok((report, None)) => (Some(report.to_string()), report.not_covered),
     }
 }
-
-const MESSAGE_HEADER_SIZE_BYTES: usize = 22;
 
 /// Returns every edit of a record.
 fn edits(record: &Record, topics: &[Option<Topic>]) -> Vec<Edit> {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mcap::records::op;
 
-use super::Change;
+use super::edit::Change;
 
 /// Channel, sequence, time of reception, time of the step.
 const MESSAGE_HEADER: [(&str, usize); 4] =

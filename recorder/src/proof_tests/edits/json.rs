@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use serde_json::Value;
 
-use super::Change;
+use super::edit::Change;
 
 /// Values of which a text replaces a known one with another that is known.
 const KNOWN_TEXTS: [(&str, &str); 4] =

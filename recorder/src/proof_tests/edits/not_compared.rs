@@ -2,7 +2,7 @@
 
 use sim_solver::Keyframe;
 
-use super::{Edit, MESSAGE_HEADER_SIZE_BYTES};
+use super::edit::{Edit, MESSAGE_HEADER_SIZE_BYTES};
 
 /// Returns the words by which the report names the content as not compared, if it is such.
 pub(super) fn not_compared(edit: &Edit) -> Option<&'static str> {
