@@ -123,7 +123,7 @@ fn a_file_without_an_end_is_scanned_up_to_the_truncation() {
                 counts.push(read.len());
             }
             Err(ReadError::Empty | ReadError::NotMcap | ReadError::NoHeader(_)) => {
-                assert!(length < 1000, "{length}")
+                assert!(length < 1000, "{length}");
             }
             Err(other) => panic!("cut at {length}: {other}"),
         }
