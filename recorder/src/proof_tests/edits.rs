@@ -9,13 +9,14 @@ use std::sync::atomic::AtomicBool;
 
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
-use recorder::{Closing, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic};
+use recorder::{
+    Closing, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic, parse_commands,
+};
 use serde_json::{Value, json};
 use sim_contract::NodeStatus;
 use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::commands::verify::{Verdict, verify};
-use crate::input::command_file;
 use crate::simulation::{Job, simulate};
 
 /// A scene whose recording has every topic: a particle that freezes, a cut, and a moving collider.
@@ -67,7 +68,7 @@ struct Edit {
 
 fn written() -> Vec<u8> {
     let scene = Scene::from_toml(SCENE, "edits.toml").unwrap();
-    let commands = command_file::parse(COMMANDS, "test").unwrap();
+    let commands = parse_commands(COMMANDS, "test").unwrap();
     let job = Job { scene, commands, steps: STEPS };
     let solver = Solver::new(&job.scene);
     let (run, scene) = (job.description(&solver), job.scene.to_toml());
