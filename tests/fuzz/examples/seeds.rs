@@ -81,7 +81,7 @@ fn write_commands(scene: u8, commands: &[TimedCommand]) -> Result<()> {
         let command = Command::new(one.client_id, one.sequence, one.action);
         let bytes = bytemuck::bytes_of(&command);
         all.extend_from_slice(bytes);
-        write("command", &format!("{scene}-{number}"), &[&[scene], bytes].concat())?;
+        write("command", &format!("{scene}-{number}"), &[&[scene][..], bytes].concat())?;
     }
     write("command", &format!("{scene}-all"), &all)
 }
@@ -92,7 +92,7 @@ fn write_keyframes(scene: u8, path: &Path) -> Result<()> {
     while let Some(frame) = frames.next_frame()? {
         if let Some(keyframe) = frame.own_keyframe() {
             let particles = bytemuck::cast_slice(&frame.particles);
-            let seed = [&[scene], particles, keyframe].concat();
+            let seed = [&[scene][..], particles, keyframe].concat();
             write("keyframe", &format!("{scene}-{}", frame.row.step), &seed)?;
         }
     }
@@ -102,7 +102,7 @@ fn write_keyframes(scene: u8, path: &Path) -> Result<()> {
 /// Writes the file, also without checksums, and its messages in groups of a few steps.
 fn write_recording(scene: u8, path: &Path) -> Result<()> {
     let mut bytes = fs::read(path)?;
-    write("recording", &format!("{scene}"), &bytes)?;
+    write("recording", &scene.to_string(), &bytes)?;
     clear_checksums(&mut bytes);
     write("recording", &format!("{scene}-unchecked"), &bytes)?;
     let mut log = LogReader::open(path)?;
