@@ -1,6 +1,5 @@
 //! Input of the subcommands: scenes and commands.
 
-pub(crate) mod command_file;
 pub(crate) mod command_source;
 pub(crate) mod scene_source;
 mod text_file;

@@ -1,6 +1,8 @@
-//! The recording format, from the bytes of a message to the state at any step.
+//! The recording format, from the bytes of a message to the state at any step, and files of commands in
+//! the form of its outcomes.
 
 mod backlog;
+mod command_file;
 mod encoding;
 mod gaps;
 mod index;
@@ -15,6 +17,7 @@ mod topic;
 mod writer;
 
 pub use backlog::Backlog;
+pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_commands};
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
 pub use gaps::GapCounter;
 pub use index::{ChunkEntry, IndexedLog};

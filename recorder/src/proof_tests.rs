@@ -11,12 +11,13 @@ mod rows;
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use recorder::{Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, Topic};
+use recorder::{
+    Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, TimedCommand, Topic, parse_commands,
+};
 use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
 use crate::commands::verify::{Report, Verdict, verify};
-use crate::input::command_file::{self, TimedCommand};
 use crate::simulation::{Job, SimulationResult, simulate};
 
 const COMMANDS: &str = r#"
@@ -33,7 +34,7 @@ const COMMANDS: &str = r#"
 
 fn job(scene: &str, commands: &str, steps: u64) -> Job {
     let scene = Scene::from_toml(builtin::text(scene).unwrap(), scene).unwrap();
-    Job { scene, commands: command_file::parse(commands, "test").unwrap(), steps }
+    Job { scene, commands: parse_commands(commands, "test").unwrap(), steps }
 }
 
 fn record(job: &Job) -> (Vec<u8>, SimulationResult) {

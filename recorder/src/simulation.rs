@@ -10,11 +10,10 @@ pub(crate) mod state_writer;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use recorder::{LogWriter, OutcomeRow, WriteError};
+use recorder::{LogWriter, OutcomeRow, TimedCommand, WriteError};
 use sim_contract::{Command, Outcome, Reason};
 use sim_solver::{Applied, Solver};
 
-use crate::input::command_file::TimedCommand;
 use apply::apply;
 pub(crate) use job::Job;
 use state_writer::{KeyframeDue, StateWriter};

@@ -185,15 +185,15 @@ impl fmt::Display for Summary {
 
 #[cfg(test)]
 mod tests {
+    use recorder::parse_commands;
     use sim_solver::{Scene, builtin};
 
     use super::*;
-    use crate::input::command_file;
 
     fn job(steps: u64) -> Job {
         let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
         let lines = "{\"step\":10,\"kind\":\"pause\"}\n{\"step\":40,\"kind\":\"pause\"}";
-        Job { scene, commands: command_file::parse(lines, "test").unwrap(), steps }
+        Job { scene, commands: parse_commands(lines, "test").unwrap(), steps }
     }
 
     #[test]

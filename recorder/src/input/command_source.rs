@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use recorder::{LogEnd, LogReader, Message, OutcomeRow};
+use recorder::{
+    LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands, sort_commands,
+};
 use sim_contract::Stop;
 
-use super::command_file::{self, TimedCommand};
 use super::scene_source::has_extension;
 use super::text_file::read_text_file;
 
@@ -24,7 +25,7 @@ pub(crate) fn load_commands(source: &str, stop: &Stop) -> anyhow::Result<Vec<Tim
     }
     let text = read_text_file(Path::new(source), COMMAND_FILE_SIZE_BYTES_MAX)
         .with_context(|| format!("{source}: cannot read the commands"))?;
-    Ok(command_file::parse(&text, source)?)
+    Ok(parse_commands(&text, source)?)
 }
 
 fn commands_in_recording(path: &Path, stop: &Stop) -> anyhow::Result<Vec<TimedCommand>> {
@@ -55,7 +56,7 @@ fn commands_in_recording(path: &Path, stop: &Stop) -> anyhow::Result<Vec<TimedCo
             row.outcome_count
         );
     }
-    command_file::sort(&mut commands);
+    sort_commands(&mut commands);
     Ok(commands)
 }
 

@@ -3,13 +3,12 @@
 
 use std::sync::atomic::AtomicBool;
 
-use recorder::{LogReader, Message, OutcomeRow};
+use recorder::{LogReader, Message, OutcomeRow, parse_commands};
 use sim_contract::ActionFields;
 use sim_solver::{PARAMETERS, Scene};
 
 use super::{check, rebuild, record};
 use crate::commands::verify::{Verdict, verify};
-use crate::input::command_file;
 use crate::simulation::Job;
 
 /// A cloth between two anchors, in the wind, above a floor and beside a rotating box.
@@ -120,7 +119,7 @@ pub(super) fn job(commands: &str) -> Job {
 
 pub(super) fn job_of(scene: &str, commands: &str) -> Job {
     let scene = Scene::from_toml(scene, "proof").unwrap();
-    Job { scene, commands: command_file::parse(commands, "test").unwrap(), steps: STEPS }
+    Job { scene, commands: parse_commands(commands, "test").unwrap(), steps: STEPS }
 }
 
 /// Collects the values that `pick` returns for the messages of a recording.

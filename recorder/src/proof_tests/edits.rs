@@ -14,7 +14,9 @@ use std::sync::atomic::AtomicBool;
 
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
-use recorder::{Closing, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic};
+use recorder::{
+    Closing, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic, parse_commands,
+};
 use sim_contract::NodeStatus;
 use sim_solver::{Scene, Solver};
 
@@ -24,7 +26,6 @@ use json::json_edits;
 use not_compared::not_compared;
 
 use crate::commands::verify::{Verdict, verify};
-use crate::input::command_file;
 use crate::proof_tests::finish;
 use crate::simulation::{Job, simulate};
 
@@ -67,7 +68,7 @@ type Record = (u8, Vec<u8>);
 
 fn written() -> Vec<u8> {
     let scene = Scene::from_toml(SCENE, "edits.toml").unwrap();
-    let commands = command_file::parse(COMMANDS, "test").unwrap();
+    let commands = parse_commands(COMMANDS, "test").unwrap();
     let job = Job { scene, commands, steps: STEPS };
     let solver = Solver::new(&job.scene);
     let (run, scene) = (job.description(&solver), job.scene.to_toml());

@@ -1,11 +1,10 @@
 //! The inputs of a simulation.
 
-use recorder::RunDescription;
+use recorder::{RunDescription, TimedCommand};
 use sim_contract::CONTRACT_VERSION;
 use sim_solver::{SOLVER_VERSION, Scene, Solver};
 
 use super::run_id::RunId;
-use crate::input::command_file::TimedCommand;
 
 /// The inputs of a simulation.
 #[derive(Debug)]

@@ -316,6 +316,20 @@ fn in_two_dimensions_a_keyframe_with_a_target_off_the_plane_is_refused() {
 }
 
 #[test]
+fn a_keyframe_with_tethers_is_refused_by_a_scene_without_them() {
+    let [with, mut without] = [true, false].map(|tethers| {
+        let text = format!(
+            "version = 1\n[solver]\ntethers = {tethers}\n[[particle]]\nposition = [0, 0, 0]\n\
+             pinned = true\n[[particle]]\nposition = [1, 0, 0]\n[[constraint]]\n\
+             particles = [0, 1]\n"
+        );
+        Solver::new(&Scene::from_toml(&text, "test").unwrap())
+    });
+    let error = without.restore(&particles(&with), &with.keyframe()).unwrap_err().to_string();
+    assert!(error.contains("its tethers belong to another scene"), "{error}");
+}
+
+#[test]
 fn damaged_keyframes_are_refused() {
     let bytes = Solver::new(&scene()).keyframe().encode();
     let mut other_version = bytes.clone();

@@ -149,6 +149,39 @@ fn a_scene_with_every_key_survives_the_round_trip_through_its_complete_text() {
     assert_eq!(scene.particles[0].mass.to_bits(), 0.3_f32.to_bits());
 }
 
+/// Every shape that a scene of 2 dimensions may have, with its required keys.
+const PLANAR_SHAPES: [&str; 6] = [
+    "shape = \"cloth\"\ncolumns = 3\nrows = 2\nspacing = 1\n",
+    "shape = \"mesh\"\ncolumns = 3\nrows = 2\nspacing = 1\n",
+    "shape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n",
+    "shape = \"web\"\nradius = 1\nspokes = 5\nrings = 2\n",
+    "shape = \"ragdoll\"\nheight = 1\n",
+    "shape = \"obj\"\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\nfaces = [[0, 1, 2]]\n",
+];
+
+#[test]
+fn every_shape_in_two_dimensions_survives_the_round_trip_through_its_complete_text() {
+    for shape in PLANAR_SHAPES {
+        let text = format!("version = 1\ndimensions = 2\n[[generate]]\n{shape}");
+        let scene = Scene::from_toml(&text, "x").unwrap();
+        assert_eq!(Scene::from_toml(&scene.to_toml(), "x"), Ok(scene), "{shape}");
+    }
+}
+
+#[test]
+fn a_web_out_of_the_plane_of_two_dimensions_is_refused() {
+    let web = |normal: &str| {
+        let shape = PLANAR_SHAPES[3];
+        let text = format!("version = 1\ndimensions = 2\n[[generate]]\n{shape}normal = {normal}\n");
+        Scene::from_toml(&text, "x")
+    };
+    assert!(web("[0, 0, -2]").is_ok());
+    for normal in ["[1, 0, 0]", "[0.1, 0, 1]"] {
+        let error = web(normal).unwrap_err();
+        assert!(error.problem.contains("in a scene of 2 dimensions"), "{error}");
+    }
+}
+
 #[test]
 fn an_empty_scene_is_valid_and_named_after_its_file() {
     let scene = Scene::from_toml("version = 1\n", "some/where/nothing.toml").unwrap();

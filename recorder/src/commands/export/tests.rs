@@ -212,7 +212,7 @@ fn a_reset_restores_torn_constraints() {
     let reset = r#"{"step":10,"kind":"cut","constraint":0}
         {"step":20,"kind":"reset"}"#;
     let scene = Scene::from_toml(TINY, "test").unwrap();
-    let commands = crate::input::command_file::parse(reset, "test").unwrap();
+    let commands = recorder::parse_commands(reset, "test").unwrap();
     let job = Job { scene, commands, steps: 30 };
     let solver = Solver::new(&job.scene);
     let (run, toml) = (job.description(&solver), job.scene.to_toml());

@@ -116,7 +116,7 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
             match self.next() {
                 Ok(Some(sample)) => *kept = Some(sample),
                 Ok(None) => break,
-                // The program holds so many that only one more can be read at a time.
+                // The program holds all but one of the messages that it may hold.
                 Err(ReadError::TooManyHeld { .. }) if kept.is_some() => break,
                 Err(error) => return Err(error),
             }

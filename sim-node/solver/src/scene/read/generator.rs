@@ -111,7 +111,7 @@ impl GeneratorFields<'_, '_> {
     fn web(&self) -> Result<Web, SceneError> {
         let file = self.file;
         let normal = file.normal.as_ref();
-        let normal = normal.map(|normal| self.reader.direction(&self.name("normal"), normal));
+        let normal = normal.map(|normal| self.reader.normal(&self.name("normal"), normal));
         Ok(Web {
             center: self.vector_or("center", file.center.as_ref(), [0.0; 3])?,
             radius: self.size("radius", file.radius.as_ref())?,

@@ -139,11 +139,17 @@ impl Reader<'_> {
         self.error(number.span(), field, problem)
     }
 
-    pub(super) fn vector(&self, field: &str, vector: &Vector) -> Result<[f32; 3], SceneError> {
+    /// Returns the numbers of a vector, also of one out of the plane of a scene of 2 dimensions.
+    fn axes(&self, field: &str, vector: &Vector) -> Result<[f32; 3], SceneError> {
         let mut axes = [0.0; 3];
         for (axis, number) in axes.iter_mut().zip(vector.get_ref().iter()) {
             *axis = self.ranged(field, number, POSITION)?;
         }
+        Ok(axes)
+    }
+
+    pub(super) fn vector(&self, field: &str, vector: &Vector) -> Result<[f32; 3], SceneError> {
+        let axes = self.axes(field, vector)?;
         if self.is_planar && axes[2] != 0.0 {
             let problem = format!("z is {} in a scene of 2 dimensions (allowed: 0)", axes[2]);
             return self.error(vector.span(), field, problem);
@@ -162,7 +168,13 @@ impl Reader<'_> {
 
     /// Returns a vector that is not zero.
     pub(super) fn direction(&self, field: &str, vector: &Vector) -> Result<[f32; 3], SceneError> {
-        let axes = self.vector(field, vector)?;
+        self.vector(field, vector)?;
+        self.normal(field, vector)
+    }
+
+    /// Returns the normal of a plane. The normal of the plane of a scene of 2 dimensions is out of it.
+    pub(super) fn normal(&self, field: &str, vector: &Vector) -> Result<[f32; 3], SceneError> {
+        let axes = self.axes(field, vector)?;
         if axes != [0.0; 3] {
             return Ok(axes);
         }

@@ -5,20 +5,23 @@ use sim_contract::{Action, ActionFields, PlainF32, Text};
 
 /// A command and the step in which it takes effect.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct TimedCommand {
+pub struct TimedCommand {
     /// The first step that shows the effect.
-    pub(crate) step: u64,
+    pub step: u64,
     /// Number of the outcome in the log that the command comes from.
-    pub(crate) index: Option<u64>,
-    pub(crate) client_id: u64,
-    pub(crate) sequence: u64,
-    pub(crate) action: Action,
+    pub index: Option<u64>,
+    /// Sender of the command. 0 is the console.
+    pub client_id: u64,
+    /// Number of the command among those of its client; by default its line in the file.
+    pub sequence: u64,
+    /// The command.
+    pub action: Action,
 }
 
 /// An error in a command file, with its position.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{label}:{line}: {}: {} (allowed: {})", .error.field, .error.problem, .error.allowed)]
-pub(crate) struct CommandFileError {
+pub struct CommandFileError {
     label: String,
     /// From 1.
     line: usize,
@@ -38,7 +41,10 @@ const COMMON_FIELDS: [&str; 8] =
     ["step", "kind", "client_id", "sequence", "index", "status", "reason", "disconnected"];
 
 /// Parses commands and sorts them in the order of application. `label` names the file in errors.
-pub(crate) fn parse(text: &str, label: &str) -> Result<Vec<TimedCommand>, CommandFileError> {
+///
+/// # Errors
+/// A line is not a command. The error names the line, the field and what is allowed.
+pub fn parse_commands(text: &str, label: &str) -> Result<Vec<TimedCommand>, CommandFileError> {
     let mut commands = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         if text.trim().is_empty() {
@@ -50,13 +56,13 @@ pub(crate) fn parse(text: &str, label: &str) -> Result<Vec<TimedCommand>, Comman
         })?;
         commands.push(command);
     }
-    sort(&mut commands);
+    sort_commands(&mut commands);
     Ok(commands)
 }
 
 /// Sorts by step, then by index, then by client and sequence. Commands without an index come last in
 /// their step.
-pub(crate) fn sort(commands: &mut [TimedCommand]) {
+pub fn sort_commands(commands: &mut [TimedCommand]) {
     commands.sort_by_key(|command| {
         let index = command.index.unwrap_or(u64::MAX);
         (command.step, index, command.client_id, command.sequence)
@@ -175,7 +181,7 @@ mod tests {
     use super::*;
 
     fn error(text: &str) -> String {
-        parse(text, "drag.jsonl").unwrap_err().to_string()
+        parse_commands(text, "drag.jsonl").unwrap_err().to_string()
     }
 
     #[test]
@@ -187,7 +193,7 @@ mod tests {
             {"step":3,"kind":"pause","client_id":2,"sequence":99}
             {"step":5,"kind":"release","particle":1,"index":8,"status":"applied","reason":""}
             {"step":5,"kind":"step","count":2,"index":7,"status":"rejected","reason":"x"}"#;
-        let commands = parse(text, "x").unwrap();
+        let commands = parse_commands(text, "x").unwrap();
         let order: Vec<_> = commands.iter().map(|c| (c.step, c.client_id, c.sequence)).collect();
         assert_eq!(order, [(3, 2, 99), (3, 7, 3), (3, 7, 4), (5, 0, 7), (5, 0, 6), (9, 0, 2)]);
         assert_eq!(commands[0].action, Action::Pause);
@@ -197,7 +203,7 @@ mod tests {
     #[test]
     fn a_line_of_a_log_is_a_command() {
         let line = r#"{"step":3,"client_id":7,"sequence":8,"index":0,"kind":"grab","particle":1,"target":["-inf",0.1,-0.0],"over_s":0.25,"status":"rejected","reason":"non_finite"}"#;
-        let commands = parse(line, "x").unwrap();
+        let commands = parse_commands(line, "x").unwrap();
         let target = [f32::NEG_INFINITY, 0.1, -0.0];
         let action = Action::Grab { particle: 1, target, over_s: 0.25 };
         let expected = TimedCommand { step: 3, index: Some(0), client_id: 7, sequence: 8, action };
@@ -209,7 +215,7 @@ mod tests {
         for action in Action::samples() {
             let mut line = serde_json::to_value(action).unwrap();
             line["step"] = 1.into();
-            assert_eq!(parse(&line.to_string(), "x").unwrap()[0].action, action);
+            assert_eq!(parse_commands(&line.to_string(), "x").unwrap()[0].action, action);
         }
     }
 

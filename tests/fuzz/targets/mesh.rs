@@ -1,0 +1,58 @@
+//! Meshes: a parsed one keeps the promises of its type, prints as OBJ that reads back the same, and
+//! becomes a scene or an error.
+#![no_main]
+
+use std::fmt::Write;
+
+use libfuzzer_sys::fuzz_target;
+use sim_solver::Scene;
+use sim_solver::scene::Mesh;
+
+const SCENE: &str = "version = 1\n[[generate]]\nshape = \"obj\"\npath = \"mesh.obj\"\n";
+
+fuzz_target!(|text: &str| {
+    let read_file = |_: &str| Ok(text.to_owned());
+    let scene = Scene::from_toml_with_files(SCENE, "scene.toml", &read_file);
+    let Ok(parsed) = Mesh::from_obj(text) else {
+        assert!(scene.is_err());
+        return;
+    };
+    check(&parsed.mesh);
+    let again = Mesh::from_obj(&obj(&parsed.mesh)).expect("a printed mesh is valid").mesh;
+    assert_eq!((&again.vertices, &again.faces), (&parsed.mesh.vertices, &parsed.mesh.faces));
+    if let Ok(scene) = scene {
+        let again =
+            Scene::from_toml(&scene.to_toml(), "scene.toml").expect("a printed scene is valid");
+        assert_eq!(Scene { read_warnings: scene.read_warnings.clone(), ..again }, scene);
+    }
+});
+
+fn check(mesh: &Mesh) {
+    let count = mesh.vertices.len();
+    let mut is_used = vec![false; count];
+    for face in &mesh.faces {
+        let mut corners = face.clone();
+        corners.sort_unstable();
+        corners.dedup();
+        assert!(corners.len() == face.len() && face.len() >= 3);
+        corners.iter().for_each(|corner| is_used[*corner as usize] = true);
+    }
+    assert!(is_used.iter().all(|is_used| *is_used));
+    assert!(mesh.vertices.iter().flatten().all(|axis| axis.is_finite()));
+    for members in mesh.groups.values() {
+        assert!(members.is_sorted() && members.iter().all(|member| (*member as usize) < count));
+    }
+}
+
+/// Prints a mesh without its groups.
+fn obj(mesh: &Mesh) -> String {
+    let mut text = String::new();
+    for [x, y, z] in &mesh.vertices {
+        _ = writeln!(text, "v {x} {y} {z}");
+    }
+    for face in &mesh.faces {
+        let corners: Vec<_> = face.iter().map(|corner| (corner + 1).to_string()).collect();
+        _ = writeln!(text, "f {}", corners.join(" "));
+    }
+    text
+}

@@ -1,0 +1,4 @@
+//! Recordings: the bytes of a file.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| fuzz::recording::check(data));
