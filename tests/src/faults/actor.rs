@@ -129,7 +129,7 @@ impl Actor {
         let is_expected = match (code, signal) {
             (Some(code), _) => ends.allow_code(*code, stderr, &sent),
             (None, Some(signal)) => sent.iter().any(|sent| {
-                let is_fatal = [Signal::KILL, Signal::HUP].contains(sent) || is_signalled_early;
+                let is_fatal = *sent == Signal::KILL || is_signalled_early;
                 sent.as_raw() == *signal && is_fatal
             }),
             (None, None) => false,

@@ -33,7 +33,7 @@ const REPORTS: Ends = Ends { codes: &[0, 3], errors: &[], needs_no_signal: true 
 /// Ends of `info` and `verify` for a file in which nothing was recorded.
 const REPORTS_NOTHING: Ends = Ends {
     codes: &[0, 3],
-    errors: &["is not an MCAP file", "has no snapshot with a keyframe"],
+    errors: &["is empty: a recorder", "is not an MCAP file", "has no snapshot with a keyframe"],
     needs_no_signal: true,
 };
 
