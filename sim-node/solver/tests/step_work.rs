@@ -126,7 +126,7 @@ fn a_step_is_given_up_when_the_flag_is_set_and_is_the_same_step_when_it_is_not()
     }
     stop.store(true, Ordering::Relaxed);
     assert!(!interruptible.step_unless(&stop));
-    // What the last complete step has published stays.
+    // The particles and the hash are still those of the last complete step.
     assert_eq!(interruptible.state_hash(), plain.state_hash());
     assert_eq!(interruptible.particles(), plain.particles());
 }
