@@ -246,6 +246,7 @@ impl Recording {
         log_time_ns: u64,
     ) -> anyhow::Result<()> {
         let Some(file) = self.file.take() else { return Ok(()) };
+        output::note(&format!("recording from step {}", self.intake.first_step().unwrap_or(0)));
         let (queue, options) = (CloseOnDrop(Arc::clone(&self.queue)), args.file.clone());
         let writing = thread::Builder::new().name("writer".to_owned()).spawn(move || {
             let log = options.begin(file, &header.run, &header.scene, log_time_ns)?;

@@ -65,6 +65,9 @@ fn run() -> anyhow::Result<()> {
     recorder.wait_until_ready();
     let mut viewer = start_viewer(&domain);
     let url = viewer.wait_for_line("ready ");
+    // A recording begins with a keyframe, which arrives a moment after the recorder is ready. Ctrl-C
+    // before that would leave nothing to describe.
+    recorder.wait_for_line("recording from step ");
     note("the node is running and being recorded; press Ctrl-C to end the demo");
     note(&format!("open in a browser:  {}", url.trim_start_matches("ready ")));
 

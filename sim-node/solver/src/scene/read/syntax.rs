@@ -1,13 +1,17 @@
-//! Errors of the TOML parser, in the words of this program.
+//! The TOML parser, with its errors in the words of this program.
+
+mod text_size;
 
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
 
 use crate::scene::error::{Place, SceneError};
+pub(super) use text_size::check_size;
 
 /// Parses TOML into a file structure. An error names the line, the field and what is allowed.
 pub(super) fn parse<T: DeserializeOwned>(place: &Place<'_>) -> Result<T, SceneError> {
+    check_size(place)?;
     let deserializer = toml::Deserializer::parse(place.text)
         .map_err(|error| syntax_error(place, &error, String::new()))?;
     serde_path_to_error::deserialize(deserializer).map_err(|error| {
