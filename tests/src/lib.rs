@@ -7,6 +7,7 @@ pub mod faults;
 mod process;
 mod programs;
 mod sandbox;
+mod signals;
 mod streams;
 mod wait;
 

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use sim_contract::Endpoint;
 use sim_contract::testing::TestDomain;
 
+use crate::signals;
+
 /// A domain that no other test uses, and a folder for files. Dropping it removes both.
 #[derive(Debug)]
 pub struct Sandbox {
@@ -25,6 +27,7 @@ impl Sandbox {
     /// # Panics
     /// If the folder cannot be created.
     pub fn new() -> Self {
+        signals::receive_in_programs();
         let domain = TestDomain::new();
         let folder = std::env::temp_dir().join(format!("catenary-{}", domain.name()));
         fs::create_dir_all(&folder).expect("a scratch folder");

@@ -382,9 +382,14 @@ fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<Vec<Family>> {
 
 #[cfg(test)]
 mod tests {
-    //! The choice between rows and the graph. That it changes no bit is tested with the kernels.
+    //! The choice between rows and the graph, and passes that are given up. That the choice changes no
+    //! bit is tested with the kernels.
+    use std::sync::atomic::AtomicBool;
+
     use super::*;
     use crate::scene::Scene;
+    use crate::solver::Solver;
+    use crate::step::prediction::Prediction;
 
     fn count_in_rows(columns: u32, rows: u32) -> usize {
         let text = format!(
@@ -399,5 +404,34 @@ mod tests {
         assert_eq!([count_in_rows(1, 65_537), count_in_rows(15, 65_537)], [0, 0]);
         assert_eq!([count_in_rows(16, 65_537), count_in_rows(1, 65_536)], [1, 1]);
         assert_eq!(count_in_rows(65_537, 1), 1);
+    }
+
+    /// A long pass must see the flag on its way, not only between passes.
+    #[test]
+    fn a_pass_that_is_given_up_moves_no_particle() {
+        let text = "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 20\nrows = 20\n\
+            spacing = 0.01\n[[generate]]\nshape = \"rope\"\ncount = 20\nfrom = [0, 0, 1]\n\
+            to = [1, 0, 1]\n";
+        let scene = Scene::from_toml(text, "test").unwrap();
+        for is_given_up in [true, false] {
+            let Solver { mut store, mut particles, .. } = Solver::new(&scene);
+            let before = particles.states.clone();
+            let free_count = before.iter().filter(|one| one.inverse_mass > 0.0).count();
+            let (gain, h) = ([0.0, -0.01, 0.0], 0.001);
+            let prediction = Prediction { h, kept: 1.0, gain, reach: 1.0, is_first: true };
+            let stop = AtomicBool::new(is_given_up);
+            let inputs = SubstepInputs { prediction, obstacles: &[], stop: &stop };
+            store.unpack(&particles.states);
+            let ParticleStore { workers, graph, patches, .. } = &mut store;
+            for pass in Pass::all(2) {
+                graph.run_pass(workers, pass, &inputs);
+                for patch in &mut *patches {
+                    patch.run_pass(workers, pass, &inputs);
+                }
+            }
+            store.pack(&mut particles.states, h);
+            let moved = before.iter().zip(&particles.states).filter(|(a, b)| a != b).count();
+            assert_eq!(moved, if is_given_up { 0 } else { free_count });
+        }
     }
 }

@@ -7,6 +7,8 @@ use std::path::Path;
 
 use rustix::fs::{major, minor};
 
+use crate::files::place::is_in_place;
+
 /// Result of locking a file that is open for writing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Lock {
@@ -23,13 +25,11 @@ pub(super) enum Lock {
 
 /// Locks a file that was opened as `path`. A file system without locks cannot refuse a second writer.
 pub(super) fn lock(file: &File, path: &Path) -> io::Result<Lock> {
-    let metadata = file.metadata()?;
     if let Err(TryLockError::WouldBlock) = file.try_lock() {
-        return Ok(Lock::Taken { process_id: lock_holder(&metadata) });
+        return Ok(Lock::Taken { process_id: lock_holder(&file.metadata()?) });
     }
     // The writer that held the lock before may have renamed the file when it finished.
-    let is_same = |named: Metadata| (named.dev(), named.ino()) == (metadata.dev(), metadata.ino());
-    Ok(if fs::metadata(path).is_ok_and(is_same) { Lock::Held } else { Lock::Moved })
+    Ok(if is_in_place(file, path) { Lock::Held } else { Lock::Moved })
 }
 
 /// Returns the process that holds the lock of a file.

@@ -2,11 +2,12 @@
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::Config;
 
+use crate::files::place::is_in_place;
 use crate::ports::domain::files::SHARED_MEMORY;
 use crate::ports::domain::root;
 
@@ -109,9 +110,7 @@ impl LockFile {
     }
 
     fn is_in_place(&self) -> bool {
-        let inode = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
-        let locked = self.file.metadata().map(inode);
-        matches!((locked, fs::symlink_metadata(&self.path).map(inode)), (Ok(a), Ok(b)) if a == b)
+        is_in_place(&self.file, &self.path)
     }
 }
 

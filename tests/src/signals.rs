@@ -1,0 +1,30 @@
+//! The signals that the tests send, as the programs receive them.
+
+use std::fs;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Once};
+
+use signal_hook::consts::{SIGHUP, SIGINT};
+use signal_hook::flag;
+
+/// Makes programs that are started from now on receive SIGINT and SIGHUP, even if these tests were
+/// started in the background or by `nohup`. A program inherits an ignored signal as ignored, but a
+/// handled one as default. For the tests themselves, such a signal still has no effect.
+pub(crate) fn receive_in_programs() {
+    static HANDLERS: Once = Once::new();
+    HANDLERS.call_once(|| {
+        let ignored = ignored_signals();
+        for signal in [SIGINT, SIGHUP] {
+            if ignored & (1 << (signal - 1)) != 0 {
+                flag::register(signal, Arc::new(AtomicBool::new(false))).expect("a handler");
+            }
+        }
+    });
+}
+
+/// Returns the signals that this process ignores: signal n as bit n - 1.
+fn ignored_signals() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+}
