@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod fairness;
+mod full_memory;
 mod grabs;
 mod owner;
 mod stop;

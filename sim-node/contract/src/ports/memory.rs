@@ -25,6 +25,15 @@ pub struct MemoryError {
     pub available_mib: u64,
 }
 
+/// Shared memory for the ports and connections of one process. iceoryx2 writes to them without
+/// allocating them first.
+const PORTS_SIZE_BYTES: u64 = 2 << 20;
+
+/// Checks that there is memory for the ports and connections of this process.
+pub(crate) fn check_ports() -> Result<(), MemoryError> {
+    check(PORTS_SIZE_BYTES)
+}
+
 /// Checks that a number of bytes are free in `/dev/shm`.
 pub(crate) fn check(needed_bytes: u64) -> Result<(), MemoryError> {
     match available_bytes() {

@@ -10,6 +10,7 @@ use crate::messages::parameters::ParametersHeader;
 use crate::messages::snapshot::SnapshotHeader;
 use crate::messages::tears::TearsHeader;
 use crate::messages::topology::{KeyframeHeader, LoadHeader};
+use crate::ports::memory;
 use crate::ports::service::ServiceError;
 use crate::ports::session::CLEANUP_TIMEOUT;
 
@@ -73,13 +74,16 @@ pub(crate) struct PortLimit {
     pub(crate) max: usize,
 }
 
-/// Creates a port. At the limit, frees the ports of dead processes and tries again.
+/// Creates a port, unless shared memory is full. At the limit, frees the ports of dead processes and tries again.
 pub(crate) fn create_port<T, E: PartialEq + Debug>(
     service: &impl PortFactory,
     full: &E,
     limit: PortLimit,
     create: impl Fn() -> Result<T, E>,
 ) -> Result<T, ServiceError> {
+    // Checked for each port, because a client creates some of them long after it joined.
+    memory::check_ports()
+        .map_err(|memory| ServiceError::Memory { service: service.name().to_string(), memory })?;
     let created = match create() {
         Err(error) if error == *full => {
             service.blocking_cleanup_dead_nodes(CLEANUP_TIMEOUT);

@@ -35,10 +35,6 @@ const ATTEMPTS_MAX: usize = 20;
 /// Longest wait for another process that cleans up after a dead process.
 pub(crate) const CLEANUP_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// Shared memory for the ports and connections of one process. iceoryx2 writes to them without
-/// allocating them first.
-const PORTS_SIZE_BYTES: u64 = 2 << 20;
-
 /// An iceoryx2 node in the domain of an endpoint. It handles no signals; programs do.
 #[derive(Debug)]
 pub(crate) struct Session {
@@ -83,7 +79,7 @@ impl Session {
         let private = |cause| ServiceError::Root { endpoint: endpoint.clone(), cause };
         let root = root::prepare(&root::path(&config)).map_err(private)?;
         unfinished::remove_segments(&config);
-        memory::check(PORTS_SIZE_BYTES)
+        memory::check_ports()
             .map_err(|memory| ServiceError::NoMemory { endpoint: endpoint.clone(), memory })?;
         let is_named = endpoint.domain().is_some();
         if is_named {
