@@ -3,6 +3,7 @@
 mod boundary;
 mod grab_connections;
 mod inbox;
+mod loading;
 mod pace;
 mod progress;
 mod publisher;
@@ -20,7 +21,7 @@ use pace::Pace;
 use progress::Progress;
 use publisher::{Position, Publisher, StepTimes};
 use statistics::Statistics;
-use threads::with_threads;
+pub(crate) use threads::with_threads;
 use warnings::Warnings;
 
 /// Time between two status messages: 10 Hz.
@@ -78,8 +79,12 @@ pub(crate) struct Node {
 
 impl Node {
     /// Takes the name and publishes the scene, without starting the run.
-    pub(crate) fn new(endpoint: &Endpoint, scene: Scene, options: Options) -> anyhow::Result<Self> {
-        let solver = with_threads(Solver::new(&scene), options.threads);
+    pub(crate) fn new(
+        endpoint: &Endpoint,
+        scene: Scene,
+        solver: Solver,
+        options: Options,
+    ) -> anyhow::Result<Self> {
         let publisher = Publisher::new(endpoint, &scene, &solver, options.every)?;
         let now_ns = monotonic_ns();
         Ok(Self {

@@ -6,10 +6,10 @@ use std::time::Duration;
 use anyhow::anyhow;
 use serde::Serialize;
 use sim_contract::{Endpoint, Stop, report_bus_errors};
-use sim_solver::Scene;
+use sim_solver::{Scene, Solver};
 
 use crate::args::RunArgs;
-use crate::node::{Node, Options};
+use crate::node::{Node, Options, with_threads};
 use crate::{output, scene_source};
 
 /// Summary at the end of a run.
@@ -45,9 +45,11 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         every: args.every,
     };
     warn(&scene);
+    // Building a large scene takes seconds. Until the node owns anything, a signal ends it at once.
+    let solver = with_threads(Solver::new(&scene), options.threads);
     let stop = Stop::install()?;
     report_bus_errors()?;
-    let mut node = Node::new(&endpoint, scene, options)?;
+    let mut node = Node::new(&endpoint, scene, solver, options)?;
     print_ready(&endpoint, &node);
     let is_terminal = stderr().is_terminal();
     let shows_status = is_terminal && !args.json;

@@ -208,6 +208,20 @@ impl Process {
         });
     }
 
+    /// Waits until the program has started a thread with a name.
+    ///
+    /// # Panics
+    /// If the deadline passes.
+    pub fn wait_for_thread(&self, name: &str) {
+        let path = format!("/proc/{}/task", self.child.id());
+        wait_for(&format!("the thread {name} of {}", self.title), || {
+            std::fs::read_dir(&path).ok()?.flatten().find(|thread| {
+                let found = std::fs::read_to_string(thread.path().join("comm"));
+                found.is_ok_and(|found| found.trim_end() == name)
+            })
+        });
+    }
+
     /// Sends a signal.
     ///
     /// # Panics

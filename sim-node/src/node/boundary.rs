@@ -5,11 +5,10 @@ use sim_contract::clock::monotonic_ns;
 use sim_contract::{
     Action, COMMANDS_PER_STEP_MAX, Command, OwnerError, Reason, ReceivedCommand, Stop,
 };
-use sim_solver::{Applied, Control, Scene, Solver};
+use sim_solver::{Applied, Control};
 
-use super::threads::with_threads;
-use super::{Node, Options};
-use crate::scene_source;
+use super::Node;
+use super::loading::load_scene;
 
 impl Node {
     /// Applies the commands that have arrived, at the boundary before the next step.
@@ -72,18 +71,16 @@ impl Node {
     /// Replaces the scene; the next step shows the initial state of the new one. The rate must stay.
     /// The inner result is the outcome. An outer error leaves neither scene able to continue.
     fn load(&mut self, source: &str, stop: &Stop) -> anyhow::Result<Result<(), Reason>> {
-        let scene = match self.read_scene(source) {
-            Ok(scene) => scene,
-            Err((problem, reason)) => {
+        let rate_hz = self.scene.solver.rate_hz;
+        let (scene, solver) = match load_scene(source, self.options, rate_hz, stop) {
+            Some(Ok(loaded)) => loaded,
+            Some(Err((problem, reason))) => {
                 self.warnings.print(&format!("load {source}: {problem}"));
                 return Ok(Err(reason));
             }
+            // This node ends.
+            None => return Ok(Err(Reason::NoEffectHere)),
         };
-        // Reading and building a large scene take seconds each.
-        if stop.is_requested() {
-            return Ok(Err(Reason::NoEffectHere));
-        }
-        let solver = with_threads(Solver::new_in_run(&scene), self.options.threads);
         match self.publisher.load(&scene, &solver, self.step + 1, self.progress.time_scale) {
             Err(error @ OwnerError::Publish(_)) => {
                 Err(error).context("publishing the loaded scene")
@@ -98,19 +95,5 @@ impl Node {
                 Ok(Ok(()))
             }
         }
-    }
-
-    /// Reads a scene that this run can continue with, or returns the problem and the reason.
-    fn read_scene(&self, source: &str) -> Result<Scene, (String, Reason)> {
-        let out_of_range = |problem| (problem, Reason::OutOfRange);
-        let mut scene =
-            scene_source::load(source).map_err(|error| out_of_range(format!("{error:#}")))?;
-        let Options { rate_hz, substeps, .. } = self.options;
-        scene.override_solver(rate_hz, substeps).map_err(out_of_range)?;
-        let (own, other) = (self.scene.solver.rate_hz, scene.solver.rate_hz);
-        if own == other {
-            return Ok(scene);
-        }
-        Err((format!("the scene runs at {other} Hz, this node at {own} Hz"), Reason::NoEffectHere))
     }
 }

@@ -1,9 +1,10 @@
-//! Requests to stop are seen within a step, however long it takes.
+//! Requests to stop are seen within a step or a load, however long it takes.
 
 use std::fs;
 use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox, Signal, wait_for};
+use sim_contract::{Action, Client, Text};
 
 /// A scene whose step is near the limit of work, one constraint after the other: ten seconds or more
 /// on one core.
@@ -21,6 +22,24 @@ fn a_node_gives_up_a_long_step_and_publishes_nothing_of_it() {
         assert_eq!(finished.code, Some(0), "{}", finished.stderr);
         assert!(finished.stderr.contains("done: 0 steps"), "{}", finished.stderr);
     }
+}
+
+/// Takes seconds to read and build.
+const LARGE: &str = "version = 1\n[solver]\nrate_hz = 240\n[[generate]]\nshape = \"cloth\"\n\
+    columns = 600\nrows = 600\nspacing = 0.01\n";
+
+#[test]
+fn a_node_that_loads_a_large_scene_ends_without_finishing_it() {
+    let sandbox = Sandbox::new();
+    let scene = sandbox.write("large.toml", LARGE);
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--json"]);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    client.send(Action::Load { scene: Text::new(&scene).unwrap() }).unwrap();
+    node.wait_for_thread("load");
+    node.signal(Signal::TERM);
+    let finished = node.wait();
+    assert_eq!(finished.code, Some(0), "{}", finished.stderr);
+    assert_eq!(finished.json()["scene"], "curtain");
 }
 
 #[test]
