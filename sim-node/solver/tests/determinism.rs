@@ -304,6 +304,20 @@ fn a_pinned_particle_with_a_velocity_is_refused() {
 }
 
 #[test]
+fn a_zero_with_a_minus_sign_is_refused_because_no_step_publishes_one() {
+    let mut solver = Solver::new(&scene());
+    let (keyframe, good) = (solver.keyframe(), particles(&solver));
+    for number in 0..6 {
+        let mut wrong = good.clone();
+        let Particle { position, velocity, .. } = &mut wrong[0];
+        *position.iter_mut().chain(velocity).nth(number).unwrap() = -0.0;
+        let error = solver.restore(&wrong, &keyframe).unwrap_err().to_string();
+        assert!(error.contains("a zero has a minus sign"), "{error}");
+    }
+    solver.restore(&good, &keyframe).unwrap();
+}
+
+#[test]
 fn in_two_dimensions_a_keyframe_with_a_target_off_the_plane_is_refused() {
     let [mut plane, mut space] = [2, 3].map(|dimensions| {
         let text =

@@ -34,8 +34,12 @@ impl Solver {
 
     fn check_particle(&self, index: usize, particle: &Particle) -> Result<(), &'static str> {
         let is_fixed = particle.flags & ParticleFlags::ALL != 0;
-        if !particle.position.iter().chain(&particle.velocity).all(|number| number.is_finite()) {
+        let numbers = || particle.position.iter().chain(&particle.velocity);
+        if !numbers().all(|number| number.is_finite()) {
             return Err("a number is not finite");
+        }
+        if numbers().any(|number| number.to_bits() == (-0.0_f32).to_bits()) {
+            return Err("a zero has a minus sign");
         }
         if particle.flags & !ParticleFlags::ALL != 0 {
             return Err("its flags are unknown to this version");
