@@ -304,20 +304,37 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
+        // Read before the kill: they show where a program hangs.
+        let threads = if std::thread::panicking() { self.threads() } else { String::new() };
         // Errors mean that the process has already ended.
         let _ended = self.child.kill();
         let _ended = self.child.wait();
         if std::thread::panicking() {
             self.stdout.join();
             self.stderr.join();
-            show_failure(&self.title, &self.stdout.text(), &self.stderr.text());
+            let (title, stdout, stderr) = (&self.title, self.stdout.text(), self.stderr.text());
+            // A panic within a panic would abort the test.
+            console::note_lines(&format!(
+                "--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n{threads}---"
+            ));
         }
     }
 }
 
-fn show_failure(title: &str, stdout: &str, stderr: &str) {
-    // A panic within a panic would abort the test.
-    console::note_lines(&format!("--- {title}\n--- stdout:\n{stdout}\n--- stderr:\n{stderr}\n---"));
+impl Process {
+    /// Describes the threads of the program: state, system call, and the stack in the kernel if this
+    /// user may read it. Empty after its end.
+    fn threads(&self) -> String {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.child.id()));
+        let describe = |task: std::fs::DirEntry| {
+            let read = |file| std::fs::read_to_string(task.path().join(file)).unwrap_or_default();
+            let status = read("status");
+            let state = status.lines().find(|line| line.starts_with("State:")).unwrap_or_default();
+            let (name, call, stack) = (read("comm"), read("syscall"), read("stack"));
+            format!("--- thread {}, {state}, system call {call}{stack}", name.trim_end())
+        };
+        tasks.into_iter().flatten().flatten().map(describe).collect()
+    }
 }
 
 impl Finished {

@@ -104,12 +104,16 @@ impl World {
             return;
         }
         let client = self.client(0).expect("a client of a running node");
-        let (mut last, mut step) = (None, 0);
+        let (mut run_id, mut first, mut step) = (0, 0, 0);
         let mut deadline = Deadline::start();
         loop {
             deadline.check("a step of the node");
             let status = client.status(DEADLINE).expect("a status").expect("a running node");
-            if status.is_paused() || status.step >= *last.get_or_insert(status.step + steps) {
+            // The client may be older than the node, and have an unread status of the node before.
+            if status.run_id != run_id {
+                (run_id, first, step) = (status.run_id, status.step, status.step);
+            }
+            if status.is_paused() || status.step >= first + steps {
                 return;
             }
             // A busy machine makes few steps. Only a node that makes none is stuck.

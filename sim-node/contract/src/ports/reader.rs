@@ -171,7 +171,8 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
     /// Returns the newest value and drops older ones; `None` if all were read.
     pub(crate) fn newest(&self) -> Result<Option<T>, ReadError> {
         let mut newest = None;
-        for _ in 0..self.buffered {
+        // As for slices: a buffer of the writer before, and a buffer of the present one.
+        for _ in 0..2 * self.buffered {
             match self.next()? {
                 Some(value) => newest = Some(value),
                 None => break,

@@ -5,7 +5,7 @@ use std::sync::mpsc;
 use std::thread;
 
 use sim_contract::testing::TestDomain;
-use sim_contract::{AttachError, Client, Endpoint, Load, Owner, OwnerError, Tap};
+use sim_contract::{AttachError, Client, Endpoint, Load, NodeStatus, Owner, OwnerError, Tap};
 
 use crate::support::{
     DEADLINE, MOMENT, constraints, create_owner, load_header, publish_step, triangles,
@@ -113,4 +113,22 @@ fn a_client_stays_connected_when_a_new_owner_claims_the_name() {
     assert_eq!(client.topology(MOMENT).unwrap().unwrap().header.topology_revision, 2);
     // Snapshots of the first owner stay readable.
     assert_eq!((held.header().step, held.particles().len()), (41, 4));
+}
+
+#[test]
+fn a_status_of_a_new_owner_is_newer_than_all_unread_ones_of_the_owner_before() {
+    let domain = TestDomain::new();
+    let status = |run_id, step| NodeStatus { run_id, step, ..NodeStatus::default() };
+    let first = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    assert!(client.status(MOMENT).unwrap().is_none());
+    // More than any reader buffers.
+    for step in 0..100 {
+        first.publish_status(&status(1, step)).unwrap();
+    }
+    drop(first);
+    let second = create_owner(&domain.endpoint()).unwrap();
+    second.publish_status(&status(2, 7)).unwrap();
+    let newest = client.status(DEADLINE).unwrap().unwrap();
+    assert_eq!((newest.run_id, newest.step), (2, 7));
 }
