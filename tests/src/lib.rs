@@ -11,7 +11,7 @@ mod signals;
 mod streams;
 mod wait;
 
-pub use process::{Finished, Process, allow_many_open_files, ctl};
+pub use process::{Finished, Process, allow_many_open_files, ctl, record};
 pub use programs::{Program, build_products};
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;

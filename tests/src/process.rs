@@ -62,6 +62,16 @@ pub fn ctl(sandbox: &Sandbox, args: &[&str]) -> serde_json::Value {
     answer
 }
 
+/// Starts a recorder, and waits until the recording has begun.
+///
+/// # Panics
+/// If the recorder ends before, or the deadline passes.
+pub fn record(sandbox: &Sandbox, file: &str) -> Process {
+    let mut recorder = Process::start_ready(Program::Recorder, sandbox, &["record", "-o", file]);
+    recorder.wait_for_line("recording from step ");
+    recorder
+}
+
 /// Lets this process open as many files as the system allows, for tests with many sockets.
 ///
 /// # Panics

@@ -2,7 +2,7 @@
 //! snapshots show its effect, late subscribers see it, and a recording of it re-simulates bit for bit.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record};
 use sim_contract::{Action, Client, ColliderShape, ParticleFlags, Reason, TearCause, Text};
 
 /// A small cloth in the wind on an anchor, over a floor and beside a ball.
@@ -281,7 +281,7 @@ fn a_recording_of_every_command_re_simulates_bit_for_bit() {
     let sandbox = Sandbox::new();
     let node = node(&sandbox, &[]);
     let file = sandbox.path("all.mcap");
-    let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    let recording = record(&sandbox, &file);
     for args in APPLIED {
         ctl(&sandbox, args);
     }

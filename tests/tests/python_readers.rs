@@ -5,7 +5,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record};
 use serde_json::{Value, json};
 use sim_contract::{CONTRACT_VERSION, Client, TearCause};
 
@@ -23,7 +23,7 @@ fn the_stock_python_reader_finds_the_published_bits() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);
-    let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    let recording = record(&sandbox, &file);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let mut published = String::new();
     ctl(&sandbox, &["grab", "90", "0.5", "0.2", "0.3"]);

@@ -6,7 +6,7 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::process::Command;
 
-use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, ctl, wait_for};
+use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, ctl, record, wait_for};
 use sim_contract::{Action, Client, Text};
 
 /// Set inside the namespace.
@@ -46,8 +46,7 @@ fn run_with_full_memory() {
     step(&mut client);
     let outcome = client.request(Action::Pin { particle: 3 }, DEADLINE).unwrap();
     assert!(outcome.is_applied(), "{outcome:?}");
-    let mut recorder = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
-    recorder.wait_for_line("recording from step ");
+    let recorder = record(&sandbox, &file);
     let bridge =
         Process::start_ready(Program::ViewerBridge, &sandbox, &["--listen", "127.0.0.1:0"]);
 

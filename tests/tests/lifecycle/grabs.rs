@@ -1,11 +1,10 @@
 //! A grab lasts as long as the connection of its client, and the node logs the release as such. The
 //! clients are processes that are killed, so nothing of theirs can release a particle.
 
-use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, record, wait_for};
 use recorder::{LogReader, Message, OutcomeRow};
 use sim_contract::{Action, Client, Outcome, ParticleFlags, Tap, Update};
 
@@ -111,11 +110,7 @@ fn the_release_of_a_lost_grab_is_recorded_and_verified() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let node = node(&sandbox, &["run", "curtain"]);
-    let recorder = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
-    wait_for("a recording", || {
-        let part = fs::metadata(format!("{file}.part")).ok()?;
-        (part.len() > 50_000).then_some(())
-    });
+    let recorder = record(&sandbox, &file);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let killed = grabber(&sandbox, &["90"]);
     wait_for_grabs(&mut client, &[90]);

@@ -5,7 +5,9 @@ use std::fs::File;
 use std::path::Path;
 use std::time::Duration;
 
-use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, wait_for};
+use integration_tests::{
+    DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, record, wait_for,
+};
 use recorder::{Closing, Frame, FrameReader, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::{Action, Client, SnapshotFlags, SnapshotHeader, Tap};
 
@@ -13,7 +15,8 @@ fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
     Process::start_ready(Program::SimNode, sandbox, args)
 }
 
-fn record(sandbox: &Sandbox, file: &str) -> Process {
+/// Starts a recorder whose recording begins later: at a paused node, with the next step.
+fn ready_recorder(sandbox: &Sandbox, file: &str) -> Process {
     Process::start_ready(Program::Recorder, sandbox, &["record", "-o", file])
 }
 
@@ -164,7 +167,7 @@ fn a_recording_that_starts_while_the_node_is_paused_verifies() {
     ctl(&sandbox, &["step", "20"]);
     // A command is pending when the recorder attaches, so it cannot record step 20 as published.
     ctl(&sandbox, &["grab", "90", "0.5", "0.2", "0.3"]);
-    let recording = record(&sandbox, &file);
+    let recording = ready_recorder(&sandbox, &file);
     ctl(&sandbox, &["step", "30"]);
     assert_eq!(recording.interrupt().code, Some(0));
     let steps: Vec<_> = frames(&file).iter().map(|frame| frame.row.step).collect();
@@ -225,7 +228,7 @@ fn a_recording_of_a_playback_equals_the_original() {
 
     let play = ["play", &first, "--wait-for-readers", "2"];
     let player = Process::start_ready(Program::Recorder, &sandbox, &play);
-    let recording = record(&sandbox, &second);
+    let recording = ready_recorder(&sandbox, &second);
     let mut tap = Tap::attach(&sandbox.endpoint()).unwrap();
     let replayed = headers(&mut tap, 151);
     assert_eq!(player.wait().code, Some(0));

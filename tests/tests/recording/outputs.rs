@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use integration_tests::{Finished, Process, Program, Sandbox, ctl, wait_for};
+use integration_tests::{Finished, Process, Program, Sandbox, ctl, record, wait_for};
 use recorder::{LogEnd, LogReader};
 
 /// Limit on the size of files: several chunks, and less than any of the recordings here.
@@ -18,7 +18,7 @@ fn a_second_writer_of_a_file_is_refused_and_the_first_one_finishes() {
     let file = sandbox.path("run.mcap");
     let part = format!("{file}.part");
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope", "--paused"]);
-    let first = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    let first = record(&sandbox, &file);
     ctl(&sandbox, &["step", "20"]);
     for args in [
         &["record", "-o", &file][..],

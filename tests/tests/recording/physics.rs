@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use integration_tests::{Process, Program, Sandbox, wait_for};
+use integration_tests::{Process, Program, Sandbox, record, wait_for};
 use recorder::{Frame, FrameReader, LogReader, Message};
 
 use super::losses::recorded_steps;
@@ -81,7 +81,7 @@ fn a_late_recording_with_tears_a_reset_and_a_load_verifies_and_plays_back_row_fo
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", &scene, "--paused"]);
     // All of this happens before the recorder attaches.
     ctl(&sandbox, &["cut 9", "move-collider 0 0 0 -0.1", "step", "cut 4", "step 3"]);
-    let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &first]);
+    let recording = record(&sandbox, &first);
     ctl(&sandbox, &["step 5", "cut 20", "cut 11", "step 2", "move-collider 0 0 0 -0.2", "step 4"]);
     ctl(&sandbox, &["reset", "cut 9", "step", "cut 4", "step 3", "load curtain"]);
     // Another scene needs another file, so the recording ends with the load.
@@ -98,7 +98,7 @@ fn a_late_recording_with_tears_a_reset_and_a_load_verifies_and_plays_back_row_fo
     // four.
     let play = ["play", &first, "--paused"];
     let player = Process::start_ready(Program::Recorder, &sandbox, &play);
-    let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &second]);
+    let recording = record(&sandbox, &second);
     let part = format!("{second}.part");
     for frame in &one {
         let step = frame.row.step;

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use integration_tests::{Process, Program, Sandbox};
+use integration_tests::{Process, Program, Sandbox, record};
 use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
 use serde_json::{Value, json};
 use sim_contract::ParticleFlags;
@@ -288,7 +288,7 @@ fn a_recording_of_a_live_node_is_shown_as_recorded() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("live.mcap");
     let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
-    let recording = Process::start_ready(Program::Recorder, &sandbox, &["record", "-o", &file]);
+    let recording = record(&sandbox, &file);
     let live = Bridge::start(&sandbox);
     let mut page = live.page();
     let epoch = page.scene().stamp.epoch;
