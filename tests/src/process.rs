@@ -221,10 +221,11 @@ impl Process {
     /// Waits until the program has started a thread with a name.
     ///
     /// # Panics
-    /// If the deadline passes.
-    pub fn wait_for_thread(&self, name: &str) {
+    /// If the program ends before, or the deadline passes.
+    pub fn wait_for_thread(&mut self, name: &str) {
         let path = format!("/proc/{}/task", self.child.id());
         wait_for(&format!("the thread {name} of {}", self.title), || {
+            assert!(self.is_running(), "{} ended before it started the thread", self.title);
             std::fs::read_dir(&path).ok()?.flatten().find(|thread| {
                 let found = std::fs::read_to_string(thread.path().join("comm"));
                 found.is_ok_and(|found| found.trim_end() == name)
@@ -341,7 +342,8 @@ impl Process {
             let status = read("status");
             let state = status.lines().find(|line| line.starts_with("State:")).unwrap_or_default();
             let (name, call, stack) = (read("comm"), read("syscall"), read("stack"));
-            format!("--- thread {}, {state}, system call {call}{stack}", name.trim_end())
+            let (name, call) = (name.trim_end(), call.trim_end());
+            format!("--- thread {name}, {state}, system call {call}\n{stack}")
         };
         tasks.into_iter().flatten().flatten().map(describe).collect()
     }

@@ -1,4 +1,4 @@
-//! The signals that the tests send, as the programs receive them.
+//! Signal dispositions that programs inherit from the tests.
 
 use std::fs;
 use std::sync::atomic::AtomicBool;

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// Limit on every wait. It is generous, because the machine may be busy.
-pub const DEADLINE: Duration = Duration::from_mins(1);
+pub const DEADLINE: Duration = Duration::from_mins(3);
 
 /// A deadline for loops that may receive unrelated messages forever.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,7 @@
 //! Services, readers and writers. Beside the derives of the messages, only these files, `owner.rs`
 //! and `client/watch.rs` name iceoryx2.
 
+pub(crate) mod cleanup;
 pub(crate) mod connection;
 pub(crate) mod domain;
 pub(crate) mod latch;

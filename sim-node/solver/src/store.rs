@@ -406,7 +406,7 @@ mod tests {
         assert_eq!(count_in_rows(65_537, 1), 1);
     }
 
-    /// A long pass must see the flag on its way, not only between passes.
+    /// Each pass checks the flag itself, not only the loop over the passes.
     #[test]
     fn a_pass_that_is_given_up_moves_no_particle() {
         let text = "version = 1\n[[generate]]\nshape = \"cloth\"\ncolumns = 20\nrows = 20\n\

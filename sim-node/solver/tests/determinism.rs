@@ -307,10 +307,11 @@ fn a_pinned_particle_with_a_velocity_is_refused() {
 fn a_zero_with_a_minus_sign_is_refused_because_no_step_publishes_one() {
     let mut solver = Solver::new(&scene());
     let (keyframe, good) = (solver.keyframe(), particles(&solver));
-    for number in 0..6 {
+    for number in 0..7 {
         let mut wrong = good.clone();
-        let Particle { position, velocity, .. } = &mut wrong[0];
-        *position.iter_mut().chain(velocity).nth(number).unwrap() = -0.0;
+        // A pinned particle, whose inverse mass is 0.
+        let Particle { position, velocity, inverse_mass, .. } = &mut wrong[0];
+        *position.iter_mut().chain(velocity).chain([inverse_mass]).nth(number).unwrap() = -0.0;
         let error = solver.restore(&wrong, &keyframe).unwrap_err().to_string();
         assert!(error.contains("a zero has a minus sign"), "{error}");
     }

@@ -12,7 +12,7 @@ use super::Options;
 use super::threads::with_threads;
 use crate::scene_source;
 
-/// Time between two looks at the request to stop.
+/// Interval between two checks for a request to stop.
 const POLL: Duration = Duration::from_millis(50);
 
 /// A problem with a scene, and the reason in the outcome.
@@ -20,7 +20,7 @@ pub(super) type Refusal = (String, Reason);
 
 /// Reads and builds a scene for a node that runs at `rate_hz`.
 ///
-/// That takes seconds for a large scene, so a thread of its own does it. Returns `None` as soon as a
+/// That takes seconds for a large scene, so a thread of its own does it. Returns `None` soon after a
 /// stop is requested; the thread then ends with the process.
 pub(super) fn load_scene(
     source: &str,
@@ -51,7 +51,7 @@ fn read_scene(source: &str, options: Options, rate_hz: u32) -> Result<Scene, Ref
     Err((problem, Reason::NoEffectHere))
 }
 
-/// Does `work` in a thread of its own. Returns its result, or `None` once a stop is requested.
+/// Runs `work` on a thread of its own. Returns its result, or `None` if a stop is requested meanwhile.
 fn unless_stopped<T: Send + 'static>(
     stop: &Stop,
     work: impl FnOnce() -> T + Send + 'static,
@@ -59,13 +59,15 @@ fn unless_stopped<T: Send + 'static>(
     let (sender, receiver) = sync_channel(1);
     let worker = thread::Builder::new()
         .name("load".to_owned())
-        // Nobody waits for the result once a stop is requested.
-        .spawn(move || sender.send(work()).unwrap_or_default())
+        .spawn(move || {
+            // Nobody waits for the result once a stop is requested.
+            let _unwanted = sender.send(work());
+        })
         .map_err(|error| format!("cannot start a thread: {error}"))?;
     loop {
         match receiver.recv_timeout(POLL) {
+            Ok(_) | Err(RecvTimeoutError::Timeout) if stop.is_requested() => return Ok(None),
             Ok(result) => return Ok(Some(result)),
-            Err(RecvTimeoutError::Timeout) if stop.is_requested() => return Ok(None),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => match worker.join() {
                 Err(panic) => resume_unwind(panic),

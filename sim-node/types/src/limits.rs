@@ -6,8 +6,8 @@ pub const ELEMENTS_MAX: u32 = 1 << 24;
 pub const COLLIDERS_MAX: usize = 1 << 16;
 /// Most work of a step: substeps x (constraints x iterations + particles x (colliders + 1)), as
 /// projections of constraints, motions of particles and tests against colliders. One core needs some
-/// seconds for it. A cloth of a million particles with 6 million constraints and 20 substeps needs an
-/// eighth of it. Beyond it, a single `set` could stop a node for minutes.
+/// seconds for it. A cloth of a million particles with 6 million constraints and 20 substeps needs about
+/// an eighth of it. Beyond it, a single `set` could stop a node for minutes.
 pub const STEP_WORK_MAX: u64 = 1 << 30;
 /// Longest text of a scene, in bytes: as a file, and with every default and mesh written out.
 pub const SCENE_SIZE_BYTES_MAX: usize = 16 << 20;

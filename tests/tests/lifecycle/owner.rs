@@ -1,6 +1,6 @@
 //! The name of a node after kills, cleaners and other users.
 
-use std::fs::{self, Permissions};
+use std::fs::{self, File, Permissions};
 use std::os::unix::fs::PermissionsExt;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
@@ -48,6 +48,40 @@ fn a_client_finds_no_node_after_one_was_killed_in_any_phase_of_its_start() {
         assert_eq!(finished.code, Some(1));
         assert!(finished.stderr.contains("no node runs as"), "phase {phase}: {}", finished.stderr);
     }
+}
+
+/// Replaces a connection of a killed client by one that it was killed in the middle of creating: an
+/// empty file that nobody may read.
+fn unfinish_a_connection(sandbox: &Sandbox) {
+    let prefix = format!("{}_", sandbox.domain());
+    let connection = wait_for("a connection", || {
+        fs::read_dir("/dev/shm").unwrap().flatten().map(|entry| entry.path()).find(|path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with(&prefix) && name.ends_with(".connection")
+        })
+    });
+    // The node still maps the other file.
+    fs::remove_file(&connection).unwrap();
+    File::create_new(&connection).unwrap();
+    fs::set_permissions(&connection, Permissions::from_mode(0o200)).unwrap();
+}
+
+#[test]
+fn a_client_killed_while_it_connects_keeps_nobody_from_joining_or_leaving() {
+    let sandbox = Sandbox::new();
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let leaving = Client::attach(&sandbox.endpoint()).unwrap();
+    for ends_by_joining in [true, false] {
+        let killed = Process::start_ready(Program::Grabber, &sandbox, &["7", "90"]);
+        killed.signal(Signal::KILL);
+        killed.wait();
+        unfinish_a_connection(&sandbox);
+        if ends_by_joining {
+            assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain");
+        }
+    }
+    drop(leaving);
+    assert_eq!(node.interrupt().code, Some(0));
 }
 
 #[test]

@@ -26,13 +26,13 @@ fn a_node_gives_up_a_long_step_and_publishes_nothing_of_it() {
 
 /// Takes seconds to read and build.
 const LARGE: &str = "version = 1\n[solver]\nrate_hz = 240\n[[generate]]\nshape = \"cloth\"\n\
-    columns = 600\nrows = 600\nspacing = 0.01\n";
+    columns = 1000\nrows = 1000\nspacing = 0.01\n";
 
 #[test]
 fn a_node_that_loads_a_large_scene_ends_without_finishing_it() {
     let sandbox = Sandbox::new();
     let scene = sandbox.write("large.toml", LARGE);
-    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--json"]);
+    let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--json"]);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     client.send(Action::Load { scene: Text::new(&scene).unwrap() }).unwrap();
     node.wait_for_thread("load");

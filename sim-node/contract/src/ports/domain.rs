@@ -26,15 +26,25 @@ pub(crate) const CREATION_TIMEOUT: Duration = Duration::from_millis(200);
 pub(crate) fn configuration(domain: Option<&str>) -> Result<Config, SemanticStringError> {
     let Some(domain) = domain else {
         let mut config = Config::global_config().clone();
-        config.global.creation_timeout = CREATION_TIMEOUT;
+        adapt(&mut config);
         return Ok(config);
     };
     let mut config = Config::default();
-    config.global.creation_timeout = CREATION_TIMEOUT;
+    adapt(&mut config);
     config.global.prefix = FileName::new(prefix(domain).as_bytes())?;
     let directory = directory(domain);
     config.global.set_root_path(&Path::new(directory.as_os_str().as_encoded_bytes())?);
     Ok(config)
+}
+
+/// Sets what all domains have in common.
+fn adapt(config: &mut Config) {
+    let Config { global, .. } = config;
+    global.creation_timeout = CREATION_TIMEOUT;
+    // The session does it, in a way that does not hang.
+    global.node.cleanup_dead_nodes_on_creation = false;
+    global.node.cleanup_dead_nodes_on_destruction = false;
+    global.service.cleanup_dead_nodes_on_open = false;
 }
 
 /// Returns the prefix of the domain's files in `/dev/shm`.

@@ -10,9 +10,9 @@ use crate::messages::parameters::ParametersHeader;
 use crate::messages::snapshot::SnapshotHeader;
 use crate::messages::tears::TearsHeader;
 use crate::messages::topology::{KeyframeHeader, LoadHeader};
+use crate::ports::cleanup;
 use crate::ports::memory;
 use crate::ports::service::ServiceError;
-use crate::ports::session::CLEANUP_TIMEOUT;
 
 /// A header that contains the length of its payload.
 pub(crate) trait SliceHeader: Debug + Default + Copy + ZeroCopySend {
@@ -76,17 +76,17 @@ pub(crate) struct PortLimit {
 
 /// Creates a port, unless shared memory is full. At the limit, frees the ports of dead processes and tries again.
 pub(crate) fn create_port<T, E: PartialEq + Debug>(
-    service: &impl PortFactory,
+    service: &impl PortFactory<Service = ipc::Service>,
     full: &E,
     limit: PortLimit,
     create: impl Fn() -> Result<T, E>,
 ) -> Result<T, ServiceError> {
-    // Checked for each port, because a client creates some of them long after it joined.
+    // Checked for each port with the memory of all, because a client creates some of them long after it joined.
     memory::check_ports()
         .map_err(|memory| ServiceError::Memory { service: service.name().to_string(), memory })?;
     let created = match create() {
         Err(error) if error == *full => {
-            service.blocking_cleanup_dead_nodes(CLEANUP_TIMEOUT);
+            cleanup::free_ports(service);
             create()
         }
         result => result,

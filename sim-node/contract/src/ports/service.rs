@@ -176,7 +176,7 @@ pub enum ServiceError {
         /// The simulation.
         endpoint: Endpoint,
     },
-    /// Not enough shared memory for the messages of the service.
+    /// Not enough shared memory for the service: its messages, or the ports of this process.
     #[error("service '{service}': {memory}")]
     Memory {
         /// Full name of the service.

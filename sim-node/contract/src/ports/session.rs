@@ -15,6 +15,7 @@ use iceoryx2::service::port_factory;
 
 use crate::endpoint::Endpoint;
 use crate::limits::{CONTRACT_VERSION, PARTICIPANTS_MAX};
+use crate::ports::cleanup;
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::{self, counter, root, unfinished};
 use crate::ports::memory;
@@ -32,8 +33,6 @@ pub(crate) type Events = port_factory::event::PortFactory<ipc::Service>;
 const RETRY_PAUSE: Duration = Duration::from_millis(5);
 /// Most attempts. In each of them, iceoryx2 waits for [`domain::CREATION_TIMEOUT`].
 const ATTEMPTS_MAX: usize = 20;
-/// Longest wait for another process that cleans up after a dead process.
-pub(crate) const CLEANUP_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// An iceoryx2 node in the domain of an endpoint. It handles no signals; programs do.
 #[derive(Debug)]
@@ -56,6 +55,13 @@ pub(crate) enum Access {
     /// For the owner, which holds the lock of the name: the service is created, unless clients have
     /// kept it.
     Create,
+}
+
+impl Drop for Session {
+    /// The last process of a domain leaves nothing of killed ones.
+    fn drop(&mut self) {
+        cleanup::clean_domain(&self.node);
+    }
 }
 
 impl Session {
@@ -90,6 +96,7 @@ impl Session {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| refused(&error))?;
+        cleanup::clean_domain(&node);
         if is_named {
             counter::narrow(&config);
         }
@@ -195,7 +202,7 @@ impl Session {
                 Ok(service) => return Ok(service),
                 Err(Cause::Full) if !has_cleaned_up => {
                     has_cleaned_up = true;
-                    self.node.blocking_cleanup_dead_nodes(CLEANUP_TIMEOUT);
+                    cleanup::free_places(&self.node);
                 }
                 Err(Cause::Stuck(_)) if access == Access::Open && self.is_abandoned() => {
                     return Err(self.service_error(spec, service, Cause::Missing));

@@ -43,6 +43,36 @@ pub(crate) fn remove_segments(config: &Config) {
     }
 }
 
+/// Removes connections of two ports that are unfinished because a process was killed. A connection of
+/// a dead process is of no use, even if the living one is about to finish it.
+pub(crate) fn remove_connections(config: &Config) {
+    let suffix = config.global.service.connection_suffix;
+    for path in segments(config, &suffix) {
+        let is_unfinished = fs::metadata(&path).is_ok_and(|file| is_unfinished_segment(&file));
+        if is_unfinished {
+            let is_useless = !connected_processes(&path).iter().all(|process| is_alive(*process));
+            wait_or_remove(&path, if is_useless { Duration::ZERO } else { CREATION_MAX });
+        }
+    }
+}
+
+/// Returns the ids of the processes of a connection. Its file name ends in `_<port>_<port><suffix>`, and
+/// the id of a port contains that of its process: seconds, nanoseconds, process, counter, with 32 bits
+/// each.
+fn connected_processes(path: &Path) -> Vec<i32> {
+    let name = path.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
+    let ports = name.rsplit('_').take(2).filter_map(|port| port.parse::<u128>().ok());
+    ports.filter_map(|port| i32::try_from((port >> 64) & u128::from(u32::MAX)).ok()).collect()
+}
+
+/// Returns `true` for a process that has not ended. A zombie has.
+fn is_alive(process: i32) -> bool {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The name in parentheses may contain anything; the state follows it.
+    let state = stat.rsplit_once(") ").and_then(|(_, rest)| rest.chars().next());
+    state.is_some_and(|state| !matches!(state, 'Z' | 'X'))
+}
+
 /// Waits until a segment is finished or gone, and removes it if it stays unfinished for `limit`.
 fn wait_or_remove(path: &Path, limit: Duration) {
     let deadline = Deadline::after(limit);

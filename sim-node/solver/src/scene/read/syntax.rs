@@ -1,17 +1,17 @@
 //! The TOML parser, with its errors in the words of this program.
 
-mod text_size;
+mod parse_cost;
 
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
 
 use crate::scene::error::{Place, SceneError};
-pub(super) use text_size::check_size;
+use parse_cost::check_parse_cost;
 
 /// Parses TOML into a file structure. An error names the line, the field and what is allowed.
 pub(super) fn parse<T: DeserializeOwned>(place: &Place<'_>) -> Result<T, SceneError> {
-    check_size(place)?;
+    check_parse_cost(place)?;
     let deserializer = toml::Deserializer::parse(place.text)
         .map_err(|error| syntax_error(place, &error, String::new()))?;
     serde_path_to_error::deserialize(deserializer).map_err(|error| {

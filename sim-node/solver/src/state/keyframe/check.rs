@@ -38,7 +38,8 @@ impl Solver {
         if !numbers().all(|number| number.is_finite()) {
             return Err("a number is not finite");
         }
-        if numbers().any(|number| number.to_bits() == (-0.0_f32).to_bits()) {
+        let is_negative_zero = |number: &f32| number.to_bits() == (-0.0_f32).to_bits();
+        if numbers().chain([&particle.inverse_mass]).any(is_negative_zero) {
             return Err("a zero has a minus sign");
         }
         if particle.flags & !ParticleFlags::ALL != 0 {
