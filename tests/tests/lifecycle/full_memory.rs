@@ -7,7 +7,7 @@ use std::io::{ErrorKind, Write};
 use std::process::Command;
 
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, ctl, record, wait_for};
-use sim_contract::{Action, Client, Text};
+use sim_contract::{Action, Client, NodeStatus, Text};
 
 /// Set inside the namespace.
 const INSIDE: &str = "CATENARY_TEST_FULL_MEMORY";
@@ -53,6 +53,11 @@ fn run_with_full_memory() {
     let recorder = record(&sandbox, &file);
     let bridge =
         Process::start_ready(Program::ViewerBridge, &sandbox, &["--listen", "127.0.0.1:0"]);
+    // A program that joins while the memory is being filled may end with a message.
+    let are_connected = |status: NodeStatus| status.reader_count >= 3;
+    wait_for("all readers", || {
+        client.status(DEADLINE).unwrap().filter(|status| are_connected(*status))
+    });
 
     fill_memory();
     // A connected client goes on. One that needs more ports learns the reason.
@@ -85,7 +90,8 @@ fn run_with_full_memory() {
     assert_eq!(recorded.code, Some(0), "{}", recorded.stderr);
     let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]);
     assert_eq!(verified.code, Some(0), "{}{}", verified.stdout, verified.stderr);
-    assert_eq!(bridge.interrupt().code, Some(0));
+    let bridged = bridge.interrupt();
+    assert_eq!(bridged.code, Some(0), "{}", bridged.stderr);
     assert_eq!(node.interrupt().code, Some(0));
 }
 
