@@ -77,7 +77,12 @@ impl Contacts {
                 continue;
             }
             let path = particles.path(index);
-            if let Some(hit) = obstacle.solid.hit(&path) {
+            let (start, displacement) = (path.start.to_array(), path.displacement.to_array());
+            // Very far away, the rounding of a path can be larger than the margin of the zone. So each
+            // particle is tested alone, or the result would depend on the others of its group.
+            if obstacle.zone.may_meet(start, displacement)
+                && let Some(hit) = obstacle.solid.hit(&path)
+            {
                 let rounding = rounding(&path, &obstacle.solid);
                 let surface = &obstacle.surface;
                 self.resolve(particles, &Contact { index, path, hit, rounding, surface });
