@@ -173,6 +173,15 @@ impl Page {
         self.socket.send(Message::text(text)).unwrap();
     }
 
+    /// Returns `true` if bytes have arrived that were not read. Does not wait for them.
+    pub(crate) fn has_arrivals(&self) -> bool {
+        let stream = self.socket.get_ref();
+        stream.set_nonblocking(true).unwrap();
+        let peeked = stream.peek(&mut [0]);
+        stream.set_nonblocking(false).unwrap();
+        peeked.is_ok_and(|count| count > 0)
+    }
+
     /// Waits for the next message, except pings and pongs.
     pub(crate) fn next(&mut self) -> Result<Message, tungstenite::Error> {
         // Pings keep the socket from timing out.

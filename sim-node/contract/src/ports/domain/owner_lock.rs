@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::Config;
 
+use crate::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use crate::files::place::is_in_place;
 use crate::ports::domain::files::SHARED_MEMORY;
 use crate::ports::domain::root;
@@ -31,8 +32,11 @@ pub(crate) enum LockError {
     System { path: PathBuf, error: io::Error },
 }
 
-/// Most attempts to lock a file that is removed between opening and locking.
-const ATTEMPTS_MAX: usize = 100;
+/// Most attempts to lock a file that is removed between opening and locking, or that a client locks for
+/// a moment to see whether an owner holds it.
+const ATTEMPTS_MAX: usize = 50;
+/// Pause before the next attempt.
+const PAUSE_NS: u64 = SECOND_NS / 1000;
 
 impl OwnerLock {
     /// Takes the lock of a name, without waiting. The root must exist.
@@ -87,11 +91,16 @@ struct LockFile {
 impl LockFile {
     fn take(path: &Path) -> Result<Self, LockError> {
         let system = |error| LockError::System { path: path.to_owned(), error };
+        let mut refusal = system(io::Error::other("the file is being replaced all the time"));
         for _ in 0..ATTEMPTS_MAX {
             let mut file = open(path).map_err(system)?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Err(LockError::Held(read_id(&mut file))),
+                Err(TryLockError::WouldBlock) => {
+                    refusal = LockError::Held(read_id(&mut file));
+                    sleep_until(monotonic_ns() + PAUSE_NS);
+                    continue;
+                }
                 Err(TryLockError::Error(error)) => return Err(system(error)),
             }
             let mut taken = Self { path: path.to_owned(), file };
@@ -101,7 +110,7 @@ impl LockFile {
                 return Ok(taken);
             }
         }
-        Err(system(io::Error::other("the file is being replaced all the time")))
+        Err(refusal)
     }
 
     fn write_id(&mut self) -> io::Result<()> {
@@ -139,6 +148,9 @@ fn read_id(file: &mut File) -> Option<u32> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread;
+
     use super::*;
     use crate::ports::domain;
     use crate::testing::TestDomain;
@@ -179,6 +191,24 @@ mod tests {
         fs::remove_file(&lock.root.path).unwrap();
         assert!(lock.is_removed());
         assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
+    }
+
+    #[test]
+    fn clients_that_look_for_an_owner_do_not_keep_one_from_its_name() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        let is_over = AtomicBool::new(false);
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Relaxed) {
+                    OwnerLock::is_held(&config, "sim");
+                }
+            });
+            let taken = (0..2000).map(|_| OwnerLock::take(&config, "sim").is_ok());
+            let taken_count = taken.filter(|is_taken| *is_taken).count();
+            is_over.store(true, Ordering::Relaxed);
+            assert_eq!(taken_count, 2000);
+        });
     }
 
     #[test]
