@@ -46,8 +46,8 @@ impl Inbox {
         }
     }
 
-    /// Removes the commands of one turn, at most `count_max`, in the order of application. A turn ends with the first load,
-    /// because a load takes long.
+    /// Removes the commands of one turn, at most `count_max`, in the order of application. A turn ends
+    /// with the first load, because a load takes long.
     pub(super) fn next_turn(&mut self, count_max: usize) -> Vec<ReceivedCommand> {
         let mut turn = Vec::new();
         while turn.len() < count_max

@@ -1,4 +1,5 @@
-//! Processes under adversity: flooding and killed clients, requests to stop, streams that refuse output.
+//! Processes under adversity: flooding and killed clients, requests to stop, streams that refuse
+//! output, and shared memory that is full.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod fairness;

@@ -15,14 +15,18 @@ const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// Cleans up after all dead processes of the domain that no other process cleans up after.
 pub(crate) fn clean_domain(node: &Node<ipc::Service>) {
-    unfinished::remove_connections(node.config());
-    node.blocking_cleanup_dead_nodes(Duration::ZERO);
+    clean_up(node, Duration::ZERO);
 }
 
-/// Frees the places of dead processes in the services of the domain.
+/// Frees the places of dead processes in the services of the domain. Waits for other processes that
+/// clean up.
 pub(crate) fn free_places(node: &Node<ipc::Service>) {
+    clean_up(node, TIMEOUT);
+}
+
+fn clean_up(node: &Node<ipc::Service>, timeout: Duration) {
     unfinished::remove_connections(node.config());
-    node.blocking_cleanup_dead_nodes(TIMEOUT);
+    node.blocking_cleanup_dead_nodes(timeout);
 }
 
 /// Frees the places of dead processes in one service.

@@ -14,6 +14,9 @@ const MESSAGE: &str = "error: a page of shared memory is missing (SIGBUS): /dev/
 /// Makes SIGBUS end the process with a message and exit code 1. Everything that a program itself writes
 /// is allocated before; this covers what iceoryx2 writes when it connects two processes.
 ///
+/// The message can be lost: the handler of the standard library runs first and restores the default
+/// action, so the signal may end the process before the message is written.
+///
 /// # Errors
 /// The system refused the handler or the thread that prints the message.
 #[allow(clippy::exit, reason = "the thread that caused the signal cannot continue")]

@@ -39,7 +39,8 @@ const ATTEMPTS_MAX: usize = 50;
 const PAUSE_NS: u64 = SECOND_NS / 1000;
 
 impl OwnerLock {
-    /// Takes the lock of a name, without waiting. The root must exist.
+    /// Takes the lock of a name. Waits some milliseconds at most, for clients that look for the owner.
+    /// The root must exist.
     pub(crate) fn take(config: &Config, name: &str) -> Result<Self, LockError> {
         let [root, shared_memory] = paths(config, name);
         let root = LockFile::take(&root)?;
