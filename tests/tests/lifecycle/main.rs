@@ -1,7 +1,8 @@
 //! Processes under adversity: flooding and killed clients, requests to stop, streams that refuse
-//! output, and shared memory that is full.
+//! output, and shared memory that is full or cut.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+mod cut_memory;
 mod fairness;
 mod full_memory;
 mod grabs;

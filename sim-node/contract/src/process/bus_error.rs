@@ -7,6 +7,7 @@ use std::thread;
 
 use signal_hook::consts::SIGBUS;
 use signal_hook::iterator::Signals;
+use signal_hook::low_level::raise;
 
 const MESSAGE: &str = "error: a page of shared memory is missing (SIGBUS): /dev/shm is full, or another \
      process has cut a segment; free memory there, and start again";
@@ -14,13 +15,14 @@ const MESSAGE: &str = "error: a page of shared memory is missing (SIGBUS): /dev/
 /// Makes SIGBUS end the process with a message and exit code 1. Everything that a program itself writes
 /// is allocated before; this covers what iceoryx2 writes when it connects two processes.
 ///
-/// The message can be lost: the handler of the standard library runs first and restores the default
-/// action, so the signal may end the process before the message is written.
-///
 /// # Errors
 /// The system refused the handler or the thread that prints the message.
 #[allow(clippy::exit, reason = "the thread that caused the signal cannot continue")]
 pub fn report_bus_errors() -> io::Result<()> {
+    // The standard library handles SIGBUS to find stack overflows, and `signal_hook` would call its
+    // handler before ours. For any other cause that handler restores the default action and returns, so
+    // the signal would end the process while the message is being written. This one triggers it.
+    raise(SIGBUS)?;
     let mut signals = Signals::new([SIGBUS])?;
     // The thread that caused the signal repeats its access, and the signal, until this one exits.
     let report = move || {
