@@ -12,6 +12,7 @@ use sim_contract::{DOMAIN_VARIABLE, console};
 
 use crate::programs::Program;
 use crate::sandbox::Sandbox;
+use crate::signals::signal_mask;
 use crate::streams::Streams;
 use crate::wait::wait_for;
 
@@ -212,9 +213,7 @@ impl Process {
         wait_for(&format!("{} to handle {signal:?}", self.title), || {
             assert!(self.is_running(), "{} ended before it handled the signal", self.title);
             let status = std::fs::read_to_string(&path).ok()?;
-            let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"))?;
-            let mask = u64::from_str_radix(mask.trim(), 16).ok()?;
-            (mask & bit != 0).then_some(())
+            (signal_mask(&status, "SigCgt")? & bit != 0).then_some(())
         });
     }
 

@@ -13,7 +13,8 @@ use signal_hook::flag;
 pub(crate) fn receive_in_programs() {
     static HANDLERS: Once = Once::new();
     HANDLERS.call_once(|| {
-        let ignored = ignored_signals();
+        let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let ignored = signal_mask(&status, "SigIgn").unwrap_or(0);
         for signal in [SIGINT, SIGHUP] {
             if ignored & (1 << (signal - 1)) != 0 {
                 flag::register(signal, Arc::new(AtomicBool::new(false))).expect("a handler");
@@ -22,9 +23,8 @@ pub(crate) fn receive_in_programs() {
     });
 }
 
-/// Returns the signals that this process ignores: signal n as bit n - 1.
-fn ignored_signals() -> u64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+/// Returns a line of a status in `/proc` that names signals, such as "SigIgn": signal n is bit n - 1.
+pub(crate) fn signal_mask(status: &str, key: &str) -> Option<u64> {
+    let line = |line: &str| line.strip_prefix(key)?.strip_prefix(':').map(str::to_owned);
+    u64::from_str_radix(status.lines().find_map(line)?.trim(), 16).ok()
 }

@@ -66,7 +66,7 @@ impl Client {
     /// Attaches to a running simulation with a random client id.
     ///
     /// # Errors
-    /// No simulation runs there, or it has another version of the contract.
+    /// No simulation runs there, it has another version of the contract, or `/dev/shm` is full.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
         let random = getrandom::u64()
             .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
@@ -108,8 +108,8 @@ impl Client {
     /// misses some; `snapshot_index` in the header shows it.
     ///
     /// # Errors
-    /// The program already holds [`crate::BORROWED_SAMPLES_MAX`] snapshots, or a malformed one
-    /// arrived.
+    /// The program already holds [`crate::BORROWED_SAMPLES_MAX`] snapshots, a malformed one arrived,
+    /// the service has no place for another reader, or `/dev/shm` none for the reader's memory.
     pub fn next_snapshot(&mut self, timeout: Duration) -> Result<Option<Snapshot>, ReadError> {
         let reader = open_particles(&mut self.particles, &self.attachment)?;
         self.watch.wait_for(&self.attachment, timeout, || Ok(reader.next()?.map(Snapshot)))
@@ -128,7 +128,8 @@ impl Client {
     /// with the same `run_id` and `topology_revision`.
     ///
     /// # Errors
-    /// A malformed message arrived, or the service has no place for another reader.
+    /// A malformed message arrived, the service has no place for another reader, or `/dev/shm` none for
+    /// the reader's memory.
     pub fn topology(&mut self, timeout: Duration) -> Result<Option<Topology>, ReadError> {
         let service = &self.attachment.services.topology;
         let latch = get_or_create(&mut self.topology, || Latch::create(service, &TOPOLOGY))?;
@@ -225,7 +226,7 @@ impl Client {
     /// Returns the newest unread status, or waits for the next one.
     ///
     /// # Errors
-    /// The service has no place for another reader.
+    /// The service has no place for another reader, or `/dev/shm` none for the reader's memory.
     pub fn status(&mut self, timeout: Duration) -> Result<Option<NodeStatus>, ReadError> {
         let service = &self.attachment.status;
         let reader = get_or_create(&mut self.status, || ValueReader::create(service, &STATUS))?;
@@ -236,7 +237,8 @@ impl Client {
     /// proves that the command took effect; see [`Client::next_outcome`].
     ///
     /// # Errors
-    /// No owner receives commands, or [`crate::COMMANDS_BUFFERED`] commands of this client are waiting.
+    /// No owner receives commands, [`crate::COMMANDS_BUFFERED`] commands of this client are waiting, or
+    /// `/dev/shm` is full.
     pub fn send(&mut self, action: Action) -> Result<u64, RequestError> {
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         commander.send(&self.attachment, action)
@@ -266,7 +268,7 @@ impl Client {
     /// [`Client::request`] returned are left out. A client that has sent no command receives none.
     ///
     /// # Errors
-    /// The service has no place for another reader.
+    /// Same as [`Client::status`].
     pub fn next_outcome(&mut self, timeout: Duration) -> Result<Option<Outcome>, ReadError> {
         let commander = &mut self.commander;
         self.watch.wait_for(&self.attachment, timeout, || match commander {

@@ -8,7 +8,7 @@ use sim_contract::{
 use sim_solver::{Applied, Control};
 
 use super::Node;
-use super::loading::load_scene;
+use super::loading::{Refusal, load_scene};
 
 impl Node {
     /// Applies the commands that have arrived, at the boundary before the next step.
@@ -74,7 +74,7 @@ impl Node {
         let rate_hz = self.scene.solver.rate_hz;
         let (scene, solver) = match load_scene(source, self.options, rate_hz, stop) {
             Some(Ok(loaded)) => loaded,
-            Some(Err((problem, reason))) => {
+            Some(Err(Refusal { problem, reason })) => {
                 self.warnings.print(&format!("load {source}: {problem}"));
                 return Ok(Err(reason));
             }

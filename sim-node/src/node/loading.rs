@@ -15,8 +15,13 @@ use crate::scene_source;
 /// Interval between two checks for a request to stop.
 const POLL: Duration = Duration::from_millis(50);
 
-/// A problem with a scene, and the reason in the outcome.
-pub(super) type Refusal = (String, Reason);
+/// Why a scene cannot be loaded.
+pub(super) struct Refusal {
+    /// For the people who read the node's warnings.
+    pub(super) problem: String,
+    /// For the outcome of the command.
+    pub(super) reason: Reason,
+}
 
 /// Reads and builds a scene for a node that runs at `rate_hz`.
 ///
@@ -34,12 +39,15 @@ pub(super) fn load_scene(
         let solver = with_threads(Solver::new_in_run(&scene), options.threads);
         Ok((scene, solver))
     };
-    unless_stopped(stop, work).unwrap_or_else(|problem| Some(Err((problem, Reason::NoEffectHere))))
+    unless_stopped(stop, work).unwrap_or_else(|problem| {
+        let reason = Reason::NoEffectHere;
+        Some(Err(Refusal { problem, reason }))
+    })
 }
 
 /// Reads a scene that a run at `rate_hz` can continue with.
 fn read_scene(source: &str, options: Options, rate_hz: u32) -> Result<Scene, Refusal> {
-    let out_of_range = |problem| (problem, Reason::OutOfRange);
+    let out_of_range = |problem| Refusal { problem, reason: Reason::OutOfRange };
     let mut scene =
         scene_source::load(source).map_err(|error| out_of_range(format!("{error:#}")))?;
     scene.override_solver(options.rate_hz, options.substeps).map_err(out_of_range)?;
@@ -48,7 +56,7 @@ fn read_scene(source: &str, options: Options, rate_hz: u32) -> Result<Scene, Ref
         return Ok(scene);
     }
     let problem = format!("the scene runs at {scene_rate_hz} Hz, this node at {rate_hz} Hz");
-    Err((problem, Reason::NoEffectHere))
+    Err(Refusal { problem, reason: Reason::NoEffectHere })
 }
 
 /// Runs `work` on a thread of its own. Returns its result, or `None` if a stop is requested meanwhile.

@@ -57,8 +57,8 @@ impl Tap {
     /// that it misses no message that belongs to a snapshot.
     ///
     /// # Errors
-    /// No simulation runs there, it has another version of the contract, or a service has no place for
-    /// another reader.
+    /// No simulation runs there, it has another version of the contract, a service has no place for
+    /// another reader, or `/dev/shm` is full.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
         let attachment = Attachment::open(Session::join(endpoint)?)?;
         Ok(Self::subscribe(attachment)?)

@@ -34,12 +34,12 @@ pub(crate) enum LockError {
 
 /// Most attempts to lock a file that is removed between opening and locking, or that a client locks for
 /// a moment to see whether an owner holds it.
-const ATTEMPTS_MAX: usize = 50;
-/// Pause before the next attempt.
+const ATTEMPTS_MAX: usize = 1000;
+/// Pause before the next attempt, for that client.
 const PAUSE_NS: u64 = SECOND_NS / 1000;
 
 impl OwnerLock {
-    /// Takes the lock of a name. Waits some milliseconds at most, for clients that look for the owner.
+    /// Takes the lock of a name. Does not wait for another holder, only for clients that look for one.
     /// The root must exist.
     pub(crate) fn take(config: &Config, name: &str) -> Result<Self, LockError> {
         let [root, shared_memory] = paths(config, name);
@@ -54,11 +54,7 @@ impl OwnerLock {
 
     /// Returns `true` if a living process holds the lock of a name. Creates no file.
     pub(crate) fn is_held(config: &Config, name: &str) -> bool {
-        let is_locked = |path| {
-            let file = File::open(path);
-            file.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
-        };
-        paths(config, name).iter().any(is_locked)
+        paths(config, name).iter().any(|path| File::open(path).is_ok_and(|file| is_owned(&file)))
     }
 
     /// Path of the file in the root.
@@ -92,13 +88,15 @@ struct LockFile {
 impl LockFile {
     fn take(path: &Path) -> Result<Self, LockError> {
         let system = |error| LockError::System { path: path.to_owned(), error };
-        let mut refusal = system(io::Error::other("the file is being replaced all the time"));
         for _ in 0..ATTEMPTS_MAX {
             let mut file = open(path).map_err(system)?;
             match file.try_lock() {
                 Ok(()) => {}
+                Err(TryLockError::WouldBlock) if is_owned(&file) => {
+                    return Err(LockError::Held(read_id(&mut file)));
+                }
                 Err(TryLockError::WouldBlock) => {
-                    refusal = LockError::Held(read_id(&mut file));
+                    drop(file);
                     sleep_until(monotonic_ns() + PAUSE_NS);
                     continue;
                 }
@@ -111,7 +109,7 @@ impl LockFile {
                 return Ok(taken);
             }
         }
-        Err(refusal)
+        Err(system(io::Error::other("other processes replace or lock the file all the time")))
     }
 
     fn write_id(&mut self) -> io::Result<()> {
@@ -132,6 +130,12 @@ impl Drop for LockFile {
             let _ = fs::remove_file(&self.path);
         }
     }
+}
+
+/// Returns `true` if an owner holds the lock of a file. Otherwise the file is locked until it is closed,
+/// for other clients as well as this one.
+fn is_owned(file: &File) -> bool {
+    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
 }
 
 fn open(path: &Path) -> io::Result<File> {
