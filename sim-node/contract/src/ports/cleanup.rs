@@ -27,6 +27,7 @@ pub(crate) fn free_places(node: &Node<ipc::Service>) {
 fn clean_up(node: &Node<ipc::Service>, timeout: Duration) {
     unfinished::remove_connections(node.config());
     node.blocking_cleanup_dead_nodes(timeout);
+    unfinished::remove_listeners(node.config());
 }
 
 /// Frees the places of dead processes in one service.

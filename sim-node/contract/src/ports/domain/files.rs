@@ -1,5 +1,6 @@
 //! The files of a domain.
 
+use std::fmt::Display;
 use std::fs::{self, DirEntry};
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,10 @@ pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 const TYPE_HASH_LENGTH: usize = 40;
 
 /// Returns the files of a kind in shared memory: `<prefix><hash of the type>_<id><suffix>`.
-pub(crate) fn segments(config: &Config, suffix: &FileName) -> impl Iterator<Item = PathBuf> {
+pub(crate) fn segments<S: Display>(
+    config: &Config,
+    suffix: &S,
+) -> impl Iterator<Item = PathBuf> + use<S> {
     let prefix = config.global.prefix.to_string();
     let suffix = suffix.to_string();
     let is_segment = move |entry: &DirEntry| {

@@ -50,23 +50,53 @@ pub(crate) fn remove_connections(config: &Config) {
     for path in segments(config, &suffix) {
         let is_unfinished = fs::metadata(&path).is_ok_and(|file| is_unfinished_segment(&file));
         if is_unfinished {
-            let is_useless = !connected_processes(&path).iter().all(|process| is_alive(*process));
+            let is_useless = ports(&path).any(|port| !is_alive(process(port)));
             wait_or_remove(&path, if is_useless { Duration::ZERO } else { CREATION_MAX });
         }
     }
 }
 
-/// Returns the ids of the processes of a connection. Its file name ends in `_<port>_<port><suffix>`, and
-/// the id of a port contains that of its process: seconds, nanoseconds, process, counter, with 32 bits
-/// each.
-fn connected_processes(path: &Path) -> Vec<i32> {
+/// Removes the segments of listeners that a process was killed in the middle of creating: iceoryx2 only
+/// removes those of the listeners that a service lists. Call it after iceoryx2's cleanup, which removes
+/// the tags of dead ports.
+pub(crate) fn remove_listeners(config: &Config) {
+    let suffix = listener_suffix(config);
+    for path in segments(config, &suffix) {
+        let is_dead = ports(&path).any(|port| !is_alive(process(port)) && !has_tag(config, port));
+        if is_dead {
+            remove(&path);
+        }
+    }
+}
+
+/// Returns the ending of the segment in which a listener counts its events.
+fn listener_suffix(config: &Config) -> String {
+    format!("{}_mgmt", config.global.service.event_connection_suffix)
+}
+
+/// Returns `true` if a node names a port as its own, from before its creation until after its removal.
+/// The node may belong to a process in a container, whose id means nothing here.
+fn has_tag(config: &Config, port: u128) -> bool {
+    let Config { global, .. } = config;
+    let tag = format!("{}{port}{}", global.prefix, global.node.port_tag_suffix);
+    entries(&root::to_std(&global.node_dir())).any(|node| node.path().join(&tag).exists())
+}
+
+/// Returns the ids of the ports in the name of a segment, which ends in `_<port><suffix>`, or for a
+/// connection in `_<port>_<port><suffix>`.
+fn ports(path: &Path) -> impl Iterator<Item = u128> {
     let name = path.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
-    let ports = name.rsplit('_').take(2).filter_map(|port| port.parse::<u128>().ok());
-    ports.filter_map(|port| i32::try_from((port >> 64) & u128::from(u32::MAX)).ok()).collect()
+    name.rsplit('_').take(2).filter_map(|port| port.parse().ok())
+}
+
+/// Returns the id of the process in the id of a port: seconds, nanoseconds, process, counter, with 32
+/// bits each.
+fn process(port: u128) -> u128 {
+    (port >> 64) & u128::from(u32::MAX)
 }
 
 /// Returns `true` for a process that has not ended. A zombie has.
-fn is_alive(process: i32) -> bool {
+fn is_alive(process: u128) -> bool {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
     // The name in parentheses may contain anything; the state follows it.
     let state = stat.rsplit_once(") ").and_then(|(_, rest)| rest.chars().next());
@@ -292,6 +322,37 @@ mod tests {
             assert_works(&domain);
             assert!(!segment.exists());
         }
+    }
+
+    #[test]
+    fn the_segment_of_a_dead_listener_is_removed_unless_a_node_names_it() {
+        let domain = TestDomain::new();
+        let config = config(&domain);
+        let owner = create_owner(&domain);
+        let mut client = Client::attach(&domain.endpoint()).unwrap();
+        client.next_snapshot(Duration::from_millis(1)).unwrap();
+        let living = segments(&config, &listener_suffix(&config)).next().unwrap();
+        let living_id = ports(&living).next().unwrap();
+        let create = |id: u128| {
+            let name = living.to_str().unwrap().replace(&living_id.to_string(), &id.to_string());
+            File::create_new(&name).unwrap();
+            PathBuf::from(name)
+        };
+        // No process has this id.
+        let dead_id = living_id | u128::from(u32::MAX) << 64;
+        let (dead, elsewhere) = (create(dead_id), create(dead_id + 1));
+        let Config { global, .. } = &config;
+        let directory = root::to_std(&global.node_dir());
+        let node = entries(&directory).find(|entry| entry.path().is_dir()).unwrap().path();
+        let tag = format!("{}{}{}", global.prefix, dead_id + 1, global.node.port_tag_suffix);
+        let tag = node.join(tag);
+        File::create_new(&tag).unwrap();
+        remove_listeners(&config);
+        assert!(living.exists() && elsewhere.exists() && !dead.exists());
+        fs::remove_file(tag).unwrap();
+        drop(client);
+        assert!(!elsewhere.exists());
+        drop(owner);
     }
 
     #[test]
