@@ -32,6 +32,7 @@ struct Summary {
 
 /// Runs a scene.
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
+    report_bus_errors()?;
     let mut scene = scene_source::load(&args.scene)?;
     scene.override_solver(args.rate, args.substeps).map_err(|problem| anyhow!("--{problem}"))?;
     let endpoint = args.endpoint.endpoint()?;
@@ -48,7 +49,6 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     // Building a large scene takes seconds. Until the node owns anything, a signal ends it at once.
     let solver = with_threads(Solver::new(&scene), options.threads);
     let stop = Stop::install()?;
-    report_bus_errors()?;
     let mut node = Node::new(&endpoint, scene, solver, options)?;
     print_ready(&endpoint, &node);
     let is_terminal = stderr().is_terminal();

@@ -9,7 +9,8 @@ use integration_tests::{Process, Program, Sandbox, record};
 #[test]
 fn no_program_ends_with_a_signal_when_its_memory_is_cut() {
     let sandbox = Sandbox::new();
-    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let node =
+        Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--threads", "3"]);
     let recorder = record(&sandbox, &sandbox.path("cut.mcap"));
     let bridge =
         Process::start_ready(Program::ViewerBridge, &sandbox, &["--listen", "127.0.0.1:0"]);
