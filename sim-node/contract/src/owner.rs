@@ -6,12 +6,13 @@ pub(crate) mod load;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
 
-use crate::clock;
+use crate::clock::{self, Deadline};
 use crate::endpoint::Endpoint;
 use crate::limits::{BORROWED_UPDATES_MAX, COMMANDS_BUFFERED, CONTRACT_VERSION};
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -72,8 +73,11 @@ const WAKES_PER_READER: u32 = 2;
 /// Most attempts to take the lock of a name, in half a second: an owner that ends frees it a moment
 /// after its clients have noticed.
 const LOCK_ATTEMPTS_MAX: usize = 100;
-/// Pause between two attempts to take the lock.
+/// Pause between two attempts to take the lock or the place of the owner.
 const LOCK_PAUSE_NS: u64 = clock::SECOND_NS / 200;
+
+/// Longest wait for another process that cleans up after a killed owner, and is slow on a busy machine.
+const CLEANUP_MAX: Duration = Duration::from_secs(2);
 
 impl Owner {
     /// Claims the name, creates its services and publishes scene, topology, surface, parameters and an
@@ -358,17 +362,26 @@ fn take_lock(endpoint: &Endpoint) -> Result<OwnerLock, OwnerError> {
 }
 
 /// Creates the one possible publisher of `status`. It exists already where a process owns the name
-/// without its lock, such as one in a container with another root.
+/// without its lock, such as one in a container with another root; and for a killed owner, until a
+/// process has cleaned up after it.
 fn claim_name(
     session: &Session,
     service: &Values<NodeStatus>,
 ) -> Result<ValueWriter<NodeStatus>, OwnerError> {
-    match ValueWriter::create(session.config(), service, &STATUS) {
-        Err(ServiceError::Full { .. }) => Err(OwnerError::NameTaken {
-            endpoint: session.endpoint.clone(),
-            process_id: owner(service).and_then(|process| process.id),
-        }),
-        status => Ok(status?),
+    let deadline = Deadline::after(CLEANUP_MAX);
+    loop {
+        match ValueWriter::create(session.config(), service, &STATUS) {
+            Err(ServiceError::Full { .. }) => {
+                let owner = owner(service);
+                if owner.is_some() || deadline.remaining().is_zero() {
+                    let process_id = owner.and_then(|process| process.id);
+                    let endpoint = session.endpoint.clone();
+                    return Err(OwnerError::NameTaken { endpoint, process_id });
+                }
+                clock::sleep_until(clock::monotonic_ns() + LOCK_PAUSE_NS);
+            }
+            status => return Ok(status?),
+        }
     }
 }
 
