@@ -4,6 +4,7 @@ mod boundary;
 mod grab_connections;
 mod inbox;
 mod loading;
+mod lockstep;
 mod pace;
 mod progress;
 mod publisher;
@@ -11,12 +12,15 @@ mod statistics;
 mod threads;
 mod warnings;
 
+use std::time::Duration;
+
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Endpoint, ReceivedCommand, Stop};
 use sim_solver::{Scene, Solver};
 
 use grab_connections::GrabConnections;
 use inbox::Inbox;
+use lockstep::{Event, Lockstep};
 use pace::Pace;
 use progress::Progress;
 use publisher::{Position, Publisher, StepTimes};
@@ -48,6 +52,8 @@ pub(crate) struct Options {
     pub(crate) waits_for_time: bool,
     /// Number of steps from one published snapshot to the next.
     pub(crate) every: u64,
+    /// Longest wait for a member of the lockstep.
+    pub(crate) lockstep_timeout: Duration,
 }
 
 /// A running simulation.
@@ -61,6 +67,9 @@ pub(crate) struct Node {
     /// Buffer that every boundary reuses.
     arrived: Vec<ReceivedCommand>,
     grab_connections: GrabConnections,
+    lockstep: Lockstep,
+    /// Lateness of a step whose time has come, but whose members are not ready.
+    met: Option<u64>,
     progress: Progress,
     pace: Pace,
     pub(crate) statistics: Statistics,
@@ -93,6 +102,8 @@ impl Node {
             inbox: Inbox::default(),
             arrived: Vec::new(),
             grab_connections: GrabConnections::default(),
+            lockstep: Lockstep::new(options.lockstep_timeout),
+            met: None,
             progress: Progress {
                 is_paused: options.starts_paused,
                 steps_due: 0,
@@ -122,9 +133,14 @@ impl Node {
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.observe(&observer)?;
         while !stop.is_requested() && !self.is_done() {
-            let due = self.wait();
+            let due = self.met.take().or_else(|| self.wait());
             if stop.is_requested() {
                 break;
+            }
+            if !self.wait_for_members() {
+                self.met = due;
+                self.observe(&observer)?;
+                continue;
             }
             self.apply_commands(due.is_some(), stop)?;
             if stop.is_requested() {
@@ -177,6 +193,28 @@ impl Node {
         }
         sleep_until(deadline_ns);
         Some(self.pace.meet(monotonic_ns()))
+    }
+
+    /// Waits until the members of the lockstep are ready for the next step, at most one polling interval.
+    /// Returns `true` if they are. A paused node waits for nobody.
+    fn wait_for_members(&mut self) -> bool {
+        let is_stepping = self.progress.is_stepping();
+        let Self { lockstep, publisher, step, warnings, next_status_ns, .. } = self;
+        let step = *step;
+        let mut report = |event| {
+            // A fresh status follows, so that clients see their membership.
+            *next_status_ns = 0;
+            match event {
+                Event::TimedOut { .. } => warnings.print(&event.describe(step)),
+                Event::Joined { .. } | Event::Left { .. } => warnings.note(&event.describe(step)),
+            }
+        };
+        if is_stepping {
+            return lockstep.wait(publisher, step, monotonic_ns() + WAITING_POLL_NS, report);
+        }
+        lockstep.receive(publisher, step, &mut report);
+        lockstep.search(publisher, &mut report);
+        true
     }
 
     /// Makes and publishes a step. Returns `false` if it was given up because of a request to stop.
@@ -241,7 +279,14 @@ impl Node {
     }
 
     pub(crate) fn status(&self) -> sim_contract::NodeStatus {
-        self.publisher.status(&self.scene, &self.solver, self.position(), &self.statistics)
+        let Self { publisher, scene, solver, statistics, lockstep, .. } = self;
+        let mut status = publisher.status(scene, solver, self.position(), statistics);
+        status.rejected_count += lockstep.refused_count;
+        for (entry, member) in status.members.iter_mut().zip(lockstep.members(self.step)) {
+            *entry = member;
+            status.member_count += 1;
+        }
+        status
     }
 
     /// Simulated time per wall-clock time of the whole run, without its pauses.

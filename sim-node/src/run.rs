@@ -44,6 +44,7 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         starts_paused: args.paused,
         waits_for_time: !args.as_fast_as_possible,
         every: args.every,
+        lockstep_timeout: args.lockstep_timeout,
     };
     warn(&scene);
     // Building a large scene takes seconds. Until the node owns anything, a signal ends it at once.

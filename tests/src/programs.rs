@@ -23,6 +23,8 @@ pub enum Program {
     Watch,
     /// The contract's example that grabs and moves a particle.
     Grab,
+    /// The contract's example that controls a pendulum in lockstep.
+    Hold,
     /// The Python interpreter of `.venv`, which `.ci/run` creates.
     Python,
     /// Node.js from the search path, for scripts whose packages `.ci/run` installs in `tests/node`.
@@ -42,6 +44,7 @@ impl Program {
             Self::Demo => built().join("demo"),
             Self::Watch => built().join("examples/watch"),
             Self::Grab => built().join("examples/grab"),
+            Self::Hold => built().join("examples/hold"),
             // Found through the search path.
             Self::Node => PathBuf::from("node"),
             Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),

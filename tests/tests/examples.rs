@@ -32,10 +32,22 @@ fn grab_moves_and_releases_a_particle() {
 }
 
 #[test]
-fn both_examples_stay_short() {
+fn hold_brings_a_pendulum_to_rest() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "pendulum", "--as-fast-as-possible"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let printed = Process::run(Program::Hold, &sandbox, &["4800"]).success();
+    let speed = printed.strip_prefix("the mass moves at ").and_then(|rest| rest.split(' ').next());
+    // It swings at 3 m/s without control.
+    assert!(speed.unwrap().parse::<f32>().unwrap() < 0.001, "{printed}");
+}
+
+#[test]
+fn the_examples_stay_short() {
     for source in [
         include_str!("../../sim-node/contract/examples/watch.rs"),
         include_str!("../../sim-node/contract/examples/grab.rs"),
+        include_str!("../../sim-node/contract/examples/hold.rs"),
     ] {
         assert!(source.lines().count() <= 50);
     }
@@ -44,7 +56,7 @@ fn both_examples_stay_short() {
 #[test]
 fn the_examples_end_with_the_text_of_an_error() {
     let sandbox = Sandbox::new();
-    for program in [Program::Watch, Program::Grab] {
+    for program in [Program::Watch, Program::Grab, Program::Hold] {
         let finished = Process::run(program, &sandbox, &[]);
         assert_eq!(finished.code, Some(1));
         assert!(finished.stderr.starts_with("error: "), "{}", finished.stderr);

@@ -2,6 +2,7 @@
 
 pub(crate) mod change;
 pub(crate) mod loaded_scene;
+pub(crate) mod lockstep;
 pub(crate) mod request;
 pub(crate) mod state;
 pub(crate) mod tap;
@@ -9,12 +10,15 @@ pub(crate) mod torn;
 pub(crate) mod views;
 pub(crate) mod watch;
 
+use std::num::NonZeroU32;
 use std::time::Duration;
 
+use crate::client::lockstep::{LockstepError, Member};
 use crate::client::request::{Commander, RequestError};
 use crate::client::torn::Torn;
 use crate::client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
+use crate::clock::Deadline;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::CONSOLE_CLIENT_ID;
@@ -22,7 +26,7 @@ use crate::messages::outcome::Outcome;
 use crate::messages::parameters::to_values;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::NodeStatus;
+use crate::messages::status::{NodeStatus, StatusFlags};
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
 use crate::ports::latch::Latch;
@@ -55,6 +59,7 @@ pub struct Client {
     colliders: Option<Latch<ColliderState, CollidersHeader>>,
     status: Option<ValueReader<NodeStatus>>,
     commander: Option<Commander>,
+    member: Option<Member>,
     // Dropped last: the ports belong to its services and its node.
     attachment: Attachment,
 }
@@ -94,6 +99,7 @@ impl Client {
             colliders: None,
             status: None,
             commander: None,
+            member: None,
             attachment,
         })
     }
@@ -249,7 +255,12 @@ impl Client {
     /// # Errors
     /// Same as [`Client::send`], or no outcome arrived within `timeout`. Then the effect of the command
     /// is unknown, and the error states whether the owner is alive, or that outcomes were missed.
+    ///
+    /// In its turn of the lockstep, a member would wait for itself, so the request is refused.
     pub fn request(&mut self, action: Action, timeout: Duration) -> Result<Outcome, RequestError> {
+        if self.member.as_ref().is_some_and(Member::is_in_turn) {
+            return Err(RequestError::InTurn);
+        }
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         let sequence = commander.send(&self.attachment, action)?;
         let missed_before = commander.missed_count();
@@ -277,6 +288,74 @@ impl Client {
         })
     }
 
+    /// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client
+    /// has called [`Client::ready`] for it. Dropping the client leaves the lockstep.
+    ///
+    /// The node applies the commands that the members send before they are ready, and those of other
+    /// clients that have arrived until then. The order is that of their client ids, so members with fixed
+    /// ids ([`Client::attach_as`]) and without other clients produce the same states in every run.
+    ///
+    /// # Errors
+    /// The lockstep already has [`crate::MEMBERS_MAX`] members, `/dev/shm` is full, or the node has not
+    /// answered within `timeout`: a replay has no lockstep.
+    pub fn join_lockstep(&mut self, timeout: Duration) -> Result<(), LockstepError> {
+        self.join_lockstep_every(NonZeroU32::MIN, timeout)
+    }
+
+    /// Joins the lockstep, and takes part only at the steps that are multiples of `every`, as a
+    /// controller of 60 Hz does beside a node of 240 Hz with `every` = 4.
+    ///
+    /// # Errors
+    /// Same as [`Client::join_lockstep`].
+    pub fn join_lockstep_every(
+        &mut self,
+        every: NonZeroU32,
+        timeout: Duration,
+    ) -> Result<(), LockstepError> {
+        let deadline = Deadline::after(timeout);
+        let member = self.member.insert(Member::create(&self.attachment, self.id, every)?);
+        member.join()?;
+        while let Some(status) = self.status(deadline.remaining())? {
+            if status.members().iter().any(|member| member.client_id == self.id) {
+                return Ok(());
+            }
+            if status.flags & StatusFlags::REPLAY != 0 {
+                self.member = None;
+                let endpoint = self.attachment.session.endpoint.clone();
+                return Err(LockstepError::Replay { endpoint });
+            }
+        }
+        self.member = None;
+        Err(LockstepError::not_admitted(&self.attachment, timeout))
+    }
+
+    /// Returns the newest snapshot that the node waits for this member at, or waits for it. Call
+    /// [`Client::ready`] after handling it. `None` if none was published within `timeout`: the node is
+    /// paused, or waits for another member or for its deadline, or is gone.
+    ///
+    /// # Errors
+    /// Same as [`Client::next_snapshot`], or the client has not joined.
+    pub fn next_turn(&mut self, timeout: Duration) -> Result<Option<Snapshot>, LockstepError> {
+        let member = self.member.as_mut().ok_or(LockstepError::NotJoined)?;
+        let reader = open_particles(&mut self.particles, &self.attachment)?;
+        let snapshot = self.watch.wait_for(&self.attachment, timeout, || {
+            Ok(reader.newest()?.map(Snapshot).filter(|snapshot| member.takes_part(snapshot)))
+        })?;
+        if let Some(snapshot) = &snapshot {
+            member.begin_turn(snapshot);
+        }
+        Ok(snapshot)
+    }
+
+    /// Ends the turn that [`Client::next_turn`] has begun. The commands of this client for the next step
+    /// must have been sent before.
+    ///
+    /// # Errors
+    /// The client has not joined, or there is no memory.
+    pub fn ready(&mut self) -> Result<(), LockstepError> {
+        self.member.as_mut().ok_or(LockstepError::NotJoined)?.ready()
+    }
+
     /// Returns `true` if the process that owns the name is alive. Reads the file system: call it a few
     /// times per second at most.
     pub fn is_owner_alive(&self) -> bool {
@@ -285,9 +364,10 @@ impl Client {
 }
 
 impl Drop for Client {
-    /// Waits briefly for the outcomes of sent commands, because commands that the owner has not received
-    /// vanish with their client.
+    /// Leaves the lockstep. Then waits briefly for the outcomes of sent commands, because commands that the
+    /// owner has not received vanish with their client.
     fn drop(&mut self) {
+        self.member = None;
         let Some(commander) = &mut self.commander else {
             return;
         };

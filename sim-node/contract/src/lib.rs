@@ -55,6 +55,7 @@ pub mod testing;
 pub use client::Client;
 pub use client::change::{Change, LostChanges};
 pub use client::loaded_scene::LoadedScene;
+pub use client::lockstep::LockstepError;
 pub use client::request::{OwnerState, RequestError};
 pub use client::state::State;
 pub use client::tap::Tap;
@@ -72,8 +73,9 @@ pub use messages::outcome::{
     OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus,
 };
 pub use messages::parameters::{ParameterState, ParametersHeader};
+pub use messages::ready::Ready;
 pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
-pub use messages::status::{NodeStatus, StatusFlags};
+pub use messages::status::{MemberStatus, NodeStatus, StatusFlags};
 pub use messages::tears::{TearsHeader, TornConstraint};
 pub use messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 pub use messages::update::Update;

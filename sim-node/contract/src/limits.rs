@@ -30,9 +30,14 @@ pub const OUTCOMES_BUFFERED: usize = 2 * COMMANDS_PER_STEP_MAX;
 pub const CLIENTS_MAX: usize = 32;
 /// Commands of one client that wait for the node. Sending one more fails.
 pub const COMMANDS_BUFFERED: usize = 256;
+/// Most members of the lockstep.
+pub const MEMBERS_MAX: usize = 16;
+/// Messages of one member that wait for the node. A member sends one for each step, and waits for the
+/// step after it.
+pub const READY_BUFFERED: usize = 4;
 /// Readers of the outcomes: each client that sends commands, and the other readers.
 pub const OUTCOME_READERS_MAX: usize = CLIENTS_MAX + READERS_MAX;
-/// Readers of the commands: the owner, and one spare for a network tunnel.
+/// Readers of the commands and of the members' messages: the owner, and one spare for a network tunnel.
 pub const COMMAND_READERS_MAX: usize = 2;
 /// Writers of the status: the owner alone.
 pub const STATUS_PUBLISHERS_MAX: usize = 1;

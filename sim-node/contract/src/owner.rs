@@ -4,7 +4,6 @@ pub(crate) mod error;
 pub(crate) mod load;
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -14,17 +13,18 @@ use iceoryx2::prelude::ipc;
 
 use crate::clock::{self, Deadline};
 use crate::endpoint::Endpoint;
-use crate::limits::{BORROWED_UPDATES_MAX, COMMANDS_BUFFERED, CONTRACT_VERSION};
+use crate::limits::{COMMANDS_BUFFERED, CONTRACT_VERSION, READY_BUFFERED};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
+use crate::messages::ready::Ready;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
-use crate::ports::connection::{self, ConnectionId, ReceivedCommand};
+use crate::ports::connection::{self, ConnectionId, ReceivedCommand, receive_round};
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
 use crate::ports::domain::{self, root, unfinished};
@@ -50,6 +50,7 @@ pub struct Owner {
     writers: LoadWriters,
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc::Service, Command, ()>,
+    ready: Subscriber<ipc::Service, Ready, ()>,
     status: ValueWriter<NodeStatus>,
     wake: WakeSender,
     /// Number of readers at the last refresh, to notice new readers.
@@ -107,6 +108,7 @@ impl Owner {
         let owner = Self {
             wake: wake_sender(&services.wake)?,
             commands: subscribe(&services.commands)?,
+            ready: subscribe(&services.ready)?,
             outcomes: ValueWriter::create(&services.config, &services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
@@ -252,20 +254,26 @@ impl Owner {
     /// other process can stop the owner.
     pub fn receive_commands(&self, commands: &mut Vec<ReceivedCommand>) -> usize {
         let before = commands.len();
-        let mut counts = BTreeMap::new();
-        // A subscriber skips the connections of which it holds the most samples that it may. Holding
-        // the last ones of a queue is the only way to reach the connections behind it.
-        let mut held = Vec::new();
-        while let Ok(Some(sample)) = self.commands.receive() {
-            let connection = ConnectionId(sample.origin().value());
-            commands.push(ReceivedCommand { command: *sample, connection });
-            let count = counts.entry(connection).or_insert(0);
-            *count += 1;
-            if *count > COMMANDS_BUFFERED - BORROWED_UPDATES_MAX {
-                held.push(sample);
-            }
-        }
+        receive_round(&self.commands, COMMANDS_BUFFERED, |command, connection| {
+            commands.push(ReceivedCommand { command, connection });
+        });
         commands.len() - before
+    }
+
+    /// Passes the messages of the members of the lockstep that have arrived to `receive`, as
+    /// [`Owner::receive_commands`] does with commands. Whatever a foreign process has written comes too.
+    pub fn receive_ready(&self, receive: impl FnMut(Ready, ConnectionId)) {
+        receive_round(&self.ready, READY_BUFFERED, receive);
+    }
+
+    /// Returns the connections of members, dead ones too. Cheap.
+    pub fn listed_members(&self) -> Vec<ConnectionId> {
+        connection::listed(&self.services.ready)
+    }
+
+    /// Returns the connections of living members. As costly as [`Owner::connections`].
+    pub fn living_members(&self) -> Vec<ConnectionId> {
+        connection::living(&self.services.ready)
     }
 
     /// Returns the connections through which living clients can send commands. It costs some system

@@ -49,6 +49,9 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "K", allow_negative_numbers = true, default_value_t = 1,
         value_parser = whole::<u64>(1..=1_000_000))]
     pub(crate) every: u64,
+    /// Longest wait for a member of the lockstep; then the run continues without it
+    #[arg(long, value_name = "TIME", default_value = "2s", value_parser = time)]
+    pub(crate) lockstep_timeout: Duration,
     /// Print a summary as one JSON object on stdout at the end
     #[arg(long)]
     pub(crate) json: bool,

@@ -37,7 +37,8 @@ fn remedy(
         Reason::UnknownAnchor => anchor_count(client, timeout)?,
         Reason::UnknownCollider => client.colliders(timeout).ok()?.colliders.len(),
         Reason::NoEffectHere
-            if !matches!(action, Action::Step { .. }) && status().is_some_and(is_replay) =>
+            if !matches!(action, Action::Step { .. })
+                && status().is_some_and(|status| is_replay(&status)) =>
         {
             return Some("a recording accepts only pause, resume and step".to_owned());
         }
@@ -50,7 +51,7 @@ fn remedy(
     Some(allowed_indices(count))
 }
 
-fn is_replay(status: NodeStatus) -> bool {
+fn is_replay(status: &NodeStatus) -> bool {
     status.flags & StatusFlags::REPLAY != 0
 }
 

@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use serde::Serialize;
-use sim_contract::{Client, NodeStatus};
+use sim_contract::{Client, MemberStatus, NodeStatus};
 
 use crate::args::CtlArgs;
 use crate::output;
@@ -31,6 +31,23 @@ struct StatusRow {
     wake_late_ns_p99: u64,
     solve_ns_p50: u64,
     solve_ns_p99: u64,
+    lockstep: Vec<MemberRow>,
+}
+
+/// A member of the lockstep.
+#[derive(Serialize)]
+struct MemberRow {
+    client_id: u64,
+    every: u32,
+    step: u64,
+    awaited: bool,
+}
+
+impl From<&MemberStatus> for MemberRow {
+    fn from(member: &MemberStatus) -> Self {
+        let MemberStatus { client_id, every, step, is_awaited } = *member;
+        Self { client_id, every, step, awaited: is_awaited != 0 }
+    }
 }
 
 impl StatusRow {
@@ -57,11 +74,12 @@ impl StatusRow {
             wake_late_ns_p99: status.wake_late_ns_p99,
             solve_ns_p50: status.solve_ns_p50,
             solve_ns_p99: status.solve_ns_p99,
+            lockstep: status.members().iter().map(MemberRow::from).collect(),
         }
     }
 
     /// Lines for people: rounded, and with units.
-    fn lines(&self) -> [(&'static str, String); 12] {
+    fn lines(&self) -> Vec<(&'static str, String)> {
         let times = |p50_ns: u64, p99_ns: u64| {
             let micros = |ns: u64| ns as f64 / 1000.0;
             format!("{:.1} µs median, {:.1} µs 99th percentile", micros(p50_ns), micros(p99_ns))
@@ -75,7 +93,7 @@ impl StatusRow {
             0 => String::new(),
             count => format!(", {count} periods skipped"),
         };
-        [
+        let mut lines = vec![
             ("scene", self.scene.clone()),
             ("process", format!("{}, run {}", self.process_id, self.run_id)),
             ("step", format!("{}, {state}", self.step)),
@@ -88,7 +106,18 @@ impl StatusRow {
             ("late", format!("{} steps{skipped}", self.late_steps)),
             ("wake-up delay", times(self.wake_late_ns_p50, self.wake_late_ns_p99)),
             ("step time", times(self.solve_ns_p50, self.solve_ns_p99)),
-        ]
+        ];
+        lines.extend(self.lockstep.iter().map(|member| ("lockstep", member.describe())));
+        lines
+    }
+}
+
+impl MemberRow {
+    fn describe(&self) -> String {
+        let Self { client_id, every, step, awaited } = self;
+        let period = if *every > 1 { format!(" every {every} steps,") } else { String::new() };
+        let state = if *awaited { "awaited, " } else { "" };
+        format!("client {client_id},{period} {state}ready for step {step}")
     }
 }
 

@@ -10,8 +10,8 @@ use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader, NodeStatus,
-    OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError, ParameterValues, ParticleState, Reason,
-    ReceivedCommand, SnapshotFlags, SnapshotHeader, TearsHeader, TornConstraint, Wake,
+    OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError, ParameterValues, ParticleState, Ready,
+    Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader, TearsHeader, TornConstraint, Wake,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
@@ -124,6 +124,25 @@ impl Publisher {
     /// Appends the commands that have arrived.
     pub(crate) fn receive_commands(&self, commands: &mut Vec<ReceivedCommand>) {
         self.owner.receive_commands(commands);
+    }
+
+    /// Same as [`Owner::receive_ready`].
+    pub(crate) fn receive_ready(&self, receive: impl FnMut(Ready, ConnectionId)) {
+        self.owner.receive_ready(receive);
+    }
+
+    /// Same as [`Owner::listed_members`].
+    pub(crate) fn listed_members(&self) -> Vec<ConnectionId> {
+        self.owner.listed_members()
+    }
+
+    /// Same as [`Owner::living_members`].
+    pub(crate) fn living_members(&self) -> Vec<ConnectionId> {
+        self.owner.living_members()
+    }
+
+    pub(crate) fn run_id(&self) -> u64 {
+        self.run_id
     }
 
     /// Connections of living clients.

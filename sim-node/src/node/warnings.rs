@@ -1,13 +1,13 @@
-//! Warnings of a running node, limited so that no client can delay it by causing them.
+//! Warnings and notes of a running node, limited so that no client can delay it by causing them.
 
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 
 use crate::output;
 
-/// Most warnings per second; further ones are only counted.
-const WARNINGS_PER_SECOND_MAX: u32 = 5;
+/// Most lines per second; further ones are only counted.
+const LINES_PER_SECOND_MAX: u32 = 5;
 
-/// Warnings printed in the current second.
+/// Lines printed in the current second.
 #[derive(Debug, Default)]
 pub(crate) struct Warnings {
     second: u64,
@@ -18,11 +18,16 @@ pub(crate) struct Warnings {
 impl Warnings {
     /// Prints a warning on stderr, or counts it for the next one.
     pub(crate) fn print(&mut self, text: &str) {
+        self.note(&format!("warning: {text}"));
+    }
+
+    /// Prints a line on stderr, or counts it for the next one.
+    pub(crate) fn note(&mut self, text: &str) {
         let second = monotonic_ns() / SECOND_NS;
         if second != self.second {
             (self.second, self.printed_count) = (second, 0);
         }
-        if self.printed_count == WARNINGS_PER_SECOND_MAX {
+        if self.printed_count == LINES_PER_SECOND_MAX {
             self.dropped_count += 1;
             return;
         }
@@ -31,6 +36,6 @@ impl Warnings {
             0 => String::new(),
             count => format!(" ({count} more before this one)"),
         };
-        output::note(&format!("warning: {text}{dropped}"));
+        output::note(&format!("{text}{dropped}"));
     }
 }

@@ -48,6 +48,12 @@ pub enum RequestError {
         /// State of the owner after the wait.
         owner: OwnerState,
     },
+    /// The command was not sent, because the node waits for this client before it answers.
+    #[error(
+        "the command was not sent: it is this client's turn in the lockstep, so no outcome would come; \
+         use `send`, then `ready`"
+    )]
+    InTurn,
     /// The command was not sent, because the owner has not received the commands before it.
     #[error(
         "the command was not sent, because {COMMANDS_BUFFERED} commands of this client are waiting: {owner}"
@@ -91,7 +97,7 @@ pub enum OwnerState {
 }
 
 impl OwnerState {
-    fn query(attachment: &Attachment) -> Self {
+    pub(crate) fn query(attachment: &Attachment) -> Self {
         let endpoint = attachment.session.endpoint.clone();
         match attachment.owner() {
             Some(OwnerProcess { id }) => Self::Alive { process_id: id, endpoint },

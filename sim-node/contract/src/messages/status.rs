@@ -3,7 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Status of a node or replay: 208 bytes, alignment 8. Written by the owner of the name at 10 Hz.
+use crate::limits::MEMBERS_MAX;
+
+/// Status of a node or replay: 592 bytes, alignment 8. Written by the owner of the name at 10 Hz.
 /// Percentiles cover the steps of the last second.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -53,13 +55,32 @@ pub struct NodeStatus {
     pub process_id: u32,
     /// [`StatusFlags`] bits.
     pub flags: u32,
-    /// Always 0.
-    pub spare: u32,
+    /// Number of members of the lockstep.
+    pub member_count: u32,
     /// Name of the scene in UTF-8, cut at 64 bytes, padded with zeros.
     pub scene_name: [u8; 64],
+    /// The members of the lockstep in the order of joining; entries beyond `member_count` are 0.
+    pub members: [MemberStatus; MEMBERS_MAX],
 }
 
-const _: () = assert!(size_of::<NodeStatus>() == 208 && align_of::<NodeStatus>() == 8);
+const _: () = assert!(size_of::<NodeStatus>() == 592 && align_of::<NodeStatus>() == 8);
+
+/// A member of the lockstep: 24 bytes, alignment 8.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.MemberStatus")]
+pub struct MemberStatus {
+    /// Client id of the member.
+    pub client_id: u64,
+    /// Last step that the member was ready for; the step of its joining if there is none.
+    pub step: u64,
+    /// The member takes part at the steps that are multiples of this number.
+    pub every: u32,
+    /// 1 if the node waits for this member, otherwise 0.
+    pub is_awaited: u32,
+}
+
+const _: () = assert!(size_of::<MemberStatus>() == 24 && align_of::<MemberStatus>() == 8);
 
 impl Default for NodeStatus {
     fn default() -> Self {
@@ -90,6 +111,11 @@ impl NodeStatus {
     pub fn scene_name(&self) -> String {
         let length = self.scene_name.iter().position(|byte| *byte == 0).unwrap_or(64);
         String::from_utf8_lossy(&self.scene_name[..length]).into_owned()
+    }
+
+    /// Returns the members of the lockstep, in the order of joining.
+    pub fn members(&self) -> &[MemberStatus] {
+        &self.members[..(self.member_count as usize).min(MEMBERS_MAX)]
     }
 
     /// Returns `true` if the node waits for `resume` or `step`.

@@ -1,12 +1,17 @@
-//! The connections through which commands arrive.
+//! The connections through which the messages of clients arrive.
 
-use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory};
+use std::collections::BTreeMap;
+use std::fmt::Debug;
 
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory, ZeroCopySend, ipc};
+
+use crate::limits::BORROWED_UPDATES_MAX;
 use crate::messages::command::Command;
 use crate::ports::session::Values;
 
-/// A connection of a client: its publisher of commands. A client that connects again has another
-/// one, even under the same client id.
+/// A connection of a client: its publisher of commands or of a member's messages. A client that
+/// connects again has another one, even under the same client id.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ConnectionId(pub u128);
 
@@ -19,20 +24,54 @@ pub struct ReceivedCommand {
     pub connection: ConnectionId,
 }
 
+/// Receives the messages that have arrived, those of each connection in the order of sending, and at
+/// most one queue of `buffered` messages of each, so that a client that sends without a pause keeps no
+/// other waiting. Ends early at a client with a broken connection.
+pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
+    subscriber: &Subscriber<ipc::Service, T, ()>,
+    buffered: usize,
+    mut add: impl FnMut(T, ConnectionId),
+) {
+    let mut counts = BTreeMap::new();
+    // A subscriber skips the connections of which it holds the most samples that it may. Holding the
+    // last ones of a queue is the only way to reach the connections behind it.
+    let mut held = Vec::new();
+    while let Ok(Some(sample)) = subscriber.receive() {
+        let connection = ConnectionId(sample.origin().value());
+        add(*sample, connection);
+        let count = counts.entry(connection).or_insert(0);
+        *count += 1;
+        if *count > buffered - BORROWED_UPDATES_MAX {
+            held.push(sample);
+        }
+    }
+}
+
+/// Returns the connections of a service. Those of killed clients count until somebody cleans up. It
+/// reads shared memory only.
+pub(crate) fn listed<T: Debug + ZeroCopySend>(service: &Values<T>) -> Vec<ConnectionId> {
+    let mut connections = Vec::new();
+    service.dynamic_config().list_publishers(|publisher| {
+        connections.push(ConnectionId(publisher.publisher_id.value()));
+        CallbackProgression::Continue
+    });
+    connections
+}
+
 /// Returns the connections whose clients are alive.
 ///
 /// A client that closes its connection removes the publisher. A killed one leaves it behind until a
 /// process cleans up, so the state of each publisher's node decides. A node whose state cannot be
 /// read counts as alive: no grab must end by mistake.
-pub(crate) fn living(commands: &Values<Command>) -> Vec<ConnectionId> {
+pub(crate) fn living<T: Debug + ZeroCopySend>(service: &Values<T>) -> Vec<ConnectionId> {
     let mut publishers = Vec::new();
-    commands.dynamic_config().list_publishers(|publisher| {
+    service.dynamic_config().list_publishers(|publisher| {
         publishers.push((publisher.node_id, ConnectionId(publisher.publisher_id.value())));
         CallbackProgression::Continue
     });
     let mut dead = Vec::new();
     // After an error, the nodes that were not listed count as alive.
-    let _ = commands.nodes(|node| {
+    let _ = service.nodes(|node| {
         if let NodeState::Dead(_) = node {
             dead.push(*node.node_id());
         }

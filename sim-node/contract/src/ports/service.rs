@@ -10,8 +10,9 @@ use thiserror::Error;
 use crate::endpoint::Endpoint;
 use crate::limits::{
     BORROWED_SAMPLES_MAX, BORROWED_UPDATES_MAX, CLIENTS_MAX, COMMAND_READERS_MAX,
-    COMMANDS_BUFFERED, KEYFRAMES_BUFFERED, LISTENERS_MAX, OUTCOME_READERS_MAX, OUTCOMES_BUFFERED,
-    OWNER_PUBLISHERS_MAX, READERS_MAX, SNAPSHOTS_BUFFERED, STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
+    COMMANDS_BUFFERED, KEYFRAMES_BUFFERED, LISTENERS_MAX, MEMBERS_MAX, OUTCOME_READERS_MAX,
+    OUTCOMES_BUFFERED, OWNER_PUBLISHERS_MAX, READERS_MAX, READY_BUFFERED, SNAPSHOTS_BUFFERED,
+    STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
 };
 use crate::ports::domain::root::RootError;
 use crate::ports::memory::MemoryError;
@@ -93,6 +94,15 @@ pub(crate) const COMMANDS: ServiceSpec = ServiceSpec {
     when_full: WhenFull::RefuseNewest,
     ..LATCHED
 };
+/// A new message of a member says all that its unread ones say.
+pub(crate) const READY: ServiceSpec = ServiceSpec {
+    suffix: "ready",
+    publishers_max: MEMBERS_MAX,
+    readers_max: COMMAND_READERS_MAX,
+    history: 0,
+    buffered: READY_BUFFERED,
+    ..LATCHED
+};
 pub(crate) const WAKE: ServiceSpec = ServiceSpec {
     suffix: "wake",
     pattern: MessagingPattern::Event,
@@ -103,7 +113,7 @@ pub(crate) const WAKE: ServiceSpec = ServiceSpec {
 };
 
 /// All services of a name.
-pub(crate) const SERVICES: [&ServiceSpec; 12] = [
+pub(crate) const SERVICES: [&ServiceSpec; 13] = [
     &PARTICLES,
     &KEYFRAME,
     &TOPOLOGY,
@@ -114,6 +124,7 @@ pub(crate) const SERVICES: [&ServiceSpec; 12] = [
     &COLLIDERS,
     &COMMANDS,
     &OUTCOMES,
+    &READY,
     &STATUS,
     &WAKE,
 ];

@@ -9,12 +9,13 @@ use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::ready::Ready;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::ports::service::{
-    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE,
+    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, SCENE, STATUS, SURFACE,
     ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
@@ -34,6 +35,7 @@ pub(crate) struct Services {
     pub(crate) colliders: Slices<ColliderState, CollidersHeader>,
     pub(crate) commands: Values<Command>,
     pub(crate) outcomes: Values<Outcome>,
+    pub(crate) ready: Values<Ready>,
     pub(crate) wake: Events,
 }
 
@@ -53,6 +55,7 @@ impl Services {
             colliders: session.slices(&COLLIDERS, access)?,
             commands: session.values(&COMMANDS, access)?,
             outcomes: session.values(&OUTCOMES, access)?,
+            ready: session.values(&READY, access)?,
             wake: session.events(access)?,
         })
     }

@@ -8,8 +8,8 @@ use std::mem::offset_of;
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use sim_contract::{
     ColliderState, CollidersHeader, Command, ConstraintState, KeyframeHeader, LoadHeader,
-    NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, SnapshotHeader,
-    TearsHeader, TornConstraint, Triangle, Wake,
+    MemberStatus, NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, Ready,
+    SnapshotHeader, TearsHeader, TornConstraint, Triangle, Wake,
 };
 
 macro_rules! layout {
@@ -153,10 +153,13 @@ fn write_command_and_status_layouts(text: &mut String) {
             reader_count,
             process_id,
             flags,
-            spare,
+            member_count,
             scene_name,
+            members,
         }
     );
+    layout!(text, MemberStatus { client_id, step, every, is_awaited });
+    layout!(text, Ready { client_id, run_id, step, every, tag });
 }
 
 #[test]
@@ -172,6 +175,8 @@ fn the_limits_are_frozen() {
         COMMANDS_PER_STEP_MAX,
         OWNER_PUBLISHERS_MAX,
         READERS_MAX,
+        MEMBERS_MAX,
+        READY_BUFFERED,
         BORROWED_SAMPLES_MAX,
         BORROWED_UPDATES_MAX,
         SNAPSHOTS_BUFFERED,

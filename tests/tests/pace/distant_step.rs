@@ -1,6 +1,5 @@
 //! Commands to a node whose next step is far away: with a period of 1,000 s, nothing that these
 //! tests wait for could come with a step.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl};
 use sim_contract::{Action, Client, ParameterValue, Text};

@@ -1,0 +1,34 @@
+//! The messages of the service `ready`.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Message of a member of the lockstep: 32 bytes, alignment 8. It is not a command: it changes no
+/// state, and has no outcome. The connection that it comes through identifies the member.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
+#[repr(C)]
+#[type_name("catenary.Ready")]
+pub struct Ready {
+    /// Client id of the member.
+    pub client_id: u64,
+    /// Run of the step; 0 if the member joins and has read no snapshot.
+    pub run_id: u64,
+    /// The node may compute the step after this one: the member has sent its commands for it.
+    pub step: u64,
+    /// The member takes part at the steps that are multiples of this number, at least 1.
+    pub every: u32,
+    /// Always [`Ready::TAG`]. Anything else is refused.
+    pub tag: u32,
+}
+
+const _: () = assert!(size_of::<Ready>() == 32 && align_of::<Ready>() == 8);
+
+impl Ready {
+    /// Marks a message of this service. Random bytes are unlikely to contain it.
+    pub const TAG: u32 = u32::from_le_bytes(*b"redy");
+
+    /// Returns `true` if the message is one of this service.
+    pub fn is_valid(&self) -> bool {
+        self.tag == Self::TAG && self.every > 0
+    }
+}

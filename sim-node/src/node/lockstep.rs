@@ -1,0 +1,306 @@
+//! The lockstep: processes that the node waits for before it computes a step.
+
+use std::hint::spin_loop;
+use std::thread::yield_now;
+use std::time::Duration;
+
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_contract::{ConnectionId, MEMBERS_MAX, MemberStatus, Ready};
+
+use super::publisher::Publisher;
+
+/// Time for which the node polls without a pause. Most members answer within it.
+const SPIN_NS: u64 = 100_000;
+/// Number of looks between two chances for another thread of this core, such as a member.
+const LOOKS_PER_YIELD: u32 = 16;
+/// Pause between two looks after that.
+const PAUSE_NS: u64 = 50_000;
+/// Time between two searches for killed members, which cost system calls.
+const SEARCH_PERIOD_NS: u64 = SECOND_NS / 10;
+
+/// The members of the lockstep.
+#[derive(Debug)]
+pub(super) struct Lockstep {
+    /// In the order of joining.
+    members: Vec<Member>,
+    /// Longest wait for a member.
+    timeout: Duration,
+    /// Since when the node waits for the members; `None` if it does not.
+    waiting_since_ns: Option<u64>,
+    next_search_ns: u64,
+    /// Messages that are none of a member, or claim a step of the future.
+    pub(super) refused_count: u64,
+}
+
+#[derive(Debug)]
+struct Member {
+    connection: ConnectionId,
+    client_id: u64,
+    every: u64,
+    /// Step at which it joined.
+    joined: u64,
+    /// Last step that it was ready for.
+    ready: Option<u64>,
+}
+
+impl Member {
+    fn is_awaited(&self, step: u64) -> bool {
+        step.is_multiple_of(self.every) && self.ready.is_none_or(|ready| ready < step)
+    }
+}
+
+/// The last published step.
+#[derive(Debug, Clone, Copy)]
+struct Published {
+    run_id: u64,
+    step: u64,
+}
+
+/// A change of the members.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Event {
+    Joined {
+        client_id: u64,
+        every: u64,
+    },
+    /// It closed its connection, or its process has ended.
+    Left {
+        client_id: u64,
+    },
+    /// It was not ready in time.
+    TimedOut {
+        client_id: u64,
+        timeout: Duration,
+    },
+}
+
+impl Event {
+    /// Returns the line for people. `step` is the last one that was computed.
+    pub(super) fn describe(self, step: u64) -> String {
+        match self {
+            Self::Joined { client_id, every: 1 } => {
+                format!("client {client_id} joined the lockstep at step {step}")
+            }
+            Self::Joined { client_id, every } => format!(
+                "client {client_id} joined the lockstep at step {step}, for every {every} steps"
+            ),
+            Self::Left { client_id } => {
+                format!("client {client_id} left the lockstep at step {step}")
+            }
+            Self::TimedOut { client_id, timeout } => format!(
+                "client {client_id} was not ready for the step after {step} within {timeout:?}: the \
+                 lockstep continues without it, until it is ready for a step again"
+            ),
+        }
+    }
+}
+
+impl Lockstep {
+    pub(super) fn new(timeout: Duration) -> Self {
+        Self {
+            members: Vec::new(),
+            timeout,
+            waiting_since_ns: None,
+            next_search_ns: 0,
+            refused_count: 0,
+        }
+    }
+
+    /// Waits until all members are ready for `step`, at most until `until_ns`. Returns `true` if they
+    /// are. Members that are gone, or have kept the node waiting for too long, are members no more.
+    pub(super) fn wait(
+        &mut self,
+        publisher: &Publisher,
+        step: u64,
+        until_ns: u64,
+        mut report: impl FnMut(Event),
+    ) -> bool {
+        let start_ns = monotonic_ns();
+        let mut look_count = 0_u32;
+        loop {
+            self.receive(publisher, step, &mut report);
+            if !self.is_waiting(step) {
+                self.waiting_since_ns = None;
+                return true;
+            }
+            let now_ns = monotonic_ns();
+            self.remove_lost(publisher, step, now_ns, &mut report);
+            if now_ns >= until_ns {
+                return !self.is_waiting(step);
+            }
+            look_count += 1;
+            if now_ns > start_ns + SPIN_NS {
+                sleep_until(now_ns + PAUSE_NS);
+            } else if look_count.is_multiple_of(LOOKS_PER_YIELD) {
+                yield_now();
+            } else {
+                spin_loop();
+            }
+        }
+    }
+
+    /// Receives the messages that have arrived. `step` is the last one that was published.
+    pub(super) fn receive(
+        &mut self,
+        publisher: &Publisher,
+        step: u64,
+        report: &mut impl FnMut(Event),
+    ) {
+        let last = Published { run_id: publisher.run_id(), step };
+        publisher.receive_ready(|message, connection| self.add(message, connection, last, report));
+    }
+
+    fn add(
+        &mut self,
+        message: Ready,
+        connection: ConnectionId,
+        last: Published,
+        report: &mut impl FnMut(Event),
+    ) {
+        let is_of_run = message.run_id == last.run_id;
+        if !message.is_valid() || (is_of_run && message.step > last.step) {
+            self.refused_count += 1;
+            return;
+        }
+        let ready = is_of_run.then_some(message.step);
+        let every = u64::from(message.every);
+        let known = self.members.iter_mut().find(|member| member.connection == connection);
+        if let Some(member) = known {
+            member.every = every;
+            member.ready = member.ready.max(ready);
+        } else if self.members.len() < MEMBERS_MAX {
+            let client_id = message.client_id;
+            self.members.push(Member { connection, client_id, every, joined: last.step, ready });
+            report(Event::Joined { client_id, every });
+        } else {
+            self.refused_count += 1;
+        }
+    }
+
+    fn is_waiting(&self, step: u64) -> bool {
+        self.members.iter().any(|member| member.is_awaited(step))
+    }
+
+    /// Removes the members that are gone, and those that the node has waited for too long.
+    fn remove_lost(
+        &mut self,
+        publisher: &Publisher,
+        step: u64,
+        now_ns: u64,
+        report: &mut impl FnMut(Event),
+    ) {
+        let since_ns = *self.waiting_since_ns.get_or_insert(now_ns);
+        let is_search_due = now_ns >= self.next_search_ns;
+        let connections = if is_search_due {
+            self.next_search_ns = now_ns + SEARCH_PERIOD_NS;
+            publisher.living_members()
+        } else {
+            publisher.listed_members()
+        };
+        let waited = Duration::from_nanos(now_ns.saturating_sub(since_ns));
+        let timeout = self.timeout;
+        self.members.retain(|member| {
+            let client_id = member.client_id;
+            if !connections.contains(&member.connection) {
+                report(Event::Left { client_id });
+                return false;
+            }
+            if waited > timeout && member.is_awaited(step) {
+                report(Event::TimedOut { client_id, timeout });
+                return false;
+            }
+            true
+        });
+    }
+
+    /// Forgets the members that are gone, a few times a second. For a node that does not wait for them.
+    pub(super) fn search(&mut self, publisher: &Publisher, report: &mut impl FnMut(Event)) {
+        let now_ns = monotonic_ns();
+        if self.members.is_empty() || now_ns < self.next_search_ns {
+            return;
+        }
+        self.next_search_ns = now_ns + SEARCH_PERIOD_NS;
+        let connections = publisher.living_members();
+        self.members.retain(|member| {
+            let is_there = connections.contains(&member.connection);
+            if !is_there {
+                report(Event::Left { client_id: member.client_id });
+            }
+            is_there
+        });
+    }
+
+    /// Returns the members in the order of joining. `step` is the last one that was published.
+    pub(super) fn members(&self, step: u64) -> impl Iterator<Item = MemberStatus> {
+        self.members.iter().map(move |member| MemberStatus {
+            client_id: member.client_id,
+            step: member.ready.unwrap_or(member.joined),
+            every: u32::try_from(member.every).unwrap_or(u32::MAX),
+            is_awaited: u32::from(member.is_awaited(step)),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Checks who is awaited, with messages given to `Lockstep::add`.
+    use super::*;
+
+    const RUN: u64 = 9;
+
+    fn ready(client_id: u64, step: u64, every: u32) -> Ready {
+        Ready { client_id, run_id: RUN, step, every, tag: Ready::TAG }
+    }
+
+    fn lockstep() -> Lockstep {
+        Lockstep::new(Duration::from_secs(1))
+    }
+
+    #[test]
+    fn a_member_is_awaited_at_its_steps_until_it_is_ready() {
+        let mut lockstep = lockstep();
+        let join = Ready { run_id: 0, ..ready(7, 0, 4) };
+        let mut events = Vec::new();
+        let mut add = |lockstep: &mut Lockstep, message, step| {
+            let last = Published { run_id: RUN, step };
+            lockstep.add(message, ConnectionId(1), last, &mut |event| events.push(event));
+        };
+        add(&mut lockstep, join, 0);
+        assert!(lockstep.is_waiting(0) && !lockstep.is_waiting(1) && lockstep.is_waiting(4));
+        add(&mut lockstep, ready(7, 4, 4), 6);
+        assert!(!lockstep.is_waiting(4) && !lockstep.is_waiting(6) && lockstep.is_waiting(8));
+        // An older message changes nothing, and one of another run neither.
+        add(&mut lockstep, ready(7, 0, 4), 6);
+        add(&mut lockstep, Ready { run_id: 8, ..ready(7, 8, 4) }, 8);
+        assert!(!lockstep.is_waiting(4) && lockstep.is_waiting(8));
+        assert_eq!(events, [Event::Joined { client_id: 7, every: 4 }]);
+        assert_eq!(lockstep.refused_count, 0);
+    }
+
+    #[test]
+    fn foreign_messages_are_refused_and_counted() {
+        let mut lockstep = lockstep();
+        let messages = [
+            Ready { tag: 0, ..ready(7, 0, 1) },
+            ready(7, 0, 0),
+            // The step is not computed yet.
+            ready(7, 3, 1),
+        ];
+        for message in messages {
+            let last = Published { run_id: RUN, step: 2 };
+            lockstep.add(message, ConnectionId(1), last, &mut |_| panic!("joined"));
+        }
+        assert_eq!(lockstep.refused_count, 3);
+        assert_eq!(lockstep.members(2).count(), 0);
+    }
+
+    #[test]
+    fn the_lockstep_has_a_limit() {
+        let mut lockstep = lockstep();
+        for connection in 0..=MEMBERS_MAX as u128 {
+            let last = Published { run_id: RUN, step: 0 };
+            lockstep.add(ready(7, 0, 1), ConnectionId(connection), last, &mut |_| {});
+        }
+        assert_eq!((lockstep.members(0).count(), lockstep.refused_count), (MEMBERS_MAX, 1));
+    }
+}

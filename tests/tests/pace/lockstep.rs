@@ -1,0 +1,199 @@
+//! The lockstep: the node waits for its members, and for nobody else.
+
+use std::num::NonZeroU32;
+use std::sync::Barrier;
+use std::thread;
+
+use fastrand::Rng;
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
+use sim_contract::clock::{monotonic_ns, sleep_until};
+use sim_contract::{Action, Client, Endpoint, Snapshot};
+
+const STEPS: u64 = 120;
+
+/// Moves a grabbed particle by what another one does: each error of a step changes all that follow.
+fn follow(client: &Client, snapshot: &Snapshot, particle: u32, leader: usize) -> Action {
+    let step = snapshot.header().step;
+    let [x, y, z] = snapshot.particles()[leader].position;
+    let target = [x + 0.1, y - 0.05 * (client.client_id() as f32), z + 0.1];
+    let over_s = 0.01;
+    if step == 0 {
+        Action::Grab { particle, target, over_s }
+    } else {
+        Action::Move { particle, target, over_s }
+    }
+}
+
+/// Takes part until the node ends. Returns the number of turns.
+fn control(endpoint: &Endpoint, id: u32, seed: u64, joined: &dyn Fn()) -> u64 {
+    let mut rng = Rng::with_seed(seed);
+    let mut client = Client::attach_as(endpoint, id.into()).unwrap();
+    client.join_lockstep(DEADLINE).unwrap();
+    joined();
+    let mut turns = 0;
+    while turns < STEPS
+        && let Some(snapshot) = client.next_turn(DEADLINE).unwrap()
+    {
+        assert_eq!(snapshot.header().step, turns, "a turn was left out");
+        sleep_until(monotonic_ns() + rng.u64(0..2_000_000));
+        client.send(follow(&client, &snapshot, 20 + id, 60 + id as usize)).unwrap();
+        drop(snapshot);
+        client.ready().unwrap();
+        turns += 1;
+    }
+    turns
+}
+
+/// Runs two controllers beside a node, and returns the hash of its last state.
+fn hash_with_controllers(seed: u64, options: &[&str]) -> String {
+    let sandbox = Sandbox::new();
+    let steps = STEPS.to_string();
+    let args = ["run", "curtain", "--paused", "--steps", &steps, "--json"];
+    let node = Process::start_ready(Program::SimNode, &sandbox, &[&args[..], options].concat());
+    let endpoint = sandbox.endpoint();
+    let barrier = Barrier::new(3);
+    thread::scope(|scope| {
+        for id in [1, 2] {
+            let (endpoint, barrier) = (&endpoint, &barrier);
+            scope.spawn(move || {
+                let joined = || {
+                    barrier.wait();
+                };
+                control(endpoint, id, seed + u64::from(id), &joined)
+            });
+        }
+        barrier.wait();
+        assert_eq!(member_count(&sandbox), 2);
+        ctl(&sandbox, &["resume"]);
+        node.wait().json()["state_hash"].as_str().unwrap().to_owned()
+    })
+}
+
+#[test]
+fn the_same_controllers_give_the_same_hash_at_any_speed() {
+    let expected = hash_with_controllers(0, &[]);
+    for seed in 1..=10 {
+        assert_eq!(hash_with_controllers(seed, &[]), expected, "seed {seed}");
+        let fast = hash_with_controllers(100 + seed, &["--as-fast-as-possible"]);
+        assert_eq!(fast, expected, "seed {seed}, as fast as possible");
+    }
+    let other_rate = hash_with_controllers(0, &["--rate", "200"]);
+    assert_ne!(other_rate, expected);
+}
+
+fn member_count(sandbox: &Sandbox) -> usize {
+    ctl(sandbox, &["status"])["lockstep"].as_array().unwrap().len()
+}
+
+#[test]
+fn a_member_of_every_fourth_step_is_waited_for_at_those_steps_only() {
+    let sandbox = Sandbox::new();
+    let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    client.join_lockstep_every(NonZeroU32::new(4).unwrap(), DEADLINE).unwrap();
+    let mut last = None;
+    for _ in 0..50 {
+        let step = client.next_turn(DEADLINE).unwrap().unwrap().header().step;
+        assert!(step.is_multiple_of(4), "{step}");
+        assert!(last.is_none_or(|last| step == last + 4), "{step} after {last:?}");
+        last = Some(step);
+        client.ready().unwrap();
+    }
+    drop(client);
+    node.wait_for_line("client ");
+    wait_for("an empty lockstep", || (member_count(&sandbox) == 0).then_some(()));
+}
+
+fn step(sandbox: &Sandbox) -> u64 {
+    ctl(sandbox, &["status"])["step"].as_u64().unwrap()
+}
+
+/// Waits until the node has made further steps.
+fn goes_on(sandbox: &Sandbox) {
+    let before = step(sandbox);
+    wait_for("further steps", || (step(sandbox) > before + 10).then_some(()));
+}
+
+#[test]
+fn a_killed_member_is_named_and_the_run_goes_on() {
+    let sandbox = Sandbox::new();
+    let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "pendulum"]);
+    let member = Process::start(Program::Hold, &sandbox, &["1000000"]);
+    let joined = node.wait_for_line("client ");
+    wait_for("a member", || (member_count(&sandbox) == 1).then_some(()));
+    goes_on(&sandbox);
+    member.signal(Signal::KILL);
+    let (id, _) = joined.split_once(" joined the lockstep at step ").unwrap();
+    node.wait_for_line(&format!("{id} left the lockstep at step "));
+    assert_eq!(member_count(&sandbox), 0);
+    goes_on(&sandbox);
+    assert_eq!(member.wait().code, None);
+    assert_eq!(node.interrupt().code, Some(0));
+}
+
+#[test]
+fn a_stopped_member_is_dropped_after_the_stated_time_and_joins_again() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "pendulum", "--lockstep-timeout", "200ms"];
+    let mut node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let member = Process::start(Program::Hold, &sandbox, &["1000000"]);
+    wait_for("the member", || (member_count(&sandbox) == 1).then_some(()));
+    goes_on(&sandbox);
+    member.signal(Signal::STOP);
+    let line = node.wait_for_line("warning: client ");
+    assert!(line.contains(" was not ready for the step after "), "{line}");
+    assert!(line.contains(" within 200ms: the lockstep continues without it"), "{line}");
+    goes_on(&sandbox);
+    assert_eq!(member_count(&sandbox), 0);
+    member.signal(Signal::CONT);
+    wait_for("the member", || (member_count(&sandbox) == 1).then_some(()));
+    goes_on(&sandbox);
+    member.signal(Signal::KILL);
+    member.wait();
+    assert_eq!(node.interrupt().code, Some(0));
+}
+
+#[test]
+fn a_member_continues_with_the_next_node() {
+    let sandbox = Sandbox::new();
+    let start = || Process::start_ready(Program::SimNode, &sandbox, &["run", "pendulum"]);
+    let mut node = start();
+    let mut client = Client::attach_as(&sandbox.endpoint(), 7).unwrap();
+    client.join_lockstep(DEADLINE).unwrap();
+    node.wait_for_line("client 7 joined the lockstep at step ");
+    let first = client.next_turn(DEADLINE).unwrap().unwrap().header().run_id;
+    client.ready().unwrap();
+    node.signal(Signal::KILL);
+    node.wait();
+    let mut node = start();
+    let second = wait_for("a turn of the next run", || {
+        let snapshot = client.next_turn(DEADLINE).unwrap()?;
+        let run_id = snapshot.header().run_id;
+        drop(snapshot);
+        client.ready().unwrap();
+        (run_id != first).then_some(run_id)
+    });
+    node.wait_for_line("client 7 joined the lockstep at step ");
+    assert_eq!(client.next_turn(DEADLINE).unwrap().unwrap().header().run_id, second);
+    // No outcome can come in a turn.
+    let error = client.request(Action::Pause, DEADLINE).unwrap_err().to_string();
+    assert!(error.contains("use `send`, then `ready`"), "{error}");
+    client.ready().unwrap();
+    assert_eq!(node.interrupt().code, Some(0));
+}
+
+#[test]
+fn a_node_without_a_lockstep_says_so() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let simulate = ["simulate", "curtain", "--steps", "50", "-o", &file];
+    assert_eq!(Process::run(Program::Recorder, &sandbox, &simulate).code, Some(0));
+    let play = ["play", &file, "--paused"];
+    let replay = Process::start_ready(Program::Recorder, &sandbox, &play);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let error = client.join_lockstep(DEADLINE).unwrap_err().to_string();
+    assert!(error.contains("is a replay, which has no lockstep"), "{error}");
+    let error = client.ready().unwrap_err().to_string();
+    assert!(error.contains("call join_lockstep first"), "{error}");
+    replay.interrupt();
+}
