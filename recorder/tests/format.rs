@@ -286,6 +286,20 @@ fn a_truncated_file_is_read_up_to_the_cut() {
 }
 
 #[test]
+fn bytes_behind_the_end_are_reported_after_all_messages() {
+    let file = write(LogOptions::default());
+    let count = read_all(&mut LogReader::new(file.as_slice()).unwrap()).unwrap().len();
+    for appended in [&b"x"[..], &file] {
+        let longer = [&file, appended].concat();
+        let mut log = LogReader::new(longer.as_slice()).unwrap();
+        assert_eq!(read_all(&mut log).unwrap().len(), count);
+        let Some(LogEnd::Damaged { byte, cause }) = log.end() else { panic!("{:?}", log.end()) };
+        assert_eq!(*byte, file.len() as u64);
+        assert!(cause.starts_with("other bytes follow the end"), "{cause}");
+    }
+}
+
+#[test]
 fn flushed_messages_outlive_a_killed_recorder() {
     let shared = SharedOut::default();
     let mut log =

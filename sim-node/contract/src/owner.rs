@@ -313,14 +313,15 @@ impl Owner {
         self.wake.wake(event);
     }
 
-    /// Returns the first file of this owner that is missing in the root of the domain, because a cleaner
-    /// or a person removed it. Connected clients do not notice, but no other can attach.
+    /// Returns the first file of this owner that is missing in the root of the domain, or its lock in shared
+    /// memory, because a cleaner or a person removed it. Connected clients do not notice, but no other can attach.
     pub fn missing_file(&self) -> Option<PathBuf> {
         let config = self.session.config();
-        if self.lock.is_removed() {
-            return Some(self.lock.path().to_owned());
+        if let Some(path) = self.lock.removed() {
+            return Some(path.to_owned());
         }
-        let files = unfinished::static_files(config, self.session.endpoint.name());
+        let mut files = unfinished::static_files(config, self.session.endpoint.name());
+        files.extend(unfinished::node_files(config, self.session.node_id()));
         files.into_iter().find(|path| !path.exists())
     }
 

@@ -180,6 +180,46 @@ fn a_file_that_another_program_writes_is_refused_even_with_overwrite() {
 }
 
 #[test]
+fn the_unfinished_file_of_another_program_is_no_target() {
+    let directory = Directory::new("target");
+    let (path, part) = (directory.file("a.mcap"), directory.file("a.mcap.part"));
+    let mut first = write(&path, Existing::Refuse, "one").unwrap();
+    first.flush().unwrap();
+    for existing in [Existing::Refuse, Existing::Overwrite] {
+        let error = write(&part, existing, "other").unwrap_err().to_string();
+        let expected = format!("{} is being written by process ", part.display());
+        assert!(error.starts_with(&expected), "{error}");
+    }
+    assert_eq!(fs::read_to_string(&part).unwrap(), "one");
+    first.finish().unwrap();
+    // The other way round: it becomes one while a file of its name is written.
+    let second = write(&part, Existing::Overwrite, "two").unwrap();
+    let third = write(&path, Existing::Overwrite, "three").unwrap();
+    let error = second.finish().unwrap_err().to_string();
+    assert!(error.contains("is being written by process "), "{error}");
+    third.finish().unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "three");
+}
+
+#[test]
+fn a_file_that_was_replaced_while_it_was_written_is_not_finished() {
+    let directory = Directory::new("replaced");
+    let (path, part) = (directory.file("a.mcap"), directory.file("a.mcap.part"));
+    for other in [Some("other"), None] {
+        let file = write(&path, Existing::Overwrite, "mine").unwrap();
+        fs::remove_file(&part).unwrap();
+        if let Some(text) = other {
+            fs::write(&part, text).unwrap();
+        }
+        let error = file.finish().unwrap_err();
+        assert!(!error.leaves_complete_file());
+        let error = error.to_string();
+        assert!(error.ends_with("another program has moved, replaced or removed it"), "{error}");
+        assert!(!path.exists());
+    }
+}
+
+#[test]
 fn the_old_file_is_replaced_as_a_whole() {
     let directory = Directory::new("whole");
     let (path, old) = (directory.file("a.toml"), directory.file("old.toml"));

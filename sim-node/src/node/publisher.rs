@@ -35,6 +35,13 @@ pub(crate) struct Position {
     pub(crate) is_last: bool,
 }
 
+/// Numbers of readers of two services.
+#[derive(Debug, Clone, Copy, Default)]
+struct ReaderCounts {
+    keyframe: usize,
+    particles: usize,
+}
+
 /// Writes snapshots, keyframes, outcomes and status.
 #[derive(Debug)]
 pub(crate) struct Publisher {
@@ -53,8 +60,10 @@ pub(crate) struct Publisher {
     snapshot_count: u32,
     /// The next snapshot needs a keyframe.
     is_keyframe_due: bool,
+    /// So does the one after it, for a reader that was counted before it could receive the first.
+    is_second_keyframe_due: bool,
     keyframe_step: u64,
-    keyframe_readers: usize,
+    readers: ReaderCounts,
     /// Outcomes of the waiting boundary that are not published yet.
     outcomes: Vec<Outcome>,
     outcome_count: u64,
@@ -88,8 +97,9 @@ impl Publisher {
             last: SnapshotHeader::default(),
             snapshot_count: 0,
             is_keyframe_due: true,
+            is_second_keyframe_due: false,
             keyframe_step: 0,
-            keyframe_readers: 0,
+            readers: ReaderCounts::default(),
             outcomes: Vec::new(),
             outcome_count: 0,
             rejected_count: 0,
@@ -208,6 +218,7 @@ impl Publisher {
         self.watch_keyframe_readers();
         if self.is_keyframe_due {
             self.publish_keyframe(solver, position)?;
+            self.is_keyframe_due = std::mem::take(&mut self.is_second_keyframe_due);
         }
         self.publish_outcomes()?;
         self.last = self.header(solver, position);
@@ -284,6 +295,8 @@ impl Publisher {
             self.last.step == position.step && self.last.outcome_count == self.outcome_count;
         if self.is_keyframe_due && is_untouched {
             self.publish_keyframe(solver, position)?;
+            // A reader that joins later receives this one, because it is latched.
+            self.is_second_keyframe_due = false;
             self.owner.wake(Wake::Frame);
         }
         self.publish_outcomes()
@@ -300,10 +313,20 @@ impl Publisher {
         Ok(())
     }
 
+    /// Makes keyframes due for a reader that has joined, so that its states begin at once. It joins the
+    /// keyframes first and the particles last, and needs both of a step.
     fn watch_keyframe_readers(&mut self) {
-        let readers = self.owner.keyframe_reader_count();
-        self.is_keyframe_due |= readers > self.keyframe_readers;
-        self.keyframe_readers = readers;
+        let (before, now) = (self.readers, self.reader_counts());
+        let has_joined = now.keyframe > before.keyframe || now.particles > before.particles;
+        if has_joined && now.keyframe > 0 {
+            (self.is_keyframe_due, self.is_second_keyframe_due) = (true, true);
+        }
+        self.readers = now;
+    }
+
+    fn reader_counts(&self) -> ReaderCounts {
+        let keyframe = self.owner.keyframe_reader_count();
+        ReaderCounts { keyframe, particles: self.owner.reader_count() }
     }
 
     fn publish_keyframe(&mut self, solver: &Solver, position: Position) -> anyhow::Result<()> {

@@ -34,7 +34,8 @@ fn segments(sandbox: &Sandbox) -> Vec<PathBuf> {
     let prefix = format!("{}_", sandbox.domain());
     let is_segment = |path: &PathBuf| {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        name.starts_with(&prefix) && (name.ends_with(".data") || name.ends_with(".dynamic"))
+        name.starts_with(&prefix)
+            && [".data", ".dynamic"].iter().any(|suffix| name.ends_with(suffix))
     };
     let files = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path());
     let segments: Vec<_> = files.filter(is_segment).collect();

@@ -3,7 +3,7 @@
 use std::fs::{self, File, Permissions};
 use std::os::unix::fs::PermissionsExt;
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, record, wait_for};
 use sim_contract::Client;
 
 /// A node creates this many services, each with a file.
@@ -90,11 +90,17 @@ fn a_cleaner_that_removes_the_files_of_a_node_is_noticed_and_frees_no_name() {
     let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let step = client.next_snapshot(DEADLINE).unwrap().unwrap().header().step;
+    let file = sandbox.path("cleaned.mcap");
+    let recorder = record(&sandbox, &file);
     for entry in fs::read_dir(sandbox.root()).unwrap().flatten() {
         let _ = fs::remove_dir_all(entry.path()).or_else(|_| fs::remove_file(entry.path()));
     }
     let warning = node.wait_for_line("warning: ");
     assert!(warning.contains("removed by a cleaner of /tmp"), "{warning}");
+    let late = Process::run(Program::SimNode, &sandbox, &["ctl", "status"]);
+    assert_eq!(late.code, Some(1));
+    let expected = "runs as 'sim' in domain ";
+    assert!(late.stderr.contains(expected) && late.stderr.contains("restart it"), "{late:?}");
 
     let second = Process::run(Program::SimNode, &sandbox, &["run", "curtain"]);
     assert_eq!(second.code, Some(1));
@@ -104,10 +110,33 @@ fn a_cleaner_that_removes_the_files_of_a_node_is_noticed_and_frees_no_name() {
         let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
         (snapshot.header().step > step + 10).then_some(())
     });
+    // So does a recorder, until the node ends.
+    let before = fs::metadata(format!("{file}.part")).unwrap().len();
+    wait_for("a longer recording", || {
+        let part = fs::metadata(format!("{file}.part")).unwrap();
+        (part.len() > before + 100_000).then_some(())
+    });
     assert_eq!(node.interrupt().code, Some(0));
+    let recorded = recorder.wait();
+    assert_eq!(recorded.code, Some(0), "{}", recorded.stderr);
+    assert!(recorded.stdout.contains("lost        none"), "{recorded:?}");
     let third = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
     assert_eq!(ctl(&sandbox, &["status"])["scene"], "curtain");
     assert_eq!(third.interrupt().code, Some(0));
+}
+
+#[test]
+fn a_node_warns_when_files_of_its_own_are_removed() {
+    for folder in ["nodes", "services"] {
+        let sandbox = Sandbox::new();
+        let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+        fs::remove_dir_all(sandbox.root().join(folder)).unwrap();
+        let warning = node.wait_for_line("warning: ");
+        assert!(warning.contains(&format!("/{folder}/")), "{warning}");
+        let second = Process::run(Program::SimNode, &sandbox, &["run", "curtain"]);
+        assert!(second.stderr.contains("is already running, as process"), "{}", second.stderr);
+        assert_eq!(node.interrupt().code, Some(0));
+    }
 }
 
 #[test]
@@ -116,6 +145,7 @@ fn programs_refuse_a_domain_whose_files_others_could_change() {
     let root = sandbox.root();
     fs::create_dir(&root).unwrap();
     fs::set_permissions(&root, Permissions::from_mode(0o777)).unwrap();
+    let expected = format!("other users can write to {} (mode 777)", root.display());
     for (program, args) in [
         (Program::SimNode, &["run", "curtain"][..]),
         (Program::SimNode, &["ctl", "status"]),
@@ -123,7 +153,11 @@ fn programs_refuse_a_domain_whose_files_others_could_change() {
     ] {
         let finished = Process::run(program, &sandbox, args);
         assert_eq!(finished.code, Some(1));
-        let expected = format!("other users can write to {} (mode 777)", root.display());
         assert!(finished.stderr.contains(&expected), "{}", finished.stderr);
     }
+    // The bridge waits until its node can be reached, and says why it cannot.
+    let args = ["--listen", "127.0.0.1:0"];
+    let mut bridge = Process::start_ready(Program::ViewerBridge, &sandbox, &args);
+    assert!(bridge.wait_for_line("warning: ").contains(&expected));
+    assert_eq!(bridge.interrupt().code, Some(0));
 }

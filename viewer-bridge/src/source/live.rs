@@ -15,6 +15,7 @@ mod updates;
 use std::time::Duration;
 
 use sim_contract::clock::monotonic_ns;
+use sim_contract::console::note;
 use sim_contract::{AttachError, Endpoint};
 
 use super::feed::Source;
@@ -61,7 +62,12 @@ impl Live {
             NodeState::None => NodeState::None,
             NodeState::Alive | NodeState::Lost => NodeState::Lost,
         };
-        self.publish_node(sinks, Node { state, text: error.to_string(), ..Node::default() });
+        let text = error.to_string();
+        // A missing node is no problem of the bridge. Anything else needs a person at its terminal.
+        if text != self.node.text && !matches!(error, AttachError::NoNode { .. }) {
+            note(&format!("warning: {text}"));
+        }
+        self.publish_node(sinks, Node { state, text, ..Node::default() });
     }
 
     fn publish_node(&mut self, sinks: &Sinks, node: Node) {

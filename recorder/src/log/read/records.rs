@@ -251,6 +251,10 @@ impl<R: Read> RecordReader<R> {
         }
         self.read_magic()?;
         self.intact_count = self.source.position();
+        if self.source.fill(&mut [0])? > 0 {
+            let cause = "other bytes follow the end of the recording, such as a second file";
+            return Err(Fault::Damaged(cause.to_owned()));
+        }
         Ok(Part::End)
     }
 

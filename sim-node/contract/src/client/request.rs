@@ -39,7 +39,9 @@ pub enum RequestError {
         missed_count: u64,
     },
     /// The command was sent, but no outcome arrived in time. Its effect is unknown.
-    #[error("no outcome of command {sequence} after at most {timeout:?}: {owner}")]
+    #[error(
+        "no outcome of command {sequence} after at most {timeout:?}, so its effect is unknown: {owner}"
+    )]
     Timeout {
         /// Sequence number of the command.
         sequence: u64,

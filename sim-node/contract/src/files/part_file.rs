@@ -68,8 +68,9 @@ impl PartFile {
     ///
     /// # Errors
     /// If either file exists and may not be replaced, if either name belongs to something that is
-    /// not a file, if another program is writing it, or if the operating system reports an error.
+    /// not a file, if another program is writing either, or if the operating system reports an error.
     pub fn create(path: &Path, existing: Existing) -> Result<Self, PartFileError> {
+        check_unused(path)?;
         existing.check(path)?;
         let part_path = part_path(path);
         check_kind(&part_path)?;
@@ -117,9 +118,12 @@ impl<F: DiskFile> PartFile<F> {
     /// states which file is complete, if one is.
     pub fn finish(mut self) -> Result<PathBuf, PartFileError> {
         self.sync()?;
-        self.rename().map_err(|error| PartFileError::NotRenamed {
-            part_path: self.part_path.clone(),
-            error: Box::new(error),
+        self.rename().map_err(|error| match error {
+            PartFileError::Moved(_) => error,
+            error => PartFileError::NotRenamed {
+                part_path: self.part_path.clone(),
+                error: Box::new(error),
+            },
         })?;
         self.sync_name()?;
         Ok(self.path)
@@ -156,6 +160,11 @@ impl<F: DiskFile> PartFile<F> {
     }
 
     fn rename(&self) -> Result<(), PartFileError> {
+        if !self.out.get_ref().is_in_place(&self.part_path) {
+            return Err(PartFileError::Moved(self.part_path.clone()));
+        }
+        // It may be the unfinished file of another program by now.
+        check_unused(&self.path)?;
         let path_error = |cause| io_error(&self.path, cause);
         if self.existing == Existing::Overwrite {
             return fs::rename(&self.part_path, &self.path).map_err(path_error);
@@ -215,7 +224,7 @@ fn open_locked(path: &Path, existing: Existing) -> Result<File, PartFileError> {
             },
             Err(error) => return Err(io_error(error)),
         };
-        match lock::lock(&file, path).map_err(io_error)? {
+        match lock::lock(&file, path) {
             Lock::Taken { process_id } => {
                 return Err(PartFileError::InUse { path: path.to_owned(), process_id });
             }
@@ -225,6 +234,20 @@ fn open_locked(path: &Path, existing: Existing) -> Result<File, PartFileError> {
         }
     }
     Err(PartFileError::InUse { path: path.to_owned(), process_id: None })
+}
+
+/// Refuses a file that another program is writing, as its `.part` file.
+fn check_unused(path: &Path) -> Result<(), PartFileError> {
+    // Opening a named pipe would wait for its writer.
+    check_kind(path)?;
+    match File::open(path) {
+        Ok(file) if lock::is_taken(&file) => {
+            let process_id = lock::holder(&file);
+            Err(PartFileError::InUse { path: path.to_owned(), process_id })
+        }
+        // Later errors report a file that cannot be opened.
+        _ => Ok(()),
+    }
 }
 
 /// Refuses a name that belongs to something other than a regular file or a link to one. Later errors

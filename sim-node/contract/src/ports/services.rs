@@ -1,5 +1,6 @@
 //! All services of a name, and the process that owns the name.
 
+use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, NodeState, PortFactory};
 use thiserror::Error;
@@ -77,6 +78,17 @@ pub enum AttachError {
         /// Options that start a node at this address.
         options: String,
     },
+    /// A process owns the name, but its services are missing.
+    #[error(
+        "{} runs as {endpoint}, but its services are missing: if it has not just started, a cleaner of /tmp has removed their files; restart it",
+        process_id.map_or("a process".to_owned(), |id| format!("process {id}"))
+    )]
+    NoServices {
+        /// Address of the process.
+        endpoint: Endpoint,
+        /// The process, if its lock names it.
+        process_id: Option<u32>,
+    },
     /// A service could not be opened or connected to.
     #[error(transparent)]
     Service(#[from] ServiceError),
@@ -95,13 +107,19 @@ pub(crate) struct OwnerProcess {
     pub(crate) id: Option<u32>,
 }
 
-/// Returns the living process that owns the name: the publisher of `status`.
-pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
-    let mut publisher_nodes = Vec::new();
+/// Returns the iceoryx2 nodes of the publishers of `status`, living or dead.
+fn publisher_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
+    let mut nodes = Vec::new();
     status.dynamic_config().list_publishers(|publisher| {
-        publisher_nodes.push(publisher.node_id);
+        nodes.push(publisher.node_id);
         CallbackProgression::Continue
     });
+    nodes
+}
+
+/// Returns the living process that owns the name: the publisher of `status`.
+pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
+    let publisher_nodes = publisher_nodes(status);
     let mut owner = None;
     if publisher_nodes.is_empty() {
         return owner;
@@ -153,12 +171,22 @@ impl Attachment {
     }
 
     pub(crate) fn owner(&self) -> Option<OwnerProcess> {
-        owner(&self.status)
+        owner(&self.status).or_else(|| self.unlisted_owner())
+    }
+
+    /// Returns an owner that iceoryx2 takes for dead, because a cleaner of `/tmp` has removed the files of
+    /// its node. It still holds the lock of the name.
+    fn unlisted_owner(&self) -> Option<OwnerProcess> {
+        let has_publisher = !publisher_nodes(&self.status).is_empty();
+        has_publisher.then(|| self.session.lock_holder()).flatten().map(|id| OwnerProcess { id })
     }
 }
 
 fn no_node(session: &Session, detail: String) -> AttachError {
     let endpoint = session.endpoint.clone();
+    if let Some(process_id) = session.lock_holder() {
+        return AttachError::NoServices { endpoint, process_id };
+    }
     let options = endpoint.options();
     AttachError::NoNode { endpoint, detail, options }
 }

@@ -104,10 +104,21 @@ impl Session {
         Ok(Self { endpoint: endpoint.clone(), node, contract_version, version, _root: root })
     }
 
+    /// Returns the id of this process's iceoryx2 node.
+    pub(crate) fn node_id(&self) -> u128 {
+        self.node.id().value()
+    }
+
     /// Returns `true` if no process holds the lock of the name. What is left of its services is then
     /// for the next owner to remove.
     fn is_abandoned(&self) -> bool {
-        !OwnerLock::is_held(self.node.config(), self.endpoint.name())
+        self.lock_holder().is_none()
+    }
+
+    /// Returns the process that holds the lock of the name: its id, if its file tells.
+    #[allow(clippy::option_option, reason = "the id of a holder may be unknown")]
+    pub(crate) fn lock_holder(&self) -> Option<Option<u32>> {
+        OwnerLock::holder(self.node.config(), self.endpoint.name())
     }
 
     /// Opens or creates a service of slices of `T` with the header `H`.

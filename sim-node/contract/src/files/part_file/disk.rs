@@ -5,6 +5,8 @@ use std::io::ErrorKind::{InvalidInput, PermissionDenied};
 use std::io::{self, Write};
 use std::path::Path;
 
+use crate::files::place;
+
 /// A file that can be synced to disk. Tests replace it, to count calls and to inject errors.
 pub trait DiskFile: Write {
     /// Waits until the contents of the file are on disk.
@@ -12,6 +14,9 @@ pub trait DiskFile: Write {
 
     /// Waits until the contents and the size of the file are on disk.
     fn sync_all(&self) -> io::Result<()>;
+
+    /// Returns `true` if a path still names this file.
+    fn is_in_place(&self, path: &Path) -> bool;
 
     /// Waits until the names in the folder of a file are on disk.
     fn sync_folder_of(&self, path: &Path) -> io::Result<()>;
@@ -24,6 +29,10 @@ impl DiskFile for File {
 
     fn sync_all(&self) -> io::Result<()> {
         Self::sync_all(self)
+    }
+
+    fn is_in_place(&self, path: &Path) -> bool {
+        place::is_in_place(self, path)
     }
 
     fn sync_folder_of(&self, path: &Path) -> io::Result<()> {

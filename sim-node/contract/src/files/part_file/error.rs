@@ -15,18 +15,24 @@ pub enum PartFileError {
         .0.display()
     )]
     PartExists(PathBuf),
-    /// Another program is writing the `.part` file. It is never replaced.
+    /// Another program is writing the file or its `.part` file. It is never replaced.
     #[error(
         "{} is being written by {}: wait for its end, or name another file",
         path.display(),
         process_id.map_or("another program".to_owned(), |id| format!("process {id}"))
     )]
     InUse {
-        /// The `.part` file.
+        /// The file.
         path: PathBuf,
         /// The process, if the system names it.
         process_id: Option<u32>,
     },
+    /// Another program has moved, replaced or removed the `.part` file.
+    #[error(
+        "{} is no longer the file that was written: another program has moved, replaced or removed it",
+        .0.display()
+    )]
+    Moved(PathBuf),
     /// The name belongs to a directory or a device, for example. It is never replaced.
     #[error("{} is {kind}; name a file", path.display())]
     NotAFile {
@@ -74,6 +80,7 @@ pub fn explain_write_error(error: &io::Error) -> String {
         ErrorKind::FileTooLarge => {
             format!("{error}: the limit on the size of files is reached (see `ulimit -f`)")
         }
+        ErrorKind::NotFound => format!("{error}: the folder must exist"),
         ErrorKind::StorageFull => format!("{error}: free space, or name a file on another disk"),
         ErrorKind::QuotaExceeded => format!("{error}: your quota of this disk is used up"),
         _ => error.to_string(),

@@ -1,7 +1,6 @@
 //! The lock that keeps two programs from writing the same file.
 
-use std::fs::{self, File, Metadata, TryLockError};
-use std::io;
+use std::fs::{self, File, TryLockError};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
@@ -24,16 +23,22 @@ pub(super) enum Lock {
 }
 
 /// Locks a file that was opened as `path`. A file system without locks cannot refuse a second writer.
-pub(super) fn lock(file: &File, path: &Path) -> io::Result<Lock> {
+pub(super) fn lock(file: &File, path: &Path) -> Lock {
     if let Err(TryLockError::WouldBlock) = file.try_lock() {
-        return Ok(Lock::Taken { process_id: lock_holder(&file.metadata()?) });
+        return Lock::Taken { process_id: holder(file) };
     }
     // The writer that held the lock before may have renamed the file when it finished.
-    Ok(if is_in_place(file, path) { Lock::Held } else { Lock::Moved })
+    if is_in_place(file, path) { Lock::Held } else { Lock::Moved }
+}
+
+/// Returns `true` if another open file holds the lock of a file.
+pub(super) fn is_taken(file: &File) -> bool {
+    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
 }
 
 /// Returns the process that holds the lock of a file.
-fn lock_holder(file: &Metadata) -> Option<u32> {
+pub(super) fn holder(file: &File) -> Option<u32> {
+    let file = file.metadata().ok()?;
     let device = file.dev();
     let id = format!("{:02x}:{:02x}:{}", major(device), minor(device), file.ino());
     find_holder(&fs::read_to_string("/proc/locks").ok()?, &id)
@@ -59,9 +64,9 @@ mod tests {
         let renamed = path.with_extension("finished");
         let file = File::create_new(&path).unwrap();
         fs::rename(&path, &renamed).unwrap();
-        assert_eq!(lock(&file, &path).unwrap(), Lock::Moved);
+        assert_eq!(lock(&file, &path), Lock::Moved);
         fs::rename(&renamed, &path).unwrap();
-        assert_eq!(lock(&file, &path).unwrap(), Lock::Held);
+        assert_eq!(lock(&file, &path), Lock::Held);
         fs::remove_file(&path).unwrap();
     }
 

@@ -40,6 +40,10 @@ impl DiskFile for NotedFile {
         self.note("sync all")
     }
 
+    fn is_in_place(&self, path: &Path) -> bool {
+        path.exists()
+    }
+
     fn sync_folder_of(&self, _path: &Path) -> io::Result<()> {
         self.note(if self.path.exists() { "sync new name" } else { "sync part name" })
     }

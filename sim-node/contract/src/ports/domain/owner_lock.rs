@@ -20,7 +20,7 @@ use crate::ports::domain::root;
 pub(crate) struct OwnerLock {
     root: LockFile,
     /// `None` if another user of the host has occupied its path.
-    _shared_memory: Option<LockFile>,
+    shared_memory: Option<LockFile>,
 }
 
 /// Reason why a lock could not be taken.
@@ -49,22 +49,24 @@ impl OwnerLock {
             Err(error @ LockError::Held(_)) => return Err(error),
             Err(LockError::System { .. }) => None,
         };
-        Ok(Self { root, _shared_memory: shared_memory })
+        Ok(Self { root, shared_memory })
     }
 
-    /// Returns `true` if a living process holds the lock of a name. Creates no file.
-    pub(crate) fn is_held(config: &Config, name: &str) -> bool {
-        paths(config, name).iter().any(|path| File::open(path).is_ok_and(|file| is_owned(&file)))
+    /// Returns the living process that holds the lock of a name: its id, if the file tells. Creates no
+    /// file.
+    #[allow(clippy::option_option, reason = "the id of a holder may be unknown")]
+    pub(crate) fn holder(config: &Config, name: &str) -> Option<Option<u32>> {
+        paths(config, name).iter().find_map(|path| {
+            let mut file = File::open(path).ok()?;
+            is_owned(&file).then(|| read_id(&mut file))
+        })
     }
 
-    /// Path of the file in the root.
-    pub(crate) fn path(&self) -> &Path {
-        &self.root.path
-    }
-
-    /// Returns `true` if the file in the root is no longer the locked one.
-    pub(crate) fn is_removed(&self) -> bool {
-        !self.root.is_in_place()
+    /// Returns the path of a file that is no longer the locked one.
+    pub(crate) fn removed(&self) -> Option<&Path> {
+        let files = [Some(&self.root), self.shared_memory.as_ref()];
+        let removed = files.into_iter().flatten().find(|file| !file.is_in_place());
+        removed.map(|file| file.path.as_path())
     }
 }
 
@@ -177,13 +179,13 @@ mod tests {
     fn a_name_has_one_holder_and_is_free_after_it() {
         let domain = TestDomain::new();
         let config = config(&domain);
-        assert!(!OwnerLock::is_held(&config, "sim"));
+        assert_eq!(OwnerLock::holder(&config, "sim"), None);
         let lock = OwnerLock::take(&config, "sim").unwrap();
-        assert!(OwnerLock::is_held(&config, "sim"));
+        assert!(OwnerLock::holder(&config, "sim").is_some());
         assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
         let _other_name = OwnerLock::take(&config, "other").unwrap();
         drop(lock);
-        assert!(!OwnerLock::is_held(&config, "sim"));
+        assert_eq!(OwnerLock::holder(&config, "sim"), None);
         OwnerLock::take(&config, "sim").unwrap();
     }
 
@@ -192,9 +194,9 @@ mod tests {
         let domain = TestDomain::new();
         let config = config(&domain);
         let lock = OwnerLock::take(&config, "sim").unwrap();
-        assert!(!lock.is_removed());
+        assert_eq!(lock.removed(), None);
         fs::remove_file(&lock.root.path).unwrap();
-        assert!(lock.is_removed());
+        assert_eq!(lock.removed(), Some(lock.root.path.as_path()));
         assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
     }
 
@@ -206,7 +208,7 @@ mod tests {
         thread::scope(|scope| {
             scope.spawn(|| {
                 while !is_over.load(Ordering::Relaxed) {
-                    OwnerLock::is_held(&config, "sim");
+                    OwnerLock::holder(&config, "sim");
                 }
             });
             let taken = (0..2000).map(|_| OwnerLock::take(&config, "sim").is_ok());

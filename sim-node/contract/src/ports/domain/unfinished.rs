@@ -217,12 +217,22 @@ fn node_id(config: &Config, file_name: &str) -> Option<String> {
 
 /// Returns `true` if a node has its details, and iceoryx2 can tell whether its process lives.
 fn is_complete_node(config: &Config, id: &str) -> bool {
+    let files = files_of_node(config, id);
+    files.iter().all(|path| fs::metadata(path).is_ok_and(|file| file.mode() & READABLE != 0))
+}
+
+/// Returns the paths of the files by which other processes know a node.
+pub(crate) fn node_files(config: &Config, id: u128) -> Vec<PathBuf> {
+    files_of_node(config, &id.to_string())
+}
+
+fn files_of_node(config: &Config, id: &str) -> Vec<PathBuf> {
     let directory = root::to_std(&config.global.node_dir());
     let Config { global, .. } = config;
     let details = format!("{}node{}", global.prefix, global.node.static_config_suffix);
     let mut files = monitor_files(config, id);
     files.push(directory.join(id).join(details));
-    files.iter().all(|path| fs::metadata(path).is_ok_and(|file| file.mode() & READABLE != 0))
+    files
 }
 
 fn remove_node(config: &Config, id: &str) {
