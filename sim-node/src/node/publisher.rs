@@ -64,6 +64,8 @@ pub(crate) struct Publisher {
     is_second_keyframe_due: bool,
     keyframe_step: u64,
     readers: ReaderCounts,
+    /// A reader has joined the keyframes, and perhaps not yet the particles.
+    is_reader_joining: bool,
     /// Outcomes of the waiting boundary that are not published yet.
     outcomes: Vec<Outcome>,
     outcome_count: u64,
@@ -100,6 +102,7 @@ impl Publisher {
             is_second_keyframe_due: false,
             keyframe_step: 0,
             readers: ReaderCounts::default(),
+            is_reader_joining: false,
             outcomes: Vec::new(),
             outcome_count: 0,
             rejected_count: 0,
@@ -293,10 +296,12 @@ impl Publisher {
         self.watch_keyframe_readers();
         let is_untouched =
             self.last.step == position.step && self.last.outcome_count == self.outcome_count;
+        if is_untouched && self.keyframe_step == position.step {
+            // A reader that joins now receives it, because it is latched.
+            (self.is_keyframe_due, self.is_second_keyframe_due) = (false, false);
+        }
         if self.is_keyframe_due && is_untouched {
             self.publish_keyframe(solver, position)?;
-            // A reader that joins later receives this one, because it is latched.
-            self.is_second_keyframe_due = false;
             self.owner.wake(Wake::Frame);
         }
         self.publish_outcomes()
@@ -317,10 +322,12 @@ impl Publisher {
     /// keyframes first and the particles last, and needs both of a step.
     fn watch_keyframe_readers(&mut self) {
         let (before, now) = (self.readers, self.reader_counts());
-        let has_joined = now.keyframe > before.keyframe || now.particles > before.particles;
-        if has_joined && now.keyframe > 0 {
+        self.is_reader_joining |= now.keyframe > before.keyframe;
+        let has_joined = self.is_reader_joining && now.particles > before.particles;
+        if now.keyframe > before.keyframe || has_joined {
             (self.is_keyframe_due, self.is_second_keyframe_due) = (true, true);
         }
+        self.is_reader_joining &= !has_joined;
         self.readers = now;
     }
 
