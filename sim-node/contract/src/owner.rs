@@ -25,6 +25,7 @@ use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
 use crate::ports::connection::{self, ConnectionId, ReceivedCommand, receive_round};
+use crate::ports::domain::orphans;
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
 use crate::ports::domain::{self, root, unfinished};
@@ -105,6 +106,7 @@ impl Owner {
         check_memory(load)?;
         let status = claim_name(&session, &status_service)?;
         let services = Services::access(&session, Access::Create)?;
+        session.restore_orphans(&services.ports());
         let owner = Self {
             wake: wake_sender(&services.wake)?,
             commands: subscribe(&services.commands)?,
@@ -387,6 +389,7 @@ fn claim_name(
                     let endpoint = session.endpoint.clone();
                     return Err(OwnerError::NameTaken { endpoint, process_id });
                 }
+                session.restore_orphans(&orphans::ports(service));
                 clock::sleep_until(clock::monotonic_ns() + LOCK_PAUSE_NS);
             }
             status => return Ok(status?),

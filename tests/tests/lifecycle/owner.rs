@@ -126,6 +126,42 @@ fn a_cleaner_that_removes_the_files_of_a_node_is_noticed_and_frees_no_name() {
 }
 
 #[test]
+fn a_name_stays_usable_when_a_process_is_killed_while_it_cleans_up_after_a_killed_node() {
+    let sandbox = Sandbox::new();
+    let nodes = sandbox.root().join("nodes");
+    let folders = || {
+        let entries = fs::read_dir(&nodes).into_iter().flatten().flatten();
+        entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect::<Vec<_>>()
+    };
+    let start = || Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let mut node = start();
+    let of_node = folders();
+    // It keeps the services, and the lists of their ports. A service has three publishers at most.
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let mut run_id = client.next_snapshot(DEADLINE).unwrap().unwrap().header().run_id;
+    let of_client: Vec<_> =
+        folders().into_iter().filter(|folder| !of_node.contains(folder)).collect();
+    for _ in 0..4 {
+        node.signal(Signal::KILL);
+        node.wait();
+        // iceoryx2 removes the tag of a port first, and then the port.
+        for folder in folders().iter().filter(|folder| !of_client.contains(folder)) {
+            for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+                if path.extension().is_some_and(|extension| extension == "port_tag") {
+                    fs::remove_file(path).unwrap();
+                }
+            }
+        }
+        node = start();
+        run_id = wait_for("a snapshot of the next node", || {
+            let next = client.next_snapshot(DEADLINE).unwrap()?.header().run_id;
+            (next != run_id).then_some(next)
+        });
+    }
+    assert_eq!(node.interrupt().code, Some(0));
+}
+
+#[test]
 fn a_node_warns_when_files_of_its_own_are_removed() {
     for folder in ["nodes", "services"] {
         let sandbox = Sandbox::new();

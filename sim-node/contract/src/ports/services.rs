@@ -15,6 +15,7 @@ use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
+use crate::ports::domain::orphans::{self, Port};
 use crate::ports::service::{
     COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, SCENE, STATUS, SURFACE,
     ServiceError, TEARS, TOPOLOGY,
@@ -59,6 +60,27 @@ impl Services {
             ready: session.values(&READY, access)?,
             wake: session.events(access)?,
         })
+    }
+}
+
+impl Services {
+    /// Returns the ports of all services, living or dead.
+    pub(crate) fn ports(&self) -> Vec<Port> {
+        [
+            orphans::ports(&self.particles),
+            orphans::ports(&self.keyframe),
+            orphans::ports(&self.topology),
+            orphans::ports(&self.surface),
+            orphans::ports(&self.scene),
+            orphans::ports(&self.tears),
+            orphans::ports(&self.parameters),
+            orphans::ports(&self.colliders),
+            orphans::ports(&self.commands),
+            orphans::ports(&self.outcomes),
+            orphans::ports(&self.ready),
+            orphans::event_ports(&self.wake),
+        ]
+        .concat()
     }
 }
 

@@ -16,6 +16,7 @@ use iceoryx2::service::port_factory;
 use crate::endpoint::Endpoint;
 use crate::limits::{CONTRACT_VERSION, PARTICIPANTS_MAX};
 use crate::ports::cleanup;
+use crate::ports::domain::orphans::{self, Port};
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::{self, counter, root, unfinished};
 use crate::ports::memory;
@@ -102,6 +103,14 @@ impl Session {
         }
         let version = version_attribute(contract_version).map_err(|error| refused(&error))?;
         Ok(Self { endpoint: endpoint.clone(), node, contract_version, version, _root: root })
+    }
+
+    /// Frees the places of those of these ports whose dead processes iceoryx2 has forgotten. For the holder
+    /// of the lock of the name.
+    pub(crate) fn restore_orphans(&self, ports: &[Port]) {
+        if orphans::restore_nodes(self.node.config(), self.node_id(), ports) {
+            cleanup::free_places(&self.node);
+        }
     }
 
     /// Returns the id of this process's iceoryx2 node.

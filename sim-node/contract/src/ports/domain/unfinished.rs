@@ -91,12 +91,12 @@ fn ports(path: &Path) -> impl Iterator<Item = u128> {
 
 /// Returns the id of the process in the id of a port: seconds, nanoseconds, process, counter, with 32
 /// bits each.
-fn process(port: u128) -> u128 {
+pub(crate) fn process(port: u128) -> u128 {
     (port >> 64) & u128::from(u32::MAX)
 }
 
 /// Returns `true` for a process that has not ended. A zombie has.
-fn is_alive(process: u128) -> bool {
+pub(crate) fn is_alive(process: u128) -> bool {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
     // The name in parentheses may contain anything; the state follows it.
     let state = stat.rsplit_once(") ").and_then(|(_, rest)| rest.chars().next());
@@ -227,12 +227,20 @@ pub(crate) fn node_files(config: &Config, id: u128) -> Vec<PathBuf> {
 }
 
 fn files_of_node(config: &Config, id: &str) -> Vec<PathBuf> {
-    let directory = root::to_std(&config.global.node_dir());
+    let mut files = Vec::from(monitor_files(config, id));
+    files.push(details_of_node(config, id));
+    files
+}
+
+/// Returns the path of the details of a node.
+pub(crate) fn details_file(config: &Config, id: u128) -> PathBuf {
+    details_of_node(config, &id.to_string())
+}
+
+fn details_of_node(config: &Config, id: &str) -> PathBuf {
     let Config { global, .. } = config;
     let details = format!("{}node{}", global.prefix, global.node.static_config_suffix);
-    let mut files = monitor_files(config, id);
-    files.push(directory.join(id).join(details));
-    files
+    root::to_std(&global.node_dir()).join(id).join(details)
 }
 
 fn remove_node(config: &Config, id: &str) {
@@ -242,14 +250,13 @@ fn remove_node(config: &Config, id: &str) {
     }
 }
 
-/// Returns the paths of the files that tell whether the process of a node lives.
-fn monitor_files(config: &Config, id: &str) -> Vec<PathBuf> {
+/// Returns the paths of the files that tell whether the process of a node lives: its state, its context,
+/// and the lock of the process that cleans up.
+pub(crate) fn monitor_files(config: &Config, id: &str) -> [PathBuf; 3] {
     let directory = root::to_std(&config.global.node_dir());
     let Config { global, .. } = config;
     let monitor = format!("{}{id}{}", global.prefix, global.node.monitor_suffix);
-    ["", "_context", "_owner_lock"]
-        .map(|ending| directory.join(format!("{monitor}{ending}")))
-        .into()
+    ["", "_context", "_owner_lock"].map(|ending| directory.join(format!("{monitor}{ending}")))
 }
 
 /// Returns `true` for a segment of shared memory without its final size or permissions.
