@@ -345,6 +345,22 @@ fn a_keyframe_with_tethers_is_refused_by_a_scene_without_them() {
 }
 
 #[test]
+fn a_keyframe_whose_tethers_hang_on_a_free_particle_is_refused() {
+    let text = "version = 1\n[solver]\ntethers = true\n[[particle]]\nposition = [0, 0, 0]\n\
+                pinned = true\n[[particle]]\nposition = [1, 0, 0]\n[[constraint]]\n\
+                particles = [0, 1]\n";
+    let scene = Scene::from_toml(text, "test").unwrap();
+    let mut solver = Solver::new(&scene);
+    // The boundary is not finished, so the tethers are those of the pinned particle.
+    solver.unpin(0).unwrap();
+    let restored = Solver::new(&scene).restore(&particles(&solver), &solver.keyframe());
+    let error = restored.unwrap_err().to_string();
+    assert!(error.contains("a root of its tethers is not fixed"), "{error}");
+    solver.finish_boundary();
+    Solver::new(&scene).restore(&particles(&solver), &solver.keyframe()).unwrap();
+}
+
+#[test]
 fn damaged_keyframes_are_refused() {
     let bytes = Solver::new(&scene()).keyframe().encode();
     let mut other_version = bytes.clone();

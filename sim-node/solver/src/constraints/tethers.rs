@@ -76,19 +76,20 @@ struct Reached {
     tether: Option<u32>,
 }
 
+/// Returns `true` for the flags of a particle that can be a root: pinned or anchored, and not grabbed.
+pub(crate) fn is_root(flags: u32) -> bool {
+    flags & (ParticleFlags::PINNED | ParticleFlags::ANCHORED) != 0
+        && flags & ParticleFlags::GRABBED == 0
+}
+
 impl Tethers {
-    /// Derives the tethers from the current state. Roots are particles that are pinned or anchored,
-    /// and not grabbed.
+    /// Derives the tethers from the current state.
     pub(crate) fn from_state(
         model: &Model,
         parameters: &Parameters,
         particles: &Particles,
         torn: &[u32],
     ) -> Self {
-        let is_root = |flags: u32| {
-            flags & (ParticleFlags::PINNED | ParticleFlags::ANCHORED) != 0
-                && flags & ParticleFlags::GRABBED == 0
-        };
         let states = (0_u32..).zip(&particles.states);
         let roots = states.filter(|(_, one)| is_root(one.flags)).map(|(index, _)| index).collect();
         let mut torn = torn.to_vec();

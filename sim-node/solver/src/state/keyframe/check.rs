@@ -4,7 +4,7 @@ use sim_types::ParticleFlags;
 
 use super::{Keyframe, Moved, RestoreError};
 use crate::checks::is_near;
-use crate::constraints::tethers::TetherBasis;
+use crate::constraints::tethers::{TetherBasis, is_root};
 use crate::frame::{Frame, Pose};
 use crate::solver::Solver;
 use crate::state::particles::Particle;
@@ -153,6 +153,11 @@ fn check_holds(particles: &[Particle], keyframe: &Keyframe) -> Result<(), &'stat
     }
     if !with(ParticleFlags::GRABBED).eq(keyframe.grabs.iter().map(|grab| grab.particle)) {
         return Err("their grabbed particles differ");
+    }
+    // The position of a root is taken from the snapshot, so it must not depend on the step.
+    let is_root = |root: &u32| particles.get(*root as usize).is_some_and(|one| is_root(one.flags));
+    if !keyframe.tethers.roots.iter().all(is_root) {
+        return Err("a root of its tethers is not fixed");
     }
     if !keyframe.fixed.iter().all(|one| is_inverse_mass(one.base_inverse_mass)) {
         return Err("a mass is not a positive number");
