@@ -312,20 +312,26 @@ impl Client {
         every: NonZeroU32,
         timeout: Duration,
     ) -> Result<(), LockstepError> {
-        let deadline = Deadline::after(timeout);
         let member = self.member.insert(Member::create(&self.attachment, self.id, every)?);
-        member.join()?;
+        let joined = member.join().and_then(|()| self.wait_for_membership(timeout));
+        if joined.is_err() {
+            // The node must not wait for a client that does not know of its membership.
+            self.member = None;
+        }
+        joined
+    }
+
+    fn wait_for_membership(&mut self, timeout: Duration) -> Result<(), LockstepError> {
+        let deadline = Deadline::after(timeout);
         while let Some(status) = self.status(deadline.remaining())? {
             if status.members().iter().any(|member| member.client_id == self.id) {
                 return Ok(());
             }
             if status.flags & StatusFlags::REPLAY != 0 {
-                self.member = None;
                 let endpoint = self.attachment.session.endpoint.clone();
                 return Err(LockstepError::Replay { endpoint });
             }
         }
-        self.member = None;
         Err(LockstepError::not_admitted(&self.attachment, timeout))
     }
 

@@ -199,17 +199,13 @@ impl Lockstep {
         };
         let waited = Duration::from_nanos(now_ns.saturating_sub(since_ns));
         let timeout = self.timeout;
+        self.remove_gone(&connections, report);
         self.members.retain(|member| {
-            let client_id = member.client_id;
-            if !connections.contains(&member.connection) {
-                report(Event::Left { client_id });
-                return false;
+            let has_timed_out = waited > timeout && member.is_awaited(step);
+            if has_timed_out {
+                report(Event::TimedOut { client_id: member.client_id, timeout });
             }
-            if waited > timeout && member.is_awaited(step) {
-                report(Event::TimedOut { client_id, timeout });
-                return false;
-            }
-            true
+            !has_timed_out
         });
     }
 
@@ -220,7 +216,11 @@ impl Lockstep {
             return;
         }
         self.next_search_ns = now_ns + SEARCH_PERIOD_NS;
-        let connections = publisher.living_members();
+        self.remove_gone(&publisher.living_members(), report);
+    }
+
+    /// Removes the members without a connection.
+    fn remove_gone(&mut self, connections: &[ConnectionId], report: &mut impl FnMut(Event)) {
         self.members.retain(|member| {
             let is_there = connections.contains(&member.connection);
             if !is_there {

@@ -154,6 +154,11 @@ impl Publisher {
         self.owner.living_members()
     }
 
+    /// Returns `true` if the newest published snapshot is that of a step.
+    pub(crate) fn has_published(&self, step: u64) -> bool {
+        self.last.step == step
+    }
+
     pub(crate) fn run_id(&self) -> u64 {
         self.run_id
     }

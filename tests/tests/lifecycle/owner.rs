@@ -173,6 +173,14 @@ fn a_node_warns_when_files_of_its_own_are_removed() {
         assert!(second.stderr.contains("is already running, as process"), "{}", second.stderr);
         assert_eq!(node.interrupt().code, Some(0));
     }
+    // Its lock in shared memory, which keeps the name taken if the root is removed.
+    let sandbox = Sandbox::new();
+    let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let user = rustix::process::geteuid().as_raw();
+    let lock = format!("/dev/shm/{}_{user}_sim.owner", sandbox.domain());
+    fs::remove_file(&lock).unwrap();
+    assert!(node.wait_for_line("warning: ").contains(&lock));
+    assert_eq!(node.interrupt().code, Some(0));
 }
 
 #[test]

@@ -88,7 +88,9 @@ fn member_count(sandbox: &Sandbox) -> usize {
 #[test]
 fn a_member_of_every_fourth_step_is_waited_for_at_those_steps_only() {
     let sandbox = Sandbox::new();
-    let mut node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    // It would be far ahead by the next turn if it did not wait.
+    let args = ["run", "curtain", "--as-fast-as-possible"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     client.join_lockstep_every(NonZeroU32::new(4).unwrap(), DEADLINE).unwrap();
     let mut last = None;
@@ -100,8 +102,28 @@ fn a_member_of_every_fourth_step_is_waited_for_at_those_steps_only() {
         client.ready().unwrap();
     }
     drop(client);
-    node.wait_for_line("client ");
     wait_for("an empty lockstep", || (member_count(&sandbox) == 0).then_some(()));
+}
+
+#[test]
+fn a_member_takes_part_at_published_steps_only() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "curtain", "--as-fast-as-possible", "--every", "5"];
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    client.join_lockstep(DEADLINE).unwrap();
+    let mut turn = || {
+        let step = client.next_turn(DEADLINE).unwrap().unwrap().header().step;
+        client.ready().unwrap();
+        step
+    };
+    let first = turn();
+    assert_eq!((1..50).map(|_| turn()).collect::<Vec<_>>(), every_fifth_after(first));
+    assert_eq!(member_count(&sandbox), 1);
+}
+
+fn every_fifth_after(first: u64) -> Vec<u64> {
+    (1..50).map(|index| first + 5 * index).collect()
 }
 
 fn step(sandbox: &Sandbox) -> u64 {

@@ -13,6 +13,7 @@ use rustix::fs::{CWD, RenameFlags, renameat_with};
 use rustix::io::Errno;
 
 use crate::files::kind::kind_of_non_file;
+use crate::files::place::is_locked;
 use disk::DiskFile;
 use error::{PartFileError, io_error};
 use lock::Lock;
@@ -241,7 +242,7 @@ fn check_unused(path: &Path) -> Result<(), PartFileError> {
     // Opening a named pipe would wait for its writer.
     check_kind(path)?;
     match File::open(path) {
-        Ok(file) if lock::is_taken(&file) => {
+        Ok(file) if is_locked(&file) => {
             let process_id = lock::holder(&file);
             Err(PartFileError::InUse { path: path.to_owned(), process_id })
         }

@@ -1,6 +1,6 @@
-//! The place of an open file.
+//! The place and the lock of an open file.
 
-use std::fs::{self, File, Metadata};
+use std::fs::{self, File, Metadata, TryLockError};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
@@ -10,4 +10,10 @@ pub(crate) fn is_in_place(file: &File, path: &Path) -> bool {
     let inode = |metadata: Metadata| (metadata.dev(), metadata.ino());
     let (open, named) = (file.metadata().map(inode), fs::metadata(path).map(inode));
     matches!((open, named), (Ok(open), Ok(named)) if open == named)
+}
+
+/// Returns `true` if another open file holds the exclusive lock of a file. Otherwise this one holds a
+/// shared lock, until it is closed.
+pub(crate) fn is_locked(file: &File) -> bool {
+    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
 }

@@ -37,7 +37,7 @@ pub struct NodeStatus {
     pub skipped_periods: u64,
     /// Number of outcomes of this run.
     pub outcome_count: u64,
-    /// Number of rejected commands of this run.
+    /// Number of rejected commands of this run, and of refused messages of the service `ready`.
     pub rejected_count: u64,
     /// Number of particles frozen since the load or the last reset because their state was not finite.
     pub frozen_count: u64,

@@ -99,8 +99,8 @@ fn an_unanswered_command_times_out_and_the_error_states_whether_a_node_runs() {
     assert_eq!(
         error.to_string(),
         format!(
-            "no outcome of command 1 after at most 20ms, so its effect is unknown: process {process} runs as 'sim' in domain \
-             '{name}', but does not answer (is it stopped, or overloaded?)"
+            "no outcome of command 1 after at most 20ms, so its effect is unknown: process {process} \
+             runs as 'sim' in domain '{name}', but does not answer (is it stopped, or overloaded?)"
         )
     );
     drop(owner);

@@ -31,11 +31,6 @@ pub(super) fn lock(file: &File, path: &Path) -> Lock {
     if is_in_place(file, path) { Lock::Held } else { Lock::Moved }
 }
 
-/// Returns `true` if another open file holds the lock of a file.
-pub(super) fn is_taken(file: &File) -> bool {
-    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
-}
-
 /// Returns the process that holds the lock of a file.
 pub(super) fn holder(file: &File) -> Option<u32> {
     let file = file.metadata().ok()?;

@@ -78,7 +78,7 @@ pub(crate) fn restore_nodes(config: &Config, own: u128, ports: &[Port]) -> bool 
     }
     let orphans: Vec<_> = ports.iter().filter(is_orphan).collect();
     for port in &orphans {
-        // What cannot be restored remains forgotten, and its place taken.
+        // If this fails, the place stays taken, and creating the port that needs it reports that.
         let _ = restore_node(config, own, port);
     }
     !orphans.is_empty()

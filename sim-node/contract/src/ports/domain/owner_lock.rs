@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::Config;
 
 use crate::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use crate::files::place::is_in_place;
+use crate::files::place::{is_in_place, is_locked};
 use crate::ports::domain::files::SHARED_MEMORY;
 use crate::ports::domain::root;
 
@@ -58,7 +58,7 @@ impl OwnerLock {
     pub(crate) fn holder(config: &Config, name: &str) -> Option<Option<u32>> {
         paths(config, name).iter().find_map(|path| {
             let mut file = File::open(path).ok()?;
-            is_owned(&file).then(|| read_id(&mut file))
+            is_locked(&file).then(|| read_id(&mut file))
         })
     }
 
@@ -94,7 +94,7 @@ impl LockFile {
             let mut file = open(path).map_err(system)?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) if is_owned(&file) => {
+                Err(TryLockError::WouldBlock) if is_locked(&file) => {
                     return Err(LockError::Held(read_id(&mut file)));
                 }
                 Err(TryLockError::WouldBlock) => {
@@ -132,12 +132,6 @@ impl Drop for LockFile {
             let _ = fs::remove_file(&self.path);
         }
     }
-}
-
-/// Returns `true` if an owner holds the lock of a file. Otherwise the file is locked until it is closed,
-/// for other clients as well as this one.
-fn is_owned(file: &File) -> bool {
-    matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
 }
 
 fn open(path: &Path) -> io::Result<File> {
