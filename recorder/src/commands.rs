@@ -4,6 +4,8 @@ pub(crate) mod export;
 pub(crate) mod info;
 pub(crate) mod play;
 pub(crate) mod record;
+pub(crate) mod restore;
 pub(crate) mod scene;
 pub(crate) mod simulate;
+pub(crate) mod state;
 pub(crate) mod verify;

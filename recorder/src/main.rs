@@ -14,7 +14,9 @@ use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 
 use cli::exit::{self, Exit};
-use commands::{export as export_command, info, play, record, scene, simulate, verify};
+use commands::{
+    export as export_command, info, play, record, restore, scene, simulate, state, verify,
+};
 
 /// Record a simulation, play it back, and prove that it can be re-simulated bit for bit
 #[derive(Debug, Parser)]
@@ -29,6 +31,8 @@ use commands::{export as export_command, info, play, record, scene, simulate, ve
         recorder info curtain.mcap\n  \
         recorder export curtain.mcap --png pictures\n  \
         recorder scene curtain.mcap > curtain.toml\n  \
+        recorder state -o state.mcap\n  \
+        recorder restore curtain.mcap --step 480\n  \
         recorder verify curtain.mcap"
 )]
 struct Args {
@@ -46,10 +50,14 @@ enum Command {
     Play(play::PlayArgs),
     /// Record everything that a running simulation publishes
     Record(record::RecordArgs),
+    /// Put a recorded state in place in a running node
+    Restore(restore::RestoreArgs),
     /// Print the scene of a recording
     Scene(scene::SceneArgs),
     /// Simulate a scene in this process, as fast as possible, and record it like a live run
     Simulate(simulate::SimulateArgs),
+    /// Record one step of a running node: its complete state
+    State(state::StateArgs),
     /// Re-simulate a recording and compare every bit
     Verify(verify::VerifyArgs),
 }
@@ -66,8 +74,10 @@ fn run(command: &Command) -> anyhow::Result<Exit> {
         Command::Info(args) => info::run(args),
         Command::Play(args) => play::run(args),
         Command::Record(args) => record::run(args),
+        Command::Restore(args) => restore::run(args),
         Command::Scene(args) => scene::run(args),
         Command::Simulate(args) => simulate::run(args),
+        Command::State(args) => state::run(args),
         Command::Verify(args) => verify::run(args),
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod apply;
 pub(crate) mod frozen;
 mod job;
+mod kept_states;
 pub(crate) mod run_id;
 pub(crate) mod solver_rows;
 pub(crate) mod state_writer;
@@ -11,11 +12,12 @@ use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use recorder::{LogWriter, OutcomeRow, TimedCommand, WriteError};
-use sim_contract::{Command, Outcome, Reason};
+use sim_contract::{Action, Command, Outcome, Reason};
 use sim_solver::{Applied, Solver};
 
 use apply::apply;
 pub(crate) use job::Job;
+use kept_states::KeptStates;
 use state_writer::{KeyframeDue, StateWriter};
 
 /// The result of a simulation.
@@ -50,22 +52,35 @@ pub(crate) fn simulate<W: Write>(
         writer.write_state(&solver, 0, KeyframeDue::Now)?;
     }
     let mut pending = job.commands.as_slice();
+    let mut kept = KeptStates::for_commands(pending);
+    kept.add(0, &solver);
     for step in 1..=job.steps {
         let mut keyframe = KeyframeDue::OnTheSecond;
         let mut rows = Vec::new();
         while let Some((command, rest)) = pending.split_first().filter(|(c, _)| c.step <= step) {
-            let answer = apply(&mut solver, command.client_id, &command.action);
+            let is_rewind = matches!(command.action, Action::Rewind { .. });
+            let answer = match command.action {
+                Action::Rewind { to_step: Some(to_step), back_steps: None } => {
+                    kept.rewind(&mut solver, step, to_step).map(|()| Applied::InPlace)
+                }
+                action => apply(&mut solver, command.client_id, &action),
+            };
             if answer.is_ok_and(|applied| applied != Applied::Target) {
                 keyframe = KeyframeDue::Now;
             }
-            let outcome = result.count(command, answer.map(|_| ()));
+            let outcome = result.count(command, step, answer.map(|_| ()));
             rows.push(OutcomeRow::from(&outcome));
             pending = rest;
+            if is_rewind && answer.is_ok() {
+                // This step shows the state without further changes, as in a node.
+                break;
+            }
         }
         if !solver.step_unless(stop) {
             break;
         }
         result.steps = step;
+        kept.add(step, &solver);
         if let Some(writer) = &mut writer {
             writer.outcomes = rows;
             writer.write_state(&solver, step, keyframe)?;
@@ -90,9 +105,9 @@ impl SimulationResult {
         }
     }
 
-    /// Counts a command and returns its outcome.
-    fn count(&mut self, command: &TimedCommand, result: Result<(), Reason>) -> Outcome {
-        let TimedCommand { step, client_id, sequence, action, .. } = *command;
+    /// Counts a command at the boundary before `step`, and returns its outcome.
+    fn count(&mut self, command: &TimedCommand, step: u64, result: Result<(), Reason>) -> Outcome {
+        let TimedCommand { client_id, sequence, action, .. } = *command;
         let index = self.applied_count + self.rejected_count;
         let outcome = Outcome::new(index, step, Command::new(client_id, sequence, action), result);
         self.applied_count += u64::from(outcome.is_applied());

@@ -16,7 +16,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use sim_contract::console;
 
-pub(crate) use command::{CommandVerb, PoseArgs};
+pub(crate) use command::{CommandVerb, PoseArgs, RewindArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb};
 use endpoint::EndpointArgs;
 pub(crate) use lesson::LessonArgs;

@@ -8,6 +8,7 @@ mod particles;
 mod rejection;
 mod status;
 
+use anyhow::Context;
 use sim_contract::{CONSOLE_CLIENT_ID, Client, report_bus_errors};
 
 use crate::args::{CtlArgs, CtlVerb, QueryVerb};
@@ -18,7 +19,10 @@ pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {
     report_bus_errors()?;
     let mut client = Client::attach_as(&args.endpoint.endpoint()?, CONSOLE_CLIENT_ID)?;
     match &args.verb {
-        CtlVerb::Command(verb) => command::send(&mut client, args, action::from_verb(verb)?),
+        CtlVerb::Command(verb) => {
+            let action = action::from_verb(verb, || rate_hz(&mut client, args))?;
+            command::send(&mut client, args, action)
+        }
         CtlVerb::Query(query) => {
             match query {
                 QueryVerb::Get { parameter } => parameters::print(&mut client, args, *parameter),
@@ -32,4 +36,11 @@ pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {
             Ok(Exit::Done)
         }
     }
+}
+
+/// Steps per second of the node.
+fn rate_hz(client: &mut Client, args: &CtlArgs) -> anyhow::Result<u32> {
+    let status =
+        client.status(args.timeout())?.context("the node published no status: is it stopped?")?;
+    Ok(status.rate_hz)
 }

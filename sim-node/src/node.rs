@@ -2,6 +2,7 @@
 
 mod boundary;
 mod grab_connections;
+mod history;
 mod inbox;
 mod loading;
 mod lockstep;
@@ -19,6 +20,7 @@ use sim_contract::{Endpoint, ReceivedCommand, Stop};
 use sim_solver::{Scene, Solver};
 
 use grab_connections::GrabConnections;
+use history::History;
 use inbox::Inbox;
 use lockstep::{Event, Lockstep};
 use pace::Pace;
@@ -54,6 +56,8 @@ pub(crate) struct Options {
     pub(crate) every: u64,
     /// Longest wait for a member of the lockstep.
     pub(crate) lockstep_timeout: Duration,
+    /// Memory for past states.
+    pub(crate) history_bytes: usize,
 }
 
 /// A running simulation.
@@ -68,6 +72,11 @@ pub(crate) struct Node {
     arrived: Vec<ReceivedCommand>,
     grab_connections: GrabConnections,
     lockstep: Lockstep,
+    history: History,
+    /// A command has been applied since the last step.
+    is_commanded: bool,
+    /// A command of this boundary has put a state in place.
+    is_state_in_place: bool,
     /// Lateness of a step whose time has come, but whose members are not ready.
     met: Option<u64>,
     progress: Progress,
@@ -103,11 +112,14 @@ impl Node {
             arrived: Vec::new(),
             grab_connections: GrabConnections::default(),
             lockstep: Lockstep::new(options.lockstep_timeout),
+            history: History::new(options.history_bytes),
+            is_commanded: false,
+            is_state_in_place: false,
             met: None,
             progress: Progress {
                 is_paused: options.starts_paused,
                 steps_due: 0,
-                is_reset_due: false,
+                is_state_due: false,
                 time_scale: 1.0,
             },
             pace: Pace::new(scene.solver.rate_hz, now_ns),
@@ -131,6 +143,7 @@ impl Node {
         self.mark_ns = self.start_ns;
         self.pace.restart(self.start_ns);
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
+        self.keep_state();
         self.observe(&observer)?;
         while !stop.is_requested() && !self.is_done() {
             let due = self.met.take().or_else(|| self.wait());
@@ -181,7 +194,7 @@ impl Node {
         if !self.options.waits_for_time {
             return Some(0);
         }
-        if self.progress.is_reset_due {
+        if self.progress.is_state_due {
             // It came while the node waited, and shows at once, as it does while paused.
             self.pace.restart(monotonic_ns());
             return Some(0);
@@ -244,7 +257,15 @@ impl Node {
         self.statistics.skipped_periods = self.pace.skipped_periods;
         let times = StepTimes { wake_late_ns, solve_ns };
         self.publisher.publish_step(&self.solver, self.position(), times)?;
+        self.keep_state();
         Ok(true)
+    }
+
+    /// Keeps the state of a step for a rewind.
+    fn keep_state(&mut self) {
+        self.is_state_in_place = false;
+        let is_commanded = std::mem::take(&mut self.is_commanded);
+        self.history.keep(self.step, &self.solver, is_commanded);
     }
 
     /// Serves late subscribers, calls the observer, and publishes the status.

@@ -45,6 +45,7 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         waits_for_time: !args.as_fast_as_possible,
         every: args.every,
         lockstep_timeout: args.lockstep_timeout,
+        history_bytes: usize::try_from(args.history.as_u64()).unwrap_or(usize::MAX),
     };
     warn(&scene);
     // Building a large scene takes seconds. Until the node owns anything, a signal ends it at once.

@@ -38,6 +38,9 @@ const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
 /// Flush period: the most that a killed recorder or a power cut loses.
 const FLUSH_NS: u64 = SECOND_NS;
 
+/// Default memory for snapshots that wait.
+const QUEUE_BYTES_DEFAULT: u64 = 256 << 20;
+
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Ends cleanly on Ctrl-C, on SIGTERM or SIGHUP, at a limit, when the node ends, or when another run \
@@ -64,7 +67,7 @@ pub(crate) struct RecordArgs {
     steps: Option<u64>,
     /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
     /// not fit are lost and counted
-    #[arg(long, value_name = "BYTES", default_value_t = 256 << 20,
+    #[arg(long, value_name = "BYTES", default_value_t = QUEUE_BYTES_DEFAULT,
         allow_hyphen_values = true, value_parser = queue_bytes)]
     queue_bytes: u64,
     /// Do not wait each second until the recording is on the disk. A power cut may then lose much
@@ -75,6 +78,40 @@ pub(crate) struct RecordArgs {
     file: FileArgs,
     #[command(flatten)]
     as_json: AsJson,
+}
+
+/// Options of a recording of one step.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct SingleStateArgs {
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+    /// File to write [default: NAME_<UTC time>.mcap]
+    #[arg(short, long, value_name = "OUT.mcap")]
+    output: Option<PathBuf>,
+    /// Longest wait for a state, such as 10s or 500ms
+    #[arg(long, value_name = "TIME", default_value = "5s", allow_hyphen_values = true,
+        value_parser = parse::duration)]
+    timeout: Duration,
+    #[command(flatten)]
+    file: FileArgs,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+impl From<SingleStateArgs> for RecordArgs {
+    fn from(args: SingleStateArgs) -> Self {
+        let SingleStateArgs { endpoint, output, timeout, file, as_json } = args;
+        Self {
+            endpoint,
+            output,
+            duration: Some(timeout),
+            steps: Some(0),
+            queue_bytes: QUEUE_BYTES_DEFAULT,
+            no_sync: false,
+            file,
+            as_json,
+        }
+    }
 }
 
 fn queue_bytes(text: &str) -> Result<u64, String> {

@@ -61,12 +61,19 @@ pub fn parse_commands(text: &str, label: &str) -> Result<Vec<TimedCommand>, Comm
 }
 
 /// Sorts by step, then by index, then by client and sequence. Commands without an index come last in
-/// their step.
+/// their step, and in the next one after a rewind, whose step shows a state without further changes.
 pub fn sort_commands(commands: &mut [TimedCommand]) {
     commands.sort_by_key(|command| {
         let index = command.index.unwrap_or(u64::MAX);
         (command.step, index, command.client_id, command.sequence)
     });
+    let mut first_step = 0;
+    for command in commands.iter_mut().filter(|command| command.index.is_none()) {
+        command.step = command.step.max(first_step);
+        if let Action::Rewind { .. } = command.action {
+            first_step = command.step.saturating_add(1);
+        }
+    }
 }
 
 fn parse_line(text: &str, line: usize) -> Result<TimedCommand, FieldError> {
@@ -141,6 +148,9 @@ fn is_valid(name: &str, value: &Value) -> bool {
         "value" => value.is_null() || is_number(value) || are_numbers(3),
         "constraint_kind" => value.is_string(),
         "force" => value.is_boolean(),
+        "to_step" => value.is_u64(),
+        "contents" => value == "state" || value == "motion",
+        "state_hash" => value.as_str().is_some_and(|text| u64::from_str_radix(text, 16).is_ok()),
         "parameter" | "scene" => value.as_str().is_some_and(|text| Text::new(text).is_ok()),
         _ => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
     }
@@ -156,6 +166,9 @@ fn allowed_values(name: &str) -> &'static str {
         "value" => "a number, three numbers, or null for off",
         "parameter" => "the name of a parameter, at most 160 bytes",
         "force" => "true or false",
+        "to_step" => "whole numbers from 0",
+        "contents" => "state or motion",
+        "state_hash" => "16 hex digits in a string",
         "constraint_kind" => "structural, shear, bend or tether",
         "scene" => "the name of a scene, at most 160 bytes",
         _ => "whole numbers 0..=4294967295",
@@ -198,6 +211,19 @@ mod tests {
         assert_eq!(order, [(3, 2, 99), (3, 7, 3), (3, 7, 4), (5, 0, 7), (5, 0, 6), (9, 0, 2)]);
         assert_eq!(commands[0].action, Action::Pause);
         assert_eq!(commands[3].action, Action::Step { count: 2 });
+    }
+
+    #[test]
+    fn a_command_after_a_rewind_takes_effect_in_the_next_step() {
+        let text = r#"
+            {"step":3,"kind":"rewind","to_step":1}
+            {"step":3,"kind":"rewind","to_step":2}
+            {"step":3,"kind":"reset"}
+            {"step":4,"kind":"pause"}
+            {"step":9,"kind":"pause"}"#;
+        let commands = parse_commands(text, "x").unwrap();
+        let order: Vec<_> = commands.iter().map(|one| (one.step, one.sequence)).collect();
+        assert_eq!(order, [(3, 2), (4, 3), (5, 4), (5, 5), (9, 6)]);
     }
 
     #[test]
@@ -250,8 +276,8 @@ mod tests {
         drag.jsonl:2: step: is missing (allowed: whole numbers from 1)
         drag.jsonl:2: step: 0 is invalid (allowed: whole numbers from 1)
         drag.jsonl:2: step: 1.5 is invalid (allowed: whole numbers from 1)
-        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load)
-        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load)
+        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore)
+        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected)

@@ -1,6 +1,6 @@
 //! One message of a recording, on any topic.
 
-use sim_contract::{Action, ParticleState};
+use sim_contract::ParticleState;
 
 use super::rows::{
     ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, StatusRow, StepRow, SurfaceRow,
@@ -82,10 +82,11 @@ impl Message {
         }
     }
 
-    /// Returns the step whose state is the initial one, if this is the outcome of a reset.
-    pub fn reset_step(&self) -> Option<u64> {
+    /// Returns the step whose torn constraints replace all earlier ones, if this is the outcome of a
+    /// command that puts a state in place: the initial one, an earlier one, or a given one.
+    pub fn replacement_step(&self) -> Option<u64> {
         let Self::Outcome(row) = self else { return None };
-        (row.action == Action::Reset && row.is_applied()).then_some(row.step)
+        (row.replaces_state() && row.is_applied()).then_some(row.step)
     }
 
     /// Returns the approximate memory use, in bytes.

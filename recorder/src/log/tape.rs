@@ -65,10 +65,10 @@ pub struct TapeState {
 }
 
 impl TapeState {
-    /// Returns the step at which the scene was last loaded, reset or restored, if the header was
-    /// readable.
+    /// Returns the difference of step and scene step, modulo 2^64, if the header was readable: it changes
+    /// at each load, and with each state that a command puts in place.
     pub fn beginning(&self) -> Option<u64> {
-        self.has_readable_row.then(|| self.row.step.saturating_sub(self.row.scene_step))
+        self.has_readable_row.then(|| self.row.step.wrapping_sub(self.row.scene_step))
     }
 }
 

@@ -10,7 +10,8 @@ use super::rows::{TearsRow, TopologyRow};
 /// A change of the torn constraints.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum TearChange {
-    /// From this step on, the earlier tears are undone.
+    /// From this step on, the earlier tears are undone. Those of a state that was put in place follow as
+    /// tears of the same step.
     Reset(u64),
     /// New tears.
     Tears(TearsRow),
@@ -54,7 +55,7 @@ impl TearChange {
     pub(crate) fn from_message(message: &Message) -> Option<Self> {
         match message {
             Message::Tears(row) => Some(Self::Tears(row.clone())),
-            _ => message.reset_step().map(Self::Reset),
+            _ => message.replacement_step().map(Self::Reset),
         }
     }
 

@@ -110,6 +110,13 @@ pub(super) const COMMANDS: &str = r#"
     {"step":90,"kind":"reset"}
     {"step":90,"kind":"cut","constraint":9}
     {"step":95,"kind":"set","parameter":"gravity","value":[0,-3,0],"client_id":7}
+    {"step":100,"kind":"rewind","to_step":64}
+    {"step":100,"kind":"pin","particle":35}
+    {"step":104,"kind":"rewind","to_step":102}
+    {"step":106,"kind":"rewind","to_step":0}
+    {"step":108,"kind":"rewind","to_step":108}
+    {"step":109,"kind":"rewind","back_steps":3}
+    {"step":110,"kind":"restore","contents":"motion","state_hash":"0000000000000000"}
 "#;
 pub(super) const STEPS: u64 = 130;
 
@@ -149,8 +156,16 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
     let rows = outcomes(&file);
     let rejected = rows.iter().filter(|row| !row.is_applied());
     let rejected: Vec<_> = rejected.map(|row| (row.step, row.reason.as_str())).collect();
-    // A load belongs to another file, this scene has no stiffness, and another client has grabbed 61.
-    let expected = [(22, "no_effect_here"), (53, "no_effect_here"), (66, "grabbed_by_other")];
+    let expected = [
+        // A load belongs to another file, and this scene has no stiffness.
+        (22, "no_effect_here"),
+        (53, "no_effect_here"),
+        (66, "grabbed_by_other"),
+        // A rewind goes to an earlier step that it names, and a restore needs a state.
+        (108, "out_of_range"),
+        (109, "no_effect_here"),
+        (110, "no_effect_here"),
+    ];
     assert_eq!(rejected, expected);
     assert!(PARAMETERS.iter().all(|info| COMMANDS.contains(&format!("\"{}\"", info.name))));
     for ActionFields { kind, .. } in ActionFields::ALL.iter().filter(|row| row.kind != "unknown") {

@@ -37,7 +37,8 @@ fn tears_are_recorded_with_their_causes_and_start_again_after_a_reset() {
     });
     let mut torn_count = 0;
     for (step, found) in (0_u64..).zip(torn_counts) {
-        torn_count = if step == 90 { 0 } else { torn_count };
+        // A reset, and rewinds, whose rows have all torn constraints of the earlier state.
+        torn_count = if [90, 100, 104, 106].contains(&step) { 0 } else { torn_count };
         let new = rows.iter().filter(|row| row.step == step);
         torn_count += new.map(|row| row.constraints.len()).sum::<usize>();
         assert_eq!(found, torn_count, "step {step}");

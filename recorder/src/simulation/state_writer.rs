@@ -76,7 +76,8 @@ impl<'a, W: Write> StateWriter<'a, W> {
             self.log.flush()?;
         }
         self.write_colliders(solver, step)?;
-        if let Some(row) = new_tears_row(solver, step) {
+        let is_in_place = self.outcomes.iter().any(|row| row.replaces_state() && row.is_applied());
+        if let Some(row) = new_tears_row(solver, step, is_in_place) {
             self.log.write(&Message::Tears(row), time_ns)?;
         }
         self.write_parameters(solver, step)?;

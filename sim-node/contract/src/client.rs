@@ -25,6 +25,7 @@ use crate::messages::command::CONSOLE_CLIENT_ID;
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::to_values;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::restore::GivenState;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::{NodeStatus, StatusFlags};
 use crate::messages::tears::{TearsHeader, TornConstraint};
@@ -258,12 +259,49 @@ impl Client {
     ///
     /// In its turn of the lockstep, a member would wait for itself, so the request is refused.
     pub fn request(&mut self, action: Action, timeout: Duration) -> Result<Outcome, RequestError> {
-        if self.member.as_ref().is_some_and(Member::is_in_turn) {
-            return Err(RequestError::InTurn);
-        }
+        self.check_turn()?;
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
-        let sequence = commander.send(&self.attachment, action)?;
         let missed_before = commander.missed_count();
+        let sequence = commander.send(&self.attachment, action)?;
+        self.wait_for_outcome(sequence, missed_before, timeout)
+    }
+
+    /// Gives a state to the node, which puts it in place at the next boundary, and waits for the
+    /// outcome. The state of the step that the outcome names is the given one, and the run continues
+    /// from it.
+    ///
+    /// # Errors
+    /// Same as [`Client::request`]. The node rejects a state that is damaged or belongs to another scene.
+    pub fn restore(
+        &mut self,
+        state: &GivenState<'_>,
+        timeout: Duration,
+    ) -> Result<Outcome, RequestError> {
+        self.check_turn()?;
+        let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
+        let missed_before = commander.missed_count();
+        let (sequence, writer) = commander.send_state(&self.attachment, state)?;
+        let outcome = self.wait_for_outcome(sequence, missed_before, timeout);
+        // The message vanishes with its writer.
+        drop(writer);
+        outcome
+    }
+
+    /// Refuses a request that the node would answer only after this client's turn.
+    fn check_turn(&self) -> Result<(), RequestError> {
+        match &self.member {
+            Some(member) if member.is_in_turn() => Err(RequestError::InTurn),
+            _ => Ok(()),
+        }
+    }
+
+    fn wait_for_outcome(
+        &mut self,
+        sequence: u64,
+        missed_before: u64,
+        timeout: Duration,
+    ) -> Result<Outcome, RequestError> {
+        let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         let poll = || commander.outcome_for(sequence);
         if let Some(outcome) = self.watch.wait_for(&self.attachment, timeout, poll)? {
             return Ok(outcome);

@@ -74,6 +74,7 @@ pub use messages::outcome::{
 };
 pub use messages::parameters::{ParameterState, ParametersHeader};
 pub use messages::ready::Ready;
+pub use messages::restore::{GivenState, ReceivedState, RestoreHeader, scene_hash};
 pub use messages::snapshot::{ParticleState, SnapshotFlags, SnapshotHeader};
 pub use messages::status::{MemberStatus, NodeStatus, StatusFlags};
 pub use messages::tears::{TearsHeader, TornConstraint};
@@ -98,8 +99,8 @@ pub use sim_types::{
     Action, ActionFields, COLLIDERS_MAX, COORDINATE_MAX, ColliderShape, ConstraintKind,
     ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS,
     Parameter, ParameterInfo, ParameterValue, ParameterValues, ParticleFlags, PerKind, PlainF32,
-    Reason, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting, TearCause, Text,
-    TextError, ValueForm, printable, printable_line,
+    Reason, RestoreContents, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX, Setting,
+    TearCause, Text, TextError, ValueForm, json_hash, printable, printable_line,
 };
 
 /// Compiles the programs in the README.

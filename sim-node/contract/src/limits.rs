@@ -35,6 +35,8 @@ pub const MEMBERS_MAX: usize = 16;
 /// Messages of one member that wait for the node. A member sends one for each step, and waits for the
 /// step after it.
 pub const READY_BUFFERED: usize = 4;
+/// Most clients that give a state to the node at the same time.
+pub const RESTORES_MAX: usize = 8;
 /// Readers of the outcomes: each client that sends commands, and the other readers.
 pub const OUTCOME_READERS_MAX: usize = CLIENTS_MAX + READERS_MAX;
 /// Readers of the commands and of the members' messages: the owner, and one spare for a network tunnel.

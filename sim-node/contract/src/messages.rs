@@ -5,6 +5,7 @@ pub(crate) mod command;
 pub(crate) mod outcome;
 pub(crate) mod parameters;
 pub(crate) mod ready;
+pub(crate) mod restore;
 pub(crate) mod snapshot;
 pub(crate) mod status;
 pub(crate) mod tears;

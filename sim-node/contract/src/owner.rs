@@ -18,13 +18,14 @@ use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
 use crate::messages::ready::Ready;
+use crate::messages::restore::{ReceivedState, RestoreHeader};
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
-use crate::ports::connection::{self, ConnectionId, ReceivedCommand, receive_round};
+use crate::ports::connection::{self, ConnectionId, ReceivedCommand, receive_held, receive_round};
 use crate::ports::domain::orphans;
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
@@ -52,6 +53,7 @@ pub struct Owner {
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc::Service, Command, ()>,
     ready: Subscriber<ipc::Service, Ready, ()>,
+    restore: Subscriber<ipc::Service, [u8], RestoreHeader>,
     status: ValueWriter<NodeStatus>,
     wake: WakeSender,
     /// Number of readers at the last refresh, to notice new readers.
@@ -111,6 +113,7 @@ impl Owner {
             wake: wake_sender(&services.wake)?,
             commands: subscribe(&services.commands)?,
             ready: subscribe(&services.ready)?,
+            restore: subscribe(&services.restore)?,
             outcomes: ValueWriter::create(&services.config, &services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
@@ -266,6 +269,20 @@ impl Owner {
     /// [`Owner::receive_commands`] does with commands. Whatever a foreign process has written comes too.
     pub fn receive_ready(&self, receive: impl FnMut(Ready, ConnectionId)) {
         receive_round(&self.ready, READY_BUFFERED, receive);
+    }
+
+    /// Appends the states that clients have given, each with the command that its outcome answers: at most
+    /// two of each connection. Returns the number of messages that are no state at all.
+    pub fn receive_states(&self, states: &mut Vec<(ReceivedCommand, ReceivedState)>) -> u64 {
+        let mut refused_count = 0;
+        receive_held(&self.restore, |header, payload, connection| {
+            let command = header.command().map(|command| ReceivedCommand { command, connection });
+            match command.zip(ReceivedState::from_message(header, payload)) {
+                Some(state) => states.push(state),
+                None => refused_count += 1,
+            }
+        });
+        refused_count
     }
 
     /// Returns the connections of members, dead ones too. Cheap.

@@ -52,8 +52,9 @@ pub use sim_types::{
     ParameterValues, ParticleFlags, Reason, TearCause,
 };
 pub use solver::Solver;
-pub use state::keyframe::{Keyframe, KeyframeError, RestoreError};
+pub use state::keyframe::{Keyframe, KeyframeError};
 pub use state::particles::Particle;
+pub use state::restore::RestoreError;
 pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that

@@ -56,9 +56,9 @@ pub struct Solver {
     pub(crate) scene_step: u64,
     /// Derived state that commands of this boundary have made out of date.
     pub(crate) due: Due,
-    /// True if the state was replaced since the last step. The next step publishes it, and
+    /// True if a state was put in place since the last step. The next step publishes it, and
     /// integrates nothing.
-    pub(crate) is_restored: bool,
+    pub(crate) is_put_in_place: bool,
     /// Particles frozen since the load or the last reset. For messages; not part of the state.
     pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
@@ -108,7 +108,7 @@ impl Solver {
             grabs: Vec::with_capacity(particle_count),
             scene_step: 0,
             due: Due { constraints: true, tethers: true, ..Due::default() },
-            is_restored: false,
+            is_put_in_place: false,
             frozen_count: 0,
             model,
         };
@@ -119,7 +119,7 @@ impl Solver {
     /// Like [`Self::new`], for a run that continues: the next step publishes the initial state, as
     /// after a reset.
     pub fn new_in_run(scene: &Scene) -> Self {
-        Self { is_restored: true, ..Self::new(scene) }
+        Self { is_put_in_place: true, ..Self::new(scene) }
     }
 
     /// Sets the number of threads that step the scene, the calling one included: 1 initially, at most
@@ -151,7 +151,8 @@ impl Solver {
             collider.place(0.0);
         }
         self.due = Due { constraints: true, tethers: true, ..Due::default() };
-        self.is_restored = true;
+        self.scene_step = 0;
+        self.is_put_in_place = true;
         self.frozen_count = 0;
     }
 
@@ -332,6 +333,11 @@ impl Solver {
     /// of real time.
     pub fn parameter_values(&self) -> ParameterValues {
         self.parameters.values(self.settings.method)
+    }
+
+    /// Returns the grabbed particles in ascending order, each with the client that holds it.
+    pub fn grabs(&self) -> impl ExactSizeIterator<Item = (u32, u64)> + '_ {
+        self.grabs.iter().map(|grab| (grab.particle, grab.client_id))
     }
 
     /// Returns the number of colliders.

@@ -3,4 +3,5 @@
 pub(crate) mod hash;
 pub(crate) mod keyframe;
 pub(crate) mod particles;
+pub(crate) mod restore;
 pub(crate) mod tear;

@@ -28,8 +28,8 @@ use crate::solver::Solver;
 use crate::state::hash::state_hash;
 
 impl Solver {
-    /// Makes one step of 1/rate seconds. Right after a reset or a restart, it publishes the state
-    /// that was put in place instead.
+    /// Makes one step of 1/rate seconds. After a state was put in place, by a reset or another command, it
+    /// publishes that state instead.
     ///
     /// Position based dynamics in small steps (Macklin et al. 2019) on positions and explicit
     /// velocities: a substep works on the displacement d = h v beside the position, so that
@@ -47,8 +47,8 @@ impl Solver {
     #[must_use]
     pub fn step_unless(&mut self, stop: &AtomicBool) -> bool {
         self.finish_boundary();
-        if self.is_restored {
-            self.publish_restored();
+        if self.is_put_in_place {
+            self.publish_put_in_place();
             return true;
         }
         self.begin_step();
@@ -93,11 +93,11 @@ impl Solver {
         true
     }
 
-    fn publish_restored(&mut self) {
-        self.is_restored = false;
-        self.scene_step = 0;
+    fn publish_put_in_place(&mut self) {
+        self.is_put_in_place = false;
+        let time_s = self.scene_time_s();
         for collider in &mut self.colliders {
-            collider.place(0.0);
+            collider.place(time_s);
         }
         self.particles.make_zeros_canonical();
         self.finish_tears();

@@ -1,5 +1,7 @@
 //! Command lines of the commands of `ctl`: each one is applied by the node and has an outcome.
 
+use std::time::Duration;
+
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
 use sim_contract::{
@@ -7,7 +9,7 @@ use sim_contract::{
 };
 use sim_solver::GRAB_OVER_S_MAX;
 
-use super::value::{index, number, number_in, whole};
+use super::value::{index, number, number_in, time, whole};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum CommandVerb {
@@ -104,6 +106,26 @@ pub(crate) enum CommandVerb {
     },
     /// Restore the initial state in the next step; the step number continues
     Reset,
+    /// Put an earlier state in place, as the state of the next step; the step number continues
+    ///
+    /// The state is the nearest kept one at or before the target. `sim-node run --history` sets the memory
+    /// for past states: the node keeps every step while it fits, then old states at growing distances.
+    #[command(after_help = "Examples:\n  \
+        sim-node ctl rewind 2s\n  \
+        sim-node ctl rewind --to-step 480")]
+    Rewind(RewindArgs),
+}
+
+#[derive(Debug, ClapArgs)]
+#[group(required = true, multiple = false)]
+pub(crate) struct RewindArgs {
+    /// Simulated time to go back, such as 2s or 500ms. Steps that an earlier rewind has left behind do not
+    /// count
+    #[arg(value_parser = time)]
+    pub(crate) time: Option<Duration>,
+    /// Step of the run to go back to
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX))]
+    pub(crate) to_step: Option<u64>,
 }
 
 /// A point, as three arguments.

@@ -32,6 +32,7 @@ const TIMEOUT_DEFAULT: Duration = Duration::from_secs(5);
         sim-node ctl set gravity 0 -1.6 0\n  \
         sim-node ctl set tear_force off\n  \
         sim-node ctl load rope\n  \
+        sim-node ctl rewind 2s\n  \
         sim-node ctl pause && sim-node ctl step 10 && sim-node ctl hash"
 )]
 pub(crate) struct CtlArgs {

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
+use bytesize::ByteSize;
 use clap::Args as ClapArgs;
 use sim_solver::THREADS_MAX;
 use sim_solver::scene::{PASSES_MAX, RATE_HZ_MAX};
 
 use super::endpoint::EndpointArgs;
-use super::value::{time, whole};
+use super::value::{size, time, whole};
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
@@ -52,6 +53,10 @@ pub(crate) struct RunArgs {
     /// Longest wait for a member of the lockstep; then the run continues without it
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = time)]
     pub(crate) lockstep_timeout: Duration,
+    /// Memory for past states, which `ctl rewind` returns to; 0 for none. Old states are kept at growing
+    /// distances
+    #[arg(long, value_name = "SIZE", default_value = "64MiB", value_parser = size)]
+    pub(crate) history: ByteSize,
     /// Print a summary as one JSON object on stdout at the end
     #[arg(long)]
     pub(crate) json: bool,

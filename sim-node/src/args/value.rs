@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
+use bytesize::ByteSize;
 use sim_contract::NumberRange;
 
 /// Parser of whole numbers in a range.
@@ -55,6 +56,11 @@ pub(super) fn time(text: &str) -> Result<Duration, String> {
         .map_err(|_| "it must be a time with its unit, such as 500ms, 10s or 2min".to_owned())
 }
 
+/// Parses a size with its unit. Without one, it is in bytes.
+pub(super) fn size(text: &str) -> Result<ByteSize, String> {
+    text.parse().map_err(|_| "it must be a size with its unit, such as 64MiB, 2GiB or 0".to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,5 +84,10 @@ mod tests {
             assert_eq!(density(text).unwrap_err(), expected);
         }
         assert!(time("10").unwrap_err().contains("such as 500ms"));
+        assert_eq!(size("64MiB"), Ok(ByteSize::mib(64)));
+        assert_eq!(size("0"), Ok(ByteSize::b(0)));
+        for text in ["", "-1", "much", "64 MiBs", "1e400"] {
+            assert!(size(text).unwrap_err().contains("such as 64MiB"), "{text}");
+        }
     }
 }

@@ -1,15 +1,20 @@
 //! The action of each command of `ctl`.
 
 use std::path;
+use std::time::Duration;
 
 use anyhow::Context;
+use sim_contract::clock::SECOND_NS;
 use sim_contract::{Action, KindFilter, Text};
 
-use crate::args::{CommandVerb, PoseArgs};
+use crate::args::{CommandVerb, PoseArgs, RewindArgs};
 use crate::scene_source;
 
-/// Action of a command.
-pub(super) fn from_verb(verb: &CommandVerb) -> anyhow::Result<Action> {
+/// Action of a command. `rate_hz` returns the rate of the node.
+pub(super) fn from_verb(
+    verb: &CommandVerb,
+    rate_hz: impl FnOnce() -> anyhow::Result<u32>,
+) -> anyhow::Result<Action> {
     Ok(match verb {
         CommandVerb::Pin { particle } => Action::Pin { particle: *particle },
         CommandVerb::Unpin { particle } => Action::Unpin { particle: *particle },
@@ -59,7 +64,20 @@ pub(super) fn from_verb(verb: &CommandVerb) -> anyhow::Result<Action> {
         CommandVerb::Resume => Action::Resume,
         CommandVerb::Step { count } => Action::Step { count: *count },
         CommandVerb::Reset => Action::Reset,
+        CommandVerb::Rewind(RewindArgs { time, to_step }) => Action::Rewind {
+            to_step: *to_step,
+            back_steps: match time {
+                Some(time) => Some(steps_in(*time, rate_hz()?)),
+                None => None,
+            },
+        },
     })
+}
+
+/// Number of steps in a simulated time, rounded up.
+fn steps_in(time: Duration, rate_hz: u32) -> u32 {
+    let steps = (time.as_nanos() * u128::from(rate_hz)).div_ceil(u128::from(SECOND_NS));
+    u32::try_from(steps).unwrap_or(u32::MAX)
 }
 
 fn translation_and_rotation(pose: &PoseArgs) -> anyhow::Result<([f32; 3], [f32; 4])> {
@@ -101,7 +119,7 @@ mod tests {
         let args = try_parse(words).unwrap_or_else(|error| panic!("{line}: {error}"));
         let Some(Verb::Ctl(ctl)) = args.verb else { panic!("{line}: not ctl") };
         let CtlVerb::Command(verb) = ctl.verb else { panic!("{line}: not a command") };
-        from_verb(&verb).unwrap()
+        from_verb(&verb, || Ok(240)).unwrap()
     }
 
     fn set(name: &str, value: ParameterValue, kind: Option<ConstraintKind>) -> Action {
@@ -162,11 +180,15 @@ mod tests {
 
     #[test]
     fn a_scene_is_a_built_in_name_or_an_absolute_path() {
+        let rewind = |to_step, back_steps| Action::Rewind { to_step, back_steps };
+        assert_eq!(action("rewind --to-step 12"), rewind(Some(12), None));
+        assert_eq!(action("rewind 2s"), rewind(None, Some(480)));
+        assert_eq!(action("rewind 5ms"), rewind(None, Some(2)), "rounded up from 1.2 steps");
         assert_eq!(action("load rope"), Action::Load { scene: Text::cut("rope") });
         let Action::Load { scene } = action("load ./scenes/rope.toml") else { panic!("no load") };
         assert!(scene.as_str().starts_with('/') && scene.as_str().ends_with("/scenes/rope.toml"));
         let verb = CommandVerb::Load { scene: "nix".to_owned() };
-        let error = from_verb(&verb).unwrap_err().to_string();
+        let error = from_verb(&verb, || Ok(240)).unwrap_err().to_string();
         assert!(error.starts_with("there is no built-in scene 'nix'"), "{error}");
         let error = format!("{:#}", text(&"x".repeat(161)).unwrap_err());
         assert!(error.ends_with("the text has 161 bytes (allowed: at most 160)"), "{error}");

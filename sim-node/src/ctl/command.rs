@@ -42,7 +42,13 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
     if args.json {
         output::json(&row)?;
     } else if outcome.is_applied() {
-        output::line(&format!("applied at step {step}"))?;
+        let what = match row.action {
+            Action::Rewind { to_step: Some(to_step), .. } => {
+                format!(": the state of step {to_step}")
+            }
+            _ => String::new(),
+        };
+        output::line(&format!("applied at step {step}{what}"))?;
     } else {
         let explanation = outcome
             .reason()

@@ -82,6 +82,11 @@ fn fixed_remedy(action: &Action, reason: Reason) -> Option<String> {
         Reason::NotGrabbed => "`ctl grab` grabs it",
         Reason::GrabbedByOther => "`ctl release --force` ends that grab",
         Reason::NoEffectHere => missing_condition(action)?,
+        Reason::UnknownStep => {
+            "older states have made room for newer ones, or belong to another scene: a larger \
+             `sim-node run --history` keeps more"
+        }
+        Reason::InvalidState => "see the node's messages",
         Reason::UnknownParticle
         | Reason::UnknownConstraint
         | Reason::UnknownAnchor
@@ -115,6 +120,7 @@ fn missing_condition(action: &Action) -> Option<&'static str> {
     Some(match action {
         Action::Set { .. } => "method \"xpbd\" has compliance, method \"pbd\" has stiffness",
         Action::Step { .. } => "the node is not paused",
+        Action::Rewind { .. } => "the node keeps no history; start it without --history 0",
         Action::Pin { .. }
         | Action::Unpin { .. }
         | Action::Grab { .. }
@@ -159,6 +165,7 @@ fn allowed_values(action: &Action) -> Option<String> {
         }
         Action::Load { .. } => "a scene that the node can read; see its messages",
         Action::Step { .. } => "1 or more",
+        Action::Rewind { .. } => "a step of this run that the node has made",
         _ => return None,
     };
     Some(values.to_owned())
@@ -218,6 +225,7 @@ mod tests {
                     | Action::Resume
                     | Action::Reset
                     | Action::Cut { .. }
+                    | Action::Restore { .. }
                     | Action::Unknown { .. }
             );
             let remedy = fixed_remedy(&action, Reason::OutOfRange);

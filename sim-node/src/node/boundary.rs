@@ -1,13 +1,17 @@
 //! The boundary before a step: applies commands, releases the grabs of lost clients, loads scenes.
 
 use anyhow::Context;
+use bytemuck::cast_slice;
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    Action, COMMANDS_PER_STEP_MAX, Command, OwnerError, Reason, ReceivedCommand, Stop,
+    Action, COMMANDS_PER_STEP_MAX, Command, OwnerError, Reason, ReceivedState, RestoreContents,
+    Stop,
 };
-use sim_solver::{Applied, Control};
+use sim_solver::{Applied, Control, Keyframe, Particle};
 
 use super::Node;
+use super::history::Target;
+use super::inbox::Request;
 use super::loading::{Refusal, load_scene};
 
 impl Node {
@@ -16,15 +20,17 @@ impl Node {
     /// If the node pauses here, the state before these commands must be published. A boundary of a
     /// step that is not due has further polls, and one of them may bring the pause.
     pub(super) fn apply_commands(&mut self, is_step_due: bool, stop: &Stop) -> anyhow::Result<()> {
-        if self.inbox.has_room() {
-            self.publisher.receive_commands(&mut self.arrived);
-            self.inbox.add(self.arrived.drain(..));
+        self.receive();
+        if self.is_state_in_place {
+            // The next step shows it without further changes.
+            return Ok(());
         }
         let lost =
             self.grab_connections.remove_lost(monotonic_ns(), || self.publisher.connections());
         // Together they are at most one turn, so that readers can keep up with the outcomes.
         let turn = self.inbox.next_turn(COMMANDS_PER_STEP_MAX - lost.len());
-        let has_pause = turn.iter().any(|received| received.command.action() == Action::Pause);
+        let has_pause =
+            turn.iter().any(|request| request.received.command.action() == Action::Pause);
         let has_any = !turn.is_empty() || !lost.is_empty();
         if has_pause || (has_any && !is_step_due) {
             self.publisher.publish_left_out(&self.solver, self.position())?;
@@ -33,8 +39,8 @@ impl Node {
         for release in lost {
             self.release_lost(release);
         }
-        for received in turn {
-            self.apply(&received, stop)?;
+        for request in turn {
+            self.apply(&request, stop)?;
         }
         self.solver.finish_boundary();
         let time_scale = self.progress.time_scale;
@@ -42,22 +48,102 @@ impl Node {
         self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
     }
 
-    fn apply(&mut self, received: &ReceivedCommand, stop: &Stop) -> anyhow::Result<()> {
+    /// Receives the commands and states that have arrived.
+    fn receive(&mut self) {
+        if self.inbox.has_room() {
+            self.publisher.receive_commands(&mut self.arrived);
+            self.inbox.add(self.arrived.drain(..));
+        }
+        if self.inbox.has_room_for_states() {
+            self.inbox.add_states(self.publisher.receive_states());
+        }
+    }
+
+    fn apply(&mut self, request: &Request, stop: &Stop) -> anyhow::Result<()> {
         // A fresh status follows, so that `ctl status` shows the effect.
         self.next_status_ns = 0;
-        let command = received.command;
+        let mut command = request.received.command;
         let result = match self.solver.apply(command.client_id, &command.action()) {
             Ok(Applied::Control(Control::Load { scene })) => {
-                self.load(scene.as_str(), stop)?.map(|()| Applied::Reset)
+                self.load(scene.as_str(), stop)?.map(|()| Applied::InPlace)
+            }
+            Ok(Applied::Control(Control::Rewind { to_step, back_steps })) => {
+                self.rewind(Target { to_step, back_steps }, &mut command)
+            }
+            Ok(Applied::Control(Control::Restore)) => {
+                self.restore(request.state.as_ref(), &mut command)
             }
             Ok(applied) => self.progress.apply(applied).map(|()| applied),
             Err(reason) => Err(reason),
         };
         if result.is_ok() {
-            self.grab_connections.on_applied(received);
+            self.is_commanded = true;
+            self.grab_connections.on_applied(&request.received);
         }
         self.publisher.add_outcome(self.step + 1, command, result);
         Ok(())
+    }
+
+    /// Puts a kept state in place. Its step replaces the target in the command.
+    fn rewind(&mut self, target: Target, command: &mut Command) -> Result<Applied, Reason> {
+        let state = self.history.find(self.step, target)?;
+        let to_step = state.step;
+        // A kept state is one of this scene.
+        self.solver
+            .put_in_place(&state.particles, &state.keyframe())
+            .map_err(|_| Reason::InvalidState)?;
+        self.history.add_branch(self.step + 1, to_step);
+        self.grab_connections.on_rewind(self.solver.grabs());
+        self.show_state_in_place();
+        let action = Action::Rewind { to_step: Some(to_step), back_steps: None };
+        *command = Command::new(command.client_id, command.sequence, action);
+        Ok(Applied::InPlace)
+    }
+
+    /// Puts a given state in place. Its hash replaces that of the command.
+    fn restore(
+        &mut self,
+        state: Option<&ReceivedState>,
+        command: &mut Command,
+    ) -> Result<Applied, Reason> {
+        // A command without a state has come through the wrong service.
+        let state = state.ok_or(Reason::NoEffectHere)?;
+        let contents = match &state.keyframe {
+            Some(_) => RestoreContents::State,
+            None => RestoreContents::Motion,
+        };
+        self.put_in_place(state).map_err(|problem| {
+            self.warnings.print(&format!("restore: {problem}"));
+            Reason::InvalidState
+        })?;
+        self.show_state_in_place();
+        let action = Action::Restore { contents, state_hash: self.solver.hash_in_place() };
+        *command = Command::new(command.client_id, command.sequence, action);
+        Ok(Applied::InPlace)
+    }
+
+    fn put_in_place(&mut self, state: &ReceivedState) -> Result<(), String> {
+        let own_hash = self.publisher.scene_hash();
+        if state.scene_hash != own_hash {
+            return Err(format!(
+                "the state belongs to the scene {:016x}, but this node runs {own_hash:016x}",
+                state.scene_hash
+            ));
+        }
+        let particles: &[Particle] = cast_slice(&state.particles);
+        let result = match &state.keyframe {
+            None => self.solver.put_motion_in_place(particles),
+            Some(bytes) => {
+                let keyframe = Keyframe::decode(bytes).map_err(|error| error.to_string())?;
+                self.solver.put_in_place(particles, &keyframe)
+            }
+        };
+        result.map_err(|error| error.to_string())
+    }
+
+    fn show_state_in_place(&mut self) {
+        self.progress.is_state_due = true;
+        self.is_state_in_place = true;
     }
 
     /// Releases a particle whose client is gone. A frozen particle has nothing to release, and no
@@ -91,7 +177,8 @@ impl Node {
             }
             Ok(()) => {
                 (self.scene, self.solver) = (scene, solver);
-                self.progress.is_reset_due = true;
+                self.history.clear();
+                self.progress.is_state_due = true;
                 Ok(Ok(()))
             }
         }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use sim_contract::clock::SECOND_NS;
 use sim_contract::{
     Action, COMMANDS_PER_STEP_MAX, CONSOLE_CLIENT_ID, Command, ConnectionId, ReceivedCommand,
+    RestoreContents,
 };
 
 /// Time between two checks of the connections. A check reads the state of every client from files.
@@ -41,9 +42,25 @@ impl GrabConnections {
             Action::Grab { particle, .. }
             | Action::Move { particle, .. }
             | Action::Release { particle, .. } => _ = self.by_particle.remove(&particle),
-            Action::Reset | Action::Load { .. } => self.by_particle.clear(),
+            // Grabs of a given state belong to no connection: they end with a release.
+            Action::Reset
+            | Action::Load { .. }
+            | Action::Restore { contents: RestoreContents::State, .. } => self.by_particle.clear(),
             _ => {}
         }
+    }
+
+    /// Updates the grabs after a rewind to a state with these grabs, each a particle and its client. A grab
+    /// continues if its client still holds the particle. The others are lost, because their clients do
+    /// not know of them.
+    pub(super) fn on_rewind(&mut self, grabs: impl Iterator<Item = (u32, u64)>) {
+        let before = std::mem::take(&mut self.by_particle);
+        let grabs = grabs.filter(|(_, client_id)| *client_id != CONSOLE_CLIENT_ID);
+        self.by_particle.extend(grabs.map(|(particle, client_id)| {
+            let held = before.get(&particle).filter(|held| held.client_id == client_id);
+            let connection = held.map_or_else(ConnectionId::default, |held| held.connection);
+            (particle, GrabConnection { client_id, connection })
+        }));
     }
 
     /// Removes grabs whose connection has ended, and returns their releases. Calls `living` for the
@@ -99,6 +116,18 @@ mod tests {
             action => panic!("{action:?}"),
         };
         releases.iter().map(|command| (command.client_id, particle(command))).collect()
+    }
+
+    #[test]
+    fn after_a_rewind_only_the_grabs_that_a_client_still_holds_continue() {
+        let mut grabs = GrabConnections::default();
+        for (client_id, connection, particle) in [(5, 1, 10), (6, 2, 11), (7, 3, 12)] {
+            grabs.on_applied(&received(client_id, connection, grab(particle)));
+        }
+        // Then client 5 held 10, client 6 had not grabbed 11, 8 held 12, and the console 13.
+        grabs.on_rewind([(10, 5), (12, 8), (13, CONSOLE_CLIENT_ID), (14, 6)].into_iter());
+        assert_eq!(releases(&mut grabs, &[1, 2, 3]), [(8, 12), (6, 14)]);
+        assert_eq!(releases(&mut grabs, &[2, 3]), [(5, 10)]);
     }
 
     #[test]

@@ -2,7 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sim_contract::{Action, COMMANDS_PER_STEP_MAX, ReceivedCommand};
+use sim_contract::{Action, COMMANDS_PER_STEP_MAX, RESTORES_MAX, ReceivedCommand, ReceivedState};
+
+/// A command that waits, with the state that a restore puts in place.
+#[derive(Debug)]
+pub(super) struct Request {
+    pub(super) received: ReceivedCommand,
+    pub(super) state: Option<ReceivedState>,
+}
 
 /// Commands that wait to be applied.
 ///
@@ -20,10 +27,12 @@ pub(super) struct Inbox {
     waiting_count: usize,
     /// Number of commands that have arrived.
     arrived_count: u64,
+    /// Number of states that wait. They can be large.
+    state_count: usize,
 }
 
 /// The commands of a client, by sequence, and by order of arrival for equal sequences.
-type ClientQueue = BTreeMap<(u64, u64), ReceivedCommand>;
+type ClientQueue = BTreeMap<(u64, u64), Request>;
 
 /// Number of commands from which on the inbox accepts no more. The rest waits in shared memory, where
 /// each connection has a bounded queue.
@@ -35,26 +44,51 @@ impl Inbox {
         self.waiting_count < INBOX_MAX
     }
 
+    /// Returns `true` if the inbox accepts more states.
+    pub(super) fn has_room_for_states(&self) -> bool {
+        self.state_count < RESTORES_MAX
+    }
+
     /// Adds commands in their order of arrival.
     pub(super) fn add(&mut self, commands: impl IntoIterator<Item = ReceivedCommand>) {
         for received in commands {
-            let command = &received.command;
-            let queue = self.queues.entry(command.client_id).or_default();
-            queue.insert((command.sequence, self.arrived_count), received);
-            self.arrived_count += 1;
-            self.waiting_count += 1;
+            self.add_request(Request { received, state: None });
         }
     }
 
+    /// Adds states in their order of arrival.
+    pub(super) fn add_states(
+        &mut self,
+        states: impl IntoIterator<Item = (ReceivedCommand, ReceivedState)>,
+    ) {
+        for (received, state) in states {
+            self.state_count += 1;
+            self.add_request(Request { received, state: Some(state) });
+        }
+    }
+
+    fn add_request(&mut self, request: Request) {
+        let command = &request.received.command;
+        let queue = self.queues.entry(command.client_id).or_default();
+        queue.insert((command.sequence, self.arrived_count), request);
+        self.arrived_count += 1;
+        self.waiting_count += 1;
+    }
+
     /// Removes the commands of one turn, at most `count_max`, in the order of application. A turn ends
-    /// with the first load, because a load takes long.
-    pub(super) fn next_turn(&mut self, count_max: usize) -> Vec<ReceivedCommand> {
+    /// with the first load, because a load takes long, and with a command that puts a state in place,
+    /// because the next step shows this state without further changes.
+    pub(super) fn next_turn(&mut self, count_max: usize) -> Vec<Request> {
         let mut turn = Vec::new();
         while turn.len() < count_max
-            && let Some(received) = self.next()
+            && let Some(request) = self.next()
         {
-            turn.push(received);
-            if matches!(received.command.action(), Action::Load { .. }) {
+            let action = request.received.command.action();
+            turn.push(request);
+            if matches!(
+                action,
+                Action::Load { .. } | Action::Rewind { .. } | Action::Restore { .. }
+            ) {
                 break;
             }
         }
@@ -62,25 +96,26 @@ impl Inbox {
     }
 
     /// Removes the first command of the next client.
-    fn next(&mut self) -> Option<ReceivedCommand> {
+    fn next(&mut self) -> Option<Request> {
         if self.round.is_empty() {
             self.round.extend(self.queues.keys());
         }
         let client_id = self.round.pop_first()?;
         let queue = self.queues.get_mut(&client_id)?;
-        let (_, received) = queue.pop_first()?;
+        let (_, request) = queue.pop_first()?;
         if queue.is_empty() {
             self.queues.remove(&client_id);
         }
         self.waiting_count -= 1;
-        Some(received)
+        self.state_count -= usize::from(request.state.is_some());
+        Some(request)
     }
 }
 
 #[cfg(test)]
 mod tests {
     //! Checks the order of a turn against lists of clients and sequence numbers.
-    use sim_contract::{Command, ConnectionId, Text};
+    use sim_contract::{Command, ConnectionId, RestoreContents, Text};
 
     use super::*;
 
@@ -89,8 +124,8 @@ mod tests {
         ReceivedCommand { command, connection: ConnectionId::default() }
     }
 
-    fn order(turn: &[ReceivedCommand]) -> Vec<(u64, u64)> {
-        let commands = turn.iter().map(|received| received.command);
+    fn order(turn: &[Request]) -> Vec<(u64, u64)> {
+        let commands = turn.iter().map(|request| request.received.command);
         commands.map(|command| (command.client_id, command.sequence)).collect()
     }
 
@@ -141,7 +176,7 @@ mod tests {
         // The inbox is as full as it becomes, and the honest client has the highest id.
         inbox.add(flood(INBOX_MAX));
         inbox.add([pin(u64::MAX, 0)]);
-        let is_served = |turn: &[ReceivedCommand]| order(turn).contains(&(u64::MAX, 0));
+        let is_served = |turn: &[Request]| order(turn).contains(&(u64::MAX, 0));
         let turns = (1..=100).find(|_| {
             let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX);
             inbox.add(flood(COMMANDS_PER_STEP_MAX));
@@ -151,13 +186,36 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_ends_with_the_first_load() {
+    fn a_turn_ends_with_a_command_that_replaces_the_state() {
+        for action in [
+            Action::Load { scene: Text::cut("rope") },
+            Action::Rewind { to_step: Some(3), back_steps: None },
+        ] {
+            let mut inbox = Inbox::default();
+            let command = Command::new(1, 2, action);
+            let replaces = ReceivedCommand { command, connection: ConnectionId::default() };
+            inbox.add([pin(1, 1), replaces, pin(1, 3)]);
+            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 1), (1, 2)]);
+            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 3)]);
+        }
+    }
+
+    #[test]
+    fn states_wait_with_the_commands_of_their_client_up_to_a_limit() {
+        let state = |sequence| {
+            let action = Action::Restore { contents: RestoreContents::Motion, state_hash: 0 };
+            let command = Command::new(1, sequence, action);
+            let received = ReceivedCommand { command, connection: ConnectionId::default() };
+            (received, ReceivedState { scene_hash: 0, particles: Vec::new(), keyframe: None })
+        };
         let mut inbox = Inbox::default();
-        let load = Command::new(1, 2, Action::Load { scene: Text::cut("rope") });
-        let load = ReceivedCommand { command: load, connection: ConnectionId::default() };
-        inbox.add([pin(1, 1), load, pin(1, 3)]);
-        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 1), (1, 2)]);
-        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 3)]);
+        inbox.add([pin(1, 1), pin(1, 4)]);
+        inbox.add_states((0..RESTORES_MAX as u64).map(|index| state(2 + 3 * index)));
+        assert!(!inbox.has_room_for_states());
+        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX);
+        assert_eq!(order(&turn), [(1, 1), (1, 2)]);
+        assert!(turn[1].state.is_some());
+        assert!(inbox.has_room_for_states());
     }
 
     #[test]

@@ -10,7 +10,7 @@ pub(super) struct Progress {
     /// Steps still to make while paused.
     pub(super) steps_due: u64,
     /// A reset or load waits for the step that shows it, which a paused node makes as well.
-    pub(super) is_reset_due: bool,
+    pub(super) is_state_due: bool,
     /// Simulated time per wall-clock time.
     pub(super) time_scale: f64,
 }
@@ -18,19 +18,19 @@ pub(super) struct Progress {
 impl Progress {
     /// Returns `true` if the node makes another step without a further command.
     pub(super) fn is_stepping(self) -> bool {
-        !self.is_paused || self.steps_due > 0 || self.is_reset_due
+        !self.is_paused || self.steps_due > 0 || self.is_state_due
     }
 
     /// Updates the loop for an action that the solver has accepted.
     ///
     /// # Errors
-    /// The action has no effect in this state of the loop. `load` never has one here: the node
-    /// itself replaces the scene.
+    /// The action has no effect in this state of the loop. `load`, `rewind` and `restore` never
+    /// have one here: the node itself replaces the scene or the state.
     pub(super) fn apply(&mut self, applied: Applied) -> Result<(), Reason> {
         let control = match applied {
             Applied::State | Applied::Target => return Ok(()),
-            Applied::Reset => {
-                self.is_reset_due = true;
+            Applied::InPlace => {
+                self.is_state_due = true;
                 return Ok(());
             }
             Applied::Control(control) => control,
@@ -42,15 +42,18 @@ impl Progress {
             Control::Step { count } if self.is_paused => self.steps_due += u64::from(count),
             Control::TimeScale(scale) => self.time_scale = f64::from(scale),
             // A running node needs no `step`.
-            Control::Step { .. } | Control::Load { .. } => return Err(Reason::NoEffectHere),
+            Control::Step { .. }
+            | Control::Load { .. }
+            | Control::Rewind { .. }
+            | Control::Restore => return Err(Reason::NoEffectHere),
         }
         Ok(())
     }
 
     /// Counts a step. The step that shows a reset is not one of `steps_due`.
     pub(super) fn count_step(&mut self) {
-        if self.is_reset_due {
-            self.is_reset_due = false;
+        if self.is_state_due {
+            self.is_state_due = false;
         } else {
             self.steps_due = self.steps_due.saturating_sub(1);
         }
@@ -65,8 +68,8 @@ mod tests {
 
     use super::*;
 
-    fn progress(is_paused: bool, steps_due: u64, is_reset_due: bool) -> Progress {
-        Progress { is_paused, steps_due, is_reset_due, time_scale: 1.0 }
+    fn progress(is_paused: bool, steps_due: u64, is_state_due: bool) -> Progress {
+        Progress { is_paused, steps_due, is_state_due, time_scale: 1.0 }
     }
 
     #[test]
@@ -105,7 +108,7 @@ mod tests {
     #[test]
     fn resets_at_one_boundary_make_one_step_even_before_a_pause() {
         let mut now = progress(true, 2, false);
-        for applied in [Applied::Reset, Applied::Reset, Applied::Control(Control::Pause)] {
+        for applied in [Applied::InPlace, Applied::InPlace, Applied::Control(Control::Pause)] {
             now.apply(applied).unwrap();
         }
         assert!(now.is_stepping());

@@ -11,7 +11,8 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader, NodeStatus,
     OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError, ParameterValues, ParticleState, Ready,
-    Reason, ReceivedCommand, SnapshotFlags, SnapshotHeader, TearsHeader, TornConstraint, Wake,
+    Reason, ReceivedCommand, ReceivedState, SnapshotFlags, SnapshotHeader, TearsHeader,
+    TornConstraint, Wake, scene_hash,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
@@ -48,9 +49,11 @@ pub(crate) struct Publisher {
     owner: Owner,
     run_id: u64,
     rate_hz: u32,
+    scene_hash: u64,
     /// Loads of this run after the first one.
     topology_revision: u32,
-    /// Number of steps between published snapshots. The last one before a pause is always published.
+    /// Number of steps between published snapshots. The last one before a pause and those of
+    /// `since_step` are published too.
     every: u64,
     /// Times of the last step.
     times: StepTimes,
@@ -74,6 +77,9 @@ pub(crate) struct Publisher {
     parameters: ParameterValues,
     /// Number of torn constraints, and the colliders, as last published.
     torn_count: usize,
+    /// First step of the last load, or step of the last state that a command put in place. It is always
+    /// published. The torn constraints of the state count as torn in it.
+    since_step: u64,
     colliders: Vec<PlacedCollider>,
 }
 
@@ -93,6 +99,7 @@ impl Publisher {
             owner,
             run_id,
             rate_hz: scene.solver.rate_hz,
+            scene_hash: scene_hash(scene.to_toml().as_bytes()),
             topology_revision: 0,
             every,
             times: StepTimes::default(),
@@ -108,6 +115,7 @@ impl Publisher {
             rejected_count: 0,
             parameters,
             torn_count: 0,
+            since_step: 0,
             colliders: Vec::new(),
         })
     }
@@ -127,9 +135,11 @@ impl Publisher {
         let parameters = parameter_values(solver, time_scale);
         let place = LoadPlace { run_id: self.run_id, step, topology_revision, parameters };
         with_load(scene, solver, place, |load| self.owner.load(load))?;
+        self.scene_hash = scene_hash(scene.to_toml().as_bytes());
         self.parameters = parameters;
         self.topology_revision = topology_revision;
         self.torn_count = 0;
+        self.since_step = step;
         self.colliders.clear();
         Ok(())
     }
@@ -137,6 +147,18 @@ impl Publisher {
     /// Appends the commands that have arrived.
     pub(crate) fn receive_commands(&self, commands: &mut Vec<ReceivedCommand>) {
         self.owner.receive_commands(commands);
+    }
+
+    /// Returns the states that have arrived.
+    pub(crate) fn receive_states(&mut self) -> Vec<(ReceivedCommand, ReceivedState)> {
+        let mut states = Vec::new();
+        self.rejected_count += self.owner.receive_states(&mut states);
+        states
+    }
+
+    /// Identifies the scene.
+    pub(crate) fn scene_hash(&self) -> u64 {
+        self.scene_hash
     }
 
     /// Same as [`Owner::receive_ready`].
@@ -178,6 +200,9 @@ impl Publisher {
         let outcome = Outcome::new(self.outcome_count, step, command, result.map(|_| ()));
         self.log(&outcome, 0);
         self.rejected_count += u64::from(result.is_err());
+        if result == Ok(Applied::InPlace) {
+            self.since_step = step;
+        }
         self.is_keyframe_due |= result.is_ok_and(|applied| applied != Applied::Target);
     }
 
@@ -204,7 +229,8 @@ impl Publisher {
         self.times = times;
         self.publish_colliders(solver, position.step)?;
         self.publish_tears(solver, position.step)?;
-        if !(position.step.is_multiple_of(self.every) || position.is_last) {
+        let is_in_place = position.step == self.since_step;
+        if !(position.step.is_multiple_of(self.every) || position.is_last || is_in_place) {
             return self.publish_outcomes();
         }
         self.publish_snapshot(solver, position)
@@ -253,14 +279,16 @@ impl Publisher {
     /// Publishes all torn constraints if a constraint tore or was restored in this step.
     fn publish_tears(&mut self, solver: &Solver, step: u64) -> anyhow::Result<()> {
         let (torn, new_count) = (solver.torn(), solver.new_torn_count());
-        if new_count == 0 && torn.len() == self.torn_count {
+        let is_same_list = torn.len() == self.torn_count && step != self.since_step;
+        let are_none = torn.is_empty() && self.torn_count == 0;
+        if new_count == 0 && (is_same_list || are_none) {
             return Ok(());
         }
         self.torn_count = torn.len();
         let header = TearsHeader {
             run_id: self.run_id,
             step,
-            since_step: step - solver.scene_step(),
+            since_step: self.since_step,
             new_count: count(new_count),
             ..TearsHeader::default()
         };

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::constraint_kind::ConstraintKind;
+use crate::json_hash;
 use crate::json_number::{number, optional_number, rotation, vector};
 use crate::parameter::ParameterValue;
 use crate::text::Text;
@@ -144,6 +145,26 @@ pub enum Action {
         /// Name of a built-in scene, or path of a file on the node's host.
         scene: Text,
     },
+    /// Puts an earlier state of this run in place: the nearest kept one at or before the target. Exactly
+    /// one of the fields is present; the outcome has `to_step`, the step of the state.
+    Rewind {
+        /// Step of the run.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        to_step: Option<u64>,
+        /// Number of steps back on the way to the current state. Steps that a rewind has left behind do
+        /// not count.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        back_steps: Option<u32>,
+    },
+    /// Puts a given state in place. The state comes through a service of its own, so that a command
+    /// alone is rejected.
+    Restore {
+        /// Part of the state that was given.
+        contents: RestoreContents,
+        /// Hash of the state in place.
+        #[serde(with = "json_hash")]
+        state_hash: u64,
+    },
     /// A kind that this version does not know. Always rejected.
     Unknown {
         /// Number of the kind on the wire. The number of a known kind becomes `u32::MAX` there, which
@@ -165,7 +186,7 @@ pub struct ActionFields {
 
 impl ActionFields {
     /// All kinds, in the order of their numbers on the wire.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::new("pin", &["particle"], &[]),
         Self::new("unpin", &["particle"], &[]),
         Self::new("grab", &["particle", "target"], &["over_s"]),
@@ -183,6 +204,8 @@ impl ActionFields {
         Self::new("move_collider", &["collider", "translation"], &["rotation"]),
         Self::new("set", &["parameter", "value"], &["constraint_kind"]),
         Self::new("load", &["scene"], &[]),
+        Self::new("rewind", &[], &["to_step", "back_steps"]),
+        Self::new("restore", &["contents", "state_hash"], &[]),
         Self::new("unknown", &["number"], &[]),
     ];
 
@@ -207,6 +230,24 @@ fn is_false(value: &bool) -> bool {
 /// No rotation.
 fn identity() -> [f32; 4] {
     [0.0, 0.0, 0.0, 1.0]
+}
+
+/// Part of a state that a restore puts in place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[repr(u32)]
+pub enum RestoreContents {
+    /// The complete state: particles and keyframe.
+    State = 1,
+    /// Positions and velocities. Everything else stays.
+    Motion = 2,
+}
+
+impl RestoreContents {
+    /// Returns the contents with this number on the wire.
+    pub fn from_number(number: u32) -> Option<Self> {
+        [Self::State, Self::Motion].into_iter().find(|contents| *contents as u32 == number)
+    }
 }
 
 /// The kind of constraints that a `set` addresses. Its JSON form is the name of the kind.
@@ -296,6 +337,10 @@ impl Action {
             set("compliance", ParameterValue::Number(0.0), Some(structural)),
             set("stiffness", ParameterValue::Number(1.0), Some(KindFilter::Unknown)),
             Self::Load { scene: Text::cut("./gemütlich.toml") },
+            Self::Rewind { to_step: Some(0x0123_4567_89ab), back_steps: None },
+            Self::Rewind { to_step: None, back_steps: Some(480) },
+            Self::Restore { contents: RestoreContents::State, state_hash: 0x0123_4567_89ab_cdef },
+            Self::Restore { contents: RestoreContents::Motion, state_hash: 0 },
             Self::Unknown { number: 99 },
         ]
     }

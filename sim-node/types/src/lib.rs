@@ -19,6 +19,7 @@
 mod action;
 mod collider_shape;
 mod constraint_kind;
+pub mod json_hash;
 mod json_number;
 mod limits;
 mod method;
@@ -30,7 +31,7 @@ mod reason;
 mod tear_cause;
 mod text;
 
-pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter};
+pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, RestoreContents};
 pub use collider_shape::ColliderShape;
 pub use constraint_kind::ConstraintKind;
 pub use json_number::PlainF32;

@@ -30,11 +30,15 @@ pub enum Reason {
     /// The command has no effect here: the particle is frozen, the parameter belongs to the other
     /// method, `step` came while the node was running, or a recording is being played.
     NoEffectHere = 11,
+    /// No state at or before that step is kept.
+    UnknownStep = 12,
+    /// A given state is damaged, or does not belong to the scene.
+    InvalidState = 13,
 }
 
 impl Reason {
     /// All reasons, by ascending number.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::NonFinite,
         Self::OutOfRange,
         Self::UnknownParticle,
@@ -46,6 +50,8 @@ impl Reason {
         Self::NotGrabbed,
         Self::GrabbedByOther,
         Self::NoEffectHere,
+        Self::UnknownStep,
+        Self::InvalidState,
     ];
 
     /// Returns the reason with this number.
@@ -72,6 +78,8 @@ impl Reason {
             Self::NotGrabbed => "not_grabbed",
             Self::GrabbedByOther => "grabbed_by_other",
             Self::NoEffectHere => "no_effect_here",
+            Self::UnknownStep => "unknown_step",
+            Self::InvalidState => "invalid_state",
         }
     }
 }
@@ -90,6 +98,8 @@ impl fmt::Display for Reason {
             Self::NotGrabbed => "the particle is not grabbed",
             Self::GrabbedByOther => "another client has grabbed the particle",
             Self::NoEffectHere => "the command has no effect here",
+            Self::UnknownStep => "no state at or before that step is kept",
+            Self::InvalidState => "the state is damaged, or does not belong to the scene",
         })
     }
 }

@@ -72,7 +72,7 @@ fn apply_tears(torn: &mut Vec<u32>, frame: &Frame) {
             torn.clone_from(&row.torn);
         }
     }
-    if frame.updates.iter().any(|update| update.reset_step().is_some()) {
+    if frame.updates.iter().any(|update| update.replacement_step().is_some()) {
         torn.clear();
     }
     for update in &frame.updates {

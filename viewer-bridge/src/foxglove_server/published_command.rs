@@ -41,6 +41,8 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
         Action::Push { .. } => return Err("push is not accepted here".to_owned()),
+        Action::Rewind { .. } => return Err("rewind is not accepted here".to_owned()),
+        Action::Restore { .. } => return Err("restore is not accepted here".to_owned()),
         Action::Unknown { .. } => return Err("no such command".to_owned()),
     })
 }

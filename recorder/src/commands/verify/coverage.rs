@@ -32,6 +32,8 @@ pub(super) struct Coverage {
     pub(super) skipped_count: u64,
     /// The first state was restored from the recording, not computed from the scene.
     pub(super) is_restored: bool,
+    /// States that a command put in place, and that the simulation had not computed before.
+    pub(super) given_count: u64,
     /// Messages after the last snapshot, or of steps after it.
     pub(super) trailing_count: usize,
     /// Messages before the first snapshot with a keyframe that describe no state of the simulation.
@@ -54,6 +56,10 @@ impl Coverage {
         }
         if self.is_restored {
             all.push("the first state, from which the simulation started".to_owned());
+        }
+        if self.given_count > 0 {
+            let count = self.given_count;
+            all.push(format!("{count} states taken from the file, which a command put in place"));
         }
         if self.skipped_count > 0 {
             let count = self.skipped_count;

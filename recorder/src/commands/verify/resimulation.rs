@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
 use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, state_hash};
-use sim_contract::{Action, Outcome, ParticleState};
+use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
 use super::difference::{Difference, first_difference};
+use super::past_states::PastStates;
 use super::side_rows::SideRows;
 use crate::simulation::apply::apply;
 
@@ -68,6 +69,7 @@ pub(crate) struct Resimulation {
     /// Outcomes that were read but not applied yet, by index.
     pending: BTreeMap<u64, OutcomeRow>,
     side_rows: SideRows,
+    past: PastStates,
     /// Messages before the first state that do not describe it.
     earlier_count: usize,
 }
@@ -84,6 +86,7 @@ impl Resimulation {
             .restore(bytemuck::cast_slice(&frame.particles), &keyframe)
             .map_err(|cause| StartError::State { step, cause })?;
         let next_index = frame.row.outcome_count;
+        let past = PastStates::from_first(step, &solver);
         Ok(Some(Self {
             scene: scene.clone(),
             solver,
@@ -91,8 +94,14 @@ impl Resimulation {
             next_index,
             pending: BTreeMap::new(),
             side_rows: SideRows::after_start(step),
+            past,
             earlier_count: 0,
         }))
+    }
+
+    /// Returns the keyframe of the last compared snapshot.
+    pub(crate) fn keyframe(&self) -> Keyframe {
+        self.solver.keyframe()
     }
 
     /// Sets the number of threads.
@@ -159,7 +168,7 @@ impl Resimulation {
             return finding;
         }
         while self.step < row.step {
-            if let Some(finding) = self.simulate_step(stop) {
+            if let Some(finding) = self.simulate_step(frame, stop) {
                 return finding;
             }
             // In the step of the snapshot, the particles are compared first.
@@ -244,8 +253,9 @@ impl Resimulation {
         Some(Finding::Incomplete { step, what })
     }
 
-    /// Applies the outcomes of the next step in the order of their index, and computes the step.
-    fn simulate_step(&mut self, stop: &AtomicBool) -> Option<Finding> {
+    /// Applies the outcomes of the next step in the order of their index, and computes the step. `frame` is
+    /// that of the next snapshot.
+    fn simulate_step(&mut self, frame: &Frame, stop: &AtomicBool) -> Option<Finding> {
         let step = self.step + 1;
         while let Some(entry) = self.pending.first_entry().filter(|entry| entry.get().step <= step)
         {
@@ -254,8 +264,11 @@ impl Resimulation {
                 return Some(self.misplaced(row.step, "the log has another order"));
             }
             self.next_index += 1;
-            if let Some(finding) = self.apply(&row) {
-                return Some(finding);
+            let is_in_place = row.puts_state_in_place() && row.is_applied();
+            let finding =
+                if is_in_place { self.put_in_place(&row, frame) } else { self.apply(&row) };
+            if finding.is_some() {
+                return finding;
             }
             self.side_rows.pass_parameters(&self.solver, step);
         }
@@ -263,18 +276,60 @@ impl Resimulation {
             return Some(Finding::Interrupted);
         }
         self.step = step;
+        self.past.add(&self.solver);
         None
     }
 
+    /// Returns the number of states that were taken from the file, and are no state that the simulation
+    /// had computed.
+    pub(crate) fn given_count(&self) -> u64 {
+        self.past.given_count
+    }
+
+    /// Puts the state of a snapshot in place, as the outcome of a rewind or restore says, and compares it
+    /// with the states that the simulation has computed.
+    fn put_in_place(&mut self, row: &OutcomeRow, frame: &Frame) -> Option<Finding> {
+        let (step, index) = (row.step, row.index);
+        let keyframe = frame.own_keyframe().filter(|_| frame.row.step == step);
+        let Some(bytes) = keyframe else {
+            let what = format!(
+                "/outcomes: outcome {index} puts a state in place whose snapshot or keyframe is missing"
+            );
+            return Some(Finding::Incomplete { step, what });
+        };
+        let result = self.put_state_in_place(row, &frame.particles, bytes);
+        let problem = result.err().or_else(|| self.past.compare(&row.action, &self.solver));
+        let what = format!("/outcomes: outcome {index}: {}", problem?);
+        Some(Finding::at_step(step, what))
+    }
+
+    fn put_state_in_place(
+        &mut self,
+        row: &OutcomeRow,
+        particles: &[ParticleState],
+        keyframe: &[u8],
+    ) -> Result<(), String> {
+        let particles = bytemuck::cast_slice(particles);
+        let keeps_rest =
+            matches!(row.action, Action::Restore { contents: RestoreContents::Motion, .. });
+        if keeps_rest {
+            self.solver.put_motion_in_place(particles).map_err(|error| error.to_string())
+        } else {
+            let keyframe = Keyframe::decode(keyframe).map_err(|error| error.to_string())?;
+            self.solver.put_in_place(particles, &keyframe).map_err(|error| error.to_string())
+        }
+    }
+
     /// Applies an outcome and compares its status. Skips pause, resume and step, which control only the
-    /// pace of the node, and rejected loads, which change nothing.
+    /// pace of the node, and rejected loads, rewinds and restores, which change nothing.
     fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
-        let is_rejected_load = matches!(row.action, Action::Load { .. }) && !row.is_applied();
+        let is_of_node = matches!(row.action, Action::Load { .. }) || row.puts_state_in_place();
+        let is_rejected_by_node = is_of_node && !row.is_applied();
         let result = match apply(&mut self.solver, row.client_id, &row.action) {
             Ok(Applied::Control(Control::Pause | Control::Resume | Control::Step { .. })) => {
                 return None;
             }
-            Err(_) if is_rejected_load => return None,
+            Err(_) if is_rejected_by_node => return None,
             result => result.map(|_| ()),
         };
         let again = Outcome::new(row.index, row.step, Outcome::from(row).command, result);

@@ -225,6 +225,7 @@ impl<R: Read> Verification<R> {
             + waiting_count;
         self.coverage.earlier_count =
             self.simulation.as_ref().map_or(0, Resimulation::earlier_count);
+        self.coverage.given_count = self.simulation.as_ref().map_or(0, Resimulation::given_count);
         let log = self.frames.log();
         let foreign = log.audit().into_iter().flat_map(recorder::Audit::foreign);
         self.coverage.foreign = foreign.map(ToOwned::to_owned).collect();

@@ -2,7 +2,9 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{Action, Command, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus, Reason};
+use sim_contract::{
+    Action, Command, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus, Reason, RestoreContents,
+};
 
 use super::json::JsonNumber;
 
@@ -60,6 +62,20 @@ impl OutcomeRow {
     /// Returns `true` if the command took effect.
     pub fn is_applied(&self) -> bool {
         self.status == APPLIED
+    }
+
+    /// Returns `true` for a command whose state is that of another step, or comes from outside.
+    pub fn puts_state_in_place(&self) -> bool {
+        matches!(self.action, Action::Rewind { .. } | Action::Restore { .. })
+    }
+
+    /// Returns `true` for a command that replaces the torn constraints and everything else.
+    pub fn replaces_state(&self) -> bool {
+        match self.action {
+            Action::Reset | Action::Rewind { .. } => true,
+            Action::Restore { contents, .. } => contents == RestoreContents::State,
+            _ => false,
+        }
     }
 }
 
@@ -125,6 +141,14 @@ struct ActionSchema {
     constraint_kind: Option<String>,
     #[schemars(default)]
     scene: Option<String>,
+    #[schemars(default)]
+    to_step: Option<u64>,
+    #[schemars(default)]
+    back_steps: Option<u32>,
+    #[schemars(default)]
+    contents: Option<String>,
+    #[schemars(default)]
+    state_hash: Option<String>,
 }
 
 /// The schema of a parameter's value. No value means off.

@@ -12,7 +12,7 @@ pub struct StepRow {
     /// Steps since the scene was last loaded, reset or restored.
     pub scene_step: u64,
     /// XXH3-64 of the particles, as 16 hex digits.
-    #[serde(with = "hex")]
+    #[serde(with = "sim_contract::json_hash")]
     #[schemars(with = "String")]
     pub state_hash: u64,
     /// Number of scene loads in this run, minus one.
@@ -44,20 +44,5 @@ impl From<&SnapshotHeader> for StepRow {
             solve_ns: header.solve_ns,
             snapshot_index: Some(header.snapshot_index),
         }
-    }
-}
-
-/// `#[serde(with = "hex")]` for a u64 as 16 lowercase hex digits in a string.
-mod hex {
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
-    pub(super) fn serialize<S: Serializer>(value: &u64, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(&format_args!("{value:016x}"))
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        u64::from_str_radix(&text, 16).map_err(|_| D::Error::custom("expected 16 hex digits"))
     }
 }

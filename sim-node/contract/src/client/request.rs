@@ -12,11 +12,12 @@ use crate::endpoint::Endpoint;
 use crate::limits::{COMMANDS_BUFFERED, OUTCOMES_BUFFERED};
 use crate::messages::command::{CONSOLE_CLIENT_ID, Command};
 use crate::messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome};
+use crate::messages::restore::{GivenState, RestoreHeader};
 use crate::ports::port::reader_count;
 use crate::ports::reader::{Drained, ReadError, ValueReader};
 use crate::ports::service::{COMMANDS, OUTCOMES, ServiceError};
 use crate::ports::services::{Attachment, OwnerProcess};
-use crate::ports::writer::{PublishError, ValueWriter};
+use crate::ports::writer::{Capacity, PublishError, SliceWriter, ValueWriter};
 use sim_types::Action;
 
 /// Error of a request: the command has no outcome.
@@ -134,6 +135,9 @@ impl RequestError {
     }
 }
 
+/// The writer of one state.
+pub(crate) type StateWriter = SliceWriter<u8, RestoreHeader>;
+
 /// Sends the commands of one client and matches their outcomes.
 #[derive(Debug)]
 pub(crate) struct Commander {
@@ -213,6 +217,29 @@ impl Commander {
         Ok(sequence)
     }
 
+    /// Sends a state. Returns its sequence number and its writer, which must live until the outcome
+    /// arrives.
+    pub(crate) fn send_state(
+        &mut self,
+        attachment: &Attachment,
+        state: &GivenState<'_>,
+    ) -> Result<(u64, StateWriter), RequestError> {
+        self.receive_outcomes()?;
+        let sequence = self.next_sequence();
+        let header = state.header(self.client_id, sequence);
+        let services = &attachment.services;
+        let len_max = usize::try_from(header.size_bytes).unwrap_or(usize::MAX);
+        let capacity = Capacity { len_max, samples: 1 };
+        let writer = SliceWriter::create(&services.config, &services.restore, capacity)?;
+        if writer.send(header, |index| state.byte(index))? == 0 {
+            return Err(RequestError::NoReceiver { owner: OwnerState::query(attachment) });
+        }
+        self.sequence = sequence;
+        let action = Action::Restore { contents: state.contents(), state_hash: 0 };
+        self.unanswered.push_back(Command::new(self.client_id, sequence, action));
+        Ok((sequence, writer))
+    }
+
     /// Receives all outcomes, and keeps those of unanswered commands.
     pub(crate) fn receive_outcomes(&mut self) -> Result<(), ReadError> {
         let mut drained = Drained::default();
@@ -220,7 +247,9 @@ impl Commander {
             self.gaps.add(outcome);
             // Processes that share the console's client id may use the same number, so the whole
             // commands are compared, as bytes because of NaN.
-            let is_answered = |command: &Command| bytes_of(command) == bytes_of(&outcome.command);
+            let answered = outcome.command.as_sent();
+            let is_answered =
+                |command: &Command| bytes_of(&command.as_sent()) == bytes_of(&answered);
             if let Some(index) = self.unanswered.iter().position(is_answered) {
                 self.unanswered.remove(index);
                 self.answered.push_back(*outcome);

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-use sim_types::{Action, KindFilter, ParameterValue, Text};
+use sim_types::{Action, KindFilter, ParameterValue, RestoreContents, Text};
 
 /// Client id of every `sim-node ctl`, so that one call can release a particle that
 /// another call grabbed.
@@ -30,6 +30,8 @@ pub const CONSOLE_CLIENT_ID: u64 = 0;
 /// | 15 move_collider | collider | translation | `rotation` |
 /// | 16 set | | value, if a vector | `text` parameter, `number` value, `count` constraint kind |
 /// | 17 load | | | `text` scene |
+/// | 18 rewind | step, low 32 bits | | `count` step, high 32 bits; or [`CommandOptions::BACK`] and `count` steps |
+/// | 19 restore | hash, low 32 bits | | `count` hash, high 32 bits; [`CommandOptions::STATE`] or [`CommandOptions::MOTION`] |
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.Command")]
@@ -86,6 +88,14 @@ impl CommandOptions {
     pub const CONSTRAINT_KIND: u32 = 1 << 4;
     /// A release ends the grab of any client.
     pub const FORCE: u32 = 1 << 5;
+    /// A rewind has a step of the run.
+    pub const TO: u32 = 1 << 6;
+    /// A rewind has a number of steps.
+    pub const BACK: u32 = 1 << 7;
+    /// A restore puts a complete state in place.
+    pub const STATE: u32 = 1 << 8;
+    /// A restore puts positions and velocities in place.
+    pub const MOTION: u32 = 1 << 9;
 
     const VALUE_ANY: u32 = Self::VALUE_NUMBER | Self::VALUE_VECTOR | Self::VALUE_OFF;
 }
@@ -108,6 +118,8 @@ mod kind {
     pub(super) const MOVE_COLLIDER: u32 = 15;
     pub(super) const SET: u32 = 16;
     pub(super) const LOAD: u32 = 17;
+    pub(super) const REWIND: u32 = 18;
+    pub(super) const RESTORE: u32 = 19;
     /// No version will assign it.
     pub(super) const UNKNOWN: u32 = u32::MAX;
 }
@@ -166,6 +178,14 @@ impl Command {
             Action::Load { scene } => {
                 Self { text: scene.to_wire(), ..Self::with_kind(kind::LOAD, 0) }
             }
+            Action::Rewind { to_step, back_steps } => Self::from_rewind(to_step, back_steps),
+            Action::Restore { contents, state_hash } => Self {
+                options: match contents {
+                    RestoreContents::State => CommandOptions::STATE,
+                    RestoreContents::Motion => CommandOptions::MOTION,
+                },
+                ..Self::with_kind(kind::RESTORE, 0).with_long(state_hash)
+            },
             Action::Unknown { number } => Self::unknown(number),
         }
     }
@@ -182,6 +202,25 @@ impl Command {
 
     fn with_kind(kind: u32, index: u32) -> Self {
         Self { kind, index, ..Self::zeroed() }
+    }
+
+    /// A step and a number of steps share a field, so a command with both keeps only the step. It is
+    /// rejected in either form.
+    fn from_rewind(to_step: Option<u64>, back_steps: Option<u32>) -> Self {
+        let to = if to_step.is_some() { CommandOptions::TO } else { 0 };
+        let back = if back_steps.is_some() { CommandOptions::BACK } else { 0 };
+        let long = to_step.unwrap_or(u64::from(back_steps.unwrap_or(0)) << 32);
+        Self { options: to | back, ..Self::with_kind(kind::REWIND, 0).with_long(long) }
+    }
+
+    /// Sets `index` to the low half of a number, and `count` to the high half.
+    fn with_long(self, number: u64) -> Self {
+        let [low, high] = bytemuck::cast(number.to_le());
+        Self { index: u32::from_le(low), count: u32::from_le(high), ..self }
+    }
+
+    fn long(&self) -> u64 {
+        u64::from(self.count) << 32 | u64::from(self.index)
     }
 
     fn with_vector(self, vector: [f32; 3], number: f32) -> Self {
@@ -242,7 +281,33 @@ impl Command {
                 None => Action::Unknown { number: kind::SET },
             },
             kind::LOAD => Action::Load { scene: Text::from_wire(&self.text) },
+            kind::REWIND => Action::Rewind {
+                to_step: self.has(CommandOptions::TO).then(|| self.long()),
+                back_steps: self.has(CommandOptions::BACK).then_some(count),
+            },
+            kind::RESTORE => match self.restore_contents() {
+                Some(contents) => Action::Restore { contents, state_hash: self.long() },
+                None => Action::Unknown { number: kind::RESTORE },
+            },
             number => Action::Unknown { number },
+        }
+    }
+
+    fn restore_contents(&self) -> Option<RestoreContents> {
+        match self.options & (CommandOptions::STATE | CommandOptions::MOTION) {
+            CommandOptions::STATE => Some(RestoreContents::State),
+            CommandOptions::MOTION => Some(RestoreContents::Motion),
+            _ => None,
+        }
+    }
+
+    /// Returns the command without the fields that the node replaces in its outcome: the step of a rewind
+    /// and the hash of a restore.
+    pub(crate) fn as_sent(self) -> Self {
+        match self.kind {
+            kind::REWIND => Self { index: 0, count: 0, options: 0, ..self },
+            kind::RESTORE => Self { index: 0, count: 0, ..self },
+            _ => self,
         }
     }
 
@@ -287,7 +352,7 @@ mod tests {
         let mut numbers: Vec<_> =
             Action::samples().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
         numbers.dedup();
-        let expected: Vec<_> = (1..=17).chain([99]).collect();
+        let expected: Vec<_> = (1..=19).chain([99]).collect();
         assert_eq!(numbers, expected);
         for kind in (0..=1000).filter(|kind| !numbers.contains(kind)) {
             let action = Command { kind, ..Command::new(0, 0, Action::Pause) }.action();
@@ -299,7 +364,8 @@ mod tests {
     fn an_unknown_action_never_becomes_a_known_one() {
         for number in (0..=100).chain([u32::MAX - 1, u32::MAX]) {
             let decoded = Command::new(0, 0, Action::Unknown { number }).action();
-            let is_known = (1..=17).contains(&number) && number != kind::SET;
+            let is_known =
+                (1..=19).contains(&number) && ![kind::SET, kind::RESTORE].contains(&number);
             let expected = if is_known { u32::MAX } else { number };
             assert_eq!(decoded, Action::Unknown { number: expected });
         }

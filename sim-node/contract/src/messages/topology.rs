@@ -34,7 +34,7 @@ pub struct Triangle {
 
 const _: () = assert!(size_of::<Triangle>() == 12 && align_of::<Triangle>() == 4);
 
-/// Header of `topology`, `surface` and `scene`: 64 bytes, alignment 8. Written once per load.
+/// Header of `topology`, `surface` and `scene`: 72 bytes, alignment 8. Written once per load.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.LoadHeader")]
@@ -43,6 +43,8 @@ pub struct LoadHeader {
     pub run_id: u64,
     /// First step that shows this load.
     pub step: u64,
+    /// Hash of the scene's text; see [`crate::scene_hash`]. Set by the owner.
+    pub scene_hash: u64,
     /// Origin of all positions, in the scene's unit (m).
     pub origin: [f64; 3],
     /// Same as in [`crate::SnapshotHeader`].
@@ -59,7 +61,7 @@ pub struct LoadHeader {
     pub spare: u32,
 }
 
-const _: () = assert!(size_of::<LoadHeader>() == 64 && align_of::<LoadHeader>() == 8);
+const _: () = assert!(size_of::<LoadHeader>() == 72 && align_of::<LoadHeader>() == 8);
 
 /// Header of `keyframe`: 24 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]

@@ -2,6 +2,7 @@
 
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::parameters::{ParameterState, ParametersHeader};
+use crate::messages::restore::scene_hash;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
@@ -111,7 +112,8 @@ impl LoadWriters {
     /// Publishes the load, its parameters and an empty list of tears. Without that list, readers would
     /// keep the list of the load before.
     pub(crate) fn publish(&self, load: &Load<'_>) -> Result<(), PublishError> {
-        let header = |count| LoadHeader { count, ..load.header };
+        let scene_hash = scene_hash(load.scene);
+        let header = |count| LoadHeader { scene_hash, count, ..load.header };
         self.scene.write(header(payload_count(load.scene)), |index| load.scene[index])?;
         let constraints = load.constraints;
         self.topology.write(header(payload_count(constraints)), |index| constraints[index])?;

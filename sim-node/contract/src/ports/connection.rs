@@ -47,6 +47,21 @@ pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
     }
 }
 
+/// Receives messages with a payload, of each connection at most as many as a reader may hold. Ends early
+/// at a client with a broken connection.
+pub(crate) fn receive_held<H: Debug + ZeroCopySend>(
+    subscriber: &Subscriber<ipc::Service, [u8], H>,
+    mut add: impl FnMut(&H, &[u8], ConnectionId),
+) {
+    // As above, holding the messages is the way to reach every connection.
+    let mut held = Vec::new();
+    while let Ok(Some(sample)) = subscriber.receive() {
+        let connection = ConnectionId(sample.origin().value());
+        add(sample.user_header(), sample.payload(), connection);
+        held.push(sample);
+    }
+}
+
 /// Returns the connections of a service. Those of killed clients count until somebody cleans up. It
 /// reads shared memory only.
 pub(crate) fn listed<T: Debug + ZeroCopySend>(service: &Values<T>) -> Vec<ConnectionId> {

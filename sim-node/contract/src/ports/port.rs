@@ -7,6 +7,7 @@ use iceoryx2::service::port_factory::publish_subscribe;
 
 use crate::messages::collider::CollidersHeader;
 use crate::messages::parameters::ParametersHeader;
+use crate::messages::restore::RestoreHeader;
 use crate::messages::snapshot::SnapshotHeader;
 use crate::messages::tears::TearsHeader;
 use crate::messages::topology::{KeyframeHeader, LoadHeader};
@@ -50,6 +51,12 @@ impl SliceHeader for ParametersHeader {
 }
 
 impl SliceHeader for KeyframeHeader {
+    fn element_count(&self) -> u64 {
+        self.size_bytes
+    }
+}
+
+impl SliceHeader for RestoreHeader {
     fn element_count(&self) -> u64 {
         self.size_bytes
     }

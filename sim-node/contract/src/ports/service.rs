@@ -11,8 +11,8 @@ use crate::endpoint::Endpoint;
 use crate::limits::{
     BORROWED_SAMPLES_MAX, BORROWED_UPDATES_MAX, CLIENTS_MAX, COMMAND_READERS_MAX,
     COMMANDS_BUFFERED, KEYFRAMES_BUFFERED, LISTENERS_MAX, MEMBERS_MAX, OUTCOME_READERS_MAX,
-    OUTCOMES_BUFFERED, OWNER_PUBLISHERS_MAX, READERS_MAX, READY_BUFFERED, SNAPSHOTS_BUFFERED,
-    STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
+    OUTCOMES_BUFFERED, OWNER_PUBLISHERS_MAX, READERS_MAX, READY_BUFFERED, RESTORES_MAX,
+    SNAPSHOTS_BUFFERED, STATUS_PUBLISHERS_MAX, UPDATES_BUFFERED,
 };
 use crate::ports::domain::root::RootError;
 use crate::ports::memory::MemoryError;
@@ -103,6 +103,16 @@ pub(crate) const READY: ServiceSpec = ServiceSpec {
     buffered: READY_BUFFERED,
     ..LATCHED
 };
+/// A client creates its writer for one message, and drops it after the outcome.
+pub(crate) const RESTORE: ServiceSpec = ServiceSpec {
+    suffix: "restore",
+    publishers_max: RESTORES_MAX,
+    readers_max: COMMAND_READERS_MAX,
+    history: 0,
+    buffered: 1,
+    when_full: WhenFull::RefuseNewest,
+    ..LATCHED
+};
 pub(crate) const WAKE: ServiceSpec = ServiceSpec {
     suffix: "wake",
     pattern: MessagingPattern::Event,
@@ -113,7 +123,7 @@ pub(crate) const WAKE: ServiceSpec = ServiceSpec {
 };
 
 /// All services of a name.
-pub(crate) const SERVICES: [&ServiceSpec; 13] = [
+pub(crate) const SERVICES: [&ServiceSpec; 14] = [
     &PARTICLES,
     &KEYFRAME,
     &TOPOLOGY,
@@ -125,6 +135,7 @@ pub(crate) const SERVICES: [&ServiceSpec; 13] = [
     &COMMANDS,
     &OUTCOMES,
     &READY,
+    &RESTORE,
     &STATUS,
     &WAKE,
 ];

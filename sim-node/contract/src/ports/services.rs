@@ -11,14 +11,15 @@ use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::ready::Ready;
+use crate::messages::restore::RestoreHeader;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::ports::domain::orphans::{self, Port};
 use crate::ports::service::{
-    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, SCENE, STATUS, SURFACE,
-    ServiceError, TEARS, TOPOLOGY,
+    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE, SCENE, STATUS,
+    SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
 
@@ -38,6 +39,7 @@ pub(crate) struct Services {
     pub(crate) commands: Values<Command>,
     pub(crate) outcomes: Values<Outcome>,
     pub(crate) ready: Values<Ready>,
+    pub(crate) restore: Slices<u8, RestoreHeader>,
     pub(crate) wake: Events,
 }
 
@@ -58,6 +60,7 @@ impl Services {
             commands: session.values(&COMMANDS, access)?,
             outcomes: session.values(&OUTCOMES, access)?,
             ready: session.values(&READY, access)?,
+            restore: session.slices(&RESTORE, access)?,
             wake: session.events(access)?,
         })
     }
@@ -78,6 +81,7 @@ impl Services {
             orphans::ports(&self.commands),
             orphans::ports(&self.outcomes),
             orphans::ports(&self.ready),
+            orphans::ports(&self.restore),
             orphans::event_ports(&self.wake),
         ]
         .concat()
@@ -228,6 +232,7 @@ mod tests {
         header: LoadHeader {
             run_id: 0,
             step: 0,
+            scene_hash: 0,
             origin: [0.0; 3],
             topology_revision: 0,
             count: 0,

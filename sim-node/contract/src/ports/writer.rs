@@ -109,6 +109,15 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
         header: H,
         element: impl Fn(usize) -> T,
     ) -> Result<(), PublishError> {
+        self.send(header, element).map(|_| ())
+    }
+
+    /// Same as [`Self::write`]. Returns the number of readers that received the message.
+    pub(crate) fn send(
+        &self,
+        header: H,
+        element: impl Fn(usize) -> T,
+    ) -> Result<usize, PublishError> {
         let len = usize::try_from(header.element_count()).unwrap_or(usize::MAX);
         if len > self.len_max {
             let (service, len_max) = (self.service.clone(), self.len_max);
@@ -118,8 +127,7 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
         let loan = self.publisher.loan_slice_uninit(len).map_err(|error| failed(&error))?;
         let mut sample = loan.write_from_fn(element);
         *sample.user_header_mut() = header;
-        sample.send().map_err(|error| failed(&error))?;
-        Ok(())
+        sample.send().map_err(|error| failed(&error))
     }
 
     /// Sends the latched message to readers that joined since it was written.

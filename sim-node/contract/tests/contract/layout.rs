@@ -9,7 +9,7 @@ use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVar
 use sim_contract::{
     ColliderState, CollidersHeader, Command, ConstraintState, KeyframeHeader, LoadHeader,
     MemberStatus, NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, Ready,
-    SnapshotHeader, TearsHeader, TornConstraint, Triangle, Wake,
+    RestoreHeader, SnapshotHeader, TearsHeader, TornConstraint, Triangle, Wake,
 };
 
 macro_rules! layout {
@@ -74,6 +74,7 @@ fn write_state_layouts(text: &mut String) {
         LoadHeader {
             run_id,
             step,
+            scene_hash,
             origin,
             topology_revision,
             count,
@@ -160,6 +161,10 @@ fn write_command_and_status_layouts(text: &mut String) {
     );
     layout!(text, MemberStatus { client_id, step, every, is_awaited });
     layout!(text, Ready { client_id, run_id, step, every, tag });
+    layout!(
+        text,
+        RestoreHeader { client_id, sequence, scene_hash, size_bytes, particle_count, contents }
+    );
 }
 
 #[test]
@@ -177,6 +182,7 @@ fn the_limits_are_frozen() {
         READERS_MAX,
         MEMBERS_MAX,
         READY_BUFFERED,
+        RESTORES_MAX,
         BORROWED_SAMPLES_MAX,
         BORROWED_UPDATES_MAX,
         SNAPSHOTS_BUFFERED,

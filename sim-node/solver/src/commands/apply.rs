@@ -14,8 +14,8 @@ pub enum Applied {
     State,
     /// A grab has a new target. The next keyframe can wait.
     Target,
-    /// The next step shows the initial state.
-    Reset,
+    /// The next step shows a state that was put in place.
+    InPlace,
     /// Nothing changed in the solver: the action concerns the process that steps it.
     Control(Control),
 }
@@ -39,6 +39,15 @@ pub enum Control {
         /// Name of a built-in scene, or path of a file.
         scene: Text,
     },
+    /// Put an earlier state in place, with [`Solver::put_in_place`].
+    Rewind {
+        /// Step of the run.
+        to_step: Option<u64>,
+        /// Number of steps back.
+        back_steps: Option<u32>,
+    },
+    /// Put a state in place that belongs to the command.
+    Restore,
 }
 
 impl Solver {
@@ -81,12 +90,16 @@ impl Solver {
             }
             Action::Reset => {
                 self.reset();
-                return Ok(Applied::Reset);
+                return Ok(Applied::InPlace);
             }
             Action::Pause => return Ok(Applied::Control(Control::Pause)),
             Action::Resume => return Ok(Applied::Control(Control::Resume)),
             Action::Step { count } => return Ok(Applied::Control(Control::Step { count })),
             Action::Load { scene } => return Ok(Applied::Control(Control::Load { scene })),
+            Action::Rewind { to_step, back_steps } => {
+                return Ok(Applied::Control(Control::Rewind { to_step, back_steps }));
+            }
+            Action::Restore { .. } => return Ok(Applied::Control(Control::Restore)),
             Action::Unknown { .. } => return Err(Reason::NoEffectHere),
         }
         Ok(Applied::State)

@@ -40,6 +40,13 @@ pub(crate) struct TetherBasis {
     pub(crate) torn: Vec<u32>,
 }
 
+impl TetherBasis {
+    /// Returns the memory of the lists, in bytes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        size_of_val(self.roots.as_slice()) + size_of_val(self.torn.as_slice())
+    }
+}
+
 /// One tether.
 #[derive(Debug, Clone, Copy)]
 struct Tether {

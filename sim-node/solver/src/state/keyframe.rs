@@ -1,19 +1,15 @@
 //! Keyframes: the state beside the particles of a snapshot.
 
-mod check;
-
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use glam::{Quat, Vec3};
 use sim_types::{Method, ParameterValues, ParticleFlags, TearCause};
 
-use crate::constraints::tethers::{TetherBasis, Tethers};
+use crate::constraints::tethers::TetherBasis;
 use crate::frame::{Frame, Pose};
 use crate::parameters::Parameters;
-use crate::solver::{Due, Solver};
-use crate::state::hash::state_hash;
-use crate::state::particles::Particle;
+use crate::solver::Solver;
 use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
@@ -24,28 +20,28 @@ const KEYFRAME_VERSION: u32 = 2;
 pub struct Keyframe {
     /// True if the node was paused. The solver only carries it: its own steps never pause.
     pub paused: bool,
-    scene_step: u64,
+    pub(super) scene_step: u64,
     /// Masses of fixed particles when they are free, ascending by particle.
-    fixed: Vec<FixedParticle>,
-    grabs: Vec<ActiveGrab>,
+    pub(super) fixed: Vec<FixedParticle>,
+    pub(super) grabs: Vec<ActiveGrab>,
     /// Torn constraints in the order of tearing, and the cause of each tear.
-    torn: Vec<u32>,
-    tear_causes: Vec<TearCause>,
+    pub(super) torn: Vec<u32>,
+    pub(super) tear_causes: Vec<TearCause>,
     /// State from which the tethers were last derived.
-    tethers: TetherBasis,
-    parameters: Parameters,
+    pub(super) tethers: TetherBasis,
+    pub(super) parameters: Parameters,
     /// Anchors and colliders that clients have moved, ascending by index.
-    moved_anchors: Vec<Moved>,
-    moved_colliders: Vec<Moved>,
+    pub(super) moved_anchors: Vec<Moved>,
+    pub(super) moved_colliders: Vec<Moved>,
 }
 
 /// An anchor or a collider that a client has moved.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Moved {
-    index: u32,
-    translation: [f32; 3],
+pub(super) struct Moved {
+    pub(super) index: u32,
+    pub(super) translation: [f32; 3],
     /// A unit quaternion.
-    rotation: [f32; 4],
+    pub(super) rotation: [f32; 4],
 }
 
 impl Moved {
@@ -59,7 +55,7 @@ impl Moved {
     }
 
     /// The frame, bit for bit: the rotation is normalised already.
-    fn frame(&self) -> Frame {
+    pub(super) fn frame(&self) -> Frame {
         Frame {
             translation: Vec3::from_array(self.translation),
             rotation: Quat::from_array(self.rotation),
@@ -68,9 +64,9 @@ impl Moved {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct FixedParticle {
-    particle: u32,
-    base_inverse_mass: f32,
+pub(super) struct FixedParticle {
+    pub(super) particle: u32,
+    pub(super) base_inverse_mass: f32,
 }
 
 /// Error of decoding a keyframe.
@@ -93,33 +89,6 @@ pub enum KeyframeError {
     Damaged(#[from] postcard::Error),
 }
 
-/// Error of restoring a snapshot and a keyframe.
-#[derive(Debug, Error, PartialEq, Eq)]
-pub enum RestoreError {
-    /// The snapshot belongs to another scene.
-    #[error("the snapshot has {found} particles, but the scene has {expected}")]
-    ParticleCount {
-        /// Number of particles in the scene.
-        expected: usize,
-        /// Number of particles in the snapshot.
-        found: usize,
-    },
-    /// A particle has a state that no step produces.
-    #[error("particle {particle} of the snapshot is invalid: {what}")]
-    Particle {
-        /// Index of the particle.
-        particle: usize,
-        /// The fault.
-        what: &'static str,
-    },
-    /// The keyframe belongs to another snapshot.
-    #[error("the keyframe does not belong to the snapshot: {what}")]
-    Mismatch {
-        /// The difference.
-        what: &'static str,
-    },
-}
-
 impl Keyframe {
     /// Returns the torn constraints, in the order of tearing.
     pub fn torn(&self) -> &[u32] {
@@ -130,6 +99,24 @@ impl Keyframe {
     /// the node and is not part of the state.
     pub fn parameter_values(&self, method: Method) -> ParameterValues {
         self.parameters.values(method)
+    }
+
+    /// Returns the same state at another step of the scene.
+    #[must_use]
+    pub fn at_scene_step(&self, scene_step: u64) -> Self {
+        Self { scene_step, ..self.clone() }
+    }
+
+    /// Returns the approximate memory use, in bytes.
+    pub fn size_bytes(&self) -> usize {
+        size_of::<Self>()
+            + size_of_val(self.fixed.as_slice())
+            + size_of_val(self.grabs.as_slice())
+            + size_of_val(self.torn.as_slice())
+            + size_of_val(self.tear_causes.as_slice())
+            + self.tethers.size_bytes()
+            + size_of_val(self.moved_anchors.as_slice())
+            + size_of_val(self.moved_colliders.as_slice())
     }
 
     /// Returns the cause of each tear in [`Self::torn`].
@@ -211,62 +198,6 @@ impl Solver {
         head + self.particle_count() * (fixed + grab + root)
             + self.constraint_count() * (torn + cause + basis)
             + (self.anchor_count() + self.collider_count()) * moved
-    }
-
-    /// Restores the state of a snapshot and the keyframe of the same step.
-    ///
-    /// # Errors
-    /// They are not a state of this scene. Then nothing changes.
-    pub fn restore(
-        &mut self,
-        particles: &[Particle],
-        keyframe: &Keyframe,
-    ) -> Result<(), RestoreError> {
-        self.check(particles, keyframe)?;
-        self.reset();
-        for (index, particle) in particles.iter().enumerate() {
-            self.particles.states[index] = *particle;
-            if particle.inverse_mass != 0.0 {
-                self.particles.base_inverse_masses[index] = particle.inverse_mass;
-            }
-        }
-        for one in &keyframe.fixed {
-            self.particles.base_inverse_masses[one.particle as usize] = one.base_inverse_mass;
-        }
-        self.grabs.extend_from_slice(&keyframe.grabs);
-        self.scene_step = keyframe.scene_step;
-        self.is_restored = false;
-        self.parameters = keyframe.parameters;
-        self.restore_constraints(keyframe);
-        self.restore_frames(keyframe);
-        self.state_hash = state_hash(&self.particles.states, self.torn.hash_seed());
-        Ok(())
-    }
-
-    fn restore_constraints(&mut self, keyframe: &Keyframe) {
-        self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
-        self.due = Due::default();
-        if self.settings.tethers {
-            let basis = keyframe.tethers.clone();
-            self.tethers.detach(&mut self.store);
-            self.tethers = Tethers::new(&self.model, &self.parameters, basis);
-        }
-        self.configure();
-        self.tethers.attach(&mut self.store, &self.particles);
-        self.tethers.drop_torn(&self.torn, &mut self.store);
-    }
-
-    fn restore_frames(&mut self, keyframe: &Keyframe) {
-        for moved in &keyframe.moved_anchors {
-            self.anchors.moved[moved.index as usize] = Some(moved.frame());
-        }
-        for moved in &keyframe.moved_colliders {
-            self.colliders[moved.index as usize].moved = Some(moved.frame());
-        }
-        let time_s = self.scene_time_s();
-        for collider in &mut self.colliders {
-            collider.place(time_s);
-        }
     }
 
     fn is_fixed(&self, particle: u32) -> bool {

@@ -55,6 +55,16 @@ impl Torn {
         self.hash_seed
     }
 
+    /// Returns the hash seed at the end of this step.
+    pub(crate) fn next_hash_seed(&self) -> u64 {
+        if self.new_tears().is_empty() {
+            return self.hash_seed;
+        }
+        let mut next = self.clone();
+        next.end_step();
+        next.hash_seed
+    }
+
     /// Restores all constraints.
     pub(crate) fn clear(&mut self) {
         *self = Self::new(self.by_constraint.len());

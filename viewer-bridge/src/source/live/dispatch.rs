@@ -208,6 +208,13 @@ impl Dispatch {
         }
     }
 
+    /// Ends the grabs as [`Self::end_applied_grabs`] does, and releases their particles.
+    pub(super) fn release_applied_grabs(&mut self) {
+        let applied = self.grabs.iter().filter(|(_, grab)| grab.is_applied);
+        self.outbox.extend(applied.map(|(particle, _)| release(*particle)));
+        self.end_applied_grabs();
+    }
+
     /// Ends the grab of a particle that another client has released by force.
     pub(super) fn end_applied_grab(&mut self, particle: u32) {
         if let Some(grab) = self.grabs.get_mut(&particle) {

@@ -295,6 +295,16 @@ fn check_run(known: &mut Option<u64>, run_id: Option<u64>) -> Result<(), LinkEnd
     }
 }
 
+/// Ends the grabs of clients at an applied action that replaces the state.
+fn end_grabs(dispatch: &mut Dispatch, action: &Action) {
+    match action {
+        Action::Reset | Action::Load { .. } => dispatch.end_applied_grabs(),
+        // The state in place may have them too, and then the node still drives the particles.
+        Action::Rewind { .. } | Action::Restore { .. } => dispatch.release_applied_grabs(),
+        _ => {}
+    }
+}
+
 /// Publishes outcomes, and answers the clients whose commands they belong to.
 fn handle_outcomes(
     dispatch: &mut Dispatch,
@@ -305,9 +315,9 @@ fn handle_outcomes(
     for outcome in outcomes {
         sinks.publish(&Update::Outcome(&OutcomeRow::from(outcome)));
         let action = outcome.command.action();
-        if outcome.is_applied() && matches!(action, Action::Reset | Action::Load { .. }) {
-            dispatch.end_applied_grabs();
-            if action == Action::Reset {
+        if outcome.is_applied() {
+            end_grabs(dispatch, &action);
+            if OutcomeRow::from(outcome).replaces_state() {
                 sinks.publish(&Update::Reset { step: outcome.step });
             }
         }

@@ -2,11 +2,12 @@
 
 use sim_types::ParticleFlags;
 
-use super::{Keyframe, Moved, RestoreError};
+use super::{RestoreError, is_held};
 use crate::checks::is_near;
 use crate::constraints::tethers::{TetherBasis, is_root};
 use crate::frame::{Frame, Pose};
 use crate::solver::Solver;
+use crate::state::keyframe::{Keyframe, Moved};
 use crate::state::particles::Particle;
 use crate::step::drive::GRAB_OVER_S_MAX;
 
@@ -14,15 +15,12 @@ use crate::step::drive::GRAB_OVER_S_MAX;
 const SCENE_STEP_MAX: u64 = 1 << 53;
 
 impl Solver {
-    pub(super) fn check(
+    pub(super) fn check_state(
         &self,
         particles: &[Particle],
         keyframe: &Keyframe,
     ) -> Result<(), RestoreError> {
-        let (expected, found) = (self.particle_count(), particles.len());
-        if expected != found {
-            return Err(RestoreError::ParticleCount { expected, found });
-        }
+        self.check_count(particles)?;
         for (particle, state) in particles.iter().enumerate() {
             self.check_particle(particle, state)
                 .map_err(|what| RestoreError::Particle { particle, what })?;
@@ -35,9 +33,6 @@ impl Solver {
     fn check_particle(&self, index: usize, particle: &Particle) -> Result<(), &'static str> {
         let is_fixed = particle.flags & ParticleFlags::ALL != 0;
         let numbers = || particle.position.iter().chain(&particle.velocity);
-        if !numbers().all(|number| number.is_finite()) {
-            return Err("a number is not finite");
-        }
         let is_negative_zero = |number: &f32| number.to_bits() == (-0.0_f32).to_bits();
         if numbers().chain([&particle.inverse_mass]).any(is_negative_zero) {
             return Err("a zero has a minus sign");
@@ -51,19 +46,46 @@ impl Solver {
         if is_fixed != (particle.inverse_mass == 0.0) {
             return Err("its flags and its inverse mass contradict each other");
         }
-        let is_held = particle.flags & (ParticleFlags::PINNED | ParticleFlags::FROZEN) != 0;
-        let is_grabbed = particle.flags & ParticleFlags::GRABBED != 0;
-        if is_held && !is_grabbed && particle.velocity != [0.0; 3] {
-            return Err("it is pinned or frozen, but has a velocity");
-        }
-        if self.is_planar && (particle.position[2] != 0.0 || particle.velocity[2] != 0.0) {
-            return Err("it lies outside of the plane of a scene of 2 dimensions");
-        }
+        self.check_place(particle, particle.flags)?;
         if is_fixed || is_inverse_mass(particle.inverse_mass) {
             Ok(())
         } else {
             Err("its inverse mass is not a positive number")
         }
+    }
+
+    fn check_count(&self, particles: &[Particle]) -> Result<(), RestoreError> {
+        let (expected, found) = (self.particle_count(), particles.len());
+        if expected == found {
+            Ok(())
+        } else {
+            Err(RestoreError::ParticleCount { expected, found })
+        }
+    }
+
+    /// Checks positions and velocities for the current state.
+    pub(super) fn check_motion(&self, particles: &[Particle]) -> Result<(), RestoreError> {
+        self.check_count(particles)?;
+        for (index, (given, current)) in particles.iter().zip(&self.particles.states).enumerate() {
+            self.check_place(given, current.flags)
+                .map_err(|what| RestoreError::Particle { particle: index, what })?;
+        }
+        Ok(())
+    }
+
+    /// Checks the position and the velocity of a particle that has these flags.
+    fn check_place(&self, particle: &Particle, flags: u32) -> Result<(), &'static str> {
+        let mut numbers = particle.position.iter().chain(&particle.velocity);
+        if !numbers.all(|number| number.is_finite()) {
+            return Err("a number is not finite");
+        }
+        if is_held(flags) && particle.velocity != [0.0; 3] {
+            return Err("it is pinned or frozen, but has a velocity");
+        }
+        if self.is_planar && (particle.position[2] != 0.0 || particle.velocity[2] != 0.0) {
+            return Err("it lies outside of the plane of a scene of 2 dimensions");
+        }
+        Ok(())
     }
 
     /// Checks the keyframe against the scene alone.

@@ -1,0 +1,269 @@
+//! `recorder restore`: puts a recorded state in place in a running node.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, anyhow, bail};
+use recorder::{Frame, FrameReader, LogReader};
+use serde::Serialize;
+use sim_contract::{
+    Action, Client, GivenState, Outcome, ParticleState, Stop, report_bus_errors, scene_hash,
+};
+use sim_solver::SOLVER_VERSION;
+
+use crate::cli::endpoint_args::EndpointArgs;
+use crate::cli::exit::Exit;
+use crate::cli::output::{self, AsJson, path_text};
+use crate::cli::parse::{self, whole_number};
+use crate::cli::thread_args::ThreadArgs;
+use crate::commands::verify::resimulation::{Finding, Resimulation};
+use crate::input::scene_source::scene_in_recording;
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "The node must run the scene of the recording, with the same rate and substeps: \
+    `recorder scene FILE` prints it. A state without a keyframe of its own is simulated from the last keyframe \
+    before it. The step number of the node continues; a paused node stays paused.\n\nExamples:\n  \
+    recorder restore run.mcap\n  \
+    recorder restore run.mcap --step 480\n  \
+    recorder restore run.mcap --time 2s\n  \
+    recorder state -o state.mcap && recorder restore state.mcap"
+)]
+pub(crate) struct RestoreArgs {
+    /// Recording with the state
+    file: PathBuf,
+    /// Step of the state [default: the last recorded step]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, conflicts_with = "time",
+        value_parser = whole_number)]
+    step: Option<u64>,
+    /// Simulated time of the state since step 0, such as 2s or 500ms: the last recorded step up to it
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration)]
+    time: Option<Duration>,
+    /// Longest wait for the answer of the node
+    #[arg(long, value_name = "TIME", default_value = "5s", allow_hyphen_values = true,
+        value_parser = parse::duration)]
+    timeout: Duration,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+/// The result, as printed.
+#[derive(Debug, Serialize)]
+struct Report {
+    /// Step of the recording.
+    recorded_step: u64,
+    /// Step of the node that has its state.
+    step: u64,
+    state_hash: String,
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { recorded_step, step, state_hash } = self;
+        write!(
+            f,
+            "restored at step {step}: the state of step {recorded_step}, state hash {state_hash}"
+        )
+    }
+}
+
+/// A complete state of a recording.
+#[derive(Debug)]
+struct RecordedState {
+    step: u64,
+    scene_hash: u64,
+    particles: Vec<ParticleState>,
+    keyframe: Vec<u8>,
+    state_hash: u64,
+}
+
+/// The state to look for.
+#[derive(Debug, Clone, Copy)]
+enum Wanted {
+    Last,
+    Step(u64),
+    /// The last one up to this step.
+    UpTo(u64),
+}
+
+pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
+    let stop = Stop::install()?;
+    report_bus_errors()?;
+    let endpoint = args.endpoint.endpoint()?;
+    let mut client = Client::attach(&endpoint)?;
+    let path = path_text(&args.file);
+    let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
+    check_scene(&mut client, args.timeout, &log).with_context(|| path.clone())?;
+    let wanted = match (args.step, args.time) {
+        (Some(step), _) => Wanted::Step(step),
+        (None, Some(time)) => Wanted::UpTo(step_at(time, log.run().rate_hz)),
+        (None, None) => Wanted::Last,
+    };
+    let place = find(log, wanted).with_context(|| path.clone())?;
+    let state = read_state(&args.file, place, args.threads.count(), &stop).context(path)?;
+    let given = GivenState {
+        scene_hash: state.scene_hash,
+        particles: &state.particles,
+        keyframe: Some(&state.keyframe),
+    };
+    let outcome = client.restore(&given, args.timeout)?;
+    let report = check_outcome(&outcome, &state)?;
+    output::result(args.as_json, &report, &report.to_string())?;
+    Ok(Exit::Done)
+}
+
+/// Compares the scenes of the node and the recording.
+fn check_scene<R: std::io::Read>(
+    client: &mut Client,
+    timeout: Duration,
+    log: &LogReader<R>,
+) -> anyhow::Result<()> {
+    if log.scene().is_empty() {
+        bail!("has no scene (attachment scene.toml)");
+    }
+    let topology = client.topology(timeout)?;
+    let topology = topology.context("the node published no scene; is it stopped?")?;
+    let (recorded, running) = (scene_hash(log.scene()), topology.header.scene_hash);
+    if recorded != running {
+        bail!(
+            "its scene '{}' has the hash {recorded:016x}, but the node runs a scene with the hash \
+             {running:016x}: start the node with the scene that `recorder scene` prints",
+            log.run().scene_name
+        );
+    }
+    Ok(())
+}
+
+/// Last step up to a time.
+fn step_at(time: Duration, rate_hz: u32) -> u64 {
+    let steps = time.as_nanos() * u128::from(rate_hz) / 1_000_000_000;
+    u64::try_from(steps).unwrap_or(u64::MAX)
+}
+
+/// The steps of a state and of the keyframe to start from.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    step: u64,
+    keyframe_step: u64,
+}
+
+/// Finds the wanted state, and the last keyframe up to it.
+fn find<R: std::io::Read>(log: LogReader<R>, wanted: Wanted) -> anyhow::Result<Place> {
+    let mut frames = FrameReader::new(log);
+    let (mut found, mut keyframe_step, mut first) = (None, None, None);
+    while let Some(frame) = frames.next_frame()? {
+        let step = frame.row.step;
+        first.get_or_insert(step);
+        let is_later = match wanted {
+            Wanted::Last => false,
+            Wanted::Step(wanted) | Wanted::UpTo(wanted) => step > wanted,
+        };
+        if is_later {
+            break;
+        }
+        if frame.own_keyframe().is_some() {
+            keyframe_step = Some(step);
+        }
+        found = keyframe_step.map(|keyframe_step| Place { step, keyframe_step });
+    }
+    let found = found.filter(|place| match wanted {
+        Wanted::Step(wanted) => place.step == wanted,
+        Wanted::Last | Wanted::UpTo(_) => true,
+    });
+    found.with_context(|| match (wanted, first) {
+        (_, None) => "has no snapshot".to_owned(),
+        (Wanted::Step(step) | Wanted::UpTo(step), Some(first)) => format!(
+            "has no complete state of step {step}: it begins with step {first}, and `recorder info` \
+             shows its steps"
+        ),
+        (Wanted::Last, Some(_)) => "has no keyframe".to_owned(),
+    })
+}
+
+/// Reads the state, and simulates it from the keyframe if it has none of its own.
+fn read_state(
+    path: &Path,
+    place: Place,
+    threads: usize,
+    stop: &Stop,
+) -> anyhow::Result<RecordedState> {
+    let log = LogReader::open_until(path, stop)?;
+    let scene_hash = scene_hash(log.scene());
+    let version = log.run().solver_version;
+    let needs_simulation = place.step != place.keyframe_step;
+    if needs_simulation && version != SOLVER_VERSION {
+        bail!(
+            "step {} has no keyframe, and was recorded with solver version {version}, but this program \
+             has version {SOLVER_VERSION}. Step {} has one",
+            place.step,
+            place.keyframe_step
+        );
+    }
+    let scene = scene_in_recording(&log)?;
+    let mut frames = FrameReader::new(log);
+    let mut simulation: Option<Resimulation> = None;
+    while let Some(frame) = frames.next_frame()? {
+        let step = frame.row.step;
+        if step < place.keyframe_step {
+            continue;
+        }
+        match &mut simulation {
+            None => {
+                let mut start = Resimulation::start(&scene, &frame)?.context("has no keyframe")?;
+                start.set_threads(threads);
+                check(start.compare_start(&frame))?;
+                simulation = Some(start);
+            }
+            Some(simulation) => check(simulation.advance(&frame, stop.flag()))?,
+        }
+        if step == place.step {
+            let keyframe = simulation.map(|one| one.keyframe().encode()).unwrap_or_default();
+            return Ok(state(frame, scene_hash, keyframe));
+        }
+    }
+    bail!("ends before step {}", place.step)
+}
+
+fn state(frame: Frame, scene_hash: u64, keyframe: Vec<u8>) -> RecordedState {
+    RecordedState {
+        step: frame.row.step,
+        scene_hash,
+        particles: frame.particles,
+        keyframe,
+        state_hash: frame.row.state_hash,
+    }
+}
+
+fn check(finding: Finding) -> anyhow::Result<()> {
+    match finding {
+        Finding::Identical => Ok(()),
+        Finding::Interrupted => bail!("interrupted"),
+        Finding::Diverged { step, what, .. } | Finding::Incomplete { step, what } => Err(anyhow!(
+            "the state cannot be simulated: step {step} differs: {what} (`recorder verify` tells more)"
+        )),
+        Finding::OtherContent { what } => bail!("{what}"),
+    }
+}
+
+fn check_outcome(outcome: &Outcome, state: &RecordedState) -> anyhow::Result<Report> {
+    let step = outcome.step;
+    if let Some(reason) = outcome.reason() {
+        bail!("the node refused the state at step {step}: {reason} (see its messages)");
+    }
+    let Action::Restore { state_hash, .. } = outcome.command.action() else {
+        bail!("the node answered with an outcome of another command");
+    };
+    if !outcome.is_applied() || state_hash != state.state_hash {
+        bail!(
+            "the node has the state hash {state_hash:016x} at step {step}, but the recording has \
+             {:016x}",
+            state.state_hash
+        );
+    }
+    Ok(Report { recorded_step: state.step, step, state_hash: format!("{state_hash:016x}") })
+}
