@@ -10,4 +10,5 @@ mod losses;
 mod outputs;
 mod physics;
 mod raw;
+mod states;
 mod threads;

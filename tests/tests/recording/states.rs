@@ -1,0 +1,335 @@
+//! States that are put in place: rewinds, and states from recordings and clients. The run continues from
+//! them bit for bit, and its recording verifies.
+
+use std::path::Path;
+use std::time::Duration;
+
+use fastrand::Rng;
+use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record, wait_for};
+use recorder::{Frame, FrameReader, LogReader, Message};
+use sim_contract::{
+    Action, Client, GivenState, Outcome, ParticleFlags, ParticleState, Reason, RestoreContents, Tap,
+};
+
+fn node(sandbox: &Sandbox, args: &[&str]) -> Process {
+    Process::start_ready(Program::SimNode, sandbox, args)
+}
+
+fn recorder(sandbox: &Sandbox, args: &[&str]) -> String {
+    Process::run(Program::Recorder, sandbox, args).success()
+}
+
+fn hash(sandbox: &Sandbox) -> String {
+    ctl(sandbox, &["hash"])["state_hash"].as_str().unwrap().to_owned()
+}
+
+fn step(sandbox: &Sandbox, count: u64) {
+    ctl(sandbox, &["step", &count.to_string()]);
+}
+
+fn frames(file: &str) -> Vec<Frame> {
+    let mut reader = FrameReader::new(LogReader::open(Path::new(file)).unwrap());
+    std::iter::from_fn(|| reader.next_frame().unwrap()).collect()
+}
+
+/// Ends a recorder after the last step of a paused node.
+fn end_after(sandbox: &Sandbox, recording: Process, file: &str) {
+    let last = ctl(sandbox, &["status"])["step"].as_u64().unwrap();
+    wait_for("the recording of the last step", || {
+        let log = LogReader::open(Path::new(&format!("{file}.part"))).ok()?;
+        let mut reader = FrameReader::new(log);
+        let frames = std::iter::from_fn(|| reader.next_frame().ok().flatten());
+        frames.last().filter(|frame| frame.row.step == last)
+    });
+    recording.interrupt().success();
+}
+
+/// Records 1,000 steps with commands, and returns the hash of the last one.
+fn record_a_thousand_steps(sandbox: &Sandbox, file: &str) -> String {
+    let node = node(sandbox, &["run", "curtain", "--paused"]);
+    let recording = record(sandbox, file);
+    ctl(sandbox, &["grab", "90", "0.5", "-0.2", "0.3", "--over", "0.1"]);
+    step(sandbox, 300);
+    ctl(sandbox, &["cut-radius", "0.3", "0.3", "0", "--radius", "0.1"]);
+    ctl(sandbox, &["set", "damping", "0.1"]);
+    ctl(sandbox, &["pin", "150"]);
+    step(sandbox, 203);
+    ctl(sandbox, &["release", "90"]);
+    step(sandbox, 497);
+    let hash = hash(sandbox);
+    end_after(sandbox, recording, file);
+    node.interrupt().success();
+    hash
+}
+
+#[test]
+fn a_state_continues_in_another_process_with_the_same_hashes() {
+    let sandbox = Sandbox::new();
+    let (file, again) = (sandbox.path("run.mcap"), sandbox.path("again.mcap"));
+    let expected = record_a_thousand_steps(&sandbox, &file);
+    let node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let recording = record(&sandbox, &again);
+    // Step 510 has no keyframe of its own.
+    assert!(frames(&file).iter().all(|one| one.row.step != 510 || one.own_keyframe().is_none()));
+    let restored = recorder(&sandbox, &["restore", &file, "--step", "510"]);
+    assert!(restored.starts_with("restored at step 1: the state of step 510, "), "{restored}");
+    step(&sandbox, 490);
+    assert_eq!(hash(&sandbox), expected);
+    // The state of a running node is a recording of one step.
+    let state = sandbox.path("state.mcap");
+    recorder(&sandbox, &["state", "-o", &state]);
+    let [only] = &frames(&state)[..] else { panic!("not one step") };
+    assert!(only.own_keyframe().is_some());
+    ctl(&sandbox, &["reset"]);
+    recorder(&sandbox, &["restore", &state]);
+    assert_eq!(hash(&sandbox), expected);
+    let restored = recorder(&sandbox, &["restore", &file, "--time", "1s"]);
+    assert!(restored.contains("the state of step 240, "), "{restored}");
+    end_after(&sandbox, recording, &again);
+    node.interrupt().success();
+    let verified = recorder(&sandbox, &["verify", &again]);
+    assert!(verified.starts_with("494 steps bit-identical (0..=494)"), "{verified}");
+    // The state of the state file is one that the run had computed.
+    assert!(verified.contains("2 states taken from the file"), "{verified}");
+}
+
+#[test]
+fn the_state_of_another_scene_is_refused_with_both_hashes() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "10", "-o", &file]);
+    let node = node(&sandbox, &["run", "curtain", "--rate", "120", "--paused"]);
+    let before = hash(&sandbox);
+    let refused = Process::run(Program::Recorder, &sandbox, &["restore", &file]);
+    assert_eq!(refused.code, Some(1));
+    let hashes = refused.stderr.split(|c: char| !c.is_ascii_hexdigit());
+    let hashes: Vec<_> = hashes.filter(|word| word.len() == 16).collect();
+    assert!(hashes.len() == 2 && hashes[0] != hashes[1], "{}", refused.stderr);
+    assert_eq!(hash(&sandbox), before);
+    let beyond = Process::run(Program::Recorder, &sandbox, &["restore", &file, "--step", "11"]);
+    assert_eq!(beyond.code, Some(1));
+    node.interrupt().success();
+}
+
+/// A state of a running node, as a client reads it.
+struct Held {
+    scene_hash: u64,
+    particles: Vec<ParticleState>,
+    keyframe: Vec<u8>,
+}
+
+fn held_state(sandbox: &Sandbox) -> Held {
+    let file = sandbox.path("held.mcap");
+    recorder(sandbox, &["state", "-o", &file, "--overwrite"]);
+    let frame = frames(&file).remove(0);
+    let log = LogReader::open(Path::new(&file)).unwrap();
+    let keyframe = frame.own_keyframe().unwrap().to_vec();
+    let scene_hash = sim_contract::scene_hash(log.scene());
+    Held { scene_hash, particles: frame.particles, keyframe }
+}
+
+impl Held {
+    fn state(&self) -> GivenState<'_> {
+        let Self { scene_hash, particles, keyframe } = self;
+        GivenState { scene_hash: *scene_hash, particles, keyframe: Some(keyframe) }
+    }
+
+    fn motion(&self) -> GivenState<'_> {
+        GivenState { keyframe: None, ..self.state() }
+    }
+}
+
+fn give(client: &mut Client, state: &GivenState<'_>) -> Outcome {
+    client.restore(state, DEADLINE).unwrap()
+}
+
+#[test]
+fn a_wrong_state_is_refused_and_changes_no_bit() {
+    let sandbox = Sandbox::new();
+    let node = node(&sandbox, &["run", "curtain", "--paused"]);
+    ctl(&sandbox, &["step", "50"]);
+    let held = held_state(&sandbox);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let before = hash(&sandbox);
+    let with = |change: fn(&mut Held)| {
+        let (particles, keyframe) = (held.particles.clone(), held.keyframe.clone());
+        let mut changed = Held { particles, keyframe, ..held };
+        change(&mut changed);
+        changed
+    };
+    for wrong in [
+        with(|held| held.scene_hash ^= 1),
+        with(|held| held.particles.truncate(167)),
+        with(|held| held.particles.push(ParticleState::default())),
+        with(|held| held.particles[40].position[1] = f32::NAN),
+        with(|held| held.particles[40].velocity[1] = f32::INFINITY),
+        with(|held| held.particles[0].velocity[1] = 1.0),
+    ] {
+        for state in [wrong.state(), wrong.motion()] {
+            assert_eq!(give(&mut client, &state).reason(), Some(Reason::InvalidState));
+        }
+    }
+    for wrong in [
+        with(|held| held.particles[40].flags = ParticleFlags::PINNED),
+        with(|held| held.keyframe.truncate(20)),
+        with(|held| held.keyframe.clear()),
+        with(|held| held.keyframe.push(0)),
+        with(|held| held.keyframe[0] = 99),
+    ] {
+        assert_eq!(give(&mut client, &wrong.state()).reason(), Some(Reason::InvalidState));
+    }
+    // A command alone has no state.
+    let action = Action::Restore { contents: RestoreContents::State, state_hash: 0 };
+    let outcome = client.request(action, DEADLINE).unwrap();
+    assert_eq!(outcome.reason(), Some(Reason::NoEffectHere));
+    assert_eq!(hash(&sandbox), before);
+    assert_eq!(ctl(&sandbox, &["status"])["rejected_commands"], 18);
+    node.interrupt().success();
+}
+
+#[test]
+fn a_client_gives_positions_and_velocities_and_the_rest_stays() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let recording = record(&sandbox, &file);
+    ctl(&sandbox, &["step", "20"]);
+    let mut held = held_state(&sandbox);
+    ctl(&sandbox, &["pin", "90"]);
+    ctl(&sandbox, &["step", "1"]);
+    for particle in &mut held.particles[90..] {
+        particle.position[2] = -0.5;
+        particle.velocity = [0.0; 3];
+    }
+    held.particles[100].velocity = [-0.0, 1.5, 0.0];
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let outcome = give(&mut client, &held.motion());
+    assert_eq!((outcome.is_applied(), outcome.step), (true, 22));
+    let snapshot = client.latest_snapshot(DEADLINE).unwrap().unwrap();
+    let header = *snapshot.header();
+    assert_eq!((header.step, header.scene_step), (22, 21), "no time passes in the scene");
+    let Action::Restore { state_hash, .. } = outcome.command.action() else { panic!("no restore") };
+    assert_eq!(state_hash, header.state_hash);
+    for (index, (found, given)) in snapshot.particles().iter().zip(&held.particles).enumerate() {
+        assert_eq!((found.position, found.velocity), (given.position, given.velocity), "{index}");
+        let is_pinned = index < 14 || index == 90;
+        assert_eq!(found.flags == ParticleFlags::PINNED, is_pinned, "{index}");
+    }
+    drop(snapshot);
+    ctl(&sandbox, &["step", "100"]);
+    end_after(&sandbox, recording, &file);
+    node.interrupt().success();
+    let verified = recorder(&sandbox, &["verify", &file]);
+    assert!(verified.contains("1 states taken from the file"), "{verified}");
+}
+
+/// Sends random commands, rewinds and states included, and waits for each outcome.
+fn disturb(client: &mut Client, held: &Held, seed: u64, count: usize) {
+    let mut rng = Rng::with_seed(seed);
+    for _ in 0..count {
+        let particle = rng.u32(0..200);
+        let target = [rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5];
+        let action = match rng.u32(0..12) {
+            0 => Action::Rewind { to_step: None, back_steps: Some(rng.u32(0..100)) },
+            1 => Action::Rewind { to_step: Some(rng.u64(0..2000)), back_steps: None },
+            2 => Action::Reset,
+            3 => Action::CutRadius { center: target, radius: 0.05 },
+            4 => Action::Pin { particle },
+            5 => Action::Unpin { particle },
+            6 => Action::Release { particle, force: true },
+            7 if rng.bool() => {
+                give(client, &held.state());
+                continue;
+            }
+            7 => {
+                give(client, &held.motion());
+                continue;
+            }
+            _ => Action::Grab { particle, target, over_s: 0.05 },
+        };
+        client.request(action, DEADLINE).unwrap();
+    }
+}
+
+#[test]
+fn a_live_recording_with_rewinds_and_states_verifies() {
+    for options in [&[][..], &["--every", "7"], &["--history", "1MiB"]] {
+        let sandbox = Sandbox::new();
+        let file = sandbox.path("run.mcap");
+        let args = [&["run", "curtain", "--rate", "500"], options].concat();
+        let node = node(&sandbox, &args);
+        let held = held_state(&sandbox);
+        let recording = record(&sandbox, &file);
+        let endpoint = sandbox.endpoint();
+        std::thread::scope(|scope| {
+            for seed in 1..=2 {
+                let (endpoint, held) = (&endpoint, &held);
+                scope.spawn(move || {
+                    let mut client = Client::attach(endpoint).unwrap();
+                    disturb(&mut client, held, seed, 300);
+                });
+            }
+        });
+        ctl(&sandbox, &["pause"]);
+        end_after(&sandbox, recording, &file);
+        node.interrupt().success();
+        let verified = recorder(&sandbox, &["verify", &file]);
+        assert!(verified.contains("steps bit-identical"), "{verified}");
+        assert_rewinds_go_to_recorded_states(&file);
+    }
+}
+
+/// Asserts that the state of each rewind is that of the recorded step that its outcome names.
+fn assert_rewinds_go_to_recorded_states(file: &str) {
+    let frames = frames(file);
+    let frame = |step| frames.iter().find(|frame| frame.row.step == step);
+    let updates = frames.iter().flat_map(|frame| &frame.updates);
+    let mut count = 0;
+    for update in updates {
+        let Message::Outcome(row) = update else { continue };
+        let Action::Rewind { to_step, .. } = row.action else { continue };
+        if !row.is_applied() {
+            continue;
+        }
+        let (now, then) = (frame(row.step).unwrap(), frame(to_step.unwrap()));
+        let Some(then) = then else { continue };
+        assert_eq!(now.row.state_hash, then.row.state_hash);
+        assert_eq!(now.row.scene_step, then.row.scene_step);
+        assert!(now.particles == then.particles);
+        count += 1;
+    }
+    assert!(count > 0);
+}
+
+#[test]
+fn a_reader_follows_a_rewind_with_all_that_belongs_to_it() {
+    let sandbox = Sandbox::new();
+    let node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let mut tap = Tap::attach(&sandbox.endpoint()).unwrap();
+    ctl(&sandbox, &["step", "30"]);
+    ctl(&sandbox, &["cut", "40"]);
+    ctl(&sandbox, &["set", "damping", "0.5"]);
+    ctl(&sandbox, &["step", "30"]);
+    ctl(&sandbox, &["cut", "41"]);
+    ctl(&sandbox, &["step", "30"]);
+    for (target, torn, damping) in [("50", &[40][..], 0.5), ("10", &[], 0.3), ("80", &[40, 41], 0.5)] {
+        let rewound = ctl(&sandbox, &["rewind", "--to-step", target]);
+        let step = rewound["step"].as_u64().unwrap();
+        assert_eq!(rewound["to_step"].to_string(), target);
+        wait_for("the state of the rewind", || {
+            let state = tap.next_state(|_| {});
+            let Some(state) = state else {
+                tap.wait(Duration::from_millis(10));
+                return None;
+            };
+            if state.header.step != step {
+                return None;
+            }
+            assert_eq!(state.header.torn_count as usize, torn.len());
+            assert_eq!(state.torn.indices().collect::<Vec<_>>(), torn);
+            assert_eq!(state.parameters.values.damping, damping);
+            Some(())
+        });
+    }
+    node.interrupt().success();
+}
