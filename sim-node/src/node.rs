@@ -4,6 +4,7 @@ mod boundary;
 mod grab_connections;
 mod history;
 mod inbox;
+mod load;
 mod loading;
 mod lockstep;
 mod pace;
@@ -22,6 +23,7 @@ use sim_solver::{Scene, Solver};
 use grab_connections::GrabConnections;
 use history::History;
 use inbox::Inbox;
+use loading::Loading;
 use lockstep::{Event, Lockstep};
 use pace::Pace;
 use progress::Progress;
@@ -48,8 +50,10 @@ pub(crate) struct Options {
     pub(crate) substeps: Option<u32>,
     /// Replaces the number of threads that suits each scene.
     pub(crate) threads: Option<u8>,
-    /// Number of steps after which the run ends.
+    /// Number of steps after which a run ends.
     pub(crate) steps: Option<u64>,
+    /// Simulated time after which a run ends, rounded up to whole steps.
+    pub(crate) duration: Option<Duration>,
     pub(crate) starts_paused: bool,
     pub(crate) waits_for_time: bool,
     /// Number of steps from one published snapshot to the next.
@@ -58,6 +62,17 @@ pub(crate) struct Options {
     pub(crate) lockstep_timeout: Duration,
     /// Memory for past states.
     pub(crate) history_bytes: usize,
+}
+
+impl Options {
+    /// Number of steps after which a run at this rate ends.
+    fn last_step(&self, rate_hz: u32) -> Option<u64> {
+        let steps_in = |time: Duration| {
+            let steps = (time.as_nanos() * u128::from(rate_hz)).div_ceil(u128::from(SECOND_NS));
+            u64::try_from(steps).unwrap_or(u64::MAX)
+        };
+        self.steps.or(self.duration.map(steps_in))
+    }
 }
 
 /// A running simulation.
@@ -73,6 +88,10 @@ pub(crate) struct Node {
     grab_connections: GrabConnections,
     lockstep: Lockstep,
     history: History,
+    /// Scene that is being loaded beside the loop.
+    loading: Option<Loading>,
+    /// A load of this boundary has begun a run.
+    has_begun_run: bool,
     /// A command has been applied since the last step.
     is_commanded: bool,
     /// A command of this boundary has put a state in place.
@@ -83,6 +102,8 @@ pub(crate) struct Node {
     pace: Pace,
     pub(crate) statistics: Statistics,
     pub(crate) step: u64,
+    /// The run ends after this step.
+    last_step: Option<u64>,
     /// CLOCK_MONOTONIC at the start of the run.
     start_ns: u64,
     /// Time spent paused.
@@ -113,6 +134,8 @@ impl Node {
             grab_connections: GrabConnections::default(),
             lockstep: Lockstep::new(options.lockstep_timeout),
             history: History::new(options.history_bytes),
+            loading: None,
+            has_begun_run: false,
             is_commanded: false,
             is_state_in_place: false,
             met: None,
@@ -125,6 +148,7 @@ impl Node {
             pace: Pace::new(scene.solver.rate_hz, now_ns),
             statistics: Statistics::new(now_ns)?,
             step: 0,
+            last_step: options.last_step(scene.solver.rate_hz),
             start_ns: now_ns,
             paused_ns: 0,
             mark_ns: now_ns,
@@ -159,6 +183,10 @@ impl Node {
             if stop.is_requested() {
                 break;
             }
+            if std::mem::take(&mut self.has_begun_run) {
+                self.observe(&observer)?;
+                continue;
+            }
             if let Some(wake_late_ns) = due
                 && self.progress.is_stepping()
             {
@@ -175,7 +203,7 @@ impl Node {
     }
 
     fn is_done(&self) -> bool {
-        self.options.steps.is_some_and(|steps| self.step >= steps)
+        self.last_step.is_some_and(|last| self.step >= last)
     }
 
     /// Waits for the deadline of the next step, at most one polling interval. Returns the lateness of

@@ -1,7 +1,6 @@
 //! `run`: runs a scene and prints messages for the user.
 
 use std::io::{IsTerminal, Write, stderr};
-use std::time::Duration;
 
 use anyhow::anyhow;
 use serde::Serialize;
@@ -40,7 +39,8 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         rate_hz: args.rate,
         substeps: args.substeps,
         threads: args.threads,
-        steps: args.steps.or(args.duration.map(|time| steps_in(time, scene.solver.rate_hz))),
+        steps: args.steps,
+        duration: args.duration,
         starts_paused: args.paused,
         waits_for_time: !args.as_fast_as_possible,
         every: args.every,
@@ -65,12 +65,6 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     drop(node);
     result?;
     summary.print(args.json, shows_status)
-}
-
-/// Number of steps in a simulated time, rounded up.
-fn steps_in(time: Duration, rate_hz: u32) -> u64 {
-    let steps = (time.as_nanos() * u128::from(rate_hz)).div_ceil(1_000_000_000);
-    u64::try_from(steps).unwrap_or(u64::MAX)
 }
 
 fn warn(scene: &Scene) {

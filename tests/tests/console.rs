@@ -53,22 +53,6 @@ fn a_rejection_names_the_remedy() {
 }
 
 #[test]
-fn a_rejected_load_names_both_rates_and_the_cure() {
-    let sandbox = Sandbox::new();
-    let _node = node(&sandbox, &["run", "rope", "--paused"]);
-    let scene = sandbox.write("fast.toml", "version = 1\n[solver]\nrate_hz = 777\n");
-    let rejected = run(&sandbox, &format!("ctl load {scene}"));
-    assert_eq!(rejected.code, Some(4), "{}", rejected.stderr);
-    let rate_hz = ctl(&sandbox, &["status"])["rate_hz"].clone();
-    for part in [
-        format!("the scene runs at 777 Hz, the node at {rate_hz} Hz"),
-        format!("`sim-node run --rate {rate_hz}`"),
-    ] {
-        assert!(rejected.stdout.contains(&part), "{part} is not in: {}", rejected.stdout);
-    }
-}
-
-#[test]
 fn a_wait_for_steps_ends_with_the_timeout_and_a_pause_ends_the_steps() {
     let sandbox = Sandbox::new();
     let _node = node(&sandbox, &["run", "curtain", "--paused"]);

@@ -36,9 +36,19 @@ struct FieldError {
     allowed: String,
 }
 
-/// The fields of every line. `status`, `reason` and `disconnected` come from logs and have no effect.
-const COMMON_FIELDS: [&str; 8] =
-    ["step", "kind", "client_id", "sequence", "index", "status", "reason", "disconnected"];
+/// The fields of every line. `status`, `reason`, `disconnected` and `new_run` come from logs and have no
+/// effect.
+const COMMON_FIELDS: [&str; 9] = [
+    "step",
+    "kind",
+    "client_id",
+    "sequence",
+    "index",
+    "status",
+    "reason",
+    "disconnected",
+    "new_run",
+];
 
 /// Parses commands and sorts them in the order of application. `label` names the file in errors.
 ///
@@ -280,7 +290,7 @@ mod tests {
         drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
-        drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected)
+        drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected, new_run)
         drag.jsonl:2: target: [0,1] is invalid (allowed: three numbers in m)
         drag.jsonl:2: over_s: "soon" is invalid (allowed: a number of seconds)
         drag.jsonl:2: radius: is missing (allowed: a number in m)

@@ -70,7 +70,7 @@ pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
 pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
 pub use messages::outcome::{
-    OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus,
+    OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, OutcomeStatus,
 };
 pub use messages::parameters::{ParameterState, ParametersHeader};
 pub use messages::ready::Ready;

@@ -19,8 +19,16 @@ struct OutcomeRow {
     step: u64,
     status: &'static str,
     reason: &'static str,
+    /// A load began another run.
+    #[serde(skip_serializing_if = "is_false")]
+    new_run: bool,
     #[serde(flatten)]
     action: Action,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// Sends a command and prints its outcome. Waits for the last step of `step`.
@@ -36,6 +44,7 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
         step: outcome.step,
         status: if outcome.is_applied() { "applied" } else { "rejected" },
         reason: outcome.reason_name(),
+        new_run: outcome.begins_run(),
         action: outcome.command.action(),
     };
     let (step, reason) = (row.step, row.reason);
@@ -45,6 +54,11 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
         let what = match row.action {
             Action::Rewind { to_step: Some(to_step), .. } => {
                 format!(": the state of step {to_step}")
+            }
+            Action::Load { .. } if row.new_run => {
+                " as the end of its run: the scene begins a new run at \
+                 step 0, because it has another rate"
+                    .to_owned()
             }
             _ => String::new(),
         };

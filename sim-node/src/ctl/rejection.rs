@@ -8,8 +8,6 @@ use sim_contract::{
 };
 use sim_solver::Scene;
 
-use crate::scene_source;
-
 /// Explains a rejection: the meaning of its reason, and the remedy in parentheses where one is known.
 pub(super) fn explain(
     client: &mut Client,
@@ -41,10 +39,6 @@ fn remedy(
                 && status().is_some_and(|status| is_replay(&status)) =>
         {
             return Some("a recording accepts only pause, resume and step".to_owned());
-        }
-        Reason::NoEffectHere if let Action::Load { scene } = action => {
-            let scene_rate_hz = scene_source::load(scene.as_str()).ok()?.solver.rate_hz;
-            return Some(load_remedy(scene_rate_hz, status()?.rate_hz));
         }
         _ => return fixed_remedy(action, reason),
     };
@@ -102,24 +96,12 @@ fn has_no_limit(action: &Action) -> bool {
         .is_some_and(|parameter| parameter.info().off == OffMeaning::NoLimit)
 }
 
-/// Remedy of a rejected load.
-fn load_remedy(scene_rate_hz: u32, node_rate_hz: u32) -> String {
-    let memory = "it needs more memory than is available; see the node's messages";
-    if scene_rate_hz == node_rate_hz {
-        return memory.to_owned();
-    }
-    format!(
-        "the scene runs at {scene_rate_hz} Hz, the node at {node_rate_hz} Hz: start the node with \
-         `sim-node run --rate {node_rate_hz}`, or set rate_hz = {node_rate_hz} in the scene; or \
-         {memory}"
-    )
-}
-
 /// Condition under which a command has an effect.
 fn missing_condition(action: &Action) -> Option<&'static str> {
     Some(match action {
         Action::Set { .. } => "method \"xpbd\" has compliance, method \"pbd\" has stiffness",
         Action::Step { .. } => "the node is not paused",
+        Action::Load { .. } => "it needs more memory than is available; see the node's messages",
         Action::Rewind { .. } => "the node keeps no history; start it without --history 0",
         Action::Pin { .. }
         | Action::Unpin { .. }

@@ -1,18 +1,16 @@
-//! The boundary before a step: applies commands, releases the grabs of lost clients, loads scenes.
+//! The boundary before a step: applies commands, and releases the grabs of lost clients.
 
-use anyhow::Context;
 use bytemuck::cast_slice;
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    Action, COMMANDS_PER_STEP_MAX, Command, OwnerError, Reason, ReceivedState, RestoreContents,
-    Stop,
+    Action, COMMANDS_PER_STEP_MAX, Command, Reason, ReceivedState, RestoreContents, Stop,
 };
 use sim_solver::{Applied, Control, Keyframe, Particle};
 
 use super::Node;
 use super::history::Target;
 use super::inbox::Request;
-use super::loading::{Refusal, load_scene};
+use super::loading::Loading;
 
 impl Node {
     /// Applies the commands that have arrived, at the boundary before the next step.
@@ -24,6 +22,9 @@ impl Node {
         if self.is_state_in_place {
             // The next step shows it without further changes.
             return Ok(());
+        }
+        if let Some(loaded) = self.loading.as_ref().and_then(Loading::poll) {
+            return self.finish_load(loaded);
         }
         let lost =
             self.grab_connections.remove_lost(monotonic_ns(), || self.publisher.connections());
@@ -40,7 +41,10 @@ impl Node {
             self.release_lost(release);
         }
         for request in turn {
-            self.apply(&request, stop)?;
+            match request.received.command.action() {
+                Action::Load { scene } => self.load(&request, scene, stop)?,
+                _ => self.apply(&request),
+            }
         }
         self.solver.finish_boundary();
         let time_scale = self.progress.time_scale;
@@ -59,14 +63,11 @@ impl Node {
         }
     }
 
-    fn apply(&mut self, request: &Request, stop: &Stop) -> anyhow::Result<()> {
+    fn apply(&mut self, request: &Request) {
         // A fresh status follows, so that `ctl status` shows the effect.
         self.next_status_ns = 0;
         let mut command = request.received.command;
         let result = match self.solver.apply(command.client_id, &command.action()) {
-            Ok(Applied::Control(Control::Load { scene })) => {
-                self.load(scene.as_str(), stop)?.map(|()| Applied::InPlace)
-            }
             Ok(Applied::Control(Control::Rewind { to_step, back_steps })) => {
                 self.rewind(Target { to_step, back_steps }, &mut command)
             }
@@ -81,7 +82,6 @@ impl Node {
             self.grab_connections.on_applied(&request.received);
         }
         self.publisher.add_outcome(self.step + 1, command, result);
-        Ok(())
     }
 
     /// Puts a kept state in place. Its step replaces the target in the command.
@@ -151,36 +151,6 @@ impl Node {
     fn release_lost(&mut self, release: Command) {
         if self.solver.apply(release.client_id, &release.action()).is_ok() {
             self.publisher.add_disconnection(self.step + 1, release);
-        }
-    }
-
-    /// Replaces the scene; the next step shows the initial state of the new one. The rate must stay.
-    /// The inner result is the outcome. An outer error leaves neither scene able to continue.
-    fn load(&mut self, source: &str, stop: &Stop) -> anyhow::Result<Result<(), Reason>> {
-        let rate_hz = self.scene.solver.rate_hz;
-        let (scene, solver) = match load_scene(source, self.options, rate_hz, stop) {
-            Some(Ok(loaded)) => loaded,
-            Some(Err(Refusal { problem, reason })) => {
-                self.warnings.print(&format!("load {source}: {problem}"));
-                return Ok(Err(reason));
-            }
-            // This node ends.
-            None => return Ok(Err(Reason::NoEffectHere)),
-        };
-        match self.publisher.load(&scene, &solver, self.step + 1, self.progress.time_scale) {
-            Err(error @ OwnerError::Publish(_)) => {
-                Err(error).context("publishing the loaded scene")
-            }
-            Err(error) => {
-                self.warnings.print(&format!("load {source}: {error}"));
-                Ok(Err(Reason::NoEffectHere))
-            }
-            Ok(()) => {
-                (self.scene, self.solver) = (scene, solver);
-                self.history.clear();
-                self.progress.is_state_due = true;
-                Ok(Ok(()))
-            }
         }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use sim_contract::{Action, COMMANDS_PER_STEP_MAX, RESTORES_MAX, ReceivedCommand, ReceivedState};
 
 /// A command that waits, with the state that a restore puts in place.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Request {
     pub(super) received: ReceivedCommand,
     pub(super) state: Option<ReceivedState>,
@@ -29,6 +29,8 @@ pub(super) struct Inbox {
     arrived_count: u64,
     /// Number of states that wait. They can be large.
     state_count: usize,
+    /// Client whose commands wait for a load.
+    held: Option<u64>,
 }
 
 /// The commands of a client, by sequence, and by order of arrival for equal sequences.
@@ -95,12 +97,39 @@ impl Inbox {
         turn
     }
 
-    /// Removes the first command of the next client.
+    /// Keeps the further commands of a client, and the loads of the others, until [`Self::release`].
+    pub(super) fn hold(&mut self, client_id: u64) {
+        self.held = Some(client_id);
+    }
+
+    pub(super) fn release(&mut self) {
+        self.held = None;
+    }
+
+    /// Removes the first command of the next client that is not held.
     fn next(&mut self) -> Option<Request> {
-        if self.round.is_empty() {
+        // At most the rest of a round and a whole one.
+        for _ in 0..2 {
+            while let Some(client_id) = self.round.pop_first() {
+                if !self.is_held(client_id) {
+                    return self.remove_first(client_id);
+                }
+            }
             self.round.extend(self.queues.keys());
         }
-        let client_id = self.round.pop_first()?;
+        None
+    }
+
+    fn is_held(&self, client_id: u64) -> bool {
+        let first = || self.queues.get(&client_id)?.first_key_value();
+        let is_load =
+            |request: &Request| matches!(request.received.command.action(), Action::Load { .. });
+        self.held.is_some_and(|held| {
+            held == client_id || first().is_some_and(|(_, request)| is_load(request))
+        })
+    }
+
+    fn remove_first(&mut self, client_id: u64) -> Option<Request> {
         let queue = self.queues.get_mut(&client_id)?;
         let (_, request) = queue.pop_first()?;
         if queue.is_empty() {
@@ -216,6 +245,22 @@ mod tests {
         assert_eq!(order(&turn), [(1, 1), (1, 2)]);
         assert!(turn[1].state.is_some());
         assert!(inbox.has_room_for_states());
+    }
+
+    #[test]
+    fn the_commands_of_a_held_client_and_other_loads_wait_for_its_release() {
+        let load = |client_id| {
+            let command = Command::new(client_id, 1, Action::Load { scene: Text::cut("rope") });
+            ReceivedCommand { command, connection: ConnectionId::default() }
+        };
+        let mut inbox = Inbox::default();
+        inbox.hold(5);
+        inbox.add([pin(5, 1), load(6), pin(6, 2), pin(7, 1), pin(7, 2)]);
+        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(7, 1), (7, 2)]);
+        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX).is_empty());
+        inbox.release();
+        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(5, 1), (6, 1)]);
+        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(6, 2)]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! Scenes that a running node loads.
+//! Scenes that are read and built beside the loop.
 
-use std::panic::resume_unwind;
-use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
@@ -9,6 +9,7 @@ use sim_contract::{Reason, Stop};
 use sim_solver::{Scene, Solver};
 
 use super::Options;
+use super::inbox::Request;
 use super::threads::with_threads;
 use crate::scene_source;
 
@@ -16,6 +17,7 @@ use crate::scene_source;
 const POLL: Duration = Duration::from_millis(50);
 
 /// Why a scene cannot be loaded.
+#[derive(Debug)]
 pub(super) struct Refusal {
     /// For the people who read the node's warnings.
     pub(super) problem: String,
@@ -23,64 +25,97 @@ pub(super) struct Refusal {
     pub(super) reason: Reason,
 }
 
-/// Reads and builds a scene for a node that runs at `rate_hz`.
-///
-/// That takes seconds for a large scene, so a thread of its own does it. Returns `None` soon after a
-/// stop is requested; the thread then ends with the process.
-pub(super) fn load_scene(
-    source: &str,
-    options: Options,
-    rate_hz: u32,
-    stop: &Stop,
-) -> Option<Result<(Scene, Solver), Refusal>> {
-    let source = source.to_owned();
-    let work = move || {
-        let scene = read_scene(&source, options, rate_hz)?;
-        let solver = with_threads(Solver::new_in_run(&scene), options.threads);
-        Ok((scene, solver))
-    };
-    unless_stopped(stop, work).unwrap_or_else(|problem| {
-        let reason = Reason::NoEffectHere;
-        Some(Err(Refusal { problem, reason }))
-    })
+/// A scene that is ready to run.
+#[derive(Debug)]
+pub(super) struct Loaded {
+    pub(super) scene: Scene,
+    pub(super) solver: Solver,
+    /// Its rate is not that of the run.
+    pub(super) begins_run: bool,
 }
 
-/// Reads a scene that a run at `rate_hz` can continue with.
-fn read_scene(source: &str, options: Options, rate_hz: u32) -> Result<Scene, Refusal> {
-    let out_of_range = |problem| Refusal { problem, reason: Reason::OutOfRange };
-    let mut scene =
-        scene_source::load(source).map_err(|error| out_of_range(format!("{error:#}")))?;
-    scene.override_solver(options.rate_hz, options.substeps).map_err(out_of_range)?;
-    let scene_rate_hz = scene.solver.rate_hz;
-    if scene_rate_hz == rate_hz {
-        return Ok(scene);
+/// A load on a thread of its own, because it takes seconds for a large scene.
+#[derive(Debug)]
+pub(super) struct Loading {
+    /// The command.
+    pub(super) request: Request,
+    work: Work<Result<Loaded, Refusal>>,
+}
+
+impl Loading {
+    /// Starts to load a scene for a run at `rate_hz`.
+    pub(super) fn start(
+        request: Request,
+        source: &str,
+        options: Options,
+        rate_hz: u32,
+    ) -> Result<Self, Refusal> {
+        let source = source.to_owned();
+        let work = Work::start(move || load(&source, options, rate_hz)).map_err(|problem| {
+            let reason = Reason::NoEffectHere;
+            Refusal { problem, reason }
+        })?;
+        Ok(Self { request, work })
     }
-    let problem = format!("the scene runs at {scene_rate_hz} Hz, this node at {rate_hz} Hz");
-    Err(Refusal { problem, reason: Reason::NoEffectHere })
+
+    /// Returns the result, once it is there.
+    pub(super) fn poll(&self) -> Option<Result<Loaded, Refusal>> {
+        self.work.poll()
+    }
+
+    /// Waits for the result. Returns `None` soon after a stop is requested; the thread then ends with
+    /// the process.
+    pub(super) fn wait(&self, stop: &Stop) -> Option<Result<Loaded, Refusal>> {
+        self.work.wait(stop)
+    }
 }
 
-/// Runs `work` on a thread of its own. Returns its result, or `None` if a stop is requested meanwhile.
-fn unless_stopped<T: Send + 'static>(
-    stop: &Stop,
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<Option<T>, String> {
-    let (sender, receiver) = sync_channel(1);
-    let worker = thread::Builder::new()
-        .name("load".to_owned())
-        .spawn(move || {
-            // Nobody waits for the result once a stop is requested.
-            let _unwanted = sender.send(work());
-        })
-        .map_err(|error| format!("cannot start a thread: {error}"))?;
-    loop {
-        match receiver.recv_timeout(POLL) {
-            Ok(_) | Err(RecvTimeoutError::Timeout) if stop.is_requested() => return Ok(None),
-            Ok(result) => return Ok(Some(result)),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => match worker.join() {
-                Err(panic) => resume_unwind(panic),
-                Ok(()) => unreachable!("the thread sends its result"),
-            },
+/// Reads and builds a scene for a run at `rate_hz`, or for a new one if the scene has another rate.
+fn load(source: &str, options: Options, rate_hz: u32) -> Result<Loaded, Refusal> {
+    let reason = Reason::OutOfRange;
+    let mut scene = scene_source::load(source)
+        .map_err(|error| Refusal { problem: format!("{error:#}"), reason })?;
+    scene
+        .override_solver(options.rate_hz, options.substeps)
+        .map_err(|problem| Refusal { problem, reason })?;
+    let begins_run = scene.solver.rate_hz != rate_hz;
+    let solver = if begins_run { Solver::new(&scene) } else { Solver::new_in_run(&scene) };
+    let solver = with_threads(solver, options.threads);
+    Ok(Loaded { scene, solver, begins_run })
+}
+
+/// Work on a thread of its own. A panic of the work is passed on.
+#[derive(Debug)]
+struct Work<T>(Receiver<thread::Result<T>>);
+
+impl<T: Send + 'static> Work<T> {
+    fn start(work: impl FnOnce() -> T + Send + 'static) -> Result<Self, String> {
+        let (sender, receiver) = sync_channel(1);
+        thread::Builder::new()
+            .name("load".to_owned())
+            .spawn(move || {
+                // Nobody waits for the result once a stop is requested.
+                let _unwanted = sender.send(catch_unwind(AssertUnwindSafe(work)));
+            })
+            .map_err(|error| format!("cannot start a thread: {error}"))?;
+        Ok(Self(receiver))
+    }
+
+    fn poll(&self) -> Option<T> {
+        match self.0.try_recv() {
+            Ok(result) => Some(result.unwrap_or_else(|panic| resume_unwind(panic))),
+            Err(TryRecvError::Empty | TryRecvError::Disconnected) => None,
+        }
+    }
+
+    fn wait(&self, stop: &Stop) -> Option<T> {
+        loop {
+            match self.0.recv_timeout(POLL) {
+                Ok(_) | Err(RecvTimeoutError::Timeout) if stop.is_requested() => return None,
+                Ok(result) => return Some(result.unwrap_or_else(|panic| resume_unwind(panic))),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
         }
     }
 }
@@ -94,17 +129,18 @@ mod tests {
     #[test]
     fn work_is_waited_for_until_a_stop_is_requested() {
         let stop = Stop::default();
-        assert_eq!(unless_stopped(&stop, || 7), Ok(Some(7)));
+        assert_eq!(Work::start(|| 7).unwrap().wait(&stop), Some(7));
         let (sender, receiver) = sync_channel::<()>(0);
-        let work = move || receiver.recv().is_err();
+        let work = Work::start(move || receiver.recv().is_err()).unwrap();
+        assert_eq!(work.poll(), None);
         stop.flag().store(true, Ordering::Relaxed);
-        assert_eq!(unless_stopped(&stop, work), Ok(None));
+        assert_eq!(work.wait(&stop), None);
         drop(sender);
     }
 
     #[test]
     #[should_panic(expected = "wrong")]
     fn a_panic_of_the_work_is_passed_on() {
-        let _ = unless_stopped(&Stop::default(), || panic!("wrong"));
+        let _ = Work::start(|| panic!("wrong")).unwrap().wait(&Stop::default());
     }
 }

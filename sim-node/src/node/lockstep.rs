@@ -106,6 +106,18 @@ impl Lockstep {
         }
     }
 
+    pub(super) fn has_members(&self) -> bool {
+        !self.members.is_empty()
+    }
+
+    /// Awaits every member at step 0 of a new run.
+    pub(super) fn begin_run(&mut self) {
+        for member in &mut self.members {
+            (member.joined, member.ready) = (0, None);
+        }
+        self.waiting_since_ns = None;
+    }
+
     /// Waits until all members are ready for `step`, at most until `until_ns`. Returns `true` if they
     /// are. Members that are gone, or have kept the node waiting for too long, are members no more.
     pub(super) fn wait(

@@ -50,6 +50,11 @@ impl Progress {
         Ok(())
     }
 
+    /// Keeps only the pause and the pace.
+    pub(super) fn begin_run(&mut self) {
+        (self.steps_due, self.is_state_due) = (0, false);
+    }
+
     /// Counts a step. The step that shows a reset is not one of `steps_due`.
     pub(super) fn count_step(&mut self) {
         if self.is_state_due {

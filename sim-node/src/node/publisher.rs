@@ -10,9 +10,9 @@ use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader, NodeStatus,
-    OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, OwnerError, ParameterValues, ParticleState, Ready,
-    Reason, ReceivedCommand, ReceivedState, SnapshotFlags, SnapshotHeader, TearsHeader,
-    TornConstraint, Wake, scene_hash,
+    OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, Owner, OwnerError, ParameterValues,
+    ParticleState, Ready, Reason, ReceivedCommand, ReceivedState, SnapshotFlags, SnapshotHeader,
+    TearsHeader, TornConstraint, Wake, scene_hash,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
@@ -34,6 +34,15 @@ pub(crate) struct Position {
     pub(crate) time_scale: f64,
     /// No further step follows for now, so late subscribers need this one.
     pub(crate) is_last: bool,
+}
+
+/// Run of a loaded scene.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Run {
+    /// The run goes on, because the rate is the same.
+    Same,
+    /// A new run with this id.
+    New(u64),
 }
 
 /// Numbers of readers of two services.
@@ -120,7 +129,8 @@ impl Publisher {
         })
     }
 
-    /// Publishes another scene; `step` is the first step that shows it.
+    /// Publishes another scene. In the same run, `step` is the first step that shows it. A new run begins
+    /// with [`Self::begin_run`].
     ///
     /// # Errors
     /// The scene exceeds a limit of the contract or of shared memory; the old one stays published.
@@ -129,11 +139,15 @@ impl Publisher {
         scene: &Scene,
         solver: &Solver,
         step: u64,
+        run: Run,
         time_scale: f64,
     ) -> Result<(), OwnerError> {
-        let topology_revision = self.topology_revision + 1;
+        let (run_id, step, topology_revision) = match run {
+            Run::Same => (self.run_id, step, self.topology_revision + 1),
+            Run::New(run_id) => (run_id, 0, 0),
+        };
         let parameters = parameter_values(solver, time_scale);
-        let place = LoadPlace { run_id: self.run_id, step, topology_revision, parameters };
+        let place = LoadPlace { run_id, step, topology_revision, parameters };
         with_load(scene, solver, place, |load| self.owner.load(load))?;
         self.scene_hash = scene_hash(scene.to_toml().as_bytes());
         self.parameters = parameters;
@@ -141,6 +155,22 @@ impl Publisher {
         self.torn_count = 0;
         self.since_step = step;
         self.colliders.clear();
+        Ok(())
+    }
+
+    /// Logs the load that begins another run, which ends the log of this one.
+    pub(crate) fn add_last_outcome(&mut self, step: u64, command: Command) {
+        let outcome = Outcome::new(self.outcome_count, step, command, Ok(()));
+        self.log(&outcome, OUTCOME_FLAG_NEW_RUN);
+    }
+
+    /// Begins a run, whose scene is published. Publish its step 0 next.
+    pub(crate) fn begin_run(&mut self, run_id: u64, rate_hz: u32) -> anyhow::Result<()> {
+        self.publish_outcomes()?;
+        (self.run_id, self.rate_hz) = (run_id, rate_hz);
+        (self.last, self.snapshot_count, self.keyframe_step) = (SnapshotHeader::default(), 0, 0);
+        (self.outcome_count, self.rejected_count) = (0, 0);
+        self.is_keyframe_due = true;
         Ok(())
     }
 

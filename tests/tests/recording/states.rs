@@ -312,7 +312,9 @@ fn a_reader_follows_a_rewind_with_all_that_belongs_to_it() {
     ctl(&sandbox, &["step", "30"]);
     ctl(&sandbox, &["cut", "41"]);
     ctl(&sandbox, &["step", "30"]);
-    for (target, torn, damping) in [("50", &[40][..], 0.5), ("10", &[], 0.3), ("80", &[40, 41], 0.5)] {
+    for (target, torn, damping) in
+        [("50", &[40][..], 0.5), ("10", &[], 0.3), ("80", &[40, 41], 0.5)]
+    {
         let rewound = ctl(&sandbox, &["rewind", "--to-step", target]);
         let step = rewound["step"].as_u64().unwrap();
         assert_eq!(rewound["to_step"].to_string(), target);

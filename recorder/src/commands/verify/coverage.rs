@@ -6,7 +6,7 @@ const ALWAYS: [&str; 9] = [
     "wake_late_ns and solve_ns in /steps, which the node measured",
     "the number and the values of messages on /status, which the node measured",
     "time_scale in /parameters and the paused flag of keyframes, which belong to the node",
-    "the outcomes of pause, resume, step and load beyond their order",
+    "the outcomes of pause, resume, step and load beyond their order, and \"new_run\" of a load",
     "run_id, epoch_ns, contract_version and recorder_version in the metadata 'run', as far as other \
      parts agree with them",
     "stop_reason and the numbers of received, lost and missing messages in the metadata 'recorder'",

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sim_contract::{
-    Action, Command, OUTCOME_FLAG_DISCONNECTED, Outcome, OutcomeStatus, Reason, RestoreContents,
+    Action, Command, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, OutcomeStatus,
+    Reason, RestoreContents,
 };
 
 use super::json::JsonNumber;
@@ -32,6 +33,9 @@ pub struct OutcomeRow {
     /// that grabbed it has ended. Absent from other rows.
     #[serde(default, skip_serializing_if = "is_false")]
     pub disconnected: bool,
+    /// The row answers a load that began another run. Absent from other rows.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub new_run: bool,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
@@ -54,6 +58,7 @@ impl From<&Outcome> for OutcomeRow {
             status: status.to_owned(),
             reason: outcome.reason_name().to_owned(),
             disconnected: outcome.is_disconnection(),
+            new_run: outcome.begins_run(),
         }
     }
 }
@@ -89,6 +94,9 @@ impl From<&OutcomeRow> for Outcome {
         }
         if row.disconnected {
             outcome.flags |= OUTCOME_FLAG_DISCONNECTED;
+        }
+        if row.new_run {
+            outcome.flags |= OUTCOME_FLAG_NEW_RUN;
         }
         outcome
     }

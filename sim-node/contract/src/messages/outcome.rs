@@ -22,7 +22,7 @@ pub struct Outcome {
     pub status: u32,
     /// A [`Reason`] as a number; 0 if applied.
     pub reason: u32,
-    /// [`OUTCOME_FLAG_CONTROL`] or [`OUTCOME_FLAG_DISCONNECTED`], else 0.
+    /// [`OUTCOME_FLAG_CONTROL`], [`OUTCOME_FLAG_DISCONNECTED`] or [`OUTCOME_FLAG_NEW_RUN`], else 0.
     pub flags: u32,
     /// Always 0.
     pub spare: u32,
@@ -41,6 +41,10 @@ pub const OUTCOME_FLAG_CONTROL: u32 = 1;
 /// the connection through which a client grabbed it has ended. The command is a release by that
 /// client, with sequence 0.
 pub const OUTCOME_FLAG_DISCONNECTED: u32 = 1 << 1;
+
+/// Bit of [`Outcome::flags`]: the outcome answers a load of a scene with another rate. It is the last one
+/// of its run, and `step` is never made. The scene begins a new run at step 0.
+pub const OUTCOME_FLAG_NEW_RUN: u32 = 1 << 2;
 
 /// Effect of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,6 +76,11 @@ impl Outcome {
     /// [`OUTCOME_FLAG_DISCONNECTED`].
     pub fn is_disconnection(&self) -> bool {
         self.flags & OUTCOME_FLAG_DISCONNECTED != 0
+    }
+
+    /// Returns `true` if the command has begun a new run; see [`OUTCOME_FLAG_NEW_RUN`].
+    pub fn begins_run(&self) -> bool {
+        self.flags & OUTCOME_FLAG_NEW_RUN != 0
     }
 
     /// Returns the reason for the rejection; `None` if the command was applied, or for a number that

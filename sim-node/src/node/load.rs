@@ -1,0 +1,140 @@
+//! Loads: a scene replaces another one in the same run, or begins a new run if it has another rate.
+
+use anyhow::Context;
+use sim_contract::clock::monotonic_ns;
+use sim_contract::{OwnerError, Reason, Stop, Text};
+use sim_solver::Applied;
+
+use super::Node;
+use super::inbox::Request;
+use super::loading::{Loaded, Loading, Refusal};
+use super::pace::Pace;
+use super::publisher::{Run, StepTimes};
+use super::statistics::Statistics;
+
+impl Node {
+    /// Loads a scene. The commands of its client wait for it, and the node goes on.
+    ///
+    /// A node that does not keep time, or that waits for members of the lockstep, loads the scene at this
+    /// boundary, so that the result does not depend on the time that the load takes.
+    pub(super) fn load(
+        &mut self,
+        request: &Request,
+        source: Text,
+        stop: &Stop,
+    ) -> anyhow::Result<()> {
+        let request = Request { received: request.received, state: None };
+        let client_id = request.received.command.client_id;
+        let rate_hz = self.scene.solver.rate_hz;
+        let loading = match Loading::start(request.clone(), source.as_str(), self.options, rate_hz)
+        {
+            Ok(loading) => loading,
+            Err(refusal) => return self.answer_load(&request, Err(refusal)),
+        };
+        if self.options.waits_for_time && !self.lockstep.has_members() {
+            self.inbox.hold(client_id);
+            self.loading = Some(loading);
+            return Ok(());
+        }
+        match loading.wait(stop) {
+            Some(loaded) => self.answer_load(&request, loaded),
+            // This node ends.
+            None => Ok(()),
+        }
+    }
+
+    /// Ends the load that has run beside the loop.
+    pub(super) fn finish_load(&mut self, loaded: Result<Loaded, Refusal>) -> anyhow::Result<()> {
+        self.inbox.release();
+        match self.loading.take() {
+            Some(loading) => {
+                self.publisher.publish_left_out(&self.solver, self.position())?;
+                self.answer_load(&loading.request, loaded)
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Puts a loaded scene in place, and logs the outcome.
+    fn answer_load(
+        &mut self,
+        request: &Request,
+        loaded: Result<Loaded, Refusal>,
+    ) -> anyhow::Result<()> {
+        // A fresh status follows, so that `ctl status` shows the effect.
+        self.next_status_ns = 0;
+        let (step, command) = (self.step + 1, request.received.command);
+        let replaced = match loaded {
+            Ok(loaded) => self.replace_scene(loaded)?,
+            Err(refusal) => Err(refusal),
+        };
+        match replaced {
+            Err(Refusal { problem, reason }) => {
+                if let sim_contract::Action::Load { scene } = command.action() {
+                    self.warnings.print(&format!("load {scene}: {problem}"));
+                }
+                self.publisher.add_outcome(step, command, Err(reason));
+            }
+            Ok(run) => {
+                self.grab_connections.on_applied(&request.received);
+                self.history.clear();
+                match run {
+                    Run::Same => {
+                        self.publisher.add_outcome(step, command, Ok(Applied::InPlace));
+                        self.progress.is_state_due = true;
+                    }
+                    Run::New(run_id) => {
+                        self.publisher.add_last_outcome(step, command);
+                        self.begin_run(run_id)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Replaces the scene. The inner error is a refusal, and changes nothing; an outer error leaves
+    /// neither scene able to continue.
+    fn replace_scene(&mut self, loaded: Loaded) -> anyhow::Result<Result<Run, Refusal>> {
+        let Loaded { scene, solver, begins_run } = loaded;
+        let run = if begins_run {
+            Run::New(getrandom::u64().context("no random number for the run")?)
+        } else {
+            Run::Same
+        };
+        let time_scale = self.progress.time_scale;
+        match self.publisher.load(&scene, &solver, self.step + 1, run, time_scale) {
+            Err(error @ OwnerError::Publish(_)) => {
+                Err(error).context("publishing the loaded scene")
+            }
+            Err(error) => {
+                let (problem, reason) = (error.to_string(), Reason::NoEffectHere);
+                Ok(Err(Refusal { problem, reason }))
+            }
+            Ok(()) => {
+                (self.scene, self.solver) = (scene, solver);
+                Ok(Ok(run))
+            }
+        }
+    }
+
+    /// Begins a run of the new scene with its step 0. A paused node stays paused.
+    fn begin_run(&mut self, run_id: u64) -> anyhow::Result<()> {
+        let rate_hz = self.scene.solver.rate_hz;
+        self.publisher.begin_run(run_id, rate_hz)?;
+        self.lockstep.begin_run();
+        self.progress.begin_run();
+        let now_ns = monotonic_ns();
+        self.pace = Pace::new(rate_hz, now_ns);
+        self.statistics = Statistics::new(now_ns)?;
+        (self.start_ns, self.paused_ns, self.mark_ns) = (now_ns, 0, now_ns);
+        self.step = 0;
+        self.last_step = self.options.last_step(rate_hz);
+        self.met = None;
+        self.has_begun_run = true;
+        self.warnings.note(&format!("scene {} begins a new run at {rate_hz} Hz", self.scene.name));
+        self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
+        self.keep_state();
+        Ok(())
+    }
+}
