@@ -64,6 +64,17 @@ pub(crate) struct Options {
     pub(crate) history_bytes: usize,
 }
 
+/// The boundary before the next step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Boundary {
+    /// Commands are applied.
+    Open,
+    /// A command has put a state in place, which the next step shows without further changes.
+    Closed,
+    /// A load has begun a run, and published its step 0.
+    OfNewRun,
+}
+
 impl Options {
     /// Number of steps after which a run at this rate ends.
     fn last_step(&self, rate_hz: u32) -> Option<u64> {
@@ -90,12 +101,9 @@ pub(crate) struct Node {
     history: History,
     /// Scene that is being loaded beside the loop.
     loading: Option<Loading>,
-    /// A load of this boundary has begun a run.
-    has_begun_run: bool,
     /// A command has been applied since the last step.
     is_commanded: bool,
-    /// A command of this boundary has put a state in place.
-    is_state_in_place: bool,
+    boundary: Boundary,
     /// Lateness of a step whose time has come, but whose members are not ready.
     met: Option<u64>,
     progress: Progress,
@@ -135,9 +143,8 @@ impl Node {
             lockstep: Lockstep::new(options.lockstep_timeout),
             history: History::new(options.history_bytes),
             loading: None,
-            has_begun_run: false,
             is_commanded: false,
-            is_state_in_place: false,
+            boundary: Boundary::Open,
             met: None,
             progress: Progress {
                 is_paused: options.starts_paused,
@@ -183,7 +190,8 @@ impl Node {
             if stop.is_requested() {
                 break;
             }
-            if std::mem::take(&mut self.has_begun_run) {
+            if self.boundary == Boundary::OfNewRun {
+                self.boundary = Boundary::Open;
                 self.observe(&observer)?;
                 continue;
             }
@@ -291,7 +299,7 @@ impl Node {
 
     /// Keeps the state of a step for a rewind.
     fn keep_state(&mut self) {
-        self.is_state_in_place = false;
+        self.boundary = Boundary::Open;
         let is_commanded = std::mem::take(&mut self.is_commanded);
         self.history.keep(self.step, &self.solver, is_commanded);
     }

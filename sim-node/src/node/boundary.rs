@@ -7,10 +7,10 @@ use sim_contract::{
 };
 use sim_solver::{Applied, Control, Keyframe, Particle};
 
-use super::Node;
 use super::history::Target;
 use super::inbox::Request;
 use super::loading::Loading;
+use super::{Boundary, Node};
 
 impl Node {
     /// Applies the commands that have arrived, at the boundary before the next step.
@@ -19,7 +19,7 @@ impl Node {
     /// step that is not due has further polls, and one of them may bring the pause.
     pub(super) fn apply_commands(&mut self, is_step_due: bool, stop: &Stop) -> anyhow::Result<()> {
         self.receive();
-        if self.is_state_in_place {
+        if self.boundary == Boundary::Closed {
             // The next step shows it without further changes.
             return Ok(());
         }
@@ -143,7 +143,7 @@ impl Node {
 
     fn show_state_in_place(&mut self) {
         self.progress.is_state_due = true;
-        self.is_state_in_place = true;
+        self.boundary = Boundary::Closed;
     }
 
     /// Releases a particle whose client is gone. A frozen particle has nothing to release, and no

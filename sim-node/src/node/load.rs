@@ -5,12 +5,12 @@ use sim_contract::clock::monotonic_ns;
 use sim_contract::{OwnerError, Reason, Stop, Text};
 use sim_solver::Applied;
 
-use super::Node;
 use super::inbox::Request;
 use super::loading::{Loaded, Loading, Refusal};
 use super::pace::Pace;
 use super::publisher::{Run, StepTimes};
 use super::statistics::Statistics;
+use super::{Boundary, Node};
 
 impl Node {
     /// Loads a scene. The commands of its client wait for it, and the node goes on.
@@ -79,7 +79,7 @@ impl Node {
                 self.grab_connections.on_applied(&request.received);
                 self.history.clear();
                 match run {
-                    Run::Same => {
+                    Run::Same { .. } => {
                         self.publisher.add_outcome(step, command, Ok(Applied::InPlace));
                         self.progress.is_state_due = true;
                     }
@@ -100,10 +100,10 @@ impl Node {
         let run = if begins_run {
             Run::New(getrandom::u64().context("no random number for the run")?)
         } else {
-            Run::Same
+            Run::Same { step: self.step + 1 }
         };
         let time_scale = self.progress.time_scale;
-        match self.publisher.load(&scene, &solver, self.step + 1, run, time_scale) {
+        match self.publisher.load(&scene, &solver, run, time_scale) {
             Err(error @ OwnerError::Publish(_)) => {
                 Err(error).context("publishing the loaded scene")
             }
@@ -131,10 +131,10 @@ impl Node {
         self.step = 0;
         self.last_step = self.options.last_step(rate_hz);
         self.met = None;
-        self.has_begun_run = true;
         self.warnings.note(&format!("scene {} begins a new run at {rate_hz} Hz", self.scene.name));
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
         self.keep_state();
+        self.boundary = Boundary::OfNewRun;
         Ok(())
     }
 }

@@ -40,7 +40,10 @@ pub(crate) struct Position {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Run {
     /// The run goes on, because the rate is the same.
-    Same,
+    Same {
+        /// The first step that shows the scene.
+        step: u64,
+    },
     /// A new run with this id.
     New(u64),
 }
@@ -129,8 +132,7 @@ impl Publisher {
         })
     }
 
-    /// Publishes another scene. In the same run, `step` is the first step that shows it. A new run begins
-    /// with [`Self::begin_run`].
+    /// Publishes another scene. A new run begins with [`Self::begin_run`].
     ///
     /// # Errors
     /// The scene exceeds a limit of the contract or of shared memory; the old one stays published.
@@ -138,12 +140,11 @@ impl Publisher {
         &mut self,
         scene: &Scene,
         solver: &Solver,
-        step: u64,
         run: Run,
         time_scale: f64,
     ) -> Result<(), OwnerError> {
         let (run_id, step, topology_revision) = match run {
-            Run::Same => (self.run_id, step, self.topology_revision + 1),
+            Run::Same { step } => (self.run_id, step, self.topology_revision + 1),
             Run::New(run_id) => (run_id, 0, 0),
         };
         let parameters = parameter_values(solver, time_scale);

@@ -36,7 +36,7 @@ fn a_load_of_another_rate_begins_a_run_that_every_client_follows() {
             tap.wait(Duration::from_millis(10));
             return None;
         };
-        (state.header.run_id == begun.run_id).then(|| (*state.header, state.load.header))
+        (state.header.run_id == begun.run_id).then_some((*state.header, state.load.header))
     });
     assert_eq!((state.0.step, state.1.rate_hz, state.1.run_id), (0, 60, begun.run_id));
     // The log of the new run begins with its first command.
