@@ -57,7 +57,7 @@ impl Refusal {
         let text = match self {
             Self::Node(Reason::NoEffectHere) => {
                 "the command has no effect here: the particle is frozen, the parameter belongs to \
-                 the other method, the simulation is running, the scene has another rate, or a \
+                 the other method, the simulation is running, the scene needs too much memory, or a \
                  recording is playing"
             }
             Self::Node(reason) => return reason.to_string().into(),

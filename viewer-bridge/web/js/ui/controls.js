@@ -168,7 +168,7 @@ export class Controls {
     const known = scenes.some((one) => one.name === name);
     const options = scenes.map((one) => {
       const isOther = node !== null && node.rate_hz > 0 && one.rate_hz !== node.rate_hz;
-      // Some nodes accept scenes of another rate, so the scene stays enabled and its label shows the rate.
+      // A scene of another rate begins a new run, so its label shows the rate.
       return make("option", { value: one.name, title: one.text }, isOther ? `${one.name} (${one.rate_hz} Hz)` : one.name);
     });
     if (!known) options.unshift(make("option", { value: name }, name));
