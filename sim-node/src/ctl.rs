@@ -6,7 +6,7 @@ mod hint;
 mod parameters;
 mod particles;
 mod rejection;
-mod status;
+pub(crate) mod status;
 
 use sim_contract::{CONSOLE_CLIENT_ID, Client, report_bus_errors};
 

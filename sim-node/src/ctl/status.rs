@@ -2,41 +2,42 @@
 
 use anyhow::bail;
 use serde::Serialize;
-use sim_contract::{Client, MemberStatus, NodeStatus};
+use sim_contract::{Client, MemberStatus, NodeStatus, StatusFlags};
 
 use crate::args::CtlArgs;
 use crate::output;
 
 /// A status in JSON.
 #[derive(Serialize)]
-struct StatusRow {
-    scene: String,
-    run_id: String,
+pub(crate) struct StatusRow {
+    pub(crate) scene: String,
+    pub(crate) run_id: String,
     process_id: u32,
-    step: u64,
-    paused: bool,
-    rate_hz: u32,
-    real_time_factor: f64,
+    pub(crate) step: u64,
+    pub(crate) paused: bool,
+    pub(crate) replay: bool,
+    pub(crate) rate_hz: u32,
+    pub(crate) real_time_factor: f64,
     time_scale: f64,
     particles: u32,
     constraints: u32,
     torn_constraints: u32,
     frozen_particles: u64,
-    readers: u32,
+    pub(crate) readers: u32,
     outcomes: u64,
     rejected_commands: u64,
-    late_steps: u64,
+    pub(crate) late_steps: u64,
     skipped_periods: u64,
     wake_late_ns_p50: u64,
     wake_late_ns_p99: u64,
     solve_ns_p50: u64,
     solve_ns_p99: u64,
-    lockstep: Vec<MemberRow>,
+    pub(crate) lockstep: Vec<MemberRow>,
 }
 
 /// A member of the lockstep.
 #[derive(Serialize)]
-struct MemberRow {
+pub(crate) struct MemberRow {
     client_id: u64,
     every: u32,
     step: u64,
@@ -51,13 +52,14 @@ impl From<&MemberStatus> for MemberRow {
 }
 
 impl StatusRow {
-    fn new(status: &NodeStatus) -> Self {
+    pub(crate) fn new(status: &NodeStatus) -> Self {
         Self {
             scene: status.scene_name(),
             run_id: format!("{:016x}", status.run_id),
             process_id: status.process_id,
             step: status.step,
             paused: status.is_paused(),
+            replay: status.flags & StatusFlags::REPLAY != 0,
             rate_hz: status.rate_hz,
             real_time_factor: status.real_time_factor,
             time_scale: status.time_scale,
@@ -84,7 +86,12 @@ impl StatusRow {
             let micros = |ns: u64| ns as f64 / 1000.0;
             format!("{:.1} µs median, {:.1} µs 99th percentile", micros(p50_ns), micros(p99_ns))
         };
-        let state = if self.paused { "paused" } else { "running" };
+        let state = match (self.paused, self.replay) {
+            (true, false) => "paused",
+            (false, false) => "running",
+            (true, true) => "replay, paused",
+            (false, true) => "replay",
+        };
         let frozen = match self.frozen_particles {
             0 => String::new(),
             count => format!(", {count} frozen"),

@@ -45,6 +45,8 @@ fn cases(sandbox: &Sandbox) -> Vec<Case> {
         node("scenes --json", 0),
         node("check curtain", 0),
         node("check curtain --json", 0),
+        node("ps", 0),
+        node("ps --json", 0),
         node("lesson", 0),
         node("lesson euler", 0),
         node("lesson euler --json", 0),

@@ -2,6 +2,7 @@
 
 pub(crate) mod counter;
 pub(crate) mod files;
+pub(crate) mod lock_list;
 pub(crate) mod orphans;
 pub(crate) mod owner_lock;
 pub(crate) mod root;

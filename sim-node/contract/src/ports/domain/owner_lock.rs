@@ -32,6 +32,9 @@ pub(crate) enum LockError {
     System { path: PathBuf, error: io::Error },
 }
 
+/// Ending of the names of both files.
+pub(crate) const LOCK_SUFFIX: &str = ".owner";
+
 /// Most attempts to lock a file that is removed between opening and locking, or that a client locks for
 /// a moment to see whether an owner holds it.
 const ATTEMPTS_MAX: usize = 1000;
@@ -75,8 +78,8 @@ fn paths(config: &Config, name: &str) -> [PathBuf; 2] {
     let prefix = &config.global.prefix;
     let user = rustix::process::geteuid().as_raw();
     [
-        root::path(config).join(format!("{prefix}{name}.owner")),
-        Path::new(SHARED_MEMORY).join(format!("{prefix}{user}_{name}.owner")),
+        root::path(config).join(format!("{prefix}{name}{LOCK_SUFFIX}")),
+        Path::new(SHARED_MEMORY).join(format!("{prefix}{user}_{name}{LOCK_SUFFIX}")),
     ]
 }
 

@@ -1,0 +1,78 @@
+//! The names in a domain that have a lock, held or left by a killed owner.
+
+use std::collections::BTreeSet;
+use std::fs::{self, DirEntry};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use iceoryx2::prelude::Config;
+
+use crate::endpoint::Endpoint;
+use crate::ports::domain::files::{SHARED_MEMORY, entries};
+use crate::ports::domain::owner_lock::LOCK_SUFFIX;
+use crate::ports::domain::root;
+
+/// Returns the names that have a lock file of this user, in order. [`super::owner_lock::OwnerLock::holder`]
+/// tells whether a living process holds it.
+pub(crate) fn names(config: &Config) -> BTreeSet<String> {
+    let user = rustix::process::geteuid().as_raw();
+    let prefix = config.global.prefix.to_string();
+    let in_root = root::path(config);
+    let mut names: BTreeSet<_> = names_in(&in_root, &prefix, user).into_iter().collect();
+    let marker = format!("{user}_");
+    let in_memory = names_in(Path::new(SHARED_MEMORY), &format!("{prefix}{marker}"), user);
+    // The lock of the name `x` in a domain whose own name ends in `_<user>` looks like one of the name
+    // `<user>_x` in this domain. Such a name counts only with its file in the root.
+    names.extend(in_memory.into_iter().filter(|name| !name.contains(&marker)));
+    names
+}
+
+/// Returns the names of the lock files `<prefix><name>.owner` in a folder that are files of this user.
+/// Opening another user's pipe, or following a link, could block or mislead.
+fn names_in(folder: &Path, prefix: &str, user: u32) -> Vec<String> {
+    let name = |entry: DirEntry| {
+        let file_name = entry.file_name();
+        let name = file_name.to_str()?.strip_prefix(prefix)?.strip_suffix(LOCK_SUFFIX)?;
+        let is_own = is_file_of(&entry.path(), user) && Endpoint::new(None, name).is_ok();
+        is_own.then(|| name.to_owned())
+    };
+    entries(folder).filter_map(name).collect()
+}
+
+fn is_file_of(path: &PathBuf, user: u32) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|file| file.is_file() && file.uid() == user)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+    use crate::ports::domain;
+    use crate::ports::domain::owner_lock::OwnerLock;
+    use crate::testing::TestDomain;
+
+    #[test]
+    fn names_are_found_by_either_lock_file_and_foreign_files_are_ignored() {
+        let domain = TestDomain::new();
+        let config = domain::configuration(Some(domain.name())).unwrap();
+        assert!(names(&config).is_empty());
+        root::prepare(&root::path(&config)).unwrap();
+        let locks = ["both", "memory", "root"].map(|name| OwnerLock::take(&config, name).unwrap());
+        let user = rustix::process::geteuid().as_raw();
+        let prefix = config.global.prefix.to_string();
+        let root = root::path(&config);
+        fs::remove_file(root.join(format!("{prefix}memory.owner"))).unwrap();
+        fs::remove_file(format!("{SHARED_MEMORY}/{prefix}{user}_root.owner")).unwrap();
+        symlink(root.join(format!("{prefix}both.owner")), root.join(format!("{prefix}link.owner")))
+            .unwrap();
+        File::create_new(root.join(format!("{prefix}a b.owner"))).unwrap();
+        // The name `sim` in the domain `<domain>_<user>`.
+        let other = format!("{SHARED_MEMORY}/{prefix}{user}_{user}_sim.owner");
+        File::create_new(other).unwrap();
+        assert_eq!(Vec::from_iter(names(&config)), ["both", "memory", "root"]);
+        drop(locks);
+        assert!(names(&config).is_empty());
+    }
+}

@@ -1,0 +1,4 @@
+//! A domain as its user sees it: the list of its nodes.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+mod ps;
