@@ -18,7 +18,7 @@ use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcomma
 use sim_contract::console;
 
 pub(crate) use command::{CommandVerb, PoseArgs};
-pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb};
+pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
 pub(crate) use domain::PsArgs;
 use endpoint::EndpointArgs;
 pub(crate) use lesson::LessonArgs;

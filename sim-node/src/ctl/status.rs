@@ -12,7 +12,7 @@ use crate::output;
 pub(crate) struct StatusRow {
     pub(crate) scene: String,
     pub(crate) run_id: String,
-    process_id: u32,
+    pub(super) process_id: u32,
     pub(crate) step: u64,
     pub(crate) paused: bool,
     pub(crate) replay: bool,
@@ -21,17 +21,17 @@ pub(crate) struct StatusRow {
     time_scale: f64,
     particles: u32,
     constraints: u32,
-    torn_constraints: u32,
+    pub(super) torn_constraints: u32,
     frozen_particles: u64,
     pub(crate) readers: u32,
     outcomes: u64,
-    rejected_commands: u64,
+    pub(super) rejected_commands: u64,
     pub(crate) late_steps: u64,
     skipped_periods: u64,
     wake_late_ns_p50: u64,
     wake_late_ns_p99: u64,
-    solve_ns_p50: u64,
-    solve_ns_p99: u64,
+    pub(super) solve_ns_p50: u64,
+    pub(super) solve_ns_p99: u64,
     pub(crate) lockstep: Vec<MemberRow>,
 }
 
@@ -80,17 +80,21 @@ impl StatusRow {
         }
     }
 
+    /// State for people.
+    pub(crate) fn state(&self) -> &'static str {
+        match (self.replay, self.paused) {
+            (false, false) => "running",
+            (false, true) => "paused",
+            (true, false) => "replay",
+            (true, true) => "replay, paused",
+        }
+    }
+
     /// Lines for people: rounded, and with units.
     fn lines(&self) -> Vec<(&'static str, String)> {
         let times = |p50_ns: u64, p99_ns: u64| {
             let micros = |ns: u64| ns as f64 / 1000.0;
             format!("{:.1} µs median, {:.1} µs 99th percentile", micros(p50_ns), micros(p99_ns))
-        };
-        let state = match (self.paused, self.replay) {
-            (true, false) => "paused",
-            (false, false) => "running",
-            (true, true) => "replay, paused",
-            (false, true) => "replay",
         };
         let frozen = match self.frozen_particles {
             0 => String::new(),
@@ -103,7 +107,7 @@ impl StatusRow {
         let mut lines = vec![
             ("scene", self.scene.clone()),
             ("process", format!("{}, run {}", self.process_id, self.run_id)),
-            ("step", format!("{}, {state}", self.step)),
+            ("step", format!("{}, {}", self.step, self.state())),
             ("rate", format!("{} Hz, time scale {:.3}", self.rate_hz, self.time_scale)),
             ("real time", format!("x{:.3}", self.real_time_factor)),
             ("particles", format!("{}{frozen}", self.particles)),

@@ -39,13 +39,13 @@ fn nodes_and_replays_are_listed_with_the_fields_of_their_status() {
     let file = sandbox.path("run.mcap");
     let args = ["simulate", "rope", "--steps", "2", "-o", &file];
     Process::run(Program::Recorder, &sandbox, &args).success();
-    let args = ["play", &file, "--name", "replay", "--loop"];
+    let args = ["play", &file, "--name", "replay", "--paused"];
     let _replay = Process::start_ready(Program::Recorder, &sandbox, &args);
 
     let rows = rows(&sandbox);
     assert_eq!(names(&rows), ["a.running", "paused", "replay"]);
     let states = rows.iter().map(|row| row["state"].clone()).collect::<Vec<_>>();
-    assert_eq!(states, ["running", "paused", "running"]);
+    assert_eq!(states, ["running", "paused", "paused"]);
     let replays = rows.iter().map(|row| row["replay"].clone()).collect::<Vec<_>>();
     assert_eq!(replays, [false, false, true]);
     // The paused node has the same status at both times.
@@ -58,9 +58,10 @@ fn nodes_and_replays_are_listed_with_the_fields_of_their_status() {
     assert_eq!((&paused["scene"], &paused["step"]), (&json!("rope"), &json!(0)));
 
     let table = Process::run(Program::SimNode, &sandbox, &["ps"]).success();
-    let states: Vec<_> =
-        table.lines().skip(1).map(|line| line.split_whitespace().nth(2).unwrap()).collect();
-    assert_eq!(states, ["running", "paused", "replay"]);
+    let rows: Vec<_> = table.lines().skip(1).collect();
+    for (row, state) in rows.iter().zip(["  running  ", "  paused  ", "  replay, paused  "]) {
+        assert!(row.contains(state), "{table}");
+    }
 }
 
 #[test]
@@ -89,4 +90,20 @@ fn a_stopped_node_is_listed_as_silent_beside_those_that_answer_and_a_killed_one_
     assert_eq!((table.code, table.stderr.as_str()), (Some(0), expected));
     stopped.signal(Signal::CONT);
     assert_eq!(stopped.interrupt().code, Some(0));
+}
+
+#[test]
+fn a_node_whose_files_a_cleaner_has_removed_is_listed_as_unreachable_with_the_cure() {
+    let sandbox = Sandbox::new();
+    let node = node(&sandbox, &[]);
+    let process_id = ctl(&sandbox, &["status"])["process_id"].clone();
+    for entry in std::fs::read_dir(sandbox.root()).unwrap().flatten() {
+        let _ =
+            std::fs::remove_dir_all(entry.path()).or_else(|_| std::fs::remove_file(entry.path()));
+    }
+    let [row] = rows(&sandbox).try_into().unwrap();
+    assert_eq!((&row["name"], &row["state"]), (&json!("sim"), &json!("unreachable")));
+    assert_eq!(row["process_id"], process_id);
+    assert!(row["problem"].as_str().unwrap().ends_with("restart it"), "{row}");
+    assert_eq!(node.interrupt().code, Some(0));
 }

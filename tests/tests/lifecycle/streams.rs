@@ -55,6 +55,7 @@ fn cases(sandbox: &Sandbox) -> Vec<Case> {
         node("run rope --name other --steps 1 --as-fast-as-possible --json", 0),
         node("ctl status", 0),
         node("ctl status --json", 0),
+        node("ctl watch --count 1", 0),
         node("ctl get", 0),
         node("ctl hash", 0),
         node("ctl particles 3", 0),

@@ -7,6 +7,7 @@ use std::time::Duration;
 use iceoryx2::prelude::{CallbackProgression, Config, Service, ipc};
 
 use crate::client::Client;
+use crate::clock::{self, Deadline};
 use crate::endpoint::Endpoint;
 use crate::messages::command::CONSOLE_CLIENT_ID;
 use crate::messages::status::NodeStatus;
@@ -44,6 +45,9 @@ pub enum NodeAnswer {
     /// The process owns the name, but this one cannot attach to it. The text is the reason.
     Unreachable(String),
 }
+
+/// Pause before the next attempt to reach a node.
+const PAUSE_NS: u64 = clock::SECOND_NS / 50;
 
 /// Lists the living owners in a domain, by name.
 pub(crate) fn list(
@@ -96,7 +100,19 @@ fn find(config: &Config, endpoint: &Endpoint, timeout: Duration) -> Option<Liste
     Some(ListedNode { name: endpoint.name().to_owned(), process_id, answer })
 }
 
+/// Asks until there is an answer: the services of a node that is just starting are missing.
 fn ask(config: &Config, endpoint: &Endpoint, timeout: Duration) -> Option<NodeAnswer> {
+    let deadline = Deadline::after(timeout);
+    loop {
+        let answer = try_to_ask(config, endpoint, timeout)?;
+        if !matches!(answer, NodeAnswer::Unreachable(_)) || deadline.remaining().is_zero() {
+            return Some(answer);
+        }
+        clock::sleep_until(clock::monotonic_ns() + PAUSE_NS);
+    }
+}
+
+fn try_to_ask(config: &Config, endpoint: &Endpoint, timeout: Duration) -> Option<NodeAnswer> {
     let is_owned = || OwnerLock::holder(config, endpoint.name()).is_some();
     let unreachable = |text: String| is_owned().then_some(NodeAnswer::Unreachable(text));
     let mut client = match Client::attach_as(endpoint, CONSOLE_CLIENT_ID) {

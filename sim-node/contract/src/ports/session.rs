@@ -130,6 +130,11 @@ impl Session {
         OwnerLock::holder(self.node.config(), self.endpoint.name())
     }
 
+    /// Returns `true` if a killed owner has left the lock of the name.
+    pub(crate) fn is_lock_left(&self) -> bool {
+        OwnerLock::is_left(self.node.config(), self.endpoint.name())
+    }
+
     /// Opens or creates a service of slices of `T` with the header `H`.
     pub(crate) fn slices<T, H>(
         &self,

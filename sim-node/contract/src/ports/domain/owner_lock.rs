@@ -65,6 +65,12 @@ impl OwnerLock {
         })
     }
 
+    /// Returns `true` if a killed owner has left a file of the lock of a name, and no other has taken it.
+    pub(crate) fn is_left(config: &Config, name: &str) -> bool {
+        let mut files = paths(config, name).into_iter().filter_map(|path| File::open(path).ok());
+        files.any(|file| !is_locked(&file))
+    }
+
     /// Returns the path of a file that is no longer the locked one.
     pub(crate) fn removed(&self) -> Option<&Path> {
         let files = [Some(&self.root), self.shared_memory.as_ref()];
@@ -220,10 +226,13 @@ mod tests {
         let domain = TestDomain::new();
         let config = config(&domain);
         let path = root::path(&config).join(format!("{}sim.owner", config.global.prefix));
+        assert!(!OwnerLock::is_left(&config, "sim"));
         fs::write(&path, "4194304\n").unwrap();
+        assert!(OwnerLock::is_left(&config, "sim"));
         let lock = OwnerLock::take(&config, "sim").unwrap();
         let id = std::process::id();
         assert_eq!(fs::read_to_string(&path).unwrap(), format!("{id}\n"));
+        assert!(!OwnerLock::is_left(&config, "sim"));
         drop(lock);
         assert!(!path.exists());
     }
