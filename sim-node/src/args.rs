@@ -19,7 +19,7 @@ use sim_contract::console;
 
 pub(crate) use command::{CommandVerb, PoseArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
-pub(crate) use domain::PsArgs;
+pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;
 pub(crate) use lesson::LessonArgs;
 pub(crate) use run::RunArgs;
@@ -44,6 +44,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
         sim-node ctl grab 90 0.5 0.2 0.3            drag particle 90 of the running node\n  \
         sim-node ctl set gravity 0 -1.6 0           set the gravity of the moon\n  \
         sim-node ps                                 list the running nodes\n  \
+        sim-node doctor                             check this host, and find what killed nodes have left\n  \
         sim-node --domain lab ctl status            show a node of another domain\n  \
         sim-node scenes                             list the built-in scenes\n  \
         sim-node import shirt.obj -o shirt.toml     convert a mesh to a scene\n  \
@@ -72,6 +73,8 @@ pub(crate) enum Verb {
     Ctl(CtlArgs),
     /// List the nodes and replays of a domain
     Ps(PsArgs),
+    /// Check this host and a domain: leftovers, memory, limits, permissions, clocks
+    Doctor(DoctorArgs),
     /// Print tables that teach the physics: Euler, iterations, stiffness, 32-bit numbers
     Lesson(LessonArgs),
 }
@@ -106,6 +109,7 @@ pub(crate) fn try_parse(
         Some(Verb::Run(run)) => run.endpoint.inherit(&args.run.endpoint),
         Some(Verb::Ctl(ctl)) => ctl.endpoint.inherit(&args.run.endpoint),
         Some(Verb::Ps(ps)) => ps.domain.inherit(&args.run.endpoint),
+        Some(Verb::Doctor(doctor)) => doctor.domain.inherit(&args.run.endpoint),
         _ => {}
     }
     check_value(&mut command, &args)?;
@@ -113,7 +117,7 @@ pub(crate) fn try_parse(
 }
 
 /// Subcommands that look at a whole domain, so that a name has no meaning for them.
-const DOMAIN_VERBS: [&str; 1] = ["ps"];
+const DOMAIN_VERBS: [&str; 2] = ["ps", "doctor"];
 
 /// Refuses arguments of `run` before another subcommand, where nothing would read them.
 fn check_order(command: &mut Command, matches: &ArgMatches) -> Result<(), clap::Error> {

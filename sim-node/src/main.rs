@@ -32,6 +32,7 @@ fn main() -> Exit {
         Some(Verb::Import(mesh)) => import::import(&mesh),
         Some(Verb::Ctl(ctl)) => return exit::from_result(ctl::ctl(&ctl)),
         Some(Verb::Ps(list)) => domain::ps::ps(&list),
+        Some(Verb::Doctor(checks)) => return exit::from_result(domain::doctor::doctor(&checks)),
         Some(Verb::Lesson(lesson)) => lesson::lesson(&lesson),
     };
     exit::from_result(result.map(|()| Exit::Done))

@@ -47,6 +47,7 @@ fn cases(sandbox: &Sandbox) -> Vec<Case> {
         node("check curtain --json", 0),
         node("ps", 0),
         node("ps --json", 0),
+        node("doctor --iox2-config", 0),
         node("lesson", 0),
         node("lesson euler", 0),
         node("lesson euler --json", 0),

@@ -2,6 +2,7 @@
 
 pub(crate) mod counter;
 pub(crate) mod files;
+pub(crate) mod leftovers;
 pub(crate) mod lock_list;
 pub(crate) mod orphans;
 pub(crate) mod owner_lock;
@@ -9,13 +10,17 @@ pub(crate) mod root;
 pub(crate) mod unfinished;
 
 use std::path::PathBuf;
+use std::sync::Once;
 use std::time::Duration;
 
-use iceoryx2::prelude::{Config, FileName, Path, SemanticString, SemanticStringError};
+use iceoryx2::prelude::{
+    Config, FileName, LogLevel, Path, SemanticString, SemanticStringError,
+    set_log_level_from_env_or,
+};
 
 /// Longest directory and prefix together, in bytes. A listener binds the Unix socket
 /// `<directory>/<prefix><id>.event`. Its path has at most 107 bytes, up to 39 of them for the id.
-const DIRECTORY_AND_PREFIX_MAX: usize = 60;
+pub(crate) const DIRECTORY_AND_PREFIX_MAX: usize = 60;
 
 /// Time that iceoryx2 waits for a service which another process is creating or removing. Both take
 /// milliseconds.
@@ -26,6 +31,9 @@ pub(crate) const CREATION_TIMEOUT: Duration = Duration::from_millis(200);
 /// Each domain has its own prefix and its own directory: the prefix separates shared memory, the
 /// directory separates nodes and services.
 pub(crate) fn configuration(domain: Option<&str>) -> Result<Config, SemanticStringError> {
+    static LOG_LEVEL: Once = Once::new();
+    // Failures are returned as errors, so iceoryx2's own warnings would repeat them.
+    LOG_LEVEL.call_once(|| set_log_level_from_env_or(LogLevel::Error));
     let Some(domain) = domain else {
         let mut config = Config::global_config().clone();
         adapt(&mut config);

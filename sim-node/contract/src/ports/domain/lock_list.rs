@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs::{self, DirEntry};
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use iceoryx2::prelude::Config;
 
@@ -15,32 +15,38 @@ use crate::ports::domain::root;
 /// Returns the names that have a lock file of this user, in order. [`super::owner_lock::OwnerLock::holder`]
 /// tells whether a living process holds it.
 pub(crate) fn names(config: &Config) -> BTreeSet<String> {
-    let user = rustix::process::geteuid().as_raw();
     let prefix = config.global.prefix.to_string();
-    let in_root = root::path(config);
-    let mut names: BTreeSet<_> = names_in(&in_root, &prefix, user).into_iter().collect();
-    let marker = format!("{user}_");
-    let in_memory = names_in(Path::new(SHARED_MEMORY), &format!("{prefix}{marker}"), user);
+    let mut names = names_in(&root::path(config), &prefix);
     // The lock of the name `x` in a domain whose own name ends in `_<user>` looks like one of the name
     // `<user>_x` in this domain. Such a name counts only with its file in the root.
-    names.extend(in_memory.into_iter().filter(|name| !name.contains(&marker)));
+    let marker = format!("{}_", user());
+    names.extend(names_in_shared_memory(config).into_iter().filter(|name| !name.contains(&marker)));
     names
+}
+
+/// Returns the names whose lock has a file in shared memory, perhaps with some of another domain.
+pub(crate) fn names_in_shared_memory(config: &Config) -> BTreeSet<String> {
+    names_in(Path::new(SHARED_MEMORY), &format!("{}{}_", config.global.prefix, user()))
+}
+
+fn user() -> u32 {
+    rustix::process::geteuid().as_raw()
 }
 
 /// Returns the names of the lock files `<prefix><name>.owner` in a folder that are files of this user.
 /// Opening another user's pipe, or following a link, could block or mislead.
-fn names_in(folder: &Path, prefix: &str, user: u32) -> Vec<String> {
+fn names_in(folder: &Path, prefix: &str) -> BTreeSet<String> {
     let name = |entry: DirEntry| {
         let file_name = entry.file_name();
         let name = file_name.to_str()?.strip_prefix(prefix)?.strip_suffix(LOCK_SUFFIX)?;
-        let is_own = is_file_of(&entry.path(), user) && Endpoint::new(None, name).is_ok();
+        let is_own = is_own_file(&entry.path()) && Endpoint::new(None, name).is_ok();
         is_own.then(|| name.to_owned())
     };
     entries(folder).filter_map(name).collect()
 }
 
-fn is_file_of(path: &PathBuf, user: u32) -> bool {
-    fs::symlink_metadata(path).is_ok_and(|file| file.is_file() && file.uid() == user)
+fn is_own_file(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|file| file.is_file() && file.uid() == user())
 }
 
 #[cfg(test)]
@@ -60,7 +66,7 @@ mod tests {
         assert!(names(&config).is_empty());
         root::prepare(&root::path(&config)).unwrap();
         let locks = ["both", "memory", "root"].map(|name| OwnerLock::take(&config, name).unwrap());
-        let user = rustix::process::geteuid().as_raw();
+        let user = user();
         let prefix = config.global.prefix.to_string();
         let root = root::path(&config);
         fs::remove_file(root.join(format!("{prefix}memory.owner"))).unwrap();

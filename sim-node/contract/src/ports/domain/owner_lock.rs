@@ -65,10 +65,17 @@ impl OwnerLock {
         })
     }
 
-    /// Returns `true` if a killed owner has left a file of the lock of a name, and no other has taken it.
-    pub(crate) fn is_left(config: &Config, name: &str) -> bool {
-        let mut files = paths(config, name).into_iter().filter_map(|path| File::open(path).ok());
-        files.any(|file| !is_locked(&file))
+    /// Returns the files of the lock of a name that a killed owner has left, and no other has taken.
+    pub(crate) fn left_files(config: &Config, name: &str) -> Vec<PathBuf> {
+        let is_left = |path: &PathBuf| File::open(path).is_ok_and(|file| !is_locked(&file));
+        paths(config, name).into_iter().filter(is_left).collect()
+    }
+
+    /// Returns `true` if a living process holds the file in shared memory, but none that in the root.
+    pub(crate) fn is_hidden(config: &Config, name: &str) -> bool {
+        let [root, memory] = paths(config, name);
+        let is_held = |path| File::open(path).is_ok_and(|file| is_locked(&file));
+        is_held(memory) && !is_held(root)
     }
 
     /// Returns the path of a file that is no longer the locked one.
@@ -198,7 +205,9 @@ mod tests {
         let config = config(&domain);
         let lock = OwnerLock::take(&config, "sim").unwrap();
         assert_eq!(lock.removed(), None);
+        assert!(!OwnerLock::is_hidden(&config, "sim"));
         fs::remove_file(&lock.root.path).unwrap();
+        assert!(OwnerLock::is_hidden(&config, "sim"));
         assert_eq!(lock.removed(), Some(lock.root.path.as_path()));
         assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
     }
@@ -226,13 +235,13 @@ mod tests {
         let domain = TestDomain::new();
         let config = config(&domain);
         let path = root::path(&config).join(format!("{}sim.owner", config.global.prefix));
-        assert!(!OwnerLock::is_left(&config, "sim"));
+        assert!(OwnerLock::left_files(&config, "sim").is_empty());
         fs::write(&path, "4194304\n").unwrap();
-        assert!(OwnerLock::is_left(&config, "sim"));
+        assert_eq!(OwnerLock::left_files(&config, "sim"), std::slice::from_ref(&path));
         let lock = OwnerLock::take(&config, "sim").unwrap();
         let id = std::process::id();
         assert_eq!(fs::read_to_string(&path).unwrap(), format!("{id}\n"));
-        assert!(!OwnerLock::is_left(&config, "sim"));
+        assert!(OwnerLock::left_files(&config, "sim").is_empty());
         drop(lock);
         assert!(!path.exists());
     }
