@@ -4,6 +4,7 @@ pub(crate) mod counter;
 pub(crate) mod files;
 pub(crate) mod leftovers;
 pub(crate) mod lock_list;
+pub(crate) mod mapped;
 pub(crate) mod orphans;
 pub(crate) mod owner_lock;
 pub(crate) mod root;

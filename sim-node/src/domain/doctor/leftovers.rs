@@ -57,8 +57,8 @@ fn describe(leftovers: &[&Leftover]) -> String {
 
 fn describe_uncertain(leftovers: &[&Leftover]) -> String {
     format!(
-        "{}{} may belong to a node that lives, but whose files in the root of the domain are gone, so they \
-         stay until it ends",
+        "{}{} may belong to programs that live, but are not in the root of the domain, because they run in a \
+         container or a cleaner has removed their files, so nothing removes them now",
         plural(leftovers.len(), "segment"),
         size(leftovers)
     )
@@ -116,7 +116,7 @@ mod tests {
         assert_eq!((problem.level, problem.cure.as_deref()), (Level::Problem, Some("fix")));
         assert_eq!(note.level, Level::Note);
         assert!(
-            note.text.starts_with("1 segment may belong to a node that lives"),
+            note.text.starts_with("1 segment may belong to programs that live"),
             "{}",
             note.text
         );

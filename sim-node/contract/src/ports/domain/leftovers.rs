@@ -12,7 +12,7 @@ use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, Service, i
 use crate::clock;
 use crate::ports::domain::files::segments;
 use crate::ports::domain::owner_lock::OwnerLock;
-use crate::ports::domain::{lock_list, root, unfinished};
+use crate::ports::domain::{lock_list, mapped, root, unfinished};
 use crate::ports::service::SERVICES;
 
 /// Time after which a file that no living node names is one of a dead process. A process that is creating
@@ -48,7 +48,8 @@ pub enum LeftoverKind {
     /// Shared memory of a killed process.
     Segment,
     /// The same, but it may belong to a living process in a container, or to one whose files a cleaner has
-    /// removed. It stays while a node of this user owns a name that is missing in the root.
+    /// removed. It stays while a node of this user owns a name that is missing in the root, and in the domain
+    /// of all iceoryx2 programs where this process does not see all others.
     UncertainSegment,
 }
 
@@ -68,7 +69,7 @@ pub(crate) fn find(config: &Config) -> Vec<Leftover> {
     }
     let unfinished = unfinished::old_segments(config).into_iter();
     paths.extend(unfinished.map(|path| (LeftoverKind::Unfinished, path)));
-    let is_uncertain = has_hidden_node(config);
+    let is_uncertain = is_uncertain(config);
     let kind = if is_uncertain { LeftoverKind::UncertainSegment } else { LeftoverKind::Segment };
     paths.extend(dead_segments(config).into_iter().map(|path| (kind, path)));
     let mut found: Vec<_> = paths.into_iter().filter_map(describe).collect();
@@ -98,7 +99,7 @@ pub(crate) fn remove_names(config: &Config) {
 /// Removes the segments that iceoryx2 does not know, because the files of their nodes are gone. Call it
 /// after joining, which removes all others.
 pub(crate) fn remove_segments(config: &Config) {
-    if has_hidden_node(config) {
+    if is_uncertain(config) {
         return;
     }
     for path in dead_segments(config) {
@@ -188,13 +189,18 @@ fn dead_segments(config: &Config) -> Vec<PathBuf> {
             && unfinished::ports(path).all(|id| !unfinished::is_alive(unfinished::process(id)))
     }));
     dead.retain(|path| is_old(path));
+    mapped::remove_mapped(&mut dead);
     dead
 }
 
-/// Returns `true` if a process of this user owns a name in a domain of this prefix, but not in this root:
-/// it runs in a container, or a cleaner has removed its files. Nothing tells which segments belong to it.
-fn has_hidden_node(config: &Config) -> bool {
-    lock_list::names_in_shared_memory(config).iter().any(|name| OwnerLock::is_hidden(config, name))
+/// Returns `true` if nothing tells which segments belong to living processes, because these may run in
+/// containers or have lost their files to a cleaner.
+fn is_uncertain(config: &Config) -> bool {
+    let names = lock_list::names_in_shared_memory(config);
+    let has_hidden_node = names.iter().any(|name| OwnerLock::is_hidden(config, name));
+    let is_shared = config.global.prefix == Config::default().global.prefix;
+    let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+    has_hidden_node || is_shared && !mapped::sees_all_processes(&namespace)
 }
 
 fn is_old(path: &Path) -> bool {
@@ -280,6 +286,14 @@ mod tests {
         assert_eq!(outside.leftovers(), []);
         // What is left suffices for another client.
         Client::attach(&domain.endpoint()).unwrap().status(Duration::ZERO).unwrap();
+        // Under another name, as a process of another container would have it.
+        let suffix = &config.global.service.data_segment_suffix;
+        let living = segments(&config, suffix).next().unwrap();
+        let id = unfinished::ports(&living).next().unwrap();
+        let dead_id = (id | u128::from(u32::MAX) << 64).to_string();
+        let name = living.to_str().unwrap().replace(&id.to_string(), &dead_id);
+        fs::hard_link(&living, &name).unwrap();
+        assert_eq!(outside.leftovers(), []);
         drop((client, owner));
     }
 
