@@ -1,12 +1,12 @@
 //! `sim-node doctor` finds what killed processes have left, and `--fix` removes that and nothing else.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File, Permissions};
+use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
-use integration_tests::{Finished, Process, Program, Sandbox, Signal, ctl};
+use integration_tests::{Finished, Process, Program, Sandbox, Signal, ctl, wait_for};
+use rustix::fs::{AtFlags, CWD, Timespec, Timestamps, utimensat};
 use serde_json::Value;
 
 fn node(sandbox: &Sandbox, name: &str) -> Process {
@@ -108,10 +108,34 @@ fn fix_removes_the_files_of_a_killed_node_and_client_and_touches_no_living_proce
     }
 }
 
-/// Makes files look as if they had been created long ago.
+/// Makes files look as if they had been created long ago. By name, because some must not be opened.
 fn make_old(files: &BTreeSet<PathBuf>) {
+    let start = Timespec { tv_sec: 0, tv_nsec: 0 };
+    let times = Timestamps { last_access: start, last_modification: start };
     for file in files {
-        File::open(file).unwrap().set_modified(SystemTime::UNIX_EPOCH).unwrap();
+        utimensat(CWD, file, &times, AtFlags::empty()).unwrap();
+    }
+}
+
+#[test]
+fn fix_removes_what_a_node_leaves_that_is_killed_in_any_phase_of_its_start() {
+    let sandbox = Sandbox::new();
+    let services = sandbox.root().join("services");
+    let service_count = || fs::read_dir(&services).into_iter().flatten().count();
+    for phase in 0..=13 {
+        let args = ["run", "rope"];
+        let mut killed = Process::start(Program::SimNode, &sandbox, &args);
+        wait_for("the services", || {
+            (service_count() >= phase || !killed.is_running()).then_some(())
+        });
+        kill(killed);
+        make_old(&files(&sandbox));
+        doctor(&sandbox, &["--fix", "--json"]);
+        let found = doctor(&sandbox, &["--json"]);
+        assert_eq!(level(&found, "leftovers"), "ok", "phase {phase}: {}", found.stdout);
+        let mut left = files(&sandbox);
+        left.retain(|path| !path.is_dir());
+        assert_eq!(left, BTreeSet::new(), "phase {phase}");
     }
 }
 

@@ -64,9 +64,10 @@ pub(super) fn timer_slack(path: &Path) -> Finding {
     let slack = fs::read_to_string(path).ok().and_then(|text| text.trim().parse::<u64>().ok());
     match slack {
         None => Finding::note(check, "the system does not tell the slack of its timers"),
-        Some(slack) if slack <= SLACK_NS_DEFAULT => {
-            Finding::ok(check, format!("a step may begin {} µs late", slack as f64 / 1000.0))
-        }
+        Some(slack) if slack <= SLACK_NS_DEFAULT => Finding::ok(
+            check,
+            format!("the kernel may delay a timer by {} µs", slack as f64 / 1000.0),
+        ),
         Some(slack) => Finding::note(
             check,
             format!(
