@@ -2,6 +2,7 @@
 
 mod command;
 mod ctl;
+mod domain;
 mod endpoint;
 mod lesson;
 mod refusal;
@@ -17,7 +18,8 @@ use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcomma
 use sim_contract::console;
 
 pub(crate) use command::{CommandVerb, PoseArgs, RewindArgs};
-pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb};
+pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
+pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;
 pub(crate) use lesson::LessonArgs;
 pub(crate) use run::RunArgs;
@@ -41,6 +43,8 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
         sim-node run my.toml --duration 10s --json  run a file for 10 s, then print a summary\n  \
         sim-node ctl grab 90 0.5 0.2 0.3            drag particle 90 of the running node\n  \
         sim-node ctl set gravity 0 -1.6 0           set the gravity of the moon\n  \
+        sim-node ps                                 list the running nodes\n  \
+        sim-node doctor                             check this host, and find what killed nodes have left\n  \
         sim-node --domain lab ctl status            show a node of another domain\n  \
         sim-node scenes                             list the built-in scenes\n  \
         sim-node import shirt.obj -o shirt.toml     convert a mesh to a scene\n  \
@@ -67,6 +71,10 @@ pub(crate) enum Verb {
     Import(ImportArgs),
     /// Command a running node, or query its state
     Ctl(CtlArgs),
+    /// List the nodes and replays of a domain
+    Ps(PsArgs),
+    /// Check this host and a domain: leftovers, memory, limits, permissions, clocks
+    Doctor(DoctorArgs),
     /// Print tables that teach the physics: Euler, iterations, stiffness, 32-bit numbers
     Lesson(LessonArgs),
 }
@@ -100,11 +108,16 @@ pub(crate) fn try_parse(
     match &mut args.verb {
         Some(Verb::Run(run)) => run.endpoint.inherit(&args.run.endpoint),
         Some(Verb::Ctl(ctl)) => ctl.endpoint.inherit(&args.run.endpoint),
+        Some(Verb::Ps(ps)) => ps.domain.inherit(&args.run.endpoint),
+        Some(Verb::Doctor(doctor)) => doctor.domain.inherit(&args.run.endpoint),
         _ => {}
     }
     check_value(&mut command, &args)?;
     Ok(args)
 }
+
+/// Subcommands that look at a whole domain, so that a name has no meaning for them.
+const DOMAIN_VERBS: [&str; 2] = ["ps", "doctor"];
 
 /// Refuses arguments of `run` before another subcommand, where nothing would read them.
 fn check_order(command: &mut Command, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -113,17 +126,17 @@ fn check_order(command: &mut Command, matches: &ArgMatches) -> Result<(), clap::
         matches.try_contains_id(id).is_ok_and(|is_present| is_present)
             && matches.value_source(id) == Some(ValueSource::CommandLine)
     };
+    let allowed = if DOMAIN_VERBS.contains(&verb) { &["domain"][..] } else { &EndpointArgs::IDS };
     // Clap shows options of `ctl` on both sides of it.
-    let is_misplaced = |id: &str| {
-        is_given(matches, id) && !is_given(behind, id) && !EndpointArgs::IDS.contains(&id)
-    };
+    let is_misplaced =
+        |id: &str| is_given(matches, id) && !is_given(behind, id) && !allowed.contains(&id);
     let Some(argument) = command.get_arguments().find(|one| is_misplaced(one.get_id().as_str()))
     else {
         return Ok(());
     };
     let name = argument.get_long().map_or_else(|| "SCENE".to_owned(), |long| format!("--{long}"));
-    let text =
-        format!("{name} cannot precede the subcommand '{verb}' (allowed there: --name, --domain)");
+    let allowed = allowed.iter().map(|id| format!("--{id}")).collect::<Vec<_>>().join(", ");
+    let text = format!("{name} cannot precede the subcommand '{verb}' (allowed there: {allowed})");
     Err(command.error(ErrorKind::ArgumentConflict, text))
 }
 
@@ -186,6 +199,9 @@ mod tests {
             let endpoint = ctl.endpoint.endpoint().unwrap();
             assert_eq!((endpoint.domain(), endpoint.name()), (Some("lab"), "left"), "{line}");
         }
+        let args = try_parse("sim-node --domain lab ps".split(' ')).unwrap();
+        let Some(Verb::Ps(ps)) = args.verb else { panic!("not ps") };
+        assert_eq!(ps.domain.endpoint().unwrap().domain(), Some("lab"));
         let args = try_parse("sim-node --domain lab run rope".split(' ')).unwrap();
         let Some(Verb::Run(run)) = args.verb else { panic!("not run") };
         assert_eq!(run.endpoint.endpoint().unwrap().domain(), Some("lab"));
@@ -195,6 +211,10 @@ mod tests {
     fn options_of_run_are_refused_before_another_subcommand() {
         let text = refused("sim-node --rate 100 ctl status");
         assert!(text.contains("--rate cannot precede the subcommand 'ctl'"), "{text}");
+        let text = refused("sim-node --name left ps");
+        assert!(
+            text.contains("--name cannot precede the subcommand 'ps' (allowed there: --domain)")
+        );
         let text = refused("sim-node rope scenes");
         assert!(text.contains("SCENE cannot precede the subcommand 'scenes'"), "{text}");
     }

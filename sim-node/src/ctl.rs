@@ -6,7 +6,8 @@ mod hint;
 mod parameters;
 mod particles;
 mod rejection;
-mod status;
+pub(crate) mod status;
+mod watch;
 
 use anyhow::Context;
 use sim_contract::{CONSOLE_CLIENT_ID, Client, report_bus_errors};
@@ -17,24 +18,26 @@ use crate::exit::Exit;
 /// Sends one command, or answers one query.
 pub(crate) fn ctl(args: &CtlArgs) -> anyhow::Result<Exit> {
     report_bus_errors()?;
-    let mut client = Client::attach_as(&args.endpoint.endpoint()?, CONSOLE_CLIENT_ID)?;
+    let endpoint = args.endpoint.endpoint()?;
+    let attach = || Client::attach_as(&endpoint, CONSOLE_CLIENT_ID);
     match &args.verb {
         CtlVerb::Command(verb) => {
+            let mut client = attach()?;
             let action = action::from_verb(verb, || rate_hz(&mut client, args))?;
             command::send(&mut client, args, action)
         }
-        CtlVerb::Query(query) => {
-            match query {
-                QueryVerb::Get { parameter } => parameters::print(&mut client, args, *parameter),
-                QueryVerb::Status => status::print(&mut client, args),
-                QueryVerb::Hash => particles::print_hash(&mut client, args),
-                QueryVerb::Particles { indices } => particles::print(&mut client, args, indices),
-                QueryVerb::Nearest(point) => {
-                    particles::print_nearest(&mut client, args, point.vector())
-                }
-            }?;
-            Ok(Exit::Done)
-        }
+        CtlVerb::Query(query) => answer(&mut attach()?, args, query).map(|()| Exit::Done),
+        CtlVerb::Watch(options) => watch::watch(args, options).map(|()| Exit::Done),
+    }
+}
+
+fn answer(client: &mut Client, args: &CtlArgs, query: &QueryVerb) -> anyhow::Result<()> {
+    match query {
+        QueryVerb::Get { parameter } => parameters::print(client, args, *parameter),
+        QueryVerb::Status => status::print(client, args),
+        QueryVerb::Hash => particles::print_hash(client, args),
+        QueryVerb::Particles { indices } => particles::print(client, args, indices),
+        QueryVerb::Nearest(point) => particles::print_nearest(client, args, point.vector()),
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod args;
 mod ctl;
+mod domain;
 mod exit;
 mod import;
 mod lesson;
@@ -30,6 +31,8 @@ fn main() -> Exit {
         Some(Verb::Check(check)) => scenes::check(&check),
         Some(Verb::Import(mesh)) => import::import(&mesh),
         Some(Verb::Ctl(ctl)) => return exit::from_result(ctl::ctl(&ctl)),
+        Some(Verb::Ps(list)) => domain::ps::ps(&list),
+        Some(Verb::Doctor(checks)) => return exit::from_result(domain::doctor::doctor(&checks)),
         Some(Verb::Lesson(lesson)) => lesson::lesson(&lesson),
     };
     exit::from_result(result.map(|()| Exit::Done))

@@ -27,6 +27,7 @@ use loading::Loading;
 use lockstep::{Event, Lockstep};
 use pace::Pace;
 use progress::Progress;
+pub(crate) use publisher::shared_memory_bytes;
 use publisher::{Position, Publisher, StepTimes};
 use statistics::Statistics;
 pub(crate) use threads::with_threads;

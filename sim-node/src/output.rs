@@ -16,6 +16,12 @@ pub(crate) fn line(line: &str) -> anyhow::Result<()> {
     text(&format!("{}\n", printable_line(line)))
 }
 
+/// Prints a line of a result that goes on. Returns `false` if its reader has gone and wants no more.
+pub(crate) fn part(line: &str) -> anyhow::Result<bool> {
+    let line = format!("{}\n", printable_line(line));
+    console::write_part(line.as_bytes()).context("cannot write to stdout")
+}
+
 /// Prints the content of a file. It is unchanged, unless it goes to a terminal.
 pub(crate) fn file(text: &str) -> anyhow::Result<()> {
     let text = if io::stdout().is_terminal() { printable(text) } else { text.into() };

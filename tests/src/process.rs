@@ -203,6 +203,20 @@ impl Process {
         })
     }
 
+    /// Waits for a number of lines on stdout, and returns all that there are.
+    ///
+    /// # Panics
+    /// If the program ends before, or the deadline passes.
+    pub fn wait_for_output(&mut self, line_count: usize) -> Vec<String> {
+        wait_for(&format!("{line_count} lines of {}", self.title), || {
+            let is_running = self.is_running();
+            let text = self.stdout.text();
+            let lines: Vec<_> = text.lines().map(ToOwned::to_owned).collect();
+            assert!(is_running || lines.len() >= line_count, "{} ended early", self.title);
+            (lines.len() >= line_count).then_some(lines)
+        })
+    }
+
     /// Waits until the program handles a signal: from then on, the signal requests its end.
     ///
     /// # Panics

@@ -405,6 +405,12 @@ impl Client {
     pub fn is_owner_alive(&self) -> bool {
         self.attachment.owner().is_some()
     }
+
+    /// Returns `true` if the last owner of the name was killed, and `false` if it has ended by itself or is
+    /// alive. As costly as [`Client::is_owner_alive`].
+    pub fn was_owner_killed(&self) -> bool {
+        self.attachment.session.is_lock_left() && !self.is_owner_alive()
+    }
 }
 
 impl Drop for Client {

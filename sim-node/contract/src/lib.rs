@@ -6,6 +6,7 @@
 //!
 //! - [`Client`] reads snapshots and sends commands.
 //! - [`Tap`] reads everything, as a sequence of coherent [`State`]s.
+//! - [`Domain`] lists the nodes of a domain.
 //! - [`Owner`] publishes everything and receives the commands: the node, or a replay.
 //!
 //! ```no_run
@@ -43,6 +44,7 @@
 
 mod client;
 pub mod clock;
+mod domain;
 mod endpoint;
 mod files;
 mod limits;
@@ -61,6 +63,9 @@ pub use client::state::State;
 pub use client::tap::Tap;
 pub use client::torn::Torn;
 pub use client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
+pub use domain::Domain;
+pub use domain::config_file::{ConfigFile, ConfigFileError};
+pub use domain::nodes::{ListedNode, NodeAnswer};
 pub use endpoint::{DOMAIN_VARIABLE, Endpoint, EndpointError, NAME_DEFAULT};
 pub use files::kind::kind_of_non_file;
 pub use files::part_file::error::{PartFileError, explain_write_error};
@@ -84,6 +89,7 @@ pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
 pub use ports::connection::{ConnectionId, ReceivedCommand};
+pub use ports::domain::leftovers::{Leftover, LeftoverKind};
 pub use ports::domain::root::RootError;
 pub use ports::memory::MemoryError;
 pub use ports::reader::ReadError;

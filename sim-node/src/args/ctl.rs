@@ -7,7 +7,7 @@ use sim_contract::{NumberRange, PARAMETERS, Parameter};
 
 use super::command::CommandVerb;
 use super::endpoint::EndpointArgs;
-use super::value::{index, number_within, time};
+use super::value::{index, number_within, time, time_in, whole};
 
 const TIMEOUT_DEFAULT: Duration = Duration::from_secs(5);
 
@@ -30,6 +30,7 @@ const TIMEOUT_DEFAULT: Duration = Duration::from_secs(5);
         sim-node ctl cut-segment --from 0 0.5 0 --to 1 0.5 0\n  \
         sim-node ctl move-collider 0 0 0.1 -0.2\n  \
         sim-node ctl set gravity 0 -1.6 0\n  \
+        sim-node ctl watch\n  \
         sim-node ctl set tear_force off\n  \
         sim-node ctl load rope\n  \
         sim-node ctl rewind 2s\n  \
@@ -41,7 +42,7 @@ pub(crate) struct CtlArgs {
     /// Wait at most this long for the node's answer [default: 5s]
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub(crate) timeout: Option<Duration>,
-    /// Print one JSON object on stdout
+    /// Print one JSON object on stdout; `watch` prints one per line
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
@@ -61,6 +62,14 @@ pub(crate) enum CtlVerb {
     Command(CommandVerb),
     #[command(flatten)]
     Query(QueryVerb),
+    /// Print the state of the node once a second, one line each, until Ctrl-C
+    ///
+    /// When the node ends or is killed, it says so on stderr and waits for the next one.
+    #[command(after_help = "Examples:\n  \
+        sim-node ctl watch\n  \
+        sim-node ctl watch --period 200ms --count 10\n  \
+        sim-node ctl watch --json | jq --unbuffered .real_time_factor")]
+    Watch(WatchArgs),
 }
 
 #[derive(Debug, Subcommand)]
@@ -93,6 +102,23 @@ pub(crate) enum QueryVerb {
         after_help = "Example: sim-node ctl nearest 0.5 -0.2 0"
     )]
     Nearest(NearestArgs),
+}
+
+/// Shortest time between two lines: a node publishes its status ten times a second.
+const PERIOD_MIN: Duration = Duration::from_millis(100);
+const PERIOD_MAX: Duration = Duration::from_hours(1);
+
+/// Times of the lines of `watch`.
+#[derive(Debug, Clone, Copy, ClapArgs)]
+pub(crate) struct WatchArgs {
+    /// Time between two lines, 100ms to 1h
+    #[arg(long, value_name = "TIME", default_value = "1s",
+        value_parser = time_in(PERIOD_MIN..=PERIOD_MAX))]
+    pub(crate) period: Duration,
+    /// End after N lines [default: go on until Ctrl-C]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = whole::<u64>(1..=u64::MAX))]
+    pub(crate) count: Option<u64>,
 }
 
 /// A point that no node judges.

@@ -61,6 +61,19 @@ pub(super) fn size(text: &str) -> Result<ByteSize, String> {
     text.parse().map_err(|_| "it must be a size with its unit, such as 64MiB, 2GiB or 0".to_owned())
 }
 
+/// Parser of times in a range.
+pub(super) fn time_in(
+    range: RangeInclusive<Duration>,
+) -> impl Fn(&str) -> Result<Duration, String> + Clone {
+    move |text| {
+        let parsed = time(text)?;
+        let text = |time: &Duration| humantime::format_duration(*time).to_string();
+        let (min, max) = (text(range.start()), text(range.end()));
+        let inside = range.contains(&parsed).then_some(parsed);
+        inside.ok_or_else(|| format!("it must be a time from {min} to {max}"))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,6 +96,12 @@ mod tests {
             let expected = "it is not a number in range (allowed: a number > 0)";
             assert_eq!(density(text).unwrap_err(), expected);
         }
+        let period = time_in(Duration::from_millis(100)..=Duration::from_hours(1));
+        assert_eq!(period("250ms"), Ok(Duration::from_millis(250)));
+        for text in ["99ms", "0s", "61min", "1year"] {
+            assert_eq!(period(text).unwrap_err(), "it must be a time from 100ms to 1h");
+        }
+        assert!(period("-1s").unwrap_err().contains("such as 500ms"));
         assert!(time("10").unwrap_err().contains("such as 500ms"));
         assert_eq!(size("64MiB"), Ok(ByteSize::mib(64)));
         assert_eq!(size("0"), Ok(ByteSize::b(0)));

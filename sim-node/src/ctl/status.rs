@@ -2,41 +2,42 @@
 
 use anyhow::bail;
 use serde::Serialize;
-use sim_contract::{Client, MemberStatus, NodeStatus};
+use sim_contract::{Client, MemberStatus, NodeStatus, StatusFlags};
 
 use crate::args::CtlArgs;
 use crate::output;
 
 /// A status in JSON.
 #[derive(Serialize)]
-struct StatusRow {
-    scene: String,
-    run_id: String,
-    process_id: u32,
-    step: u64,
-    paused: bool,
-    rate_hz: u32,
-    real_time_factor: f64,
+pub(crate) struct StatusRow {
+    pub(crate) scene: String,
+    pub(crate) run_id: String,
+    pub(super) process_id: u32,
+    pub(crate) step: u64,
+    pub(crate) paused: bool,
+    pub(crate) replay: bool,
+    pub(crate) rate_hz: u32,
+    pub(crate) real_time_factor: f64,
     time_scale: f64,
     particles: u32,
     constraints: u32,
-    torn_constraints: u32,
+    pub(super) torn_constraints: u32,
     frozen_particles: u64,
-    readers: u32,
+    pub(crate) readers: u32,
     outcomes: u64,
-    rejected_commands: u64,
-    late_steps: u64,
+    pub(super) rejected_commands: u64,
+    pub(crate) late_steps: u64,
     skipped_periods: u64,
     wake_late_ns_p50: u64,
     wake_late_ns_p99: u64,
-    solve_ns_p50: u64,
-    solve_ns_p99: u64,
-    lockstep: Vec<MemberRow>,
+    pub(super) solve_ns_p50: u64,
+    pub(super) solve_ns_p99: u64,
+    pub(crate) lockstep: Vec<MemberRow>,
 }
 
 /// A member of the lockstep.
 #[derive(Serialize)]
-struct MemberRow {
+pub(crate) struct MemberRow {
     client_id: u64,
     every: u32,
     step: u64,
@@ -51,13 +52,14 @@ impl From<&MemberStatus> for MemberRow {
 }
 
 impl StatusRow {
-    fn new(status: &NodeStatus) -> Self {
+    pub(crate) fn new(status: &NodeStatus) -> Self {
         Self {
             scene: status.scene_name(),
             run_id: format!("{:016x}", status.run_id),
             process_id: status.process_id,
             step: status.step,
             paused: status.is_paused(),
+            replay: status.flags & StatusFlags::REPLAY != 0,
             rate_hz: status.rate_hz,
             real_time_factor: status.real_time_factor,
             time_scale: status.time_scale,
@@ -78,13 +80,22 @@ impl StatusRow {
         }
     }
 
+    /// State for people.
+    pub(crate) fn state(&self) -> &'static str {
+        match (self.replay, self.paused) {
+            (false, false) => "running",
+            (false, true) => "paused",
+            (true, false) => "replay",
+            (true, true) => "replay, paused",
+        }
+    }
+
     /// Lines for people: rounded, and with units.
     fn lines(&self) -> Vec<(&'static str, String)> {
         let times = |p50_ns: u64, p99_ns: u64| {
             let micros = |ns: u64| ns as f64 / 1000.0;
             format!("{:.1} µs median, {:.1} µs 99th percentile", micros(p50_ns), micros(p99_ns))
         };
-        let state = if self.paused { "paused" } else { "running" };
         let frozen = match self.frozen_particles {
             0 => String::new(),
             count => format!(", {count} frozen"),
@@ -96,7 +107,7 @@ impl StatusRow {
         let mut lines = vec![
             ("scene", self.scene.clone()),
             ("process", format!("{}, run {}", self.process_id, self.run_id)),
-            ("step", format!("{}, {state}", self.step)),
+            ("step", format!("{}, {}", self.step, self.state())),
             ("rate", format!("{} Hz, time scale {:.3}", self.rate_hz, self.time_scale)),
             ("real time", format!("x{:.3}", self.real_time_factor)),
             ("particles", format!("{}{frozen}", self.particles)),

@@ -16,6 +16,7 @@ use sim_contract::{
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
+pub(crate) use load::shared_memory_bytes;
 use load::{LoadPlace, count, to_collider_state, with_load};
 
 /// Solver time and lateness of a step.

@@ -37,6 +37,13 @@ pub struct Load<'a> {
     pub parameters: ParameterValues,
 }
 
+impl Load<'_> {
+    /// Returns the free shared memory that an owner needs to publish this load, in bytes.
+    pub fn shared_memory_bytes(&self) -> u64 {
+        Capacities::of(self).size_bytes() + SERVICES_SIZE_BYTES
+    }
+}
+
 /// The writers of a load.
 #[derive(Debug)]
 pub(crate) struct LoadWriters {
@@ -194,8 +201,7 @@ const SERVICES_SIZE_BYTES: u64 = 4 << 20;
 /// Checks that the messages of a load fit into shared memory, before any of it is allocated. The memory
 /// of the load before does not count as free, because readers hold its messages.
 pub(crate) fn check_memory(load: &Load<'_>) -> Result<(), OwnerError> {
-    let needed_bytes = Capacities::of(load).size_bytes() + SERVICES_SIZE_BYTES;
-    memory::check(needed_bytes).map_err(|memory| OwnerError::NotEnoughSharedMemory {
+    memory::check(load.shared_memory_bytes()).map_err(|memory| OwnerError::NotEnoughSharedMemory {
         particle_count: load.header.particle_count,
         constraint_count: load.constraints.len(),
         memory,

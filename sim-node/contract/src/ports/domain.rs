@@ -2,19 +2,26 @@
 
 pub(crate) mod counter;
 pub(crate) mod files;
+pub(crate) mod leftovers;
+pub(crate) mod lock_list;
+pub(crate) mod mapped;
 pub(crate) mod orphans;
 pub(crate) mod owner_lock;
 pub(crate) mod root;
 pub(crate) mod unfinished;
 
 use std::path::PathBuf;
+use std::sync::Once;
 use std::time::Duration;
 
-use iceoryx2::prelude::{Config, FileName, Path, SemanticString, SemanticStringError};
+use iceoryx2::prelude::{
+    Config, FileName, LogLevel, Path, SemanticString, SemanticStringError,
+    set_log_level_from_env_or,
+};
 
 /// Longest directory and prefix together, in bytes. A listener binds the Unix socket
 /// `<directory>/<prefix><id>.event`. Its path has at most 107 bytes, up to 39 of them for the id.
-const DIRECTORY_AND_PREFIX_MAX: usize = 60;
+pub(crate) const DIRECTORY_AND_PREFIX_MAX: usize = 60;
 
 /// Time that iceoryx2 waits for a service which another process is creating or removing. Both take
 /// milliseconds.
@@ -25,6 +32,9 @@ pub(crate) const CREATION_TIMEOUT: Duration = Duration::from_millis(200);
 /// Each domain has its own prefix and its own directory: the prefix separates shared memory, the
 /// directory separates nodes and services.
 pub(crate) fn configuration(domain: Option<&str>) -> Result<Config, SemanticStringError> {
+    static LOG_LEVEL: Once = Once::new();
+    // Failures are returned as errors, so iceoryx2's own warnings would repeat them.
+    LOG_LEVEL.call_once(|| set_log_level_from_env_or(LogLevel::Error));
     let Some(domain) = domain else {
         let mut config = Config::global_config().clone();
         adapt(&mut config);

@@ -53,7 +53,8 @@ pub(crate) fn check_fits(needed_bytes: u64, available_bytes: u64) -> Result<(), 
     })
 }
 
-fn available_bytes() -> Option<u64> {
+/// Returns the free memory in `/dev/shm`, in bytes; `None` if that folder cannot be read.
+pub(crate) fn available_bytes() -> Option<u64> {
     let memory = statvfs(SHARED_MEMORY).ok()?;
     Some(memory.f_bavail * memory.f_frsize)
 }

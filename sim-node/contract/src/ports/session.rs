@@ -3,12 +3,11 @@
 use std::error::Error;
 use std::fmt::Debug;
 use std::fs::File;
-use std::sync::Once;
 use std::time::Duration;
 
 use iceoryx2::prelude::{
-    AttributeVerifier, Config, IceoryxSend, LogLevel, Node, NodeBuilder, Service, ServiceName,
-    SignalHandlingMode, ZeroCopySend, ipc, set_log_level_from_env_or,
+    AttributeVerifier, Config, IceoryxSend, Node, NodeBuilder, Service, ServiceName,
+    SignalHandlingMode, ZeroCopySend, ipc,
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
@@ -75,9 +74,6 @@ impl Session {
         endpoint: &Endpoint,
         contract_version: u32,
     ) -> Result<Self, ServiceError> {
-        static LOG_LEVEL: Once = Once::new();
-        // Failures are returned as errors, so iceoryx2's own warnings would repeat them.
-        LOG_LEVEL.call_once(|| set_log_level_from_env_or(LogLevel::Error));
         let refused = |cause: &dyn Debug| ServiceError::Domain {
             endpoint: endpoint.clone(),
             cause: format!("{cause:?}"),
@@ -128,6 +124,11 @@ impl Session {
     #[allow(clippy::option_option, reason = "the id of a holder may be unknown")]
     pub(crate) fn lock_holder(&self) -> Option<Option<u32>> {
         OwnerLock::holder(self.node.config(), self.endpoint.name())
+    }
+
+    /// Returns `true` if a killed owner has left the lock of the name.
+    pub(crate) fn is_lock_left(&self) -> bool {
+        !OwnerLock::left_files(self.node.config(), self.endpoint.name()).is_empty()
     }
 
     /// Opens or creates a service of slices of `T` with the header `H`.

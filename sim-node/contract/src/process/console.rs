@@ -6,7 +6,10 @@
 //! start is `/dev/null`.
 
 use std::io::{self, ErrorKind, Write};
+use std::os::fd::AsFd;
 
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::time::Timespec;
 use sim_types::{printable, printable_line};
 
 /// Writes a result to stdout, past every buffer: the end of a program ignores errors.
@@ -15,6 +18,28 @@ use sim_types::{printable, printable_line};
 /// Stdout does not accept the bytes, for example because its disk is full.
 pub fn write_result(bytes: &[u8]) -> io::Result<()> {
     write(io::stdout().lock(), bytes)
+}
+
+/// Writes a part of a result that goes on to stdout, past every buffer. Returns `false` if its reader
+/// has gone and wants no more.
+///
+/// # Errors
+/// Same as [`write_result`].
+pub fn write_part(bytes: &[u8]) -> io::Result<bool> {
+    write_or_closed(io::stdout().lock(), bytes)
+}
+
+/// Returns `true` if stdout is a pipe whose reader has gone. A program that writes seldom asks, to end
+/// with its reader.
+pub fn is_reader_gone() -> bool {
+    has_lost_its_reader(&io::stdout())
+}
+
+fn has_lost_its_reader(out: &impl AsFd) -> bool {
+    let mut streams = [PollFd::new(out, PollFlags::empty())];
+    // Without an answer, the next write tells.
+    let _ = poll(&mut streams, Some(&Timespec { tv_sec: 0, tv_nsec: 0 }));
+    streams[0].revents().contains(PollFlags::ERR)
 }
 
 /// Writes a line to stderr, or drops it. Replaces line breaks and control characters in it.
@@ -52,8 +77,15 @@ pub fn usage_exit_code(printed: io::Result<()>, is_error: bool, code: i32) -> i3
     }
 }
 
-fn write(mut out: impl Write, bytes: &[u8]) -> io::Result<()> {
-    accept_closed_pipe(out.write_all(bytes).and_then(|()| out.flush()))
+fn write(out: impl Write, bytes: &[u8]) -> io::Result<()> {
+    write_or_closed(out, bytes).map(|_| ())
+}
+
+fn write_or_closed(mut out: impl Write, bytes: &[u8]) -> io::Result<bool> {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        result => result.map(|()| true),
+    }
 }
 
 #[cfg(test)]
@@ -78,6 +110,17 @@ mod tests {
         let full = write(Failing(ErrorKind::StorageFull), b"text").unwrap_err();
         assert_eq!(full.kind(), ErrorKind::StorageFull);
         write(Failing(ErrorKind::BrokenPipe), b"text").unwrap();
+        assert!(!write_or_closed(Failing(ErrorKind::BrokenPipe), b"text").unwrap());
+        assert!(write_or_closed(io::sink(), b"text").unwrap());
+    }
+
+    #[test]
+    fn a_pipe_has_lost_its_reader_once_that_is_closed() {
+        let (reader, writer) = io::pipe().unwrap();
+        assert!(!has_lost_its_reader(&writer));
+        drop(reader);
+        assert!(has_lost_its_reader(&writer));
+        assert!(!has_lost_its_reader(&std::fs::File::open("/dev/null").unwrap()));
     }
 
     #[test]

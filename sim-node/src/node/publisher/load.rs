@@ -46,6 +46,17 @@ pub(super) fn with_load<T>(
     })
 }
 
+/// Returns the free shared memory that a node needs to run a scene, in bytes.
+pub(crate) fn shared_memory_bytes(scene: &Scene, solver: &Solver) -> Result<u64, OwnerError> {
+    let place = LoadPlace {
+        run_id: 0,
+        step: 0,
+        topology_revision: 0,
+        parameters: ParameterValues::DEFAULT,
+    };
+    with_load(scene, solver, place, |load| Ok(load.shared_memory_bytes()))
+}
+
 fn to_constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
     ConstraintState {
         a: constraint.a,

@@ -32,6 +32,9 @@ pub(crate) enum LockError {
     System { path: PathBuf, error: io::Error },
 }
 
+/// Ending of the names of both files.
+pub(crate) const LOCK_SUFFIX: &str = ".owner";
+
 /// Most attempts to lock a file that is removed between opening and locking, or that a client locks for
 /// a moment to see whether an owner holds it.
 const ATTEMPTS_MAX: usize = 1000;
@@ -62,6 +65,19 @@ impl OwnerLock {
         })
     }
 
+    /// Returns the files of the lock of a name that a killed owner has left, and no other has taken.
+    pub(crate) fn left_files(config: &Config, name: &str) -> Vec<PathBuf> {
+        let is_left = |path: &PathBuf| File::open(path).is_ok_and(|file| !is_locked(&file));
+        paths(config, name).into_iter().filter(is_left).collect()
+    }
+
+    /// Returns `true` if a living process holds the file in shared memory, but none that in the root.
+    pub(crate) fn is_hidden(config: &Config, name: &str) -> bool {
+        let [root, memory] = paths(config, name);
+        let is_held = |path| File::open(path).is_ok_and(|file| is_locked(&file));
+        is_held(memory) && !is_held(root)
+    }
+
     /// Returns the path of a file that is no longer the locked one.
     pub(crate) fn removed(&self) -> Option<&Path> {
         let files = [Some(&self.root), self.shared_memory.as_ref()];
@@ -75,8 +91,8 @@ fn paths(config: &Config, name: &str) -> [PathBuf; 2] {
     let prefix = &config.global.prefix;
     let user = rustix::process::geteuid().as_raw();
     [
-        root::path(config).join(format!("{prefix}{name}.owner")),
-        Path::new(SHARED_MEMORY).join(format!("{prefix}{user}_{name}.owner")),
+        root::path(config).join(format!("{prefix}{name}{LOCK_SUFFIX}")),
+        Path::new(SHARED_MEMORY).join(format!("{prefix}{user}_{name}{LOCK_SUFFIX}")),
     ]
 }
 
@@ -189,7 +205,9 @@ mod tests {
         let config = config(&domain);
         let lock = OwnerLock::take(&config, "sim").unwrap();
         assert_eq!(lock.removed(), None);
+        assert!(!OwnerLock::is_hidden(&config, "sim"));
         fs::remove_file(&lock.root.path).unwrap();
+        assert!(OwnerLock::is_hidden(&config, "sim"));
         assert_eq!(lock.removed(), Some(lock.root.path.as_path()));
         assert_eq!(holder(OwnerLock::take(&config, "sim")), Some(std::process::id()));
     }
@@ -217,10 +235,13 @@ mod tests {
         let domain = TestDomain::new();
         let config = config(&domain);
         let path = root::path(&config).join(format!("{}sim.owner", config.global.prefix));
+        assert!(OwnerLock::left_files(&config, "sim").is_empty());
         fs::write(&path, "4194304\n").unwrap();
+        assert_eq!(OwnerLock::left_files(&config, "sim"), std::slice::from_ref(&path));
         let lock = OwnerLock::take(&config, "sim").unwrap();
         let id = std::process::id();
         assert_eq!(fs::read_to_string(&path).unwrap(), format!("{id}\n"));
+        assert!(OwnerLock::left_files(&config, "sim").is_empty());
         drop(lock);
         assert!(!path.exists());
     }

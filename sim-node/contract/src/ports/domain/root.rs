@@ -88,6 +88,18 @@ pub(crate) fn prepare(path: &Path) -> Result<File, RootError> {
     Ok(directory)
 }
 
+/// Checks an existing root directory like [`prepare`], and changes nothing. Returns `false` if there is none.
+pub(crate) fn exists(path: &Path) -> Result<bool, RootError> {
+    match fs::symlink_metadata(path) {
+        Ok(metadata) => {
+            check(path, &metadata, rustix::process::geteuid().as_raw())?;
+            Ok(true)
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(RootError::System { path: path.to_owned(), cause: error.to_string() }),
+    }
+}
+
 fn check(path: &Path, metadata: &Metadata, user: u32) -> Result<(), RootError> {
     let path = path.to_owned();
     let (owner, mode) = (metadata.uid(), metadata.mode() & 0o7777);
@@ -132,6 +144,7 @@ mod tests {
     #[test]
     fn a_new_root_is_private_and_a_readable_one_becomes_private() {
         let scratch = Scratch::new("new");
+        assert_eq!(exists(&scratch.0), Ok(false));
         let _first = prepare(&scratch.0).unwrap();
         assert_eq!(mode(&scratch.0), MODE);
         fs::set_permissions(&scratch.0, Permissions::from_mode(0o755)).unwrap();
@@ -144,6 +157,7 @@ mod tests {
         let scratch = Scratch::new("writable");
         fs::create_dir(&scratch.0).unwrap();
         fs::set_permissions(&scratch.0, Permissions::from_mode(0o777)).unwrap();
+        assert_eq!(exists(&scratch.0).unwrap_err(), prepare(&scratch.0).unwrap_err());
         let error = prepare(&scratch.0).unwrap_err().to_string();
         assert!(error.contains("(mode 777): stop all programs of this domain"), "{error}");
 

@@ -1,7 +1,8 @@
 //! Files of iceoryx2 that their process was killed in the middle of creating. iceoryx2 waits for them
 //! to be finished, and never removes them.
 
-use std::fs::{self, Metadata};
+use std::collections::BTreeSet;
+use std::fs::{self, DirEntry, Metadata};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -62,15 +63,31 @@ pub(crate) fn remove_connections(config: &Config) {
 pub(crate) fn remove_listeners(config: &Config) {
     let suffix = listener_suffix(config);
     for path in segments(config, &suffix) {
-        let is_dead = ports(&path).any(|port| !is_alive(process(port)) && !has_tag(config, port));
-        if is_dead {
+        if ports(&path).any(|port| is_dead_port(config, port)) {
             remove(&path);
         }
     }
 }
 
+/// Returns `true` if the process of a port is dead, and no node names the port as its own.
+pub(crate) fn is_dead_port(config: &Config, port: u128) -> bool {
+    !is_alive(process(port)) && !has_tag(config, port)
+}
+
+/// Returns the unfinished segments whose creator must be dead, because they are old.
+pub(crate) fn old_segments(config: &Config) -> Vec<PathBuf> {
+    let Config { global, .. } = config;
+    let service = &global.service;
+    let all = segments(config, &global.node.global_mgmt_suffix)
+        .chain(segments(config, &service.dynamic_config_storage_suffix))
+        .chain(segments(config, &service.connection_suffix));
+    let is_old =
+        |file: &Metadata| is_unfinished_segment(file) && clock::age(file) > NODE_CREATION_MAX;
+    all.filter(|path| fs::metadata(path).is_ok_and(|file| is_old(&file))).collect()
+}
+
 /// Returns the ending of the segment in which a listener counts its events.
-fn listener_suffix(config: &Config) -> String {
+pub(crate) fn listener_suffix(config: &Config) -> String {
     format!("{}_mgmt", config.global.service.event_connection_suffix)
 }
 
@@ -84,7 +101,7 @@ fn has_tag(config: &Config, port: u128) -> bool {
 
 /// Returns the ids of the ports in the name of a segment, which ends in `_<port><suffix>`, or for a
 /// connection in `_<port>_<port><suffix>`.
-fn ports(path: &Path) -> impl Iterator<Item = u128> {
+pub(crate) fn ports(path: &Path) -> impl Iterator<Item = u128> {
     let name = path.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
     name.rsplit('_').take(2).filter_map(|port| port.parse().ok())
 }
@@ -141,7 +158,7 @@ pub(crate) fn remove_service(config: &Config, spec: &ServiceSpec, name: &str) {
 }
 
 /// Removes the files of a service, the one that names the other last.
-fn remove_files(config: &Config, static_file: &Path) {
+pub(crate) fn remove_files(config: &Config, static_file: &Path) {
     if let Some(segment) = dynamic_segment(config, static_file) {
         remove(&segment);
     }
@@ -153,7 +170,8 @@ pub(crate) fn static_files(config: &Config, name: &str) -> Vec<PathBuf> {
     SERVICES.iter().filter_map(|spec| static_file(config, spec, name)).collect()
 }
 
-fn static_file(config: &Config, spec: &ServiceSpec, name: &str) -> Option<PathBuf> {
+/// Returns the path of the static configuration of a service, existing or not.
+pub(crate) fn static_file(config: &Config, spec: &ServiceSpec, name: &str) -> Option<PathBuf> {
     let directory = root::to_std(&config.global.service_dir());
     let service = ServiceName::new(&spec.service_name(name)).ok()?;
     let hash =
@@ -163,9 +181,15 @@ fn static_file(config: &Config, spec: &ServiceSpec, name: &str) -> Option<PathBu
     Some(directory.join(format!("{}{hash}{suffix}", global.prefix)))
 }
 
+/// Returns the segments of all services of the domain whose static configurations can be read.
+pub(crate) fn dynamic_segments(config: &Config) -> Vec<PathBuf> {
+    let directory = root::to_std(&config.global.service_dir());
+    entries(&directory).filter_map(|entry| dynamic_segment(config, &entry.path())).collect()
+}
+
 /// Returns the segment of a service that its static configuration names: its file name ends in the
 /// id of the service.
-fn dynamic_segment(config: &Config, static_file: &Path) -> Option<PathBuf> {
+pub(crate) fn dynamic_segment(config: &Config, static_file: &Path) -> Option<PathBuf> {
     let text = fs::read_to_string(static_file).ok()?;
     let number = |key: &str| -> Option<u128> {
         let (_, rest) = text.split_once(key)?;
@@ -193,16 +217,30 @@ pub(crate) fn remove_nodes(config: &Config) {
             remove_node(config, id);
         }
     }
-    let directory = root::to_std(&config.global.node_dir());
-    for entry in entries(&directory) {
-        let is_old = entry.metadata().is_ok_and(|file| clock::age(&file) > NODE_CREATION_MAX);
-        if let Some(id) = entry.file_name().to_str().and_then(|name| node_id(config, name))
-            && is_old
-            && !is_complete_node(config, &id)
-        {
-            remove_node(config, &id);
-        }
+    for id in incomplete_nodes(config) {
+        remove_node(config, &id);
     }
+}
+
+/// Returns the ids of the nodes that lack a file although they are old, so their process is dead.
+fn incomplete_nodes(config: &Config) -> BTreeSet<String> {
+    let directory = root::to_std(&config.global.node_dir());
+    let incomplete = |entry: DirEntry| {
+        let is_old = entry.metadata().is_ok_and(|file| clock::age(&file) > NODE_CREATION_MAX);
+        let id = entry.file_name().to_str().and_then(|name| node_id(config, name))?;
+        (is_old && !is_complete_node(config, &id)).then_some(id)
+    };
+    entries(&directory).filter_map(incomplete).collect()
+}
+
+/// Returns the files and folders of such nodes.
+pub(crate) fn incomplete_node_files(config: &Config) -> Vec<PathBuf> {
+    let directory = root::to_std(&config.global.node_dir());
+    let files = |id: String| {
+        let folder = directory.join(&id);
+        monitor_files(config, &id).into_iter().chain([folder]).filter(|path| path.exists())
+    };
+    incomplete_nodes(config).into_iter().flat_map(files).collect()
 }
 
 /// Returns the id of the node that a file in the directory of nodes belongs to: `<id>`, or
