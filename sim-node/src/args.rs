@@ -4,6 +4,7 @@ mod command;
 mod ctl;
 mod endpoint;
 mod lesson;
+mod real_time;
 mod refusal;
 mod run;
 mod scene;
@@ -103,6 +104,7 @@ pub(crate) fn try_parse(
         _ => {}
     }
     check_value(&mut command, &args)?;
+    check_run(&mut command, &args)?;
     Ok(args)
 }
 
@@ -135,6 +137,21 @@ fn check_value(command: &mut Command, args: &Args) -> Result<(), clap::Error> {
     let ctl = command.find_subcommand_mut("ctl");
     let set = ctl.and_then(|ctl| ctl.find_subcommand_mut("set")).cloned();
     Err(set.unwrap_or_else(|| command.clone()).error(ErrorKind::WrongNumberOfValues, text))
+}
+
+/// Refuses options of `run` that contradict each other, with the reason.
+fn check_run(command: &mut Command, args: &Args) -> Result<(), clap::Error> {
+    let run = match &args.verb {
+        None => &args.run,
+        Some(Verb::Run(run)) => run,
+        Some(_) => return Ok(()),
+    };
+    match run.real_time.conflict() {
+        Some(text) if run.as_fast_as_possible => {
+            Err(command.error(ErrorKind::ArgumentConflict, text))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Rewrites a negative number for clap, which takes `-.5` and `-1e-3` for options.
@@ -197,6 +214,19 @@ mod tests {
         assert!(text.contains("--rate cannot precede the subcommand 'ctl'"), "{text}");
         let text = refused("sim-node rope scenes");
         assert!(text.contains("SCENE cannot precede the subcommand 'scenes'"), "{text}");
+    }
+
+    #[test]
+    fn real_time_scheduling_is_refused_for_a_run_that_never_waits() {
+        for line in [
+            "sim-node --realtime --as-fast-as-possible",
+            "sim-node run rope --as-fast-as-possible --realtime=require",
+        ] {
+            let text = refused(line);
+            assert!(text.contains("a loop that never waits would keep"), "{text}");
+        }
+        assert!(try_parse("sim-node run --cpu 0 --as-fast-as-possible".split(' ')).is_ok());
+        assert!(try_parse("sim-node run --realtime rope".split(' ')).is_ok());
     }
 
     #[test]

@@ -8,13 +8,14 @@ mod lockstep;
 mod pace;
 mod progress;
 mod publisher;
+mod real_time;
 mod statistics;
 mod threads;
 mod warnings;
 
 use std::time::Duration;
 
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until, thread_time_ns};
 use sim_contract::{Endpoint, ReceivedCommand, Stop};
 use sim_solver::{Scene, Solver};
 
@@ -24,8 +25,10 @@ use lockstep::{Event, Lockstep};
 use pace::Pace;
 use progress::Progress;
 use publisher::{Position, Publisher, StepTimes};
+pub(crate) use real_time::cpus::Cpus;
+use real_time::rest::Rest;
+pub(crate) use real_time::{RealTime, RealTimeOptions};
 use statistics::Statistics;
-pub(crate) use threads::with_threads;
 use warnings::Warnings;
 
 /// Time between two status messages: 10 Hz.
@@ -54,6 +57,7 @@ pub(crate) struct Options {
     pub(crate) every: u64,
     /// Longest wait for a member of the lockstep.
     pub(crate) lockstep_timeout: Duration,
+    pub(crate) real_time: RealTimeOptions,
 }
 
 /// A running simulation.
@@ -68,6 +72,10 @@ pub(crate) struct Node {
     arrived: Vec<ReceivedCommand>,
     grab_connections: GrabConnections,
     lockstep: Lockstep,
+    cpus: Cpus,
+    pub(crate) real_time: RealTime,
+    /// Rests of a loop with real-time scheduling.
+    rest: Option<Rest>,
     /// Lateness of a step whose time has come, but whose members are not ready.
     met: Option<u64>,
     progress: Progress,
@@ -87,7 +95,7 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    /// Takes the name and publishes the scene, without starting the run.
+    /// Takes the name and publishes the scene, without starting the run. The solver has one thread.
     pub(crate) fn new(
         endpoint: &Endpoint,
         scene: Scene,
@@ -103,6 +111,9 @@ impl Node {
             arrived: Vec::new(),
             grab_connections: GrabConnections::default(),
             lockstep: Lockstep::new(options.lockstep_timeout),
+            cpus: Cpus::observe(),
+            real_time: RealTime::default(),
+            rest: None,
             met: None,
             progress: Progress {
                 is_paused: options.starts_paused,
@@ -191,7 +202,10 @@ impl Node {
             sleep_until(now_ns + WAITING_POLL_NS);
             return None;
         }
-        sleep_until(deadline_ns);
+        let rest = self.rest.as_mut();
+        sleep_until(
+            rest.map_or(deadline_ns, |rest| rest.end_ns(now_ns, deadline_ns, thread_time_ns)),
+        );
         Some(self.pace.meet(monotonic_ns()))
     }
 

@@ -9,7 +9,7 @@ use sim_contract::{Endpoint, Stop, report_bus_errors};
 use sim_solver::{Scene, Solver};
 
 use crate::args::RunArgs;
-use crate::node::{Node, Options, with_threads};
+use crate::node::{Node, Options, RealTime};
 use crate::{output, scene_source};
 
 /// Summary at the end of a run.
@@ -28,6 +28,7 @@ struct Summary {
     solve_ns_p50: u64,
     solve_ns_p99: u64,
     state_hash: String,
+    real_time: RealTime,
 }
 
 /// Runs a scene.
@@ -45,12 +46,14 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         waits_for_time: !args.as_fast_as_possible,
         every: args.every,
         lockstep_timeout: args.lockstep_timeout,
+        real_time: args.real_time.options(),
     };
     warn(&scene);
     // Building a large scene takes seconds. Until the node owns anything, a signal ends it at once.
-    let solver = with_threads(Solver::new(&scene), options.threads);
+    let solver = Solver::new(&scene);
     let stop = Stop::install()?;
     let mut node = Node::new(&endpoint, scene, solver, options)?;
+    node.prepare()?;
     print_ready(&endpoint, &node);
     let is_terminal = stderr().is_terminal();
     let shows_status = is_terminal && !args.json;
@@ -128,6 +131,7 @@ impl Summary {
             solve_ns_p50: run.solve_ns(0.5),
             solve_ns_p99: run.solve_ns(0.99),
             state_hash: format!("{:016x}", node.solver.state_hash()),
+            real_time: node.real_time,
         }
     }
 

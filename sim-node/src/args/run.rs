@@ -7,6 +7,7 @@ use sim_solver::THREADS_MAX;
 use sim_solver::scene::{PASSES_MAX, RATE_HZ_MAX};
 
 use super::endpoint::EndpointArgs;
+use super::real_time::RealTimeArgs;
 use super::value::{time, whole};
 
 #[derive(Debug, ClapArgs)]
@@ -14,7 +15,8 @@ use super::value::{time, whole};
     sim-node run                                              run the curtain in real time\n  \
     sim-node run curtain --rate 1000 --duration 10s --json    run 10 s at 1 kHz, then print a summary\n  \
     sim-node run ./my.toml --steps 5000 --as-fast-as-possible run a file without waiting\n  \
-    sim-node run rope --name left --domain lab                run beside other nodes")]
+    sim-node run rope --name left --domain lab                run beside other nodes\n  \
+    sim-node run --rate 1000 --realtime --cpu 3               run 1 kHz with little jitter")]
 pub(crate) struct RunArgs {
     /// Built-in scene (see `sim-node scenes`), or TOML file: a path with / or ending in .toml
     #[arg(default_value = "curtain")]
@@ -52,6 +54,8 @@ pub(crate) struct RunArgs {
     /// Longest wait for a member of the lockstep; then the run continues without it
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = time)]
     pub(crate) lockstep_timeout: Duration,
+    #[command(flatten)]
+    pub(crate) real_time: RealTimeArgs,
     /// Print a summary as one JSON object on stdout at the end
     #[arg(long)]
     pub(crate) json: bool,

@@ -72,7 +72,7 @@ impl Node {
     /// The inner result is the outcome. An outer error leaves neither scene able to continue.
     fn load(&mut self, source: &str, stop: &Stop) -> anyhow::Result<Result<(), Reason>> {
         let rate_hz = self.scene.solver.rate_hz;
-        let (scene, solver) = match load_scene(source, self.options, rate_hz, stop) {
+        let (scene, solver) = match load_scene(source, self.options, rate_hz, &self.cpus, stop) {
             Some(Ok(loaded)) => loaded,
             Some(Err(Refusal { problem, reason })) => {
                 self.warnings.print(&format!("load {source}: {problem}"));

@@ -9,7 +9,9 @@ use sim_contract::{Reason, Stop};
 use sim_solver::{Scene, Solver};
 
 use super::Options;
-use super::threads::with_threads;
+use super::real_time::cpus::Cpus;
+use super::real_time::scheduling::leave_fifo;
+use super::threads::start_threads;
 use crate::scene_source;
 
 /// Interval between two checks for a request to stop.
@@ -31,17 +33,25 @@ pub(super) fn load_scene(
     source: &str,
     options: Options,
     rate_hz: u32,
+    cpus: &Cpus,
     stop: &Stop,
 ) -> Option<Result<(Scene, Solver), Refusal>> {
     let source = source.to_owned();
     let work = move || {
+        leave_fifo();
         let scene = read_scene(&source, options, rate_hz)?;
-        let solver = with_threads(Solver::new_in_run(&scene), options.threads);
+        let solver = Solver::new_in_run(&scene);
         Ok((scene, solver))
     };
-    unless_stopped(stop, work).unwrap_or_else(|problem| {
+    let loaded = cpus.lend(|| unless_stopped(stop, work)).unwrap_or_else(|problem| {
         let reason = Reason::NoEffectHere;
         Some(Err(Refusal { problem, reason }))
+    });
+    loaded.map(|result| {
+        result.map(|(scene, mut solver)| {
+            start_threads(&mut solver, options.threads, cpus);
+            (scene, solver)
+        })
     })
 }
 

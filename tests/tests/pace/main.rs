@@ -1,5 +1,7 @@
-//! When a node makes its next step: after a long wait, and in lockstep with other processes.
+//! When a node makes its next step: after a long wait, in lockstep with other processes, and with the
+//! scheduling of the system.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod distant_step;
 mod lockstep;
+mod real_time;
