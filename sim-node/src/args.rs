@@ -1,5 +1,6 @@
 //! The command line. Help texts are the doc comments.
 
+mod bench;
 mod command;
 mod ctl;
 mod endpoint;
@@ -17,6 +18,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use sim_contract::console;
 
+pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
 pub(crate) use command::{CommandVerb, PoseArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb};
 use endpoint::EndpointArgs;
@@ -45,6 +47,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
         sim-node --domain lab ctl status            show a node of another domain\n  \
         sim-node scenes                             list the built-in scenes\n  \
         sim-node import shirt.obj -o shirt.toml     convert a mesh to a scene\n  \
+        sim-node bench --rate 1000                  measure this machine with the curtain at 1 kHz\n  \
         sim-node lesson                             list the physics lessons"
 )]
 pub(crate) struct Args {
@@ -68,6 +71,10 @@ pub(crate) enum Verb {
     Import(ImportArgs),
     /// Command a running node, or query its state
     Ctl(CtlArgs),
+    /// Measure latencies and times of steps on this machine
+    Bench(BenchArgs),
+    #[command(hide = true)]
+    BenchClient(BenchClientArgs),
     /// Print tables that teach the physics: Euler, iterations, stiffness, 32-bit numbers
     Lesson(LessonArgs),
 }

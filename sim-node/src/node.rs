@@ -23,12 +23,17 @@ use grab_connections::GrabConnections;
 use inbox::Inbox;
 use lockstep::{Event, Lockstep};
 use pace::Pace;
+use pace::polling::Polling;
 use progress::Progress;
 use publisher::{Position, Publisher, StepTimes};
 pub(crate) use real_time::cpus::Cpus;
+pub(crate) use real_time::preparation::prepare;
 use real_time::rest::Rest;
 pub(crate) use real_time::{RealTime, RealTimeOptions};
 use statistics::Statistics;
+pub(crate) use statistics::TIME_NS_MAX;
+use statistics::phases::Phases;
+pub(crate) use statistics::phases::{Phase, PhaseTimes};
 use warnings::Warnings;
 
 /// Time between two status messages: 10 Hz.
@@ -76,6 +81,7 @@ pub(crate) struct Node {
     pub(crate) real_time: RealTime,
     /// Rests of a loop with real-time scheduling.
     rest: Option<Rest>,
+    polling: Polling,
     /// Lateness of a step whose time has come, but whose members are not ready.
     met: Option<u64>,
     progress: Progress,
@@ -114,6 +120,7 @@ impl Node {
             cpus: Cpus::observe(),
             real_time: RealTime::default(),
             rest: None,
+            polling: Polling::default(),
             met: None,
             progress: Progress {
                 is_paused: options.starts_paused,
@@ -153,7 +160,9 @@ impl Node {
                 self.observe(&observer)?;
                 continue;
             }
+            self.publisher.phases.begin();
             self.apply_commands(due.is_some(), stop)?;
+            self.publisher.phases.end(Phase::Drain);
             if stop.is_requested() {
                 break;
             }
@@ -167,6 +176,8 @@ impl Node {
                 self.publisher.publish_between(&self.solver, self.position())?;
             }
             self.observe(&observer)?;
+            self.publisher.phases.end(Phase::Observe);
+            self.publisher.phases.record();
         }
         // Those of the last boundary, if its step was not made.
         self.publisher.publish_outcomes()
@@ -182,7 +193,7 @@ impl Node {
     /// A paused node has no deadline: a command that lets it step makes the step due at once.
     fn wait(&mut self) -> Option<u64> {
         if !self.progress.is_stepping() {
-            sleep_until(monotonic_ns() + PAUSED_POLL_NS);
+            sleep_until(self.polling.next_ns(monotonic_ns(), PAUSED_POLL_NS));
             let now_ns = monotonic_ns();
             self.paused_ns += now_ns - self.mark_ns;
             self.mark_ns = now_ns;
@@ -199,7 +210,7 @@ impl Node {
         }
         let (now_ns, deadline_ns) = (monotonic_ns(), self.pace.deadline_ns());
         if now_ns + WAITING_POLL_NS < deadline_ns {
-            sleep_until(now_ns + WAITING_POLL_NS);
+            sleep_until(self.polling.next_ns(now_ns, WAITING_POLL_NS));
             return None;
         }
         let rest = self.rest.as_mut();
@@ -240,6 +251,7 @@ impl Node {
             return Ok(false);
         }
         let solve_ns = monotonic_ns() - before_ns;
+        self.publisher.phases.end(Phase::Solve);
         if self.solver.frozen_count() > frozen_count {
             let count = self.solver.frozen_count() - frozen_count;
             self.warnings.print(&format!(
@@ -291,6 +303,17 @@ impl Node {
                 path.display()
             ));
         }
+    }
+
+    /// Records the times of the phases of each step from now on.
+    pub(crate) fn record_phases(&mut self) -> anyhow::Result<()> {
+        self.publisher.phases = Phases::recording()?;
+        Ok(())
+    }
+
+    /// Returns the recorded times; `None` unless [`Self::record_phases`] was called.
+    pub(crate) fn phase_times(&self) -> Option<&PhaseTimes> {
+        self.publisher.phases.times()
     }
 
     pub(crate) fn status(&self) -> sim_contract::NodeStatus {

@@ -53,7 +53,9 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
     let solver = Solver::new(&scene);
     let stop = Stop::install()?;
     let mut node = Node::new(&endpoint, scene, solver, options)?;
-    node.prepare()?;
+    for line in node.prepare()? {
+        output::note(&line);
+    }
     print_ready(&endpoint, &node);
     let is_terminal = stderr().is_terminal();
     let shows_status = is_terminal && !args.json;

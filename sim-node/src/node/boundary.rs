@@ -33,6 +33,9 @@ impl Node {
         for release in lost {
             self.release_lost(release);
         }
+        if !turn.is_empty() {
+            self.polling.on_commands(monotonic_ns());
+        }
         for received in turn {
             self.apply(&received, stop)?;
         }

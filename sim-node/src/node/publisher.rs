@@ -15,6 +15,7 @@ use sim_contract::{
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
+use super::statistics::phases::{Phase, Phases};
 use load::{LoadPlace, count, to_collider_state, with_load};
 
 /// Solver time and lateness of a step.
@@ -75,6 +76,8 @@ pub(crate) struct Publisher {
     /// Number of torn constraints, and the colliders, as last published.
     torn_count: usize,
     colliders: Vec<PlacedCollider>,
+    /// Times of the phases of steps, for `bench`.
+    pub(crate) phases: Phases,
 }
 
 impl Publisher {
@@ -109,6 +112,7 @@ impl Publisher {
             parameters,
             torn_count: 0,
             colliders: Vec::new(),
+            phases: Phases::default(),
         })
     }
 
@@ -233,7 +237,9 @@ impl Publisher {
         let particles: &[ParticleState] = cast_slice(solver.particles());
         self.owner.publish_particles(&self.last, |index| particles[index])?;
         self.snapshot_count = self.snapshot_count.wrapping_add(1);
+        self.phases.end(Phase::Publish);
         self.owner.wake(Wake::Frame);
+        self.phases.end(Phase::Wake);
         Ok(())
     }
 

@@ -5,7 +5,7 @@
 
 pub(crate) mod cpus;
 mod memory;
-mod preparation;
+pub(crate) mod preparation;
 mod refused;
 pub(crate) mod rest;
 pub(crate) mod scheduling;

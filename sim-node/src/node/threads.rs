@@ -1,12 +1,31 @@
-//! Number of threads of the solver. It changes no bit.
+//! The threads of a node: that of the loop, and those of the solver, whose number changes no bit.
 
 use sim_solver::{Solver, THREADS_MAX};
 
+use super::Node;
 use super::real_time::cpus::Cpus;
+use super::real_time::preparation::{Prepared, prepare};
+use super::real_time::rest::Rest;
 
 /// Number of particles from which on the default is more than one thread. The solver does not divide
 /// smaller scenes.
 const SHARED_MIN: usize = 4000;
+
+impl Node {
+    /// Obtains the real-time properties of the options and starts the solver's threads. Call it on the
+    /// thread of the loop, after everything that takes long. Returns lines for people.
+    ///
+    /// # Errors
+    /// The system refuses a property that the options require.
+    pub(crate) fn prepare(&mut self) -> anyhow::Result<Vec<String>> {
+        let Prepared { real_time, lines } = prepare(self.options.real_time, &mut self.cpus)?;
+        self.real_time = real_time;
+        self.rest = real_time.fifo_priority.map(|_| Rest::default());
+        // They inherit the scheduling of this thread.
+        start_threads(&mut self.solver, self.options.threads, &self.cpus);
+        Ok(lines)
+    }
+}
 
 /// Starts the threads of a new solver: the requested number, or the default of its scene. No step
 /// starts a thread. The thread of the loop calls it, because they inherit its scheduling.

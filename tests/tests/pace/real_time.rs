@@ -9,13 +9,13 @@ use serde_json::Value;
 use sim_contract::{Action, Client, Text};
 
 /// Policy of ordinary threads.
-const SCHED_OTHER: u32 = 0;
+pub(crate) const SCHED_OTHER: u32 = 0;
 const SCHED_FIFO: u32 = 1;
 
 /// Scheduling of a thread as `/proc` shows it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct ThreadState {
-    policy: u32,
+pub(crate) struct ThreadState {
+    pub(crate) policy: u32,
     priority: u32,
     /// CPUs that it may use, such as "0-3".
     cpus: String,
@@ -33,7 +33,7 @@ fn field(status: &str, name: &str) -> String {
 }
 
 /// Returns the state of a thread; `None` if it has ended.
-fn thread_state(thread: &Path) -> Option<ThreadState> {
+pub(crate) fn thread_state(thread: &Path) -> Option<ThreadState> {
     let stat = fs::read_to_string(thread.join("stat")).ok()?;
     let status = fs::read_to_string(thread.join("status")).ok()?;
     // Behind the name in parentheses, the fields begin with the third one; see proc_pid_stat(5).

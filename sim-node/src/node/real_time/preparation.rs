@@ -1,58 +1,62 @@
-//! Preparation of the loop for a run: its scheduling, its CPU, its memory, and the solver's threads.
+//! Preparation of the thread of a loop: its timers, its scheduling, its CPU, and locked memory.
 
 use std::num::NonZero;
 
 use anyhow::bail;
 use rustix::thread::set_current_timer_slack;
 
+use super::cpus::Cpus;
 use super::refused::Refused;
-use super::rest::Rest;
-use super::{RealTimeOptions, memory, scheduling};
-use crate::node::Node;
-use crate::node::threads::start_threads;
-use crate::output;
+use super::{RealTime, RealTimeOptions, memory, scheduling};
 
-impl Node {
-    /// Starts the solver's threads and obtains the real-time properties of the options. Call it on the
-    /// thread of the loop, after everything that takes long.
-    ///
-    /// # Errors
-    /// The system refuses a property that the options require.
-    pub(crate) fn prepare(&mut self) -> anyhow::Result<()> {
-        // The default of 50 µs, within which the system may delay a wake-up, would be most of the
-        // lateness. A system without the setting wakes the loop later.
-        let _kept = set_current_timer_slack(Some(NonZero::<u64>::MIN));
-        let options = self.options.real_time;
-        if let Some(priority) = options.priority
-            && obtain(options, scheduling::enter_fifo(priority))?
-        {
-            output::note(&format!("real time: SCHED_FIFO, priority {priority}"));
-            self.real_time.fifo_priority = Some(priority);
-            self.rest = Some(Rest::default());
-        }
-        let wanted = options.cpu.or_else(|| options.priority.and(self.cpus.last()));
-        if let Some(cpu) = wanted
-            && obtain(options, self.cpus.pin(cpu))?
-        {
-            output::note(&format!("real time: the loop runs on CPU {cpu}"));
-            self.real_time.cpu = Some(cpu);
-        }
-        // They inherit the scheduling of this thread.
-        start_threads(&mut self.solver, self.options.threads, &self.cpus);
-        if options.priority.is_some() && obtain(options, memory::lock())? {
-            output::note("real time: memory is locked");
-            self.real_time.is_memory_locked = true;
-        }
-        Ok(())
-    }
+/// Real-time properties of a thread, with a line for people about each one that was asked for.
+#[derive(Debug, Default)]
+pub(crate) struct Prepared {
+    pub(crate) real_time: RealTime,
+    pub(crate) lines: Vec<String>,
 }
 
-/// Returns `true` if a property was obtained, and reports a refusal.
-fn obtain(options: RealTimeOptions, result: Result<(), Refused>) -> anyhow::Result<bool> {
-    let Err(refused) = result else { return Ok(true) };
-    if options.is_required {
-        bail!("--realtime=require: {refused}");
+/// Obtains the real-time properties of the options for the calling thread.
+///
+/// # Errors
+/// The system refuses a property that the options require.
+pub(crate) fn prepare(options: RealTimeOptions, cpus: &mut Cpus) -> anyhow::Result<Prepared> {
+    // The default of 50 µs, within which the system may delay a wake-up, would be most of the lateness.
+    // Without the setting, the loop wakes later.
+    let _kept = set_current_timer_slack(Some(NonZero::<u64>::MIN));
+    let mut prepared = Prepared::default();
+    if let Some(priority) = options.priority
+        && prepared.obtain(options, scheduling::enter_fifo(priority))?
+    {
+        prepared.lines.push(format!("real time: SCHED_FIFO, priority {priority}"));
+        prepared.real_time.fifo_priority = Some(priority);
     }
-    output::note(&format!("warning: real time: {refused}"));
-    Ok(false)
+    let wanted = options.cpu.or_else(|| options.priority.and(cpus.last()));
+    if let Some(cpu) = wanted
+        && prepared.obtain(options, cpus.pin(cpu))?
+    {
+        prepared.lines.push(format!("real time: the loop runs on CPU {cpu}"));
+        prepared.real_time.cpu = Some(cpu);
+    }
+    if options.priority.is_some() && prepared.obtain(options, memory::lock())? {
+        prepared.lines.push("real time: memory is locked".to_owned());
+        prepared.real_time.is_memory_locked = true;
+    }
+    Ok(prepared)
+}
+
+impl Prepared {
+    /// Returns `true` if a property was obtained, and adds a warning if it was refused.
+    fn obtain(
+        &mut self,
+        options: RealTimeOptions,
+        result: Result<(), Refused>,
+    ) -> anyhow::Result<bool> {
+        let Err(refused) = result else { return Ok(true) };
+        if options.is_required {
+            bail!("--realtime=require: {refused}");
+        }
+        self.lines.push(format!("warning: real time: {refused}"));
+        Ok(false)
+    }
 }
