@@ -1,10 +1,12 @@
 //! The command line. Help texts are the doc comments.
 
+mod bench;
 mod command;
 mod ctl;
 mod domain;
 mod endpoint;
 mod lesson;
+mod real_time;
 mod refusal;
 mod run;
 mod scene;
@@ -17,6 +19,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use sim_contract::console;
 
+pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
 pub(crate) use command::{CommandVerb, PoseArgs, RewindArgs};
 pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
 pub(crate) use domain::{DoctorArgs, PsArgs};
@@ -48,6 +51,7 @@ pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
         sim-node --domain lab ctl status            show a node of another domain\n  \
         sim-node scenes                             list the built-in scenes\n  \
         sim-node import shirt.obj -o shirt.toml     convert a mesh to a scene\n  \
+        sim-node bench --rate 1000                  measure this machine with the curtain at 1 kHz\n  \
         sim-node lesson                             list the physics lessons"
 )]
 pub(crate) struct Args {
@@ -75,6 +79,10 @@ pub(crate) enum Verb {
     Ps(PsArgs),
     /// Check this host and a domain: leftovers, memory, limits, permissions, clocks
     Doctor(DoctorArgs),
+    /// Measure latencies and times of steps on this machine
+    Bench(BenchArgs),
+    #[command(hide = true)]
+    BenchClient(BenchClientArgs),
     /// Print tables that teach the physics: Euler, iterations, stiffness, 32-bit numbers
     Lesson(LessonArgs),
 }
@@ -113,6 +121,7 @@ pub(crate) fn try_parse(
         _ => {}
     }
     check_value(&mut command, &args)?;
+    check_run(&mut command, &args)?;
     Ok(args)
 }
 
@@ -148,6 +157,21 @@ fn check_value(command: &mut Command, args: &Args) -> Result<(), clap::Error> {
     let ctl = command.find_subcommand_mut("ctl");
     let set = ctl.and_then(|ctl| ctl.find_subcommand_mut("set")).cloned();
     Err(set.unwrap_or_else(|| command.clone()).error(ErrorKind::WrongNumberOfValues, text))
+}
+
+/// Refuses options of `run` that contradict each other, with the reason.
+fn check_run(command: &mut Command, args: &Args) -> Result<(), clap::Error> {
+    let run = match &args.verb {
+        None => &args.run,
+        Some(Verb::Run(run)) => run,
+        Some(_) => return Ok(()),
+    };
+    match run.real_time.conflict() {
+        Some(text) if run.as_fast_as_possible => {
+            Err(command.error(ErrorKind::ArgumentConflict, text))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Rewrites a negative number for clap, which takes `-.5` and `-1e-3` for options.
@@ -217,6 +241,19 @@ mod tests {
         );
         let text = refused("sim-node rope scenes");
         assert!(text.contains("SCENE cannot precede the subcommand 'scenes'"), "{text}");
+    }
+
+    #[test]
+    fn real_time_scheduling_is_refused_for_a_run_that_never_waits() {
+        for line in [
+            "sim-node --realtime --as-fast-as-possible",
+            "sim-node run rope --as-fast-as-possible --realtime=require",
+        ] {
+            let text = refused(line);
+            assert!(text.contains("a loop that never waits would keep"), "{text}");
+        }
+        assert!(try_parse("sim-node run --cpu 0 --as-fast-as-possible".split(' ')).is_ok());
+        assert!(try_parse("sim-node run --realtime rope".split(' ')).is_ok());
     }
 
     #[test]

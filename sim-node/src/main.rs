@@ -3,10 +3,10 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod bench;
 mod ctl;
 mod domain;
 mod exit;
-mod import;
 mod lesson;
 mod node;
 mod output;
@@ -29,10 +29,12 @@ fn main() -> Exit {
         Some(Verb::Scenes(list)) => scenes::list(&list),
         Some(Verb::Show(show)) => scenes::show(&show),
         Some(Verb::Check(check)) => scenes::check(&check),
-        Some(Verb::Import(mesh)) => import::import(&mesh),
+        Some(Verb::Import(mesh)) => scenes::import::import(&mesh),
         Some(Verb::Ctl(ctl)) => return exit::from_result(ctl::ctl(&ctl)),
         Some(Verb::Ps(list)) => domain::ps::ps(&list),
         Some(Verb::Doctor(checks)) => return exit::from_result(domain::doctor::doctor(&checks)),
+        Some(Verb::Bench(options)) => bench::bench(&options),
+        Some(Verb::BenchClient(client)) => bench::client::run(&client),
         Some(Verb::Lesson(lesson)) => lesson::lesson(&lesson),
     };
     exit::from_result(result.map(|()| Exit::Done))

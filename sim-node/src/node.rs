@@ -10,13 +10,14 @@ mod lockstep;
 mod pace;
 mod progress;
 mod publisher;
+mod real_time;
 mod statistics;
 mod threads;
 mod warnings;
 
 use std::time::Duration;
 
-use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
+use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until, thread_time_ns};
 use sim_contract::{Endpoint, ReceivedCommand, Stop};
 use sim_solver::{Scene, Solver};
 
@@ -26,11 +27,18 @@ use inbox::Inbox;
 use loading::Loading;
 use lockstep::{Event, Lockstep};
 use pace::Pace;
+use pace::polling::Polling;
 use progress::Progress;
 pub(crate) use publisher::shared_memory_bytes;
 use publisher::{Position, Publisher, StepTimes};
+pub(crate) use real_time::cpus::Cpus;
+pub(crate) use real_time::preparation::prepare;
+use real_time::rest::Rest;
+pub(crate) use real_time::{RealTime, RealTimeOptions};
 use statistics::Statistics;
-pub(crate) use threads::with_threads;
+pub(crate) use statistics::TIME_NS_MAX;
+use statistics::phases::Phases;
+pub(crate) use statistics::phases::{Phase, PhaseTimes};
 use warnings::Warnings;
 
 /// Time between two status messages: 10 Hz.
@@ -63,6 +71,7 @@ pub(crate) struct Options {
     pub(crate) lockstep_timeout: Duration,
     /// Memory for past states.
     pub(crate) history_bytes: usize,
+    pub(crate) real_time: RealTimeOptions,
 }
 
 /// The boundary before the next step.
@@ -105,6 +114,11 @@ pub(crate) struct Node {
     /// A command has been applied since the last step.
     is_commanded: bool,
     boundary: Boundary,
+    cpus: Cpus,
+    pub(crate) real_time: RealTime,
+    /// Rests of a loop with real-time scheduling.
+    rest: Option<Rest>,
+    polling: Polling,
     /// Lateness of a step whose time has come, but whose members are not ready.
     met: Option<u64>,
     progress: Progress,
@@ -126,7 +140,7 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    /// Takes the name and publishes the scene, without starting the run.
+    /// Takes the name and publishes the scene, without starting the run. The solver has one thread.
     pub(crate) fn new(
         endpoint: &Endpoint,
         scene: Scene,
@@ -146,6 +160,10 @@ impl Node {
             loading: None,
             is_commanded: false,
             boundary: Boundary::Open,
+            cpus: Cpus::observe(),
+            real_time: RealTime::default(),
+            rest: None,
+            polling: Polling::default(),
             met: None,
             progress: Progress {
                 is_paused: options.starts_paused,
@@ -187,7 +205,9 @@ impl Node {
                 self.observe(&observer)?;
                 continue;
             }
+            self.publisher.phases.begin();
             self.apply_commands(due.is_some(), stop)?;
+            self.publisher.phases.end(Phase::Drain);
             if stop.is_requested() {
                 break;
             }
@@ -206,6 +226,8 @@ impl Node {
                 self.publisher.publish_between(&self.solver, self.position())?;
             }
             self.observe(&observer)?;
+            self.publisher.phases.end(Phase::Observe);
+            self.publisher.phases.record();
         }
         // Those of the last boundary, if its step was not made.
         self.publisher.publish_outcomes()
@@ -221,7 +243,7 @@ impl Node {
     /// A paused node has no deadline: a command that lets it step makes the step due at once.
     fn wait(&mut self) -> Option<u64> {
         if !self.progress.is_stepping() {
-            sleep_until(monotonic_ns() + PAUSED_POLL_NS);
+            sleep_until(self.polling.next_ns(monotonic_ns(), PAUSED_POLL_NS));
             let now_ns = monotonic_ns();
             self.paused_ns += now_ns - self.mark_ns;
             self.mark_ns = now_ns;
@@ -238,10 +260,13 @@ impl Node {
         }
         let (now_ns, deadline_ns) = (monotonic_ns(), self.pace.deadline_ns());
         if now_ns + WAITING_POLL_NS < deadline_ns {
-            sleep_until(now_ns + WAITING_POLL_NS);
+            sleep_until(self.polling.next_ns(now_ns, WAITING_POLL_NS));
             return None;
         }
-        sleep_until(deadline_ns);
+        let rest = self.rest.as_mut();
+        sleep_until(
+            rest.map_or(deadline_ns, |rest| rest.end_ns(now_ns, deadline_ns, thread_time_ns)),
+        );
         Some(self.pace.meet(monotonic_ns()))
     }
 
@@ -276,6 +301,7 @@ impl Node {
             return Ok(false);
         }
         let solve_ns = monotonic_ns() - before_ns;
+        self.publisher.phases.end(Phase::Solve);
         if self.solver.frozen_count() > frozen_count {
             let count = self.solver.frozen_count() - frozen_count;
             self.warnings.print(&format!(
@@ -335,6 +361,17 @@ impl Node {
                 path.display()
             ));
         }
+    }
+
+    /// Records the times of the phases of each step from now on.
+    pub(crate) fn record_phases(&mut self) -> anyhow::Result<()> {
+        self.publisher.phases = Phases::recording()?;
+        Ok(())
+    }
+
+    /// Returns the recorded times; `None` unless [`Self::record_phases`] was called.
+    pub(crate) fn phase_times(&self) -> Option<&PhaseTimes> {
+        self.publisher.phases.times()
     }
 
     pub(crate) fn status(&self) -> sim_contract::NodeStatus {

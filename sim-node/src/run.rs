@@ -8,7 +8,7 @@ use sim_contract::{Endpoint, Stop, report_bus_errors};
 use sim_solver::{Scene, Solver};
 
 use crate::args::RunArgs;
-use crate::node::{Node, Options, with_threads};
+use crate::node::{Node, Options, RealTime};
 use crate::{output, scene_source};
 
 /// Summary at the end of a run.
@@ -27,6 +27,7 @@ struct Summary {
     solve_ns_p50: u64,
     solve_ns_p99: u64,
     state_hash: String,
+    real_time: RealTime,
 }
 
 /// Runs a scene.
@@ -46,12 +47,16 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<()> {
         every: args.every,
         lockstep_timeout: args.lockstep_timeout,
         history_bytes: usize::try_from(args.history.as_u64()).unwrap_or(usize::MAX),
+        real_time: args.real_time.options(),
     };
     warn(&scene);
     // Building a large scene takes seconds. Until the node owns anything, a signal ends it at once.
-    let solver = with_threads(Solver::new(&scene), options.threads);
+    let solver = Solver::new(&scene);
     let stop = Stop::install()?;
     let mut node = Node::new(&endpoint, scene, solver, options)?;
+    for line in node.prepare()? {
+        output::note(&line);
+    }
     print_ready(&endpoint, &node);
     let is_terminal = stderr().is_terminal();
     let shows_status = is_terminal && !args.json;
@@ -123,6 +128,7 @@ impl Summary {
             solve_ns_p50: run.solve_ns(0.5),
             solve_ns_p99: run.solve_ns(0.99),
             state_hash: format!("{:016x}", node.solver.state_hash()),
+            real_time: node.real_time,
         }
     }
 

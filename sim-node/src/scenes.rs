@@ -1,5 +1,7 @@
 //! `scenes`, `show` and `check`: scenes without a simulation.
 
+pub(crate) mod import;
+
 use serde::Serialize;
 use sim_solver::builtin;
 use sim_solver::scene::SceneCounts;

@@ -134,6 +134,25 @@ impl Process {
         Self::spawn(command, (program, sandbox.domain()), args, streams)
     }
 
+    /// Starts a program with no capability and the limits of an ordinary user: no real-time priority,
+    /// and 64 KiB of locked memory. It keeps the files of its user.
+    ///
+    /// # Panics
+    /// If the program does not start.
+    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
+    pub fn start_without_privileges(program: Program, sandbox: &Sandbox, args: &[&str]) -> Self {
+        let limits = r#"ulimit -r 0 && ulimit -l 64 && exec "$@""#;
+        let mut command = Command::new("sh");
+        command.args(["-c", limits, "sh"]);
+        if rustix::process::geteuid().is_root() {
+            // Root gets every capability of the bounding set with a new program.
+            command.args(["setpriv", "--bounding-set", "-all", "--inh-caps", "-all"]);
+        }
+        command.arg(program.path());
+        let streams = [Stdio::piped(), Stdio::piped()];
+        Self::spawn(command, (program, sandbox.domain()), args, streams)
+    }
+
     fn spawn(
         mut command: Command,
         (program, domain): (Program, &str),
@@ -244,6 +263,11 @@ impl Process {
                 found.is_ok_and(|found| found.trim_end() == name)
             })
         });
+    }
+
+    /// Returns the process id.
+    pub fn id(&self) -> u32 {
+        self.child.id()
     }
 
     /// Sends a signal.

@@ -20,6 +20,11 @@ pub fn realtime_ns() -> u64 {
     nanoseconds(clock_gettime(ClockId::Realtime))
 }
 
+/// Processor time of the calling thread in nanoseconds.
+pub fn thread_time_ns() -> u64 {
+    nanoseconds(clock_gettime(ClockId::ThreadCPUTime))
+}
+
 /// Sleeps until CLOCK_MONOTONIC reaches `deadline_ns`. A signal ends the sleep early. The deadline
 /// is absolute, so that lateness does not accumulate over the steps.
 pub fn sleep_until(deadline_ns: u64) {

@@ -52,6 +52,7 @@ mod messages;
 mod owner;
 mod ports;
 mod process;
+mod scratch_domain;
 pub mod testing;
 
 pub use client::Client;
@@ -101,6 +102,7 @@ pub use process::bus_error::report_bus_errors;
 pub use process::console;
 pub use process::file_size::report_file_size_limit;
 pub use process::stop::Stop;
+pub use scratch_domain::ScratchDomain;
 pub use sim_types::{
     Action, ActionFields, COLLIDERS_MAX, COORDINATE_MAX, ColliderShape, ConstraintKind,
     ELEMENTS_MAX, GRAB_OVER_S_DEFAULT, KindFilter, Method, NumberRange, OffMeaning, PARAMETERS,

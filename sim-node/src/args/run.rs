@@ -8,6 +8,7 @@ use sim_solver::THREADS_MAX;
 use sim_solver::scene::{PASSES_MAX, RATE_HZ_MAX};
 
 use super::endpoint::EndpointArgs;
+use super::real_time::RealTimeArgs;
 use super::value::{size, time, whole};
 
 #[derive(Debug, ClapArgs)]
@@ -15,7 +16,8 @@ use super::value::{size, time, whole};
     sim-node run                                              run the curtain in real time\n  \
     sim-node run curtain --rate 1000 --duration 10s --json    run 10 s at 1 kHz, then print a summary\n  \
     sim-node run ./my.toml --steps 5000 --as-fast-as-possible run a file without waiting\n  \
-    sim-node run rope --name left --domain lab                run beside other nodes")]
+    sim-node run rope --name left --domain lab                run beside other nodes\n  \
+    sim-node run --rate 1000 --realtime --cpu 3               run 1 kHz with little jitter")]
 pub(crate) struct RunArgs {
     /// Built-in scene (see `sim-node scenes`), or TOML file: a path with / or ending in .toml
     #[arg(default_value = "curtain")]
@@ -57,6 +59,8 @@ pub(crate) struct RunArgs {
     /// distances
     #[arg(long, value_name = "SIZE", default_value = "64MiB", value_parser = size)]
     pub(crate) history: ByteSize,
+    #[command(flatten)]
+    pub(crate) real_time: RealTimeArgs,
     /// Print a summary as one JSON object on stdout at the end
     #[arg(long)]
     pub(crate) json: bool,

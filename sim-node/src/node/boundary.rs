@@ -40,6 +40,9 @@ impl Node {
         for release in lost {
             self.release_lost(release);
         }
+        if !turn.is_empty() {
+            self.polling.on_commands(monotonic_ns());
+        }
         for request in turn {
             match request.received.command.action() {
                 Action::Load { scene } => self.load(&request, scene, stop)?,

@@ -10,6 +10,7 @@ use super::loading::{Loaded, Loading, Refusal};
 use super::pace::Pace;
 use super::publisher::{Run, StepTimes};
 use super::statistics::Statistics;
+use super::threads::start_threads;
 use super::{Boundary, Node};
 
 impl Node {
@@ -26,7 +27,8 @@ impl Node {
         let request = Request { received: request.received, state: None };
         let client_id = request.received.command.client_id;
         let rate_hz = self.scene.solver.rate_hz;
-        let loading = match Loading::start(request.clone(), source.as_str(), self.options, rate_hz)
+        let (options, cpus) = (self.options, &self.cpus);
+        let loading = match Loading::start(request.clone(), source.as_str(), options, rate_hz, cpus)
         {
             Ok(loading) => loading,
             Err(refusal) => return self.answer_load(&request, Err(refusal)),
@@ -96,7 +98,8 @@ impl Node {
     /// Replaces the scene. The inner error is a refusal, and changes nothing; an outer error leaves
     /// neither scene able to continue.
     fn replace_scene(&mut self, loaded: Loaded) -> anyhow::Result<Result<Run, Refusal>> {
-        let Loaded { scene, solver, begins_run } = loaded;
+        let Loaded { scene, mut solver, begins_run } = loaded;
+        start_threads(&mut solver, self.options.threads, &self.cpus);
         let run = if begins_run {
             Run::New(getrandom::u64().context("no random number for the run")?)
         } else {

@@ -10,7 +10,8 @@ use sim_solver::{Scene, Solver};
 
 use super::Options;
 use super::inbox::Request;
-use super::threads::with_threads;
+use super::real_time::cpus::Cpus;
+use super::real_time::scheduling::leave_fifo;
 use crate::scene_source;
 
 /// Interval between two checks for a request to stop.
@@ -25,7 +26,7 @@ pub(super) struct Refusal {
     pub(super) reason: Reason,
 }
 
-/// A scene that is ready to run.
+/// A scene that is ready to run, but for the threads of its solver.
 #[derive(Debug)]
 pub(super) struct Loaded {
     pub(super) scene: Scene,
@@ -43,15 +44,17 @@ pub(super) struct Loading {
 }
 
 impl Loading {
-    /// Starts to load a scene for a run at `rate_hz`.
+    /// Starts to load a scene for a run at `rate_hz`, beside the CPU of the loop.
     pub(super) fn start(
         request: Request,
         source: &str,
         options: Options,
         rate_hz: u32,
+        cpus: &Cpus,
     ) -> Result<Self, Refusal> {
         let source = source.to_owned();
-        let work = Work::start(move || load(&source, options, rate_hz)).map_err(|problem| {
+        let start = || Work::start(move || load(&source, options, rate_hz));
+        let work = cpus.lend(start).map_err(|problem| {
             let reason = Reason::NoEffectHere;
             Refusal { problem, reason }
         })?;
@@ -72,6 +75,7 @@ impl Loading {
 
 /// Reads and builds a scene for a run at `rate_hz`, or for a new one if the scene has another rate.
 fn load(source: &str, options: Options, rate_hz: u32) -> Result<Loaded, Refusal> {
+    leave_fifo();
     let reason = Reason::OutOfRange;
     let mut scene = scene_source::load(source)
         .map_err(|error| Refusal { problem: format!("{error:#}"), reason })?;
@@ -80,7 +84,6 @@ fn load(source: &str, options: Options, rate_hz: u32) -> Result<Loaded, Refusal>
         .map_err(|problem| Refusal { problem, reason })?;
     let begins_run = scene.solver.rate_hz != rate_hz;
     let solver = if begins_run { Solver::new(&scene) } else { Solver::new_in_run(&scene) };
-    let solver = with_threads(solver, options.threads);
     Ok(Loaded { scene, solver, begins_run })
 }
 

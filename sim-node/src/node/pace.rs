@@ -4,6 +4,8 @@
 //! A node more than [`CATCH_UP_NS_MAX`] behind gives up whole periods and counts them, so that a
 //! stall (a suspended process) does not end in a burst of steps.
 
+pub(crate) mod polling;
+
 use sim_contract::clock::SECOND_NS;
 
 /// Most lateness that the node catches up: a quarter of a second, or four periods if that is longer.

@@ -16,6 +16,7 @@ use sim_contract::{
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
+use super::statistics::phases::{Phase, Phases};
 pub(crate) use load::shared_memory_bytes;
 use load::{LoadPlace, count, to_collider_state, with_load};
 
@@ -94,6 +95,8 @@ pub(crate) struct Publisher {
     /// published. The torn constraints of the state count as torn in it.
     since_step: u64,
     colliders: Vec<PlacedCollider>,
+    /// Times of the phases of steps, for `bench`.
+    pub(crate) phases: Phases,
 }
 
 impl Publisher {
@@ -130,6 +133,7 @@ impl Publisher {
             torn_count: 0,
             since_step: 0,
             colliders: Vec::new(),
+            phases: Phases::default(),
         })
     }
 
@@ -291,7 +295,9 @@ impl Publisher {
         let particles: &[ParticleState] = cast_slice(solver.particles());
         self.owner.publish_particles(&self.last, |index| particles[index])?;
         self.snapshot_count = self.snapshot_count.wrapping_add(1);
+        self.phases.end(Phase::Publish);
         self.owner.wake(Wake::Frame);
+        self.phases.end(Phase::Wake);
         Ok(())
     }
 

@@ -1,11 +1,13 @@
 //! Times of steps: over the whole run, and over the last second.
 
+pub(crate) mod phases;
+
 use anyhow::Context;
 use hdrhistogram::Histogram;
 use sim_contract::clock::SECOND_NS;
 
 /// Longest time that the histograms resolve: a minute.
-const TIME_NS_MAX: u64 = 60 * SECOND_NS;
+pub(crate) const TIME_NS_MAX: u64 = 60 * SECOND_NS;
 
 /// Wake-up lateness and solver time of steps. Recording does not allocate.
 #[derive(Debug)]
@@ -36,6 +38,10 @@ impl Times {
         self.solve.len()
     }
 
+    pub(crate) fn wake_late(&self) -> &Histogram<u64> {
+        &self.wake_late
+    }
+
     pub(crate) fn wake_late_ns(&self, quantile: f64) -> u64 {
         self.wake_late.value_at_quantile(quantile)
     }
@@ -45,12 +51,32 @@ impl Times {
     }
 }
 
+/// Percentiles of the times of a second.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SecondTimes {
+    pub(crate) wake_late_ns_p50: u64,
+    pub(crate) wake_late_ns_p99: u64,
+    pub(crate) solve_ns_p50: u64,
+    pub(crate) solve_ns_p99: u64,
+}
+
+impl SecondTimes {
+    fn new(times: &Times) -> Self {
+        Self {
+            wake_late_ns_p50: times.wake_late_ns(0.5),
+            wake_late_ns_p99: times.wake_late_ns(0.99),
+            solve_ns_p50: times.solve_ns(0.5),
+            solve_ns_p99: times.solve_ns(0.99),
+        }
+    }
+}
+
 /// Times and losses of a run.
 #[derive(Debug)]
 pub(crate) struct Statistics {
     pub(crate) run: Times,
-    /// Times of the last whole second.
-    pub(crate) last: Times,
+    /// Times of the last whole second, computed once: a status follows each command.
+    pub(crate) last: SecondTimes,
     current: Times,
     current_start_ns: u64,
     /// Simulated time per wall-clock time in the last whole second.
@@ -65,7 +91,7 @@ impl Statistics {
     pub(crate) fn new(now_ns: u64) -> anyhow::Result<Self> {
         Ok(Self {
             run: Times::new()?,
-            last: Times::new()?,
+            last: SecondTimes::default(),
             current: Times::new()?,
             current_start_ns: now_ns,
             real_time_factor: 0.0,
@@ -86,10 +112,10 @@ impl Statistics {
         if elapsed_ns < SECOND_NS {
             return false;
         }
-        std::mem::swap(&mut self.last, &mut self.current);
+        let simulated_s = self.current.step_count() as f64 / f64::from(rate_hz);
+        self.last = SecondTimes::new(&self.current);
         self.current.clear();
         self.current_start_ns = now_ns;
-        let simulated_s = self.last.step_count() as f64 / f64::from(rate_hz);
         self.real_time_factor = simulated_s / (elapsed_ns as f64 / SECOND_NS as f64);
         true
     }

@@ -1,25 +1,38 @@
-//! Number of threads of the solver. It changes no bit.
-
-use std::num::NonZero;
-use std::thread::available_parallelism;
+//! The threads of a node: that of the loop, and those of the solver, whose number changes no bit.
 
 use sim_solver::{Solver, THREADS_MAX};
+
+use super::Node;
+use super::real_time::cpus::Cpus;
+use super::real_time::preparation::{Prepared, prepare};
+use super::real_time::rest::Rest;
 
 /// Number of particles from which on the default is more than one thread. The solver does not divide
 /// smaller scenes.
 const SHARED_MIN: usize = 4000;
 
+impl Node {
+    /// Obtains the real-time properties of the options and starts the solver's threads. Call it on the
+    /// thread of the loop, after everything that takes long. Returns lines for people.
+    ///
+    /// # Errors
+    /// The system refuses a property that the options require.
+    pub(crate) fn prepare(&mut self) -> anyhow::Result<Vec<String>> {
+        let Prepared { real_time, lines } = prepare(self.options.real_time, &mut self.cpus)?;
+        self.real_time = real_time;
+        self.rest = real_time.fifo_priority.map(|_| Rest::default());
+        // They inherit the scheduling of this thread.
+        start_threads(&mut self.solver, self.options.threads, &self.cpus);
+        Ok(lines)
+    }
+}
+
 /// Starts the threads of a new solver: the requested number, or the default of its scene. No step
-/// starts a thread.
-pub(crate) fn with_threads(mut solver: Solver, requested: Option<u8>) -> Solver {
-    let by_default = || {
-        // One core, if the system does not tell their number.
-        let core_count = available_parallelism().map_or(1, NonZero::get);
-        default_count(solver.particle_count(), core_count)
-    };
+/// starts a thread. The thread of the loop calls it, because they inherit its scheduling.
+pub(super) fn start_threads(solver: &mut Solver, requested: Option<u8>, cpus: &Cpus) {
+    let by_default = || default_count(solver.particle_count(), cpus.core_count);
     let count = requested.map_or_else(by_default, usize::from);
-    solver.set_threads(count);
-    solver
+    cpus.lend(|| solver.set_threads(count));
 }
 
 /// Default number of threads: 1 for a small scene, else one less than the number of cores available
@@ -58,9 +71,11 @@ mod tests {
 
     #[test]
     fn a_solver_has_the_requested_threads_or_the_default_of_its_scene() {
-        let empty = || Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
-        assert_eq!(with_threads(empty(), Some(3)).threads(), 3);
-        assert_eq!(with_threads(empty(), Some(1)).threads(), 1);
-        assert_eq!(with_threads(empty(), None).threads(), 1);
+        let cpus = Cpus::observe();
+        for (requested, expected) in [(Some(3), 3), (Some(1), 1), (None, 1)] {
+            let mut solver = Solver::new(&Scene::from_toml("version = 1", "empty").unwrap());
+            start_threads(&mut solver, requested, &cpus);
+            assert_eq!(solver.threads(), expected);
+        }
     }
 }
