@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::thread;
 use std::time::Duration;
 
-use iceoryx2::prelude::{CallbackProgression, Config, Service, ipc};
+use iceoryx2::prelude::{CallbackProgression, Config};
 
 use crate::client::Client;
 use crate::clock::{self, Deadline};
@@ -12,7 +12,7 @@ use crate::endpoint::Endpoint;
 use crate::messages::command::CONSOLE_CLIENT_ID;
 use crate::messages::status::NodeStatus;
 use crate::ports::domain::owner_lock::OwnerLock;
-use crate::ports::domain::{lock_list, root};
+use crate::ports::domain::{lock_list, root, unfinished};
 use crate::ports::service::{STATUS, ServiceError};
 use crate::ports::services::AttachError;
 
@@ -78,7 +78,7 @@ pub(crate) fn list(
 fn names_of_services(config: &Config) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     // Without a list, the locks tell all names but those of damaged domains.
-    let _ = ipc::Service::list(config, |service| {
+    unfinished::list_services(config, |service| {
         let service = service.static_details.name().as_str();
         if let Some(name) = service.strip_suffix(STATUS.suffix)
             && let Some(name) = name.strip_suffix('/')

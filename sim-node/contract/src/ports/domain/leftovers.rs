@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, Service, ipc};
+use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, ipc};
 
 use crate::clock;
 use crate::ports::domain::files::segments;
@@ -147,8 +147,8 @@ struct ServiceFile {
 /// Returns the services of this contract that no living process has open.
 fn dead_services(config: &Config) -> Vec<ServiceFile> {
     let mut dead = Vec::new();
-    // After an error, the services that were not listed count as open.
-    let _ = ipc::Service::list(config, |service| {
+    // The services that were not listed count as open.
+    unfinished::list_services(config, |service| {
         if let Some(file) = service_file(config, service.static_details.name().as_str()) {
             let is_alive = |node: &NodeState<ipc::Service>| !matches!(node, NodeState::Dead(_));
             let is_open = match &service.dynamic_details {
