@@ -82,3 +82,29 @@ fn the_iceoryx2_python_package_reads_particles_tears_and_parameters() {
         assert_eq!(position, expected);
     }
 }
+
+#[test]
+#[ignore = "needs Python"]
+fn a_foreign_process_that_floods_ready_and_restore_changes_nothing() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let recording = record(&sandbox, &file);
+    let prefix = format!("{}_", sandbox.domain());
+    let root = format!("/tmp/catenary-{}-{}", rustix::process::getuid().as_raw(), sandbox.domain());
+    let before = ctl(&sandbox, &["status"]);
+    let flood = python(&sandbox, "flood.py", &[&prefix, &root, "10"]);
+    assert!(flood["messages"].as_u64() > Some(1000), "{flood}");
+    let after = ctl(&sandbox, &["status"]);
+    assert!(after["step"].as_u64() > before["step"].as_u64(), "{after}");
+    assert!(after["rejected_commands"].as_u64() > Some(100), "{after}");
+    assert_eq!(after["lockstep"].as_array().map(Vec::len), Some(0), "{after}");
+    // Every state is the one that the scene computes without the flood.
+    ctl(&sandbox, &["pause"]);
+    let finished = recording.interrupt();
+    assert!(matches!(finished.code, Some(0 | 3)), "{}", finished.stderr);
+    let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    assert!(verified.contains("steps bit-identical"), "{verified}");
+    assert!(!verified.contains("taken from the file"), "{verified}");
+    assert_eq!(node.interrupt().code, Some(0));
+}
