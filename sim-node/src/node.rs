@@ -24,7 +24,7 @@ use sim_solver::{Scene, Solver};
 use grab_connections::GrabConnections;
 use history::History;
 use inbox::Inbox;
-use loading::Loading;
+use loading::{Loading, Overrides};
 use lockstep::{Event, Lockstep};
 use pace::Pace;
 use pace::polling::Polling;
@@ -86,6 +86,10 @@ enum Boundary {
 }
 
 impl Options {
+    fn overrides(&self) -> Overrides {
+        Overrides { rate_hz: self.rate_hz, substeps: self.substeps }
+    }
+
     /// Number of steps after which a run at this rate ends.
     fn last_step(&self, rate_hz: u32) -> Option<u64> {
         let steps_in = |time: Duration| {

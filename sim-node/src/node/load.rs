@@ -27,12 +27,12 @@ impl Node {
         let request = Request { received: request.received, state: None };
         let client_id = request.received.command.client_id;
         let rate_hz = self.scene.solver.rate_hz;
-        let (options, cpus) = (self.options, &self.cpus);
-        let loading = match Loading::start(request.clone(), source.as_str(), options, rate_hz, cpus)
-        {
-            Ok(loading) => loading,
-            Err(refusal) => return self.answer_load(&request, Err(refusal)),
-        };
+        let (overrides, cpus) = (self.options.overrides(), &self.cpus);
+        let loading =
+            match Loading::start(request.clone(), source.as_str(), overrides, rate_hz, cpus) {
+                Ok(loading) => loading,
+                Err(refusal) => return self.answer_load(&request, Err(refusal)),
+            };
         if self.options.waits_for_time && !self.lockstep.has_members() {
             self.inbox.hold(client_id);
             self.loading = Some(loading);

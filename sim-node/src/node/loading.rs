@@ -8,7 +8,6 @@ use std::time::Duration;
 use sim_contract::{Reason, Stop};
 use sim_solver::{Scene, Solver};
 
-use super::Options;
 use super::inbox::Request;
 use super::real_time::cpus::Cpus;
 use super::real_time::scheduling::leave_fifo;
@@ -16,6 +15,13 @@ use crate::scene_source;
 
 /// Interval between two checks for a request to stop.
 const POLL: Duration = Duration::from_millis(50);
+
+/// Settings of the node that replace those of each scene.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Overrides {
+    pub(crate) rate_hz: Option<u32>,
+    pub(crate) substeps: Option<u32>,
+}
 
 /// Why a scene cannot be loaded.
 #[derive(Debug)]
@@ -48,12 +54,12 @@ impl Loading {
     pub(super) fn start(
         request: Request,
         source: &str,
-        options: Options,
+        overrides: Overrides,
         rate_hz: u32,
         cpus: &Cpus,
     ) -> Result<Self, Refusal> {
         let source = source.to_owned();
-        let start = || Work::start(move || load(&source, options, rate_hz));
+        let start = || Work::start(move || load(&source, overrides, rate_hz));
         let work = cpus.lend(start).map_err(|problem| {
             let reason = Reason::NoEffectHere;
             Refusal { problem, reason }
@@ -74,13 +80,13 @@ impl Loading {
 }
 
 /// Reads and builds a scene for a run at `rate_hz`, or for a new one if the scene has another rate.
-fn load(source: &str, options: Options, rate_hz: u32) -> Result<Loaded, Refusal> {
+fn load(source: &str, overrides: Overrides, rate_hz: u32) -> Result<Loaded, Refusal> {
     leave_fifo();
     let reason = Reason::OutOfRange;
     let mut scene = scene_source::load(source)
         .map_err(|error| Refusal { problem: format!("{error:#}"), reason })?;
     scene
-        .override_solver(options.rate_hz, options.substeps)
+        .override_solver(overrides.rate_hz, overrides.substeps)
         .map_err(|problem| Refusal { problem, reason })?;
     let begins_run = scene.solver.rate_hz != rate_hz;
     let solver = if begins_run { Solver::new(&scene) } else { Solver::new_in_run(&scene) };

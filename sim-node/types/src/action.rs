@@ -3,8 +3,8 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::constraint_kind::ConstraintKind;
-use crate::json_hash;
-use crate::json_number::{number, optional_number, rotation, vector};
+use crate::json::hash;
+use crate::json::non_finite::{number, optional_number, rotation, vector};
 use crate::parameter::ParameterValue;
 use crate::text::Text;
 
@@ -162,7 +162,7 @@ pub enum Action {
         /// Part of the state that was given.
         contents: RestoreContents,
         /// Hash of the state in place.
-        #[serde(with = "json_hash")]
+        #[serde(with = "hash")]
         state_hash: u64,
     },
     /// A kind that this version does not know. Always rejected.

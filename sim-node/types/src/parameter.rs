@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::json_number::{number, vector};
+use crate::json::non_finite::{number, vector};
 use crate::range::NumberRange;
 
 /// A parameter that can change while a scene runs.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::constraint_kind::ConstraintKind;
-use crate::json_number::{number, optional_number, vector};
+use crate::json::non_finite::{number, optional_number, vector};
 use crate::parameter::{Parameter, ParameterValue};
 
 /// A parameter with a value. `compliance` and `stiffness` have a value for each kind of constraint.

@@ -388,7 +388,7 @@ mod tests {
             fs::set_permissions(&path, Permissions::from_mode(0o400)).unwrap();
             File::create_new(&segment).unwrap().set_len(size_bytes).unwrap();
             fs::set_permissions(&segment, Permissions::from_mode(mode)).unwrap();
-            // It would wait for ever.
+            // It would wait without end.
             list_services(&config, |_| panic!("an unfinished service was listed"));
             assert_works(&domain);
             assert!(!segment.exists());
