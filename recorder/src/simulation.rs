@@ -61,7 +61,7 @@ pub(crate) fn simulate<W: Write>(
             let is_rewind = matches!(command.action, Action::Rewind { .. });
             let answer = match command.action {
                 Action::Rewind { to_step: Some(to_step), back_steps: None } => {
-                    kept.rewind(&mut solver, step, to_step).map(|()| Applied::InPlace)
+                    kept.rewind(&mut solver, to_step).map(|()| Applied::InPlace)
                 }
                 action => apply(&mut solver, command.client_id, &action),
             };

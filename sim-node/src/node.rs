@@ -197,6 +197,7 @@ impl Node {
         self.mark_ns = self.start_ns;
         self.pace.restart(self.start_ns);
         self.publisher.publish_step(&self.solver, self.position(), StepTimes::default())?;
+        self.check_history();
         self.keep_state();
         self.observe(&observer)?;
         while !stop.is_requested() && !self.is_done() {
@@ -326,6 +327,15 @@ impl Node {
         self.publisher.publish_step(&self.solver, self.position(), times)?;
         self.keep_state();
         Ok(true)
+    }
+
+    /// Warns if the history is too small for the scene.
+    fn check_history(&mut self) {
+        if !self.history.has_room(&self.solver) {
+            self.warnings.print(
+                "no past state is kept, because a state of this scene is larger than --history",
+            );
+        }
     }
 
     /// Keeps the state of a step for a rewind.

@@ -244,7 +244,7 @@ fn check(finding: Finding) -> anyhow::Result<()> {
         Finding::Identical => Ok(()),
         Finding::Interrupted => bail!("interrupted"),
         Finding::Diverged { step, what, .. } | Finding::Incomplete { step, what } => Err(anyhow!(
-            "the state cannot be simulated: step {step} differs: {what} (`recorder verify` tells more)"
+            "the state cannot be simulated: step {step} differs: {what} (`recorder verify` shows the details)"
         )),
         Finding::OtherContent { what } => bail!("{what}"),
     }

@@ -10,8 +10,8 @@ use sim_solver::{Keyframe, Particle, Solver};
 /// them.
 #[derive(Debug)]
 pub(super) struct KeptStates {
-    /// By step: the last step that rewinds to it, and the state once it is computed.
-    by_step: BTreeMap<u64, (u64, Option<State>)>,
+    /// By step: the number of commands that are still to rewind to it, and the state once it is computed.
+    by_step: BTreeMap<u64, (usize, Option<State>)>,
 }
 
 #[derive(Debug)]
@@ -26,7 +26,7 @@ impl KeptStates {
         let mut by_step = BTreeMap::new();
         for command in commands {
             if let Action::Rewind { to_step: Some(to_step), .. } = command.action {
-                by_step.insert(to_step, (command.step, None));
+                by_step.entry(to_step).or_insert((0, None)).0 += 1;
             }
         }
         Self { by_step }
@@ -40,18 +40,14 @@ impl KeptStates {
         }
     }
 
-    /// Puts the state of a step in place at the boundary before `step`.
-    pub(super) fn rewind(
-        &mut self,
-        solver: &mut Solver,
-        step: u64,
-        to_step: u64,
-    ) -> Result<(), Reason> {
-        let Some((last_use, Some(state))) = self.by_step.get(&to_step) else {
+    /// Puts the state of a step in place.
+    pub(super) fn rewind(&mut self, solver: &mut Solver, to_step: u64) -> Result<(), Reason> {
+        let Some((use_count, Some(state))) = self.by_step.get_mut(&to_step) else {
             return Err(Reason::OutOfRange);
         };
         solver.put_in_place(&state.particles, &state.keyframe).map_err(|_| Reason::InvalidState)?;
-        if *last_use <= step {
+        *use_count -= 1;
+        if *use_count == 0 {
             self.by_step.remove(&to_step);
         }
         Ok(())

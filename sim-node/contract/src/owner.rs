@@ -12,7 +12,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
 
 use crate::endpoint::Endpoint;
-use crate::limits::{COMMANDS_BUFFERED, CONTRACT_VERSION, READY_BUFFERED};
+use crate::limits::{COMMANDS_BUFFERED, CONTRACT_VERSION, READY_BUFFERED, RESTORES_MAX};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::command::Command;
 use crate::messages::outcome::Outcome;
@@ -129,12 +129,27 @@ impl Owner {
     /// nothing has changed, and the old load can continue. After [`OwnerError::Publish`] it
     /// cannot continue, because its writers are gone.
     pub fn load(&mut self, load: &Load<'_>) -> Result<(), OwnerError> {
+        self.load_after(load, |_| Ok(()))
+    }
+
+    /// Same as [`Owner::load`]. Calls `publish_last` once nothing but memory can fail, before anything of the
+    /// new load is published.
+    ///
+    /// # Errors
+    /// Same as [`Owner::load`], or those of `publish_last`.
+    pub fn load_after(
+        &mut self,
+        load: &Load<'_>,
+        publish_last: impl FnOnce(&Self) -> Result<(), PublishError>,
+    ) -> Result<(), OwnerError> {
         check_limits(load)?;
         check_memory(load)?;
         // All new writers exist before the old ones are dropped, so an error leaves the old load as
         // it was. The old ones are dropped before the new ones publish: readers empty the buffers of
         // dropped writers first, so they never see the new load before the old.
-        self.writers = LoadWriters::create(&self.services, load)?;
+        let writers = LoadWriters::create(&self.services, load)?;
+        publish_last(self)?;
+        self.writers = writers;
         self.publish_load(load)?;
         self.wake(Wake::Load);
         Ok(())
@@ -261,12 +276,15 @@ impl Owner {
     }
 
     /// Appends the states that clients have given, each with the command that its outcome answers: at most
-    /// two of each connection. Returns the number of messages that are no state at all.
+    /// two of each connection, and [`crate::RESTORES_MAX`] in all. A message that is longer than any state of
+    /// the load is not copied: its state has no particles. Returns the number of malformed messages.
     pub fn receive_states(&self, states: &mut Vec<(ReceivedCommand, ReceivedState)>) -> u64 {
         let mut refused_count = 0;
-        receive_held(&self.restore, |header, payload, connection| {
+        let size_bytes_max = self.writers.state_size_bytes_max();
+        receive_held(&self.restore, RESTORES_MAX, |header, payload, connection| {
             let command = header.command().map(|command| ReceivedCommand { command, connection });
-            match command.zip(ReceivedState::from_message(header, payload)) {
+            let state = ReceivedState::from_message(header, payload, size_bytes_max);
+            match command.zip(state) {
                 Some(state) => states.push(state),
                 None => refused_count += 1,
             }

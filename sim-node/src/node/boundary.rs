@@ -9,7 +9,6 @@ use sim_solver::{Applied, Control, Keyframe, Particle};
 
 use super::history::Target;
 use super::inbox::Request;
-use super::loading::Loading;
 use super::{Boundary, Node};
 
 impl Node {
@@ -23,7 +22,12 @@ impl Node {
             // The next step shows it without further changes.
             return Ok(());
         }
-        if let Some(loaded) = self.loading.as_ref().and_then(Loading::poll) {
+        let has_members = self.lockstep.has_members();
+        let loaded = self.loading.as_ref().and_then(|loading| {
+            // A member has joined meanwhile.
+            if has_members { loading.wait(stop) } else { loading.poll() }
+        });
+        if let Some(loaded) = loaded {
             return self.finish_load(loaded);
         }
         let lost =
@@ -91,10 +95,13 @@ impl Node {
     fn rewind(&mut self, target: Target, command: &mut Command) -> Result<Applied, Reason> {
         let state = self.history.find(self.step, target)?;
         let to_step = state.step;
-        // A kept state is one of this scene.
-        self.solver
-            .put_in_place(&state.particles, &state.keyframe())
-            .map_err(|_| Reason::InvalidState)?;
+        self.solver.put_in_place(&state.particles, &state.keyframe()).map_err(|error| {
+            debug_assert!(
+                false,
+                "the kept state of step {to_step} does not belong to the scene: {error}"
+            );
+            Reason::InvalidState
+        })?;
         self.history.add_branch(self.step + 1, to_step);
         self.grab_connections.on_rewind(self.solver.grabs());
         self.show_state_in_place();
@@ -122,7 +129,11 @@ impl Node {
         self.show_state_in_place();
         let action = Action::Restore { contents, state_hash: self.solver.hash_in_place() };
         *command = Command::new(command.client_id, command.sequence, action);
-        Ok(Applied::InPlace)
+        Ok(match contents {
+            RestoreContents::State => Applied::InPlace,
+            // The torn constraints stay.
+            RestoreContents::Motion => Applied::State,
+        })
     }
 
     fn put_in_place(&mut self, state: &ReceivedState) -> Result<(), String> {
@@ -147,12 +158,14 @@ impl Node {
     fn show_state_in_place(&mut self) {
         self.progress.is_state_due = true;
         self.boundary = Boundary::Closed;
+        self.publisher.include(self.step + 1);
     }
 
     /// Releases a particle whose client is gone. A frozen particle has nothing to release, and no
     /// client waits for an answer.
     fn release_lost(&mut self, release: Command) {
         if self.solver.apply(release.client_id, &release.action()).is_ok() {
+            self.is_commanded = true;
             self.publisher.add_disconnection(self.step + 1, release);
         }
     }

@@ -79,19 +79,22 @@ impl History {
         }
     }
 
-    /// Returns `true` if at least the state of one step fits.
+    /// Returns `true` if at least the state of one step fits, or none is asked for.
     pub(super) fn has_room(&self, solver: &Solver) -> bool {
-        state_size_bytes(solver) <= self.limit_bytes
+        self.limit_bytes == 0 || state_size_bytes(solver) <= self.limit_bytes
     }
 
     /// Keeps the state after a step. `is_commanded` is true if a command was applied before it.
     pub(super) fn keep(&mut self, step: u64, solver: &Solver, is_commanded: bool) {
-        if !self.has_room(solver) {
+        if self.limit_bytes == 0 {
             return;
         }
         let keyframe = self.keyframe(solver, is_commanded);
         // A shared keyframe counts for each of its states, so that the memory is never exceeded.
         let size_bytes = state_size_bytes(solver) + keyframe.size_bytes();
+        if size_bytes > self.limit_bytes {
+            return;
+        }
         while self.size_bytes + size_bytes > self.limit_bytes && !self.states.is_empty() {
             self.thin();
         }
@@ -253,7 +256,8 @@ mod tests {
         assert_eq!(steps(&history_after(1, 7)), [7]);
         let history = history_after(0, 7);
         assert!(steps(&history).is_empty());
-        assert!(!history.has_room(&pendulum()));
+        assert!(history.has_room(&pendulum()), "none is asked for");
+        assert!(!History::new(10).has_room(&pendulum()));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{OwnerError, Reason, Stop, Text};
+use sim_contract::{Command, OwnerError, Reason, Stop, Text};
 use sim_solver::Applied;
 
 use super::inbox::Request;
@@ -67,7 +67,7 @@ impl Node {
         self.next_status_ns = 0;
         let (step, command) = (self.step + 1, request.received.command);
         let replaced = match loaded {
-            Ok(loaded) => self.replace_scene(loaded)?,
+            Ok(loaded) => self.replace_scene(loaded, command)?,
             Err(refusal) => Err(refusal),
         };
         match replaced {
@@ -80,15 +80,13 @@ impl Node {
             Ok(run) => {
                 self.grab_connections.on_applied(&request.received);
                 self.history.clear();
+                self.check_history();
                 match run {
                     Run::Same { .. } => {
                         self.publisher.add_outcome(step, command, Ok(Applied::InPlace));
                         self.progress.is_state_due = true;
                     }
-                    Run::New(run_id) => {
-                        self.publisher.add_last_outcome(step, command);
-                        self.begin_run(run_id)?;
-                    }
+                    Run::New { run_id, .. } => self.begin_run(run_id)?,
                 }
             }
         }
@@ -97,16 +95,21 @@ impl Node {
 
     /// Replaces the scene. The inner error is a refusal, and changes nothing; an outer error leaves
     /// neither scene able to continue.
-    fn replace_scene(&mut self, loaded: Loaded) -> anyhow::Result<Result<Run, Refusal>> {
+    fn replace_scene(
+        &mut self,
+        loaded: Loaded,
+        command: Command,
+    ) -> anyhow::Result<Result<Run, Refusal>> {
         let Loaded { scene, mut solver, begins_run } = loaded;
         start_threads(&mut solver, self.options.threads, &self.cpus);
         let run = if begins_run {
-            Run::New(getrandom::u64().context("no random number for the run")?)
+            let run_id = getrandom::u64().context("no random number for the run")?;
+            Run::New { run_id, last: self.publisher.last_outcome(self.step + 1, command) }
         } else {
             Run::Same { step: self.step + 1 }
         };
         let time_scale = self.progress.time_scale;
-        match self.publisher.load(&scene, &solver, run, time_scale) {
+        match self.publisher.load(&scene, &solver, &run, time_scale) {
             Err(error @ OwnerError::Publish(_)) => {
                 Err(error).context("publishing the loaded scene")
             }
@@ -124,11 +127,12 @@ impl Node {
     /// Begins a run of the new scene with its step 0. A paused node stays paused.
     fn begin_run(&mut self, run_id: u64) -> anyhow::Result<()> {
         let rate_hz = self.scene.solver.rate_hz;
-        self.publisher.begin_run(run_id, rate_hz)?;
+        self.publisher.begin_run(run_id, rate_hz);
         self.lockstep.begin_run();
         self.progress.begin_run();
         let now_ns = monotonic_ns();
         self.pace = Pace::new(rate_hz, now_ns);
+        self.pace.set_time_scale(self.progress.time_scale, now_ns);
         self.statistics = Statistics::new(now_ns)?;
         (self.start_ns, self.paused_ns, self.mark_ns) = (now_ns, 0, now_ns);
         self.step = 0;

@@ -39,15 +39,19 @@ pub(crate) struct Position {
 }
 
 /// Run of a loaded scene.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) enum Run {
     /// The run goes on, because the rate is the same.
     Same {
         /// The first step that shows the scene.
         step: u64,
     },
-    /// A new run with this id.
-    New(u64),
+    /// A new run.
+    New {
+        run_id: u64,
+        /// Outcome of the load, which ends the log of the old run.
+        last: Box<Outcome>,
+    },
 }
 
 /// Numbers of readers of two services.
@@ -66,8 +70,8 @@ pub(crate) struct Publisher {
     scene_hash: u64,
     /// Loads of this run after the first one.
     topology_revision: u32,
-    /// Number of steps between published snapshots. The last one before a pause and those of
-    /// `since_step` are published too.
+    /// Number of steps between published snapshots. The last one before a pause, and states
+    /// that commands put in place, are published too.
     every: u64,
     /// Times of the last step.
     times: StepTimes,
@@ -91,9 +95,11 @@ pub(crate) struct Publisher {
     parameters: ParameterValues,
     /// Number of torn constraints, and the colliders, as last published.
     torn_count: usize,
-    /// First step of the last load, or step of the last state that a command put in place. It is always
-    /// published. The torn constraints of the state count as torn in it.
+    /// First step of the last load, or step of the last complete state that a command put in place. The
+    /// torn constraints of the state count as torn in it.
     since_step: u64,
+    /// A step whose snapshot is published, whatever `every` says.
+    included_step: u64,
     colliders: Vec<PlacedCollider>,
     /// Times of the phases of steps, for `bench`.
     pub(crate) phases: Phases,
@@ -132,6 +138,7 @@ impl Publisher {
             parameters,
             torn_count: 0,
             since_step: 0,
+            included_step: 0,
             colliders: Vec::new(),
             phases: Phases::default(),
         })
@@ -145,16 +152,28 @@ impl Publisher {
         &mut self,
         scene: &Scene,
         solver: &Solver,
-        run: Run,
+        run: &Run,
         time_scale: f64,
     ) -> Result<(), OwnerError> {
-        let (run_id, step, topology_revision) = match run {
+        let (run_id, step, topology_revision) = match *run {
             Run::Same { step } => (self.run_id, step, self.topology_revision + 1),
-            Run::New(run_id) => (run_id, 0, 0),
+            Run::New { run_id, .. } => (run_id, 0, 0),
         };
         let parameters = parameter_values(solver, time_scale);
         let place = LoadPlace { run_id, step, topology_revision, parameters };
-        with_load(scene, solver, place, |load| self.owner.load(load))?;
+        let Self { owner, outcomes, .. } = self;
+        with_load(scene, solver, place, |load| {
+            owner.load_after(load, |owner| match run {
+                Run::Same { .. } => Ok(()),
+                // The outcomes of the old run come before anything of the new one.
+                Run::New { last, .. } => {
+                    let mut all = outcomes.drain(..).chain([**last]);
+                    all.try_for_each(|outcome| owner.publish_outcome(&outcome))?;
+                    owner.wake(Wake::Outcome);
+                    Ok(())
+                }
+            })
+        })?;
         self.scene_hash = scene_hash(scene.to_toml().as_bytes());
         self.parameters = parameters;
         self.topology_revision = topology_revision;
@@ -164,20 +183,19 @@ impl Publisher {
         Ok(())
     }
 
-    /// Logs the load that begins another run, which ends the log of this one.
-    pub(crate) fn add_last_outcome(&mut self, step: u64, command: Command) {
+    /// Returns the outcome of a load that begins another run: the last one of this run.
+    pub(crate) fn last_outcome(&self, step: u64, command: Command) -> Box<Outcome> {
         let outcome = Outcome::new(self.outcome_count, step, command, Ok(()));
-        self.log(&outcome, OUTCOME_FLAG_NEW_RUN);
+        Box::new(Outcome { run_id: self.run_id, flags: OUTCOME_FLAG_NEW_RUN, ..outcome })
     }
 
     /// Begins a run, whose scene is published. Publish its step 0 next.
-    pub(crate) fn begin_run(&mut self, run_id: u64, rate_hz: u32) -> anyhow::Result<()> {
-        self.publish_outcomes()?;
+    pub(crate) fn begin_run(&mut self, run_id: u64, rate_hz: u32) {
         (self.run_id, self.rate_hz) = (run_id, rate_hz);
         (self.last, self.snapshot_count, self.keyframe_step) = (SnapshotHeader::default(), 0, 0);
         (self.outcome_count, self.rejected_count) = (0, 0);
+        (self.since_step, self.included_step) = (0, 0);
         self.is_keyframe_due = true;
-        Ok(())
     }
 
     /// Appends the commands that have arrived.
@@ -190,6 +208,11 @@ impl Publisher {
         let mut states = Vec::new();
         self.rejected_count += self.owner.receive_states(&mut states);
         states
+    }
+
+    /// Publishes the snapshot of a coming step in any case.
+    pub(crate) fn include(&mut self, step: u64) {
+        self.included_step = step;
     }
 
     /// Identifies the scene.
@@ -265,8 +288,8 @@ impl Publisher {
         self.times = times;
         self.publish_colliders(solver, position.step)?;
         self.publish_tears(solver, position.step)?;
-        let is_in_place = position.step == self.since_step;
-        if !(position.step.is_multiple_of(self.every) || position.is_last || is_in_place) {
+        let is_included = [self.since_step, self.included_step].contains(&position.step);
+        if !(position.step.is_multiple_of(self.every) || position.is_last || is_included) {
             return self.publish_outcomes();
         }
         self.publish_snapshot(solver, position)

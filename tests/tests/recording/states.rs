@@ -193,6 +193,7 @@ fn a_client_gives_positions_and_velocities_and_the_rest_stays() {
     let file = sandbox.path("run.mcap");
     let node = node(&sandbox, &["run", "curtain", "--paused"]);
     let recording = record(&sandbox, &file);
+    ctl(&sandbox, &["cut", "400"]);
     ctl(&sandbox, &["step", "20"]);
     let mut held = held_state(&sandbox);
     ctl(&sandbox, &["pin", "90"]);
@@ -221,6 +222,9 @@ fn a_client_gives_positions_and_velocities_and_the_rest_stays() {
     node.interrupt().success();
     let verified = recorder(&sandbox, &["verify", &file]);
     assert!(verified.contains("1 states taken from the file"), "{verified}");
+    let rows = frames(&file).into_iter().flat_map(|frame| frame.updates);
+    let tears = rows.filter(|update| matches!(update, Message::Tears(_)));
+    assert_eq!(tears.map(|update| update.step()).collect::<Vec<_>>(), [1], "torn once");
 }
 
 /// Sends random commands, rewinds and states included, and waits for each outcome.
@@ -247,8 +251,33 @@ fn disturb(client: &mut Client, held: &Held, seed: u64, count: usize) {
             }
             _ => Action::Grab { particle, target, over_s: 0.05 },
         };
-        client.request(action, DEADLINE).unwrap();
+        let outcome = client.request(action, DEADLINE).unwrap();
+        assert_ne!(outcome.reason(), Some(Reason::InvalidState), "{outcome:?}");
     }
+}
+
+#[test]
+fn a_rewind_goes_to_a_step_after_the_lost_grab_of_a_client() {
+    let sandbox = Sandbox::new();
+    let node = node(&sandbox, &["run", "curtain"]);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let grab = Action::Grab { particle: 90, target: [0.5, -0.2, 0.3], over_s: 0.1 };
+    assert!(client.request(grab, DEADLINE).unwrap().is_applied());
+    drop(client);
+    let mut other = Client::attach(&sandbox.endpoint()).unwrap();
+    let released = wait_for("the release of the lost grab", || {
+        let snapshot = other.latest_snapshot(DEADLINE).unwrap()?;
+        let is_grabbed = snapshot.particles()[90].flags & ParticleFlags::GRABBED != 0;
+        (!is_grabbed).then(|| snapshot.header().step)
+    });
+    wait_for("a later step", || {
+        let snapshot = other.latest_snapshot(DEADLINE).unwrap()?;
+        (snapshot.header().step > released + 10).then_some(())
+    });
+    let rewind = Action::Rewind { to_step: Some(released + 5), back_steps: None };
+    let outcome = other.request(rewind, DEADLINE).unwrap();
+    assert!(outcome.is_applied(), "{outcome:?}");
+    node.interrupt().success();
 }
 
 #[test]

@@ -223,6 +223,10 @@ impl Replay {
     pub(crate) fn answer_commands(&mut self, next_step: u64) -> anyhow::Result<bool> {
         self.owner.refresh();
         self.owner.receive_commands(&mut self.commands);
+        // A replay refuses states, but answers the clients that give them.
+        let mut states = Vec::new();
+        self.owner.receive_states(&mut states);
+        self.commands.extend(states.into_iter().map(|(command, _)| command));
         let has_any = !self.commands.is_empty();
         for ReceivedCommand { command, .. } in self.commands.drain(..) {
             let result = self.control.obey(command.action());

@@ -209,12 +209,16 @@ impl Commander {
                 _ => RequestError::QueueFull { owner },
             });
         }
-        self.sequence = sequence;
+        self.await_outcome(command);
+        Ok(sequence)
+    }
+
+    fn await_outcome(&mut self, command: Command) {
+        self.sequence = command.sequence;
         self.unanswered.push_back(command);
         if self.unanswered.len() > OUTCOMES_BUFFERED {
             self.unanswered.pop_front();
         }
-        Ok(sequence)
     }
 
     /// Sends a state. Returns its sequence number and its writer, which must live until the outcome
@@ -234,9 +238,8 @@ impl Commander {
         if writer.send(header, |index| state.byte(index))? == 0 {
             return Err(RequestError::NoReceiver { owner: OwnerState::query(attachment) });
         }
-        self.sequence = sequence;
         let action = Action::Restore { contents: state.contents(), state_hash: 0 };
-        self.unanswered.push_back(Command::new(self.client_id, sequence, action));
+        self.await_outcome(Command::new(self.client_id, sequence, action));
         Ok((sequence, writer))
     }
 

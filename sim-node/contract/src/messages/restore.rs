@@ -93,12 +93,23 @@ pub struct ReceivedState {
 }
 
 impl ReceivedState {
-    /// Copies a message. Returns `None` if its header and its length contradict each other.
-    pub(crate) fn from_message(header: &RestoreHeader, payload: &[u8]) -> Option<Self> {
+    /// Copies a message, unless it is longer than `size_bytes_max`. Returns `None` if its header and its
+    /// length contradict each other.
+    pub(crate) fn from_message(
+        header: &RestoreHeader,
+        payload: &[u8],
+        size_bytes_max: usize,
+    ) -> Option<Self> {
+        if header.size_bytes != payload.len() as u64 {
+            return None;
+        }
         let contents = RestoreContents::from_number(header.contents)?;
         let particle_count = usize::try_from(header.particle_count).ok()?;
         let particles_size_bytes = particle_count.checked_mul(size_of::<ParticleState>())?;
         let (particles, keyframe) = payload.split_at_checked(particles_size_bytes)?;
+        let is_copied = payload.len() <= size_bytes_max;
+        let (particles, keyframe) =
+            if is_copied { (particles, keyframe) } else { (&[][..], &[][..]) };
         let keyframe = match contents {
             RestoreContents::State => Some(keyframe.to_vec()),
             RestoreContents::Motion if keyframe.is_empty() => None,
@@ -133,17 +144,26 @@ mod tests {
             contents: contents as u32,
             ..RestoreHeader::default()
         };
-        let read = |header, payload: &[u8]| ReceivedState::from_message(&header, payload);
+        let read = |header, payload: &[u8]| {
+            let header = RestoreHeader { size_bytes: payload.len() as u64, ..header };
+            ReceivedState::from_message(&header, payload, 34)
+        };
         let motion = read(header(RestoreContents::Motion, 1), &payload).unwrap();
         assert_eq!((motion.particles, motion.keyframe), (vec![state], None));
         payload.extend([7, 8]);
         let complete = read(header(RestoreContents::State, 1), &payload).unwrap();
         assert_eq!((complete.particles, complete.keyframe), (vec![state], Some(vec![7, 8])));
+        let wrong_length = header(RestoreContents::State, 1);
+        assert!(ReceivedState::from_message(&wrong_length, &payload, 34).is_none());
         assert!(read(header(RestoreContents::Motion, 1), &payload).is_none());
         assert!(read(header(RestoreContents::State, 2), &payload).is_none());
         assert!(
             read(RestoreHeader { contents: 3, ..header(RestoreContents::State, 1) }, &payload)
                 .is_none()
         );
+        // Too long for this load.
+        payload.push(9);
+        let long = read(header(RestoreContents::State, 1), &payload).unwrap();
+        assert_eq!((long.particles, long.keyframe), (vec![], Some(vec![])));
     }
 }

@@ -116,6 +116,11 @@ impl LoadWriters {
         })
     }
 
+    /// Returns the size of the longest state of the load: its particles and a keyframe.
+    pub(crate) fn state_size_bytes_max(&self) -> usize {
+        self.particles.len_max() * size_of::<ParticleState>() + self.keyframe.len_max()
+    }
+
     /// Publishes the load, its parameters and an empty list of tears. Without that list, readers would
     /// keep the list of the load before.
     pub(crate) fn publish(&self, load: &Load<'_>) -> Result<(), PublishError> {

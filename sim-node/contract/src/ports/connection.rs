@@ -47,15 +47,18 @@ pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
     }
 }
 
-/// Receives messages with a payload, of each connection at most as many as a reader may hold. Ends early
-/// at a client with a broken connection.
+/// Receives messages with a payload, at most `count_max`, and of each connection at most as many as a
+/// reader may hold. Ends early at a client with a broken connection.
 pub(crate) fn receive_held<H: Debug + ZeroCopySend>(
     subscriber: &Subscriber<ipc::Service, [u8], H>,
+    count_max: usize,
     mut add: impl FnMut(&H, &[u8], ConnectionId),
 ) {
     // As above, holding the messages is the way to reach every connection.
     let mut held = Vec::new();
-    while let Ok(Some(sample)) = subscriber.receive() {
+    while held.len() < count_max
+        && let Ok(Some(sample)) = subscriber.receive()
+    {
         let connection = ConnectionId(sample.origin().value());
         add(sample.user_header(), sample.payload(), connection);
         held.push(sample);

@@ -112,6 +112,11 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
         self.send(header, element).map(|_| ())
     }
 
+    /// Returns the most elements of a message.
+    pub(crate) fn len_max(&self) -> usize {
+        self.len_max
+    }
+
     /// Same as [`Self::write`]. Returns the number of readers that received the message.
     pub(crate) fn send(
         &self,

@@ -211,8 +211,11 @@ impl Dispatch {
     /// Ends the grabs as [`Self::end_applied_grabs`] does, and releases their particles.
     pub(super) fn release_applied_grabs(&mut self) {
         let applied = self.grabs.iter().filter(|(_, grab)| grab.is_applied);
-        self.outbox.extend(applied.map(|(particle, _)| release(*particle)));
+        let particles: Vec<_> = applied.map(|(particle, _)| *particle).collect();
         self.end_applied_grabs();
+        // A grab that is on its way has its owner still, and comes after the state.
+        let ended = particles.into_iter().filter(|particle| !self.grabs.contains_key(particle));
+        self.outbox.extend(ended.map(release));
     }
 
     /// Ends the grab of a particle that another client has released by force.
