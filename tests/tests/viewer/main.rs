@@ -168,13 +168,17 @@ fn pages_can_pin_cut_brush_set_step_reset_and_load() {
     assert_eq!((rope.text.name.as_str(), rope.positions.len()), ("rope", 41));
     assert_ne!(rope.stamp.epoch, epoch);
     page.frame(|frame| frame.head.stamp.epoch == rope.stamp.epoch);
+    // Another rate begins a new run, which the page follows.
+    page.applied(json!({ "type": "load", "scene": "ragdoll" }));
+    let ragdoll = page.scene();
+    assert_eq!(ragdoll.text.name, "ragdoll");
+    page.frame(|frame| frame.head.stamp.epoch == ragdoll.stamp.epoch);
 }
 
 /// Checks commands that a live node or the bridge refuses.
 fn check_refusals(page: &mut Page) {
     for (message, reason) in [
         (json!({ "type": "load", "scene": "/etc/passwd.toml" }), "out_of_range"),
-        (json!({ "type": "load", "scene": "ragdoll" }), "no_effect_here"),
         (json!({ "type": "seek", "step": 3 }), "only_replay"),
         (json!({ "type": "step", "count": -3 }), "only_replay"),
         (json!({ "type": "pin", "particle": 100_000 }), "unknown_particle"),
