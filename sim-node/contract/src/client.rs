@@ -180,7 +180,7 @@ impl Client {
         })
     }
 
-    /// Returns all constraints torn since the load or the last reset, with their causes. Waits only if
+    /// Returns all torn constraints, with their causes. Waits only if
     /// no list was published yet; an owner publishes an empty list with the load. Returns an empty
     /// list after `timeout`.
     ///

@@ -181,7 +181,7 @@ impl Owner {
         self.writers.keyframe.write(KeyframeHeader { size_bytes, ..header }, |index| bytes[index])
     }
 
-    /// Publishes all constraints torn since the load or the last reset, in the order of tearing.
+    /// Publishes all torn constraints, in the order of tearing.
     /// Sets `count`.
     ///
     /// # Errors

@@ -59,7 +59,8 @@ pub struct Solver {
     /// True if a state was put in place since the last step. The next step publishes it, and
     /// integrates nothing.
     pub(crate) is_put_in_place: bool,
-    /// Particles frozen since the load or the last reset. For messages; not part of the state.
+    /// Particles frozen since the load or the last state that was put in place. For messages; not part of
+    /// the state.
     pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
 }
@@ -275,7 +276,7 @@ impl Solver {
         self.state_hash
     }
 
-    /// Returns the number of particles that froze since the load or the last reset, because their
+    /// Returns the number of particles that froze since the load, a reset or a restore, because their
     /// state was not finite. A frozen particle stays in place until a reset.
     pub fn frozen_count(&self) -> u64 {
         self.frozen_count
@@ -314,7 +315,7 @@ impl Solver {
         &self.model.triangles
     }
 
-    /// Returns the constraints torn since the load or the last reset, by step and then by index.
+    /// Returns the torn constraints, by step and then by index.
     pub fn torn(&self) -> &[u32] {
         self.torn.order()
     }

@@ -17,7 +17,7 @@ pub struct StepRow {
     pub state_hash: u64,
     /// Number of scene loads in this run, minus one.
     pub topology_revision: u32,
-    /// Constraints torn since the load or the last reset.
+    /// Number of torn constraints.
     pub torn_count: u32,
     /// Outcomes that this state includes: those with a lower index.
     pub outcome_count: u64,

@@ -18,7 +18,7 @@ pub struct State<'a> {
     pub particles: &'a [ParticleState],
     /// The load that the state belongs to.
     pub load: &'a LoadedScene,
-    /// The `header.torn_count` constraints torn since the load or the last reset; fewer if a message
+    /// The `header.torn_count` torn constraints; fewer if a message
     /// was lost.
     pub torn: &'a Torn,
     /// The colliders. The `run_id` of their header is 0 until they have arrived.

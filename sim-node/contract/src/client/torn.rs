@@ -2,7 +2,7 @@
 
 use crate::messages::tears::{TearsHeader, TornConstraint};
 
-/// The constraints torn since the load or the last reset. Empty if nothing tore.
+/// The torn constraints of a state. Empty if nothing tore.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Torn {
     /// Header of the list: the step of the newest tear, and the number of tears in that step.

@@ -55,7 +55,7 @@ pub struct SnapshotHeader {
     pub solve_ns: u64,
     /// Number of the load in this run. Topology, surface and scene of the load carry the same number.
     pub topology_revision: u32,
-    /// Number of constraints torn since the load or the last reset.
+    /// Number of torn constraints.
     pub torn_count: u32,
     /// Length of the payload.
     pub particle_count: u32,

@@ -39,7 +39,8 @@ pub struct NodeStatus {
     pub outcome_count: u64,
     /// Number of rejected commands of this run, and of refused messages of the service `ready`.
     pub rejected_count: u64,
-    /// Number of particles frozen since the load or the last reset because their state was not finite.
+    /// Number of particles that froze because their state was not finite, since the load, or since a
+    /// command last put a state in place.
     pub frozen_count: u64,
     /// Steps per second.
     pub rate_hz: u32,
@@ -47,7 +48,7 @@ pub struct NodeStatus {
     pub particle_count: u32,
     /// Number of constraints in the scene.
     pub constraint_count: u32,
-    /// Number of constraints torn since the load or the last reset.
+    /// Number of torn constraints.
     pub torn_count: u32,
     /// Number of readers of `particles`.
     pub reader_count: u32,

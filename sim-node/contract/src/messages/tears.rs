@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use sim_types::TearCause;
 
-/// Header of `tears`: 32 bytes, alignment 8. The payload lists every constraint torn since the load
-/// or the last reset, in the order of tearing. A list repeats the lists before it, so a reader that
+/// Header of `tears`: 32 bytes, alignment 8. The payload lists every torn constraint,
+/// in the order of tearing. A list repeats the lists before it, so a reader that
 /// misses a message loses nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
@@ -13,9 +13,9 @@ use sim_types::TearCause;
 pub struct TearsHeader {
     /// Same as in [`crate::SnapshotHeader`].
     pub run_id: u64,
-    /// Step of the newest tear, or of the load or reset that emptied the list.
+    /// Step of the newest tear, or of the load, reset, rewind or restore that replaced the list.
     pub step: u64,
-    /// Step of the load or reset that the list begins after. Lists with the same `since_step`
+    /// Step of the load, reset, rewind or restore that the list begins with. Lists with the same `since_step`
     /// continue each other.
     pub since_step: u64,
     /// Number of constraints at the end of the payload that tore in this step.

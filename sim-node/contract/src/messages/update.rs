@@ -20,7 +20,7 @@ pub enum Update<'a> {
     Surface(&'a LoadHeader, &'a [Triangle]),
     /// All colliders, in their poses at the end of a step.
     Colliders(&'a CollidersHeader, &'a [ColliderState]),
-    /// All constraints torn since the load or the last reset.
+    /// All torn constraints.
     Tears(&'a TearsHeader, &'a [TornConstraint]),
     /// The values of all parameters.
     Parameters(&'a ParametersHeader, &'a ParameterValues),

@@ -4,7 +4,7 @@ use bytemuck::cast_slice;
 use sim_types::TearCause;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// The constraints torn since the load or the last reset. It has room for every constraint, so that a tear does not
+/// The torn constraints. It has room for every constraint, so that a tear does not
 /// allocate.
 #[derive(Debug, Clone)]
 pub(crate) struct Torn {

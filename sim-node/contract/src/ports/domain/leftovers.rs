@@ -284,7 +284,7 @@ mod tests {
         outside.remove_leftovers().unwrap();
         assert!(dead.iter().all(|path| !path.exists()));
         assert_eq!(outside.leftovers(), []);
-        // What is left suffices for another client.
+        // Another client can still attach.
         Client::attach(&domain.endpoint()).unwrap().status(Duration::ZERO).unwrap();
         // Under another name, as a process of another container would have it.
         let suffix = &config.global.service.data_segment_suffix;
