@@ -2,6 +2,7 @@
 
 pub(crate) mod apply;
 pub(crate) mod cut;
+pub(crate) mod preparation;
 
 use glam::Vec3;
 use sim_types::{ConstraintKind, ParameterValue, ParticleFlags, Reason};
@@ -204,12 +205,8 @@ impl Solver {
         kind: Option<ConstraintKind>,
     ) -> Result<(), Reason> {
         let affected = self.parameters.set(name, value, kind, self.context())?;
-        match affected {
-            Affected::Nothing => {}
-            Affected::Limits => self.due.limits = true,
-            Affected::Constraints => self.due.constraints = true,
-            Affected::RigidPaths => (self.due.constraints, self.due.tethers) = (true, true),
-        }
+        self.due.constraints |= affected > Affected::Nothing;
+        self.due.tethers |= affected == Affected::RigidPaths;
         Ok(())
     }
 

@@ -40,6 +40,7 @@ mod store;
 
 pub use commands::apply::{Applied, Control};
 pub use commands::cut::{Sphere, Sweep};
+pub use commands::preparation::{Plan, Prepared, Spare};
 pub use commands::{Grab, Push};
 pub use constraints::Constraint;
 pub use contacts::colliders::PlacedCollider;

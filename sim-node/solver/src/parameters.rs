@@ -30,8 +30,8 @@ pub(crate) struct Parameters {
     softness: [Option<f32>; 4],
 }
 
-/// Derived state that a parameter affects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Derived state that a parameter affects, from nothing to everything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Affected {
     /// None: the step reads the parameter itself.
     Nothing,
@@ -118,6 +118,38 @@ impl Parameters {
             | Parameter::Relaxation
             | Parameter::WindDrag => Affected::Constraints,
         })
+    }
+
+    /// Returns the derived state that is out of date if it was derived from `before`.
+    pub(crate) fn affected_since(&self, before: &Self) -> Affected {
+        if self.softness_bits() != before.softness_bits() {
+            Affected::RigidPaths
+        } else if self.pass_bits() != before.pass_bits() {
+            Affected::Constraints
+        } else if self.limit_bits() != before.limit_bits() {
+            Affected::Limits
+        } else {
+            Affected::Nothing
+        }
+    }
+
+    /// Returns true if the same constraints are rigid as with `other`.
+    pub(crate) fn has_softness_of(&self, other: &Self) -> bool {
+        self.softness_bits() == other.softness_bits()
+    }
+
+    fn softness_bits(&self) -> [Option<u32>; 4] {
+        self.softness.map(|softness| softness.map(f32::to_bits))
+    }
+
+    fn pass_bits(&self) -> [u32; 4] {
+        let has_wind = u32::from(self.wind_drag > 0.0);
+        [self.substeps, self.iterations, self.relaxation.to_bits(), has_wind]
+    }
+
+    fn limit_bits(&self) -> [Option<u32>; 4] {
+        let Limits { max_stretch, tear_stretch, tear_distance, tear_force } = self.limits();
+        [max_stretch, tear_stretch, tear_distance, tear_force].map(|one| one.map(f32::to_bits))
     }
 
     /// Stores a checked value.

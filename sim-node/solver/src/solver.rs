@@ -1,12 +1,15 @@
 //! The running state of a scene.
 
+use std::sync::Arc;
+
 use sim_types::{ParameterValues, TearCause};
 
 use crate::checks::{Context, StepSize};
+use crate::commands::preparation::Prepared;
 use crate::constraints::Constraint;
 use crate::constraints::builder::{ConstraintBuilder, Setup};
 use crate::constraints::order::ProjectionOrder;
-use crate::constraints::tethers::Tethers;
+use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::contacts::colliders::{Collider, PlacedCollider};
 use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
 use crate::kernels::Kernels;
@@ -30,12 +33,12 @@ use crate::store::{Configured, ParticleStore, SceneFields};
 #[derive(Debug, Clone)]
 pub struct Solver {
     /// Particles as loaded, constraints by index, triangles. Immutable until the next load.
-    pub(crate) model: Model,
+    pub(crate) model: Arc<Model>,
     /// Rate, method, order and tethers, which never change.
     pub(crate) settings: SolverSettings,
     /// Values that clients can change.
     pub(crate) parameters: Parameters,
-    initial_parameters: Parameters,
+    pub(crate) initial_parameters: Parameters,
     /// True in a scene of 2 dimensions, where z is exactly 0.
     pub(crate) is_planar: bool,
     /// The state between two steps.
@@ -56,6 +59,8 @@ pub struct Solver {
     pub(crate) scene_step: u64,
     /// Derived state that commands of this boundary have made out of date.
     pub(crate) due: Due,
+    /// Constraints that a command of this boundary may take over.
+    pub(crate) offered: Option<Box<Prepared>>,
     /// True if a state was put in place since the last step. The next step publishes it, and
     /// integrates nothing.
     pub(crate) is_put_in_place: bool,
@@ -70,9 +75,11 @@ pub struct Solver {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
     pub(crate) constraints: bool,
-    /// Only the limits of constraints.
-    pub(crate) limits: bool,
     pub(crate) tethers: bool,
+}
+
+impl Due {
+    const ALL: Self = Self { constraints: true, tethers: true };
 }
 
 impl Solver {
@@ -108,10 +115,11 @@ impl Solver {
             // Room for every particle, so that a grab does not allocate.
             grabs: Vec::with_capacity(particle_count),
             scene_step: 0,
-            due: Due { constraints: true, tethers: true, ..Due::default() },
+            due: Due::ALL,
             is_put_in_place: false,
             frozen_count: 0,
-            model,
+            offered: None,
+            model: Arc::new(model),
         };
         solver.finish_boundary();
         solver
@@ -151,7 +159,7 @@ impl Solver {
             collider.moved = None;
             collider.place(0.0);
         }
-        self.due = Due { constraints: true, tethers: true, ..Due::default() };
+        self.due = Due::ALL;
         self.scene_step = 0;
         self.is_put_in_place = true;
         self.frozen_count = 0;
@@ -161,11 +169,9 @@ impl Solver {
     /// steps in real time calls it after the commands; otherwise the next step does, and then may
     /// allocate.
     pub fn finish_boundary(&mut self) {
-        let Due { constraints, limits, tethers } = std::mem::take(&mut self.due);
+        let Due { constraints, tethers } = std::mem::take(&mut self.due);
         if constraints {
             self.configure();
-        } else if limits {
-            self.configure_limits();
         }
         if tethers {
             self.derive_tethers();
@@ -174,50 +180,62 @@ impl Solver {
 
     /// Derives the constraints from the parameters.
     pub(crate) fn configure(&mut self) {
-        let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
-        let configured = self.store.configure(&builder, self.scene_fields(), self.torn.all());
-        self.follow_particles(configured);
+        let is_exchanged = self.accept_constraints();
+        let (setup, fields) = (self.setup(&self.parameters), self.scene_fields(&self.parameters));
+        let builder = ConstraintBuilder::new(&self.model, &self.parameters, setup);
+        let configured = self.store.configure(&builder, fields, self.torn.all());
+        if is_exchanged || configured == Configured::Moved {
+            self.follow_particles();
+        }
     }
 
-    /// Derives the limits of the constraints from the parameters.
-    fn configure_limits(&mut self) {
-        let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
-        let configured =
-            self.store.configure_limits(&builder, self.scene_fields(), self.torn.all());
-        self.follow_particles(configured);
-    }
-
-    fn scene_fields(&self) -> SceneFields {
+    pub(crate) fn scene_fields(&self, parameters: &Parameters) -> SceneFields {
         SceneFields {
             colliders: !self.colliders.is_empty(),
-            wind: self.air.has_surface() && self.parameters.wind_drag > 0.0,
+            wind: self.air.has_surface() && parameters.wind_drag > 0.0,
             tethers: self.settings.tethers,
         }
     }
 
     /// Updates the locations of particles after a change of the layout.
-    fn follow_particles(&mut self, configured: Configured) {
-        if configured == Configured::Moved {
-            if self.scene_fields().wind || self.air.is_located() {
-                self.air.locate_corners(&self.store);
-            }
-            self.tethers.attach(&mut self.store, &self.particles);
+    fn follow_particles(&mut self) {
+        if self.scene_fields(&self.parameters).wind || self.air.is_located() {
+            self.air.locate_corners(&self.store);
         }
+        self.tethers.attach(&mut self.store, &self.particles);
     }
 
-    pub(crate) fn setup(&self) -> Setup {
-        Setup { method: self.settings.method, h: self.h() }
+    pub(crate) fn setup(&self, parameters: &Parameters) -> Setup {
+        let h = substep_length(self.settings.rate_hz, parameters.substeps);
+        Setup { method: self.settings.method, h }
     }
 
     /// Derives the tethers from the current state, if the scene has any.
     fn derive_tethers(&mut self) {
-        if !self.settings.tethers {
-            return;
+        if self.settings.tethers {
+            self.replace_tethers(self.tether_basis());
+            self.tethers.attach(&mut self.store, &self.particles);
         }
+    }
+
+    /// Replaces the tethers. They are not attached yet.
+    pub(crate) fn replace_tethers(&mut self, basis: TetherBasis) {
         self.tethers.detach(&mut self.store);
-        let (model, parameters) = (&self.model, &self.parameters);
-        self.tethers = Tethers::from_state(model, parameters, &self.particles, self.torn.order());
-        self.tethers.attach(&mut self.store, &self.particles);
+        if self.tethers.are_derived_from(&self.parameters, &basis) {
+            self.tethers.restore_dropped();
+        } else if !self.accept_tethers(&basis) {
+            self.tethers = Tethers::new(&self.model, &self.parameters, basis);
+        }
+    }
+
+    /// Basis of the tethers in the current state.
+    pub(crate) fn tether_basis(&self) -> TetherBasis {
+        TetherBasis::new(&self.particles, self.torn())
+    }
+
+    /// Basis of the tethers in the initial state.
+    pub(crate) fn initial_tether_basis(&self) -> TetherBasis {
+        TetherBasis::new(&new_particles(&self.model, &self.scene_anchors), &[])
     }
 
     /// Tears a constraint, unless it is torn already.

@@ -175,7 +175,8 @@ impl Solver {
     /// [`Stage::Tear`].
     fn tear_marked(&mut self, is_any_marked: bool) {
         if is_any_marked {
-            let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup());
+            let builder =
+                ConstraintBuilder::new(&self.model, &self.parameters, self.setup(&self.parameters));
             let torn = &mut self.torn;
             self.store.remove_marks(|constraint, mark| {
                 torn.tear(constraint, builder.cause(constraint, mark));

@@ -2,6 +2,7 @@
 //! rest as a graph. The state is unpacked from the published particles at the start of a step, and
 //! packed again at the end.
 
+mod configure;
 mod graph;
 mod layout;
 mod patch;
@@ -9,22 +10,22 @@ mod publish;
 mod survey;
 mod workers;
 
+pub(crate) use configure::Configured;
 use graph::Graph;
-use graph::block::BLOCK_PARTICLES;
 use layout::Layout;
 pub(crate) use layout::{Location, SceneFields};
 use patch::Patch;
 use survey::Survey;
 use workers::Workers;
 
-use crate::constraints::builder::ConstraintBuilder;
 use crate::constraints::column_writer::ColumnWriter;
 use crate::constraints::families::{Family, Sheet};
-use crate::constraints::fields::{ConstraintFields, Pass};
+use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
 use crate::kernels::Kernels;
+use crate::parameters::Parameters;
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::substep::SubstepInputs;
@@ -41,20 +42,14 @@ pub(crate) struct ParticleStore {
     is_allocated: bool,
     /// Properties of the constraints with the current parameters.
     survey: Survey,
+    /// Parameters from which the constraints are derived; None before the first derivation.
+    derived_from: Option<Parameters>,
+    /// By constraint: true if it is torn, and so inactive.
+    is_torn: Vec<bool>,
     /// By constraint: where its parameters are.
     locations: Vec<Location>,
     /// Largest number of particles in a block; 0 in scenes without colliders.
     contact_count: usize,
-}
-
-/// Effect of a change of parameters on the locations of particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[must_use]
-pub(crate) enum Configured {
-    /// Everything stays in place.
-    InPlace,
-    /// Particles have new locations, and no tethers.
-    Moved,
 }
 
 impl ParticleStore {
@@ -74,108 +69,13 @@ impl ParticleStore {
             layout: Layout::default(),
             is_allocated: false,
             survey: Survey::default(),
+            derived_from: None,
+            is_torn: vec![false; model.constraints.len()],
             locations,
             contact_count: 0,
         };
         store.locate_constraints(model);
         store
-    }
-
-    /// Sets the parameters of all constraints. Torn ones stay inactive. Allocates only fields that
-    /// are not in memory yet.
-    pub(crate) fn configure(
-        &mut self,
-        builder: &ConstraintBuilder<'_>,
-        scene: SceneFields,
-        is_torn: &[bool],
-    ) -> Configured {
-        self.survey.restart(self.patches.len());
-        for (constraint, location) in (0_u32..).zip(&self.locations) {
-            let family = builder.model.families[constraint as usize].map(Family::from_group);
-            let place = location.sheet().zip(family);
-            self.survey.observe(&builder.build(constraint), place);
-        }
-        let used = self.survey.fields(builder.pass_count());
-        let configured = self.use_fields(builder.model, used, scene);
-        for (constraint, is_torn) in (0_u32..).zip(is_torn) {
-            if *is_torn {
-                self.set_parameters(constraint, &ConstraintParameters::INACTIVE);
-            } else {
-                self.set_parameters(constraint, &builder.build(constraint));
-            }
-        }
-        configured
-    }
-
-    /// Sets the limits of all constraints, when nothing else has changed since
-    /// [`Self::configure`]. Torn ones stay inactive.
-    pub(crate) fn configure_limits(
-        &mut self,
-        builder: &ConstraintBuilder<'_>,
-        scene: SceneFields,
-        is_torn: &[bool],
-    ) -> Configured {
-        let possible = builder.possible_limit_fields();
-        let possible = ConstraintFields { multipliers: possible.tear_multipliers, ..possible };
-        if !self.layout.extended(possible, scene).fits(&self.layout) {
-            return self.configure(builder, scene, is_torn);
-        }
-        self.survey.restart_limits();
-        for (constraint, is_torn) in (0_u32..).zip(is_torn) {
-            let limits = builder.limit_lengths(constraint);
-            self.survey.observe_limits(&limits);
-            if !is_torn {
-                let location = self.locations[constraint as usize];
-                self.writer(location).set_limits(location.index(), &limits);
-            }
-        }
-        self.use_fields(builder.model, self.survey.fields(builder.pass_count()), scene)
-    }
-
-    /// Takes fields into use, and allocates them if they are not in memory.
-    fn use_fields(
-        &mut self,
-        model: &Model,
-        used: ConstraintFields,
-        scene: SceneFields,
-    ) -> Configured {
-        let before = self.layout;
-        self.layout = before.extended(used, scene);
-        self.graph.use_fields(self.layout, self.survey.graph_softness());
-        for (index, patch) in self.patches.iter_mut().enumerate() {
-            patch.use_fields(self.layout, self.survey.family_softness(index));
-        }
-        if self.is_allocated && self.layout.fits(&before) {
-            return Configured::InPlace;
-        }
-        self.graph.allocate();
-        for patch in &mut self.patches {
-            patch.allocate();
-        }
-        self.locate_constraints(model);
-        let widest = self.sheets.iter().map(|sheet| sheet.columns as usize).max();
-        let largest = BLOCK_PARTICLES.min(self.graph.particle_count()).max(widest.unwrap_or(0));
-        self.contact_count = if scene.colliders { largest } else { 0 };
-        self.workers.reserve_contacts(self.contact_count);
-        self.is_allocated = true;
-        Configured::Moved
-    }
-
-    /// Updates the locations of the constraints of sheets, whose indices depend on the layout.
-    fn locate_constraints(&mut self, model: &Model) {
-        if self.patches.is_empty() {
-            return;
-        }
-        for (constraint, group) in (0_u32..).zip(&model.families) {
-            let found = find_sheet(&self.sheets, model.pair(constraint)[0]);
-            if let (Some(found), Some(group)) = (found, group) {
-                let family = Family::from_group(*group);
-                let [row, column] = found.place;
-                let place = [row, column - family.shifts()[0]];
-                let index = self.patches[found.sheet].constraint_index(family, place);
-                self.locations[constraint as usize] = Location::in_sheet(found.sheet, index);
-            }
-        }
     }
 
     fn writer(&mut self, location: Location) -> ColumnWriter<'_> {
@@ -192,6 +92,7 @@ impl ParticleStore {
 
     /// Takes a constraint out of every pass.
     pub(crate) fn tear(&mut self, constraint: u32) {
+        self.is_torn[constraint as usize] = true;
         self.set_parameters(constraint, &ConstraintParameters::INACTIVE);
     }
 
@@ -238,6 +139,16 @@ impl ParticleStore {
             }
         }
         is_marked
+    }
+
+    /// Exchanges everything but the threads with a store of the same scene.
+    pub(crate) fn exchange(&mut self, other: &mut Self) {
+        std::mem::swap(self, other);
+        std::mem::swap(&mut self.workers, &mut other.workers);
+    }
+
+    pub(crate) fn kernels(&self) -> Kernels {
+        self.workers.kernels
     }
 
     /// Replaces the threads by `count`, or as many as the system grants.
@@ -297,6 +208,13 @@ impl ParticleStore {
         match location.sheet() {
             None => self.graph.set_wind(location.index(), gain),
             Some(sheet) => self.patches[sheet].set_wind(location.index(), gain),
+        }
+    }
+
+    /// Removes the tethers of all particles, of which there are `particle_count`.
+    pub(crate) fn detach_tethers(&mut self, particle_count: u32) {
+        for particle in 0..particle_count {
+            self.set_tether_length(self.location(particle), f32::INFINITY);
         }
     }
 

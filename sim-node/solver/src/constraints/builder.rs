@@ -16,7 +16,7 @@ use crate::scene::model::Model;
 /// Builds the parameters of each constraint.
 pub(crate) struct ConstraintBuilder<'a> {
     pub(crate) model: &'a Model,
-    parameters: &'a Parameters,
+    pub(crate) parameters: &'a Parameters,
     setup: Setup,
     /// By kind: the previous stiffness, and its share per pass. The root is expensive, and most
     /// constraints have the stiffness of the one of their kind before.

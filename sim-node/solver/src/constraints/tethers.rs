@@ -17,6 +17,8 @@ use crate::store::{Location, ParticleStore};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tethers {
     pub(crate) basis: TetherBasis,
+    /// Parameters from which they were derived; None in a scene without tethers.
+    parameters: Option<Parameters>,
     /// Parents before children.
     all: Vec<Tether>,
     /// Tethers whose root moves within a step.
@@ -41,6 +43,15 @@ pub(crate) struct TetherBasis {
 }
 
 impl TetherBasis {
+    /// Basis of a state.
+    pub(crate) fn new(particles: &Particles, torn: &[u32]) -> Self {
+        let states = (0_u32..).zip(&particles.states);
+        let roots = states.filter(|(_, one)| is_root(one.flags)).map(|(index, _)| index).collect();
+        let mut torn = torn.to_vec();
+        torn.sort_unstable();
+        Self { roots, torn }
+    }
+
     /// Returns the memory of the lists, in bytes.
     pub(crate) fn size_bytes(&self) -> usize {
         size_of_val(self.roots.as_slice()) + size_of_val(self.torn.as_slice())
@@ -90,20 +101,6 @@ pub(crate) fn is_root(flags: u32) -> bool {
 }
 
 impl Tethers {
-    /// Derives the tethers from the current state.
-    pub(crate) fn from_state(
-        model: &Model,
-        parameters: &Parameters,
-        particles: &Particles,
-        torn: &[u32],
-    ) -> Self {
-        let states = (0_u32..).zip(&particles.states);
-        let roots = states.filter(|(_, one)| is_root(one.flags)).map(|(index, _)| index).collect();
-        let mut torn = torn.to_vec();
-        torn.sort_unstable();
-        Self::new(model, parameters, TetherBasis { roots, torn })
-    }
-
     /// Derives the tethers from their basis, by Dijkstra's algorithm over rigid constraints that are
     /// neither torn nor bends.
     pub(crate) fn new(model: &Model, parameters: &Parameters, basis: TetherBasis) -> Self {
@@ -139,7 +136,19 @@ impl Tethers {
             let CandidatePath { particle, root, .. } = path;
             links.push_paths(&mut paths, Reached { particle, root, length, tether });
         }
-        Self { basis, all, moving_roots: Vec::new() }
+        Self { basis, parameters: Some(*parameters), all, moving_roots: Vec::new() }
+    }
+
+    /// Returns true if [`Self::new`] derives the same tethers from these values.
+    pub(crate) fn are_derived_from(&self, parameters: &Parameters, basis: &TetherBasis) -> bool {
+        self.basis == *basis && self.parameters.is_some_and(|own| own.has_softness_of(parameters))
+    }
+
+    /// Restores the tethers that were dropped since they were derived.
+    pub(crate) fn restore_dropped(&mut self) {
+        for tether in &mut self.all {
+            tether.is_dropped = false;
+        }
     }
 
     /// Drops every tether whose path contains a torn constraint.

@@ -25,11 +25,11 @@ pub struct Keyframe {
     pub(super) fixed: Vec<FixedParticle>,
     pub(super) grabs: Vec<ActiveGrab>,
     /// Torn constraints in the order of tearing, and the cause of each tear.
-    pub(super) torn: Vec<u32>,
+    pub(crate) torn: Vec<u32>,
     pub(super) tear_causes: Vec<TearCause>,
     /// State from which the tethers were last derived.
-    pub(super) tethers: TetherBasis,
-    pub(super) parameters: Parameters,
+    pub(crate) tethers: TetherBasis,
+    pub(crate) parameters: Parameters,
     /// Anchors and colliders that clients have moved, ascending by index.
     pub(super) moved_anchors: Vec<Moved>,
     pub(super) moved_colliders: Vec<Moved>,

@@ -5,7 +5,6 @@ mod check;
 use sim_types::ParticleFlags;
 use thiserror::Error;
 
-use crate::constraints::tethers::Tethers;
 use crate::solver::{Due, Solver};
 use crate::state::hash::state_hash;
 use crate::state::keyframe::Keyframe;
@@ -73,9 +72,7 @@ impl Solver {
         self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
         self.due = Due::default();
         if self.settings.tethers {
-            let basis = keyframe.tethers.clone();
-            self.tethers.detach(&mut self.store);
-            self.tethers = Tethers::new(&self.model, &self.parameters, basis);
+            self.replace_tethers(keyframe.tethers.clone());
         }
         self.configure();
         self.tethers.attach(&mut self.store, &self.particles);

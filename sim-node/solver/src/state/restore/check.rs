@@ -89,7 +89,7 @@ impl Solver {
     }
 
     /// Checks the keyframe against the scene alone.
-    fn check_keyframe(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
+    pub(crate) fn check_keyframe(&self, keyframe: &Keyframe) -> Result<(), &'static str> {
         let (particles, constraints) = (self.particle_count(), self.constraint_count());
         let mut all_torn = keyframe.torn.clone();
         all_torn.sort_unstable();

@@ -1,0 +1,154 @@
+//! Derives the constraints of a store from the scene, the parameters and the tears.
+
+use super::graph::block::BLOCK_PARTICLES;
+use super::{ParticleStore, SceneFields, find_sheet};
+use crate::constraints::builder::ConstraintBuilder;
+use crate::constraints::families::Family;
+use crate::constraints::fields::ConstraintFields;
+use crate::constraints::parameters::ConstraintParameters;
+use crate::parameters::{Affected, Parameters};
+use crate::scene::model::Model;
+use crate::store::layout::Location;
+
+/// Effect of a change of parameters on the locations of particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[must_use]
+pub(crate) enum Configured {
+    /// Everything stays in place.
+    InPlace,
+    /// Particles have new locations, and no tethers.
+    Moved,
+}
+
+impl ParticleStore {
+    /// Derives the constraints, as far as they depend on what has changed since the last call. Torn
+    /// ones are inactive. Allocates only fields that are not in memory yet.
+    pub(crate) fn configure(
+        &mut self,
+        builder: &ConstraintBuilder<'_>,
+        scene: SceneFields,
+        is_torn: &[bool],
+    ) -> Configured {
+        let affected = self.derived_from.map(|from| builder.parameters.affected_since(&from));
+        let configured = match affected {
+            Some(Affected::Nothing) => Configured::InPlace,
+            Some(Affected::Limits) => self.configure_limits(builder, scene),
+            _ => self.configure_all(builder, scene),
+        };
+        self.derived_from = Some(*builder.parameters);
+        self.follow_tears(builder, is_torn);
+        configured
+    }
+
+    /// Returns true if the constraints are those of these parameters.
+    pub(crate) fn is_derived_from(&self, parameters: &Parameters) -> bool {
+        self.derived_from.is_some_and(|from| parameters.affected_since(&from) == Affected::Nothing)
+    }
+
+    fn configure_all(&mut self, builder: &ConstraintBuilder<'_>, scene: SceneFields) -> Configured {
+        self.survey.restart(self.patches.len());
+        for (constraint, location) in (0_u32..).zip(&self.locations) {
+            let family = builder.model.families[constraint as usize].map(Family::from_group);
+            let place = location.sheet().zip(family);
+            self.survey.observe(&builder.build(constraint), place);
+        }
+        let used = self.survey.fields(builder.pass_count());
+        let configured = self.use_fields(builder.model, used, scene);
+        for constraint in (0_u32..).take(self.locations.len()) {
+            self.set_parameters(constraint, &self.parameters_of(constraint, builder));
+        }
+        configured
+    }
+
+    fn parameters_of(
+        &self,
+        constraint: u32,
+        builder: &ConstraintBuilder<'_>,
+    ) -> ConstraintParameters {
+        if self.is_torn[constraint as usize] {
+            ConstraintParameters::INACTIVE
+        } else {
+            builder.build(constraint)
+        }
+    }
+
+    /// Sets the limits of all constraints, when nothing else has changed.
+    fn configure_limits(
+        &mut self,
+        builder: &ConstraintBuilder<'_>,
+        scene: SceneFields,
+    ) -> Configured {
+        let possible = builder.possible_limit_fields();
+        let possible = ConstraintFields { multipliers: possible.tear_multipliers, ..possible };
+        if !self.layout.extended(possible, scene).fits(&self.layout) {
+            return self.configure_all(builder, scene);
+        }
+        self.survey.restart_limits();
+        for constraint in (0_u32..).take(self.locations.len()) {
+            let limits = builder.limit_lengths(constraint);
+            self.survey.observe_limits(&limits);
+            if !self.is_torn[constraint as usize] {
+                let location = self.locations[constraint as usize];
+                self.writer(location).set_limits(location.index(), &limits);
+            }
+        }
+        self.use_fields(builder.model, self.survey.fields(builder.pass_count()), scene)
+    }
+
+    /// Deactivates the constraints that have torn since the last call, and activates those that are no
+    /// longer torn.
+    fn follow_tears(&mut self, builder: &ConstraintBuilder<'_>, is_torn: &[bool]) {
+        for (constraint, is_torn) in (0_u32..).zip(is_torn) {
+            if self.is_torn[constraint as usize] != *is_torn {
+                self.is_torn[constraint as usize] = *is_torn;
+                self.set_parameters(constraint, &self.parameters_of(constraint, builder));
+            }
+        }
+    }
+
+    /// Takes fields into use, and allocates them if they are not in memory.
+    fn use_fields(
+        &mut self,
+        model: &Model,
+        used: ConstraintFields,
+        scene: SceneFields,
+    ) -> Configured {
+        let before = self.layout;
+        self.layout = before.extended(used, scene);
+        self.graph.use_fields(self.layout, self.survey.graph_softness());
+        for (index, patch) in self.patches.iter_mut().enumerate() {
+            patch.use_fields(self.layout, self.survey.family_softness(index));
+        }
+        if self.is_allocated && self.layout.fits(&before) {
+            return Configured::InPlace;
+        }
+        self.graph.allocate();
+        for patch in &mut self.patches {
+            patch.allocate();
+        }
+        self.locate_constraints(model);
+        let widest = self.sheets.iter().map(|sheet| sheet.columns as usize).max();
+        let largest = BLOCK_PARTICLES.min(self.graph.particle_count()).max(widest.unwrap_or(0));
+        self.contact_count = if scene.colliders { largest } else { 0 };
+        self.workers.reserve_contacts(self.contact_count);
+        self.is_allocated = true;
+        Configured::Moved
+    }
+
+    /// Updates the locations of the constraints of sheets, whose indices depend on the layout.
+    pub(super) fn locate_constraints(&mut self, model: &Model) {
+        if self.patches.is_empty() {
+            return;
+        }
+        for (constraint, group) in (0_u32..).zip(&model.families) {
+            let found = find_sheet(&self.sheets, model.pair(constraint)[0]);
+            if let (Some(found), Some(group)) = (found, group) {
+                let family = Family::from_group(*group);
+                let [row, column] = found.place;
+                let place = [row, column - family.shifts()[0]];
+                let index = self.patches[found.sheet].constraint_index(family, place);
+                self.locations[constraint as usize] = Location::in_sheet(found.sheet, index);
+            }
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Constraints that are prepared beside a solver: the same bits as without, whatever happens between the
+//! plan and the command, and whatever the spare was used for before.
+
+use sim_solver::{
+    Action, Keyframe, Parameter, ParameterValue, Particle, Prepared, Scene, Solver, Spare,
+};
+use sim_types::{KindFilter, Text};
+
+/// A cloth with soft shear and tethers, which tears, in the wind, above a ball.
+const SCENE: &str = "version = 1\n[solver]\ntethers = true\nsubsteps = 2\n\
+    [wind]\nvelocity = [1.0, 0.0, 2.0]\ndrag = 0.1\n\
+    [[generate]]\nshape = \"cloth\"\ncolumns = 28\nrows = 30\nspacing = 0.05\n\
+    pinned = [0, 27]\ncompliance = { shear = 1e-5 }\n\
+    [[generate]]\nshape = \"rope\"\ncount = 40\nfrom = [0, 1, 1]\nto = [1, 1, 1]\n\
+    [[collider]]\nshape = \"sphere\"\ncenter = [0.5, -1.0, 0.2]\nradius = 0.4\n";
+
+fn solver(text: &str) -> Solver {
+    Solver::new(&Scene::from_toml(text, "test").unwrap())
+}
+
+fn set(parameter: Parameter, value: f32) -> Action {
+    let value = ParameterValue::Number(value);
+    Action::Set { parameter: Text::cut(parameter.name()), value, constraint_kind: None }
+}
+
+/// A state to return to.
+struct Past {
+    particles: Vec<Particle>,
+    keyframe: Keyframe,
+}
+
+impl Past {
+    fn of(solver: &Solver) -> Self {
+        Self { particles: solver.particles().to_vec(), keyframe: solver.keyframe() }
+    }
+}
+
+/// A solver whose commands take prepared constraints over.
+struct Assisted {
+    solver: Solver,
+    spare: Option<Spare>,
+    /// Number of plans.
+    plan_count: usize,
+}
+
+impl Assisted {
+    fn prepare(&mut self, plan: Option<sim_solver::Plan>) -> Option<Prepared> {
+        let plan = plan?;
+        self.plan_count += 1;
+        Some(plan.prepare(self.spare.take()))
+    }
+
+    fn finish(&mut self, prepared: Option<Prepared>, command: impl FnOnce(&mut Solver)) {
+        if let Some(prepared) = prepared {
+            self.solver.offer(prepared);
+        }
+        command(&mut self.solver);
+        self.solver.finish_boundary();
+        self.spare = self.solver.withdraw().or(self.spare.take());
+    }
+}
+
+#[test]
+fn prepared_constraints_change_no_bit() {
+    let mut plain = solver(SCENE);
+    let mut assisted = Assisted { solver: plain.clone(), spare: None, plan_count: 0 };
+    let mut past = vec![Past::of(&plain)];
+    let actions = [
+        set(Parameter::Compliance, 1e-4),
+        set(Parameter::TearStretch, 1.05),
+        set(Parameter::Substeps, 3.0),
+        set(Parameter::WindDrag, 0.0),
+        set(Parameter::Compliance, 0.0),
+        Action::Reset,
+        set(Parameter::Iterations, 2.0),
+        set(Parameter::TearForce, 4.0),
+        Action::Set {
+            parameter: Text::cut("compliance"),
+            value: ParameterValue::Off,
+            constraint_kind: Some(KindFilter::Known(sim_solver::ConstraintKind::Shear)),
+        },
+        set(Parameter::TearStretch, 1.1),
+        set(Parameter::MaxStretch, 1.2),
+        Action::Reset,
+        set(Parameter::WindDrag, 0.3),
+    ];
+    let mut torn_counts = Vec::new();
+    for (round, action) in actions.iter().cycle().take(60).enumerate() {
+        let plan = assisted.solver.plan(action);
+        let prepared = assisted.prepare(plan);
+        // The scene goes on between the plan and the command, and sometimes changes what it was made
+        // from.
+        for step in 0..round % 5 {
+            if round % 3 == 1 && step == 1 {
+                let (constraint, particle) = (11 * round, 7 * round);
+                for solver in [&mut plain, &mut assisted.solver] {
+                    // It may be torn already.
+                    let _is_cut = solver.cut(u32::try_from(constraint).unwrap());
+                    solver.pin(u32::try_from(particle).unwrap()).unwrap();
+                }
+            }
+            plain.step();
+            assisted.solver.step();
+            assert_eq!(plain.state_hash(), assisted.solver.state_hash(), "before {round}");
+        }
+        let (expected, found) = (plain.apply(7, action), &mut None);
+        plain.finish_boundary();
+        assisted.finish(prepared, |solver| *found = Some(solver.apply(7, action)));
+        assert_eq!(Some(expected), *found);
+        for _ in 0..12 {
+            plain.step();
+            assisted.solver.step();
+            assert_eq!(plain.state_hash(), assisted.solver.state_hash(), "{round}: {action:?}");
+        }
+        torn_counts.push(plain.torn().len());
+        if round % 4 == 2 {
+            past.push(Past::of(&plain));
+        }
+        if round % 5 == 4 {
+            let Past { particles, keyframe } = &past[(7 * round) % past.len()];
+            let plan = assisted.solver.plan_state(keyframe);
+            let prepared = assisted.prepare(plan);
+            plain.step();
+            assisted.solver.step();
+            plain.put_in_place(particles, keyframe).unwrap();
+            assisted.finish(prepared, |solver| solver.put_in_place(particles, keyframe).unwrap());
+            let mut fresh = solver(SCENE);
+            fresh.put_in_place(particles, keyframe).unwrap();
+            for _ in 0..9 {
+                for solver in [&mut plain, &mut assisted.solver, &mut fresh] {
+                    solver.step();
+                }
+                assert_eq!(plain.state_hash(), fresh.state_hash(), "restored in {round}");
+                assert_eq!(plain.state_hash(), assisted.solver.state_hash(), "{round}");
+            }
+        }
+        assert_eq!(plain.keyframe(), assisted.solver.keyframe());
+    }
+    assert!(assisted.plan_count > 40, "{}", assisted.plan_count);
+    assert!(torn_counts.iter().any(|count| *count > 0), "nothing tore");
+}
+
+#[test]
+fn a_state_from_before_a_tear_has_its_tethers_again() {
+    let mut torn = solver(SCENE);
+    torn.step();
+    let past = Past::of(&torn);
+    // Every path from a root begins with one of these.
+    for constraint in (0..torn.constraint_count()).map(|index| u32::try_from(index).unwrap()) {
+        let ends = torn.constraints().nth(constraint as usize).unwrap();
+        if [ends.a, ends.b].iter().any(|end| [0, 27].contains(end)) {
+            torn.cut(constraint).unwrap();
+        }
+    }
+    torn.step();
+    torn.restore(&past.particles, &past.keyframe).unwrap();
+    let mut fresh = solver(SCENE);
+    fresh.restore(&past.particles, &past.keyframe).unwrap();
+    for _ in 0..60 {
+        torn.step();
+        fresh.step();
+    }
+    assert_eq!(torn.state_hash(), fresh.state_hash());
+}
+
+#[test]
+fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
+    let solver = solver(SCENE);
+    let action = |name: &str, value: f32| Action::Set {
+        parameter: Text::cut(name),
+        value: ParameterValue::Number(value),
+        constraint_kind: None,
+    };
+    assert!(solver.plan(&action("compliance", 1e-3)).is_some());
+    for action in [
+        action("compliance", -1.0),
+        action("compliance", f32::NAN),
+        action("stiffness", 0.5),
+        action("unknown", 0.5),
+        action("damping", 0.5),
+        Action::Pin { particle: 1 },
+        Action::Reset,
+    ] {
+        assert!(solver.plan(&action).is_none(), "{action:?}");
+    }
+    assert!(solver.plan_state(&solver.keyframe()).is_none());
+    let small = Solver::new(&Scene::from_toml("version = 1", "small").unwrap());
+    assert!(small.plan(&action("compliance", 1e-3)).is_none());
+}
+
+#[test]
+fn constraints_of_another_scene_are_ignored() {
+    let mut first = solver(SCENE);
+    let mut second = solver(&SCENE.replace("columns = 28", "columns = 29"));
+    let action = set(Parameter::Compliance, 1e-4);
+    first.offer(second.plan(&action).unwrap().prepare(None));
+    assert!(first.withdraw().is_none());
+    // A spare of another scene is of no use, either.
+    second.offer(second.plan(&action).unwrap().prepare(None));
+    let spare = second.withdraw();
+    assert!(spare.is_some());
+    let mut plain = first.clone();
+    first.offer(first.plan(&action).unwrap().prepare(spare));
+    for solver in [&mut plain, &mut first] {
+        solver.apply(1, &action).unwrap();
+        for _ in 0..5 {
+            solver.step();
+        }
+    }
+    assert_eq!(plain.state_hash(), first.state_hash());
+}
+
+#[test]
+fn a_keyframe_of_another_scene_has_no_plan() {
+    let large = solver(&SCENE.replace("columns = 28", "columns = 60"));
+    let mut torn = large.clone();
+    torn.cut(u32::try_from(large.constraint_count() - 1).unwrap()).unwrap();
+    torn.set("substeps", ParameterValue::Number(3.0), None).unwrap();
+    torn.step();
+    assert!(large.plan_state(&torn.keyframe()).is_some());
+    assert!(solver(SCENE).plan_state(&torn.keyframe()).is_none());
+}
