@@ -4,8 +4,8 @@ mod boundary;
 mod grab_connections;
 mod history;
 mod inbox;
+mod job;
 mod load;
-mod loading;
 mod lockstep;
 mod pace;
 mod progress;
@@ -19,12 +19,13 @@ use std::time::Duration;
 
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until, thread_time_ns};
 use sim_contract::{Endpoint, ReceivedCommand, Stop};
-use sim_solver::{Scene, Solver};
+use sim_solver::{Scene, Solver, Spare};
 
 use grab_connections::GrabConnections;
 use history::History;
 use inbox::Inbox;
-use loading::{Loading, Overrides};
+use job::Job;
+use job::scene::Overrides;
 use lockstep::{Event, Lockstep};
 use pace::Pace;
 use pace::polling::Polling;
@@ -113,8 +114,10 @@ pub(crate) struct Node {
     grab_connections: GrabConnections,
     lockstep: Lockstep,
     history: History,
-    /// Scene that is being loaded beside the loop.
-    loading: Option<Loading>,
+    /// Command that is prepared beside the loop.
+    job: Option<Job>,
+    /// Memory for the next one.
+    spare: Option<Spare>,
     /// A command has been applied since the last step.
     is_commanded: bool,
     boundary: Boundary,
@@ -161,7 +164,8 @@ impl Node {
             grab_connections: GrabConnections::default(),
             lockstep: Lockstep::new(options.lockstep_timeout),
             history: History::new(options.history_bytes),
-            loading: None,
+            job: None,
+            spare: None,
             is_commanded: false,
             boundary: Boundary::Open,
             cpus: Cpus::observe(),

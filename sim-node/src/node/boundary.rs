@@ -9,6 +9,7 @@ use sim_solver::{Applied, Control, Keyframe, Particle};
 
 use super::history::Target;
 use super::inbox::Request;
+use super::job::Done;
 use super::{Boundary, Node};
 
 impl Node {
@@ -22,18 +23,22 @@ impl Node {
             // The next step shows it without further changes.
             return Ok(());
         }
-        let has_members = self.lockstep.has_members();
-        let loaded = self.loading.as_ref().and_then(|loading| {
-            // A member has joined meanwhile.
-            if has_members { loading.wait(stop) } else { loading.poll() }
-        });
-        if let Some(loaded) = loaded {
-            return self.finish_load(loaded);
-        }
+        let first = match self.finish_job(stop) {
+            None => None,
+            Some((request, Done::Scene(loaded))) => {
+                self.publisher.publish_left_out(&self.solver, self.position())?;
+                return self.answer_load(&request, loaded);
+            }
+            Some((request, Done::Constraints(prepared))) => {
+                self.solver.offer(*prepared);
+                Some(request)
+            }
+        };
+        let is_prepared = first.is_some();
         let lost =
             self.grab_connections.remove_lost(monotonic_ns(), || self.publisher.connections());
         // Together they are at most one turn, so that readers can keep up with the outcomes.
-        let turn = self.inbox.next_turn(COMMANDS_PER_STEP_MAX - lost.len());
+        let turn = self.inbox.next_turn(COMMANDS_PER_STEP_MAX - lost.len(), first);
         let has_pause =
             turn.iter().any(|request| request.received.command.action() == Action::Pause);
         let has_any = !turn.is_empty() || !lost.is_empty();
@@ -47,13 +52,17 @@ impl Node {
         if !turn.is_empty() {
             self.polling.on_commands(monotonic_ns());
         }
+        let mut turn = turn.into_iter();
+        if is_prepared && let Some(request) = turn.next() {
+            self.apply(&request);
+        }
         for request in turn {
-            match request.received.command.action() {
-                Action::Load { scene } => self.load(&request, scene, stop)?,
-                _ => self.apply(&request),
-            }
+            self.process(request, stop)?;
         }
         self.solver.finish_boundary();
+        if let Some(spare) = self.solver.withdraw() {
+            self.spare = Some(spare);
+        }
         let time_scale = self.progress.time_scale;
         self.pace.set_time_scale(time_scale, monotonic_ns());
         self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
@@ -70,6 +79,22 @@ impl Node {
         }
     }
 
+    /// Applies a command, or starts its work beside the loop.
+    fn process(&mut self, request: Request, stop: &Stop) -> anyhow::Result<()> {
+        if self.inbox.is_held(request.received.command.client_id) {
+            // One of its commands in this turn waits.
+            self.inbox.put_back(request);
+            return Ok(());
+        }
+        if let Action::Load { scene } = request.received.command.action() {
+            return self.load(request, scene, stop);
+        }
+        if let Some(request) = self.prepare_beside(request) {
+            self.apply(&request);
+        }
+        Ok(())
+    }
+
     fn apply(&mut self, request: &Request) {
         // A fresh status follows, so that `ctl status` shows the effect.
         self.next_status_ns = 0;
@@ -79,7 +104,7 @@ impl Node {
                 self.rewind(Target { to_step, back_steps }, &mut command)
             }
             Ok(Applied::Control(Control::Restore)) => {
-                self.restore(request.state.as_ref(), &mut command)
+                self.restore(request.state.as_deref(), &mut command)
             }
             Ok(applied) => self.progress.apply(applied).map(|()| applied),
             Err(reason) => Err(reason),

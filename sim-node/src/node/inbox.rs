@@ -1,6 +1,7 @@
 //! Order in which the commands of several clients are applied.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use sim_contract::{Action, COMMANDS_PER_STEP_MAX, RESTORES_MAX, ReceivedCommand, ReceivedState};
 
@@ -8,7 +9,9 @@ use sim_contract::{Action, COMMANDS_PER_STEP_MAX, RESTORES_MAX, ReceivedCommand,
 #[derive(Debug, Clone)]
 pub(super) struct Request {
     pub(super) received: ReceivedCommand,
-    pub(super) state: Option<ReceivedState>,
+    pub(super) state: Option<Rc<ReceivedState>>,
+    /// Number of requests that arrived before.
+    arrived_before: u64,
 }
 
 /// Commands that wait to be applied.
@@ -29,8 +32,8 @@ pub(super) struct Inbox {
     arrived_count: u64,
     /// Number of states that wait. They can be large.
     state_count: usize,
-    /// Client whose commands wait for a load.
-    held: Option<u64>,
+    /// Clients whose commands wait for the end of a job.
+    held: BTreeSet<u64>,
 }
 
 /// The commands of a client, by sequence, and by order of arrival for equal sequences.
@@ -54,7 +57,7 @@ impl Inbox {
     /// Adds commands in their order of arrival.
     pub(super) fn add(&mut self, commands: impl IntoIterator<Item = ReceivedCommand>) {
         for received in commands {
-            self.add_request(Request { received, state: None });
+            self.add_request(&received, None);
         }
     }
 
@@ -64,46 +67,58 @@ impl Inbox {
         states: impl IntoIterator<Item = (ReceivedCommand, ReceivedState)>,
     ) {
         for (received, state) in states {
-            self.state_count += 1;
-            self.add_request(Request { received, state: Some(state) });
+            self.add_request(&received, Some(Rc::new(state)));
         }
     }
 
-    fn add_request(&mut self, request: Request) {
-        let command = &request.received.command;
-        let queue = self.queues.entry(command.client_id).or_default();
-        queue.insert((command.sequence, self.arrived_count), request);
+    fn add_request(&mut self, received: &ReceivedCommand, state: Option<Rc<ReceivedState>>) {
+        let arrived_before = self.arrived_count;
         self.arrived_count += 1;
-        self.waiting_count += 1;
+        self.put_back(Request { received: *received, state, arrived_before });
     }
 
-    /// Removes the commands of one turn, at most `count_max`, in the order of application. A turn ends
-    /// with the first load, because a load takes long, and with a command that puts a state in place,
-    /// because the next step shows this state without further changes.
-    pub(super) fn next_turn(&mut self, count_max: usize) -> Vec<Request> {
+    /// Puts a request back to its place among those of its client.
+    pub(super) fn put_back(&mut self, request: Request) {
+        let command = &request.received.command;
+        let queue = self.queues.entry(command.client_id).or_default();
+        self.waiting_count += 1;
+        self.state_count += usize::from(request.state.is_some());
+        queue.insert((command.sequence, request.arrived_before), request);
+    }
+
+    /// Removes the commands of one turn, at most `count_max`, in the order of application. `first` comes
+    /// before all others. A turn ends with the first load, because a load takes long, and with a
+    /// command that puts a state in place, because the next step shows this state without further
+    /// changes.
+    pub(super) fn next_turn(&mut self, count_max: usize, first: Option<Request>) -> Vec<Request> {
+        let ends_turn = |request: &Request| {
+            let action = request.received.command.action();
+            matches!(action, Action::Load { .. } | Action::Rewind { .. } | Action::Restore { .. })
+        };
         let mut turn = Vec::new();
+        turn.extend(first);
         while turn.len() < count_max
+            && !turn.last().is_some_and(ends_turn)
             && let Some(request) = self.next()
         {
-            let action = request.received.command.action();
             turn.push(request);
-            if matches!(
-                action,
-                Action::Load { .. } | Action::Rewind { .. } | Action::Restore { .. }
-            ) {
-                break;
-            }
         }
         turn
     }
 
-    /// Keeps the further commands of a client, and the loads of the others, until [`Self::release`].
+    /// Keeps the further commands of a client until [`Self::release`].
     pub(super) fn hold(&mut self, client_id: u64) {
-        self.held = Some(client_id);
+        self.held.insert(client_id);
     }
 
+    /// Releases the commands of all clients.
     pub(super) fn release(&mut self) {
-        self.held = None;
+        self.held.clear();
+    }
+
+    /// Returns `true` if the commands of a client wait for [`Self::release`].
+    pub(super) fn is_held(&self, client_id: u64) -> bool {
+        self.held.contains(&client_id)
     }
 
     /// Removes the first command of the next client that is not held.
@@ -118,15 +133,6 @@ impl Inbox {
             self.round.extend(self.queues.keys());
         }
         None
-    }
-
-    fn is_held(&self, client_id: u64) -> bool {
-        let first = || self.queues.get(&client_id)?.first_key_value();
-        let is_load =
-            |request: &Request| matches!(request.received.command.action(), Action::Load { .. });
-        self.held.is_some_and(|held| {
-            held == client_id || first().is_some_and(|(_, request)| is_load(request))
-        })
     }
 
     fn remove_first(&mut self, client_id: u64) -> Option<Request> {
@@ -163,10 +169,10 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add([pin(9, 1), pin(9, 2), pin(4, 7), pin(9, 3), pin(4, 6)]);
         assert_eq!(
-            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)),
+            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)),
             [(4, 6), (9, 1), (4, 7), (9, 2), (9, 3)]
         );
-        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX).is_empty());
+        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX, None).is_empty());
     }
 
     #[test]
@@ -174,10 +180,10 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add((0..1500).map(|sequence| pin(1, sequence)));
         inbox.add([pin(2, 0)]);
-        let first = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX));
+        let first = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None));
         assert_eq!(first.len(), COMMANDS_PER_STEP_MAX);
         assert_eq!(first[..3], [(1, 0), (2, 0), (1, 1)]);
-        let rest = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX));
+        let rest = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None));
         assert_eq!((rest.len(), rest[0]), (1501 - COMMANDS_PER_STEP_MAX, (1, 1023)));
     }
 
@@ -187,10 +193,10 @@ mod tests {
         let flood = |round| (0..COMMANDS_PER_STEP_MAX as u64).map(move |id| pin(id, round));
         inbox.add([pin(u64::MAX - 1, 0)]);
         inbox.add(flood(0));
-        assert_eq!(inbox.next_turn(COMMANDS_PER_STEP_MAX).len(), COMMANDS_PER_STEP_MAX);
+        assert_eq!(inbox.next_turn(COMMANDS_PER_STEP_MAX, None).len(), COMMANDS_PER_STEP_MAX);
         inbox.add(flood(1));
         assert_eq!(
-            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX))[..2],
+            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None))[..2],
             [(u64::MAX - 1, 0), (0, 1)]
         );
     }
@@ -207,7 +213,7 @@ mod tests {
         inbox.add([pin(u64::MAX, 0)]);
         let is_served = |turn: &[Request]| order(turn).contains(&(u64::MAX, 0));
         let turns = (1..=100).find(|_| {
-            let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX);
+            let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
             inbox.add(flood(COMMANDS_PER_STEP_MAX));
             is_served(&turn)
         });
@@ -224,8 +230,8 @@ mod tests {
             let command = Command::new(1, 2, action);
             let replaces = ReceivedCommand { command, connection: ConnectionId::default() };
             inbox.add([pin(1, 1), replaces, pin(1, 3)]);
-            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 1), (1, 2)]);
-            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(1, 3)]);
+            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)), [(1, 1), (1, 2)]);
+            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)), [(1, 3)]);
         }
     }
 
@@ -241,26 +247,55 @@ mod tests {
         inbox.add([pin(1, 1), pin(1, 4)]);
         inbox.add_states((0..RESTORES_MAX as u64).map(|index| state(2 + 3 * index)));
         assert!(!inbox.has_room_for_states());
-        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX);
+        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
         assert_eq!(order(&turn), [(1, 1), (1, 2)]);
         assert!(turn[1].state.is_some());
         assert!(inbox.has_room_for_states());
     }
 
     #[test]
-    fn the_commands_of_a_held_client_and_other_loads_wait_for_its_release() {
-        let load = |client_id| {
-            let command = Command::new(client_id, 1, Action::Load { scene: Text::cut("rope") });
-            ReceivedCommand { command, connection: ConnectionId::default() }
-        };
+    fn the_commands_of_a_held_client_wait_for_its_release() {
         let mut inbox = Inbox::default();
         inbox.hold(5);
-        inbox.add([pin(5, 1), load(6), pin(6, 2), pin(7, 1), pin(7, 2)]);
-        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(7, 1), (7, 2)]);
-        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX).is_empty());
+        inbox.add([pin(5, 1), pin(6, 1), pin(7, 1), pin(7, 2)]);
+        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
+        assert_eq!(order(&turn), [(6, 1), (7, 1), (7, 2)]);
+        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX, None).is_empty());
         inbox.release();
-        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(5, 1), (6, 1)]);
-        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX)), [(6, 2)]);
+        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)), [(5, 1)]);
+    }
+
+    #[test]
+    fn a_request_that_is_put_back_keeps_its_place_among_those_of_its_client() {
+        let mut inbox = Inbox::default();
+        inbox.add([pin(5, 1), pin(5, 1), pin(5, 2)]);
+        let arrivals = |turn: &[Request]| -> Vec<_> {
+            turn.iter().map(|request| request.arrived_before).collect()
+        };
+        let turn = inbox.next_turn(2, None);
+        assert_eq!(arrivals(&turn), [0, 1]);
+        for request in turn.into_iter().rev() {
+            inbox.put_back(request);
+        }
+        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
+        assert_eq!((order(&turn), arrivals(&turn)), (vec![(5, 1), (5, 1), (5, 2)], vec![0, 1, 2]));
+        assert_eq!((inbox.waiting_count, inbox.state_count), (0, 0));
+    }
+
+    #[test]
+    fn the_first_request_of_a_turn_comes_before_others_and_may_end_it() {
+        let mut inbox = Inbox::default();
+        let first = |inbox: &mut Inbox, action| {
+            let command = Command::new(1, 1, action);
+            inbox.add([ReceivedCommand { command, connection: ConnectionId::default() }]);
+            inbox.next_turn(1, None).pop()
+        };
+        let cheap = first(&mut inbox, Action::Pause);
+        let rewind = first(&mut inbox, Action::Rewind { to_step: Some(3), back_steps: None });
+        inbox.add([pin(0, 5), pin(0, 6)]);
+        assert_eq!(order(&inbox.next_turn(2, cheap)), [(1, 1), (0, 5)]);
+        assert_eq!(order(&inbox.next_turn(2, rewind)), [(1, 1)]);
+        assert_eq!(order(&inbox.next_turn(2, None)), [(0, 6)]);
     }
 
     #[test]
@@ -268,7 +303,7 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add((0..INBOX_MAX as u64).map(|sequence| pin(1, sequence)));
         assert!(!inbox.has_room());
-        inbox.next_turn(COMMANDS_PER_STEP_MAX);
+        inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
         assert!(inbox.has_room());
     }
 }

@@ -6,7 +6,8 @@ use sim_contract::{Command, OwnerError, Reason, Stop, Text};
 use sim_solver::Applied;
 
 use super::inbox::Request;
-use super::loading::{Loaded, Loading, Refusal};
+use super::job::Done;
+use super::job::scene::{Loaded, Refusal};
 use super::pace::Pace;
 use super::publisher::{Run, StepTimes};
 use super::statistics::Statistics;
@@ -14,60 +15,44 @@ use super::threads::start_threads;
 use super::{Boundary, Node};
 
 impl Node {
-    /// Loads a scene. The commands of its client wait for it, and the node goes on.
-    ///
-    /// A node that does not keep time, or that waits for members of the lockstep, loads the scene at this
-    /// boundary, so that the result does not depend on the time that the load takes.
+    /// Loads a scene. The commands of its client wait for it, and the node goes on if it
+    /// [works beside the loop](Self::works_beside).
     pub(super) fn load(
         &mut self,
-        request: &Request,
+        request: Request,
         source: Text,
         stop: &Stop,
     ) -> anyhow::Result<()> {
-        let request = Request { received: request.received, state: None };
-        let client_id = request.received.command.client_id;
-        let rate_hz = self.scene.solver.rate_hz;
-        let (overrides, cpus) = (self.options.overrides(), &self.cpus);
-        let loading =
-            match Loading::start(request.clone(), source.as_str(), overrides, rate_hz, cpus) {
-                Ok(loading) => loading,
-                Err(refusal) => return self.answer_load(&request, Err(refusal)),
-            };
-        if self.options.waits_for_time && !self.lockstep.has_members() {
-            self.inbox.hold(client_id);
-            self.loading = Some(loading);
+        if self.job.is_some() {
+            self.inbox.hold(request.received.command.client_id);
+            self.inbox.put_back(request);
             return Ok(());
         }
-        match loading.wait(stop) {
-            Some(loaded) => self.answer_load(&request, loaded),
-            // This node ends.
-            None => Ok(()),
+        if let Err(problem) = self.begin_load(&request, source) {
+            let reason = Reason::NoEffectHere;
+            return self.answer_load(&request, Err(Refusal { problem, reason }));
         }
-    }
-
-    /// Ends the load that has run beside the loop.
-    pub(super) fn finish_load(&mut self, loaded: Result<Loaded, Refusal>) -> anyhow::Result<()> {
-        self.inbox.release();
-        match self.loading.take() {
-            Some(loading) => {
-                self.publisher.publish_left_out(&self.solver, self.position())?;
-                self.answer_load(&loading.request, loaded)
-            }
-            None => Ok(()),
+        if self.works_beside() {
+            return Ok(());
+        }
+        match self.finish_job(stop) {
+            Some((request, Done::Scene(loaded))) => self.answer_load(&request, loaded),
+            // This node ends.
+            _ => Ok(()),
         }
     }
 
     /// Puts a loaded scene in place, and logs the outcome.
-    fn answer_load(
+    pub(super) fn answer_load(
         &mut self,
         request: &Request,
-        loaded: Result<Loaded, Refusal>,
+        loaded: Result<Box<Loaded>, Refusal>,
     ) -> anyhow::Result<()> {
         // A fresh status follows, so that `ctl status` shows the effect.
         self.next_status_ns = 0;
         let (step, command) = (self.step + 1, request.received.command);
         let replaced = match loaded {
-            Ok(loaded) => self.replace_scene(loaded, command)?,
+            Ok(loaded) => self.replace_scene(*loaded, command)?,
             Err(refusal) => Err(refusal),
         };
         match replaced {

@@ -6,4 +6,5 @@ mod bench;
 mod distant_step;
 mod load;
 mod lockstep;
+mod prepared;
 mod real_time;
