@@ -163,7 +163,7 @@ impl Node {
             arrived: Vec::new(),
             grab_connections: GrabConnections::default(),
             lockstep: Lockstep::new(options.lockstep_timeout),
-            history: History::new(options.history_bytes),
+            history: History::new(options.history_bytes, &solver)?,
             job: None,
             spare: None,
             is_commanded: false,

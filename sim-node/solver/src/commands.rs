@@ -2,6 +2,7 @@
 
 pub(crate) mod apply;
 pub(crate) mod cut;
+pub(crate) mod plan;
 pub(crate) mod preparation;
 
 use glam::Vec3;

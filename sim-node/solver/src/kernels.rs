@@ -8,6 +8,7 @@ pub(crate) mod huge_pages;
 pub(crate) mod lanes;
 mod portable;
 mod scalar;
+pub(crate) mod stream;
 pub(crate) mod worker_pool;
 
 use lanes::LaneWork;

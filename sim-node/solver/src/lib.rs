@@ -56,6 +56,7 @@ pub use solver::Solver;
 pub use state::keyframe::{Keyframe, KeyframeError};
 pub use state::particles::Particle;
 pub use state::restore::RestoreError;
+pub use state::slots::{Slot, Slots};
 pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that

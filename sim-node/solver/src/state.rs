@@ -4,4 +4,5 @@ pub(crate) mod hash;
 pub(crate) mod keyframe;
 pub(crate) mod particles;
 pub(crate) mod restore;
+pub(crate) mod slots;
 pub(crate) mod tear;

@@ -10,10 +10,9 @@ mod publish;
 mod survey;
 mod workers;
 
-pub(crate) use configure::Configured;
 use graph::Graph;
 use layout::Layout;
-pub(crate) use layout::{Location, SceneFields};
+pub(crate) use layout::{Configured, Location, SceneFields};
 use patch::Patch;
 use survey::Survey;
 use workers::Workers;

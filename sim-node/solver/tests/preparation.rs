@@ -1,5 +1,6 @@
 //! Constraints that are prepared beside a solver: the same bits as without, whatever happens between the
 //! plan and the command, and whatever the spare was used for before.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::{
     Action, Keyframe, Parameter, ParameterValue, Particle, Prepared, Scene, Solver, Spare,
@@ -60,6 +61,26 @@ impl Assisted {
     }
 }
 
+/// Puts a state in place in both solvers and in a new one, and compares their steps.
+fn return_to(past: &Past, plain: &mut Solver, assisted: &mut Assisted) {
+    let Past { particles, keyframe } = past;
+    let plan = assisted.solver.plan_state(keyframe);
+    let prepared = assisted.prepare(plan);
+    plain.step();
+    assisted.solver.step();
+    plain.put_in_place(particles, keyframe).unwrap();
+    assisted.finish(prepared, |solver| solver.put_in_place(particles, keyframe).unwrap());
+    let mut fresh = solver(SCENE);
+    fresh.put_in_place(particles, keyframe).unwrap();
+    for _ in 0..9 {
+        for solver in [&mut *plain, &mut assisted.solver, &mut fresh] {
+            solver.step();
+        }
+        assert_eq!(plain.state_hash(), fresh.state_hash());
+        assert_eq!(plain.state_hash(), assisted.solver.state_hash());
+    }
+}
+
 #[test]
 fn prepared_constraints_change_no_bit() {
     let mut plain = solver(SCENE);
@@ -117,22 +138,7 @@ fn prepared_constraints_change_no_bit() {
             past.push(Past::of(&plain));
         }
         if round % 5 == 4 {
-            let Past { particles, keyframe } = &past[(7 * round) % past.len()];
-            let plan = assisted.solver.plan_state(keyframe);
-            let prepared = assisted.prepare(plan);
-            plain.step();
-            assisted.solver.step();
-            plain.put_in_place(particles, keyframe).unwrap();
-            assisted.finish(prepared, |solver| solver.put_in_place(particles, keyframe).unwrap());
-            let mut fresh = solver(SCENE);
-            fresh.put_in_place(particles, keyframe).unwrap();
-            for _ in 0..9 {
-                for solver in [&mut plain, &mut assisted.solver, &mut fresh] {
-                    solver.step();
-                }
-                assert_eq!(plain.state_hash(), fresh.state_hash(), "restored in {round}");
-                assert_eq!(plain.state_hash(), assisted.solver.state_hash(), "{round}");
-            }
+            return_to(&past[(7 * round) % past.len()], &mut plain, &mut assisted);
         }
         assert_eq!(plain.keyframe(), assisted.solver.keyframe());
     }

@@ -120,7 +120,8 @@ impl Node {
     fn rewind(&mut self, target: Target, command: &mut Command) -> Result<Applied, Reason> {
         let state = self.history.find(self.step, target)?;
         let to_step = state.step;
-        self.solver.put_in_place(&state.particles, &state.keyframe()).map_err(|error| {
+        let particles = self.history.particles(state);
+        self.solver.put_in_place(particles, &state.keyframe()).map_err(|error| {
             debug_assert!(
                 false,
                 "the kept state of step {to_step} does not belong to the scene: {error}"

@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use std::rc::Rc;
 
+use anyhow::Context;
 use sim_contract::Reason;
-use sim_solver::{Keyframe, Particle, Solver};
+use sim_solver::{Keyframe, Particle, Slot, Slots, Solver};
 
 /// Most places where the run continued from another state than the last one. Beyond it the oldest are
 /// forgotten, and steps back across them are counted as if they did not exist.
@@ -20,8 +21,7 @@ pub(super) struct History {
     /// By ascending step, all of the same scene.
     states: VecDeque<KeptState>,
     size_bytes: usize,
-    /// Buffers of removed states.
-    free: Vec<Vec<Particle>>,
+    slots: Slots,
     /// By ascending step.
     branches: VecDeque<Branch>,
     newest: Option<Newest>,
@@ -32,7 +32,7 @@ pub(super) struct History {
 pub(super) struct KeptState {
     pub(super) step: u64,
     scene_step: u64,
-    pub(super) particles: Vec<Particle>,
+    particles: Slot,
     /// Shared by steps that differ only in their scene step.
     keyframe: Rc<Keyframe>,
     size_bytes: usize,
@@ -67,16 +67,32 @@ pub(super) struct Target {
 }
 
 impl History {
-    /// Keeps states in `limit_bytes`; 0 keeps none.
-    pub(super) fn new(limit_bytes: usize) -> Self {
-        Self {
+    /// Takes `limit_bytes` of memory for the states of a solver; 0 keeps none.
+    ///
+    /// # Errors
+    /// There is not enough memory.
+    pub(super) fn new(limit_bytes: usize, solver: &Solver) -> anyhow::Result<Self> {
+        let mut history = Self {
             limit_bytes,
             states: VecDeque::new(),
             size_bytes: 0,
-            free: Vec::new(),
-            branches: VecDeque::new(),
+            slots: Slots::new(limit_bytes).context("no memory for --history")?,
+            branches: VecDeque::with_capacity(BRANCHES_MAX),
             newest: None,
-        }
+        };
+        history.restart(solver);
+        Ok(history)
+    }
+
+    /// Forgets all states. Those of another scene follow.
+    pub(super) fn restart(&mut self, solver: &Solver) {
+        let count_max = self.limit_bytes / state_size_bytes(solver);
+        self.states.clear();
+        self.states.reserve(count_max);
+        self.size_bytes = 0;
+        self.slots.divide(solver.particle_count(), count_max);
+        self.branches.clear();
+        self.newest = None;
     }
 
     /// Returns `true` if at least the state of one step fits, or none is asked for.
@@ -98,9 +114,9 @@ impl History {
         while self.size_bytes + size_bytes > self.limit_bytes && !self.states.is_empty() {
             self.thin();
         }
-        let mut particles = self.free.pop().unwrap_or_default();
-        particles.clear();
-        particles.extend_from_slice(solver.particles());
+        let Some(particles) = self.slots.store(solver.particles()) else {
+            unreachable!("{} states fill the memory for more of them", self.states.len())
+        };
         self.size_bytes += size_bytes;
         let scene_step = solver.scene_step();
         self.states.push_back(KeptState { step, scene_step, particles, keyframe, size_bytes });
@@ -131,26 +147,28 @@ impl History {
             return;
         }
         let mut index = 0;
-        let Self { states, free, size_bytes, .. } = self;
-        states.retain_mut(|state| {
+        let Self { states, slots, size_bytes, .. } = self;
+        states.retain(|state| {
             let keeps = !is_removed(index);
             index += 1;
             if !keeps {
                 *size_bytes -= state.size_bytes;
-                free.push(std::mem::take(&mut state.particles));
+                slots.release(state.particles);
             }
             keeps
         });
     }
 
     fn remove_all(&mut self) {
-        self.free.extend(self.states.drain(..).map(|state| state.particles));
+        for state in self.states.drain(..) {
+            self.slots.release(state.particles);
+        }
         self.size_bytes = 0;
     }
 
-    /// Forgets all states, because another scene is loaded.
-    pub(super) fn clear(&mut self) {
-        *self = Self::new(self.limit_bytes);
+    /// Returns the particles of a kept state.
+    pub(super) fn particles(&self, state: &KeptState) -> &[Particle] {
+        self.slots.particles(state.particles)
     }
 
     /// Notes that the state of `step` is that of the step `from`.
@@ -220,7 +238,7 @@ mod tests {
     fn history_after(count: usize, last: u64) -> History {
         let mut solver = pendulum();
         let size_bytes = state_size_bytes(&solver) + solver.keyframe().size_bytes();
-        let mut history = History::new(count * size_bytes);
+        let mut history = History::new(count * size_bytes, &solver).unwrap();
         history.keep(0, &solver, false);
         for step in 1..=last {
             solver.step();
@@ -257,13 +275,13 @@ mod tests {
         let history = history_after(0, 7);
         assert!(steps(&history).is_empty());
         assert!(history.has_room(&pendulum()), "none is asked for");
-        assert!(!History::new(10).has_room(&pendulum()));
+        assert!(!History::new(10, &pendulum()).unwrap().has_room(&pendulum()));
     }
 
     #[test]
     fn a_kept_state_continues_as_its_step_did() {
         let mut solver = pendulum();
-        let mut history = History::new(1 << 20);
+        let mut history = History::new(1 << 20, &solver).unwrap();
         let mut hashes = Vec::new();
         for step in 0..200 {
             if step == 20 {
@@ -285,7 +303,7 @@ mod tests {
                 history.find(199, Target { to_step: Some(from), back_steps: None }).unwrap();
             assert_eq!(state.step, from);
             let mut again = pendulum();
-            again.put_in_place(&state.particles, &state.keyframe()).unwrap();
+            again.put_in_place(history.particles(state), &state.keyframe()).unwrap();
             again.step();
             assert_eq!(again.state_hash(), hashes[usize::try_from(from).unwrap()]);
             let commanded = [20, 90].into_iter().find(|step| *step > from).unwrap_or(200);
@@ -331,6 +349,9 @@ mod tests {
         let found = reason(&thinned, target(Some(123), None)).unwrap();
         assert!(found <= 123);
         assert_eq!(reason(&history_after(1, 700), target(Some(3), None)), Err(Reason::UnknownStep));
-        assert_eq!(reason(&History::new(0), target(Some(3), None)), Err(Reason::NoEffectHere));
+        assert_eq!(
+            reason(&History::new(0, &pendulum()).unwrap(), target(Some(3), None)),
+            Err(Reason::NoEffectHere)
+        );
     }
 }

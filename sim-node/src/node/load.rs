@@ -64,7 +64,7 @@ impl Node {
             }
             Ok(run) => {
                 self.grab_connections.on_applied(&request.received);
-                self.history.clear();
+                self.history.restart(&self.solver);
                 self.check_history();
                 match run {
                     Run::Same { .. } => {

@@ -1,24 +1,14 @@
 //! Derives the constraints of a store from the scene, the parameters and the tears.
 
 use super::graph::block::BLOCK_PARTICLES;
-use super::{ParticleStore, SceneFields, find_sheet};
+use super::layout::{Configured, Location, SceneFields};
+use super::{ParticleStore, find_sheet};
 use crate::constraints::builder::ConstraintBuilder;
 use crate::constraints::families::Family;
 use crate::constraints::fields::ConstraintFields;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::parameters::{Affected, Parameters};
 use crate::scene::model::Model;
-use crate::store::layout::Location;
-
-/// Effect of a change of parameters on the locations of particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[must_use]
-pub(crate) enum Configured {
-    /// Everything stays in place.
-    InPlace,
-    /// Particles have new locations, and no tethers.
-    Moved,
-}
 
 impl ParticleStore {
     /// Derives the constraints, as far as they depend on what has changed since the last call. Torn

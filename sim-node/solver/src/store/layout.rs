@@ -62,6 +62,16 @@ impl Layout {
     }
 }
 
+/// Effect of a change of parameters on the locations of particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[must_use]
+pub(crate) enum Configured {
+    /// Everything stays in place.
+    InPlace,
+    /// Particles have new locations, and no tethers.
+    Moved,
+}
+
 /// Location of a particle or a constraint: an index in the graph or in a sheet.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Location {
