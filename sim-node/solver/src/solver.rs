@@ -64,8 +64,7 @@ pub struct Solver {
     /// True if a state was put in place since the last step. The next step publishes it, and
     /// integrates nothing.
     pub(crate) is_put_in_place: bool,
-    /// Particles frozen since the load or the last state that was put in place. For messages; not part of
-    /// the state.
+    /// Number of frozen particles, which their flags tell as well.
     pub(crate) frozen_count: u64,
     pub(crate) state_hash: u64,
 }
@@ -294,8 +293,8 @@ impl Solver {
         self.state_hash
     }
 
-    /// Returns the number of particles that froze since the load, a reset or a restore, because their
-    /// state was not finite. A frozen particle stays in place until a reset.
+    /// Returns the number of frozen particles, whose state was not finite. A frozen particle stays in
+    /// place until a reset, or a restore of a state in which it is not frozen.
     pub fn frozen_count(&self) -> u64 {
         self.frozen_count
     }

@@ -39,8 +39,7 @@ pub struct NodeStatus {
     pub outcome_count: u64,
     /// Number of rejected commands of this run, and of refused messages of the service `ready`.
     pub rejected_count: u64,
-    /// Number of particles that froze because their state was not finite, since the load, or since a
-    /// command last put a state in place.
+    /// Number of frozen particles, whose state was not finite.
     pub frozen_count: u64,
     /// Steps per second.
     pub rate_hz: u32,

@@ -58,6 +58,8 @@ impl Solver {
         for one in &keyframe.fixed {
             self.particles.base_inverse_masses[one.particle as usize] = one.base_inverse_mass;
         }
+        let frozen = particles.iter().filter(|one| one.flags & ParticleFlags::FROZEN != 0);
+        self.frozen_count = frozen.count() as u64;
         self.grabs.extend_from_slice(&keyframe.grabs);
         self.scene_step = keyframe.scene_step;
         self.is_put_in_place = false;

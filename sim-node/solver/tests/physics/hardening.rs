@@ -53,6 +53,18 @@ fn a_frozen_particle_refuses_commands_until_a_reset() {
 }
 
 #[test]
+fn a_restored_state_has_its_own_number_of_frozen_particles() {
+    let mut solver = stepped(BLOWS_UP, 0);
+    let before = (solver.particles().to_vec(), solver.keyframe());
+    step(&mut solver, 1);
+    let after = (solver.particles().to_vec(), solver.keyframe());
+    for ((particles, keyframe), frozen_count) in [(&before, 0), (&after, 2), (&before, 0)] {
+        solver.restore(particles, keyframe).unwrap();
+        assert_eq!(solver.frozen_count(), frozen_count);
+    }
+}
+
+#[test]
 fn a_state_with_frozen_particles_continues_bit_for_bit_from_a_keyframe() {
     let scene = Scene::from_toml(&format!("version = 1\n{BLOWS_UP}"), "test").unwrap();
     let mut solver = Solver::new(&scene);
