@@ -36,19 +36,23 @@ impl World {
             return;
         }
         let run_id = self.node_status().run_id;
-        let members = self.members.iter_mut().flatten().map(|member| &mut member.actor);
-        for client in members.chain(&mut self.followers) {
-            wait_for_run(client, run_id);
+        for index in 0..self.followers.len() {
+            wait_for("a reader that sees the newest run", || {
+                has_seen(&mut self.followers[index], run_id).then_some(())
+            });
+        }
+        for slot in 0..self.members.len() {
+            wait_for("a member that sees the newest run", || {
+                let Some(member) = &mut self.members[slot] else { return Some(()) };
+                // A paused node may never reach a step of this member.
+                let has_seen = has_seen(&mut member.actor, run_id);
+                (has_seen || self.node_status().is_paused()).then_some(())
+            });
         }
     }
 }
 
-fn wait_for_run(client: &mut Actor, run_id: u64) {
-    if client.is_stopped() {
-        return;
-    }
-    let line = format!("run {run_id}");
-    wait_for(&format!("a client that sees the run {run_id}"), || {
-        (client.has_written(&line) || !client.is_running()).then_some(())
-    });
+/// Returns `true` if a program has seen a run. A stopped one sees none.
+fn has_seen(client: &mut Actor, run_id: u64) -> bool {
+    client.is_stopped() || client.has_written(&format!("run {run_id}")) || !client.is_running()
 }
