@@ -6,8 +6,7 @@ use std::error::Error;
 use std::time::Duration;
 
 use sim_contract::{
-    Change, Client, Endpoint, GivenState, Outcome, ParticleState, Reason, RequestError, State,
-    Stop, Tap,
+    Client, Endpoint, GivenState, Outcome, ParticleState, Reason, RequestError, Stop, Tap, Update,
 };
 
 /// Longest wait for a message or an outcome before the next check for a signal.
@@ -36,16 +35,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         Ok((tap, client.map_err(|error| error.to_string())?))
     };
     let (mut tap, mut client) = attach()?;
-    let mut held: Option<Held> = None;
+    let (mut held, mut reading) = (None, Reading::default());
     let mut state_count = 0;
     while !stop.is_requested() {
         tap.wait(WAIT_MAX);
-        while let Some(state) = tap.next_state(|_| {}) {
+        let count_before = state_count;
+        while reading.read(&mut tap) {
             state_count += 1;
-            held = complete(&state).or(held);
+            held = reading.complete().or(held);
         }
+        held = reading.complete().or(held);
+        // A paused node publishes no states of its own.
+        let is_due = state_count >= STATES_PER_RESTORE || state_count == count_before;
         if let Some(held) = &held
-            && state_count >= STATES_PER_RESTORE
+            && is_due
         {
             state_count = 0;
             let keyframe = (!is_motion).then_some(&held.keyframe[..]);
@@ -56,14 +59,44 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Returns a state that has arrived with its keyframe.
-fn complete(state: &State<'_>) -> Option<Held> {
-    let keyframe = state.changes.iter().find_map(|change| match change {
-        Change::Keyframe(header, bytes) if header.step == state.header.step => Some(bytes.clone()),
-        _ => None,
-    })?;
-    let scene_hash = state.load.header.scene_hash;
-    Some(Held { scene_hash, particles: state.particles.to_vec(), keyframe })
+/// The newest state and the newest keyframe.
+#[derive(Default)]
+struct Reading {
+    state: Option<(Moment, u64, Vec<ParticleState>)>,
+    keyframe: Option<(Moment, Vec<u8>)>,
+}
+
+/// A step of a run.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Moment {
+    run_id: u64,
+    step: u64,
+}
+
+impl Reading {
+    /// Reads the next state, and the keyframes that have arrived. A paused node publishes one after its state.
+    fn read(&mut self, tap: &mut Tap) -> bool {
+        let keyframe = &mut self.keyframe;
+        let state = tap.next_state(|update| {
+            if let Update::Keyframe(header, bytes) = update {
+                let moment = Moment { run_id: header.run_id, step: header.step };
+                *keyframe = Some((moment, bytes.to_vec()));
+            }
+        });
+        let Some(state) = state else { return false };
+        let moment = Moment { run_id: state.header.run_id, step: state.header.step };
+        let scene_hash = state.load.header.scene_hash;
+        self.state = Some((moment, scene_hash, state.particles.to_vec()));
+        true
+    }
+
+    /// Returns the state, if its keyframe has arrived.
+    fn complete(&self) -> Option<Held> {
+        let (moment, scene_hash, particles) = self.state.as_ref()?;
+        let (_, keyframe) = self.keyframe.as_ref().filter(|(of, _)| of == moment)?;
+        let (particles, keyframe) = (particles.clone(), keyframe.clone());
+        Some(Held { scene_hash: *scene_hash, particles, keyframe })
+    }
 }
 
 /// Fails unless the state was put in place, or could not be: the node may have ended, be busy, or have loaded

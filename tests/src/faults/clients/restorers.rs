@@ -13,6 +13,9 @@ const RESTORER_ID: u64 = 4000;
 /// Particles in the states of a foreign process: those of the curtain.
 const PARTICLE_COUNT: &str = "168";
 
+/// Ends of a client that gives states. One that was stopped while it attached finds no node later.
+const RESTORER_ENDS: Ends =
+    Ends { codes: &[0], errors: &["no node runs as"], needs_no_signal: false };
 /// Ends of `recorder restore`: the node runs another scene, has gone, or is not there, or the recording is
 /// later than the time.
 const RESTORE_ENDS: Ends = Ends {
@@ -54,7 +57,7 @@ impl World {
         let client_id = (RESTORER_ID + self.restorer_count).to_string();
         self.restorer_count += 1;
         let args = [client_id.as_str(), contents];
-        Actor::start(Program::Restorer, &self.sandbox, &args, self.client_ends())
+        Actor::start(Program::Restorer, &self.sandbox, &args, RESTORER_ENDS)
     }
 
     /// Gives a state of the newest kept recording to the node.
