@@ -95,6 +95,7 @@ fn messages() -> Vec<Message> {
             step: 3,
             kind: "frozen".to_owned(),
             particle: Some(1),
+            client_id: None,
             text: "particle 1 was not finite".to_owned(),
         }),
     ];

@@ -18,7 +18,7 @@ mod warnings;
 use std::time::Duration;
 
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until, thread_time_ns};
-use sim_contract::{Endpoint, ReceivedCommand, Stop};
+use sim_contract::{Endpoint, NodeStatus, ReceivedCommand, Stop};
 use sim_solver::{Scene, Solver, Spare};
 
 use grab_connections::GrabConnections;
@@ -209,7 +209,7 @@ impl Node {
             if stop.is_requested() {
                 break;
             }
-            if !self.wait_for_members() {
+            if !self.wait_for_members()? {
                 self.met = due;
                 self.observe(&observer)?;
                 continue;
@@ -281,25 +281,32 @@ impl Node {
 
     /// Waits until the members of the lockstep are ready for the next step, at most one polling interval.
     /// Returns `true` if they are. A paused node waits for nobody.
-    fn wait_for_members(&mut self) -> bool {
+    fn wait_for_members(&mut self) -> anyhow::Result<bool> {
         let is_stepping = self.progress.is_stepping();
-        let Self { lockstep, publisher, step, warnings, next_status_ns, .. } = self;
+        let Self { lockstep, publisher, step, warnings, .. } = self;
         let step = *step;
-        let mut report = |event| {
-            // A fresh status follows, so that clients see their membership.
-            *next_status_ns = 0;
+        let mut events = Vec::new();
+        let mut report = |event| events.push(event);
+        // A step that was not published has no turns.
+        let is_ready = if is_stepping && publisher.has_published(step) {
+            lockstep.wait(publisher, step, monotonic_ns() + WAITING_POLL_NS, report)
+        } else {
+            lockstep.receive(publisher, step, &mut report);
+            lockstep.search(publisher, &mut report);
+            true
+        };
+        for event in &events {
+            lockstep.changes.add(event.to_change(step));
             match event {
                 Event::TimedOut { .. } => warnings.print(&event.describe(step)),
-                Event::Joined { .. } | Event::Left { .. } => warnings.note(&event.describe(step)),
+                _ => warnings.note(&event.describe(step)),
             }
-        };
-        // A step that was not published has no turns.
-        if is_stepping && publisher.has_published(step) {
-            return lockstep.wait(publisher, step, monotonic_ns() + WAITING_POLL_NS, report);
         }
-        lockstep.receive(publisher, step, &mut report);
-        lockstep.search(publisher, &mut report);
-        true
+        if !events.is_empty() {
+            // At once: clients wait for their membership, and a load may begin another run.
+            self.publisher.publish_status(&self.status())?;
+        }
+        Ok(is_ready)
     }
 
     /// Makes and publishes a step. Returns `false` if it was given up because of a request to stop.
@@ -392,10 +399,11 @@ impl Node {
         self.publisher.phases.times()
     }
 
-    pub(crate) fn status(&self) -> sim_contract::NodeStatus {
+    pub(crate) fn status(&self) -> NodeStatus {
         let Self { publisher, scene, solver, statistics, lockstep, .. } = self;
         let mut status = publisher.status(scene, solver, self.position(), statistics);
         status.rejected_count += lockstep.refused_count;
+        status.member_changes = lockstep.changes;
         for (entry, member) in status.members.iter_mut().zip(lockstep.members(self.step)) {
             *entry = member;
             status.member_count += 1;

@@ -3,6 +3,7 @@
 
 mod action;
 mod actor;
+mod clients;
 mod commands;
 mod domain_files;
 mod journal;
@@ -84,7 +85,25 @@ impl World {
             Action::Wait { steps } => self.wait_for_steps(steps),
             Action::KillGrabber { particle, changes } => self.kill_grabber(particle, changes),
             Action::StartStubbornReader => self.start_stubborn_reader(),
+            Action::StopStubbornReader => self.set_stubborn_reader_stopped(true),
+            Action::ContinueStubbornReader => self.set_stubborn_reader_stopped(false),
             Action::KillStubbornReader => self.kill_stubborn_reader(),
+            Action::StartFollower => self.start_follower(),
+            Action::StopFollower => self.set_follower_stopped(true),
+            Action::ContinueFollower => self.set_follower_stopped(false),
+            Action::EndFollower(ending) => self.end_follower(ending),
+            Action::StartMember { slot, every } => self.start_member(slot, every),
+            Action::KillMemberAtStart { every, changes } => {
+                self.kill_member_at_start(every, changes);
+            }
+            Action::StopMember { slot } => self.stop_member(slot),
+            Action::ContinueMember { slot } => self.continue_member(slot),
+            Action::EndMember { slot, ending } => self.end_member(slot, ending),
+            Action::KillRestorer { contents, changes } => self.kill_restorer(contents, changes),
+            Action::StopRestorer { contents, changes } => self.stop_restorer(contents, changes),
+            Action::EndRestorer(ending) => self.end_restorer(ending),
+            Action::Restore { time_ms, changes } => self.restore(time_ms, changes),
+            Action::WriteNoise { steps, ending } => self.write_noise(steps, ending),
             Action::Clean { args } => self.clean(&args),
             Action::Play { ending, changes } => self.play(ending, changes),
             Action::Simulate { steps, changes } => self.simulate(steps, changes),

@@ -8,6 +8,7 @@ mod process;
 mod programs;
 mod sandbox;
 mod signals;
+pub mod storm;
 mod streams;
 mod wait;
 

@@ -344,6 +344,11 @@ impl Process {
         self.stderr.text().lines().any(|line| line.starts_with(start))
     }
 
+    /// Returns true if a line on stderr contains `part`. Does not wait for it.
+    pub fn has_written_part(&self, part: &str) -> bool {
+        self.stderr.text().contains(part)
+    }
+
     /// Returns the program and its arguments.
     pub(crate) fn title(&self) -> &str {
         &self.title

@@ -17,6 +17,14 @@ pub enum Program {
     StubbornReader,
     /// A client that grabs particles and never releases them.
     Grabber,
+    /// A member of the lockstep that goes on with the next node.
+    Member,
+    /// A reader of snapshots that goes on with the next node.
+    Follower,
+    /// A client that gives states back to the node, again and again.
+    Restorer,
+    /// A process without the contract's client that writes random bytes into two services.
+    ForeignWriter,
     /// The demo that `cargo demo` runs.
     Demo,
     /// The contract's example that prints snapshots.
@@ -41,6 +49,10 @@ impl Program {
             Self::ViewerBridge => built().join("viewer-bridge"),
             Self::StubbornReader => built().join("stubborn-reader"),
             Self::Grabber => built().join("grabber"),
+            Self::Member => built().join("member"),
+            Self::Follower => built().join("follower"),
+            Self::Restorer => built().join("restorer"),
+            Self::ForeignWriter => built().join("examples/foreign-writer"),
             Self::Demo => built().join("demo"),
             Self::Watch => built().join("examples/watch"),
             Self::Grab => built().join("examples/grab"),

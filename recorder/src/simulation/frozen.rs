@@ -53,7 +53,7 @@ pub(crate) fn frozen_event(step: u64, particle: u32) -> EventRow {
 }
 
 fn row(step: u64, particle: Option<u32>, text: String) -> EventRow {
-    EventRow { step, kind: "frozen".to_owned(), particle, text }
+    EventRow { step, kind: "frozen".to_owned(), particle, client_id: None, text }
 }
 
 #[cfg(test)]

@@ -369,6 +369,11 @@ impl Client {
                 let endpoint = self.attachment.session.endpoint.clone();
                 return Err(LockstepError::Replay { endpoint });
             }
+            // A node that waits only briefly may have dropped this client before it knew of its
+            // membership.
+            if let Some(member) = &self.member {
+                member.join()?;
+            }
         }
         Err(LockstepError::not_admitted(&self.attachment, timeout))
     }

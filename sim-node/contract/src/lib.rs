@@ -36,7 +36,7 @@
 //! | parameters | [`ParameterState`]s; [`ParametersHeader`] | per load and on a change: all values |
 //! | commands | [`Command`] | by clients |
 //! | outcomes | [`Outcome`] | for every command |
-//! | status | [`NodeStatus`] | ten times a second |
+//! | status | [`NodeStatus`] | ten times a second, and after a change of the lockstep |
 //! | wake | [`Wake`] events | after a snapshot, load, tear, outcome or status, and when the owner goes |
 //!
 //! This crate knows no solver, and no other crate knows iceoryx2.
@@ -75,6 +75,7 @@ pub use files::text_file::{TextFileError, read_scene_file};
 pub use limits::*;
 pub use messages::collider::{ColliderState, CollidersHeader};
 pub use messages::command::{CONSOLE_CLIENT_ID, Command, CommandOptions};
+pub use messages::member_changes::{MemberChange, MemberChangeKind, MemberChanges};
 pub use messages::outcome::{
     OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, OutcomeStatus,
 };

@@ -32,6 +32,9 @@ pub const CLIENTS_MAX: usize = 32;
 pub const COMMANDS_BUFFERED: usize = 256;
 /// Most members of the lockstep.
 pub const MEMBERS_MAX: usize = 16;
+/// Changes of the members that a status names. A reader that misses statuses still receives each of the last
+/// changes: one poll of the node can lose every member and admit as many others.
+pub const MEMBER_CHANGES_KEPT: usize = 2 * MEMBERS_MAX;
 /// Messages of one member that wait for the node. A member sends one for each step, and waits for the
 /// step after it.
 pub const READY_BUFFERED: usize = 4;

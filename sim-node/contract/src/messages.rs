@@ -2,6 +2,7 @@
 
 pub(crate) mod collider;
 pub(crate) mod command;
+pub(crate) mod member_changes;
 pub(crate) mod outcome;
 pub(crate) mod parameters;
 pub(crate) mod ready;

@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use sim_contract::clock::{monotonic_ns, sleep_until};
-use sim_contract::{AttachError, CONSOLE_CLIENT_ID, Client, Endpoint, NodeStatus, Stop, console};
+use sim_contract::{
+    AttachError, CONSOLE_CLIENT_ID, Client, Endpoint, MemberChanges, NodeStatus, Stop, console,
+};
 
 use crate::args::{CtlArgs, WatchArgs};
 use crate::ctl::status::StatusRow;
@@ -27,7 +29,12 @@ pub(super) fn watch(args: &CtlArgs, options: &WatchArgs) -> anyhow::Result<()> {
         }
         bail!("the node published no status within {:?}; is it stopped?", args.timeout());
     };
-    let printer = Printer { as_json: args.json, left: options.count, run_id: status.run_id };
+    let printer = Printer {
+        as_json: args.json,
+        left: options.count,
+        run_id: status.run_id,
+        member_change_count: status.member_changes.count,
+    };
     let mut watch = Watch { endpoint, stop, period: options.period, printer };
     watch.printer.print_header()?;
     let mut attached = Some((client, status));
@@ -198,6 +205,8 @@ struct Printer {
     left: Option<u64>,
     /// Run of the last line.
     run_id: u64,
+    /// Number of changes of the lockstep in this run that are printed, or precede the first line.
+    member_change_count: u64,
 }
 
 impl Printer {
@@ -211,9 +220,10 @@ impl Printer {
     fn print(&mut self, status: &NodeStatus) -> anyhow::Result<Flow> {
         let row = StatusRow::new(status);
         if status.run_id != self.run_id {
-            self.run_id = status.run_id;
+            (self.run_id, self.member_change_count) = (status.run_id, 0);
             output::note(&format!("note: a new run: {}, process {}", row.run_id, row.process_id));
         }
+        self.note_member_changes(&status.member_changes);
         let line = if self.as_json {
             serde_json::to_string(&row).context("encoding the status")?
         } else {
@@ -222,6 +232,18 @@ impl Printer {
         let is_read = output::part(&line)?;
         self.left = self.left.map(|left| left - 1);
         Ok(if is_read && self.left != Some(0) { Flow::Continue } else { Flow::End })
+    }
+
+    /// Prints who joined the lockstep, left it, or was dropped since the line before.
+    fn note_member_changes(&mut self, changes: &MemberChanges) {
+        let missing_count = changes.oldest().saturating_sub(self.member_change_count);
+        if missing_count > 0 {
+            output::note(&format!("note: {missing_count} more changes of the lockstep"));
+        }
+        for change in changes.iter_from(self.member_change_count) {
+            output::note(&format!("note: step {}: {change}", change.step));
+        }
+        self.member_change_count = changes.count;
     }
 }
 

@@ -1,11 +1,15 @@
 //! The lockstep: processes that the node waits for before it computes a step.
 
+mod event;
+
 use std::hint::spin_loop;
 use std::thread::yield_now;
 use std::time::Duration;
 
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
-use sim_contract::{ConnectionId, MEMBERS_MAX, MemberStatus, Ready};
+use sim_contract::{ConnectionId, MEMBERS_MAX, MemberChanges, MemberStatus, Ready};
+
+pub(super) use event::Event;
 
 use super::publisher::Publisher;
 
@@ -28,6 +32,8 @@ pub(super) struct Lockstep {
     /// Since when the node waits for the members; `None` if it does not.
     waiting_since_ns: Option<u64>,
     next_search_ns: u64,
+    /// The changes of this run, for the status.
+    pub(super) changes: MemberChanges,
     /// Messages that are none of a member, or claim a step of the future.
     pub(super) refused_count: u64,
 }
@@ -56,45 +62,6 @@ struct Published {
     step: u64,
 }
 
-/// A change of the members.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Event {
-    Joined {
-        client_id: u64,
-        every: u64,
-    },
-    /// It closed its connection, or its process has ended.
-    Left {
-        client_id: u64,
-    },
-    /// It was not ready in time.
-    TimedOut {
-        client_id: u64,
-        timeout: Duration,
-    },
-}
-
-impl Event {
-    /// Returns the line for people. `step` is the last one that was computed.
-    pub(super) fn describe(self, step: u64) -> String {
-        match self {
-            Self::Joined { client_id, every: 1 } => {
-                format!("client {client_id} joined the lockstep at step {step}")
-            }
-            Self::Joined { client_id, every } => format!(
-                "client {client_id} joined the lockstep at step {step}, for every {every} steps"
-            ),
-            Self::Left { client_id } => {
-                format!("client {client_id} left the lockstep at step {step}")
-            }
-            Self::TimedOut { client_id, timeout } => format!(
-                "client {client_id} was not ready for the step after {step} within {timeout:?}: the \
-                 lockstep continues without it, until it is ready for a step again"
-            ),
-        }
-    }
-}
-
 impl Lockstep {
     pub(super) fn new(timeout: Duration) -> Self {
         Self {
@@ -102,6 +69,7 @@ impl Lockstep {
             timeout,
             waiting_since_ns: None,
             next_search_ns: 0,
+            changes: MemberChanges::default(),
             refused_count: 0,
         }
     }
@@ -116,6 +84,7 @@ impl Lockstep {
             (member.joined, member.ready) = (0, None);
         }
         self.waiting_since_ns = None;
+        self.changes = MemberChanges::default();
     }
 
     /// Waits until all members are ready for `step`, at most until `until_ns`. Returns `true` if they
@@ -211,11 +180,12 @@ impl Lockstep {
         };
         let waited = Duration::from_nanos(now_ns.saturating_sub(since_ns));
         let timeout = self.timeout;
-        self.remove_gone(&connections, report);
+        self.remove_gone(publisher, &connections, report);
         self.members.retain(|member| {
             let has_timed_out = waited > timeout && member.is_awaited(step);
             if has_timed_out {
-                report(Event::TimedOut { client_id: member.client_id, timeout });
+                let Member { client_id, every, .. } = *member;
+                report(Event::TimedOut { client_id, every, timeout });
             }
             !has_timed_out
         });
@@ -228,17 +198,32 @@ impl Lockstep {
             return;
         }
         self.next_search_ns = now_ns + SEARCH_PERIOD_NS;
-        self.remove_gone(&publisher.living_members(), report);
+        self.remove_gone(publisher, &publisher.living_members(), report);
     }
 
-    /// Removes the members without a connection.
-    fn remove_gone(&mut self, connections: &[ConnectionId], report: &mut impl FnMut(Event)) {
+    /// Removes the members without a connection. A connection that is still listed was not closed.
+    fn remove_gone(
+        &mut self,
+        publisher: &Publisher,
+        connections: &[ConnectionId],
+        report: &mut impl FnMut(Event),
+    ) {
+        let is_there = |member: &Member| connections.contains(&member.connection);
+        if self.members.iter().all(is_there) {
+            return;
+        }
+        let listed = publisher.listed_members();
         self.members.retain(|member| {
-            let is_there = connections.contains(&member.connection);
-            if !is_there {
-                report(Event::Left { client_id: member.client_id });
+            let Member { client_id, every, connection, .. } = *member;
+            if !is_there(member) {
+                let was_killed = listed.contains(&connection);
+                report(if was_killed {
+                    Event::Killed { client_id, every }
+                } else {
+                    Event::Left { client_id, every }
+                });
             }
-            is_there
+            is_there(member)
         });
     }
 

@@ -5,6 +5,7 @@
 
 use anyhow::{Context, bail};
 use integration_tests::faults;
+use integration_tests::storm::{self, Counts, Storm, Summary};
 use sim_contract::Stop;
 
 /// The text of `--help`.
@@ -12,22 +13,27 @@ const HELP: &str = "Perform random actions on a node, recorders, a viewer and cl
 Check after each that no recording is damaged, no loss is undeclared, and no program hangs or panics.
 
 Usage: cargo faults [--seed N] [--actions K] [--verbose]
+       cargo faults --storm K
 
 --seed N     schedule to perform [default: a random one]
 --actions K  number of actions [default: 300]
 --verbose    print each action
+--storm K    let four clients send K random commands each, bad ones, rewinds and states included, record
+             it, and verify the recording
 
 A failure names the seed and the action, and shows the output of the programs. Ctrl-C ends the run
 after the current action.";
 
 /// Number of actions without `--actions`.
 const ACTIONS_DEFAULT: u64 = 300;
+/// Number of clients of `--storm`.
+const STORM_CLIENTS: u64 = 4;
 /// Actions between two lines of progress.
 const ACTIONS_PER_LINE: usize = 50;
 
 fn main() -> anyhow::Result<()> {
     let mut words = std::env::args().skip(1);
-    let (mut seed, mut actions, mut is_verbose) = (None, ACTIONS_DEFAULT, false);
+    let (mut seed, mut actions, mut is_verbose, mut storm) = (None, ACTIONS_DEFAULT, false, None);
     while let Some(word) = words.next() {
         let mut number = || -> anyhow::Result<u64> {
             let text = words.next().with_context(|| format!("{word} needs a number"))?;
@@ -36,6 +42,7 @@ fn main() -> anyhow::Result<()> {
         match word.as_str() {
             "--seed" => seed = Some(number()?),
             "--actions" => actions = number()?,
+            "--storm" => storm = Some(number()?),
             "--verbose" => is_verbose = true,
             "--help" | "-h" => {
                 eprintln!("{HELP}");
@@ -43,6 +50,10 @@ fn main() -> anyhow::Result<()> {
             }
             _ => bail!("unexpected argument '{word}'\n\n{HELP}"),
         }
+    }
+    if let Some(commands) = storm {
+        run_storm(commands);
+        return Ok(());
     }
     let stop = Stop::install()?;
     // Short, so that it is easy to type.
@@ -62,4 +73,14 @@ fn main() -> anyhow::Result<()> {
          {unfinished} without an end) of {snapshots} snapshots"
     );
     Ok(())
+}
+
+fn run_storm(commands: u64) {
+    let Summary { counts, last_step, size_bytes, verified } =
+        storm::run(Storm { clients: STORM_CLIENTS, commands });
+    let Counts { applied, rejected } = counts;
+    eprintln!(
+        "{applied} commands applied and {rejected} rejected within {last_step} steps, recorded in {size_bytes} \
+         bytes: {verified}"
+    );
 }

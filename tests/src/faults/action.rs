@@ -2,6 +2,8 @@
 
 /// Number of recorders that can run at the same time.
 pub(super) const RECORDERS: usize = 2;
+/// Number of members of the lockstep that can run at the same time.
+pub(super) const MEMBERS: usize = 3;
 /// Number of clients that stay connected from action to action.
 pub(super) const CLIENTS: usize = 3;
 /// The end of a program.
@@ -99,7 +101,57 @@ pub(super) enum Action {
         changes: u32,
     },
     StartStubbornReader,
+    StopStubbornReader,
+    ContinueStubbornReader,
     KillStubbornReader,
+    /// Starts a reader of snapshots that goes on from node to node.
+    StartFollower,
+    StopFollower,
+    ContinueFollower,
+    EndFollower(Ending),
+    /// Starts a member of the lockstep, which takes part every k-th step.
+    StartMember {
+        slot: usize,
+        every: u32,
+    },
+    KillMemberAtStart {
+        every: u32,
+        changes: u32,
+    },
+    /// Stops a member. The node drops it.
+    StopMember {
+        slot: usize,
+    },
+    /// Continues a member, which joins again.
+    ContinueMember {
+        slot: usize,
+    },
+    EndMember {
+        slot: usize,
+        ending: Ending,
+    },
+    /// Starts a client that gives states to the node, and kills it.
+    KillRestorer {
+        contents: &'static str,
+        changes: u32,
+    },
+    /// Starts a client that gives states to the node, and stops it.
+    StopRestorer {
+        contents: &'static str,
+        changes: u32,
+    },
+    /// Continues the client that was stopped first, and ends it.
+    EndRestorer(Ending),
+    /// Gives a state of a kept recording to the node, with `recorder restore`.
+    Restore {
+        time_ms: u32,
+        changes: Option<u32>,
+    },
+    /// Lets a process write random bytes into two services, without a pause, for some steps.
+    WriteNoise {
+        steps: u64,
+        ending: Ending,
+    },
     /// Removes the files in the root of the domain. Nothing can attach to the node until it has ended.
     Clean {
         args: String,

@@ -62,6 +62,14 @@ impl Actor {
         self.is_stopped
     }
 
+    pub(super) fn has_written(&self, start: &str) -> bool {
+        self.process.has_written(start)
+    }
+
+    pub(super) fn process_id(&self) -> u32 {
+        self.process.id()
+    }
+
     /// Waits for a line on stderr.
     pub(super) fn wait_for_line(&mut self, start: &str) -> String {
         self.process.wait_for_line(start)

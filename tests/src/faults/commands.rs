@@ -33,6 +33,7 @@ impl World {
         let finished = self.run(Program::SimNode, &words, ends);
         if line.starts_with("load") && finished.code == Some(0) {
             self.load_count += 1;
+            self.check_clients_follow();
         }
     }
 
@@ -59,11 +60,12 @@ impl World {
         let is_load = matches!(action, Action::Load { .. });
         if is_load && outcome.is_ok_and(|outcome| outcome.is_applied()) {
             self.load_count += 1;
+            self.check_clients_follow();
         }
     }
 
     /// Returns a client, attached if there is a node.
-    fn client(&mut self, index: usize) -> Option<&mut Client> {
+    pub(super) fn client(&mut self, index: usize) -> Option<&mut Client> {
         let slot = &mut self.clients[index];
         if slot.is_none() && self.node.is_some() {
             let client = Client::attach_as(&self.sandbox.endpoint(), CLIENT_ID + index as u64);

@@ -24,6 +24,9 @@ pub(super) const CTL_LINES: &[&str] = &[
     "resume",
     "step PARTICLE",
     "reset",
+    "rewind POINTs",
+    "rewind --to-step CONSTRAINT",
+    "rewind --to-step 4000000000",
     "load curtain",
     "load spider-web",
     "load tearable-cloth",
@@ -58,7 +61,11 @@ pub(super) const COMMANDS: &[&str] = &[
     r#"{"kind":"resume"}"#,
     r#"{"kind":"step","count":3}"#,
     r#"{"kind":"reset"}"#,
+    r#"{"kind":"rewind","to_step":CONSTRAINT}"#,
+    r#"{"kind":"rewind","back_steps":PARTICLE}"#,
+    r#"{"kind":"restore","contents":"state","state_hash":"0123456789abcdef"}"#,
     r#"{"kind":"load","scene":"rope-bridge"}"#,
+    r#"{"kind":"load","scene":"tearable-cloth"}"#,
     r#"{"kind":"load","scene":"./missing.toml"}"#,
     r#"{"kind":"grab","particle":PARTICLE,"target":["nan",0,"inf"]}"#,
     r#"{"kind":"unknown","number":77}"#,
@@ -71,6 +78,7 @@ pub(super) const FLOODS: &[&str] = &[
     r#"{"kind":"pin","particle":PARTICLE}"#,
     r#"{"kind":"cut","constraint":CONSTRAINT}"#,
     r#"{"kind":"reset"}"#,
+    r#"{"kind":"rewind","back_steps":PARTICLE}"#,
 ];
 
 /// Chooses a line and replaces its words in capitals.

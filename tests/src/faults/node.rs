@@ -26,6 +26,7 @@ impl World {
         }
         self.load_count += 1;
         self.node = Some(node);
+        self.check_clients_follow();
     }
 
     /// Kills a node during its start. If another one runs, the new one may be refused before.
@@ -56,9 +57,7 @@ impl World {
     /// The shared memory of a program that was killed before, or is killed now, would stay: only the removed
     /// files name it. So a new node removes it first.
     pub(super) fn clean(&mut self, args: &str) {
-        while !self.readers.is_empty() {
-            self.kill_stubborn_reader();
-        }
+        self.end_clients();
         self.end_node(Ending::Interrupt);
         self.start_node(args);
         let root = self.sandbox.root();
@@ -76,11 +75,25 @@ impl World {
         for slot in 0..self.recorders.len() {
             self.end_recorder(slot, Ending::Interrupt);
         }
+        self.end_clients();
+        self.end_bridge(Ending::Interrupt);
+        self.end_node(Ending::Interrupt);
+    }
+
+    /// Ends the programs that stay connected from node to node.
+    fn end_clients(&mut self) {
         while !self.readers.is_empty() {
             self.kill_stubborn_reader();
         }
-        self.end_bridge(Ending::Interrupt);
-        self.end_node(Ending::Interrupt);
+        for slot in 0..self.members.len() {
+            self.end_member(slot, Ending::Interrupt);
+        }
+        while !self.followers.is_empty() {
+            self.end_follower(Ending::Interrupt);
+        }
+        while !self.restorers.is_empty() {
+            self.end_restorer(Ending::Interrupt);
+        }
     }
 
     /// Starts a node of each name and ends it, until nothing is left in the domain. Half-created nodes of iceoryx2 are

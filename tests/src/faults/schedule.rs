@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 
-use crate::faults::action::{Action, CLIENTS, Ending, RECORDERS, Visit};
+use crate::faults::action::{Action, CLIENTS, Ending, MEMBERS, RECORDERS, Visit};
 use crate::faults::lines::{COMMANDS, CTL_LINES, FLOODS, fill};
 
 /// Scenes of a node. The last one has another rate and 20 times as many particles.
@@ -44,7 +44,26 @@ const ACTIONS: &[(u32, Create)] = &[
     (8, |rng| Action::Wait { steps: rng.u64(..500) }),
     (2, |rng| Action::KillGrabber { particle: rng.u32(..50), changes: changes(rng) }),
     (2, |_| Action::StartStubbornReader),
+    (1, |_| Action::StopStubbornReader),
+    (1, |_| Action::ContinueStubbornReader),
     (2, |_| Action::KillStubbornReader),
+    (4, |_| Action::StartFollower),
+    (1, |_| Action::StopFollower),
+    (1, |_| Action::ContinueFollower),
+    (2, |rng| Action::EndFollower(ending(rng))),
+    (8, |rng| Action::StartMember { slot: rng.usize(..MEMBERS), every: every(rng) }),
+    (2, |rng| Action::KillMemberAtStart { every: every(rng), changes: changes(rng) }),
+    (3, |rng| Action::StopMember { slot: rng.usize(..MEMBERS) }),
+    (3, |rng| Action::ContinueMember { slot: rng.usize(..MEMBERS) }),
+    (5, |rng| Action::EndMember { slot: rng.usize(..MEMBERS), ending: ending(rng) }),
+    (4, |rng| Action::KillRestorer { contents: contents(rng), changes: changes(rng) }),
+    (2, |rng| Action::StopRestorer { contents: contents(rng), changes: changes(rng) }),
+    (2, |rng| Action::EndRestorer(ending(rng))),
+    (5, |rng| Action::Restore {
+        time_ms: rng.u32(..3000),
+        changes: rng.bool().then(|| changes(rng)),
+    }),
+    (2, |rng| Action::WriteNoise { steps: rng.u64(..200), ending: ending(rng) }),
     (1, |rng| Action::Clean { args: node_args(rng) }),
     (2, |rng| Action::Play { ending: ending(rng), changes: changes(rng) }),
     (2, |rng| Action::Simulate {
@@ -74,9 +93,13 @@ fn node_args(rng: &mut Rng) -> String {
     if rng.bool() {
         args += &format!(" --every {}", rng.u32(2..=10));
     }
-    // With a rate of its own, a node loads any scene.
+    // Without a rate of its own, a node begins a new run with a scene of another rate.
     args += rng.choice(["", "", " --rate 240", " --rate 1000"]).unwrap_or_default();
     args += rng.choice(["", "", "", " --paused"]).unwrap_or_default();
+    args += rng.choice(["", "", " --history 1MiB", " --history 0"]).unwrap_or_default();
+    // Short, because each stopped member costs this time.
+    args +=
+        rng.choice([" --lockstep-timeout 100ms", " --lockstep-timeout 500ms"]).unwrap_or_default();
     args
 }
 
@@ -89,6 +112,16 @@ fn recorder_args(rng: &mut Rng) -> String {
 
 fn scene(rng: &mut Rng) -> &'static str {
     rng.choice(SCENES).unwrap_or_default()
+}
+
+/// Contents of a state that a client gives.
+fn contents(rng: &mut Rng) -> &'static str {
+    if rng.bool() { "state" } else { "motion" }
+}
+
+/// Steps from one turn of a member to its next.
+fn every(rng: &mut Rng) -> u32 {
+    if rng.bool() { 1 } else { rng.u32(2..=8) }
 }
 
 fn changes(rng: &mut Rng) -> u32 {

@@ -2,7 +2,7 @@
 
 use sim_contract::Client;
 
-use crate::faults::action::{CLIENTS, Ending, RECORDERS};
+use crate::faults::action::{CLIENTS, MEMBERS, RECORDERS};
 use crate::faults::actor::{Actor, Ends};
 use crate::faults::domain_files::DomainFiles;
 use crate::faults::journal::Journal;
@@ -10,11 +10,6 @@ use crate::faults::kept_files::KeptFiles;
 use crate::process::Finished;
 use crate::programs::Program;
 use crate::sandbox::Sandbox;
-
-/// Most stubborn readers at the same time.
-const READERS_MAX: usize = 2;
-
-const READER_ENDS: Ends = Ends { codes: &[], errors: &["NoNode"], needs_no_signal: false };
 
 /// A recorder and its file.
 #[derive(Debug)]
@@ -27,6 +22,13 @@ pub(super) struct Recorder {
     pub(super) has_steps: bool,
 }
 
+/// A member of the lockstep.
+#[derive(Debug)]
+pub(super) struct Member {
+    pub(super) actor: Actor,
+    pub(super) client_id: u64,
+}
+
 /// The programs, and what is known of them.
 // Fields are dropped in this order: clients and programs leave the domain before it is removed, and the
 // journal is printed after the output of the programs.
@@ -36,9 +38,16 @@ pub(super) struct World {
     pub(super) recorders: [Option<Recorder>; RECORDERS],
     pub(super) bridge: Option<Actor>,
     pub(super) readers: Vec<Actor>,
+    pub(super) followers: Vec<Actor>,
+    pub(super) members: [Option<Member>; MEMBERS],
+    /// Clients that were stopped while they gave states.
+    pub(super) restorers: Vec<Actor>,
     pub(super) node: Option<Actor>,
     /// Number of nodes and loads so far. A recording ends with its load.
     pub(super) load_count: u64,
+    /// Numbers of members and of restorers so far.
+    pub(super) member_count: u64,
+    pub(super) restorer_count: u64,
     pub(super) kept: KeptFiles,
     pub(super) journal: Journal,
     pub(super) files: DomainFiles,
@@ -53,8 +62,13 @@ impl World {
             recorders: Default::default(),
             bridge: None,
             readers: Vec::new(),
+            followers: Vec::new(),
+            members: Default::default(),
+            restorers: Vec::new(),
             node: None,
             load_count: 0,
+            member_count: 0,
+            restorer_count: 0,
             kept: KeptFiles::default(),
             journal: Journal::new(seed),
             files: DomainFiles::new(&sandbox),
@@ -64,6 +78,20 @@ impl World {
 
     /// Asserts that no program has ended that runs until it gets a signal.
     pub(super) fn check_lasting_programs(&mut self) {
+        for index in (0..self.followers.len()).rev() {
+            if !self.followers[index].is_running() {
+                self.followers.remove(index).wait(&mut self.journal);
+            }
+        }
+        for slot in &mut self.members {
+            if let Some(mut member) = slot.take() {
+                if member.actor.is_running() {
+                    *slot = Some(member);
+                } else {
+                    member.actor.wait(&mut self.journal);
+                }
+            }
+        }
         for lasting in [&mut self.node, &mut self.bridge] {
             if let Some(mut actor) = lasting.take() {
                 if actor.is_running() {
@@ -78,20 +106,5 @@ impl World {
     /// Runs a program to its end.
     pub(super) fn run(&mut self, program: Program, args: &[&str], ends: Ends) -> Finished {
         Actor::start(program, &self.sandbox, args, ends).wait(&mut self.journal)
-    }
-
-    /// Starts a reader that borrows samples and never returns them.
-    pub(super) fn start_stubborn_reader(&mut self) {
-        if self.node.is_some() && self.readers.len() < READERS_MAX {
-            let reader = Actor::start(Program::StubbornReader, &self.sandbox, &[], READER_ENDS);
-            self.readers.push(reader);
-        }
-    }
-
-    /// Kills the oldest of them.
-    pub(super) fn kill_stubborn_reader(&mut self) {
-        if !self.readers.is_empty() {
-            self.readers.remove(0).end(Ending::Kill, &self.files, &mut self.journal);
-        }
     }
 }

@@ -1,11 +1,13 @@
 //! The lockstep: the node waits for its members, and for nobody else.
 
 use std::num::NonZeroU32;
+use std::path::Path;
 use std::sync::Barrier;
 use std::thread;
 
 use fastrand::Rng;
-use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, wait_for};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, Signal, ctl, record, wait_for};
+use recorder::{LogReader, Message};
 use sim_contract::clock::{monotonic_ns, sleep_until};
 use sim_contract::{Action, Client, Endpoint, Snapshot};
 
@@ -173,6 +175,71 @@ fn a_stopped_member_is_dropped_after_the_stated_time_and_joins_again() {
     member.signal(Signal::KILL);
     member.wait();
     assert_eq!(node.interrupt().code, Some(0));
+}
+
+/// Returns the kinds and clients of the events in a recording.
+fn events(file: &str) -> Vec<(String, u64)> {
+    let mut log = LogReader::open(Path::new(file)).unwrap();
+    let mut events = Vec::new();
+    let mut last_step = 0;
+    while let Some(logged) = log.next_message().unwrap() {
+        if let Message::Event(row) = logged.message {
+            assert!(row.step >= last_step, "{row:?} after step {last_step}");
+            last_step = row.step;
+            let client_id = row.client_id.unwrap();
+            assert!(row.text.starts_with(&format!("client {client_id} ")), "{row:?}");
+            events.push((row.kind, client_id));
+        }
+    }
+    events
+}
+
+#[test]
+fn a_recording_and_a_watch_name_each_member_that_joins_leaves_or_is_dropped() {
+    let sandbox = Sandbox::new();
+    let args = ["run", "pendulum", "--lockstep-timeout", "500ms"];
+    let mut node = Process::start_ready(Program::SimNode, &sandbox, &args);
+    let file = sandbox.path("run.mcap");
+    let recording = record(&sandbox, &file);
+    let mut watch = Process::start(Program::SimNode, &sandbox, &["ctl", "watch"]);
+    watch.wait_for_output(2);
+    // A membership of less than a step is named, too.
+    for _ in 0..3 {
+        let mut client = Client::attach_as(&sandbox.endpoint(), 7).unwrap();
+        client.join_lockstep(DEADLINE).unwrap();
+        drop(client);
+        wait_for("an empty lockstep", || (member_count(&sandbox) == 0).then_some(()));
+    }
+    let members = ["8", "9"].map(|id| Process::start(Program::Member, &sandbox, &[id, "1"]));
+    wait_for("two members", || (member_count(&sandbox) == 2).then_some(()));
+    let [killed, stopped] = members;
+    killed.signal(Signal::KILL);
+    node.wait_for_line("client 8 left the lockstep at step ");
+    stopped.signal(Signal::STOP);
+    node.wait_for_line("warning: client 9 was not ready");
+    stopped.signal(Signal::CONT);
+    wait_for("the member", || (member_count(&sandbox) == 1).then_some(()));
+    assert_eq!(stopped.interrupt().code, Some(0));
+    wait_for("an empty lockstep", || (member_count(&sandbox) == 0).then_some(()));
+    for line in ["client 7 left the lockstep", "client 8 was dropped", "client 9 was dropped"] {
+        wait_for(line, || watch.has_written_part(line).then_some(()));
+    }
+    goes_on(&sandbox);
+    recording.interrupt().success();
+    let found = events(&file);
+    let kinds =
+        |id| found.iter().filter(move |(_, client)| *client == id).map(|(kind, _)| &kind[..]);
+    assert_eq!(kinds(7).collect::<Vec<_>>(), ["joined", "left"].repeat(3));
+    assert_eq!(kinds(8).collect::<Vec<_>>(), ["joined", "killed"]);
+    // A busy machine may drop it more than once.
+    let last: Vec<_> = kinds(9).collect();
+    assert!(last.starts_with(&["joined", "timed_out"]), "{last:?}");
+    assert!(last.ends_with(&["joined", "left"]), "{last:?}");
+    let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    assert!(verified.contains("the members of the lockstep in /events"), "{verified}");
+    killed.wait();
+    watch.interrupt();
+    node.interrupt().success();
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use fastrand::Rng;
+use integration_tests::storm::{self, HeldState, Storm};
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record, wait_for};
 use recorder::{Frame, FrameReader, LogReader, Message};
 use sim_contract::{
@@ -111,34 +111,6 @@ fn the_state_of_another_scene_is_refused_with_both_hashes() {
     node.interrupt().success();
 }
 
-/// A state of a running node, as a client reads it.
-struct Held {
-    scene_hash: u64,
-    particles: Vec<ParticleState>,
-    keyframe: Vec<u8>,
-}
-
-fn held_state(sandbox: &Sandbox) -> Held {
-    let file = sandbox.path("held.mcap");
-    recorder(sandbox, &["state", "-o", &file, "--overwrite"]);
-    let frame = frames(&file).remove(0);
-    let log = LogReader::open(Path::new(&file)).unwrap();
-    let keyframe = frame.own_keyframe().unwrap().to_vec();
-    let scene_hash = sim_contract::scene_hash(log.scene());
-    Held { scene_hash, particles: frame.particles, keyframe }
-}
-
-impl Held {
-    fn state(&self) -> GivenState<'_> {
-        let Self { scene_hash, particles, keyframe } = self;
-        GivenState { scene_hash: *scene_hash, particles, keyframe: Some(keyframe) }
-    }
-
-    fn motion(&self) -> GivenState<'_> {
-        GivenState { keyframe: None, ..self.state() }
-    }
-}
-
 fn give(client: &mut Client, state: &GivenState<'_>) -> Outcome {
     client.restore(state, DEADLINE).unwrap()
 }
@@ -148,12 +120,12 @@ fn a_wrong_state_is_refused_and_changes_no_bit() {
     let sandbox = Sandbox::new();
     let node = node(&sandbox, &["run", "curtain", "--paused"]);
     ctl(&sandbox, &["step", "50"]);
-    let held = held_state(&sandbox);
+    let held = HeldState::read(&sandbox);
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let before = hash(&sandbox);
-    let with = |change: fn(&mut Held)| {
+    let with = |change: fn(&mut HeldState)| {
         let (particles, keyframe) = (held.particles.clone(), held.keyframe.clone());
-        let mut changed = Held { particles, keyframe, ..held };
+        let mut changed = HeldState { particles, keyframe, ..held };
         change(&mut changed);
         changed
     };
@@ -195,7 +167,7 @@ fn a_client_gives_positions_and_velocities_and_the_rest_stays() {
     let recording = record(&sandbox, &file);
     ctl(&sandbox, &["cut", "400"]);
     ctl(&sandbox, &["step", "20"]);
-    let mut held = held_state(&sandbox);
+    let mut held = HeldState::read(&sandbox);
     ctl(&sandbox, &["pin", "90"]);
     ctl(&sandbox, &["step", "1"]);
     for particle in &mut held.particles[90..] {
@@ -225,35 +197,6 @@ fn a_client_gives_positions_and_velocities_and_the_rest_stays() {
     let rows = frames(&file).into_iter().flat_map(|frame| frame.updates);
     let tears = rows.filter(|update| matches!(update, Message::Tears(_)));
     assert_eq!(tears.map(|update| update.step()).collect::<Vec<_>>(), [1], "torn once");
-}
-
-/// Sends random commands, rewinds and states included, and waits for each outcome.
-fn disturb(client: &mut Client, held: &Held, seed: u64, count: usize) {
-    let mut rng = Rng::with_seed(seed);
-    for _ in 0..count {
-        let particle = rng.u32(0..200);
-        let target = [rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5];
-        let action = match rng.u32(0..12) {
-            0 => Action::Rewind { to_step: None, back_steps: Some(rng.u32(0..100)) },
-            1 => Action::Rewind { to_step: Some(rng.u64(0..2000)), back_steps: None },
-            2 => Action::Reset,
-            3 => Action::CutRadius { center: target, radius: 0.05 },
-            4 => Action::Pin { particle },
-            5 => Action::Unpin { particle },
-            6 => Action::Release { particle, force: true },
-            7 if rng.bool() => {
-                give(client, &held.state());
-                continue;
-            }
-            7 => {
-                give(client, &held.motion());
-                continue;
-            }
-            _ => Action::Grab { particle, target, over_s: 0.05 },
-        };
-        let outcome = client.request(action, DEADLINE).unwrap();
-        assert_ne!(outcome.reason(), Some(Reason::InvalidState), "{outcome:?}");
-    }
 }
 
 #[test]
@@ -287,18 +230,10 @@ fn a_live_recording_with_rewinds_and_states_verifies() {
         let file = sandbox.path("run.mcap");
         let args = [&["run", "curtain", "--rate", "500"], options].concat();
         let node = node(&sandbox, &args);
-        let held = held_state(&sandbox);
+        let held = HeldState::read(&sandbox);
         let recording = record(&sandbox, &file);
-        let endpoint = sandbox.endpoint();
-        std::thread::scope(|scope| {
-            for seed in 1..=2 {
-                let (endpoint, held) = (&endpoint, &held);
-                scope.spawn(move || {
-                    let mut client = Client::attach(endpoint).unwrap();
-                    disturb(&mut client, held, seed, 300);
-                });
-            }
-        });
+        let counts = storm::send(&sandbox, &held, Storm { clients: 2, commands: 300 });
+        assert!(counts.applied > 0 && counts.rejected > 0, "{counts:?}");
         ctl(&sandbox, &["pause"]);
         end_after(&sandbox, recording, &file);
         node.interrupt().success();

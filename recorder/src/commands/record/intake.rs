@@ -3,7 +3,7 @@
 mod started;
 
 use recorder::{AllCounts, Closing};
-use sim_contract::{Change, LostChanges, Outcome, ReadError, State};
+use sim_contract::{Change, LostChanges, NodeStatus, Outcome, ReadError, State};
 
 use super::accepted::Accepted;
 use super::first_state::FirstState;
@@ -23,6 +23,8 @@ pub(crate) struct Intake {
     load: Option<Load>,
     /// The newest state, until its keyframe arrives. A paused node publishes it after the state.
     candidate: Option<FirstState>,
+    /// The newest status, until the recording starts.
+    status: Option<NodeStatus>,
     /// Outcomes that may follow the first state.
     outcomes: Vec<Outcome>,
     started: Option<Started>,
@@ -90,6 +92,7 @@ impl Intake {
         let Some(started) = &mut self.started else {
             let excess = self.outcomes.len().saturating_sub(OUTCOMES_PENDING_MAX);
             self.outcomes.drain(..excess);
+            self.status = messages.statuses.last().copied().or(self.status);
             return;
         };
         started.accept_outcomes(self.outcomes.drain(..), accepted);
@@ -103,6 +106,7 @@ impl Intake {
         let mut started = Started::new(&first, self.steps_max, self.lost);
         let header = load.into_run_header(&first.header, first.torn_before, now);
         started.count_load(&header.rows);
+        started.skip_member_changes(self.status.as_ref());
         accepted.header = Some(header);
         let FirstState { header, particles, changes, .. } = first;
         started.accept(&header, particles, &changes, accepted);

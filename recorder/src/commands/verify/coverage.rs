@@ -14,10 +14,11 @@ const ALWAYS: [&str; 9] = [
     "the indexes and the statistics of the file",
 ];
 /// Content that a recording of a node has only once.
-const LIVE: [&str; 3] = [
+const LIVE: [&str; 4] = [
     "values of the scene that no recorded state depends on",
     "fields of commands in /outcomes that have no effect on a state, such as client_id and sequence, \
      and \"disconnected\" of a release",
+    "the members of the lockstep in /events, which only the node knows",
     "snapshot_index in /steps beyond its order and the number of missing snapshots",
 ];
 

@@ -5,7 +5,8 @@ use sim_contract::{ParticleFlags, ParticleState};
 
 use crate::simulation::frozen::{FrozenTracker, frozen_event};
 
-/// Compares the events of each snapshot with the particles that froze since the last one.
+/// Compares the events of each snapshot with the particles that froze since the last one. Those of members of
+/// the lockstep are not compared.
 #[derive(Debug, Default)]
 pub(super) struct EventCheck {
     frozen: FrozenTracker,
@@ -45,7 +46,8 @@ impl EventCheck {
 
 fn event(update: &Message) -> Option<&EventRow> {
     match update {
-        Message::Event(row) => Some(row),
+        // Only the node knows the members.
+        Message::Event(row) if !row.is_of_member() => Some(row),
         _ => None,
     }
 }

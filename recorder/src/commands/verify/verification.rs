@@ -157,6 +157,9 @@ impl<R: Read> Verification<R> {
             let what = match update {
                 Message::Outcome(row) => self.check_disconnected(row),
                 Message::Tears(row) => self.check_causes(row),
+                Message::Event(row) if self.is_simulated && row.is_of_member() => {
+                    Some("/events: a simulation has no lockstep".to_owned())
+                }
                 _ => None,
             }?;
             Some(Finding::Diverged { step: update.step(), what, difference: None })

@@ -2,8 +2,11 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use sim_contract::{MemberChange, MemberChangeKind};
 
-/// A notable event in one step.
+/// A notable event in one step: a particle that froze (kind `frozen`), or a member of the lockstep that
+/// joined (`joined`), left (`left`), or was dropped, because its process ended (`killed`) or because it was
+/// not ready in time (`timed_out`).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct EventRow {
     /// The step that shows the event.
@@ -13,6 +16,29 @@ pub struct EventRow {
     /// The particle, if the event concerns one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub particle: Option<u32>,
+    /// The member of the lockstep, if the event concerns one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub client_id: Option<u64>,
     /// A description for people.
     pub text: String,
+}
+
+impl EventRow {
+    /// Returns `true` if the row has the form of a change of the members of the lockstep.
+    pub fn is_of_member(&self) -> bool {
+        let is_known = MemberChangeKind::ALL.iter().any(|kind| kind.name() == self.kind);
+        (is_known || self.kind == "unknown") && self.client_id.is_some() && self.particle.is_none()
+    }
+}
+
+impl From<&MemberChange> for EventRow {
+    fn from(change: &MemberChange) -> Self {
+        Self {
+            step: change.step,
+            kind: change.kind_name().to_owned(),
+            particle: None,
+            client_id: Some(change.client_id),
+            text: change.to_string(),
+        }
+    }
 }

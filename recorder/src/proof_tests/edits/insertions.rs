@@ -111,7 +111,8 @@ fn a_row_of_steps_without_its_snapshot_is_an_error() {
 fn events_of_other_steps_are_compared_with_their_particles() {
     let event = |step, particle: u32| {
         let text = format!("particle {particle} was not finite and is frozen");
-        Message::Event(EventRow { step, kind: "frozen".into(), particle: Some(particle), text })
+        let (kind, particle) = ("frozen".into(), Some(particle));
+        Message::Event(EventRow { step, kind, particle, client_id: None, text })
     };
     // Nothing is missing before this step, so each event has the step of its snapshot.
     for inserted in [event(1, 0), event(3, 0), event(2, 4000), event(2, 3)] {

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::clock::epoch_microseconds;
 use crate::endpoint::Endpoint;
-use crate::limits::{COMMANDS_BUFFERED, OUTCOMES_BUFFERED};
+use crate::limits::{COMMANDS_BUFFERED, COMMANDS_PER_STEP_MAX, OUTCOMES_BUFFERED};
 use crate::messages::command::{CONSOLE_CLIENT_ID, Command};
 use crate::messages::outcome::{OUTCOME_FLAG_CONTROL, Outcome};
 use crate::messages::restore::{GivenState, RestoreHeader};
@@ -135,6 +135,11 @@ impl RequestError {
     }
 }
 
+/// Most commands of a client that wait for their outcome. A node keeps fewer, those of all clients together:
+/// it applies one rewind per step, and takes further commands meanwhile. So only a command whose outcome was
+/// missed, or whose node has ended, is beyond this number.
+const UNANSWERED_MAX: usize = 32 * COMMANDS_PER_STEP_MAX;
+
 /// The writer of one state.
 pub(crate) type StateWriter = SliceWriter<u8, RestoreHeader>;
 
@@ -144,7 +149,7 @@ pub(crate) struct Commander {
     client_id: u64,
     /// Sequence number of the last command.
     sequence: u64,
-    /// Commands without an outcome, by ascending number; at most [`OUTCOMES_BUFFERED`].
+    /// Commands without an outcome, by ascending number; at most [`UNANSWERED_MAX`].
     unanswered: VecDeque<Command>,
     /// Outcomes that arrived while the client waited for another, in the order of application; at most
     /// [`OUTCOMES_BUFFERED`].
@@ -216,7 +221,7 @@ impl Commander {
     fn await_outcome(&mut self, command: Command) {
         self.sequence = command.sequence;
         self.unanswered.push_back(command);
-        if self.unanswered.len() > OUTCOMES_BUFFERED {
+        if self.unanswered.len() > UNANSWERED_MAX {
             self.unanswered.pop_front();
         }
     }
@@ -248,6 +253,9 @@ impl Commander {
         let mut drained = Drained::default();
         self.outcomes.drain(&mut drained, |outcome| {
             self.gaps.add(outcome);
+            if outcome.command.client_id != self.client_id {
+                return;
+            }
             // Processes that share the console's client id may use the same number, so the whole
             // commands are compared, as bytes because of NaN.
             let answered = outcome.command.as_sent();

@@ -4,9 +4,10 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::limits::MEMBERS_MAX;
+use crate::messages::member_changes::MemberChanges;
 
-/// Status of a node or replay: 592 bytes, alignment 8. Written by the owner of the name at 10 Hz.
-/// Percentiles cover the steps of the last second.
+/// Status of a node or replay: 1368 bytes, alignment 8. Written by the owner of the name at 10 Hz, and at
+/// once after a change of the members, before the step that follows it. Percentiles cover the steps of the last second.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[repr(C)]
 #[type_name("catenary.NodeStatus")]
@@ -61,9 +62,11 @@ pub struct NodeStatus {
     pub scene_name: [u8; 64],
     /// The members of the lockstep in the order of joining; entries beyond `member_count` are 0.
     pub members: [MemberStatus; MEMBERS_MAX],
+    /// The changes of the members in this run.
+    pub member_changes: MemberChanges,
 }
 
-const _: () = assert!(size_of::<NodeStatus>() == 592 && align_of::<NodeStatus>() == 8);
+const _: () = assert!(size_of::<NodeStatus>() == 1368 && align_of::<NodeStatus>() == 8);
 
 /// A member of the lockstep: 24 bytes, alignment 8.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]

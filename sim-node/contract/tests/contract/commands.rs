@@ -174,6 +174,25 @@ fn a_command_beyond_the_queue_is_an_error_and_the_queued_commands_are_kept() {
 }
 
 #[test]
+fn each_command_has_an_outcome_though_the_owner_answers_late() {
+    const COUNT: usize = 3 * OUTCOMES_BUFFERED;
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    let mut client = Client::attach_as(&domain.endpoint(), 5).unwrap();
+    let mut received = Vec::new();
+    for _ in 0..COUNT {
+        client.send(PIN).unwrap();
+        owner.receive_commands(&mut received);
+    }
+    for (index, received) in (0_u64..).zip(&received) {
+        owner.publish_outcome(&Outcome::new(index, 9, received.command, Ok(()))).unwrap();
+        let outcome = client.next_outcome(DEADLINE).unwrap();
+        assert_eq!(outcome.map(|outcome| outcome.command.sequence), Some(index + 1));
+    }
+    assert_eq!(received.len(), COUNT);
+}
+
+#[test]
 fn dropping_a_client_waits_until_its_commands_are_answered() {
     let domain = TestDomain::new();
     let owner = create_owner(&domain.endpoint()).unwrap();

@@ -8,8 +8,9 @@ use std::mem::offset_of;
 use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVariant};
 use sim_contract::{
     ColliderState, CollidersHeader, Command, ConstraintState, KeyframeHeader, LoadHeader,
-    MemberStatus, NodeStatus, Outcome, ParameterState, ParametersHeader, ParticleState, Ready,
-    RestoreHeader, SnapshotHeader, TearsHeader, TornConstraint, Triangle, Wake,
+    MemberChange, MemberChanges, MemberStatus, NodeStatus, Outcome, ParameterState,
+    ParametersHeader, ParticleState, Ready, RestoreHeader, SnapshotHeader, TearsHeader,
+    TornConstraint, Triangle, Wake,
 };
 
 macro_rules! layout {
@@ -157,9 +158,12 @@ fn write_command_and_status_layouts(text: &mut String) {
             member_count,
             scene_name,
             members,
+            member_changes,
         }
     );
     layout!(text, MemberStatus { client_id, step, every, is_awaited });
+    layout!(text, MemberChanges { count, last });
+    layout!(text, MemberChange { client_id, step, every, kind });
     layout!(text, Ready { client_id, run_id, step, every, tag });
     layout!(
         text,
@@ -181,6 +185,7 @@ fn the_limits_are_frozen() {
         OWNER_PUBLISHERS_MAX,
         READERS_MAX,
         MEMBERS_MAX,
+        MEMBER_CHANGES_KEPT,
         READY_BUFFERED,
         RESTORES_MAX,
         BORROWED_SAMPLES_MAX,

@@ -1,8 +1,8 @@
 //! The run in progress: the accepted states and messages, the end, and the missing messages.
 
 use recorder::{
-    AllCounts, CollidersRow, Message, OutcomeRow, ParametersRow, StatusRow, StepRow, TearsRow,
-    Topic,
+    AllCounts, CollidersRow, EventRow, Message, OutcomeRow, ParametersRow, StatusRow, StepRow,
+    TearsRow, Topic,
 };
 use sim_contract::{
     Change, ColliderState, CollidersHeader, KeyframeHeader, LostChanges, NodeStatus, Outcome,
@@ -37,6 +37,8 @@ pub(super) struct Started {
     state_gaps: u64,
     /// Number of the next list of colliders, modulo 2^32; `None` before the first.
     next_collider_list: Option<u32>,
+    /// Number of the next change of the members; `None` before the first status.
+    next_member_change: Option<u64>,
     /// The changes that the tap dropped before the start.
     lost_before: LostChanges,
     frozen: FrozenTracker,
@@ -65,6 +67,7 @@ impl Started {
             torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
             state_gaps: 0,
             next_collider_list: None,
+            next_member_change: None,
             lost_before,
             frozen: FrozenTracker::default(),
             counts: AllCounts::default(),
@@ -195,10 +198,33 @@ impl Started {
     pub(super) fn accept_statuses(&mut self, statuses: &[NodeStatus], accepted: &mut Accepted) {
         let steps = self.first_step..=self.end_step;
         for status in statuses {
-            if status.run_id == self.run_id && steps.contains(&status.step) {
+            if status.run_id != self.run_id {
+                continue;
+            }
+            self.accept_member_changes(status, accepted);
+            if steps.contains(&status.step) {
                 self.counts[Topic::Status].received += 1;
                 accepted.push(Message::Status(StatusRow::from(status)));
             }
+        }
+    }
+
+    /// Leaves out the changes of the members that precede the recording.
+    pub(super) fn skip_member_changes(&mut self, status: Option<&NodeStatus>) {
+        let status = status.filter(|status| status.run_id == self.run_id);
+        self.next_member_change = status.map(|status| status.member_changes.count);
+    }
+
+    /// Accepts the changes of the members that no status before has named.
+    fn accept_member_changes(&mut self, status: &NodeStatus, accepted: &mut Accepted) {
+        let changes = &status.member_changes;
+        let next = self.next_member_change.unwrap_or(changes.oldest());
+        self.counts[Topic::Events].gaps += changes.oldest().saturating_sub(next);
+        self.next_member_change = Some(changes.count.max(next));
+        let steps = self.first_step..=self.end_step;
+        for change in changes.iter_from(next).filter(|change| steps.contains(&change.step)) {
+            self.counts[Topic::Events].received += 1;
+            accepted.push(Message::Event(EventRow::from(change)));
         }
     }
 

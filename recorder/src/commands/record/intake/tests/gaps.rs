@@ -1,5 +1,7 @@
 //! The counts of missing messages.
 
+use sim_contract::{MemberChange, MemberChangeKind, NodeStatus};
+
 use super::*;
 use crate::commands::record::report::Report;
 
@@ -128,4 +130,26 @@ fn the_first_unreadable_message_before_the_start_and_the_first_after_it_are_repo
         [1, 0, 1, 1].map(|count| add_errors(&mut intake, count)),
         [false, false, true, false]
     );
+}
+
+#[test]
+fn changes_of_the_lockstep_are_recorded_once_and_missing_ones_are_counted() {
+    let mut status = NodeStatus { run_id: header(4, 2).run_id, step: 4, ..NodeStatus::default() };
+    let mut change = |count: u64| {
+        for client_id in 0..count {
+            let kind = MemberChangeKind::TimedOut as u32;
+            status.member_changes.add(MemberChange { client_id, step: 5, every: 1, kind });
+        }
+        status
+    };
+    let mut intake = Intake::default();
+    // The status before the start names two changes that precede the recording.
+    send(&mut intake, &[Update::Status(&change(2))]);
+    publish(&mut intake, header(4, 2), &[Change::Load, keyframe(4)]);
+    let mut rows = |status: &NodeStatus| side_rows(&send(&mut intake, &[Update::Status(status)]));
+    let dropped = "5: client 0 was dropped from the lockstep: it was not ready in time";
+    assert_eq!(rows(&change(1)), [dropped]);
+    assert_eq!(rows(&change(0)), Vec::<String>::new());
+    assert_eq!(rows(&change(40)).len(), 32);
+    assert_eq!(intake.counts()[Topic::Events].gaps, 8);
 }
