@@ -42,6 +42,11 @@ enum CompressionArg {
 pub(crate) type LogFile = LogWriter<PartFile>;
 
 impl FileArgs {
+    /// Returns the handling of files that exist.
+    pub(crate) fn existing(&self) -> Existing {
+        self.overwrite.existing()
+    }
+
     /// Creates the file, with the suffix `.part`.
     pub(crate) fn create(&self, path: &Path) -> anyhow::Result<PartFile> {
         Ok(PartFile::create(path, self.overwrite.existing())?)

@@ -122,6 +122,16 @@ impl AllCounts {
         }
     }
 
+    /// Adds the counts of another file.
+    pub fn add(&mut self, other: &Self) {
+        for (counts, other) in self.0.iter_mut().zip(&other.0) {
+            counts.received += other.received;
+            counts.written += other.written;
+            counts.lost += other.lost;
+            counts.gaps += other.gaps;
+        }
+    }
+
     /// Copies `written` from other counts.
     pub fn set_written(&mut self, written: &Self) {
         for (counts, other) in self.0.iter_mut().zip(&written.0) {

@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -64,8 +66,8 @@ impl From<mcap::McapError> for WriteError {
     }
 }
 
-impl From<std::io::Error> for WriteError {
-    fn from(error: std::io::Error) -> Self {
+impl From<io::Error> for WriteError {
+    fn from(error: io::Error) -> Self {
         Self::Failed(explain_write_error(&error))
     }
 }
@@ -76,6 +78,24 @@ impl From<serde_json::Error> for WriteError {
     }
 }
 
+/// A sink that counts the bytes that it accepts.
+struct Counted<W> {
+    out: W,
+    size_bytes: Arc<AtomicU64>,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, data: &[u8]) -> io::Result<usize> {
+        let count = self.out.write(data)?;
+        self.size_bytes.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
 /// Writes one recording.
 ///
 /// The first error is final: the file stays readable up to it, while a file that continued after
@@ -83,7 +103,9 @@ impl From<serde_json::Error> for WriteError {
 /// leaves a file without an end, as a killed process does.
 pub struct LogWriter<W: Write> {
     /// `None` after an error.
-    file: Option<Writer<NoSeek<W>>>,
+    file: Option<Writer<NoSeek<Counted<W>>>>,
+    /// Bytes that the sink has accepted.
+    size_bytes: Arc<AtomicU64>,
     run: RunDescription,
     /// Channel of each topic, in the order of [`Topic::ALL`].
     channels: [u16; Topic::ALL.len()],
@@ -107,10 +129,13 @@ impl<W: Write> LogWriter<W> {
         scene: &[u8],
         log_time_ns: u64,
     ) -> Result<Self, WriteError> {
+        let size_bytes = Arc::new(AtomicU64::new(0));
+        let out = Counted { out, size_bytes: Arc::clone(&size_bytes) };
         let mut file = write_options(options).create(NoSeek::new(out))?;
         match write_header(&mut file, run, scene, log_time_ns) {
             Ok(channels) => Ok(Self {
                 file: Some(file),
+                size_bytes,
                 run: run.clone(),
                 channels,
                 encoder: MessageEncoder::default(),
@@ -151,6 +176,11 @@ impl<W: Write> LogWriter<W> {
         &self.counts
     }
 
+    /// Returns the size of the file so far, in bytes. The open chunk is not part of it.
+    pub fn size_bytes(&self) -> u64 {
+        self.size_bytes.load(Ordering::Relaxed)
+    }
+
     /// Closes the open chunk and writes everything to the operating system, so that it outlives
     /// this process.
     ///
@@ -171,7 +201,7 @@ impl<W: Write> LogWriter<W> {
         let result = file.write_metadata(&metadata).and_then(|()| file.finish().map(drop));
         self.stop_on_error(result)?;
         let file = self.file.take().ok_or(WriteError::Stopped)?;
-        let mut out = file.into_inner().into_inner();
+        let mut out = file.into_inner().into_inner().out;
         out.flush()?;
         Ok(out)
     }
@@ -221,7 +251,7 @@ fn write_options(options: LogOptions) -> WriteOptions {
 }
 
 fn write_header<W: Write>(
-    file: &mut Writer<NoSeek<W>>,
+    file: &mut Writer<NoSeek<Counted<W>>>,
     run: &RunDescription,
     scene: &[u8],
     log_time_ns: u64,
@@ -245,7 +275,10 @@ fn write_header<W: Write>(
     Ok(channels)
 }
 
-fn add_channel<W: Write>(file: &mut Writer<NoSeek<W>>, topic: Topic) -> mcap::McapResult<u16> {
+fn add_channel<W: Write>(
+    file: &mut Writer<NoSeek<Counted<W>>>,
+    topic: Topic,
+) -> mcap::McapResult<u16> {
     let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
     let schema_id = match &schema {
         Some(schema) => file.add_schema(schema.name, schema.encoding, &schema.data)?,
