@@ -33,7 +33,7 @@ pub use rows::{
     ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow,
     StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
-pub use run::{Closing, FORMAT_VERSION, RunDescription};
+pub use run::{Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
 pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
 pub use tears::{TearTracker, torn_before_first};

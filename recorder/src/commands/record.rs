@@ -7,7 +7,6 @@ mod first_state;
 mod intake;
 mod load;
 mod messages;
-mod names;
 mod queue;
 mod report;
 mod split;
@@ -37,13 +36,12 @@ use report::{Report, Written};
 use split::WritePosition;
 use stop_reason::StopReason;
 use writing::WriteOptions;
+use writing::extras::Extras;
 
 /// Longest wait for messages before the next check for signals.
 const WAIT_MAX: Duration = Duration::from_millis(50);
 /// Period of the check whether the owner is alive.
 const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
-/// Flush period: the most that a killed recorder or a power cut loses.
-const FLUSH_NS: u64 = SECOND_NS;
 /// Pause between two attempts to attach to a node that is not there yet.
 const ATTACH_PAUSE_NS: u64 = SECOND_NS / 50;
 
@@ -54,6 +52,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let endpoint = args.endpoint.endpoint()?;
     let begin_ns = monotonic_ns();
     let names = args.names(default_path(endpoint.name(), realtime_ns()));
+    let extras = Extras::open(&args.extras)?;
     let earlier_count = names.check(args.file.existing())?;
     let Some(tap) = attach(args, &endpoint, &stop)? else {
         bail!("nothing was recorded: no node has come up as {endpoint}");
@@ -63,7 +62,8 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         names,
         files_max: args.split.files_max(),
         is_synced: !args.no_sync,
-        flush_interval_ns: FLUSH_NS,
+        flush_interval: args.flush_interval,
+        extras,
     };
     let file = options.create(0)?;
     let path = output::path_text(&options.names.path(0));

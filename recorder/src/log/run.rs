@@ -23,7 +23,7 @@ pub(super) const RUN_METADATA: &str = "run";
 /// Name of the metadata record of [`Closing`].
 pub(super) const CLOSING_METADATA: &str = "recorder";
 /// Name of the attachment with the scene.
-pub(super) const SCENE_ATTACHMENT: &str = "scene.toml";
+pub const SCENE_ATTACHMENT: &str = "scene.toml";
 /// Media type of the attachment with the scene.
 pub(super) const SCENE_MEDIA_TYPE: &str = "application/toml";
 

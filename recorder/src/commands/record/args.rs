@@ -1,12 +1,14 @@
 //! The options of `recorder record`.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::error::ErrorKind;
 
-use super::names::FileNames;
 use super::split::SplitArgs;
+use super::writing::extras::ExtraArgs;
+use super::writing::names::FileNames;
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::file_args::FileArgs;
 use crate::cli::output::AsJson;
@@ -14,6 +16,12 @@ use crate::cli::parse::{self, whole_number, whole_number_in};
 
 /// Default memory for snapshots that wait.
 const QUEUE_BYTES_DEFAULT: u64 = 256 << 20;
+
+/// Flush interval of a recording of one step.
+const FLUSH_INTERVAL_DEFAULT: Duration = Duration::from_secs(1);
+/// Flush intervals. Each flush closes a chunk, and waits for the disk.
+const FLUSH_INTERVALS: RangeInclusive<Duration> =
+    Duration::from_millis(100)..=Duration::from_hours(1);
 
 /// Options of a recording.
 #[derive(Debug, clap::Args)]
@@ -59,10 +67,16 @@ pub(crate) struct RecordArgs {
     #[arg(long, value_name = "BYTES", default_value_t = QUEUE_BYTES_DEFAULT,
         allow_hyphen_values = true, value_parser = queue_bytes)]
     pub(super) queue_bytes: u64,
-    /// Do not wait each second until the recording is on the disk. A power cut may then lose much
-    /// more than the last second
+    /// Longest time that messages wait in memory, from 100ms to 1h: what a killed recorder loses
+    #[arg(long, value_name = "TIME", default_value = "1s", allow_hyphen_values = true,
+        value_parser = flush_interval)]
+    pub(super) flush_interval: Duration,
+    /// Do not wait at each flush until the recording is on the disk. A power cut may then lose much
+    /// more than the last interval
     #[arg(long)]
     pub(super) no_sync: bool,
+    #[command(flatten)]
+    pub(super) extras: ExtraArgs,
     #[command(flatten)]
     pub(super) file: FileArgs,
     #[command(flatten)]
@@ -99,11 +113,19 @@ impl From<SingleStateArgs> for RecordArgs {
             duration: Some(timeout),
             steps: Some(0),
             queue_bytes: QUEUE_BYTES_DEFAULT,
+            flush_interval: FLUSH_INTERVAL_DEFAULT,
             no_sync: false,
+            extras: ExtraArgs::default(),
             file,
             as_json,
         }
     }
+}
+
+fn flush_interval(text: &str) -> Result<Duration, String> {
+    let interval = parse::duration(text)?;
+    let is_valid = FLUSH_INTERVALS.contains(&interval);
+    is_valid.then_some(interval).ok_or_else(|| "it must be a time from 100ms to 1h".to_owned())
 }
 
 fn queue_bytes(text: &str) -> Result<u64, String> {

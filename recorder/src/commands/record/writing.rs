@@ -1,5 +1,8 @@
 //! The writing thread: writes the queue into one file after the other.
 
+pub(crate) mod extras;
+pub(crate) mod names;
+
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -12,12 +15,13 @@ use recorder::{Closing, LogWriter, Message, PartFile, WriteError};
 use sim_contract::clock::monotonic_ns;
 
 use super::load::RunHeader;
-use super::names::FileNames;
 use super::queue::{Content, Item, Popped, Queue};
 use super::report::Written;
 use super::split::WritePosition;
 use crate::cli::file_args::{FileArgs, LogFile};
 use crate::cli::output;
+use extras::Extras;
+use names::FileNames;
 
 /// Longest wait for an item before the next check whether a flush is due.
 const WAIT_MAX: Duration = Duration::from_millis(50);
@@ -27,12 +31,13 @@ const WAIT_MAX: Duration = Duration::from_millis(50);
 pub(crate) struct WriteOptions {
     pub(crate) file: FileArgs,
     pub(crate) names: FileNames,
+    pub(crate) extras: Extras,
     /// Most files to keep.
     pub(crate) files_max: Option<u64>,
     /// Every flush waits until the data is on the disk.
     pub(crate) is_synced: bool,
     /// The most that a killed recorder or a power cut loses, besides the open chunk.
-    pub(crate) flush_interval_ns: u64,
+    pub(crate) flush_interval: Duration,
 }
 
 impl WriteOptions {
@@ -100,7 +105,9 @@ struct OpenFile {
 impl Files {
     /// Writes every entry of the queue, and flushes at intervals.
     fn write_all(&mut self, queue: &Queue) -> anyhow::Result<()> {
-        let mut next_flush_ns = monotonic_ns() + self.options.flush_interval_ns;
+        let interval_ns = self.options.flush_interval.as_nanos();
+        let interval_ns = u64::try_from(interval_ns).unwrap_or(u64::MAX);
+        let mut next_flush_ns = monotonic_ns().saturating_add(interval_ns);
         loop {
             match queue.pop(WAIT_MAX) {
                 Popped::Begin { header, log_time_ns } => self.begin(&header, log_time_ns)?,
@@ -111,7 +118,7 @@ impl Files {
             }
             let now_ns = monotonic_ns();
             if now_ns >= next_flush_ns {
-                next_flush_ns = now_ns + self.options.flush_interval_ns;
+                next_flush_ns = now_ns.saturating_add(interval_ns);
                 self.flush()?;
             }
         }
@@ -130,7 +137,8 @@ impl Files {
         let file = self.created.take().map_or_else(|| self.options.create(number), Ok)?;
         let part_path = file.part_path().to_owned();
         let log = self.options.file.begin(file, &header.run, &header.scene, log_time_ns);
-        let log = log.with_context(|| incomplete(&part_path))?;
+        let mut log = log.with_context(|| incomplete(&part_path))?;
+        self.options.extras.write(&mut log).with_context(|| incomplete(&part_path))?;
         self.position.set(number, log.size_bytes());
         self.open = Some(OpenFile { number, part_path, log, steps: None });
         Ok(())
