@@ -1,6 +1,9 @@
 //! Recordings of several files: across loads, runs and restarts of the node, and at limits. Each file
 //! verifies alone, and together they have every published step.
 
+mod extras;
+mod kills;
+
 use std::path::Path;
 
 use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, wait_for};

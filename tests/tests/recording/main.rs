@@ -4,7 +4,6 @@
 mod bad_input;
 mod coverage;
 mod end_to_end;
-mod extras;
 mod files;
 mod hostile;
 mod interrupt;
