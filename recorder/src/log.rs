@@ -29,6 +29,7 @@ pub use read::frames::{Frame, FrameReader};
 pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};
 pub use read::reader::LogReader;
+pub use read::selection::ContentSelection;
 pub use rows::{
     ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow,
     StepRow, SurfaceRow, TearsRow, TopologyRow,

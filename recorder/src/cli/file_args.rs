@@ -55,7 +55,11 @@ enum Preset {
 
 impl Preset {
     fn options(self) -> LogOptions {
-        let chunks = |compression, chunk_size_bytes| LogOptions { compression, chunk_size_bytes };
+        let chunks = |compression, chunk_size_bytes| LogOptions {
+            compression,
+            chunk_size_bytes,
+            ..LogOptions::default()
+        };
         match self {
             Self::Fast => chunks(Compression::None, 1 << 20),
             Self::Default => LogOptions::default(),
@@ -92,7 +96,8 @@ impl FileArgs {
 }
 
 impl FileArgs {
-    fn options(&self) -> LogOptions {
+    /// Returns the format of the file.
+    pub(crate) fn options(&self) -> LogOptions {
         let compression = match self.compression {
             None => return self.preset.unwrap_or(Preset::Default).options(),
             Some(CompressionArg::None) => Compression::None,

@@ -57,7 +57,9 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let Some(tap) = attach(args, &endpoint, &stop)? else {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
+    let selection = args.selection.selection();
     let options = WriteOptions {
+        selection,
         file: args.file.clone(),
         names,
         files_max: args.split.files_max(),
@@ -83,7 +85,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let feed = Feed::new(intake, Arc::clone(&queue), position, args.split.clone());
     let mut recording = Recording {
         tap,
-        feed: feed.following(args.follow),
+        feed: feed.following(args.follow).selecting(selection),
         queue,
         writing,
         begin_ns,

@@ -13,6 +13,7 @@ use sim_contract::explain_write_error;
 
 use super::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use super::message::Message;
+use super::read::selection::{ContentSelection, SELECTION_METADATA};
 use super::run::{
     CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
     header_library,
@@ -43,11 +44,17 @@ pub struct LogOptions {
     /// Uncompressed size at which a chunk is closed, in bytes. A killed process loses its open
     /// chunk. Default: 1 MiB.
     pub chunk_size_bytes: u64,
+    /// Declaration of the content that the caller leaves out. Default: none.
+    pub selection: ContentSelection,
 }
 
 impl Default for LogOptions {
     fn default() -> Self {
-        Self { compression: Compression::Zstd, chunk_size_bytes: 1 << 20 }
+        Self {
+            compression: Compression::Zstd,
+            chunk_size_bytes: 1 << 20,
+            selection: ContentSelection::default(),
+        }
     }
 }
 
@@ -137,7 +144,8 @@ impl<W: Write> LogWriter<W> {
         let size_bytes = Arc::new(AtomicU64::new(0));
         let out = Counted { out, size_bytes: Arc::clone(&size_bytes) };
         let mut file = write_options(options).create(NoSeek::new(out))?;
-        match write_header(&mut file, run, scene, log_time_ns) {
+        let selected = write_selection(&mut file, &options.selection);
+        match selected.and_then(|()| write_header(&mut file, run, scene, log_time_ns)) {
             Ok(channels) => Ok(Self {
                 file: Some(file),
                 size_bytes,
@@ -297,6 +305,18 @@ fn write_options(options: LogOptions) -> WriteOptions {
         .compression_level(level)
         // The cores belong to the solver.
         .compression_threads(0)
+}
+
+/// Declares what is left out. Nothing declares that everything is recorded.
+fn write_selection<W: Write>(
+    file: &mut Writer<NoSeek<Counted<W>>>,
+    selection: &ContentSelection,
+) -> Result<(), WriteError> {
+    if selection.is_everything() {
+        return Ok(());
+    }
+    let name = SELECTION_METADATA.to_owned();
+    Ok(file.write_metadata(&Metadata { name, metadata: selection.to_map() })?)
 }
 
 fn write_header<W: Write>(

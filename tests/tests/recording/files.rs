@@ -3,6 +3,7 @@
 
 mod extras;
 mod kills;
+mod selection;
 
 use std::path::Path;
 

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::error::ErrorKind;
 
+use super::feed::selector::SelectionArgs;
 use super::split::SplitArgs;
 use super::writing::extras::ExtraArgs;
 use super::writing::names::FileNames;
@@ -36,7 +37,8 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     recorder record --name left --duration 10s --compression none\n  \
     recorder record -o run.mcap --steps 2400 --json\n  \
     recorder record -o run.mcap --follow --wait\n  \
-    recorder record -o run.mcap --split-size 1GB --max-files 10"
+    recorder record -o run.mcap --split-size 1GB --max-files 10\n  \
+    recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada"
 )]
 pub(crate) struct RecordArgs {
     #[command(flatten)]
@@ -54,6 +56,8 @@ pub(crate) struct RecordArgs {
     pub(super) wait: bool,
     #[command(flatten)]
     pub(super) split: SplitArgs,
+    #[command(flatten)]
+    pub(super) selection: SelectionArgs,
     /// End after this time, such as 10s or 500ms. It counts from the start of the program, so it
     /// includes the wait for the first step that can be recorded [default: no limit]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true,
@@ -110,6 +114,7 @@ impl From<SingleStateArgs> for RecordArgs {
             follow: false,
             wait: false,
             split: SplitArgs::default(),
+            selection: SelectionArgs::default(),
             duration: Some(timeout),
             steps: Some(0),
             queue_bytes: QUEUE_BYTES_DEFAULT,

@@ -1,8 +1,10 @@
 //! The way from the states of a tap into the queue: one file after the other.
 
+pub(crate) mod selector;
+
 use std::sync::Arc;
 
-use recorder::Closing;
+use recorder::ContentSelection;
 use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State};
 
@@ -15,6 +17,7 @@ use super::queue::{Item, Queue};
 use super::split::{FileBegin, SplitArgs, WritePosition};
 use super::stop_reason::StopReason;
 use crate::cli::output;
+use selector::Selector;
 
 /// Feeds the queue with the files of a recording.
 #[derive(Debug)]
@@ -25,6 +28,7 @@ pub(crate) struct Feed {
     split: SplitArgs,
     /// Another load and another run begin the next file.
     is_following: bool,
+    selector: Selector,
     /// The newest file.
     file: Option<FileBegin>,
     /// Contents of the newest file that are not in the queue yet.
@@ -39,12 +43,18 @@ impl Feed {
         split: SplitArgs,
     ) -> Self {
         let accepted = Accepted::default();
-        Self { intake, queue, position, split, is_following: false, file: None, accepted }
+        let selector = Selector::new(ContentSelection::default());
+        Self { intake, queue, position, split, is_following: false, selector, file: None, accepted }
     }
 
     /// Goes on in the next file with another load or run.
     pub(crate) fn following(self, is_following: bool) -> Self {
         Self { is_following, ..self }
+    }
+
+    /// Leaves out what is not selected.
+    pub(crate) fn selecting(self, selection: ContentSelection) -> Self {
+        Self { selector: Selector::new(selection), ..self }
     }
 
     /// Accepts a state, in the next file if this one ends before it. `messages` have arrived before it.
@@ -98,7 +108,8 @@ impl Feed {
     pub(crate) fn end_file(&mut self, stop_reason: String) {
         self.enqueue();
         if self.intake.has_started() {
-            let closing: Closing = self.intake.end_file(stop_reason);
+            let mut closing = self.intake.end_file(stop_reason);
+            closing.counts.set_left_out(&self.selector.take_counts());
             self.queue.end(closing);
         }
     }
@@ -116,6 +127,7 @@ impl Feed {
             self.queue.begin(header, log_time_ns);
         }
         for content in self.accepted.contents.drain(..) {
+            let Some(content) = self.selector.select(content) else { continue };
             self.queue.push(Item { content, log_time_ns });
         }
     }

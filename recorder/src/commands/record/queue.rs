@@ -112,7 +112,7 @@ impl Queue {
             }
             return;
         }
-        state.is_beginning &= matches!(item.content, Content::Update(_));
+        state.is_beginning &= item.content.snapshot_step().is_none();
         state.add_to_backlog(&item.content);
         state.push(Entry::Item(item));
         drop(state);
@@ -184,11 +184,13 @@ impl State {
     fn add_to_backlog(&mut self, content: &Content) {
         let Some(backlog) = &mut self.backlog else { return };
         match content {
+            Content::Update(Message::Step(row)) | Content::Snapshot(row, _) => {
+                backlog.remove_to(row.step);
+            }
             Content::Update(message) => {
                 // The start of a file always fits: the limit includes it.
                 let _fits = backlog.add(message);
             }
-            Content::Snapshot(row, _) => backlog.remove_to(row.step),
         }
     }
 }
@@ -204,6 +206,14 @@ impl Entry {
 }
 
 impl Content {
+    /// Returns the step of a snapshot, with its particles or without.
+    fn snapshot_step(&self) -> Option<u64> {
+        match self {
+            Self::Snapshot(row, _) | Self::Update(Message::Step(row)) => Some(row.step),
+            Self::Update(_) => None,
+        }
+    }
+
     fn size_bytes(&self) -> usize {
         match self {
             Self::Update(message) => message.size_bytes(),

@@ -117,7 +117,8 @@ fn record(seed: u64) -> (Vec<u8>, Closing) {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let (disk, queue) = (Arc::new(Disk::default()), begun_queue(QUEUE_BYTES));
     let file = StallingFile { disk: Arc::clone(&disk), bytes: Vec::new() };
-    let options = LogOptions { compression: Compression::None, chunk_size_bytes: 1 };
+    let options =
+        LogOptions { compression: Compression::None, chunk_size_bytes: 1, ..LogOptions::default() };
     let log = LogWriter::create(file, options, &description(), SCENE, 0).unwrap();
     let mut closing = Closing::default();
     let (log, closing) = thread::scope(|scope| {

@@ -11,7 +11,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
-use recorder::{Closing, LogWriter, Message, PartFile, WriteError};
+use recorder::{Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, WriteError};
 use sim_contract::clock::monotonic_ns;
 
 use super::load::RunHeader;
@@ -32,6 +32,7 @@ pub(crate) struct WriteOptions {
     pub(crate) file: FileArgs,
     pub(crate) names: FileNames,
     pub(crate) extras: Extras,
+    pub(crate) selection: ContentSelection,
     /// Most files to keep.
     pub(crate) files_max: Option<u64>,
     /// Every flush waits until the data is on the disk.
@@ -136,7 +137,9 @@ impl Files {
         }
         let file = self.created.take().map_or_else(|| self.options.create(number), Ok)?;
         let part_path = file.part_path().to_owned();
-        let log = self.options.file.begin(file, &header.run, &header.scene, log_time_ns);
+        let log_options =
+            LogOptions { selection: self.options.selection, ..self.options.file.options() };
+        let log = LogWriter::create(file, log_options, &header.run, &header.scene, log_time_ns);
         let mut log = log.with_context(|| incomplete(&part_path))?;
         self.options.extras.write(&mut log).with_context(|| incomplete(&part_path))?;
         self.position.set(number, log.size_bytes());
@@ -146,7 +149,7 @@ impl Files {
 
     fn write(&mut self, item: Item) -> anyhow::Result<()> {
         let Some(open) = &mut self.open else { return Ok(()) };
-        if let Content::Snapshot(row, _) = &item.content {
+        if let Content::Snapshot(row, _) | Content::Update(Message::Step(row)) = &item.content {
             open.steps = Some((open.steps.map_or(row.step, |(first, _)| first), row.step));
         }
         write_item(&mut open.log, item).with_context(|| incomplete(&open.part_path))?;
