@@ -29,11 +29,12 @@ pub use read::frames::{Frame, FrameReader};
 pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};
 pub use read::reader::LogReader;
+pub use read::selection::ContentSelection;
 pub use rows::{
     ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow,
     StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
-pub use run::{Closing, FORMAT_VERSION, RunDescription};
+pub use run::{Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
 pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
 pub use tears::{TearTracker, torn_before_first};

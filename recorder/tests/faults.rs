@@ -120,7 +120,8 @@ fn record(seed: u64, fault: Option<Fault>) -> Course {
     let file = FaultyFile { bytes: Rc::clone(&bytes), random: random.clone(), fault };
     let capacity = [0, 300, LARGE_BUFFER][random.below(3)];
     let compression = [Compression::None, Compression::Lz4, Compression::Zstd][random.below(3)];
-    let options = LogOptions { compression, chunk_size_bytes: 1 + random.below(2000) as u64 };
+    let chunk_size_bytes = 1 + random.below(2000) as u64;
+    let options = LogOptions { compression, chunk_size_bytes, ..LogOptions::default() };
     let out = BufWriter::with_capacity(capacity, file);
     let mut flushed_count = 0;
     let log = LogWriter::create(out, options, &run(), b"version = 1", 0);

@@ -136,7 +136,8 @@ fn a_recording_reads_back_as_it_was_written() {
     for compression in
         [recorder::Compression::None, recorder::Compression::Lz4, recorder::Compression::Zstd]
     {
-        let file = write(LogOptions { compression, chunk_size_bytes: 500 });
+        let file =
+            write(LogOptions { compression, chunk_size_bytes: 500, ..LogOptions::default() });
         let mut log = LogReader::new(file.as_slice()).unwrap();
         assert_eq!(*log.run(), run());
         assert_eq!(log.scene(), SCENE);

@@ -3,6 +3,8 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
+use bytesize::ByteSize;
+
 /// Parses a whole number from 0.
 pub(crate) fn whole_number(text: &str) -> Result<u64, String> {
     whole_number_in(text, &(0..=u64::MAX))
@@ -23,9 +25,26 @@ pub(crate) fn duration(text: &str) -> Result<Duration, String> {
         .map_err(|_| "it must be a time with its unit, such as 2s or 500ms".to_owned())
 }
 
+/// Parses a size in bytes, such as `100MB` or `2GiB`.
+pub(crate) fn size_bytes(text: &str) -> Result<u64, String> {
+    let size = text.parse::<ByteSize>();
+    size.map(|size| size.as_u64())
+        .map_err(|_| "it must be a size with its unit, such as 100MB or 2GiB".to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_size_has_a_decimal_or_a_binary_unit() {
+        assert_eq!((size_bytes("100MB"), size_bytes("2GiB")), (Ok(100_000_000), Ok(2 << 30)));
+        assert_eq!(size_bytes("4096"), Ok(4096));
+        for text in ["-1", "much", ""] {
+            let error = size_bytes(text).unwrap_err();
+            assert_eq!(error, "it must be a size with its unit, such as 100MB or 2GiB");
+        }
+    }
 
     #[test]
     fn errors_state_the_expected_value() {

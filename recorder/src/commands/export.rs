@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::{FrameReader, LogEnd, LogReader, ReadError, RunDescription};
+use recorder::{ContentSelection, FrameReader, LogEnd, LogReader, ReadError, RunDescription};
 use serde::Serialize;
 use sim_contract::Stop;
 use sim_solver::Scene;
@@ -116,7 +116,10 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     let path = output::path_text(&args.file);
     let open = || LogReader::open_until(&args.file, &stop);
-    let survey = Survey::read(open().with_context(|| path.clone())?, &path)?;
+    let log = open().with_context(|| path.clone())?;
+    let needed = log.selection().require(&ContentSelection::FOR_PICTURES, "`recorder export`");
+    needed.with_context(|| path.clone())?;
+    let survey = Survey::read(log, &path)?;
     let selection = args.selection();
     let steps =
         selection.select(&survey.steps, survey.run.rate_hz).with_context(|| path.clone())?;

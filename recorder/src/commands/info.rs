@@ -80,7 +80,7 @@ pub(crate) fn inspect<R: Read>(
     size_bytes: u64,
 ) -> Result<(Info, LogEnd), recorder::ReadError> {
     let mut info = Info::new(log.run(), file, size_bytes);
-    let mut gaps = GapCounter::default();
+    let mut gaps = GapCounter::for_selection(log.selection());
     while let Some(logged) = log.next_message()? {
         gaps.add(&logged.message);
         *info.messages.entry(logged.message.topic().name()).or_default() += 1;

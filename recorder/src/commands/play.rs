@@ -12,8 +12,8 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use recorder::{
-    CollidersRow, FileSource, Frame, FrameReader, LogEnd, LogReader, Message, SurfaceRow,
-    TopologyRow, torn_before_first,
+    CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
+    SurfaceRow, TopologyRow, torn_before_first,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, sleep_until};
 use sim_contract::{Endpoint, Method, Stop, report_bus_errors};
@@ -134,6 +134,7 @@ impl Pass {
     /// Skips to the first snapshot to play, and becomes the owner of the name.
     fn open(args: &PlayArgs, endpoint: &Endpoint, stop: &Stop) -> anyhow::Result<Self> {
         let log = LogReader::open_until(&args.file, stop)?;
+        log.selection().require(&ContentSelection::FOR_STATES, "`recorder play`")?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let solver = Solver::new(&scene_in_recording(&log)?);
         let mut frames = FrameReader::new(log);

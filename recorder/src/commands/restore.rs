@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use recorder::{Frame, FrameReader, LogReader};
+use recorder::{ContentSelection, Frame, FrameReader, LogReader};
 use serde::Serialize;
 use sim_contract::{
     Action, Client, GivenState, Outcome, ParticleState, Stop, report_bus_errors, scene_hash,
@@ -98,6 +98,8 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
     let mut client = Client::attach(&endpoint)?;
     let path = path_text(&args.file);
     let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
+    let needed = log.selection().require(&ContentSelection::FOR_STATES, "`recorder restore`");
+    needed.with_context(|| path.clone())?;
     check_scene(&mut client, args.timeout, &log).with_context(|| path.clone())?;
     let wanted = match (args.step, args.time) {
         (Some(step), _) => Wanted::Step(step),

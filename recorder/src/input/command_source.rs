@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use recorder::{
-    LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands, sort_commands,
+    LogEnd, LogReader, Message, OutcomeRow, TimedCommand, Topic, parse_commands, sort_commands,
 };
 use sim_contract::Stop;
 
@@ -30,6 +30,7 @@ pub(crate) fn load_commands(source: &str, stop: &Stop) -> anyhow::Result<Vec<Tim
 
 fn commands_in_recording(path: &Path, stop: &Stop) -> anyhow::Result<Vec<TimedCommand>> {
     let mut log = LogReader::open_until(path, stop)?;
+    log.selection().require(&[Topic::Outcomes], "`recorder simulate --commands`")?;
     let mut first_row = None;
     let mut commands = Vec::new();
     while let Some(logged) = log.next_message()? {

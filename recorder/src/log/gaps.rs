@@ -1,6 +1,7 @@
 //! Messages that are missing between the recorded ones, counted by their numbers.
 
 use super::message::Message;
+use super::read::selection::ContentSelection;
 use super::topic::{AllCounts, Topic};
 
 /// Counts the snapshots and outcomes that are missing in a recording, from the messages in it.
@@ -10,7 +11,8 @@ use super::topic::{AllCounts, Topic};
 /// out. Files of format version 3 and earlier do not number their snapshots.
 #[derive(Debug, Default)]
 pub struct GapCounter {
-    next_snapshot: Option<u32>,
+    selection: ContentSelection,
+    last_snapshot: Option<u32>,
     has_unnumbered_snapshots: bool,
     /// `None` before the first snapshot, which contains all earlier outcomes.
     next_outcome: Option<u64>,
@@ -20,6 +22,11 @@ pub struct GapCounter {
 }
 
 impl GapCounter {
+    /// Counts only what a recording with this selection should have.
+    pub fn for_selection(selection: ContentSelection) -> Self {
+        Self { selection, ..Self::default() }
+    }
+
     /// Processes the next message of the file.
     pub fn add(&mut self, message: &Message) {
         match message {
@@ -42,11 +49,12 @@ impl GapCounter {
 
     /// Adds the numbers that are left out before a snapshot. Numbers count modulo 2^32.
     fn add_snapshot(&mut self, index: u32) {
-        let missing = index.wrapping_sub(self.next_snapshot.unwrap_or(index));
-        for topic in [Topic::Steps, Topic::Particles] {
-            self.counts[topic].gaps += u64::from(missing);
+        let last = self.last_snapshot.replace(index);
+        let missing = last.map_or(0, |last| self.selection.missing_between(last, index));
+        let topics = [Topic::Steps, Topic::Particles];
+        for topic in topics.into_iter().filter(|topic| self.selection.has_topic(*topic)) {
+            self.counts[topic].gaps += missing;
         }
-        self.next_snapshot = Some(index.wrapping_add(1));
     }
 
     /// Returns `true` if the file has snapshots without numbers, between which others may be missing.
@@ -57,6 +65,9 @@ impl GapCounter {
     /// Returns the numbers of missing messages so far, as `gaps`. The other counts are 0.
     pub fn counts(&self) -> AllCounts {
         let mut counts = self.counts;
+        if !self.selection.has_topic(Topic::Outcomes) {
+            return counts;
+        }
         let next = self.next_outcome.unwrap_or(self.outcome_count);
         counts[Topic::Outcomes].gaps += self.outcome_count.saturating_sub(next);
         counts

@@ -25,6 +25,7 @@ use super::read::open::open_regular_file;
 use super::read::read_error::{LogEnd, ReadError};
 use super::read::reader::LogReader;
 use super::read::records::RecordReader;
+use super::read::selection::ContentSelection;
 use super::run::RunDescription;
 use super::topic::Topic;
 use chunk::{LocatedChunk, record_size_bytes};
@@ -95,6 +96,7 @@ impl IndexedLog {
         on_progress: &mut dyn FnMut(u64, u64),
     ) -> Result<Self, ReadError> {
         let log = LogReader::open_file(path, stop.cloned())?;
+        log.selection().require(&ContentSelection::FOR_PICTURES, "a reader of single steps")?;
         let limits = log.limits();
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let file = open_regular_file(path)?;

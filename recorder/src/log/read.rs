@@ -12,4 +12,5 @@ pub(super) mod open;
 pub(super) mod read_error;
 pub(super) mod reader;
 pub(super) mod records;
+pub(super) mod selection;
 mod source;

@@ -23,7 +23,7 @@ pub(super) const RUN_METADATA: &str = "run";
 /// Name of the metadata record of [`Closing`].
 pub(super) const CLOSING_METADATA: &str = "recorder";
 /// Name of the attachment with the scene.
-pub(super) const SCENE_ATTACHMENT: &str = "scene.toml";
+pub const SCENE_ATTACHMENT: &str = "scene.toml";
 /// Media type of the attachment with the scene.
 pub(super) const SCENE_MEDIA_TYPE: &str = "application/toml";
 
@@ -173,6 +173,9 @@ impl Closing {
             put("written", counts.written);
             put("lost", counts.lost);
             put("gaps", counts.gaps);
+            if counts.left_out > 0 {
+                put("left_out", counts.left_out);
+            }
         }
         map
     }
@@ -200,6 +203,7 @@ impl Closing {
             counts.written = count("written");
             counts.lost = count("lost");
             counts.gaps = count("gaps");
+            counts.left_out = count("left_out");
         }
         closing
     }

@@ -87,6 +87,8 @@ pub struct TopicCounts {
     pub written: u64,
     /// Messages that reached the recorder but not the file, because its queue was full.
     pub lost: u64,
+    /// Messages that reached the recorder and were left out on purpose.
+    pub left_out: u64,
     /// Messages that never reached the recorder, as gaps in their numbering show.
     pub gaps: u64,
 }
@@ -122,10 +124,28 @@ impl AllCounts {
         }
     }
 
+    /// Adds the counts of another file.
+    pub fn add(&mut self, other: &Self) {
+        for (counts, other) in self.0.iter_mut().zip(&other.0) {
+            counts.received += other.received;
+            counts.written += other.written;
+            counts.lost += other.lost;
+            counts.left_out += other.left_out;
+            counts.gaps += other.gaps;
+        }
+    }
+
     /// Copies `written` from other counts.
     pub fn set_written(&mut self, written: &Self) {
         for (counts, other) in self.0.iter_mut().zip(&written.0) {
             counts.written = other.written;
+        }
+    }
+
+    /// Copies `left_out` from other counts.
+    pub fn set_left_out(&mut self, left_out: &Self) {
+        for (counts, other) in self.0.iter_mut().zip(&left_out.0) {
+            counts.left_out = other.left_out;
         }
     }
 

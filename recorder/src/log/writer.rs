@@ -2,20 +2,26 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::{self, Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use mcap::records::{MessageHeader, Metadata};
+use mcap::records::{AttachmentHeader, MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
 use sim_contract::explain_write_error;
 
 use super::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use super::message::Message;
+use super::read::selection::{ContentSelection, SELECTION_METADATA};
 use super::run::{
     CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
     header_library,
 };
 use super::topic::{AllCounts, Topic};
+
+/// Bytes of an attachment to copy at a time.
+const COPY_SIZE_BYTES: usize = 1 << 18;
 
 /// Compression of the chunks of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +32,8 @@ pub enum Compression {
     Lz4,
     /// Zstandard level 1: 1.4 ms per 10,000 particles.
     Zstd,
+    /// Zstandard level 19: about 100 ms per 10,000 particles.
+    ZstdSmallest,
 }
 
 /// Options of a [`LogWriter`].
@@ -36,11 +44,17 @@ pub struct LogOptions {
     /// Uncompressed size at which a chunk is closed, in bytes. A killed process loses its open
     /// chunk. Default: 1 MiB.
     pub chunk_size_bytes: u64,
+    /// Declaration of the content that the caller leaves out. Default: none.
+    pub selection: ContentSelection,
 }
 
 impl Default for LogOptions {
     fn default() -> Self {
-        Self { compression: Compression::Zstd, chunk_size_bytes: 1 << 20 }
+        Self {
+            compression: Compression::Zstd,
+            chunk_size_bytes: 1 << 20,
+            selection: ContentSelection::default(),
+        }
     }
 }
 
@@ -64,8 +78,8 @@ impl From<mcap::McapError> for WriteError {
     }
 }
 
-impl From<std::io::Error> for WriteError {
-    fn from(error: std::io::Error) -> Self {
+impl From<io::Error> for WriteError {
+    fn from(error: io::Error) -> Self {
         Self::Failed(explain_write_error(&error))
     }
 }
@@ -76,6 +90,24 @@ impl From<serde_json::Error> for WriteError {
     }
 }
 
+/// A sink that counts the bytes that it accepts.
+struct Counted<W> {
+    out: W,
+    size_bytes: Arc<AtomicU64>,
+}
+
+impl<W: Write> Write for Counted<W> {
+    fn write(&mut self, data: &[u8]) -> io::Result<usize> {
+        let count = self.out.write(data)?;
+        self.size_bytes.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
 /// Writes one recording.
 ///
 /// The first error is final: the file stays readable up to it, while a file that continued after
@@ -83,7 +115,9 @@ impl From<serde_json::Error> for WriteError {
 /// leaves a file without an end, as a killed process does.
 pub struct LogWriter<W: Write> {
     /// `None` after an error.
-    file: Option<Writer<NoSeek<W>>>,
+    file: Option<Writer<NoSeek<Counted<W>>>>,
+    /// Bytes that the sink has accepted.
+    size_bytes: Arc<AtomicU64>,
     run: RunDescription,
     /// Channel of each topic, in the order of [`Topic::ALL`].
     channels: [u16; Topic::ALL.len()],
@@ -107,10 +141,14 @@ impl<W: Write> LogWriter<W> {
         scene: &[u8],
         log_time_ns: u64,
     ) -> Result<Self, WriteError> {
+        let size_bytes = Arc::new(AtomicU64::new(0));
+        let out = Counted { out, size_bytes: Arc::clone(&size_bytes) };
         let mut file = write_options(options).create(NoSeek::new(out))?;
-        match write_header(&mut file, run, scene, log_time_ns) {
+        let selected = write_selection(&mut file, &options.selection);
+        match selected.and_then(|()| write_header(&mut file, run, scene, log_time_ns)) {
             Ok(channels) => Ok(Self {
                 file: Some(file),
+                size_bytes,
                 run: run.clone(),
                 channels,
                 encoder: MessageEncoder::default(),
@@ -151,6 +189,51 @@ impl<W: Write> LogWriter<W> {
         &self.counts
     }
 
+    /// Writes a metadata record. Readers of recordings skip it.
+    ///
+    /// # Errors
+    /// If this or an earlier call failed.
+    pub fn write_metadata(
+        &mut self,
+        name: &str,
+        entries: BTreeMap<String, String>,
+    ) -> Result<(), WriteError> {
+        let metadata = Metadata { name: name.to_owned(), metadata: entries };
+        let result = self.file.as_mut().ok_or(WriteError::Stopped)?.write_metadata(&metadata);
+        self.stop_on_error(result)
+    }
+
+    /// Copies an attachment of `size_bytes` into the file. Readers of recordings skip it.
+    ///
+    /// # Errors
+    /// If this or an earlier call failed, or `content` ends early.
+    pub fn attach(
+        &mut self,
+        name: &str,
+        size_bytes: u64,
+        content: impl Read,
+    ) -> Result<(), WriteError> {
+        let header = AttachmentHeader {
+            log_time: self.log_time_ns,
+            create_time: 0,
+            name: name.to_owned(),
+            media_type: "application/octet-stream".to_owned(),
+        };
+        let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
+        match copy_attachment(file, size_bytes, header, content) {
+            Ok(()) => Ok(()),
+            Err(error) => {
+                self.abandon();
+                Err(error)
+            }
+        }
+    }
+
+    /// Returns the size of the file so far, in bytes. The open chunk is not part of it.
+    pub fn size_bytes(&self) -> u64 {
+        self.size_bytes.load(Ordering::Relaxed)
+    }
+
     /// Closes the open chunk and writes everything to the operating system, so that it outlives
     /// this process.
     ///
@@ -171,7 +254,7 @@ impl<W: Write> LogWriter<W> {
         let result = file.write_metadata(&metadata).and_then(|()| file.finish().map(drop));
         self.stop_on_error(result)?;
         let file = self.file.take().ok_or(WriteError::Stopped)?;
-        let mut out = file.into_inner().into_inner();
+        let mut out = file.into_inner().into_inner().out;
         out.flush()?;
         Ok(out)
     }
@@ -205,9 +288,13 @@ fn write_options(options: LogOptions) -> WriteOptions {
     let compression = match options.compression {
         Compression::None => None,
         Compression::Lz4 => Some(mcap::Compression::Lz4),
-        Compression::Zstd => Some(mcap::Compression::Zstd),
+        Compression::Zstd | Compression::ZstdSmallest => Some(mcap::Compression::Zstd),
     };
-    let level = u32::from(options.compression == Compression::Zstd);
+    let level = match options.compression {
+        Compression::None | Compression::Lz4 => 0,
+        Compression::Zstd => 1,
+        Compression::ZstdSmallest => 19,
+    };
     WriteOptions::new()
         .profile("")
         .library(header_library(env!("CARGO_PKG_VERSION")) + mcap::LIBRARY_IDENTIFIER)
@@ -220,8 +307,20 @@ fn write_options(options: LogOptions) -> WriteOptions {
         .compression_threads(0)
 }
 
+/// Declares what is left out. Nothing declares that everything is recorded.
+fn write_selection<W: Write>(
+    file: &mut Writer<NoSeek<Counted<W>>>,
+    selection: &ContentSelection,
+) -> Result<(), WriteError> {
+    if selection.is_everything() {
+        return Ok(());
+    }
+    let name = SELECTION_METADATA.to_owned();
+    Ok(file.write_metadata(&Metadata { name, metadata: selection.to_map() })?)
+}
+
 fn write_header<W: Write>(
-    file: &mut Writer<NoSeek<W>>,
+    file: &mut Writer<NoSeek<Counted<W>>>,
     run: &RunDescription,
     scene: &[u8],
     log_time_ns: u64,
@@ -245,7 +344,33 @@ fn write_header<W: Write>(
     Ok(channels)
 }
 
-fn add_channel<W: Write>(file: &mut Writer<NoSeek<W>>, topic: Topic) -> mcap::McapResult<u16> {
+fn copy_attachment<W: Write>(
+    file: &mut Writer<NoSeek<Counted<W>>>,
+    size_bytes: u64,
+    header: AttachmentHeader,
+    mut content: impl Read,
+) -> Result<(), WriteError> {
+    file.start_attachment(size_bytes, header)?;
+    let mut buffer = vec![0; COPY_SIZE_BYTES];
+    let mut left = size_bytes;
+    while left > 0 {
+        let wanted = usize::try_from(left).unwrap_or(usize::MAX).min(buffer.len());
+        let count = content.read(&mut buffer[..wanted])?;
+        if count == 0 {
+            return Err(WriteError::Failed(format!(
+                "it has become shorter by {left} bytes since the start"
+            )));
+        }
+        file.put_attachment_bytes(&buffer[..count])?;
+        left -= count as u64;
+    }
+    Ok(file.finish_attachment()?)
+}
+
+fn add_channel<W: Write>(
+    file: &mut Writer<NoSeek<Counted<W>>>,
+    topic: Topic,
+) -> mcap::McapResult<u16> {
     let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
     let schema_id = match &schema {
         Some(schema) => file.add_schema(schema.name, schema.encoding, &schema.data)?,

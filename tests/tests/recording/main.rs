@@ -4,6 +4,7 @@
 mod bad_input;
 mod coverage;
 mod end_to_end;
+mod files;
 mod hostile;
 mod interrupt;
 mod losses;

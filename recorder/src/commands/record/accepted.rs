@@ -1,18 +1,9 @@
 //! The part of the messages of a node that goes into the recording.
 
-use recorder::{Message, RunDescription};
+use recorder::Message;
 
+use super::load::RunHeader;
 use super::queue::Content;
-
-/// The start of a recording.
-#[derive(Debug)]
-pub(crate) struct RunHeader {
-    pub(crate) run: RunDescription,
-    /// The scene as TOML.
-    pub(crate) scene: Vec<u8>,
-    /// The rows of the load.
-    pub(crate) rows: Vec<Message>,
-}
 
 /// The reason why this file cannot record the rest of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +19,7 @@ pub(crate) enum RunEnd {
 /// The part of the messages since the last wait that goes into the recording.
 #[derive(Debug, Default)]
 pub(crate) struct Accepted {
-    /// The header, when the recording starts.
+    /// The header, when a file starts.
     pub(crate) header: Option<RunHeader>,
     pub(crate) contents: Vec<Content>,
     pub(crate) end: Option<RunEnd>,

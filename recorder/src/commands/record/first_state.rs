@@ -17,11 +17,7 @@ impl FirstState {
     /// Copies a state. Returns `None` if a part of it has not arrived, as right after attaching.
     pub(crate) fn new(state: &State<'_>) -> Option<Self> {
         let State { header, torn, colliders, parameters, .. } = *state;
-        let is_complete = torn.constraints.len() == header.torn_count as usize
-            && torn.header.run_id == header.run_id
-            && colliders.header.run_id == header.run_id
-            && parameters.header.run_id == header.run_id;
-        if !is_complete {
+        if !has_all_parts(state) {
             return None;
         }
         let own_count = own_tear_count(header, &torn.header);
@@ -45,6 +41,12 @@ impl FirstState {
         })
     }
 
+    /// Returns `true` if a state has arrived with all its parts and its keyframe.
+    pub(crate) fn is_complete(state: &State<'_>) -> bool {
+        has_all_parts(state)
+            && state.changes.iter().any(|change| is_keyframe_of(change, state.header))
+    }
+
     /// Returns `true` if the keyframe has arrived.
     pub(crate) fn has_keyframe(&self) -> bool {
         self.changes.iter().any(|change| is_keyframe_of(change, &self.header))
@@ -57,6 +59,15 @@ impl FirstState {
             self.changes.push(change);
         }
     }
+}
+
+/// Returns `true` if everything that belongs to a state, except its keyframe, has arrived.
+fn has_all_parts(state: &State<'_>) -> bool {
+    let State { header, torn, colliders, parameters, .. } = *state;
+    torn.constraints.len() == header.torn_count as usize
+        && torn.header.run_id == header.run_id
+        && colliders.header.run_id == header.run_id
+        && parameters.header.run_id == header.run_id
 }
 
 /// Returns the number of constraints that tore in the step of a snapshot.

@@ -3,23 +3,26 @@
 mod started;
 
 use recorder::{AllCounts, Closing};
-use sim_contract::{Change, LostChanges, NodeStatus, Outcome, ReadError, State};
+use sim_contract::{
+    Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotHeader, State,
+};
 
-use super::accepted::Accepted;
+use super::accepted::{Accepted, RunEnd};
 use super::first_state::FirstState;
 use super::load::{Load, LoadError, Now};
 use super::messages::Messages;
-use started::Started;
+use started::{PreviousFile, Started};
 
 /// Most outcomes to keep before the first state. Beyond it the oldest are dropped.
 const OUTCOMES_PENDING_MAX: usize = 1 << 16;
 
-/// Accepts a run from the first state that has its keyframe.
+/// Accepts a run from the first state that has its keyframe, in one file or in several that follow each
+/// other.
 #[derive(Debug, Default)]
 pub(crate) struct Intake {
     /// Steps to record after the first one.
     steps_max: Option<u64>,
-    /// The load of the newest state, until the recording starts.
+    /// The load of the newest state.
     load: Option<Load>,
     /// The newest state, until its keyframe arrives. A paused node publishes it after the state.
     candidate: Option<FirstState>,
@@ -28,6 +31,8 @@ pub(crate) struct Intake {
     /// Outcomes that may follow the first state.
     outcomes: Vec<Outcome>,
     started: Option<Started>,
+    /// The file before this one.
+    previous: Option<PreviousFile>,
     lost: LostChanges,
     /// Messages after the first state or the candidate that arrived but could not be read.
     unreadable: u64,
@@ -66,11 +71,14 @@ impl Intake {
         if matches!(state.changes.first(), Some(Change::Load)) {
             self.load = Some(Load::new(state.load)?);
         }
+        let first_outcome = self.first_outcome(state.header);
         self.outcomes.retain(|outcome| {
-            outcome.run_id != state.header.run_id || outcome.index >= state.header.outcome_count
+            outcome.run_id != state.header.run_id || outcome.index >= first_outcome
         });
         self.candidate = FirstState::new(state);
-        (self.unreadable, self.follows_errors) = (0, true);
+        if self.previous.is_none() {
+            (self.unreadable, self.follows_errors) = (0, true);
+        }
         self.start_if_ready(now, accepted);
         Ok(())
     }
@@ -99,12 +107,67 @@ impl Intake {
         started.accept_statuses(&messages.statuses, accepted);
     }
 
+    /// Returns the index of the first outcome that a file with this first state holds. Earlier ones are
+    /// part of the state, or in the file before.
+    fn first_outcome(&self, first: &SnapshotHeader) -> u64 {
+        let previous = self.previous.as_ref().filter(|previous| previous.run_id == first.run_id);
+        previous.map_or(first.outcome_count, |previous| previous.next_outcome)
+    }
+
+    /// Returns the reason why the file ends before a state.
+    pub(crate) fn end_at(&self, header: &SnapshotHeader) -> Option<RunEnd> {
+        self.started.as_ref()?.end_at(header)
+    }
+
+    /// Returns `true` if a file has begun and not ended.
+    pub(crate) fn has_started(&self) -> bool {
+        self.started.is_some()
+    }
+
+    /// Accepts the last messages of a file that ends before `next`: those of earlier steps. The others
+    /// stay in `messages`, for the file that begins with it.
+    pub(crate) fn accept_before(
+        &mut self,
+        next: &State<'_>,
+        messages: &mut Messages,
+        accepted: &mut Accepted,
+    ) {
+        let Some(started) = &mut self.started else { return };
+        started.accept_changes_before(next, accepted);
+        let header = next.header;
+        let is_earlier = |run_id: u64, step: u64| run_id != header.run_id || step < header.step;
+        self.outcomes.append(&mut messages.outcomes);
+        let outcomes = self.outcomes.extract_if(.., |one| is_earlier(one.run_id, one.step));
+        started.accept_outcomes(outcomes, accepted);
+        let statuses: Vec<_> =
+            messages.statuses.extract_if(.., |one| is_earlier(one.run_id, one.step)).collect();
+        started.accept_statuses(&statuses, accepted);
+    }
+
+    /// Ends a file. Returns its end, with the numbers of received and missing messages. The next state
+    /// with its keyframe begins another one.
+    pub(crate) fn end_file(&mut self, stop_reason: String) -> Closing {
+        let closing = self.closing(stop_reason);
+        if let Some(started) = self.started.take() {
+            self.previous =
+                Some(started.into_previous(self.load.as_ref().map_or(0, Load::epoch_ns)));
+        }
+        (self.candidate, self.unreadable) = (None, 0);
+        closing
+    }
+
     /// Starts the recording at the candidate, once it has its keyframe.
     fn start_if_ready(&mut self, now: Now, accepted: &mut Accepted) {
         let Some(first) = self.candidate.take_if(|first| first.has_keyframe()) else { return };
-        let Some(load) = self.load.take() else { return };
-        let mut started = Started::new(&first, self.steps_max, self.lost);
-        let header = load.into_run_header(&first.header, first.torn_before, now);
+        let Some(load) = &mut self.load else { return };
+        let previous = self.previous.as_ref();
+        let mut started = Started::new(&first, previous, self.lost);
+        if previous.is_none() {
+            started.set_steps_max(self.steps_max);
+        }
+        let epoch_ns = previous.and_then(|previous| previous.epoch_ns_of(&first.header));
+        load.set_epoch(&first.header, epoch_ns, now);
+        let header = load.run_header(&first.header, first.torn_before);
         started.count_load(&header.rows);
         started.skip_member_changes(self.status.as_ref());
         accepted.header = Some(header);
@@ -119,7 +182,9 @@ impl Intake {
     #[must_use]
     pub(crate) fn count_unreadable(&mut self, errors: &[ReadError]) -> Option<String> {
         let is_missing = !std::mem::take(&mut self.follows_errors);
-        if is_missing && (self.candidate.is_some() || self.started.is_some()) {
+        let has_begun =
+            self.candidate.is_some() || self.started.is_some() || self.previous.is_some();
+        if is_missing && has_begun {
             self.unreadable += errors.len() as u64;
         }
         let error = errors.first()?;
@@ -129,7 +194,7 @@ impl Intake {
         is_first.then(|| format!("warning: a message {effect}: {error}"))
     }
 
-    /// Returns the first recorded step, once the recording has started.
+    /// Returns the first step of the file, once it has begun.
     pub(crate) fn first_step(&self) -> Option<u64> {
         self.started.as_ref().map(|started| started.first_step)
     }

@@ -5,7 +5,15 @@ use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{LoadHeader, LoadedScene, SnapshotHeader};
 use sim_solver::{Scene, SceneError};
 
-use super::accepted::RunHeader;
+/// The start of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RunHeader {
+    pub(crate) run: RunDescription,
+    /// The scene as TOML.
+    pub(crate) scene: Vec<u8>,
+    /// The rows of the load.
+    pub(crate) rows: Vec<Message>,
+}
 
 /// The clocks at the reception of a state, in nanoseconds.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +48,8 @@ pub(crate) struct Load {
     text: Vec<u8>,
     topology: TopologyRow,
     surface: SurfaceRow,
+    /// Wall clock of step 0, in nanoseconds since 1970.
+    epoch_ns: u64,
 }
 
 impl Load {
@@ -51,21 +61,32 @@ impl Load {
             text: loaded.scene.clone(),
             topology: TopologyRow::new(&loaded.header, &loaded.constraints),
             surface: SurfaceRow::new(&loaded.header, &loaded.triangles),
+            epoch_ns: 0,
         })
     }
 
-    /// Returns the header of a recording that starts at a snapshot. `torn` are the constraints that
-    /// tore in earlier steps.
-    pub(crate) fn into_run_header(
-        self,
-        first: &SnapshotHeader,
-        torn: Vec<u32>,
-        now: Now,
-    ) -> RunHeader {
-        let mut run = RunDescription {
+    /// Sets the wall clock of step 0: that of an earlier file of the run, or the one that follows from the
+    /// time of a snapshot.
+    pub(crate) fn set_epoch(&mut self, first: &SnapshotHeader, epoch_ns: Option<u64>, now: Now) {
+        let age_ns = now.monotonic_ns.saturating_sub(first.publish_monotonic_ns);
+        let published_ns = now.realtime_ns.saturating_sub(age_ns);
+        let rate_hz = self.scene.solver.rate_hz;
+        let since_ns = RunDescription::duration_ns(first.step, rate_hz);
+        self.epoch_ns = epoch_ns.unwrap_or(published_ns.saturating_sub(since_ns));
+    }
+
+    /// Returns the wall clock of step 0, in nanoseconds since 1970.
+    pub(crate) fn epoch_ns(&self) -> u64 {
+        self.epoch_ns
+    }
+
+    /// Returns the header of a file that starts at a snapshot. `torn` are the constraints that tore in
+    /// earlier steps.
+    pub(crate) fn run_header(&self, first: &SnapshotHeader, torn: Vec<u32>) -> RunHeader {
+        let run = RunDescription {
             run_id: first.run_id,
-            epoch_ns: 0,
-            scene_name: self.scene.name,
+            epoch_ns: self.epoch_ns,
+            scene_name: self.scene.name.clone(),
             origin: self.header.origin,
             rate_hz: self.scene.solver.rate_hz,
             method: self.header.method,
@@ -75,11 +96,8 @@ impl Load {
             contract_version: first.contract_version,
             recorder_version: env!("CARGO_PKG_VERSION").to_owned(),
         };
-        let age_ns = now.monotonic_ns.saturating_sub(first.publish_monotonic_ns);
-        let published_ns = now.realtime_ns.saturating_sub(age_ns);
-        run.epoch_ns = published_ns.saturating_sub(run.time_of_step_ns(first.step));
-        let topology = TopologyRow { torn, ..self.topology };
-        let rows = vec![Message::Topology(topology), Message::Surface(self.surface)];
-        RunHeader { run, scene: self.text, rows }
+        let topology = TopologyRow { torn, ..self.topology.clone() };
+        let rows = vec![Message::Topology(topology), Message::Surface(self.surface.clone())];
+        RunHeader { run, scene: self.text.clone(), rows }
     }
 }

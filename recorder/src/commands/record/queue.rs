@@ -4,8 +4,10 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use recorder::{AllCounts, Backlog, Message, StepRow, Topic};
+use recorder::{AllCounts, Backlog, Closing, Message, StepRow, Topic};
 use sim_contract::ParticleState;
+
+use super::load::RunHeader;
 
 /// One or two messages to write.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,11 +25,20 @@ pub(crate) struct Item {
     pub(crate) log_time_ns: u64,
 }
 
+/// An entry of the queue: the start of a file, a content, or the end of a file.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "nearly every entry is an item")]
+enum Entry {
+    Begin { header: Box<RunHeader>, log_time_ns: u64 },
+    Item(Item),
+    End(Box<Closing>),
+}
+
 /// A queue that never blocks the reading thread: it drops and counts items that do not fit.
 ///
 /// The limit applies to snapshots. Other messages are small, and later steps build on them, so their
-/// limit is twice as high. The load, without which a file is useless, and an item that finds the
-/// queue empty are always accepted. Beyond that, a reader must be able to collect the messages between
+/// limit is twice as high. The first snapshot of a file and everything before it, without which the file
+/// is useless, and an item that finds the queue empty are always accepted. Beyond that, a reader must be able to collect the messages between
 /// two snapshots: the queue drops those for which the [`Backlog`] has no room.
 #[derive(Debug)]
 pub(crate) struct Queue {
@@ -38,10 +49,13 @@ pub(crate) struct Queue {
 
 #[derive(Debug, Default)]
 struct State {
-    items: VecDeque<Item>,
+    entries: VecDeque<Entry>,
     size_bytes: usize,
     /// The accepted messages without a snapshot; `None` before the start.
     backlog: Option<Backlog>,
+    /// The newest file has no snapshot yet.
+    is_beginning: bool,
+    /// Messages of the newest file that were dropped.
     lost: AllCounts,
     is_closed: bool,
 }
@@ -50,7 +64,14 @@ struct State {
 #[derive(Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "moved once; a box for each item would cost more")]
 pub(crate) enum Popped {
+    /// A file begins.
+    Begin {
+        header: Box<RunHeader>,
+        log_time_ns: u64,
+    },
     Item(Item),
+    /// The file ends.
+    End(Box<Closing>),
     /// No item arrived before the timeout.
     Timeout,
     /// The queue is closed and empty.
@@ -62,9 +83,17 @@ impl Queue {
         Self { state: Mutex::default(), changed: Condvar::new(), limit_bytes }
     }
 
-    /// Begins a recording, before its first item.
-    pub(crate) fn begin(&self, backlog: Backlog) {
-        self.lock().backlog = Some(backlog);
+    /// Begins a file, with the rows of its load.
+    pub(crate) fn begin(&self, mut header: RunHeader, log_time_ns: u64) {
+        let rows = std::mem::take(&mut header.rows);
+        let mut state = self.lock();
+        state.backlog = Some(Backlog::new(&header.run, header.scene.len()));
+        state.is_beginning = true;
+        state.push(Entry::Begin { header: Box::new(header), log_time_ns });
+        drop(state);
+        for row in rows {
+            self.push(Item { content: Content::Update(row), log_time_ns });
+        }
     }
 
     /// Adds an item, or counts it as lost.
@@ -75,20 +104,34 @@ impl Queue {
             Content::Update(message) => (2 * self.limit_bytes, &[message.topic()][..]),
             Content::Snapshot(..) => (self.limit_bytes, &[Topic::Steps, Topic::Particles][..]),
         };
-        let is_load = [Topic::Topology, Topic::Surface].contains(&topics[0]);
-        let fits = state.size_bytes + size_bytes <= limit_bytes || state.items.is_empty();
-        let is_accepted = is_load || fits && state.can_be_read_with(&item.content);
+        let fits = state.size_bytes + size_bytes <= limit_bytes || state.entries.is_empty();
+        let is_accepted = state.is_beginning || fits && state.can_be_read_with(&item.content);
         if state.is_closed || !is_accepted {
             for topic in topics {
                 state.lost[*topic].lost += 1;
             }
             return;
         }
-        state.size_bytes += size_bytes;
+        state.is_beginning &= item.content.snapshot_step().is_none();
         state.add_to_backlog(&item.content);
-        state.items.push_back(item);
+        state.push(Entry::Item(item));
         drop(state);
         self.changed.notify_one();
+    }
+
+    /// Ends the file, and adds the numbers of its dropped messages to its end.
+    pub(crate) fn end(&self, mut closing: Closing) {
+        let mut state = self.lock();
+        closing.counts.set_lost(&std::mem::take(&mut state.lost));
+        state.is_beginning = false;
+        state.push(Entry::End(Box::new(closing)));
+        drop(state);
+        self.changed.notify_one();
+    }
+
+    /// Returns the size of what waits, in bytes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.lock().size_bytes
     }
 
     /// Closes the queue. Items in the queue can still be popped.
@@ -104,22 +147,18 @@ impl Queue {
 
     /// Returns the next item. Waits for one at most `timeout`.
     pub(crate) fn pop(&self, timeout: Duration) -> Popped {
-        let is_idle = |state: &mut State| state.items.is_empty() && !state.is_closed;
+        let is_idle = |state: &mut State| state.entries.is_empty() && !state.is_closed;
         let waited = self.changed.wait_timeout_while(self.lock(), timeout, is_idle);
         let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        match state.items.pop_front() {
-            Some(item) => {
-                state.size_bytes -= item.content.size_bytes();
-                Popped::Item(item)
-            }
+        let entry = state.entries.pop_front();
+        state.size_bytes -= entry.as_ref().map_or(0, Entry::size_bytes);
+        match entry {
+            Some(Entry::Begin { header, log_time_ns }) => Popped::Begin { header, log_time_ns },
+            Some(Entry::Item(item)) => Popped::Item(item),
+            Some(Entry::End(closing)) => Popped::End(closing),
             None if state.is_closed => Popped::Closed,
             None => Popped::Timeout,
         }
-    }
-
-    /// Returns the number of dropped messages by topic. The other counts are 0.
-    pub(crate) fn lost(&self) -> AllCounts {
-        self.lock().lost
     }
 
     /// Locks the state. A panic of the other thread cannot leave it inconsistent.
@@ -129,6 +168,11 @@ impl Queue {
 }
 
 impl State {
+    fn push(&mut self, entry: Entry) {
+        self.size_bytes += entry.size_bytes();
+        self.entries.push_back(entry);
+    }
+
     /// Returns `true` if the file can be read with this content.
     fn can_be_read_with(&self, content: &Content) -> bool {
         match (content, &self.backlog) {
@@ -140,16 +184,36 @@ impl State {
     fn add_to_backlog(&mut self, content: &Content) {
         let Some(backlog) = &mut self.backlog else { return };
         match content {
+            Content::Update(Message::Step(row)) | Content::Snapshot(row, _) => {
+                backlog.remove_to(row.step);
+            }
             Content::Update(message) => {
-                // A load always fits: the limit includes it.
+                // The start of a file always fits: the limit includes it.
                 let _fits = backlog.add(message);
             }
-            Content::Snapshot(row, _) => backlog.remove_to(row.step),
+        }
+    }
+}
+
+impl Entry {
+    fn size_bytes(&self) -> usize {
+        match self {
+            Self::Begin { header, .. } => size_of::<RunHeader>() + header.scene.len(),
+            Self::Item(item) => item.content.size_bytes(),
+            Self::End(_) => size_of::<Closing>(),
         }
     }
 }
 
 impl Content {
+    /// Returns the step of a snapshot, with its particles or without.
+    fn snapshot_step(&self) -> Option<u64> {
+        match self {
+            Self::Snapshot(row, _) | Self::Update(Message::Step(row)) => Some(row.step),
+            Self::Update(_) => None,
+        }
+    }
+
     fn size_bytes(&self) -> usize {
         match self {
             Self::Update(message) => message.size_bytes(),
@@ -179,7 +243,7 @@ mod tests {
     fn pop_steps(queue: &Queue) -> Vec<u64> {
         let next = || match queue.pop(Duration::ZERO) {
             Popped::Item(item) => Some(item.log_time_ns),
-            Popped::Timeout | Popped::Closed => None,
+            _ => None,
         };
         std::iter::from_fn(next).collect()
     }
@@ -191,7 +255,7 @@ mod tests {
             queue.push(keyframe(100 + step, 100));
             queue.push(snapshot(step));
         }
-        let lost = queue.lost();
+        let lost = queue.lock().lost;
         assert_eq!(lost[Topic::Particles].lost, 7);
         assert_eq!(lost[Topic::Steps].lost, 7);
         assert_eq!(lost[Topic::Keyframe].lost, 0);
@@ -206,7 +270,7 @@ mod tests {
         let queue = Queue::new(1000);
         queue.push(snapshot(1));
         queue.push(snapshot(2));
-        assert_eq!(queue.lost()[Topic::Particles].lost, 1);
+        assert_eq!(queue.lock().lost[Topic::Particles].lost, 1);
         assert_eq!(pop_steps(&queue), [1]);
         queue.push(snapshot(3));
         assert_eq!(pop_steps(&queue), [3]);
@@ -218,7 +282,7 @@ mod tests {
         for step in 0..10 {
             queue.push(keyframe(step, 500));
         }
-        assert!(queue.lost()[Topic::Keyframe].lost > 0);
+        assert!(queue.lock().lost[Topic::Keyframe].lost > 0);
         assert!(pop_steps(&queue).len() < 4);
     }
 
@@ -230,6 +294,6 @@ mod tests {
         queue.push(snapshot(2));
         assert!(matches!(queue.pop(Duration::ZERO), Popped::Item(_)));
         assert_eq!(queue.pop(Duration::ZERO), Popped::Closed);
-        assert_eq!(queue.lost()[Topic::Particles].lost, 1);
+        assert_eq!(queue.lock().lost[Topic::Particles].lost, 1);
     }
 }

@@ -2,22 +2,65 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use recorder::{Closing, Topic};
 use serde::Serialize;
 
 use crate::cli::output;
 
+/// The files that a recording has written.
+#[derive(Debug, Default)]
+pub(crate) struct Written {
+    /// The newest file.
+    last_path: PathBuf,
+    file_count: u64,
+    /// Number of the oldest files that were removed again.
+    pub(crate) removed_count: u64,
+    /// The sums of the counts of all files.
+    total: Closing,
+    /// First and last recorded step.
+    steps: Option<(u64, u64)>,
+}
+
+impl Written {
+    /// Adds a finished file, with its first and last recorded step.
+    pub(crate) fn add(&mut self, path: PathBuf, closing: &Closing, steps: Option<(u64, u64)>) {
+        self.last_path = path;
+        self.file_count += 1;
+        self.total.counts.add(&closing.counts);
+        self.total.unreadable += closing.unreadable;
+        if let Some((first, last)) = steps {
+            self.steps = Some((self.steps.map_or(first, |(first, _)| first), last));
+        }
+    }
+
+    /// Describes a finished file in a line.
+    pub(crate) fn file_line(path: &Path, closing: &Closing, steps: Option<(u64, u64)>) -> String {
+        let count = closing.counts[Topic::Particles].written;
+        let steps = steps.map_or_else(|| "no step".to_owned(), |(a, b)| format!("steps {a}..={b}"));
+        let missing: Vec<_> =
+            closing.missing().iter().map(|one| format!("{} {}", one.0, one.1)).collect();
+        let lost = if missing.is_empty() { "none".to_owned() } else { missing.join(", ") };
+        let (path, reason) = (output::path_text(path), &closing.stop_reason);
+        format!("written {path}: {steps}, {count} recorded, lost {lost} ({reason})")
+    }
+}
+
+/// The report, for one file or the sum of several.
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
+    /// The newest file.
     output: String,
-    first_step: u64,
-    last_step: u64,
-    /// Number of snapshots in the file.
+    /// Number of files, with the removed ones.
+    files: u64,
+    /// Number of the oldest files that were removed again.
+    removed_files: u64,
+    first_step: Option<u64>,
+    last_step: Option<u64>,
+    /// Number of recorded snapshots.
     snapshots: u64,
-    /// Number of outcomes in the file.
+    /// Number of recorded outcomes.
     outcomes: u64,
     /// Number of missing messages, for topics that have any, and "unreadable" ones.
     lost: BTreeMap<&'static str, u64>,
@@ -25,24 +68,23 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    pub(crate) fn new(
-        path: impl AsRef<Path>,
-        closing: Closing,
-        steps: RangeInclusive<u64>,
-    ) -> Self {
-        let counts = &closing.counts;
-        Self {
-            output: output::path_text(path.as_ref()),
-            first_step: *steps.start(),
-            last_step: *steps.end(),
+    /// Returns `None` if no file was written.
+    pub(crate) fn new(written: &Written, stop_reason: String) -> Option<Self> {
+        let counts = &written.total.counts;
+        (written.file_count > 0).then(|| Self {
+            output: output::path_text(&written.last_path),
+            files: written.file_count,
+            removed_files: written.removed_count,
+            first_step: written.steps.map(|(first, _)| first),
+            last_step: written.steps.map(|(_, last)| last),
             snapshots: counts[Topic::Particles].written,
             outcomes: counts[Topic::Outcomes].written,
-            lost: closing.missing(),
-            stop_reason: closing.stop_reason,
-        }
+            lost: written.total.missing(),
+            stop_reason,
+        })
     }
 
-    /// Returns `true` if every published message is in the file.
+    /// Returns `true` if every published message was recorded.
     pub(crate) fn is_complete(&self) -> bool {
         self.lost.is_empty()
     }
@@ -50,9 +92,18 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { first_step, last_step, snapshots, .. } = self;
         writeln!(f, "written     {}", self.output)?;
-        writeln!(f, "steps       {first_step}..={last_step}, {snapshots} recorded")?;
+        if self.files > 1 {
+            let (files, removed) = (self.files, self.removed_files);
+            writeln!(f, "files       {files}, {removed} of them removed")?;
+        }
+        let snapshots = self.snapshots;
+        match (self.first_step, self.last_step) {
+            (Some(first), Some(last)) => {
+                writeln!(f, "steps       {first}..={last}, {snapshots} recorded")?;
+            }
+            _ => writeln!(f, "steps       none")?,
+        }
         writeln!(f, "outcomes    {}", self.outcomes)?;
         if self.lost.is_empty() {
             writeln!(f, "lost        none")?;

@@ -1,13 +1,18 @@
 //! A disk that stalls: what is recorded and what is declared as lost add up to what was received.
 
+use std::io::Write;
 use std::sync::{Condvar, Mutex};
+use std::thread;
 
 use recorder::{
     AllCounts, Closing, Compression, FrameReader, GapCounter, LogEnd, LogOptions, LogReader,
-    OutcomeRow, RunDescription, StepRow, Topic,
+    LogWriter, Message, OutcomeRow, RunDescription, StepRow, Topic,
 };
 use sim_contract::{Action, Command, Outcome, ParticleState};
 
+use super::load::RunHeader;
+use super::queue::{Content, Item, Popped};
+use super::writing::write_item;
 use super::*;
 
 const SEEDS: u64 = 20;
@@ -87,8 +92,23 @@ fn keyframe(index: u32) -> Content {
 
 fn begun_queue(limit_bytes: usize) -> Queue {
     let queue = Queue::new(limit_bytes);
-    queue.begin(Backlog::new(&description(), SCENE.len()));
+    queue.begin(RunHeader { run: description(), scene: SCENE.to_vec(), rows: Vec::new() }, 0);
     queue
+}
+
+/// Writes one file of the queue. Returns it unfinished, and its end.
+fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> (LogWriter<W>, Closing) {
+    loop {
+        match queue.pop(WAIT_MAX) {
+            Popped::Item(item) => write_item(&mut log, item).unwrap(),
+            Popped::End(mut closing) => {
+                closing.counts.set_written(log.counts());
+                return (log, *closing);
+            }
+            Popped::Begin { .. } | Popped::Timeout => {}
+            Popped::Closed => panic!("closed without an end"),
+        }
+    }
 }
 
 /// Receives snapshots and keyframes while the disk stalls at times. Returns the finished file, and the
@@ -97,10 +117,11 @@ fn record(seed: u64) -> (Vec<u8>, Closing) {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let (disk, queue) = (Arc::new(Disk::default()), begun_queue(QUEUE_BYTES));
     let file = StallingFile { disk: Arc::clone(&disk), bytes: Vec::new() };
-    let options = LogOptions { compression: Compression::None, chunk_size_bytes: 1 };
+    let options =
+        LogOptions { compression: Compression::None, chunk_size_bytes: 1, ..LogOptions::default() };
     let log = LogWriter::create(file, options, &description(), SCENE, 0).unwrap();
     let mut closing = Closing::default();
-    let log = thread::scope(|scope| {
+    let (log, closing) = thread::scope(|scope| {
         let writing = scope.spawn(|| write(&queue, log));
         let mut index = 0;
         for _ in 0..MESSAGES {
@@ -117,11 +138,9 @@ fn record(seed: u64) -> (Vec<u8>, Closing) {
             }
         }
         disk.set_stalled(false);
-        queue.close();
-        writing.join().unwrap().unwrap()
+        queue.end(closing);
+        writing.join().unwrap()
     });
-    closing.counts.set_written(log.counts());
-    closing.counts.set_lost(&queue.lost());
     (log.finish(&closing).unwrap().bytes, closing)
 }
 
@@ -176,15 +195,14 @@ fn messages_of_a_stall_without_a_snapshot_can_be_read_and_outcomes_are_kept() {
         push(Content::Update(Message::Outcome(OutcomeRow::from(&outcome))));
     }
     push(snapshot(7000));
-    queue.close();
+    queue.end(Closing::default());
     let options = LogOptions::default();
     let log = LogWriter::create(Vec::new(), options, &description(), SCENE, 0).unwrap();
-    let log = write(&queue, log).unwrap();
-    let (written, lost) = (*log.counts(), queue.lost());
+    let (log, Closing { counts, .. }) = write(&queue, log);
     let bytes = log.finish(&Closing::default()).unwrap();
-    let sum = |topic| written[topic].written + lost[topic].lost;
-    assert!(lost[Topic::Keyframe].lost > 0);
-    assert_eq!((sum(Topic::Keyframe), written[Topic::Outcomes].written), (KEYFRAMES, KEYFRAMES));
-    assert_eq!(lost[Topic::Steps].lost, 0);
-    assert_eq!(count_in_frames(&bytes), written_count(&written));
+    let sum = |topic| counts[topic].written + counts[topic].lost;
+    assert!(counts[Topic::Keyframe].lost > 0);
+    assert_eq!((sum(Topic::Keyframe), counts[Topic::Outcomes].written), (KEYFRAMES, KEYFRAMES));
+    assert_eq!(counts[Topic::Steps].lost, 0);
+    assert_eq!(count_in_frames(&bytes), written_count(&counts));
 }

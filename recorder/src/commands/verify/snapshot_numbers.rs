@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use recorder::{Closing, StepRow, Topic};
+use recorder::{Closing, ContentSelection, StepRow, Topic};
 
 /// Checks `snapshot_index` from row to row, and counts the numbers that are left out.
 #[derive(Debug)]
@@ -15,11 +15,13 @@ pub(super) struct SnapshotNumbers {
     /// Number of the snapshots that are left out before the newest one.
     missing_before: u64,
     missing_count: u64,
+    selection: ContentSelection,
 }
 
 impl SnapshotNumbers {
-    pub(super) fn new(is_simulated: bool, has_numbers: bool) -> Self {
-        Self { is_simulated, has_numbers, last: None, missing_before: 0, missing_count: 0 }
+    pub(super) fn new(is_simulated: bool, has_numbers: bool, selection: ContentSelection) -> Self {
+        let (last, missing_before, missing_count) = (None, 0, 0);
+        Self { is_simulated, has_numbers, last, missing_before, missing_count, selection }
     }
 
     /// Checks the next row. Returns a description of a wrong number.
@@ -51,7 +53,7 @@ impl SnapshotNumbers {
             ));
         }
         self.missing_before = added - 1;
-        self.missing_count += added - 1;
+        self.missing_count += self.selection.missing_between(last_index, index);
         None
     }
 

@@ -48,6 +48,7 @@ impl<R: Read> Verification<R> {
     pub(super) fn new(log: LogReader<R>, scene: Scene, threads: usize) -> Self {
         let is_simulated = log.run().epoch_ns == 0;
         let is_older_format = !log.is_current_format();
+        let selection = log.selection();
         let coverage = Coverage { is_older_format, ..Coverage::default() };
         Self {
             run_id: RunId::new(log.scene()),
@@ -59,7 +60,7 @@ impl<R: Read> Verification<R> {
             revision: None,
             load_topics: Vec::new(),
             is_simulated,
-            numbers: SnapshotNumbers::new(is_simulated, !is_older_format),
+            numbers: SnapshotNumbers::new(is_simulated, !is_older_format, selection),
             events: EventCheck::default(),
             has_all_commands: false,
         }

@@ -90,6 +90,9 @@ pub enum ReadError {
         /// The missing or invalid entry.
         key: String,
     },
+    /// The declaration of what the recording leaves out is none that a recorder writes.
+    #[error("its metadata 'selection' is not one that a recorder writes")]
+    BadSelection,
     /// A message with a correct checksum and invalid content.
     #[error(
         "step {sequence}: the message on {topic} that ends before byte {byte} is invalid: {what}"
@@ -123,6 +126,16 @@ pub enum ReadError {
         byte: u64,
         /// The limit for the scene of the file.
         size_bytes_max: usize,
+    },
+    /// The recording leaves out topics on purpose.
+    #[error(
+        "leaves out {topics} on purpose (--topics or --exclude of its recorder), which {purpose} needs"
+    )]
+    LeftOut {
+        /// Names of the topics.
+        topics: String,
+        /// The program that needs them.
+        purpose: &'static str,
     },
     /// A header of a snapshot that another one follows.
     #[error("the row of step {step} in /steps is not followed by its snapshot in /particles")]

@@ -14,6 +14,7 @@ use super::limits::SizeLimits;
 use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
 use super::records::RecordReader;
+use super::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
     SCENE_ATTACHMENT,
@@ -33,6 +34,7 @@ pub struct LogReader<R> {
     channels: BTreeMap<u16, Option<Topic>>,
     run: RunDescription,
     scene: Vec<u8>,
+    selection: ContentSelection,
     closing: Option<Closing>,
     header: HeaderText,
     audit: Option<Box<Audit>>,
@@ -81,6 +83,7 @@ impl<R: Read> LogReader<R> {
         let mut records = RecordReader::new(source);
         let mut header = HeaderText::default();
         let mut scene = None;
+        let mut selection = ContentSelection::default();
         loop {
             match records.next(read_header_record)? {
                 Some(HeaderRecord::File { profile, library }) => {
@@ -104,10 +107,15 @@ impl<R: Read> LogReader<R> {
                         channels,
                         run,
                         scene,
+                        selection,
                         closing: None,
                         header,
                         audit: None,
                     });
+                }
+                Some(HeaderRecord::Selection(map)) => {
+                    let bad = || ReadError::BadSelection;
+                    selection = ContentSelection::from_map(&map).ok_or_else(bad)?;
                 }
                 Some(HeaderRecord::Skipped) => {}
                 Some(HeaderRecord::Message) => {
@@ -139,6 +147,11 @@ impl<R: Read> LogReader<R> {
     /// Returns the run that was recorded.
     pub fn run(&self) -> &RunDescription {
         &self.run
+    }
+
+    /// Returns the part of the run that the recording holds.
+    pub fn selection(&self) -> ContentSelection {
+        self.selection
     }
 
     /// Returns the text of the complete effective scene. It is empty if the file has none.
@@ -291,6 +304,7 @@ enum HeaderRecord {
     File { profile: String, library: String },
     Scene(AttachmentHeader, Vec<u8>),
     Run(BTreeMap<String, String>),
+    Selection(BTreeMap<String, String>),
     Message,
     Skipped,
 }
@@ -304,6 +318,9 @@ fn read_header_record(record: Record<'_>, _byte: u64) -> Result<HeaderRecord, Re
         }
         Record::Metadata(metadata) if metadata.name == RUN_METADATA => {
             HeaderRecord::Run(metadata.metadata)
+        }
+        Record::Metadata(metadata) if metadata.name == SELECTION_METADATA => {
+            HeaderRecord::Selection(metadata.metadata)
         }
         Record::Message { .. } | Record::Unknown { opcode: op::CHUNK, .. } => HeaderRecord::Message,
         _ => HeaderRecord::Skipped,

@@ -6,13 +6,53 @@ use recorder::{
 };
 use sim_contract::{
     Change, ColliderState, CollidersHeader, KeyframeHeader, LostChanges, NodeStatus, Outcome,
-    ParticleState, SnapshotHeader,
+    ParticleState, SnapshotFlags, SnapshotHeader, State,
 };
 
 use crate::commands::record::accepted::{Accepted, RunEnd};
 use crate::commands::record::first_state::FirstState;
 use crate::commands::record::queue::Content;
 use crate::simulation::frozen::FrozenTracker;
+
+/// The end of a file that another one may follow.
+#[derive(Debug)]
+pub(super) struct PreviousFile {
+    pub(super) run_id: u64,
+    /// Number of the next snapshot, modulo 2^32.
+    next_snapshot: u32,
+    /// Index of the next outcome.
+    pub(super) next_outcome: u64,
+    /// Number of the next change of the members; `None` before the first status.
+    next_member_change: Option<u64>,
+    /// The last step to record.
+    end_step: u64,
+    /// Wall clock of step 0, in nanoseconds since 1970.
+    epoch_ns: u64,
+}
+
+impl PreviousFile {
+    /// Returns the wall clock of step 0, if this file belongs to the run of a snapshot.
+    pub(super) fn epoch_ns_of(&self, first: &SnapshotHeader) -> Option<u64> {
+        (self.run_id == first.run_id).then_some(self.epoch_ns)
+    }
+
+    /// Returns the number of snapshots between this file and one that begins with `first`. A node
+    /// numbers the snapshots of a run from 0; a replay starts anywhere.
+    fn missing_before(&self, first: &SnapshotHeader) -> u64 {
+        if self.run_id == first.run_id {
+            first.snapshot_index.wrapping_sub(self.next_snapshot).into()
+        } else if first.flags & SnapshotFlags::REPLAY == 0 {
+            first.snapshot_index.into()
+        } else {
+            0
+        }
+    }
+
+    /// Returns the index of the next outcome that a file with this first state holds.
+    fn next_outcome_of(&self, first: &SnapshotHeader) -> u64 {
+        if self.run_id == first.run_id { self.next_outcome } else { first.outcome_count }
+    }
+}
 
 /// The run that is being recorded.
 #[derive(Debug)]
@@ -49,28 +89,67 @@ impl Started {
     /// Starts before a state, which comes next.
     pub(super) fn new(
         first: &FirstState,
-        steps_max: Option<u64>,
+        previous: Option<&PreviousFile>,
         lost_before: LostChanges,
     ) -> Self {
         let FirstState { header, torn_before, .. } = first;
         Self {
             run_id: header.run_id,
-            end_step: steps_max.map_or(u64::MAX, |steps| header.step.saturating_add(steps)),
+            end_step: previous.map_or(u64::MAX, |previous| previous.end_step),
             topology_revision: header.topology_revision,
             first_step: header.step,
             last: *header,
             next_snapshot: header.snapshot_index,
-            // Earlier outcomes are part of the first state.
-            next_outcome: header.outcome_count,
+            // Earlier outcomes are part of the first state, or in the file before.
+            next_outcome: previous
+                .map_or(header.outcome_count, |previous| previous.next_outcome_of(header)),
             keyframe_step: 0,
             recorded_keyframe_step: None,
             torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
-            state_gaps: 0,
+            state_gaps: previous.map_or(0, |previous| previous.missing_before(header)),
             next_collider_list: None,
-            next_member_change: None,
+            next_member_change: previous
+                .filter(|previous| previous.run_id == header.run_id)
+                .and_then(|previous| previous.next_member_change),
             lost_before,
             frozen: FrozenTracker::default(),
             counts: AllCounts::default(),
+        }
+    }
+
+    /// Ends the recording a number of steps after the first one.
+    pub(super) fn set_steps_max(&mut self, steps_max: Option<u64>) {
+        let end_step = steps_max.map(|steps| self.first_step.saturating_add(steps));
+        self.end_step = end_step.unwrap_or(u64::MAX);
+    }
+
+    /// Ends the file.
+    pub(super) fn into_previous(self, epoch_ns: u64) -> PreviousFile {
+        PreviousFile {
+            run_id: self.run_id,
+            next_snapshot: self.next_snapshot,
+            next_outcome: self.next_outcome.max(self.last.outcome_count),
+            next_member_change: self.next_member_change,
+            end_step: self.end_step,
+            epoch_ns,
+        }
+    }
+
+    /// Accepts the changes between the last state and the first one of the next file. The changes in
+    /// the step of that one are part of it, except its events.
+    pub(super) fn accept_changes_before(&mut self, next: &State<'_>, accepted: &mut Accepted) {
+        if next.header.run_id != self.run_id {
+            return;
+        }
+        let changes = next.changes.iter().filter(|change| is_before(change, next.header.step));
+        let mut rows: Vec<_> = changes.filter_map(|change| self.row(change)).collect();
+        if next.header.topology_revision == self.topology_revision {
+            let events = self.frozen.new_events(next.header.step, next.particles);
+            rows.extend(events.into_iter().map(Message::Event));
+        }
+        for message in rows {
+            self.counts[message.topic()].received += 1;
+            accepted.push(message);
         }
     }
 
@@ -110,7 +189,8 @@ impl Started {
         }
     }
 
-    fn end_at(&self, header: &SnapshotHeader) -> Option<RunEnd> {
+    /// Returns the reason why the file ends before a state.
+    pub(super) fn end_at(&self, header: &SnapshotHeader) -> Option<RunEnd> {
         if header.run_id != self.run_id {
             Some(RunEnd::NewRun)
         } else if header.topology_revision != self.topology_revision {
@@ -212,7 +292,8 @@ impl Started {
     /// Leaves out the changes of the members that precede the recording.
     pub(super) fn skip_member_changes(&mut self, status: Option<&NodeStatus>) {
         let status = status.filter(|status| status.run_id == self.run_id);
-        self.next_member_change = status.map(|status| status.member_changes.count);
+        let count = status.map(|status| status.member_changes.count);
+        self.next_member_change = self.next_member_change.or(count);
     }
 
     /// Accepts the changes of the members that no status before has named.
@@ -237,5 +318,16 @@ impl Started {
         counts[Topic::Tears].gaps = u64::from(self.last.torn_count.saturating_sub(self.torn_count));
         counts[Topic::Parameters].gaps = lost.parameters - self.lost_before.parameters;
         counts
+    }
+}
+
+/// Returns `true` for a row of a step before `step`.
+fn is_before(change: &Change, step: u64) -> bool {
+    match change {
+        Change::Load | Change::Outcome(_) => false,
+        Change::Colliders(header, _) => header.step < step,
+        Change::Tears(header, _) => header.step < step,
+        Change::Parameters(header, _) => header.step < step,
+        Change::Keyframe(header, _) => header.step < step,
     }
 }

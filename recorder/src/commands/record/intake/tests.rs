@@ -15,6 +15,7 @@ use crate::commands::record::accepted::RunEnd;
 use crate::commands::record::queue::Content;
 
 mod gaps;
+mod next_file;
 
 const RUN_ID: u64 = 77;
 const NOW: Now = Now { realtime_ns: 5_000_000_000, monotonic_ns: 2_000_000_000 };

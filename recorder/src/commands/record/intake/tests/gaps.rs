@@ -3,7 +3,7 @@
 use sim_contract::{MemberChange, MemberChangeKind, NodeStatus};
 
 use super::*;
-use crate::commands::record::report::Report;
+use crate::commands::record::report::{Report, Written};
 
 #[test]
 fn missing_outcomes_are_counted() {
@@ -107,7 +107,9 @@ fn unreadable_messages_are_counted_from_the_start_on_and_make_the_report_incompl
     add_errors(&mut intake, 1);
     let closing = intake.closing("signal".to_owned());
     assert_eq!(closing.missing(), [("unreadable", 3)].into());
-    assert!(!Report::new("run.mcap", closing, 5..=6).is_complete());
+    let mut written = Written::default();
+    written.add("run.mcap".into(), &closing, Some((5, 6)));
+    assert!(!Report::new(&written, String::new()).unwrap().is_complete());
 }
 
 #[test]

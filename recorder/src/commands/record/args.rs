@@ -1,0 +1,157 @@
+//! The options of `recorder record`.
+
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::error::ErrorKind;
+
+use super::feed::selector::SelectionArgs;
+use super::split::SplitArgs;
+use super::writing::extras::ExtraArgs;
+use super::writing::names::FileNames;
+use crate::cli::endpoint_args::EndpointArgs;
+use crate::cli::file_args::FileArgs;
+use crate::cli::output::AsJson;
+use crate::cli::parse::{self, whole_number, whole_number_in};
+
+/// Default memory for snapshots that wait.
+const QUEUE_BYTES_DEFAULT: u64 = 256 << 20;
+
+/// Flush interval of a recording of one step.
+const FLUSH_INTERVAL_DEFAULT: Duration = Duration::from_secs(1);
+/// Flush intervals. Each flush closes a chunk, and waits for the disk.
+const FLUSH_INTERVALS: RangeInclusive<Duration> =
+    Duration::from_millis(100)..=Duration::from_hours(1);
+
+/// Options of a recording.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Ends cleanly on Ctrl-C, on SIGTERM or SIGHUP, and at a limit. Without --follow, it also ends with the \
+    node, when another scene is loaded, and when another run starts (as with play --loop).\n\n\
+    With --follow or a limit of a file, -o run.mcap names the files run_0000.mcap, run_0001.mcap and so \
+    on. Each begins with the scene, the latest message of every topic and a keyframe, so it plays and \
+    verifies alone. No step is in two files.\n\n\
+    Exit codes: 0 all recorded; 1 failed; 3 messages lost.\n\nExamples:\n  \
+    recorder record -o run.mcap\n  \
+    recorder record --name left --duration 10s --compression none\n  \
+    recorder record -o run.mcap --steps 2400 --json\n  \
+    recorder record -o run.mcap --follow --wait\n  \
+    recorder record -o run.mcap --split-size 1GB --max-files 10\n  \
+    recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada"
+)]
+pub(crate) struct RecordArgs {
+    #[command(flatten)]
+    pub(super) endpoint: EndpointArgs,
+    /// File to write. Its name ends in `.part` until it is finished
+    /// [default: NAME_<UTC time>.mcap]
+    #[arg(short, long, value_name = "OUT.mcap")]
+    pub(super) output: Option<PathBuf>,
+    /// Go on in the next file when another scene is loaded, when another run starts, and after a
+    /// restart of the node
+    #[arg(long, conflicts_with = "steps")]
+    pub(super) follow: bool,
+    /// Wait for a node that is not there yet
+    #[arg(long)]
+    pub(super) wait: bool,
+    #[command(flatten)]
+    pub(super) split: SplitArgs,
+    #[command(flatten)]
+    pub(super) selection: SelectionArgs,
+    /// End after this time, such as 10s or 500ms. It counts from the start of the program, so it
+    /// includes the wait for the first step that can be recorded [default: no limit]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true,
+        value_parser = parse::duration)]
+    pub(super) duration: Option<Duration>,
+    /// End N steps after the first recorded step [default: no limit]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
+    pub(super) steps: Option<u64>,
+    /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
+    /// not fit are lost and counted
+    #[arg(long, value_name = "BYTES", default_value_t = QUEUE_BYTES_DEFAULT,
+        allow_hyphen_values = true, value_parser = queue_bytes)]
+    pub(super) queue_bytes: u64,
+    /// Longest time that messages wait in memory, from 100ms to 1h: what a killed recorder loses
+    #[arg(long, value_name = "TIME", default_value = "1s", allow_hyphen_values = true,
+        value_parser = flush_interval)]
+    pub(super) flush_interval: Duration,
+    /// Do not wait at each flush until the recording is on the disk. A power cut may then lose much
+    /// more than the last interval
+    #[arg(long)]
+    pub(super) no_sync: bool,
+    #[command(flatten)]
+    pub(super) extras: ExtraArgs,
+    #[command(flatten)]
+    pub(super) file: FileArgs,
+    #[command(flatten)]
+    pub(super) as_json: AsJson,
+}
+
+/// Options of a recording of one step.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct SingleStateArgs {
+    #[command(flatten)]
+    endpoint: EndpointArgs,
+    /// File to write [default: NAME_<UTC time>.mcap]
+    #[arg(short, long, value_name = "OUT.mcap")]
+    output: Option<PathBuf>,
+    /// Longest wait for a state, such as 10s or 500ms
+    #[arg(long, value_name = "TIME", default_value = "5s", allow_hyphen_values = true,
+        value_parser = parse::duration)]
+    timeout: Duration,
+    #[command(flatten)]
+    file: FileArgs,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+impl From<SingleStateArgs> for RecordArgs {
+    fn from(args: SingleStateArgs) -> Self {
+        let SingleStateArgs { endpoint, output, timeout, file, as_json } = args;
+        Self {
+            endpoint,
+            output,
+            follow: false,
+            wait: false,
+            split: SplitArgs::default(),
+            selection: SelectionArgs::default(),
+            duration: Some(timeout),
+            steps: Some(0),
+            queue_bytes: QUEUE_BYTES_DEFAULT,
+            flush_interval: FLUSH_INTERVAL_DEFAULT,
+            no_sync: false,
+            extras: ExtraArgs::default(),
+            file,
+            as_json,
+        }
+    }
+}
+
+fn flush_interval(text: &str) -> Result<Duration, String> {
+    let interval = parse::duration(text)?;
+    let is_valid = FLUSH_INTERVALS.contains(&interval);
+    is_valid.then_some(interval).ok_or_else(|| "it must be a time from 100ms to 1h".to_owned())
+}
+
+fn queue_bytes(text: &str) -> Result<u64, String> {
+    whole_number_in(text, &(1 << 20..=1 << 40))
+}
+
+impl RecordArgs {
+    /// Returns the names of the files.
+    pub(super) fn names(&self, default: PathBuf) -> FileNames {
+        let path = self.output.clone().unwrap_or(default);
+        let is_numbered = self.follow || self.split.is_given();
+        if is_numbered { FileNames::Numbered(path) } else { FileNames::Single(path) }
+    }
+
+    /// Checks options that are useful only with others.
+    pub(super) fn check(&self) -> Result<(), clap::Error> {
+        if self.split.files_max().is_none() || self.follow || self.split.is_given() {
+            return Ok(());
+        }
+        let text = "--max-files needs a limit of a file, or --follow: add --split-size or \
+            --split-duration\n";
+        Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
+    }
+}

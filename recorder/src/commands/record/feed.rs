@@ -1,0 +1,146 @@
+//! The way from the states of a tap into the queue: one file after the other.
+
+pub(crate) mod selector;
+
+use std::sync::Arc;
+
+use recorder::ContentSelection;
+use sim_contract::clock::{monotonic_ns, realtime_ns};
+use sim_contract::{LostChanges, ReadError, State};
+
+use super::accepted::{Accepted, RunEnd};
+use super::first_state::FirstState;
+use super::intake::Intake;
+use super::load::{LoadError, Now};
+use super::messages::Messages;
+use super::queue::{Item, Queue};
+use super::split::{FileBegin, SplitArgs, WritePosition};
+use super::stop_reason::StopReason;
+use crate::cli::output;
+use selector::Selector;
+
+/// Feeds the queue with the files of a recording.
+#[derive(Debug)]
+pub(crate) struct Feed {
+    intake: Intake,
+    queue: Arc<Queue>,
+    position: Arc<WritePosition>,
+    split: SplitArgs,
+    /// Another load and another run begin the next file.
+    is_following: bool,
+    selector: Selector,
+    /// The newest file.
+    file: Option<FileBegin>,
+    /// Contents of the newest file that are not in the queue yet.
+    accepted: Accepted,
+}
+
+impl Feed {
+    pub(crate) fn new(
+        intake: Intake,
+        queue: Arc<Queue>,
+        position: Arc<WritePosition>,
+        split: SplitArgs,
+    ) -> Self {
+        let accepted = Accepted::default();
+        let selector = Selector::new(ContentSelection::default());
+        Self { intake, queue, position, split, is_following: false, selector, file: None, accepted }
+    }
+
+    /// Goes on in the next file with another load or run.
+    pub(crate) fn following(self, is_following: bool) -> Self {
+        Self { is_following, ..self }
+    }
+
+    /// Leaves out what is not selected.
+    pub(crate) fn selecting(self, selection: ContentSelection) -> Self {
+        Self { selector: Selector::new(selection), ..self }
+    }
+
+    /// Accepts a state, in the next file if this one ends before it. `messages` have arrived before it.
+    pub(crate) fn accept_state(
+        &mut self,
+        state: &State<'_>,
+        messages: &mut Messages,
+    ) -> Result<(), LoadError> {
+        if let Some(reason) = self.end_before(state) {
+            self.intake.accept_before(state, messages, &mut self.accepted);
+            self.end_file(reason.text().to_owned());
+        }
+        self.intake.accept_state(state, Now::read(), &mut self.accepted)
+    }
+
+    /// Returns the reason why another file begins with a state.
+    fn end_before(&self, state: &State<'_>) -> Option<StopReason> {
+        match self.intake.end_at(state.header) {
+            Some(RunEnd::EndStep) => None,
+            Some(end) => self.is_following.then_some(StopReason::Run(end)),
+            None => self.is_split_before(state).then_some(StopReason::Split),
+        }
+    }
+
+    fn is_split_before(&self, state: &State<'_>) -> bool {
+        let Some(file) = self.file.filter(|_| self.intake.has_started()) else { return false };
+        let waiting_bytes = self.queue.size_bytes();
+        self.split.is_due(file, &self.position, waiting_bytes, monotonic_ns())
+            && FirstState::is_complete(state)
+    }
+
+    /// Accepts messages that arrived between states, and passes everything to the queue. Returns the end
+    /// of the recording, if it is reached.
+    pub(crate) fn accept_messages(&mut self, messages: Messages) -> Option<RunEnd> {
+        self.intake.accept_messages(messages, Now::read(), &mut self.accepted);
+        self.enqueue();
+        self.accepted.end.take()
+    }
+
+    /// Returns `true` if the recording ends.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.accepted.end.is_some()
+    }
+
+    /// Returns `true` if a file has begun and not ended.
+    pub(crate) fn has_file(&self) -> bool {
+        self.intake.has_started()
+    }
+
+    /// Ends the file, if one has begun.
+    pub(crate) fn end_file(&mut self, stop_reason: String) {
+        self.enqueue();
+        if self.intake.has_started() {
+            let mut closing = self.intake.end_file(stop_reason);
+            closing.counts.set_left_out(&self.selector.take_counts());
+            self.queue.end(closing);
+        }
+    }
+
+    /// Passes what is accepted to the queue, in the order of publication.
+    fn enqueue(&mut self) {
+        let log_time_ns = realtime_ns();
+        self.accepted.sort();
+        if let Some(header) = self.accepted.header.take() {
+            let number = self.file.map_or(0, |file| file.number + 1);
+            self.file = Some(FileBegin { number, monotonic_ns: monotonic_ns() });
+            if let Some(step) = self.intake.first_step() {
+                output::note(&format!("recording from step {step}"));
+            }
+            self.queue.begin(header, log_time_ns);
+        }
+        for content in self.accepted.contents.drain(..) {
+            let Some(content) = self.selector.select(content) else { continue };
+            self.queue.push(Item { content, log_time_ns });
+        }
+    }
+
+    /// Counts messages that could not be read.
+    pub(crate) fn count_unreadable(&mut self, errors: &[ReadError]) {
+        if let Some(warning) = self.intake.count_unreadable(errors) {
+            output::note(&warning);
+        }
+    }
+
+    /// Sets the numbers of changes that the tap has dropped so far.
+    pub(crate) fn set_lost(&mut self, lost: LostChanges) {
+        self.intake.set_lost(lost);
+    }
+}

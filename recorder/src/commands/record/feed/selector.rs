@@ -1,0 +1,170 @@
+//! The topics and snapshots that a recording holds, and the count of those that it leaves out.
+
+use std::num::NonZeroU32;
+
+use recorder::{AllCounts, ContentSelection, Message, Topic};
+
+use crate::cli::parse::whole_number_in;
+use crate::commands::record::queue::Content;
+
+/// Options that leave out a part of a run.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct SelectionArgs {
+    /// Record only these topics, such as particles,keyframe,status. The constraints, the triangles, and
+    /// the headers of snapshots (/steps) are always recorded
+    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with = "exclude",
+        value_parser = topic)]
+    topics: Vec<Topic>,
+    /// Leave these topics out, such as status,events. Files declare it, and programs that need a
+    /// topic name it
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = optional_topic)]
+    exclude: Vec<Topic>,
+    /// Record every N-th snapshot, and those with a keyframe. Commands and tears between them are
+    /// recorded, so the file can still be verified
+    #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true,
+        value_parser = period)]
+    every: NonZeroU32,
+}
+
+impl Default for SelectionArgs {
+    fn default() -> Self {
+        Self { topics: Vec::new(), exclude: Vec::new(), every: NonZeroU32::MIN }
+    }
+}
+
+impl SelectionArgs {
+    pub(crate) fn selection(&self) -> ContentSelection {
+        let is_left_out = |topic: &Topic| {
+            self.exclude.contains(topic) || !self.topics.is_empty() && !self.topics.contains(topic)
+        };
+        let left_out: Vec<_> = ContentSelection::OPTIONAL.into_iter().filter(is_left_out).collect();
+        ContentSelection::new(self.every, &left_out)
+    }
+}
+
+fn topic(text: &str) -> Result<Topic, String> {
+    let name = format!("/{}", text.trim().trim_start_matches('/'));
+    Topic::from_name(&name).ok_or_else(|| {
+        let names: Vec<_> = Topic::ALL.map(|topic| &topic.name()[1..]).into();
+        format!("it must be topics of a recording: {}", names.join(", "))
+    })
+}
+
+fn optional_topic(text: &str) -> Result<Topic, String> {
+    let topic = topic(text)?;
+    if ContentSelection::OPTIONAL.contains(&topic) {
+        return Ok(topic);
+    }
+    let names: Vec<_> = ContentSelection::OPTIONAL.map(|topic| &topic.name()[1..]).into();
+    Err(format!("every reader needs it (allowed: {})", names.join(", ")))
+}
+
+fn period(text: &str) -> Result<NonZeroU32, String> {
+    let number = whole_number_in(text, &(1..=1_000_000))?;
+    u32::try_from(number).and_then(NonZeroU32::try_from).map_err(|error| error.to_string())
+}
+
+/// Leaves out what is not selected, and counts it.
+#[derive(Debug)]
+pub(super) struct Selector {
+    selection: ContentSelection,
+    /// Step of the newest keyframe.
+    keyframe_step: Option<u64>,
+    /// Only `left_out` is set.
+    counts: AllCounts,
+}
+
+impl Selector {
+    pub(super) fn new(selection: ContentSelection) -> Self {
+        Self { selection, keyframe_step: None, counts: AllCounts::default() }
+    }
+
+    /// Returns the part of a content that is recorded.
+    pub(super) fn select(&mut self, content: Content) -> Option<Content> {
+        match content {
+            Content::Update(message) => {
+                if let Message::Keyframe { step, .. } = &message {
+                    self.keyframe_step = Some(*step);
+                }
+                let is_selected = self.has(message.topic());
+                is_selected.then_some(Content::Update(message))
+            }
+            Content::Snapshot(row, particles) => {
+                let is_due = row.snapshot_index.is_none_or(|one| self.selection.has_snapshot(one));
+                if !is_due && self.keyframe_step != Some(row.step) {
+                    self.counts[Topic::Steps].left_out += 1;
+                    self.counts[Topic::Particles].left_out += 1;
+                    None
+                } else if self.has(Topic::Particles) {
+                    Some(Content::Snapshot(row, particles))
+                } else {
+                    Some(Content::Update(Message::Step(row)))
+                }
+            }
+        }
+    }
+
+    /// Returns `true` for a selected topic, and counts a message of any other.
+    fn has(&mut self, topic: Topic) -> bool {
+        let has_topic = self.selection.has_topic(topic);
+        self.counts[topic].left_out += u64::from(!has_topic);
+        has_topic
+    }
+
+    /// Returns the counts of a file, and begins with those of the next one.
+    pub(super) fn take_counts(&mut self) -> AllCounts {
+        std::mem::take(&mut self.counts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use recorder::StepRow;
+
+    use super::*;
+
+    fn snapshot(index: u32) -> Content {
+        let step = u64::from(index);
+        let row = StepRow { step, snapshot_index: Some(index), ..StepRow::default() };
+        Content::Snapshot(row, Vec::new())
+    }
+
+    fn keyframe(step: u64) -> Content {
+        Content::Update(Message::Keyframe { step, bytes: Vec::new() })
+    }
+
+    #[test]
+    fn snapshots_of_the_period_and_those_with_a_keyframe_are_selected() {
+        let every = NonZeroU32::new(4).unwrap();
+        let mut selector = Selector::new(ContentSelection::new(every, &[Topic::Keyframe]));
+        assert_eq!(selector.select(keyframe(3)), None);
+        let selected: Vec<_> =
+            (0..10).filter(|one| selector.select(snapshot(*one)).is_some()).collect();
+        assert_eq!(selected, [0, 3, 4, 8]);
+        let counts = selector.take_counts();
+        assert_eq!((counts[Topic::Particles].left_out, counts[Topic::Steps].left_out), (6, 6));
+        assert_eq!(counts[Topic::Keyframe].left_out, 1);
+        assert_eq!(selector.take_counts(), AllCounts::default());
+    }
+
+    #[test]
+    fn without_particles_the_header_of_a_snapshot_stays() {
+        let mut selector =
+            Selector::new(ContentSelection::new(NonZeroU32::MIN, &[Topic::Particles]));
+        let selected = selector.select(snapshot(5)).unwrap();
+        assert!(matches!(selected, Content::Update(Message::Step(StepRow { step: 5, .. }))));
+    }
+
+    #[test]
+    fn topics_that_readers_need_cannot_be_left_out() {
+        assert_eq!((topic("/status"), topic("steps")), (Ok(Topic::Status), Ok(Topic::Steps)));
+        assert!(topic("stats").unwrap_err().contains("particles"));
+        assert!(optional_topic("steps").unwrap_err().starts_with("every reader needs it"));
+        let args =
+            SelectionArgs { topics: vec![Topic::Status, Topic::Tf], ..SelectionArgs::default() };
+        let selection = args.selection();
+        let selected = Topic::ALL.into_iter().filter(|topic| selection.has_topic(*topic));
+        let expected = [Topic::Tf, Topic::Topology, Topic::Surface, Topic::Status, Topic::Steps];
+        assert_eq!(selected.collect::<Vec<_>>(), expected);
+    }
+}

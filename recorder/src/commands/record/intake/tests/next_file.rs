@@ -1,0 +1,99 @@
+//! Files that follow each other: every message between two of them is in one, or declared.
+
+use sim_contract::SnapshotFlags;
+
+use super::*;
+
+/// Ends the file before a state of [`Node::new`]. `messages` have arrived before it. Returns the last
+/// contents of the file, and the messages that it leaves to the next one.
+fn end_before(
+    intake: &mut Intake,
+    header: &SnapshotHeader,
+    changes: &[Change],
+    updates: &[Update<'_>],
+) -> (Vec<String>, Messages) {
+    let node = Node::new();
+    let state = State {
+        header,
+        particles: &node.particles,
+        load: &node.load,
+        torn: &node.torn,
+        colliders: &node.colliders,
+        parameters: &node.parameters,
+        changes,
+    };
+    let (mut messages, mut accepted) = (Messages::default(), Accepted::default());
+    for update in updates {
+        messages.add(update);
+    }
+    intake.accept_before(&state, &mut messages, &mut accepted);
+    accepted.sort();
+    (names(&accepted), messages)
+}
+
+#[test]
+fn messages_of_earlier_steps_end_a_file_and_those_of_its_step_begin_the_next_one() {
+    let mut intake = started();
+    let next = header(8, 5);
+    let earlier = Change::Parameters(parameters_header(6), ParameterValues::default());
+    let status = |step| NodeStatus { run_id: RUN_ID, step, ..NodeStatus::default() };
+    let (outcomes, statuses) = ([outcome(2, 5), outcome(3, 7), outcome(4, 8)], [5, 8].map(status));
+    let updates: Vec<_> =
+        outcomes.iter().map(Update::Outcome).chain(statuses.iter().map(Update::Status)).collect();
+    let changes = [earlier, keyframe(8)];
+    let (last, messages) = end_before(&mut intake, &next, &changes, &updates);
+    assert_eq!(last, ["/outcomes 5", "/status 5", "/parameters 6", "/outcomes 7"]);
+    assert_eq!(intake.end_file(String::new()).missing(), [].into());
+    let mut accepted = Accepted::default();
+    Node::new().publish(&mut intake, next, &changes, &mut accepted).unwrap();
+    intake.accept_messages(messages, NOW, &mut accepted);
+    accepted.sort();
+    let expected = ["/parameters 0", "/keyframe 8", "/outcomes 8", "/status 8", "snapshot 8"];
+    assert_eq!(names(&accepted), expected);
+    // Snapshots 5 to 7 are in neither file.
+    let missing = [("/particles", 3), ("/steps", 3)];
+    assert_eq!(intake.closing(String::new()).missing(), missing.into());
+}
+
+#[test]
+fn files_of_one_run_have_one_epoch() {
+    let mut intake = started();
+    end_before(&mut intake, &header(5, 2), &[keyframe(5)], &[]);
+    intake.end_file(String::new());
+    // Published later than its step says, as after a pause.
+    let late = SnapshotHeader { publish_monotonic_ns: 1_700_000_000, ..header(5, 2) };
+    let accepted = publish(&mut intake, late, &[keyframe(5)]);
+    assert_eq!(accepted.header.unwrap().run.epoch_ns, 3_600_000_000);
+    assert_eq!(missing_count(&intake), 0);
+}
+
+#[test]
+fn the_missing_start_of_a_later_run_is_declared_unless_it_is_a_replay() {
+    for (flags, missing) in [(0, 6), (SnapshotFlags::REPLAY, 0)] {
+        let mut intake = started();
+        intake.end_file(String::new());
+        let first = SnapshotHeader { run_id: RUN_ID + 1, flags, ..header(3, 0) };
+        let own = KeyframeHeader { run_id: RUN_ID + 1, ..keyframe_header(3) };
+        let changes = [Change::Load, Change::Keyframe(own, vec![1])];
+        let mut node = Node::new();
+        for run_id in [&mut node.torn.header.run_id, &mut node.colliders.header.run_id] {
+            *run_id = RUN_ID + 1;
+        }
+        node.parameters.header.run_id = RUN_ID + 1;
+        let mut accepted = Accepted::default();
+        node.publish(&mut intake, first, &changes, &mut accepted).unwrap();
+        assert_eq!(accepted.header.unwrap().run.run_id, RUN_ID + 1);
+        assert_eq!(missing_count(&intake), missing, "snapshots 0 to 2 on two topics");
+    }
+}
+
+#[test]
+fn the_last_requested_step_holds_across_files() {
+    let mut intake = Intake::new(Some(3));
+    publish(&mut intake, header(4, 0), &[Change::Load, keyframe(4)]);
+    intake.end_file(String::new());
+    let accepted = publish(&mut intake, header(5, 0), &[keyframe(5)]);
+    assert_eq!(accepted.end, None);
+    publish(&mut intake, header(6, 0), &[]);
+    assert_eq!(publish(&mut intake, header(7, 0), &[]).end, Some(RunEnd::EndStep));
+}

@@ -1,0 +1,141 @@
+//! The limits at which a file ends and the next one begins.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use crate::cli::parse::{self, size_bytes};
+
+/// Smallest limit on the size of a file, so that a wrong unit does not fill a folder with tiny files.
+const SPLIT_SIZE_MIN_BYTES: u64 = 64 << 10;
+/// Shortest limit on the time of a file. Files begin with keyframes, which are a second apart.
+const SPLIT_DURATION_MIN: Duration = Duration::from_secs(1);
+/// Fewest files of a ring: one is being written, and one is complete.
+const FILES_MIN: u64 = 2;
+
+/// Options that divide a recording into files.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub(crate) struct SplitArgs {
+    /// Go on in the next file at the first keyframe after this size, such as 100MB or 2GiB, at least
+    /// 64KiB. A running node publishes a keyframe each second
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true, value_parser = split_size)]
+    split_size: Option<u64>,
+    /// Go on in the next file at the first keyframe after this time, such as 10min, at least 1s
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = split_duration)]
+    split_duration: Option<Duration>,
+    /// Keep the newest N files, at least 2, and remove older ones of this recording
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = file_count)]
+    max_files: Option<u64>,
+}
+
+impl SplitArgs {
+    /// Returns `true` if a limit divides the recording into files.
+    pub(crate) fn is_given(&self) -> bool {
+        self.split_size.is_some() || self.split_duration.is_some()
+    }
+
+    /// Returns the most files to keep.
+    pub(crate) fn files_max(&self) -> Option<u64> {
+        self.max_files
+    }
+}
+
+fn split_size(text: &str) -> Result<u64, String> {
+    let size = size_bytes(text)?;
+    if size < SPLIT_SIZE_MIN_BYTES { Err("it must be at least 64KiB".to_owned()) } else { Ok(size) }
+}
+
+fn split_duration(text: &str) -> Result<Duration, String> {
+    let duration = parse::duration(text)?;
+    if duration < SPLIT_DURATION_MIN {
+        Err("it must be at least 1s".to_owned())
+    } else {
+        Ok(duration)
+    }
+}
+
+fn file_count(text: &str) -> Result<u64, String> {
+    parse::whole_number_in(text, &(FILES_MIN..=u64::MAX))
+}
+
+/// The file that the writing thread writes, for the reading thread.
+#[derive(Debug, Default)]
+pub(crate) struct WritePosition(Mutex<Option<FilePosition>>);
+
+#[derive(Debug, Clone, Copy)]
+struct FilePosition {
+    number: u64,
+    size_bytes: u64,
+}
+
+impl WritePosition {
+    pub(crate) fn set(&self, number: u64, size_bytes: u64) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) =
+            Some(FilePosition { number, size_bytes });
+    }
+
+    /// Returns the size of a file; `None` if the writing thread has not begun it.
+    fn size_bytes_of(&self, number: u64) -> Option<u64> {
+        let position = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        position.filter(|position| position.number == number).map(|position| position.size_bytes)
+    }
+}
+
+/// The begin of the newest file in the queue.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FileBegin {
+    /// Counted from 0.
+    pub(crate) number: u64,
+    /// CLOCK_MONOTONIC, in nanoseconds.
+    pub(crate) monotonic_ns: u64,
+}
+
+impl SplitArgs {
+    /// Returns `true` if a file has reached a limit. `waiting_bytes` wait to be written. While a stalled
+    /// disk keeps the writing thread in an earlier file, no further one begins.
+    pub(crate) fn is_due(
+        &self,
+        file: FileBegin,
+        position: &WritePosition,
+        waiting_bytes: usize,
+        now_ns: u64,
+    ) -> bool {
+        let Some(size_bytes) = position.size_bytes_of(file.number) else { return false };
+        let size_bytes = size_bytes + waiting_bytes as u64;
+        let age = Duration::from_nanos(now_ns.saturating_sub(file.monotonic_ns));
+        self.split_size.is_some_and(|limit| size_bytes >= limit)
+            || self.split_duration.is_some_and(|limit| age >= limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: FileBegin = FileBegin { number: 3, monotonic_ns: 1_000_000_000 };
+
+    #[test]
+    fn a_file_ends_at_its_size_or_its_time_once_the_writing_thread_has_begun_it() {
+        let args = SplitArgs {
+            split_size: Some(1000),
+            split_duration: Some(Duration::from_secs(10)),
+            max_files: None,
+        };
+        let position = WritePosition::default();
+        let is_due = |waiting, now_ns| args.is_due(FILE, &position, waiting, now_ns);
+        assert!(!is_due(5000, 20_000_000_000), "not begun");
+        position.set(2, 5000);
+        assert!(!is_due(5000, 20_000_000_000), "in the file before");
+        position.set(3, 600);
+        assert!(!is_due(399, 10_999_999_999));
+        assert!(is_due(400, 1_000_000_000));
+        assert!(is_due(0, 11_000_000_000));
+    }
+
+    #[test]
+    fn limits_state_their_range() {
+        assert_eq!(split_size("1MiB"), Ok(1 << 20));
+        assert_eq!(split_size("1kB").unwrap_err(), "it must be at least 64KiB");
+        assert_eq!(split_duration("500ms").unwrap_err(), "it must be at least 1s");
+        assert_eq!(file_count("1").unwrap_err(), "it must be a whole number from 2");
+    }
+}

@@ -1,0 +1,210 @@
+//! The writing thread: writes the queue into one file after the other.
+
+pub(crate) mod extras;
+pub(crate) mod names;
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use anyhow::{Context, anyhow};
+use recorder::{Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, WriteError};
+use sim_contract::clock::monotonic_ns;
+
+use super::load::RunHeader;
+use super::queue::{Content, Item, Popped, Queue};
+use super::report::Written;
+use super::split::WritePosition;
+use crate::cli::file_args::{FileArgs, LogFile};
+use crate::cli::output;
+use extras::Extras;
+use names::FileNames;
+
+/// Longest wait for an item before the next check whether a flush is due.
+const WAIT_MAX: Duration = Duration::from_millis(50);
+
+/// The writing of files.
+#[derive(Debug)]
+pub(crate) struct WriteOptions {
+    pub(crate) file: FileArgs,
+    pub(crate) names: FileNames,
+    pub(crate) extras: Extras,
+    pub(crate) selection: ContentSelection,
+    /// Most files to keep.
+    pub(crate) files_max: Option<u64>,
+    /// Every flush waits until the data is on the disk.
+    pub(crate) is_synced: bool,
+    /// The most that a killed recorder or a power cut loses, besides the open chunk.
+    pub(crate) flush_interval: Duration,
+}
+
+impl WriteOptions {
+    /// Creates a file, with the suffix `.part`.
+    pub(crate) fn create(&self, number: u64) -> anyhow::Result<PartFile> {
+        let file = self.file.create(&self.names.path(number))?;
+        Ok(if self.is_synced { file.with_sync_on_flush() } else { file })
+    }
+}
+
+/// Closes the queue when the writing thread ends for any reason, so that the reading thread sees it.
+struct CloseOnDrop(Arc<Queue>);
+
+impl Drop for CloseOnDrop {
+    fn drop(&mut self) {
+        self.0.close();
+    }
+}
+
+/// Starts the writing thread, which ends with the queue. `first` is the first file.
+pub(crate) fn start(
+    queue: Arc<Queue>,
+    position: Arc<WritePosition>,
+    options: WriteOptions,
+    first: PartFile,
+) -> anyhow::Result<JoinHandle<anyhow::Result<Written>>> {
+    let queue = CloseOnDrop(queue);
+    let writing = thread::Builder::new().name("writer".to_owned()).spawn(move || {
+        let mut files = Files {
+            options,
+            position,
+            created: Some(first),
+            open: None,
+            next_number: 0,
+            written: Written::default(),
+        };
+        files.write_all(&queue.0)?;
+        files.close()
+    });
+    writing.context("cannot start the writing thread")
+}
+
+/// The files of a recording.
+#[derive(Debug)]
+struct Files {
+    options: WriteOptions,
+    position: Arc<WritePosition>,
+    /// The first file, until it begins.
+    created: Option<PartFile>,
+    open: Option<OpenFile>,
+    next_number: u64,
+    written: Written,
+}
+
+/// The file that is being written.
+#[derive(Debug)]
+struct OpenFile {
+    number: u64,
+    part_path: PathBuf,
+    log: LogFile,
+    /// First and last recorded step.
+    steps: Option<(u64, u64)>,
+}
+
+impl Files {
+    /// Writes every entry of the queue, and flushes at intervals.
+    fn write_all(&mut self, queue: &Queue) -> anyhow::Result<()> {
+        let interval_ns = self.options.flush_interval.as_nanos();
+        let interval_ns = u64::try_from(interval_ns).unwrap_or(u64::MAX);
+        let mut next_flush_ns = monotonic_ns().saturating_add(interval_ns);
+        loop {
+            match queue.pop(WAIT_MAX) {
+                Popped::Begin { header, log_time_ns } => self.begin(&header, log_time_ns)?,
+                Popped::Item(item) => self.write(item)?,
+                Popped::End(closing) => self.finish(*closing)?,
+                Popped::Timeout => {}
+                Popped::Closed => return Ok(()),
+            }
+            let now_ns = monotonic_ns();
+            if now_ns >= next_flush_ns {
+                next_flush_ns = now_ns.saturating_add(interval_ns);
+                self.flush()?;
+            }
+        }
+    }
+
+    /// Begins the next file. In a ring, removes the file in whose place it comes.
+    fn begin(&mut self, header: &RunHeader, log_time_ns: u64) -> anyhow::Result<()> {
+        let number = self.next_number;
+        self.next_number += 1;
+        if let Some(oldest) = self.options.files_max.and_then(|max| number.checked_sub(max)) {
+            let path = self.options.names.path(oldest);
+            fs::remove_file(&path)
+                .with_context(|| format!("cannot remove {}", output::path_text(&path)))?;
+            self.written.removed_count += 1;
+        }
+        let file = self.created.take().map_or_else(|| self.options.create(number), Ok)?;
+        let part_path = file.part_path().to_owned();
+        let log_options =
+            LogOptions { selection: self.options.selection, ..self.options.file.options() };
+        let log = LogWriter::create(file, log_options, &header.run, &header.scene, log_time_ns);
+        let mut log = log.with_context(|| incomplete(&part_path))?;
+        self.options.extras.write(&mut log).with_context(|| incomplete(&part_path))?;
+        self.position.set(number, log.size_bytes());
+        self.open = Some(OpenFile { number, part_path, log, steps: None });
+        Ok(())
+    }
+
+    fn write(&mut self, item: Item) -> anyhow::Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        if let Content::Snapshot(row, _) | Content::Update(Message::Step(row)) = &item.content {
+            open.steps = Some((open.steps.map_or(row.step, |(first, _)| first), row.step));
+        }
+        write_item(&mut open.log, item).with_context(|| incomplete(&open.part_path))?;
+        self.position.set(open.number, open.log.size_bytes());
+        Ok(())
+    }
+
+    fn flush(&mut self) -> anyhow::Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        open.log.flush().with_context(|| incomplete(&open.part_path))
+    }
+
+    /// Writes the end of the file, and gives it its name.
+    fn finish(&mut self, mut closing: Closing) -> anyhow::Result<()> {
+        let Some(OpenFile { part_path, log, steps, .. }) = self.open.take() else {
+            return Ok(());
+        };
+        closing.counts.set_written(log.counts());
+        let kept = || {
+            let part = output::path_text(&part_path);
+            format!("the recording is complete except for its end, in {part}")
+        };
+        let file = log.finish(&closing).with_context(kept)?;
+        let path = file.finish().map_err(|error| {
+            let is_complete = error.leaves_complete_file();
+            if is_complete { anyhow!(error) } else { anyhow!(error).context(kept()) }
+        })?;
+        if matches!(self.options.names, FileNames::Numbered(_)) {
+            output::note(&Written::file_line(&path, &closing, steps));
+        }
+        self.written.add(path, &closing, steps);
+        Ok(())
+    }
+
+    /// Ends the thread. Removes a file that has not begun.
+    fn close(self) -> anyhow::Result<Written> {
+        if let Some(file) = self.created {
+            file.discard()?;
+        }
+        Ok(self.written)
+    }
+}
+
+fn incomplete(part_path: &Path) -> String {
+    format!("the recording is incomplete; its readable part is {}", output::path_text(part_path))
+}
+
+/// Writes the messages of an item.
+pub(super) fn write_item<W: Write>(log: &mut LogWriter<W>, item: Item) -> Result<(), WriteError> {
+    let Item { content, log_time_ns } = item;
+    match content {
+        Content::Update(message) => log.write(&message, log_time_ns),
+        Content::Snapshot(row, particles) => {
+            log.write(&Message::Step(row), log_time_ns)?;
+            log.write(&Message::Particles { step: row.step, particles }, log_time_ns)
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! The names of the files of a recording.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use recorder::{Existing, PartFileError};
+
+/// The names of the files of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum FileNames {
+    /// The one file of a recording.
+    Single(PathBuf),
+    /// `NAME_0000.mcap`, `NAME_0001.mcap` and so on: numbered from 0 after an underscore, as rosbag2 does,
+    /// but with zeros before the number, so that the names sort.
+    Numbered(PathBuf),
+}
+
+impl FileNames {
+    /// Returns the path of a file, counted from 0.
+    pub(crate) fn path(&self, number: u64) -> PathBuf {
+        match self {
+            Self::Single(path) => path.clone(),
+            Self::Numbered(path) => {
+                let (stem, extension) = split_name(path);
+                let mut name = stem;
+                name.push(format!("_{number:04}{extension}"));
+                path.with_file_name(name)
+            }
+        }
+    }
+
+    /// Checks that the first file may be created, and that no numbered file of an earlier recording is
+    /// there: its files would be taken for those of this one. Returns the number of those that `existing`
+    /// allows.
+    pub(crate) fn check(&self, existing: Existing) -> Result<usize, PartFileError> {
+        existing.check(&self.path(0))?;
+        let earlier = self.earlier_files();
+        match earlier.first() {
+            Some(path) if existing == Existing::Refuse => {
+                Err(PartFileError::Exists(path.to_owned()))
+            }
+            _ => Ok(earlier.len()),
+        }
+    }
+
+    /// Returns the numbered files, finished or not, that are in the folder. A folder that cannot be
+    /// read is reported when a file is created.
+    fn earlier_files(&self) -> Vec<PathBuf> {
+        let Self::Numbered(path) = self else { return Vec::new() };
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let entries = fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten();
+        let names = entries.flatten().map(|entry| entry.file_name());
+        let mut names: Vec<_> = names.filter(|name| self.has_name(name)).collect();
+        names.sort();
+        names.into_iter().map(|name| path.with_file_name(name)).collect()
+    }
+
+    /// Returns `true` for the name of a file, finished or not, with any number.
+    fn has_name(&self, name: &OsString) -> bool {
+        let Self::Numbered(path) = self else { return false };
+        let (stem, extension) = split_name(path);
+        let (Some(name), Some(stem)) = (name.to_str(), stem.to_str()) else { return false };
+        let name = name.strip_suffix(".part").unwrap_or(name);
+        let number = name.strip_suffix(extension).and_then(|name| name.strip_prefix(stem));
+        let number = number.and_then(|number| number.strip_prefix('_'));
+        number.is_some_and(|number| {
+            number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit())
+        })
+    }
+}
+
+/// Splits a name before `.mcap`. Any other ending belongs to the name.
+fn split_name(path: &Path) -> (OsString, &'static str) {
+    let is_mcap = path.extension().is_some_and(|extension| extension == "mcap");
+    let (stem, extension) =
+        if is_mcap { (path.file_stem(), ".mcap") } else { (path.file_name(), "") };
+    (stem.map_or_else(OsString::new, OsString::from), extension)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_numbered_before_their_extension() {
+        let path = |name: &str, number| FileNames::Numbered(PathBuf::from(name)).path(number);
+        assert_eq!(path("logs/run.mcap", 0), Path::new("logs/run_0000.mcap"));
+        assert_eq!(path("logs/run.mcap", 12_345), Path::new("logs/run_12345.mcap"));
+        assert_eq!(path("run.v2", 7), Path::new("run.v2_0007"));
+        assert_eq!(FileNames::Single(PathBuf::from("run.mcap")).path(3), Path::new("run.mcap"));
+    }
+
+    #[test]
+    fn only_numbered_files_of_the_same_name_belong_to_a_recording() {
+        let names = FileNames::Numbered(PathBuf::from("logs/run.mcap"));
+        for name in ["run_0000.mcap", "run_12345.mcap", "run_0003.mcap.part"] {
+            assert!(names.has_name(&OsString::from(name)), "{name}");
+        }
+        for name in ["run.mcap", "run_1.mcap", "run_00a0.mcap", "run_0000.txt", "rerun_0000.mcap"] {
+            assert!(!names.has_name(&OsString::from(name)), "{name}");
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The part of a run that a recording leaves out on purpose, so that no reader takes it for a loss.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroU32;
+
+use super::read_error::ReadError;
+use crate::log::topic::Topic;
+
+/// Name of the metadata record of [`ContentSelection`].
+pub(in crate::log) const SELECTION_METADATA: &str = "selection";
+/// Key of the period of snapshots.
+const EVERY: &str = "every";
+/// Key of the topics that are left out.
+const LEFT_OUT: &str = "left_out";
+
+/// The topics and snapshots of a recording: metadata `selection`, before the metadata `run`. The default
+/// is everything, and a file with everything has no such record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ContentSelection {
+    every: NonZeroU32,
+    /// In the order of [`Topic::ALL`].
+    left_out: [bool; Topic::ALL.len()],
+}
+
+impl Default for ContentSelection {
+    fn default() -> Self {
+        Self { every: NonZeroU32::MIN, left_out: [false; Topic::ALL.len()] }
+    }
+}
+
+impl ContentSelection {
+    /// The topics that a recording may leave out. The others are needed to read it at all.
+    pub const OPTIONAL: [Topic; 8] = [
+        Topic::Colliders,
+        Topic::Tears,
+        Topic::Parameters,
+        Topic::Keyframe,
+        Topic::Outcomes,
+        Topic::Status,
+        Topic::Events,
+        Topic::Particles,
+    ];
+
+    /// The topics that a picture of any step needs.
+    pub const FOR_PICTURES: [Topic; 3] = [Topic::Colliders, Topic::Tears, Topic::Particles];
+    /// The topics that a proof, a replay and a restored state need.
+    pub const FOR_STATES: [Topic; 6] = [
+        Topic::Colliders,
+        Topic::Tears,
+        Topic::Parameters,
+        Topic::Keyframe,
+        Topic::Outcomes,
+        Topic::Particles,
+    ];
+
+    /// Leaves out topics of [`ContentSelection::OPTIONAL`], and all snapshots without a keyframe but every n-th.
+    ///
+    /// # Panics
+    /// If another topic is left out.
+    pub fn new(every: NonZeroU32, left_out: &[Topic]) -> Self {
+        let mut selection = Self { every, ..Self::default() };
+        for topic in left_out {
+            assert!(Self::OPTIONAL.contains(topic), "{} cannot be left out", topic.name());
+            selection.left_out[topic.index()] = true;
+        }
+        selection
+    }
+
+    /// Returns `true` if nothing is left out.
+    pub fn is_everything(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Returns `true` for a topic of the recording.
+    pub fn has_topic(&self, topic: Topic) -> bool {
+        !self.left_out[topic.index()]
+    }
+
+    /// Returns `true` for the number of a snapshot that is recorded, whether it has a keyframe or not.
+    pub fn has_snapshot(&self, index: u32) -> bool {
+        index.is_multiple_of(self.every.get())
+    }
+
+    /// Returns how many snapshots between two recorded ones should be in the file and are not. Numbers
+    /// count modulo 2^32.
+    pub fn missing_between(&self, last_index: u32, index: u32) -> u64 {
+        let every = u64::from(self.every.get());
+        let last = u64::from(last_index);
+        let next = last + u64::from(index.wrapping_sub(last_index));
+        // Multiples of `every` between the two, without them.
+        next.saturating_sub(1).max(last) / every - last / every
+    }
+
+    /// Checks that a recording has topics.
+    ///
+    /// # Errors
+    /// If it leaves some of them out; `purpose` needs them.
+    pub fn require(&self, topics: &[Topic], purpose: &'static str) -> Result<(), ReadError> {
+        let missing = topics.iter().filter(|topic| !self.has_topic(**topic));
+        let missing: Vec<_> = missing.map(|topic| topic.name()).collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        Err(ReadError::LeftOut { topics: missing.join(", "), purpose })
+    }
+
+    pub(in crate::log) fn to_map(self) -> BTreeMap<String, String> {
+        let left_out = Topic::ALL.into_iter().filter(|topic| !self.has_topic(*topic));
+        let left_out: Vec<_> = left_out.map(Topic::name).collect();
+        BTreeMap::from([
+            (EVERY.to_owned(), self.every.to_string()),
+            (LEFT_OUT.to_owned(), left_out.join(" ")),
+        ])
+    }
+
+    /// Parses the output of [`ContentSelection::to_map`]. `None` for anything else.
+    pub(in crate::log) fn from_map(map: &BTreeMap<String, String>) -> Option<Self> {
+        let every = map.get(EVERY)?.parse().ok()?;
+        let topics = map.get(LEFT_OUT)?.split(' ').filter(|name| !name.is_empty());
+        let topics = topics
+            .map(|name| Topic::from_name(name).filter(|topic| Self::OPTIONAL.contains(topic)));
+        Some(Self::new(every, &topics.collect::<Option<Vec<_>>>()?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn every(count: u32) -> ContentSelection {
+        ContentSelection::new(NonZeroU32::new(count).unwrap(), &[Topic::Status, Topic::Keyframe])
+    }
+
+    #[test]
+    fn a_selection_survives_a_round_trip_and_refuses_what_no_recorder_writes() {
+        for selection in [ContentSelection::default(), every(7)] {
+            assert_eq!(ContentSelection::from_map(&selection.to_map()), Some(selection));
+        }
+        for (key, value) in
+            [("every", "0"), ("every", "x"), ("left_out", "/steps"), ("left_out", "?")]
+        {
+            let mut map = every(2).to_map();
+            map.insert(key.to_owned(), value.to_owned());
+            assert_eq!(ContentSelection::from_map(&map), None, "{key}={value}");
+        }
+    }
+
+    #[test]
+    fn only_snapshots_of_the_period_are_missing() {
+        let missing = |count, last, index| every(count).missing_between(last, index);
+        assert_eq!((missing(1, 4, 5), missing(1, 4, 8), missing(1, u32::MAX, 2)), (0, 3, 2));
+        assert_eq!((missing(10, 0, 10), missing(10, 0, 30), missing(10, 7, 9)), (0, 2, 0));
+        assert_eq!((missing(10, 7, 11), missing(10, 7, 20)), (1, 1));
+    }
+
+    #[test]
+    fn a_missing_topic_is_named_with_its_use() {
+        let error = every(1)
+            .require(&[Topic::Keyframe, Topic::Particles], "`recorder verify`")
+            .unwrap_err();
+        let expected = "leaves out /keyframe on purpose (--topics or --exclude of its recorder), which \
+            `recorder verify` needs";
+        assert_eq!(error.to_string(), expected);
+    }
+}

@@ -1,0 +1,104 @@
+//! Recordings that leave a part of a run out on purpose: they declare it, no reader takes it for a loss,
+//! and a program that needs it says so.
+
+use std::path::Path;
+
+use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, Signal, ctl, wait_for};
+use serde_json::{Value, json};
+use sim_contract::{Action, Client};
+
+use super::{record, steps};
+
+fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
+    Process::run(Program::Recorder, sandbox, args)
+}
+
+/// Records 200 steps of a node with commands, and returns the report.
+fn record_steps(sandbox: &Sandbox, args: &[&str]) -> Value {
+    let node = Process::start_ready(Program::SimNode, sandbox, &["run", "curtain", "--paused"]);
+    let recording = record(sandbox, args);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    for round in 1..=10 {
+        client.request(Action::Cut { constraint: round }, DEADLINE).unwrap();
+        client.request(Action::Step { count: 20 }, DEADLINE).unwrap();
+        wait_for("the steps", || {
+            let snapshot = client.latest_snapshot(DEADLINE).unwrap()?;
+            (snapshot.header().step >= u64::from(20 * round)).then_some(())
+        });
+    }
+    drop(client);
+    node.interrupt().success();
+    serde_json::from_str(&recording.wait().success()).unwrap()
+}
+
+#[test]
+fn every_seventh_snapshot_verifies_and_nothing_counts_as_lost() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let report = record_steps(&sandbox, &["-o", &file, "--every", "7"]);
+    assert_eq!(report["lost"], json!({}), "{report}");
+    let recorded = steps(&file);
+    for step in (0..=200).step_by(7) {
+        assert!(recorded.contains(&step), "step {step} is not in {recorded:?}");
+    }
+    // The others have a keyframe: the first step, and the first one after each round of commands.
+    let others: Vec<_> = recorded.iter().filter(|step| *step % 7 != 0).collect();
+    assert!(recorded.len() < 60 && others.len() >= 8, "{recorded:?}");
+    let verified = recorder(&sandbox, &["verify", "--json", &file]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    assert_eq!(verified["lost"], json!({}), "{verified}");
+    let info = recorder(&sandbox, &["info", "--json", &file]).json();
+    assert_eq!(info["lost"], json!({}), "{info}");
+}
+
+#[test]
+fn a_file_without_its_end_does_not_take_what_is_left_out_for_lost() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope", "--paused"]);
+    let args = ["-o", &file, "--every", "5", "--exclude", "outcomes", "--flush-interval", "100ms"];
+    let recording = record(&sandbox, &args);
+    ctl(&sandbox, &["step", "20"]);
+    ctl(&sandbox, &["pin", "3"]);
+    ctl(&sandbox, &["step", "20"]);
+    let part = format!("{file}.part");
+    wait_for("step 40", || steps(&part).contains(&40).then_some(()));
+    recording.signal(Signal::KILL);
+    recording.wait();
+    let info = recorder(&sandbox, &["info", "--json", &part]);
+    let info: Value = serde_json::from_str(&info.stdout).unwrap();
+    assert_eq!((&info["lost"], &info["file_end"].is_string()), (&json!({}), &true), "{info}");
+    assert!(steps(&part).len() < 20);
+}
+
+#[test]
+fn programs_name_the_topics_that_a_recording_leaves_out() {
+    let sandbox = Sandbox::new();
+    let (file, pictures) = (sandbox.path("run.mcap"), sandbox.path("pictures"));
+    record_steps(&sandbox, &["-o", &file, "--topics", "status,/outcomes"]);
+    let info = recorder(&sandbox, &["info", "--json", &file]).json();
+    assert_eq!((&info["lost"], &info["messages"]["/particles"]), (&json!({}), &json!(0)), "{info}");
+    assert_eq!(info["messages"]["/steps"], 201, "{info}");
+    for args in [&["verify", &file][..], &["play", &file], &["export", &file, "--png", &pictures]] {
+        let refused = recorder(&sandbox, args);
+        assert_eq!(refused.code, Some(1), "{refused:?}");
+        for words in [&file, "leaves out ", "/particles", " on purpose", args[0]] {
+            assert!(refused.stderr.contains(words), "no \"{words}\" in: {}", refused.stderr);
+        }
+    }
+    assert!(!Path::new(&pictures).exists());
+    // Without the status of the node, everything else works.
+    let other = sandbox.path("other.mcap");
+    record_steps(&sandbox, &["-o", &other, "--exclude", "status"]);
+    let verified = recorder(&sandbox, &["verify", "--json", &other]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    for (option, value, words) in [
+        ("--exclude", "steps", "every reader needs it"),
+        ("--topics", "partikles", "it must be topics of a recording: tf, topology"),
+        ("--every", "0", "it must be a whole number from 1 to 1000000"),
+    ] {
+        let refused = recorder(&sandbox, &["record", option, value]);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert!(refused.stderr.contains(words), "no \"{words}\" in: {}", refused.stderr);
+    }
+}
