@@ -310,7 +310,9 @@ fn read_header_record(record: Record<'_>, _byte: u64) -> Result<HeaderRecord, Re
     })
 }
 
-fn read_run(map: &BTreeMap<String, String>) -> Result<RunDescription, ReadError> {
+pub(in crate::log) fn read_run(
+    map: &BTreeMap<String, String>,
+) -> Result<RunDescription, ReadError> {
     let is_supported = |text: &String| {
         text.parse().is_ok_and(|version| (FORMAT_VERSION_MIN..=FORMAT_VERSION).contains(&version))
     };

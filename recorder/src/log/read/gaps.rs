@@ -1,7 +1,7 @@
 //! Messages that are missing between the recorded ones, counted by their numbers.
 
-use super::message::Message;
-use super::topic::{AllCounts, Topic};
+use crate::log::message::Message;
+use crate::log::topic::{AllCounts, Topic};
 
 /// Counts the snapshots and outcomes that are missing in a recording, from the messages in it.
 ///
