@@ -23,6 +23,9 @@ use crate::log::topic::Topic;
 /// Bytes between two calls of the progress callback.
 const PROGRESS_PERIOD_BYTES: u64 = 16 << 20;
 
+/// Most parts of other programs that a report names.
+const NOT_CHECKED_MAX: usize = 16;
+
 /// The result of the check of a file.
 #[derive(Debug)]
 pub struct CheckReport {
@@ -121,8 +124,9 @@ impl Check {
     fn add(&mut self, part: Part<'_>, chunks: &mut ChunkContent) -> Result<SectionEnd, ReadError> {
         match part {
             Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
+            Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run()),
             Part::Skipped { byte, opcode } => {
-                self.extent.not_checked.push(format!("the {} at byte {byte}", record_name(opcode)));
+                self.not_checked(format!("the {} at byte {byte}", record_name(opcode)));
                 if opcode == op::ATTACHMENT {
                     self.places.statistics.attachment_count += 1;
                 }
@@ -139,6 +143,16 @@ impl Check {
                 self.findings.add(byte, "end of the file", "the file is truncated here");
                 Ok(SectionEnd::None)
             }
+        }
+    }
+
+    /// Adds content that cannot be checked.
+    fn not_checked(&mut self, what: String) {
+        let all = &mut self.extent.not_checked;
+        match all.len() {
+            0..NOT_CHECKED_MAX => all.push(what),
+            NOT_CHECKED_MAX => all.push("more content of other programs".to_owned()),
+            _ => {}
         }
     }
 
@@ -213,7 +227,7 @@ impl Check {
             Record::Attachment { header, data, crc } => {
                 if *crc == 0 {
                     let what = format!("the attachment '{}', which has no checksum", header.name);
-                    self.extent.not_checked.push(what);
+                    self.not_checked(what);
                 }
                 if header.name == SCENE_ATTACHMENT && self.content.is_none() {
                     self.scene_size_bytes = data.len();

@@ -150,6 +150,7 @@ impl<W: Write> Repair<W> {
     ) -> Result<Option<u32>, RepairError> {
         match part {
             Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
+            Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run().into()),
             Part::Skipped { byte, opcode } => {
                 self.lose(byte, record_name(opcode), "it is too long, or of another program")?;
                 Ok(None)

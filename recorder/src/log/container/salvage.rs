@@ -1,6 +1,6 @@
 //! The output of a repair: sound messages with a new index, and the declaration of the others.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 
 use mcap::records::{Channel, MessageHeader, Metadata, SchemaHeader};
@@ -16,6 +16,8 @@ use crate::log::writer::WriteError;
 
 /// Uncompressed size at which a chunk is closed, as in a recording.
 const CHUNK_SIZE_BYTES: u64 = 1 << 20;
+/// Most bytes of all schemas and channels. Those of a recorder have 20 kilobytes.
+const DECLARED_SIZE_BYTES_MAX: usize = 16 << 20;
 /// Reason in the closing metadata of a file that had none.
 const UNKNOWN_STOP: &str = "unknown: the recording had no end, and was repaired";
 
@@ -25,6 +27,13 @@ struct HeldRow {
     header: MessageHeader,
     data: Vec<u8>,
     step: u64,
+}
+
+/// The id of a schema or channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Declared {
+    Schema(u16),
+    Channel(u16),
 }
 
 /// The options of the output, from the input.
@@ -44,6 +53,10 @@ pub(super) struct Salvage<W: Write> {
     row: Option<HeldRow>,
     /// The channel of `/tf`, which the file has lost.
     missing_transform: Option<u16>,
+    /// The ids of the schemas and channels so far.
+    declared: BTreeSet<Declared>,
+    /// Memory of the schemas and channels, which stay in memory for the index.
+    declared_size_bytes: usize,
     pub(super) losses: Losses,
 }
 
@@ -64,7 +77,14 @@ impl<W: Write> Salvage<W> {
             .compression(compression)
             .compression_threads(0)
             .create(NoSeek::new(out))?;
-        Ok(Self { file: Some(file), row: None, missing_transform: None, losses: Losses::default() })
+        Ok(Self {
+            file: Some(file),
+            row: None,
+            missing_transform: None,
+            declared: BTreeSet::new(),
+            declared_size_bytes: 0,
+            losses: Losses::default(),
+        })
     }
 
     /// Calls `write` with the file. The first error is final.
@@ -92,12 +112,33 @@ impl<W: Write> Salvage<W> {
         self.write(|file| file.write_metadata(metadata))
     }
 
+    /// Counts the memory of a schema or channel. Other programs repeat them in each chunk.
+    fn reserve(&mut self, id: Declared, size_bytes: usize) -> Result<(), String> {
+        if self.declared.contains(&id) {
+            return Ok(());
+        }
+        let sum = self.declared_size_bytes.saturating_add(size_bytes);
+        if sum > DECLARED_SIZE_BYTES_MAX {
+            return Err(format!(
+                "the schemas and channels have more than {DECLARED_SIZE_BYTES_MAX} bytes"
+            ));
+        }
+        self.declared_size_bytes = sum;
+        self.declared.insert(id);
+        Ok(())
+    }
+
     /// Copies a schema. The inner `Err` is a conflict with an earlier one.
     pub(super) fn add_schema(
         &mut self,
         header: &SchemaHeader,
         data: &[u8],
     ) -> Result<Result<(), String>, WriteError> {
+        let id = Declared::Schema(header.id);
+        if let Err(what) = self.reserve(id, header.name.len() + header.encoding.len() + data.len())
+        {
+            return Ok(Err(what));
+        }
         let mut conflict = Ok(());
         self.write(|file| {
             match file.add_schema_with_id(header.id, &header.name, &header.encoding, data) {
@@ -120,6 +161,13 @@ impl<W: Write> Salvage<W> {
         channel: &Channel,
     ) -> Result<Result<(), String>, WriteError> {
         let Channel { id, schema_id, topic, message_encoding, metadata } = channel;
+        let texts = metadata.iter().map(|(key, value)| key.len() + value.len());
+        let declared = Declared::Channel(*id);
+        if let Err(what) =
+            self.reserve(declared, topic.len() + message_encoding.len() + texts.sum::<usize>())
+        {
+            return Ok(Err(what));
+        }
         let mut conflict = Ok(());
         self.write(|file| {
             match file.add_channel_with_id(*id, *schema_id, topic, message_encoding, metadata) {

@@ -33,7 +33,8 @@ const PRIVATE_MIN: u8 = 0x80;
 pub(super) enum Part<'a> {
     /// A record whose form is intact.
     Record { byte: u64, opcode: u8, body: &'a [u8] },
-    /// A record that is too long to read: an attachment of another program, or a private record.
+    /// A record that is not read: a long attachment of another program, a private record, or a chunk before
+    /// the description of the run.
     Skipped { byte: u64, opcode: u8 },
     /// Bytes that are no records.
     Damaged { bytes: Range<u64>, cause: String },
@@ -251,7 +252,10 @@ impl<R: Read + Seek> Walk<R> {
             return wrong(cause, true);
         }
         let limit = size_bytes_max(opcode, limits);
-        if opcode >= PRIVATE_MIN || length > limit && opcode == op::ATTACHMENT {
+        // Without a scene, nothing bounds the memory for a chunk.
+        let is_early_chunk = opcode == op::CHUNK && limits.is_none();
+        let is_long_attachment = opcode == op::ATTACHMENT && length > limit;
+        if opcode >= PRIVATE_MIN || is_early_chunk || is_long_attachment {
             return Ok(Form::Skipped { opcode, size_bytes });
         }
         if length > limit {
@@ -262,7 +266,6 @@ impl<R: Read + Seek> Walk<R> {
         let body = record.get(RECORD_HEADER_SIZE_BYTES..).unwrap_or(&[]);
         let is_right = match (opcode, &limits) {
             (op::CHUNK, Some(limits)) => is_chunk(body, limits),
-            (op::CHUNK, None) => Ok(()),
             _ if is_exact(opcode, body) => Ok(()),
             _ => Err("its length is not that of its fields".to_owned()),
         };
@@ -304,8 +307,6 @@ fn size_bytes_max(opcode: u8, limits: Option<SizeLimits>) -> u64 {
     match (opcode, limits) {
         (op::CHUNK, Some(limits)) => limits.chunk_record_size_bytes_max(),
         (op::MESSAGE, Some(limits)) => limits.record_size_bytes_max(),
-        // Without a scene, a chunk is not read.
-        (op::CHUNK, None) => u64::MAX,
         (op::ATTACHMENT, _) => HEADER_RECORD_SIZE_BYTES_MAX,
         (op::MESSAGE_INDEX | op::STATISTICS, _) => INDEX_SIZE_BYTES_MAX,
         _ => TEXT_SIZE_BYTES_MAX,

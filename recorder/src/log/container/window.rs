@@ -62,8 +62,10 @@ impl<R: Read + Seek> Window<R> {
         self.start = at;
         self.source.seek(SeekFrom::Start(at + self.bytes.len() as u64))?;
         let end = (self.size_bytes - at.min(self.size_bytes)).min(usize::MAX as u64);
-        let wanted =
-            size_bytes.max(READ_SIZE_BYTES).min(usize::try_from(end).unwrap_or(usize::MAX));
+        // Beyond what is needed now, so that many positions close together need few reads.
+        let wanted = size_bytes
+            .saturating_add(READ_SIZE_BYTES)
+            .min(usize::try_from(end).unwrap_or(usize::MAX));
         while self.bytes.len() < wanted {
             check_stop(self.stop.as_ref())?;
             let count = (wanted - self.bytes.len()).min(READ_SIZE_BYTES) as u64;
