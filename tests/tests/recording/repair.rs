@@ -117,3 +117,24 @@ fn a_check_of_several_files_reports_each_and_ends_with_the_worst() {
         all.stderr
     );
 }
+
+#[test]
+fn a_repaired_simulation_without_its_last_commands_is_verified_up_to_its_end() {
+    let sandbox = Sandbox::new();
+    let commands = r#"{"step":990,"kind":"cut","constraint":7}"#;
+    let (commands, whole) = (sandbox.write("cut.jsonl", commands), sandbox.path("whole.mcap"));
+    let args = ["simulate", "curtain", "--steps", "1000", "--commands", &commands, "-o", &whole];
+    recorder(&sandbox, &args).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    // The metadata at the end follow the last chunk and its message indexes.
+    let end = bytes.windows(11).rposition(|text| text == b"stop_reason").unwrap();
+    bytes[end - 25_000] ^= 1;
+    let (damaged, repaired) = (sandbox.path("damaged.mcap"), sandbox.path("repaired.mcap"));
+    fs::write(&damaged, &bytes).unwrap();
+    let report = recorder(&sandbox, &["repair", &damaged, &repaired, "--json"]);
+    let report: Value = serde_json::from_str(&report.stdout).unwrap();
+    assert_eq!(report["lost"]["/outcomes"], 1, "{report}");
+    let verified = recorder(&sandbox, &["verify", &repaired]).success();
+    assert!(verified.contains("steps bit-identical (0..="), "{verified}");
+    assert!(verified.contains("missing: /outcomes 1"), "{verified}");
+}
