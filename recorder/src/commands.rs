@@ -1,9 +1,11 @@
 //! The subcommands, one file each.
 
+pub(crate) mod check;
 pub(crate) mod export;
 pub(crate) mod info;
 pub(crate) mod play;
 pub(crate) mod record;
+pub(crate) mod repair;
 pub(crate) mod restore;
 pub(crate) mod scene;
 pub(crate) mod simulate;

@@ -3,8 +3,8 @@
 
 mod backlog;
 mod command_file;
+mod container;
 mod encoding;
-mod gaps;
 mod index;
 mod message;
 mod read;
@@ -18,22 +18,26 @@ mod writer;
 
 pub use backlog::Backlog;
 pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_commands};
+pub use container::check::{CheckExtent, CheckReport, check_file};
+pub use container::finding::{Cure, Finding, Findings};
+pub use container::losses::{Losses, LostSteps};
+pub use container::repair::{RepairError, RepairReport, repair_file};
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
-pub use gaps::GapCounter;
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
 pub use read::audit::{Audit, AuditDifference};
 pub use read::decode::LoggedMessage;
 pub use read::file_source::FileSource;
 pub use read::frames::{Frame, FrameReader};
+pub use read::gaps::GapCounter;
 pub use read::open::open_regular_file;
 pub use read::read_error::{LogEnd, ReadError};
 pub use read::reader::LogReader;
-pub use read::selection::ContentSelection;
 pub use rows::{
     ColliderRow, CollidersRow, EventRow, OutcomeRow, ParametersRow, ShapeRow, Softness, StatusRow,
     StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
+pub use run::selection::ContentSelection;
 pub use run::{Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
 pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};

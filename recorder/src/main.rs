@@ -15,7 +15,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use cli::exit::{self, Exit};
 use commands::{
-    export as export_command, info, play, record, restore, scene, simulate, state, verify,
+    check, export as export_command, info, play, record, repair, restore, scene, simulate, state,
+    verify,
 };
 
 /// Record a simulation, play it back, and prove that it can be re-simulated bit for bit
@@ -29,6 +30,8 @@ use commands::{
         recorder play run.mcap\n  \
         recorder simulate curtain --steps 2400 -o curtain.mcap\n  \
         recorder info curtain.mcap\n  \
+        recorder check curtain.mcap\n  \
+        recorder repair run.mcap.part repaired.mcap\n  \
         recorder export curtain.mcap --png pictures\n  \
         recorder scene curtain.mcap > curtain.toml\n  \
         recorder state -o state.mcap\n  \
@@ -42,6 +45,8 @@ struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Test every byte of recordings: structure, checksums, index, steps and hashes
+    Check(check::CheckArgs),
     /// Draw pictures of a recording
     Export(export_command::ExportArgs),
     /// Show what a recording contains
@@ -50,6 +55,8 @@ enum Command {
     Play(play::PlayArgs),
     /// Record everything that a running simulation publishes
     Record(record::RecordArgs),
+    /// Copy what is intact in a damaged or unfinished recording, and declare the rest as missing
+    Repair(repair::RepairArgs),
     /// Put a recorded state in place in a running node
     Restore(restore::RestoreArgs),
     /// Print the scene of a recording
@@ -70,10 +77,12 @@ fn main() -> Exit {
 fn run(command: &Command) -> anyhow::Result<Exit> {
     sim_contract::report_file_size_limit()?;
     match command {
+        Command::Check(args) => check::run(args),
         Command::Export(args) => export_command::run(args),
         Command::Info(args) => info::run(args),
         Command::Play(args) => play::run(args),
         Command::Record(args) => record::run(args),
+        Command::Repair(args) => repair::run(args),
         Command::Restore(args) => restore::run(args),
         Command::Scene(args) => scene::run(args),
         Command::Simulate(args) => simulate::run(args),

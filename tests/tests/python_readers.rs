@@ -57,6 +57,27 @@ fn the_stock_python_reader_finds_the_published_bits() {
 
 #[test]
 #[ignore = "needs Python"]
+fn the_stock_python_reader_opens_a_repaired_recording() {
+    let sandbox = Sandbox::new();
+    let (whole, damaged) = (sandbox.path("whole.mcap"), sandbox.path("damaged.mcap"));
+    let args = ["simulate", "curtain", "--steps", "2400", "-o", &whole];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let mut bytes = std::fs::read(&whole).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 5000].fill(0);
+    bytes.truncate(bytes.len() - 100);
+    std::fs::write(&damaged, bytes).unwrap();
+    let repaired = sandbox.path("repaired.mcap");
+    let args = ["repair", &damaged, &repaired, "--json"];
+    let report = Process::run(Program::Recorder, &sandbox, &args);
+    let report: Value = serde_json::from_str(&report.stdout).unwrap();
+    let read = python(&sandbox, "count_messages.py", &[&repaired]);
+    assert_eq!(read["counts"]["/particles"], report["snapshot_count"]);
+    assert_eq!(read["repair"]["lost_steps"], report["lost_steps"][0]);
+}
+
+#[test]
+#[ignore = "needs Python"]
 fn the_iceoryx2_python_package_reads_particles_tears_and_parameters() {
     let sandbox = Sandbox::new();
     let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"]);

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use anyhow::Context;
+use recorder::LogEnd;
 use serde::Serialize;
-use sim_contract::{console, printable, printable_line};
+use sim_contract::{console, is_being_written, printable, printable_line};
 
 /// The option that selects the format of a result.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -32,6 +33,18 @@ pub(crate) fn bytes(bytes: &[u8]) -> anyhow::Result<()> {
 /// Prints a line on stderr, or drops it.
 pub(crate) fn note(text: &str) {
     console::note(text);
+}
+
+/// Warns about a file without its end, on stderr. `done` is the work that was done with it.
+pub(crate) fn warn_incomplete(path: &Path, end: &LogEnd, done: &str) {
+    let text = path.display();
+    if is_being_written(path) {
+        note(&format!("warning: {text} is being written by another program; {done}"));
+    } else {
+        note(&format!(
+            "warning: {text} is {end}; {done}. `recorder repair {text} OUT.mcap` copies what is intact"
+        ));
+    }
 }
 
 /// Returns a path as text for users.

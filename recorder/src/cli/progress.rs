@@ -18,3 +18,14 @@ pub(crate) fn progress_bar(steps: u64) -> ProgressBar {
 pub(crate) fn progress_spinner() -> ProgressBar {
     if io::stderr().is_terminal() { ProgressBar::new_spinner() } else { ProgressBar::hidden() }
 }
+
+/// Returns a progress bar for a known number of bytes.
+pub(crate) fn progress_bytes(bytes: u64) -> ProgressBar {
+    if !io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let template = "{bar:40} {bytes}/{total_bytes}, {bytes_per_sec}, {eta} left";
+    let style =
+        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(bytes).with_style(style)
+}

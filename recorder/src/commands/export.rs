@@ -149,7 +149,7 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let files: Vec<_> = written.iter().map(|picture| picture.file.as_str()).collect();
     output::result(args.as_json, &written, &files.join("\n"))?;
     if survey.end != LogEnd::Complete {
-        output::note(&format!("warning: {path} is {}; drawn as far as it goes", survey.end));
+        output::warn_incomplete(&args.file, &survey.end, "drawn as far as it goes");
     }
     let is_complete = survey.end == LogEnd::Complete && written.len() == steps.len();
     Ok(if is_complete { Exit::Done } else { Exit::Loss })

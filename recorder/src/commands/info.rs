@@ -68,7 +68,7 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<Exit> {
     let (info, end) = inspect(&mut log, path.clone(), size_bytes).with_context(|| path.clone())?;
     output::result(args.as_json, &info, &info.to_string())?;
     if end != LogEnd::Complete {
-        output::note(&format!("warning: {path} is {end}"));
+        output::warn_incomplete(&args.file, &end, "read as far as it goes");
     }
     Ok(if end == LogEnd::Complete && info.lost.is_empty() { Exit::Done } else { Exit::Loss })
 }

@@ -109,7 +109,7 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<Exit> {
         if let Some(end) = &end
             && *end != LogEnd::Complete
         {
-            output::note(&format!("warning: {path} is {end}; played as far as it goes"));
+            output::warn_incomplete(&args.file, end, "played as far as it goes");
         }
         if !args.loops || stop.is_requested() {
             let is_whole = end.is_none_or(|end| end == LogEnd::Complete);

@@ -98,7 +98,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     bar.finish_and_clear();
     output::result(args.as_json, &report, &report.text())?;
     if let Some(end) = &end {
-        output::note(&format!("warning: {path} is {end}; verified as far as it goes"));
+        output::warn_incomplete(&args.file, end, "verified as far as it goes");
     }
     Ok(match report.verdict {
         Verdict::Interrupted => Exit::Failed,

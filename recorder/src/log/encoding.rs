@@ -15,8 +15,8 @@ use super::rows::{
 use super::topic::Topic;
 use descriptor::{FRAME_TRANSFORM, POINT_CLOUD, file_descriptor_set};
 use protobuf::PointCloudEncoder;
-pub(super) use protobuf::decode_particles;
 pub use protobuf::{WORLD_FRAME, encode_transform};
+pub(super) use protobuf::{decode_particles, particle_bytes};
 
 /// Encoding of `/keyframe`: bytes that only the solver reads.
 const KEYFRAME_ENCODING: &str = "application/octet-stream";

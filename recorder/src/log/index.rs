@@ -25,8 +25,8 @@ use super::read::open::open_regular_file;
 use super::read::read_error::{LogEnd, ReadError};
 use super::read::reader::LogReader;
 use super::read::records::RecordReader;
-use super::read::selection::ContentSelection;
 use super::run::RunDescription;
+use super::run::selection::ContentSelection;
 use super::topic::Topic;
 use chunk::{LocatedChunk, record_size_bytes};
 

@@ -1,5 +1,7 @@
 //! The metadata of a recording: the recorded run, and the end of the recording.
 
+pub(in crate::log) mod selection;
+
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::str::FromStr;
@@ -22,6 +24,8 @@ pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 pub(super) const RUN_METADATA: &str = "run";
 /// Name of the metadata record of [`Closing`].
 pub(super) const CLOSING_METADATA: &str = "recorder";
+/// Name of the metadata record with the losses of a repair.
+pub(super) const REPAIR_METADATA: &str = "repair";
 /// Name of the attachment with the scene.
 pub const SCENE_ATTACHMENT: &str = "scene.toml";
 /// Media type of the attachment with the scene.

@@ -8,11 +8,19 @@ use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 /// `torn` holds all torn constraints of this state, in any order. The seed is 0 while it is empty.
 /// Otherwise the seed is the XXH3-64 of the indices, ascending, as little-endian u32.
 pub fn state_hash(particles: &[ParticleState], torn: &[u32]) -> u64 {
-    let mut ascending = torn.to_vec();
-    ascending.sort_unstable();
-    let bytes: Vec<u8> = ascending.iter().flat_map(|index| index.to_le_bytes()).collect();
-    let seed = if bytes.is_empty() { 0 } else { xxh3_64(&bytes) };
-    xxh3_64_with_seed(bytemuck::cast_slice(particles), seed)
+    hash_bytes(bytemuck::cast_slice(particles), hash_seed(torn.to_vec()))
+}
+
+/// Returns the seed of the hash for these torn constraints.
+pub(in crate::log) fn hash_seed(mut torn: Vec<u32>) -> u64 {
+    torn.sort_unstable();
+    let bytes: Vec<u8> = torn.iter().flat_map(|index| index.to_le_bytes()).collect();
+    if bytes.is_empty() { 0 } else { xxh3_64(&bytes) }
+}
+
+/// Returns the hash of the bytes of particles.
+pub(in crate::log) fn hash_bytes(particles: &[u8], seed: u64) -> u64 {
+    xxh3_64_with_seed(particles, seed)
 }
 
 #[cfg(test)]

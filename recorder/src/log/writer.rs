@@ -13,7 +13,7 @@ use sim_contract::explain_write_error;
 
 use super::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use super::message::Message;
-use super::read::selection::{ContentSelection, SELECTION_METADATA};
+use super::run::selection::{ContentSelection, SELECTION_METADATA};
 use super::run::{
     CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
     header_library,

@@ -36,6 +36,10 @@ const REPORTS_NOTHING: Ends = Ends {
     errors: &["is empty: a recorder", "is not an MCAP file", "has no snapshot with a keyframe"],
     needs_no_signal: true,
 };
+/// End of `recorder check` for a sound file.
+const CHECKS: Ends = Ends { codes: &[0], errors: &[], needs_no_signal: true };
+/// Ends of `recorder repair`: the last record may be cut.
+const REPAIRS: Ends = Ends { codes: &[0, 3], errors: &[], needs_no_signal: true };
 
 impl World {
     /// Starts a recorder, after it has ended the one in the slot.
@@ -123,7 +127,22 @@ impl World {
         recording.check_info(&info);
         let verified = self.run(Program::Recorder, &["verify", "--json", &recording.path], ends);
         recording.check_verified(&info, &verified);
+        if !recording.rows.is_empty() {
+            self.check_repaired(&recording);
+        }
         self.kept.add(recording);
+    }
+
+    /// Checks that a file passes `recorder check`: a finished one as it is, another one after its repair.
+    fn check_repaired(&mut self, recording: &Recording) {
+        if recording.is_finished() {
+            self.run(Program::Recorder, &["check", &recording.path], CHECKS);
+            return;
+        }
+        let repaired = format!("{}.repaired", recording.path);
+        self.run(Program::Recorder, &["repair", &recording.path, &repaired], REPAIRS);
+        self.run(Program::Recorder, &["check", &repaired], CHECKS);
+        std::fs::remove_file(repaired).expect("a file of this run");
     }
 }
 

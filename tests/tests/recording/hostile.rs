@@ -150,6 +150,22 @@ fn a_claim_beyond_the_limits_is_an_error_of_every_program() {
 }
 
 #[test]
+fn a_check_and_a_repair_need_little_memory_for_any_claim() {
+    let sandbox = Sandbox::new();
+    let output = sandbox.path("repaired.mcap");
+    for Hostile { name, bytes, .. } in hostile_files(&sandbox) {
+        let file = sandbox.path(name);
+        std::fs::write(&file, &bytes).unwrap();
+        let checked = read(&sandbox, Program::Recorder, &["check", &file]);
+        assert!(matches!(checked.code, Some(1 | 3)), "{name}: {checked:?}");
+        let args = ["repair", &file, &output, "--overwrite"];
+        let repaired = read(&sandbox, Program::Recorder, &args);
+        assert!(matches!(repaired.code, Some(0 | 1 | 3)), "{name}: {repaired:?}");
+        assert_eq!(repaired.code == Some(1), repaired.stderr.contains("error: "), "{name}");
+    }
+}
+
+#[test]
 fn messages_that_belong_to_no_snapshot_are_refused_before_they_fill_the_memory() {
     let sandbox = Sandbox::new();
     let (_, head) = small(&sandbox);
@@ -225,4 +241,8 @@ fn a_verification_keeps_no_schemas_of_other_programs() {
     assert_eq!(finished.code, Some(1), "{finished:?}");
     // The reader has reached the end.
     assert!(finished.stderr.contains("a record with opcode 0"), "{finished:?}");
+    let repaired =
+        read(&sandbox, Program::Recorder, &["repair", &file, &sandbox.path("repaired.mcap")]);
+    assert_eq!(repaired.code, Some(3), "{repaired:?}");
+    assert!(repaired.stdout.contains("the schemas and channels have more than"), "{repaired:?}");
 }

@@ -50,9 +50,12 @@ fn a_scan_of_many_records_stops_at_a_signal() {
     // Private records without content. A file without an end is scanned.
     bytes.extend([0x80, 0, 0, 0, 0, 0, 0, 0, 0].repeat(20_000_000));
     std::fs::write(&file, &bytes).unwrap();
+    let repaired = sandbox.path("repaired.mcap");
     for (program, args, code) in [
         (Program::ViewerBridge, vec!["--replay", &file, "--listen", "127.0.0.1:0"], Some(0)),
         (Program::Recorder, vec!["verify", &file], Some(1)),
+        (Program::Recorder, vec!["check", &file], Some(1)),
+        (Program::Recorder, vec!["repair", &file, &repaired], Some(1)),
     ] {
         let mut process = Process::start(program, &sandbox, &args);
         process.wait_until_it_handles(Signal::INT);

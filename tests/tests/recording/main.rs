@@ -11,5 +11,6 @@ mod losses;
 mod outputs;
 mod physics;
 mod raw;
+mod repair;
 mod states;
 mod threads;

@@ -3,9 +3,7 @@
 mod started;
 
 use recorder::{AllCounts, Closing};
-use sim_contract::{
-    Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotHeader, State,
-};
+use sim_contract::{Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotHeader, State};
 
 use super::accepted::{Accepted, RunEnd};
 use super::first_state::FirstState;

@@ -240,9 +240,13 @@ impl<R: Read> Verification<R> {
         if let Some(what) = log.closing().and_then(|one| self.numbers.check_declared(one)) {
             return Finding::in_file(what);
         }
-        // A recording of a node has a random id. An interrupted simulation has fewer commands.
+        // A recording of a node has a random id. An interrupted simulation has fewer commands, and so has a
+        // repaired file that lacks some.
         let has_inputs = self.is_simulated && self.has_all_commands;
-        let is_whole = log.closing().is_some_and(|one| one.stop_reason == "steps reached");
+        let is_whole = log.closing().is_some_and(|one| {
+            one.stop_reason == "steps reached"
+                && !one.missing().contains_key(Topic::Outcomes.name())
+        });
         self.coverage.has_run_hash = has_inputs && is_whole;
         if self.coverage.has_run_hash && log.run().run_id != self.run_id.value() {
             return Finding::in_file(

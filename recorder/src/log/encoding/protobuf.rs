@@ -156,6 +156,14 @@ impl PointCloudEncoder {
 
 /// Decodes the particles of a cloud that [`PointCloudEncoder`] encoded.
 pub(crate) fn decode_particles(message: &[u8]) -> Result<Vec<ParticleState>, String> {
+    let data = particle_bytes(message)?;
+    let mut particles = vec![ParticleState::default(); data.len() / 32];
+    bytemuck::cast_slice_mut(&mut particles).copy_from_slice(data);
+    Ok(particles)
+}
+
+/// Returns the bytes of the particles of a cloud that [`PointCloudEncoder`] encoded: 32 for each.
+pub(crate) fn particle_bytes(message: &[u8]) -> Result<&[u8], String> {
     let (rest, data) = split_data(message).ok_or("it is not a point cloud")?;
     if rest.len() > REST_SIZE_BYTES_MAX {
         let problem = "bytes beside its data (allowed: up to";
@@ -169,9 +177,7 @@ pub(crate) fn decode_particles(message: &[u8]) -> Result<Vec<ParticleState>, Str
     if data.len() % 32 != 0 {
         return Err(format!("its data of {} bytes is not a multiple of 32 bytes", data.len()));
     }
-    let mut particles = vec![ParticleState::default(); data.len() / 32];
-    bytemuck::cast_slice_mut(&mut particles).copy_from_slice(data);
-    Ok(particles)
+    Ok(data)
 }
 
 /// Splits a cloud into its field `data` and the bytes of all other fields. Decoding those costs many

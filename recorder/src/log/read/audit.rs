@@ -10,7 +10,8 @@ use mcap::records::{AttachmentHeader, Channel, MessageHeader, SchemaHeader};
 use super::decode::LoggedMessage;
 use crate::log::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use crate::log::run::{
-    Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE, header_library,
+    Closing, FORMAT_VERSION, REPAIR_METADATA, RunDescription, SCENE_ATTACHMENT, SCENE_MEDIA_TYPE,
+    header_library,
 };
 use crate::log::topic::{AllCounts, Topic};
 
@@ -122,6 +123,9 @@ impl Audit {
     }
 
     pub(super) fn add_metadata(&mut self, name: &str) {
+        if name == REPAIR_METADATA {
+            return;
+        }
         self.add_foreign(format!("metadata '{name}'"));
     }
 
@@ -238,7 +242,7 @@ impl Audit {
 }
 
 /// Returns `true` if messages of this file have the form that this recorder writes.
-pub(super) fn is_current_format(map: &BTreeMap<String, String>) -> bool {
+pub(in crate::log) fn is_current_format(map: &BTreeMap<String, String>) -> bool {
     map.get("format_version").is_some_and(|version| *version == FORMAT_VERSION.to_string())
 }
 

@@ -18,7 +18,7 @@ const COMPRESSION_SIZE_BYTES_MAX: usize = 32;
 const READ_SIZE_BYTES_MAX: u64 = 1 << 20;
 
 /// A chunk whose sizes are within the limits. Decompresses it while it is read.
-pub(super) struct ChunkData {
+pub(in crate::log) struct ChunkData {
     linear: LinearReader,
     /// The start of the record, until the linear reader requests it.
     head: Vec<u8>,
@@ -29,7 +29,7 @@ pub(super) struct ChunkData {
 impl ChunkData {
     /// Reads the header of a chunk and compares its sizes with the limits. `record_header` is the
     /// opcode and `length`, which precede it.
-    pub(super) fn open<R: Read>(
+    pub(in crate::log) fn open<R: Read>(
         source: &mut Source<R>,
         record_header: [u8; RECORD_HEADER_SIZE_BYTES],
         length: u64,
@@ -65,7 +65,7 @@ impl ChunkData {
     }
 
     /// Reads the next record into `body` and returns its opcode, or `None` at the end of the chunk.
-    pub(super) fn next_record<R: Read>(
+    pub(in crate::log) fn next_record<R: Read>(
         &mut self,
         source: &mut Source<R>,
         body: &mut Vec<u8>,

@@ -6,36 +6,45 @@ use mcap::records::op;
 
 /// Checks every length within a record. `Err` describes the first one that exceeds the record.
 pub(in crate::log) fn check_lengths(opcode: u8, body: &[u8]) -> Result<(), String> {
+    let fields = skip_fields(opcode, &mut Rest(body));
+    fields.ok_or_else(|| "a text or list that is longer than its record".to_owned())
+}
+
+/// Returns `true` if a record has the length that its fields need, and not a byte more.
+pub(in crate::log) fn is_exact(opcode: u8, body: &[u8]) -> bool {
     let mut rest = Rest(body);
-    let rest = &mut rest;
+    skip_fields(opcode, &mut rest).is_some() && (rest.0.is_empty() || opcode == op::MESSAGE)
+}
+
+/// Skips the fields of a record, or returns `None` if one exceeds it.
+fn skip_fields(opcode: u8, rest: &mut Rest<'_>) -> Option<()> {
     match opcode {
         op::HEADER => rest.text().and_then(|()| rest.text()),
-        op::SCHEMA => rest
-            .skip(2)
-            .and_then(|()| rest.text())
-            .and_then(|()| rest.text())
-            .and_then(|()| rest.text()),
-        op::CHANNEL => rest
-            .skip(4)
-            .and_then(|()| rest.text())
-            .and_then(|()| rest.text())
-            .and_then(|()| rest.texts()),
+        op::SCHEMA => rest.skip(2).and_then(|()| rest.text()).and_then(|()| rest.text_and_text()),
+        op::CHANNEL => rest.skip(4).and_then(|()| rest.text_and_text()).and_then(|()| rest.texts()),
+        op::MESSAGE => rest.skip(22),
         op::METADATA => rest.text().and_then(|()| rest.texts()),
         op::ATTACHMENT => rest
             .skip(16)
-            .and_then(|()| rest.text())
-            .and_then(|()| rest.text())
+            .and_then(|()| rest.text_and_text())
             .and_then(|()| rest.data())
             .and_then(|()| rest.skip(4)),
+        op::CHUNK => rest.skip(28).and_then(|()| rest.text()).and_then(|()| rest.data()),
+        op::MESSAGE_INDEX => rest.skip(2).and_then(|()| rest.entries(16)),
         op::CHUNK_INDEX => rest
             .skip(32)
-            .and_then(|()| rest.text())
+            .and_then(|()| rest.entries(10))
             .and_then(|()| rest.skip(8))
             .and_then(|()| rest.text())
             .and_then(|()| rest.skip(16)),
+        op::ATTACHMENT_INDEX => rest.skip(40).and_then(|()| rest.text_and_text()),
+        op::STATISTICS => rest.skip(42).and_then(|()| rest.entries(10)),
+        op::METADATA_INDEX => rest.skip(16).and_then(|()| rest.text()),
+        op::SUMMARY_OFFSET => rest.skip(17),
+        op::DATA_END => rest.skip(4),
+        op::FOOTER => rest.skip(20),
         _ => Some(()),
     }
-    .ok_or_else(|| "a text or list that is longer than its record".to_owned())
 }
 
 /// The bytes of a record that are not checked yet.
@@ -60,6 +69,15 @@ impl<'a> Rest<'a> {
 
     fn text(&mut self) -> Option<()> {
         self.part().map(drop)
+    }
+
+    fn text_and_text(&mut self) -> Option<()> {
+        self.text().and_then(|()| self.text())
+    }
+
+    /// Takes a list of entries of one size.
+    fn entries(&mut self, size_bytes: usize) -> Option<()> {
+        self.part().filter(|list| list.len() % size_bytes == 0).map(drop)
     }
 
     /// Takes a list of texts.

@@ -14,7 +14,7 @@ use super::limits::SizeLimits;
 use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
 use super::records::RecordReader;
-use super::selection::{ContentSelection, SELECTION_METADATA};
+use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
     SCENE_ATTACHMENT,
@@ -114,8 +114,7 @@ impl<R: Read> LogReader<R> {
                     });
                 }
                 Some(HeaderRecord::Selection(map)) => {
-                    let bad = || ReadError::BadSelection;
-                    selection = ContentSelection::from_map(&map).ok_or_else(bad)?;
+                    selection = ContentSelection::read(&map)?;
                 }
                 Some(HeaderRecord::Skipped) => {}
                 Some(HeaderRecord::Message) => {
@@ -327,7 +326,9 @@ fn read_header_record(record: Record<'_>, _byte: u64) -> Result<HeaderRecord, Re
     })
 }
 
-fn read_run(map: &BTreeMap<String, String>) -> Result<RunDescription, ReadError> {
+pub(in crate::log) fn read_run(
+    map: &BTreeMap<String, String>,
+) -> Result<RunDescription, ReadError> {
     let is_supported = |text: &String| {
         text.parse().is_ok_and(|version| (FORMAT_VERSION_MIN..=FORMAT_VERSION).contains(&version))
     };

@@ -12,7 +12,7 @@ const READ_SIZE_BYTES_MAX: u64 = 1 << 20;
 const SKIP_SIZE_BYTES: usize = 1 << 16;
 
 /// The bytes of a file, in order.
-pub(super) struct Source<R> {
+pub(in crate::log) struct Source<R> {
     inner: R,
     position: u64,
     /// The checksum of the current section. `None` if nothing checks it.
@@ -20,31 +20,31 @@ pub(super) struct Source<R> {
 }
 
 impl<R: Read> Source<R> {
-    pub(super) fn with_checksum(inner: R) -> Self {
+    pub(in crate::log) fn with_checksum(inner: R) -> Self {
         Self { inner, position: 0, hasher: Some(Hasher::new()) }
     }
 
-    pub(super) fn without_checksum(inner: R) -> Self {
+    pub(in crate::log) fn without_checksum(inner: R) -> Self {
         Self { inner, position: 0, hasher: None }
     }
 
     /// Returns the number of bytes read so far.
-    pub(super) fn position(&self) -> u64 {
+    pub(in crate::log) fn position(&self) -> u64 {
         self.position
     }
 
     /// Returns the checksum of the section so far.
-    pub(super) fn checksum(&self) -> Option<u32> {
+    pub(in crate::log) fn checksum(&self) -> Option<u32> {
         self.hasher.clone().map(Hasher::finalize)
     }
 
     /// Starts another section.
-    pub(super) fn restart_checksum(&mut self) {
+    pub(in crate::log) fn restart_checksum(&mut self) {
         self.hasher = self.hasher.take().map(|_| Hasher::new());
     }
 
     /// Reads up to the length of the buffer. Returns 0 at the end of the file.
-    pub(super) fn read_some(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+    pub(in crate::log) fn read_some(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = read_some(&mut self.inner, buffer)?;
         self.position += count as u64;
         if let Some(hasher) = &mut self.hasher {
@@ -54,7 +54,7 @@ impl<R: Read> Source<R> {
     }
 
     /// Fills the buffer. Returns fewer bytes than its length at the end of the file.
-    pub(super) fn fill(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+    pub(in crate::log) fn fill(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let mut count = 0;
         while count < buffer.len() {
             match self.read_some(&mut buffer[count..])? {
@@ -66,7 +66,11 @@ impl<R: Read> Source<R> {
     }
 
     /// Replaces `out` with the next `size_bytes` bytes.
-    pub(super) fn read_exactly(&mut self, size_bytes: u64, out: &mut Vec<u8>) -> Result<(), Fault> {
+    pub(in crate::log) fn read_exactly(
+        &mut self,
+        size_bytes: u64,
+        out: &mut Vec<u8>,
+    ) -> Result<(), Fault> {
         out.clear();
         while (out.len() as u64) < size_bytes {
             let begin = out.len();
@@ -80,7 +84,7 @@ impl<R: Read> Source<R> {
     }
 
     /// Skips `size_bytes` bytes.
-    pub(super) fn skip(&mut self, size_bytes: u64) -> Result<(), Fault> {
+    pub(in crate::log) fn skip(&mut self, size_bytes: u64) -> Result<(), Fault> {
         let mut left = size_bytes;
         let mut buffer = vec![0; usize::try_from(left).unwrap_or(usize::MAX).min(SKIP_SIZE_BYTES)];
         while left > 0 {

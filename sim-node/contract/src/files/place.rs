@@ -12,6 +12,12 @@ pub(crate) fn is_in_place(file: &File, path: &Path) -> bool {
     matches!((open, named), (Ok(open), Ok(named)) if open == named)
 }
 
+/// Returns `true` if a program of this project is writing a file. Returns `false` if the file cannot be
+/// opened.
+pub fn is_being_written(path: &Path) -> bool {
+    File::open(path).is_ok_and(|file| is_locked(&file))
+}
+
 /// Returns `true` if another open file holds the exclusive lock of a file. Otherwise this one holds a
 /// shared lock, until it is closed.
 pub(crate) fn is_locked(file: &File) -> bool {

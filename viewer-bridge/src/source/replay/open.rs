@@ -60,7 +60,11 @@ pub(super) fn open(
     let mut tape = Tape::open(path, Some(stop), &mut on_walk).map_err(with_remedy)?;
     if *tape.log().end() != LogEnd::Complete {
         let (end, last) = (tape.log().end(), tape.last_step());
-        note(&format!("warning: {} is {end}; shown up to step {last}", path.display()));
+        let path = path.display();
+        note(&format!(
+            "warning: {path} is {end}; shown up to step {last}. `recorder repair {path} OUT.mcap` copies \
+             what is intact"
+        ));
     }
     let load = load_of(&tape)?;
     let first = tape.state_at(tape.first_step()).map_err(with_remedy)?;

@@ -1,8 +1,8 @@
 //! Messages that are missing between the recorded ones, counted by their numbers.
 
-use super::message::Message;
-use super::read::selection::ContentSelection;
-use super::topic::{AllCounts, Topic};
+use crate::log::message::Message;
+use crate::log::run::selection::ContentSelection;
+use crate::log::topic::{AllCounts, Topic};
 
 /// Counts the snapshots and outcomes that are missing in a recording, from the messages in it.
 ///

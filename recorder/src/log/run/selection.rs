@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 
-use super::read_error::ReadError;
+use crate::log::read::read_error::ReadError;
 use crate::log::topic::Topic;
 
 /// Name of the metadata record of [`ContentSelection`].
@@ -113,8 +113,13 @@ impl ContentSelection {
         ])
     }
 
+    /// Reads the metadata record.
+    pub(in crate::log) fn read(map: &BTreeMap<String, String>) -> Result<Self, ReadError> {
+        Self::from_map(map).ok_or(ReadError::BadSelection)
+    }
+
     /// Parses the output of [`ContentSelection::to_map`]. `None` for anything else.
-    pub(in crate::log) fn from_map(map: &BTreeMap<String, String>) -> Option<Self> {
+    fn from_map(map: &BTreeMap<String, String>) -> Option<Self> {
         let every = map.get(EVERY)?.parse().ok()?;
         let topics = map.get(LEFT_OUT)?.split(' ').filter(|name| !name.is_empty());
         let topics = topics

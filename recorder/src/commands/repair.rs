@@ -1,0 +1,159 @@
+//! `recorder repair`: copies what is intact in a recording.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::{self, File};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use recorder::{Finding, PartFile, ReadError, RepairReport, Topic, open_regular_file, repair_file};
+use serde::Serialize;
+use sim_contract::{Stop, part_path, printable_line};
+
+use crate::cli::exit::Exit;
+use crate::cli::file_args::OverwriteArgs;
+use crate::cli::output::{self, AsJson};
+use crate::cli::progress::progress_bytes;
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Skips damaged parts and goes on behind them. A chunk is kept if its checksum is right, a \
+    message if it passes `recorder check`, a snapshot with its row or not at all. Writes a new index, and \
+    declares what is missing: by topic in the metadata 'recorder', by ranges of steps in the metadata \
+    'repair'. The result passes `recorder check`. IN is never changed.\n\n\
+    Exit codes: 0 nothing is missing; 1 not repairable, or not written; 3 parts are missing.\n\nExamples:\n  \
+    recorder repair run.mcap.part repaired.mcap\n  \
+    recorder repair damaged.mcap repaired.mcap --overwrite --json"
+)]
+pub(crate) struct RepairArgs {
+    /// Recording to read
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// Recording to write
+    #[arg(value_name = "OUT")]
+    output: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
+    #[command(flatten)]
+    as_json: AsJson,
+}
+
+/// The result, as printed.
+#[derive(Debug, Serialize)]
+struct Repaired<'a> {
+    input: String,
+    output: String,
+    is_lossless: bool,
+    /// The first and the last step of the snapshots in the output.
+    steps: Option<[u64; 2]>,
+    snapshot_count: u64,
+    /// Number of messages that are missing, by topic, as far as the file tells.
+    lost: BTreeMap<&'static str, u64>,
+    /// Ranges of steps without snapshots.
+    lost_steps: Vec<String>,
+    /// The checksum of the data is wrong, and no damaged part explains it.
+    is_uncertain: bool,
+    finding_count: u64,
+    findings: &'a [Finding],
+}
+
+pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
+    let stop = Stop::install()?;
+    let (input, output) = (output::path_text(&args.input), output::path_text(&args.output));
+    let source =
+        open_regular_file(&args.input).map_err(ReadError::from).with_context(|| input.clone())?;
+    refuse_own_input(&source, &args.output)?;
+    let mut file = PartFile::create(&args.output, args.overwrite.existing())?;
+    let bar = progress_bytes(0);
+    let result = repair_file(source, &mut file, Some(&stop), &mut |at, size_bytes| {
+        bar.set_length(size_bytes);
+        bar.set_position(at);
+    });
+    bar.finish_and_clear();
+    let report = match result {
+        Ok(report) => report,
+        Err(error) => {
+            file.discard()?;
+            return Err(error).with_context(|| input);
+        }
+    };
+    file.finish()?;
+    let repaired = Repaired::new(input, output, &report);
+    output::result(args.as_json, &repaired, &repaired.to_string())?;
+    Ok(if repaired.is_lossless { Exit::Done } else { Exit::Loss })
+}
+
+/// Refuses an output that would replace the input: its own name, or its name without `.part`, whose
+/// `.part` file it is.
+fn refuse_own_input(input: &File, output: &Path) -> anyhow::Result<()> {
+    let input = input.metadata()?;
+    for path in [output.to_owned(), part_path(output)] {
+        let Ok(existing) = fs::metadata(&path) else { continue };
+        if (existing.dev(), existing.ino()) == (input.dev(), input.ino()) {
+            bail!(
+                "{}: this is the input, or the name under which the output is written; choose another \
+                 name for OUT",
+                path.display()
+            );
+        }
+    }
+    Ok(())
+}
+
+impl<'a> Repaired<'a> {
+    fn new(input: String, output: String, report: &'a RepairReport) -> Self {
+        let losses = &report.losses;
+        let mut lost_steps: Vec<_> = losses.ranges().iter().map(ToString::to_string).collect();
+        if losses.more_ranges() > 0 {
+            lost_steps.push(format!("{} more ranges", losses.more_ranges()));
+        }
+        Self {
+            input,
+            output,
+            is_lossless: losses.is_empty() && !report.is_uncertain,
+            steps: report.steps,
+            snapshot_count: report.counts[Topic::Particles].written,
+            lost: losses.messages(),
+            lost_steps,
+            is_uncertain: report.is_uncertain,
+            finding_count: report.findings.count(),
+            findings: report.findings.list(),
+        }
+    }
+}
+
+impl fmt::Display for Repaired<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let output = printable_line(&self.output);
+        write!(f, "written     {output}: {} snapshots", self.snapshot_count)?;
+        if let Some([first, last]) = self.steps {
+            write!(f, " (steps {first}..={last})")?;
+        }
+        for finding in self.findings {
+            let Finding { byte, record, what, .. } = finding;
+            write!(f, "\ndamage      byte {byte}: {record}: {}", printable_line(what))?;
+        }
+        let more = self.finding_count - self.findings.len() as u64;
+        if more > 0 {
+            write!(f, "\ndamage      {more} more")?;
+        }
+        if self.is_uncertain {
+            let what = "the checksum of the data is wrong, and no damaged part explains it: a byte outside \
+                        of the messages may be wrong";
+            write!(f, "\nuncertain   {what}")?;
+        }
+        if self.is_lossless {
+            return write!(f, "\nmissing     nothing");
+        }
+        if !self.lost_steps.is_empty() {
+            write!(f, "\nmissing     steps {}", self.lost_steps.join(", "))?;
+        }
+        let lost: Vec<_> =
+            self.lost.iter().map(|(topic, count)| format!("{topic} {count}")).collect();
+        if !lost.is_empty() {
+            write!(f, "\nmissing     messages: {}", lost.join(", "))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,16 @@
+//! The whole of a file, record by record and with the position of each: for checks and repairs.
+//!
+//! [`super::read`] reads a recording up to its first damage. This module goes on behind it.
+
+pub(super) mod check;
+mod chunk;
+mod content;
+pub(super) mod finding;
+pub(super) mod losses;
+mod places;
+pub(super) mod repair;
+mod salvage;
+mod summary;
+mod tears;
+mod walk;
+mod window;

@@ -1,0 +1,110 @@
+//! The findings of a check.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// Most findings that a report lists. It counts the others.
+const FINDINGS_MAX: usize = 100;
+
+/// A difference between a file and what its writer wrote, or must write.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// Position of the record in the file.
+    pub byte: u64,
+    /// The record, such as "chunk" or "chunk, message on /steps".
+    pub record: String,
+    /// The difference, for people.
+    pub what: String,
+    /// The effect of a repair.
+    pub cure: Cure,
+}
+
+/// The effect of a repair on a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cure {
+    /// The damaged part is left out, and declared as missing.
+    LeaveOut,
+    /// The part is rewritten from the rest of the file. Nothing is missing.
+    Rewrite,
+}
+
+impl fmt::Display for Cure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::LeaveOut => "`recorder repair` leaves it out and declares it as missing",
+            Self::Rewrite => "`recorder repair` rewrites it",
+        })
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "byte {}: {}: {}; {}", self.byte, self.record, self.what, self.cure)
+    }
+}
+
+/// The findings of a check, in the order of discovery.
+#[derive(Debug, Default)]
+pub struct Findings {
+    list: Vec<Finding>,
+    count: u64,
+}
+
+impl Findings {
+    /// Returns the first findings.
+    pub fn list(&self) -> &[Finding] {
+        &self.list
+    }
+
+    /// Returns the number of all findings.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Adds a finding about content that cannot be restored.
+    pub(super) fn add(&mut self, byte: u64, record: impl Into<String>, what: impl Into<String>) {
+        self.push(byte, record.into(), what.into(), Cure::LeaveOut);
+    }
+
+    /// Adds a finding about a part that follows from the rest of the file.
+    pub(super) fn add_index(
+        &mut self,
+        byte: u64,
+        record: impl Into<String>,
+        what: impl Into<String>,
+    ) {
+        self.push(byte, record.into(), what.into(), Cure::Rewrite);
+    }
+
+    fn push(&mut self, byte: u64, record: String, what: String, cure: Cure) {
+        self.count += 1;
+        if self.list.len() < FINDINGS_MAX {
+            self.list.push(Finding { byte, record, what, cure });
+        }
+    }
+}
+
+/// Returns the name of a kind of record.
+pub(super) fn record_name(opcode: u8) -> &'static str {
+    use mcap::records::op;
+    match opcode {
+        op::HEADER => "header",
+        op::FOOTER => "footer",
+        op::SCHEMA => "schema",
+        op::CHANNEL => "channel",
+        op::MESSAGE => "message",
+        op::CHUNK => "chunk",
+        op::MESSAGE_INDEX => "message index",
+        op::CHUNK_INDEX => "chunk index",
+        op::ATTACHMENT => "attachment",
+        op::ATTACHMENT_INDEX => "attachment index",
+        op::STATISTICS => "statistics",
+        op::METADATA => "metadata",
+        op::METADATA_INDEX => "metadata index",
+        op::SUMMARY_OFFSET => "summary offset",
+        op::DATA_END => "end of the data",
+        _ => "record of another program",
+    }
+}

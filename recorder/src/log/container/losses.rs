@@ -1,0 +1,160 @@
+//! The losses of a repair: messages by topic, and steps by range.
+
+use std::collections::BTreeMap;
+
+use super::content::ContentCheck;
+use crate::log::run::Closing;
+use crate::log::topic::{AllCounts, Topic};
+
+/// Most ranges that a repair lists. It counts the others.
+const RANGES_MAX: usize = 1000;
+
+/// A range of steps without snapshots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LostSteps {
+    /// The newest snapshot before the range, if there is one.
+    pub after: Option<u64>,
+    /// The first snapshot after the range, if there is one.
+    pub before: Option<u64>,
+}
+
+impl std::fmt::Display for LostSteps {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match (self.after, self.before) {
+            (Some(after), Some(before)) => write!(formatter, "{}..{before}", after + 1),
+            (Some(after), None) => write!(formatter, "from {} on", after + 1),
+            (None, Some(before)) => write!(formatter, "before {before}"),
+            (None, None) => formatter.write_str("all"),
+        }
+    }
+}
+
+/// The messages and steps that a repair leaves out.
+#[derive(Debug, Default)]
+pub struct Losses {
+    /// Lost messages whose topic is known. Only `lost` is set.
+    counts: AllCounts,
+    /// Damaged messages of unknown topics.
+    unknown_count: u64,
+    ranges: Vec<LostSteps>,
+    more_ranges: u64,
+    /// The newest copied snapshot.
+    last_step: Option<u64>,
+    /// Something is lost since the newest copied snapshot.
+    is_open: bool,
+    has_any: bool,
+}
+
+impl Losses {
+    /// Returns the ranges of steps with losses.
+    pub fn ranges(&self) -> &[LostSteps] {
+        &self.ranges
+    }
+
+    /// Returns the number of further ranges, which are not listed.
+    pub fn more_ranges(&self) -> u64 {
+        self.more_ranges
+    }
+
+    /// Returns the number of lost messages by topic, as far as the file tells.
+    pub fn messages(&self) -> BTreeMap<&'static str, u64> {
+        let counts = self.counts.iter().map(|(topic, counts)| (topic.name(), counts.lost));
+        let all = counts.chain([("unknown", self.unknown_count)]);
+        all.filter(|(_, count)| *count > 0).collect()
+    }
+
+    /// Returns `true` if nothing is lost.
+    pub fn is_empty(&self) -> bool {
+        !self.has_any
+    }
+
+    pub(super) fn begin_gap(&mut self) {
+        self.is_open = true;
+        self.has_any = true;
+    }
+
+    pub(super) fn add_message(&mut self, topic: Option<Topic>) {
+        self.begin_gap();
+        match topic {
+            Some(topic) => self.counts[topic].lost += 1,
+            None => self.unknown_count += 1,
+        }
+    }
+
+    /// Adds the messages of a damaged chunk, as its message index counts them.
+    pub(super) fn add_indexed(&mut self, topic: Option<Topic>, count: u64) {
+        match topic {
+            // It is rewritten.
+            Some(Topic::Tf) => {}
+            Some(topic) => self.counts[topic].lost += count,
+            None => self.unknown_count += count,
+        }
+    }
+
+    /// Ends a gap at a sound snapshot.
+    pub(super) fn end_gap(&mut self, step: u64) {
+        if self.is_open && self.last_step.is_none_or(|last| last + 1 < step) {
+            self.add_range(Some(step));
+        }
+        self.is_open = false;
+        self.last_step = Some(step);
+    }
+
+    pub(super) fn finish(&mut self) {
+        if self.is_open {
+            self.add_range(None);
+        }
+    }
+
+    fn add_range(&mut self, before: Option<u64>) {
+        if self.ranges.len() < RANGES_MAX {
+            self.ranges.push(LostSteps { after: self.last_step, before });
+        } else {
+            self.more_ranges += 1;
+        }
+    }
+
+    /// Returns the closing metadata with the losses. `reason` is for a file that had none.
+    pub(super) fn declare(
+        &mut self,
+        closing: Option<Closing>,
+        reason: &str,
+        content: &ContentCheck,
+    ) -> Closing {
+        let had_end = closing.is_some();
+        let mut closing = closing
+            .unwrap_or_else(|| Closing { stop_reason: reason.to_owned(), ..Closing::default() });
+        let gaps = content.gaps.counts();
+        for topic in Topic::ALL {
+            let counts = &mut closing.counts[topic];
+            counts.lost += self.counts[topic].lost;
+            let declared = counts.lost.saturating_add(counts.gaps);
+            let more = gaps[topic].gaps.saturating_sub(declared);
+            counts.lost += more;
+            // Gaps of a file that declares no losses are those of the repair only if it left something out.
+            if self.has_any {
+                self.counts[topic].lost = self.counts[topic].lost.max(more);
+            }
+            // A recorder does not count /tf, which it writes into the header.
+            let is_counted = topic != Topic::Tf;
+            counts.written = if is_counted { content.counts[topic].written } else { 0 };
+            if !had_end {
+                counts.received = counts.written + counts.lost;
+            }
+        }
+        closing
+    }
+
+    /// Adds the losses to the metadata of the repair.
+    pub(super) fn add_to(&self, repair: &mut BTreeMap<String, String>) {
+        for (topic, count) in self.messages() {
+            let key = format!("lost.{}", topic.trim_start_matches('/'));
+            repair.insert(key, count.to_string());
+        }
+        let texts: Vec<_> = self.ranges.iter().map(ToString::to_string).collect();
+        repair.insert("lost_steps".to_owned(), texts.join(", "));
+        if self.more_ranges > 0 {
+            repair.insert("more_lost_ranges".to_owned(), self.more_ranges.to_string());
+        }
+    }
+}

@@ -1,0 +1,433 @@
+//! The repair of a file: everything that is intact, with a new index and all losses declared.
+//!
+//! The walk goes on behind damage, chunks count only with a correct checksum, and messages only if they
+//! pass the checks of `recorder check`. A snapshot is kept with its row or not at all. So the result is
+//! sound, and says what it lacks: message counts in the metadata `recorder`, and ranges of steps in the
+//! metadata `repair`.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, Write};
+
+use mcap::Attachment;
+use mcap::records::{MessageIndex, Metadata, Record, op};
+use sim_contract::Stop;
+
+use super::chunk::{ChunkContent, InnerRecords, compression};
+use super::content::ContentCheck;
+use super::finding::{Findings, record_name};
+use super::losses::Losses;
+use super::salvage::{Format, Salvage};
+use super::walk::{Part, Walk};
+use super::window::Window;
+use crate::log::read::audit::is_current_format;
+use crate::log::read::limits::{HEADER_RECORD_SIZE_BYTES_MAX, SizeLimits};
+use crate::log::read::read_error::{LogEnd, ReadError};
+use crate::log::read::reader::read_run;
+use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
+use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};
+use crate::log::topic::AllCounts;
+use crate::log::writer::WriteError;
+
+/// Bytes between two calls of the progress callback.
+const PROGRESS_PERIOD_BYTES: u64 = 16 << 20;
+
+/// The reason why a file could not be repaired.
+#[derive(Debug, thiserror::Error)]
+pub enum RepairError {
+    /// The input cannot be read, or has no readable description of its run.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The output cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// The result of a repair.
+#[derive(Debug)]
+pub struct RepairReport {
+    /// The damage that was found.
+    pub findings: Findings,
+    /// The content that the output lacks.
+    pub losses: Losses,
+    /// The checksum of the data is wrong, and no damaged record explains it.
+    pub is_uncertain: bool,
+    /// The messages of the output. Only `written` is set.
+    pub counts: AllCounts,
+    /// The first and the last step of the snapshots in the output.
+    pub steps: Option<[u64; 2]>,
+}
+
+/// Copies the intact part of a recording. Calls `on_progress` with the position and the size of the input.
+///
+/// # Errors
+/// If the input is not a recording, the operating system reports an error, or a signal has arrived. The
+/// output then has no end.
+pub fn repair_file<R: Read + Seek, W: Write>(
+    source: R,
+    out: W,
+    stop: Option<&Stop>,
+    on_progress: &mut dyn FnMut(u64, u64),
+) -> Result<RepairReport, RepairError> {
+    let mut walk = Walk::new(Window::new(source, stop.cloned())?)?;
+    let mut repair = Repair::new(walk.size_bytes(), out);
+    let mut chunks = ChunkContent::default();
+    let mut next_progress = 0;
+    loop {
+        if walk.position() >= next_progress {
+            on_progress(walk.position(), walk.size_bytes());
+            next_progress = walk.position() + PROGRESS_PERIOD_BYTES;
+        }
+        let Some(part) = walk.next()? else { break };
+        if let Some(saved) = repair.add(part, &mut chunks)? {
+            repair.has_wrong_checksum = saved != 0 && saved != walk.checksum_before();
+            walk.restart_checksum();
+        }
+        if let Some(limits) = repair.new_limits.take() {
+            walk.set_limits(limits);
+        }
+    }
+    repair.finish()
+}
+
+/// The section of the input that is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Section {
+    Data,
+    /// The message indexes of a damaged chunk follow.
+    AfterBadChunk,
+    /// The index, which is rewritten.
+    Index,
+}
+
+/// The state of a repair.
+struct Repair<W: Write> {
+    /// Size of the input.
+    size_bytes: u64,
+    findings: Findings,
+    format: Format,
+    scene_size_bytes: usize,
+    selection: ContentSelection,
+    content: Option<ContentCheck>,
+    new_limits: Option<SizeLimits>,
+    is_current_format: bool,
+    /// Attachments and metadata before the first chunk.
+    head: Vec<Record<'static>>,
+    head_size_bytes: u64,
+    /// The output, until it is created.
+    out: Option<W>,
+    salvage: Option<Salvage<W>>,
+    closing: Option<Closing>,
+    section: Section,
+    has_wrong_checksum: bool,
+    first_step: Option<u64>,
+}
+
+impl<W: Write> Repair<W> {
+    fn new(size_bytes: u64, out: W) -> Self {
+        Self {
+            size_bytes,
+            findings: Findings::default(),
+            format: Format::default(),
+            scene_size_bytes: 0,
+            selection: ContentSelection::default(),
+            content: None,
+            new_limits: None,
+            is_current_format: false,
+            head: Vec::new(),
+            head_size_bytes: 0,
+            out: Some(out),
+            salvage: None,
+            closing: None,
+            section: Section::Data,
+            has_wrong_checksum: false,
+            first_step: None,
+        }
+    }
+
+    /// Adds a part of the input. Returns the checksum of the data at their end.
+    fn add(
+        &mut self,
+        part: Part<'_>,
+        chunks: &mut ChunkContent,
+    ) -> Result<Option<u32>, RepairError> {
+        match part {
+            Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
+            Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run().into()),
+            Part::Skipped { byte, opcode } => {
+                self.lose(byte, record_name(opcode), "it is too long, or of another program")?;
+                Ok(None)
+            }
+            Part::Damaged { bytes, cause } => {
+                let size_bytes = bytes.end - bytes.start;
+                let what = format!("{size_bytes} bytes are damaged: {cause}");
+                self.allow_scene(size_bytes);
+                self.lose(bytes.start, "damaged record", &what)?;
+                Ok(None)
+            }
+            // A killed recorder leaves whole records.
+            Part::Truncated { byte } if byte == self.size_bytes => {
+                self.findings.add_index(byte, "end of the file", "the file has no end");
+                Ok(None)
+            }
+            Part::Truncated { byte } => {
+                self.lose(byte, "end of the file", "the file is truncated here")?;
+                Ok(None)
+            }
+        }
+    }
+
+    /// Allows for a scene in a damaged part before the first message.
+    fn allow_scene(&mut self, size_bytes: u64) {
+        if self.content.is_none() {
+            let size_bytes = usize::try_from(size_bytes).unwrap_or(usize::MAX);
+            self.scene_size_bytes = size_bytes.min(sim_contract::SCENE_SIZE_BYTES_MAX);
+        }
+    }
+
+    /// Reports a part that is left out. The index is rewritten, so nothing of it is lost.
+    fn lose(&mut self, byte: u64, record: &str, what: &str) -> Result<(), RepairError> {
+        if self.section == Section::Index {
+            self.findings.add_index(byte, record, what);
+            return Ok(());
+        }
+        self.findings.add(byte, record, what);
+        if self.content.is_some() {
+            self.begin()?;
+        }
+        if let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) {
+            salvage.mark_gap(content);
+        }
+        Ok(())
+    }
+
+    fn add_record(
+        &mut self,
+        byte: u64,
+        opcode: u8,
+        body: &[u8],
+        chunks: &mut ChunkContent,
+    ) -> Result<Option<u32>, RepairError> {
+        if self.section == Section::Index {
+            return Ok(None);
+        }
+        if opcode == op::CHUNK {
+            self.add_chunk(byte, body, chunks)?;
+            return Ok(None);
+        }
+        let record = match mcap::parse_record(opcode, body) {
+            Ok(record) => record,
+            Err(error) => {
+                self.allow_scene(body.len() as u64);
+                self.lose(byte, record_name(opcode), &error.to_string())?;
+                return Ok(None);
+            }
+        };
+        match record {
+            Record::DataEnd(end) => {
+                self.section = Section::Index;
+                return Ok(Some(end.data_section_crc));
+            }
+            Record::Footer(_) => self.section = Section::Index,
+            Record::Header(header) => {
+                (self.format.profile, self.format.library) = (header.profile, header.library);
+            }
+            Record::MessageIndex(index) => self.add_message_index(&index),
+            Record::Metadata(metadata) => self.add_metadata(metadata)?,
+            Record::Attachment { header, data, crc } => {
+                if header.name == SCENE_ATTACHMENT && self.content.is_none() {
+                    self.scene_size_bytes = data.len();
+                }
+                self.add_head(Record::Attachment {
+                    header,
+                    data: Cow::Owned(data.into_owned()),
+                    crc,
+                })?;
+            }
+            other => self.add_content_record(byte, "record", &other)?,
+        }
+        Ok(None)
+    }
+
+    fn add_metadata(&mut self, metadata: Metadata) -> Result<(), RepairError> {
+        if metadata.name == CLOSING_METADATA {
+            self.closing = Some(Closing::from_map(&metadata.metadata));
+            return Ok(());
+        }
+        if metadata.name == SELECTION_METADATA {
+            self.selection = ContentSelection::read(&metadata.metadata)?;
+        }
+        if metadata.name == RUN_METADATA && self.content.is_none() {
+            let run = read_run(&metadata.metadata)?;
+            self.is_current_format = is_current_format(&metadata.metadata);
+            let content = ContentCheck::new(run, self.selection, self.scene_size_bytes);
+            self.new_limits = Some(*content.limits());
+            self.content = Some(content);
+        }
+        self.add_head(Record::Metadata(metadata))
+    }
+
+    /// Copies an attachment or a metadata record. Those before the first chunk wait for its compression,
+    /// as long as they need little memory.
+    fn add_head(&mut self, record: Record<'static>) -> Result<(), RepairError> {
+        if self.salvage.is_some() {
+            return Ok(self.copy_head(&record)?);
+        }
+        self.head_size_bytes += match &record {
+            Record::Attachment { data, .. } => data.len() as u64,
+            _ => 0,
+        };
+        self.head.push(record);
+        if self.content.is_some() && self.head_size_bytes > HEADER_RECORD_SIZE_BYTES_MAX {
+            self.begin()?;
+        }
+        Ok(())
+    }
+
+    fn copy_head(&mut self, record: &Record<'static>) -> Result<(), WriteError> {
+        let Some(salvage) = &mut self.salvage else { return Ok(()) };
+        match record {
+            Record::Attachment { header, data, .. } => salvage.attach(&Attachment {
+                log_time: header.log_time,
+                create_time: header.create_time,
+                name: header.name.clone(),
+                media_type: header.media_type.clone(),
+                data: Cow::Borrowed(data),
+            }),
+            Record::Metadata(metadata) => salvage.write_metadata(metadata),
+            _ => Ok(()),
+        }
+    }
+
+    /// Creates the output.
+    fn begin(&mut self) -> Result<(), RepairError> {
+        let Some(out) = self.out.take() else { return Ok(()) };
+        self.salvage = Some(Salvage::create(out, &self.format)?);
+        for record in std::mem::take(&mut self.head) {
+            self.copy_head(&record)?;
+        }
+        Ok(())
+    }
+
+    fn add_chunk(
+        &mut self,
+        byte: u64,
+        body: &[u8],
+        chunks: &mut ChunkContent,
+    ) -> Result<(), RepairError> {
+        let Some(content) = &self.content else { return Err(self.no_run().into()) };
+        let limits = *content.limits();
+        let chunk = chunks.read(body, &limits)?;
+        if self.salvage.is_none()
+            && let Some(compression) = compression(body)
+        {
+            self.format.compression = compression;
+        }
+        self.begin()?;
+        self.section = if chunk.is_ok() { Section::Data } else { Section::AfterBadChunk };
+        let chunk = match chunk {
+            Ok(chunk) => chunk,
+            Err(cause) => {
+                self.declare_channels()?;
+                return self.lose(byte, "chunk", &cause);
+            }
+        };
+        for record in InnerRecords::new(chunk.content) {
+            let record = record.and_then(|inner| {
+                mcap::parse_record(inner.opcode, inner.body).map_err(|error| error.to_string())
+            });
+            match record {
+                Ok(record) => self.add_content_record(byte, "chunk", &record)?,
+                Err(what) => self.lose(byte, "chunk", &what)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Declares the channels as a recorder does, if the first chunk, which declares them, is lost.
+    fn declare_channels(&mut self) -> Result<(), WriteError> {
+        let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
+            return Ok(());
+        };
+        if content.has_channels() || !self.is_current_format {
+            return Ok(());
+        }
+        salvage.declare_channels(content)
+    }
+
+    /// Copies a schema, a channel or a message.
+    fn add_content_record(
+        &mut self,
+        byte: u64,
+        place: &str,
+        record: &Record<'_>,
+    ) -> Result<(), RepairError> {
+        if self.content.is_none() {
+            return Err(self.no_run().into());
+        }
+        self.begin()?;
+        let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
+            return Ok(());
+        };
+        let result = match record {
+            Record::Schema { header, data } => salvage.add_schema(header, data)?,
+            Record::Channel(channel) => match salvage.add_channel(channel)? {
+                Ok(()) => content.add_channel(channel.id, &channel.topic),
+                conflict => conflict,
+            },
+            Record::Message { header, data } => {
+                let result = salvage.add_message(header, data, content)?;
+                self.first_step = self.first_step.or(content.last_row().map(|row| row.step));
+                result
+            }
+            other => Err(format!("a {} does not belong here", record_name(other.opcode()))),
+        };
+        if let Err(what) = result {
+            self.findings.add(byte, place, what);
+        }
+        Ok(())
+    }
+
+    /// Counts the messages of a damaged chunk.
+    fn add_message_index(&mut self, index: &MessageIndex) {
+        let (Some(salvage), Some(content)) = (&mut self.salvage, &self.content) else { return };
+        if self.section == Section::AfterBadChunk {
+            let topic = content.topic(index.channel_id);
+            salvage.losses.add_indexed(topic, index.records.len() as u64);
+        }
+    }
+
+    /// Returns the error of a file without a readable description of its run.
+    fn no_run(&self) -> ReadError {
+        match self.findings.list().first() {
+            None => ReadError::Foreign { library: self.format.library.clone() },
+            Some(first) => {
+                ReadError::NoHeader(LogEnd::Damaged { byte: first.byte, cause: first.what.clone() })
+            }
+        }
+    }
+
+    fn finish(mut self) -> Result<RepairReport, RepairError> {
+        if self.content.is_none() {
+            return Err(self.no_run().into());
+        }
+        self.begin()?;
+        let (Some(salvage), Some(mut content)) = (self.salvage.take(), self.content.take()) else {
+            return Err(WriteError::Stopped.into());
+        };
+        let mut metadata = BTreeMap::from([
+            ("recorder_version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("source_size_bytes".to_owned(), self.size_bytes.to_string()),
+            ("finding_count".to_owned(), self.findings.count().to_string()),
+        ]);
+        let (_, losses) = salvage.finish(self.closing.take(), &mut content, &mut metadata)?;
+        let last = content.last_row().map(|row| row.step);
+        Ok(RepairReport {
+            is_uncertain: self.has_wrong_checksum && losses.is_empty(),
+            findings: self.findings,
+            counts: content.counts,
+            steps: self.first_step.zip(last).map(|(first, last)| [first, last]),
+            losses,
+        })
+    }
+}

@@ -1,0 +1,316 @@
+//! The output of a repair: sound messages with a new index, and the declaration of the others.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+
+use mcap::records::{Channel, MessageHeader, Metadata, SchemaHeader};
+use mcap::write::NoSeek;
+use mcap::{Attachment, WriteOptions, Writer};
+
+use super::content::{ContentCheck, Sound};
+use super::losses::Losses;
+use crate::log::encoding::{TopicFormat, encode_transform};
+use crate::log::run::{CLOSING_METADATA, Closing, REPAIR_METADATA};
+use crate::log::topic::Topic;
+use crate::log::writer::WriteError;
+
+/// Uncompressed size at which a chunk is closed, as in a recording.
+const CHUNK_SIZE_BYTES: u64 = 1 << 20;
+/// Most bytes of all schemas and channels. Those of a recorder have 20 kilobytes.
+const DECLARED_SIZE_BYTES_MAX: usize = 16 << 20;
+/// Reason in the closing metadata of a file that had none.
+const UNKNOWN_STOP: &str = "unknown: the recording had no end, and was repaired";
+
+/// A message with its header in the file.
+#[derive(Debug)]
+struct HeldRow {
+    header: MessageHeader,
+    data: Vec<u8>,
+    step: u64,
+}
+
+/// The id of a schema or channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Declared {
+    Schema(u16),
+    Channel(u16),
+}
+
+/// The options of the output, from the input.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Format {
+    pub(super) profile: String,
+    pub(super) library: String,
+    /// "", "lz4" or "zstd".
+    pub(super) compression: String,
+}
+
+/// The output of a repair.
+pub(super) struct Salvage<W: Write> {
+    /// `None` after an error. Dropping the writer of mcap would finish the file.
+    file: Option<Writer<NoSeek<W>>>,
+    /// The header of a snapshot, until its payload has followed.
+    row: Option<HeldRow>,
+    /// The channel of `/tf`, which the file has lost.
+    missing_transform: Option<u16>,
+    /// The ids of the schemas and channels so far.
+    declared: BTreeSet<Declared>,
+    /// Memory of the schemas and channels, which stay in memory for the index.
+    declared_size_bytes: usize,
+    pub(super) losses: Losses,
+}
+
+impl<W: Write> Salvage<W> {
+    pub(super) fn create(out: W, format: &Format) -> Result<Self, WriteError> {
+        // The level of a recording. Other compressions have none.
+        let (compression, level) = match format.compression.as_str() {
+            "" => (None, 0),
+            "lz4" => (Some(mcap::Compression::Lz4), 0),
+            _ => (Some(mcap::Compression::Zstd), 1),
+        };
+        let file = WriteOptions::new()
+            .profile(format.profile.as_str())
+            .library(format.library.as_str())
+            .disable_seeking(true)
+            .chunk_size(Some(CHUNK_SIZE_BYTES))
+            .compression_level(level)
+            .compression(compression)
+            .compression_threads(0)
+            .create(NoSeek::new(out))?;
+        Ok(Self {
+            file: Some(file),
+            row: None,
+            missing_transform: None,
+            declared: BTreeSet::new(),
+            declared_size_bytes: 0,
+            losses: Losses::default(),
+        })
+    }
+
+    /// Calls `write` with the file. The first error is final.
+    fn write(
+        &mut self,
+        write: impl FnOnce(&mut Writer<NoSeek<W>>) -> mcap::McapResult<()>,
+    ) -> Result<(), WriteError> {
+        let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
+        let result = write(file);
+        if result.is_err() {
+            self.abandon();
+        }
+        Ok(result?)
+    }
+
+    fn abandon(&mut self) {
+        drop(self.file.take().map(Writer::into_inner));
+    }
+
+    pub(super) fn attach(&mut self, attachment: &Attachment<'_>) -> Result<(), WriteError> {
+        self.write(|file| file.attach(attachment))
+    }
+
+    pub(super) fn write_metadata(&mut self, metadata: &Metadata) -> Result<(), WriteError> {
+        self.write(|file| file.write_metadata(metadata))
+    }
+
+    /// Counts the memory of a schema or channel. Other programs repeat them in each chunk.
+    fn reserve(&mut self, id: Declared, size_bytes: usize) -> Result<(), String> {
+        if self.declared.contains(&id) {
+            return Ok(());
+        }
+        let sum = self.declared_size_bytes.saturating_add(size_bytes);
+        if sum > DECLARED_SIZE_BYTES_MAX {
+            return Err(format!(
+                "the schemas and channels have more than {DECLARED_SIZE_BYTES_MAX} bytes"
+            ));
+        }
+        self.declared_size_bytes = sum;
+        self.declared.insert(id);
+        Ok(())
+    }
+
+    /// Copies a schema. The inner `Err` is a conflict with an earlier one.
+    pub(super) fn add_schema(
+        &mut self,
+        header: &SchemaHeader,
+        data: &[u8],
+    ) -> Result<Result<(), String>, WriteError> {
+        let id = Declared::Schema(header.id);
+        if let Err(what) = self.reserve(id, header.name.len() + header.encoding.len() + data.len())
+        {
+            return Ok(Err(what));
+        }
+        let mut conflict = Ok(());
+        self.write(|file| {
+            match file.add_schema_with_id(header.id, &header.name, &header.encoding, data) {
+                Err(
+                    error @ (mcap::McapError::ConflictingSchemas(_)
+                    | mcap::McapError::InvalidSchemaId),
+                ) => {
+                    conflict = Err(error.to_string());
+                    Ok(())
+                }
+                result => result.map(drop),
+            }
+        })?;
+        Ok(conflict)
+    }
+
+    /// Copies a channel. The inner `Err` is a conflict with an earlier one, or a missing schema.
+    pub(super) fn add_channel(
+        &mut self,
+        channel: &Channel,
+    ) -> Result<Result<(), String>, WriteError> {
+        let Channel { id, schema_id, topic, message_encoding, metadata } = channel;
+        let texts = metadata.iter().map(|(key, value)| key.len() + value.len());
+        let declared = Declared::Channel(*id);
+        if let Err(what) =
+            self.reserve(declared, topic.len() + message_encoding.len() + texts.sum::<usize>())
+        {
+            return Ok(Err(what));
+        }
+        let mut conflict = Ok(());
+        self.write(|file| {
+            match file.add_channel_with_id(*id, *schema_id, topic, message_encoding, metadata) {
+                Err(
+                    error @ (mcap::McapError::ConflictingChannels(_)
+                    | mcap::McapError::UnknownSchema(..)),
+                ) => {
+                    conflict = Err(error.to_string());
+                    Ok(())
+                }
+                result => result.map(drop),
+            }
+        })?;
+        Ok(conflict)
+    }
+
+    /// Declares the channels as a recorder does, for a file that has lost its first chunk.
+    pub(super) fn declare_channels(
+        &mut self,
+        content: &mut ContentCheck,
+    ) -> Result<(), WriteError> {
+        for topic in Topic::ALL {
+            let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
+            let mut id = 0;
+            self.write(|file| {
+                let schema_id = match &schema {
+                    Some(schema) => file.add_schema(schema.name, schema.encoding, &schema.data)?,
+                    None => 0,
+                };
+                id = file.add_channel(schema_id, topic.name(), encoding, &BTreeMap::new())?;
+                Ok(())
+            })?;
+            // A conflict is found with the first message of the channel.
+            let _ = content.add_channel(id, topic.name());
+            if topic == Topic::Tf {
+                self.missing_transform = Some(id);
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes `/tf` before the first message, if the file has lost it. `header` and `topic` are those of
+    /// this message.
+    fn add_transform(
+        &mut self,
+        header: &MessageHeader,
+        topic: Option<Topic>,
+        content: &ContentCheck,
+    ) -> Result<(), WriteError> {
+        match self.missing_transform.take() {
+            Some(channel) if topic != Some(Topic::Tf) => {
+                self.write_transform(channel, header.log_time, content)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn write_transform(
+        &mut self,
+        channel_id: u16,
+        log_time: u64,
+        content: &ContentCheck,
+    ) -> Result<(), WriteError> {
+        let (time, origin) = (content.run().time_of_step_ns(0), content.run().origin);
+        let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: time };
+        self.write(|file| file.write_to_known_channel(&header, &encode_transform(time, origin)))
+    }
+
+    /// Checks a message, and copies it if it is sound. Returns the fault of another one.
+    pub(super) fn add_message(
+        &mut self,
+        header: &MessageHeader,
+        data: &[u8],
+        content: &mut ContentCheck,
+    ) -> Result<Result<(), String>, WriteError> {
+        let topic = content.topic(header.channel_id);
+        self.add_transform(header, topic, content)?;
+        match content.check(header, data) {
+            Ok(Sound::Row) => {
+                let step = content.row_step().unwrap_or(0);
+                self.row = Some(HeldRow { header: *header, data: data.to_vec(), step });
+            }
+            Ok(Sound::Payload) => {
+                let row = self.row.take().map(|row| (row.header, row.data, row.step));
+                if let Some((row_header, row_data, step)) = row {
+                    self.losses.end_gap(step);
+                    self.write(|file| file.write_to_known_channel(&row_header, &row_data))?;
+                }
+                self.write(|file| file.write_to_known_channel(header, data))?;
+            }
+            Ok(Sound::Other | Sound::Update(_)) => {
+                self.write(|file| file.write_to_known_channel(header, data))?;
+            }
+            Err(what) => {
+                self.losses.add_message(topic);
+                // A snapshot needs both messages.
+                self.drop_row(content);
+                return Ok(Err(what));
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    /// Marks a part of the file as lost.
+    pub(super) fn mark_gap(&mut self, content: &mut ContentCheck) {
+        self.drop_row(content);
+        content.mark_gap();
+        self.losses.begin_gap();
+    }
+
+    /// Leaves out a header without its payload.
+    fn drop_row(&mut self, content: &mut ContentCheck) {
+        if self.row.take().is_some() {
+            content.uncount_row();
+            self.losses.add_message(Some(Topic::Steps));
+        }
+    }
+
+    /// Writes the end of the file: the closing metadata with all losses, and the index.
+    pub(super) fn finish(
+        mut self,
+        closing: Option<Closing>,
+        content: &mut ContentCheck,
+        repair: &mut BTreeMap<String, String>,
+    ) -> Result<(W, Losses), WriteError> {
+        self.drop_row(content);
+        self.losses.finish();
+        let closing = self.losses.declare(closing, UNKNOWN_STOP, content);
+        self.losses.add_to(repair);
+        let metadata = Metadata { name: CLOSING_METADATA.to_owned(), metadata: closing.to_map() };
+        self.write_metadata(&metadata)?;
+        let name = REPAIR_METADATA.to_owned();
+        self.write_metadata(&Metadata { name, metadata: repair.clone() })?;
+        self.write(|file| file.finish().map(drop))?;
+        let file = self.file.take().ok_or(WriteError::Stopped)?;
+        let mut out = file.into_inner().into_inner();
+        out.flush()?;
+        Ok((out, std::mem::take(&mut self.losses)))
+    }
+}
+
+impl<W: Write> Drop for Salvage<W> {
+    fn drop(&mut self) {
+        self.abandon();
+    }
+}

@@ -1,0 +1,314 @@
+//! A walk over the records of a file, which goes on behind damage.
+//!
+//! Every record has a form that its length must match exactly, so a wrong length is noticed at its own
+//! record. Behind a damaged record, the walk searches byte by byte for the next record of a file. It
+//! does not accept records that also occur within chunks, or it would read the content of an
+//! uncompressed chunk as if no checksum belonged to it.
+
+use std::io::{Read, Seek};
+use std::ops::Range;
+
+use crc32fast::Hasher;
+use mcap::MAGIC;
+use mcap::records::op;
+
+use super::chunk::is_chunk;
+use super::window::Window;
+use crate::log::read::lengths::is_exact;
+use crate::log::read::limits::{
+    HEADER_RECORD_SIZE_BYTES_MAX, RECORD_HEADER_SIZE_BYTES, SizeLimits, TEXT_SIZE_BYTES_MAX,
+};
+use crate::log::read::read_error::ReadError;
+
+/// Longest record of an index: one entry of 16 bytes for each message of a chunk. A message has at
+/// least 31 bytes.
+const INDEX_SIZE_BYTES_MAX: u64 = 8 << 20;
+/// Bytes to examine or to add to a checksum at a time.
+const BLOCK_SIZE_BYTES: usize = 1 << 20;
+/// Opcodes from here on are those of private records.
+const PRIVATE_MIN: u8 = 0x80;
+
+/// A part of a file.
+#[derive(Debug)]
+pub(super) enum Part<'a> {
+    /// A record whose form is intact.
+    Record { byte: u64, opcode: u8, body: &'a [u8] },
+    /// A record that is not read: a long attachment of another program, a private record, or a chunk before
+    /// the description of the run.
+    Skipped { byte: u64, opcode: u8 },
+    /// Bytes that are no records.
+    Damaged { bytes: Range<u64>, cause: String },
+    /// The file ends within a record, or before its end.
+    Truncated { byte: u64 },
+}
+
+/// The form of the bytes at a position.
+enum Form {
+    Record { opcode: u8, size_bytes: usize },
+    Skipped { opcode: u8, size_bytes: u64 },
+    EndOfFile,
+    Wrong { cause: String, is_cut: bool },
+}
+
+/// A walk over the records of a file.
+pub(super) struct Walk<R> {
+    window: Window<R>,
+    /// Position of the next record.
+    at: u64,
+    limits: Option<SizeLimits>,
+    /// The checksum of the current section up to `at`.
+    section: Hasher,
+    /// The checksum of the section without its last record.
+    section_before: u32,
+    is_after_footer: bool,
+    is_done: bool,
+}
+
+impl<R: Read + Seek> Walk<R> {
+    /// Begins after the magic of a file.
+    pub(super) fn new(mut window: Window<R>) -> Result<Self, ReadError> {
+        let magic = window.bytes(0, MAGIC.len())?;
+        if magic.is_empty() {
+            return Err(ReadError::Empty);
+        }
+        if magic != MAGIC {
+            return Err(ReadError::NotMcap);
+        }
+        let mut section = Hasher::new();
+        section.update(MAGIC);
+        Ok(Self {
+            window,
+            at: MAGIC.len() as u64,
+            limits: None,
+            section,
+            section_before: 0,
+            is_after_footer: false,
+            is_done: false,
+        })
+    }
+
+    /// Sets the limits, once the size of the scene is known.
+    pub(super) fn set_limits(&mut self, limits: SizeLimits) {
+        self.limits = Some(limits);
+    }
+
+    /// Returns the position of the next record.
+    pub(super) fn position(&self) -> u64 {
+        self.at
+    }
+
+    pub(super) fn size_bytes(&self) -> u64 {
+        self.window.size_bytes()
+    }
+
+    /// Returns the checksum of the section before the record that was read last.
+    pub(super) fn checksum_before(&self) -> u32 {
+        self.section_before
+    }
+
+    /// Returns the checksum of the section up to the footer's own checksum. `footer` is its body.
+    pub(super) fn summary_checksum(&self, footer_record: &[u8]) -> u32 {
+        let mut hasher = Hasher::new_with_initial(self.section_before);
+        hasher.update(footer_record);
+        hasher.finalize()
+    }
+
+    /// Starts the next section, after its first record was read.
+    pub(super) fn restart_checksum(&mut self) {
+        self.section = Hasher::new();
+    }
+
+    /// Returns the next part, or `None` at the end of the file.
+    pub(super) fn next(&mut self) -> Result<Option<Part<'_>>, ReadError> {
+        if self.is_done {
+            return Ok(None);
+        }
+        if self.is_after_footer {
+            return self.end();
+        }
+        let byte = self.at;
+        match self.form(byte, self.limits)? {
+            Form::Record { opcode, size_bytes } => self.record(byte, opcode, size_bytes).map(Some),
+            Form::Skipped { opcode, size_bytes } => {
+                self.section_before = self.section.clone().finalize();
+                self.advance(byte + size_bytes)?;
+                Ok(Some(Part::Skipped { byte, opcode }))
+            }
+            Form::EndOfFile => {
+                self.is_done = true;
+                Ok(Some(Part::Truncated { byte }))
+            }
+            Form::Wrong { cause, is_cut } => self.damage(byte, cause, is_cut).map(Some),
+        }
+    }
+
+    fn record(&mut self, byte: u64, opcode: u8, size_bytes: usize) -> Result<Part<'_>, ReadError> {
+        let record = self.window.bytes(byte, size_bytes)?;
+        // Only these two compare it.
+        if matches!(opcode, op::DATA_END | op::FOOTER) {
+            self.section_before = self.section.clone().finalize();
+        }
+        self.section.update(record);
+        self.at = byte + size_bytes as u64;
+        self.is_after_footer = opcode == op::FOOTER;
+        Ok(Part::Record { byte, opcode, body: &record[RECORD_HEADER_SIZE_BYTES..] })
+    }
+
+    /// Returns the part that a damaged record spoils: up to the next record, or to the end.
+    fn damage(&mut self, byte: u64, cause: String, is_cut: bool) -> Result<Part<'_>, ReadError> {
+        match self.find_record(byte + 1)? {
+            Some(next) => {
+                self.advance(next)?;
+                Ok(Part::Damaged { bytes: byte..next, cause })
+            }
+            None if is_cut => {
+                self.is_done = true;
+                Ok(Part::Truncated { byte })
+            }
+            None => {
+                let end = self.size_bytes();
+                self.is_done = true;
+                Ok(Part::Damaged { bytes: byte..end, cause })
+            }
+        }
+    }
+
+    /// Checks the bytes after the footer.
+    fn end(&mut self) -> Result<Option<Part<'_>>, ReadError> {
+        self.is_done = true;
+        let (byte, end) = (self.at, self.size_bytes());
+        let rest = self.window.bytes(byte, MAGIC.len() + 1)?;
+        if rest == MAGIC {
+            return Ok(None);
+        }
+        let cause = if rest.starts_with(MAGIC) {
+            "other bytes follow the end of the recording, such as a second file"
+        } else if MAGIC.starts_with(rest) {
+            return Ok(Some(Part::Truncated { byte }));
+        } else {
+            "the last bytes are not those of an MCAP file"
+        };
+        Ok(Some(Part::Damaged { bytes: byte..end, cause: cause.to_owned() }))
+    }
+
+    /// Adds the bytes up to a position to the checksum, and continues there.
+    fn advance(&mut self, to: u64) -> Result<(), ReadError> {
+        while self.at < to {
+            let count = usize::try_from(to - self.at).unwrap_or(usize::MAX).min(BLOCK_SIZE_BYTES);
+            let block = self.window.bytes(self.at, count)?;
+            if block.is_empty() {
+                return Ok(());
+            }
+            self.section.update(block);
+            self.at += block.len() as u64;
+        }
+        Ok(())
+    }
+
+    /// Returns the position of the next record of a file, from `from` on.
+    fn find_record(&mut self, from: u64) -> Result<Option<u64>, ReadError> {
+        let mut at = from;
+        loop {
+            let block = self.window.bytes(at, BLOCK_SIZE_BYTES)?;
+            if block.len() < RECORD_HEADER_SIZE_BYTES {
+                return Ok(None);
+            }
+            let headers = block.windows(RECORD_HEADER_SIZE_BYTES);
+            let count = headers.len() as u64;
+            let candidates: Vec<u64> = headers
+                .enumerate()
+                .filter(|(_, header)| is_candidate(header))
+                .map(|(offset, _)| at + offset as u64)
+                .collect();
+            for candidate in candidates {
+                if let Form::Record { .. } = self.form(candidate, self.limits)? {
+                    return Ok(Some(candidate));
+                }
+            }
+            at += count;
+        }
+    }
+
+    /// Examines the bytes at a position.
+    fn form(&mut self, byte: u64, limits: Option<SizeLimits>) -> Result<Form, ReadError> {
+        let left = self.size_bytes() - byte;
+        let header = self.window.bytes(byte, RECORD_HEADER_SIZE_BYTES)?;
+        let Some((opcode, length)) = split_header(header) else {
+            let is_empty = header.is_empty();
+            let cause = "the file ends within a record".to_owned();
+            return Ok(if is_empty {
+                Form::EndOfFile
+            } else {
+                Form::Wrong { cause, is_cut: true }
+            });
+        };
+        let wrong = |cause: String, is_cut| Ok(Form::Wrong { cause, is_cut });
+        if opcode == 0 || (op::DATA_END + 1..PRIVATE_MIN).contains(&opcode) {
+            return wrong(format!("no record has opcode {opcode}"), false);
+        }
+        let size_bytes = length.saturating_add(RECORD_HEADER_SIZE_BYTES as u64);
+        if size_bytes > left {
+            let cause = format!("a record of {size_bytes} bytes, of which the file has {left}");
+            return wrong(cause, true);
+        }
+        let limit = size_bytes_max(opcode, limits);
+        // Without a scene, nothing bounds the memory for a chunk.
+        let is_early_chunk = opcode == op::CHUNK && limits.is_none();
+        let is_long_attachment = opcode == op::ATTACHMENT && length > limit;
+        if opcode >= PRIVATE_MIN || is_early_chunk || is_long_attachment {
+            return Ok(Form::Skipped { opcode, size_bytes });
+        }
+        if length > limit {
+            return wrong(format!("a record of {length} bytes (allowed: up to {limit})"), false);
+        }
+        let size_bytes = usize::try_from(size_bytes).unwrap_or(usize::MAX);
+        let record = self.window.bytes(byte, size_bytes)?;
+        let body = record.get(RECORD_HEADER_SIZE_BYTES..).unwrap_or(&[]);
+        let is_right = match (opcode, &limits) {
+            (op::CHUNK, Some(limits)) => is_chunk(body, limits),
+            _ if is_exact(opcode, body) => Ok(()),
+            _ => Err("its length is not that of its fields".to_owned()),
+        };
+        match is_right {
+            Ok(()) => Ok(Form::Record { opcode, size_bytes }),
+            Err(cause) => wrong(cause, false),
+        }
+    }
+}
+
+/// Returns the opcode and the length of a record.
+fn split_header(header: &[u8]) -> Option<(u8, u64)> {
+    let (opcode, length) = header.split_first()?;
+    Some((*opcode, u64::from_le_bytes(length.try_into().ok()?)))
+}
+
+/// Returns `true` if a record that occurs only outside of chunks may begin with these bytes.
+fn is_candidate(header: &[u8]) -> bool {
+    let is_outside = matches!(
+        header[0],
+        op::CHUNK
+            | op::MESSAGE_INDEX
+            | op::CHUNK_INDEX
+            | op::ATTACHMENT
+            | op::ATTACHMENT_INDEX
+            | op::STATISTICS
+            | op::METADATA
+            | op::METADATA_INDEX
+            | op::SUMMARY_OFFSET
+            | op::DATA_END
+            | op::FOOTER
+    );
+    // No record of a recording has 4 GiB.
+    is_outside && header[5..] == [0; 4]
+}
+
+/// Returns the length of the longest record of a kind.
+fn size_bytes_max(opcode: u8, limits: Option<SizeLimits>) -> u64 {
+    match (opcode, limits) {
+        (op::CHUNK, Some(limits)) => limits.chunk_record_size_bytes_max(),
+        (op::MESSAGE, Some(limits)) => limits.record_size_bytes_max(),
+        (op::ATTACHMENT, _) => HEADER_RECORD_SIZE_BYTES_MAX,
+        (op::MESSAGE_INDEX | op::STATISTICS, _) => INDEX_SIZE_BYTES_MAX,
+        _ => TEXT_SIZE_BYTES_MAX,
+    }
+}

@@ -1,0 +1,140 @@
+//! `recorder check` and `recorder repair` on damaged and unfinished files: exit codes, names, and that no
+//! input is changed.
+
+use std::fs;
+
+use integration_tests::{Finished, Process, Program, Sandbox, record, wait_for};
+use rustix::process::Signal;
+use serde_json::Value;
+
+fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
+    Process::run(Program::Recorder, sandbox, args)
+}
+
+/// Returns the path of a recording with a damaged part in the middle, and its bytes.
+fn damaged(sandbox: &Sandbox) -> (String, Vec<u8>) {
+    let whole = sandbox.path("whole.mcap");
+    recorder(sandbox, &["simulate", "curtain", "--steps", "2400", "-o", &whole]).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle..middle + 5000].fill(0);
+    let path = sandbox.path("damaged.mcap");
+    fs::write(&path, &bytes).unwrap();
+    (path, bytes)
+}
+
+#[test]
+fn a_damaged_recording_is_found_repaired_and_verified() {
+    let sandbox = Sandbox::new();
+    let (damaged, bytes) = damaged(&sandbox);
+    let repaired = sandbox.path("repaired.mcap");
+    let found = recorder(&sandbox, &["check", &damaged]);
+    assert_eq!(found.code, Some(3), "{}{}", found.stdout, found.stderr);
+    assert!(found.stdout.contains(&format!("cure: recorder repair {damaged} OUT.mcap")));
+    let report = recorder(&sandbox, &["repair", &damaged, &repaired, "--json"]);
+    assert_eq!(report.code, Some(3), "{}{}", report.stdout, report.stderr);
+    let report: Value = serde_json::from_str(&report.stdout).unwrap();
+    assert_eq!((&report["is_lossless"], &report["steps"][1]), (&false.into(), &2400.into()));
+    assert_eq!(report["lost_steps"].as_array().map(Vec::len), Some(1), "{report}");
+    assert_eq!(fs::read(&damaged).unwrap(), bytes, "the input is never changed");
+    let checked = recorder(&sandbox, &["check", &repaired]);
+    assert!(checked.success().contains("the file declares"));
+    let verified: Value =
+        serde_json::from_str(&recorder(&sandbox, &["verify", &repaired, "--json"]).stdout).unwrap();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    assert_eq!(verified["lost"]["/particles"], report["lost"]["/particles"]);
+    assert_eq!(verified["last_identical_step"], 2400);
+}
+
+#[test]
+fn a_repair_replaces_no_file_and_leaves_no_part_of_one() {
+    let sandbox = Sandbox::new();
+    let (damaged, bytes) = damaged(&sandbox);
+    let taken = sandbox.write("taken.mcap", "mine");
+    for (output, word) in [(&taken, "exists"), (&damaged, "this is the input")] {
+        let refused = recorder(&sandbox, &["repair", &damaged, output]);
+        assert_eq!(refused.code, Some(1), "{}{}", refused.stdout, refused.stderr);
+        assert!(refused.stderr.contains(word), "{}", refused.stderr);
+    }
+    let part = sandbox.path("run.mcap.part");
+    fs::rename(&damaged, &part).unwrap();
+    let refused = recorder(&sandbox, &["repair", &part, &sandbox.path("run.mcap"), "--overwrite"]);
+    assert!(refused.stderr.contains("choose another name for OUT"), "{}", refused.stderr);
+    assert_eq!(fs::read(&part).unwrap(), bytes);
+    let text = sandbox.write("text.mcap", "no recording");
+    let output = sandbox.path("new.mcap");
+    assert_eq!(recorder(&sandbox, &["repair", &text, &output]).code, Some(1));
+    assert!(!fs::exists(format!("{output}.part")).unwrap());
+    assert_eq!(recorder(&sandbox, &["repair", &part, &taken, "--overwrite"]).code, Some(3));
+    assert_ne!(fs::read(&taken).unwrap(), b"mine");
+}
+
+#[test]
+fn the_file_of_a_killed_recorder_is_repaired_and_that_of_a_running_one_is_being_written() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let file = sandbox.path("run.mcap");
+    let part = format!("{file}.part");
+    let recording = record(&sandbox, &file);
+    // The header of the file is on the disk after the first flush.
+    wait_for("the header of the file", || {
+        (recorder(&sandbox, &["info", &part]).code == Some(3)).then_some(())
+    });
+    let running = recorder(&sandbox, &["info", &part]);
+    assert!(running.stderr.contains("is being written by another program"), "{}", running.stderr);
+    recording.signal(Signal::KILL);
+    recording.wait();
+    let killed = recorder(&sandbox, &["info", &part]);
+    let command = format!("`recorder repair {part} OUT.mcap`");
+    assert!(killed.stderr.contains(&command), "{}", killed.stderr);
+    let repaired = sandbox.path("repaired.mcap");
+    let report = recorder(&sandbox, &["repair", &part, &repaired]);
+    assert!(matches!(report.code, Some(0 | 3)), "{}{}", report.stdout, report.stderr);
+    recorder(&sandbox, &["check", &repaired]).success();
+}
+
+#[test]
+fn a_check_of_several_files_reports_each_and_ends_with_the_worst() {
+    let sandbox = Sandbox::new();
+    let (damaged, _) = damaged(&sandbox);
+    let (whole, text) = (sandbox.path("whole.mcap"), sandbox.write("text.mcap", "no recording"));
+    recorder(&sandbox, &["check", &whole]).success();
+    let both = recorder(&sandbox, &["check", "--json", &damaged, &whole]);
+    assert_eq!(both.code, Some(3));
+    let reports: Vec<Value> =
+        both.stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(
+        reports.iter().map(|one| one["is_sound"] == true).collect::<Vec<_>>(),
+        [false, true]
+    );
+    assert!(reports[0]["findings"][0]["byte"].is_u64(), "{}", reports[0]);
+    let all = recorder(&sandbox, &["check", &text, &whole]);
+    assert_eq!(all.code, Some(1));
+    assert!(
+        all.stdout.contains("sound") && all.stderr.contains(&text),
+        "{}{}",
+        all.stdout,
+        all.stderr
+    );
+}
+
+#[test]
+fn a_repaired_simulation_without_its_last_commands_is_verified_up_to_its_end() {
+    let sandbox = Sandbox::new();
+    let commands = r#"{"step":990,"kind":"cut","constraint":7}"#;
+    let (commands, whole) = (sandbox.write("cut.jsonl", commands), sandbox.path("whole.mcap"));
+    let args = ["simulate", "curtain", "--steps", "1000", "--commands", &commands, "-o", &whole];
+    recorder(&sandbox, &args).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    // The metadata at the end follow the last chunk and its message indexes.
+    let end = bytes.windows(11).rposition(|text| text == b"stop_reason").unwrap();
+    bytes[end - 25_000] ^= 1;
+    let (damaged, repaired) = (sandbox.path("damaged.mcap"), sandbox.path("repaired.mcap"));
+    fs::write(&damaged, &bytes).unwrap();
+    let report = recorder(&sandbox, &["repair", &damaged, &repaired, "--json"]);
+    let report: Value = serde_json::from_str(&report.stdout).unwrap();
+    assert_eq!(report["lost"]["/outcomes"], 1, "{report}");
+    let verified = recorder(&sandbox, &["verify", &repaired]).success();
+    assert!(verified.contains("steps bit-identical (0..="), "{verified}");
+    assert!(verified.contains("missing: /outcomes 1"), "{verified}");
+}
