@@ -42,6 +42,8 @@ pub struct Summary {
     pub last_step: u64,
     /// Size of the recording in bytes.
     pub size_bytes: u64,
+    /// The report of the recorder, with the messages that were lost.
+    pub recorded: String,
     /// First line of the report of `recorder verify`.
     pub verified: String,
 }
@@ -89,7 +91,7 @@ impl HeldState {
 /// Runs a storm on a node of its own, records it, and verifies the recording in another process.
 ///
 /// # Panics
-/// If a program fails, a message is missing in the recording, or the recording is not bit-identical.
+/// If a program fails, or the recording is not bit-identical up to the last step.
 pub fn run(storm: Storm) -> Summary {
     let sandbox = Sandbox::new();
     let file = sandbox.path("storm.mcap");
@@ -99,7 +101,9 @@ pub fn run(storm: Storm) -> Summary {
     let recording = record(&sandbox, &file);
     let counts = send(&sandbox, &held, storm);
     ctl(&sandbox, &["pause"]);
-    recording.interrupt().success();
+    let recorded = recording.interrupt();
+    // A busy machine may lose snapshots, which the file declares.
+    assert!(matches!(recorded.code, Some(0 | 3)), "{}", recorded.stderr);
     let status = ctl(&sandbox, &["status"]);
     node.interrupt().success();
     let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
@@ -108,7 +112,7 @@ pub fn run(storm: Storm) -> Summary {
     let last_step = status["step"].as_u64().expect("a step");
     assert!(verified.contains(&format!("..={last_step})")), "{verified}, not up to {last_step}");
     let size_bytes = fs::metadata(&file).expect("the recording").len();
-    Summary { counts, last_step, size_bytes, verified }
+    Summary { counts, last_step, size_bytes, recorded: recorded.stdout, verified }
 }
 
 /// Sends random commands from several clients at the same time. Each waits for the outcome of a command

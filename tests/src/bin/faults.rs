@@ -76,9 +76,10 @@ fn main() -> anyhow::Result<()> {
 }
 
 fn run_storm(commands: u64) {
-    let Summary { counts, last_step, size_bytes, verified } =
+    let Summary { counts, last_step, size_bytes, recorded, verified } =
         storm::run(Storm { clients: STORM_CLIENTS, commands });
     let Counts { applied, rejected } = counts;
+    eprintln!("{recorded}");
     eprintln!(
         "{applied} commands applied and {rejected} rejected within {last_step} steps, recorded in {size_bytes} \
          bytes: {verified}"

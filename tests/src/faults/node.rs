@@ -71,11 +71,12 @@ impl World {
 
     /// Ends all programs, without a kill where that is possible, and checks their recordings.
     pub(super) fn end_all(&mut self) {
-        self.clients = Default::default();
         for slot in 0..self.recorders.len() {
             self.end_recorder(slot, Ending::Interrupt);
         }
         self.end_clients();
+        // After the members, because a client asks the node whether it has forgotten them.
+        self.clients = Default::default();
         self.end_bridge(Ending::Interrupt);
         self.end_node(Ending::Interrupt);
     }
