@@ -93,7 +93,7 @@ impl Recording {
     fn has(&self, message: &Message) -> bool {
         let step = message.step();
         let is_snapshot = [Topic::Steps, Topic::Particles].contains(&message.topic());
-        let is_due = step % KEYFRAME_PERIOD == 0
+        let is_due = step.is_multiple_of(KEYFRAME_PERIOD)
             || step == RESET
             || self.selection.has_snapshot(u32::try_from(step).unwrap());
         self.selection.has_topic(message.topic()) && (is_due || !is_snapshot)

@@ -59,6 +59,9 @@ pub struct Solver {
     pub(crate) scene_step: u64,
     /// Derived state that commands of this boundary have made out of date.
     pub(crate) due: Due,
+    /// True if the tethers were derived since the last step. They then follow further tears, so that they
+    /// depend on the commands of a boundary, and not on when these arrive.
+    pub(crate) has_new_tethers: bool,
     /// Constraints that a command of this boundary may take over.
     pub(crate) offered: Option<Box<Prepared>>,
     /// True if a state was put in place since the last step. The next step publishes it, and
@@ -115,12 +118,14 @@ impl Solver {
             grabs: Vec::with_capacity(particle_count),
             scene_step: 0,
             due: Due::ALL,
+            has_new_tethers: false,
             is_put_in_place: false,
             frozen_count: 0,
             offered: None,
             model: Arc::new(model),
         };
         solver.finish_boundary();
+        solver.has_new_tethers = false;
         solver
     }
 
@@ -174,6 +179,7 @@ impl Solver {
         }
         if tethers {
             self.derive_tethers();
+            self.has_new_tethers = true;
         }
     }
 
@@ -241,6 +247,7 @@ impl Solver {
     pub(crate) fn tear(&mut self, constraint: u32, cause: TearCause) {
         self.torn.tear(constraint, cause);
         self.store.tear(constraint);
+        self.due.tethers |= self.has_new_tethers;
     }
 
     /// Length of a substep in seconds.

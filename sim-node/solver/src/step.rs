@@ -47,6 +47,7 @@ impl Solver {
     #[must_use]
     pub fn step_unless(&mut self, stop: &AtomicBool) -> bool {
         self.finish_boundary();
+        self.has_new_tethers = false;
         if self.is_put_in_place {
             self.publish_put_in_place();
             return true;

@@ -170,6 +170,37 @@ fn a_state_from_before_a_tear_has_its_tethers_again() {
 }
 
 #[test]
+fn the_commands_of_a_boundary_have_the_same_effect_together_and_one_by_one() {
+    let pin = Action::Pin { particle: 41 };
+    let cut = Action::Cut { constraint: 1 };
+    let across = Action::CutRadius { center: [0.4, -0.4, 0.0], radius: 0.1 };
+    let soft = set(Parameter::Compliance, 1e-4);
+    for actions in [
+        [pin, cut, across],
+        [cut, pin, across],
+        [Action::Reset, cut, pin],
+        [soft, cut, Action::Unpin { particle: 0 }],
+        [cut, Action::Reset, across],
+    ] {
+        let (mut together, mut one_by_one) = (solver(SCENE), solver(SCENE));
+        for solver in [&mut together, &mut one_by_one] {
+            solver.step();
+        }
+        for action in &actions {
+            together.apply(1, action).unwrap();
+            one_by_one.apply(1, action).unwrap();
+            one_by_one.finish_boundary();
+        }
+        for _ in 0..30 {
+            together.step();
+            one_by_one.step();
+            assert_eq!(together.keyframe(), one_by_one.keyframe(), "{actions:?}");
+            assert_eq!(together.state_hash(), one_by_one.state_hash(), "{actions:?}");
+        }
+    }
+}
+
+#[test]
 fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
     let solver = solver(SCENE);
     let action = |name: &str, value: f32| Action::Set {

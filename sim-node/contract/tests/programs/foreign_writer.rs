@@ -4,6 +4,7 @@
 //! It is an example target because only this package names iceoryx2. Tests start it.
 #![allow(
     clippy::unwrap_used,
+    clippy::panic,
     clippy::print_stderr,
     reason = "only tests run it, and read its output"
 )]

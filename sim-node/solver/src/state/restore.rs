@@ -72,7 +72,7 @@ impl Solver {
 
     fn restore_constraints(&mut self, keyframe: &Keyframe) {
         self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
-        self.due = Due::default();
+        (self.due, self.has_new_tethers) = (Due::default(), false);
         if self.settings.tethers {
             self.replace_tethers(keyframe.tethers.clone());
         }
