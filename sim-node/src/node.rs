@@ -114,8 +114,10 @@ pub(crate) struct Node {
     grab_connections: GrabConnections,
     lockstep: Lockstep,
     history: History,
-    /// Command that is prepared beside the loop.
+    /// Commands that are prepared beside the loop.
     job: Option<Job>,
+    /// Client whose next command needs a job.
+    waiting: Option<u64>,
     /// Memory for the next one.
     spare: Option<Spare>,
     /// A command has been applied since the last step.
@@ -165,6 +167,7 @@ impl Node {
             lockstep: Lockstep::new(options.lockstep_timeout),
             history: History::new(options.history_bytes, &solver)?,
             job: None,
+            waiting: None,
             spare: None,
             is_commanded: false,
             boundary: Boundary::Open,

@@ -107,7 +107,7 @@ fn prepared_constraints_change_no_bit() {
     ];
     let mut torn_counts = Vec::new();
     for (round, action) in actions.iter().cycle().take(60).enumerate() {
-        let plan = assisted.solver.plan(action);
+        let plan = assisted.solver.plan([*action]);
         let prepared = assisted.prepare(plan);
         // The scene goes on between the plan and the command, and sometimes changes what it was made
         // from.
@@ -144,6 +144,44 @@ fn prepared_constraints_change_no_bit() {
     }
     assert!(assisted.plan_count > 40, "{}", assisted.plan_count);
     assert!(torn_counts.iter().any(|count| *count > 0), "nothing tore");
+}
+
+#[test]
+fn settings_that_follow_each_other_are_prepared_together() {
+    let actions = [
+        set(Parameter::Compliance, 1e-4),
+        set(Parameter::Substeps, 3.0),
+        set(Parameter::Stiffness, 0.5),
+        set(Parameter::Compliance, 1e-5),
+        set(Parameter::Gravity, 1.0),
+        set(Parameter::MaxStretch, 1.1),
+    ];
+    let mut plain = solver(SCENE);
+    let mut assisted = Assisted { solver: plain.clone(), spare: None, plan_count: 0 };
+    for _ in 0..3 {
+        let plan = assisted.solver.plan(actions);
+        let prepared = assisted.prepare(plan);
+        let apply = |solver: &mut Solver| {
+            for action in &actions {
+                // Some are rejected.
+                let _applied = solver.apply(1, action);
+            }
+        };
+        apply(&mut plain);
+        assisted.finish(prepared, apply);
+        for _ in 0..20 {
+            plain.step();
+            assisted.solver.step();
+            assert_eq!(plain.state_hash(), assisted.solver.state_hash());
+        }
+        assert_eq!(plain.keyframe(), assisted.solver.keyframe());
+    }
+    // The same values need no work, and they cancel a change.
+    assert!(assisted.solver.plan(actions).is_none());
+    assert_eq!(assisted.plan_count, 1);
+    let there_and_back = [set(Parameter::Substeps, 5.0), set(Parameter::Substeps, 3.0)];
+    assert!(assisted.solver.plan(there_and_back[..1].iter().copied()).is_some());
+    assert!(assisted.solver.plan(there_and_back).is_none());
 }
 
 #[test]
@@ -208,7 +246,7 @@ fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
         value: ParameterValue::Number(value),
         constraint_kind: None,
     };
-    assert!(solver.plan(&action("compliance", 1e-3)).is_some());
+    assert!(solver.plan([action("compliance", 1e-3)]).is_some());
     for action in [
         action("compliance", -1.0),
         action("compliance", f32::NAN),
@@ -218,11 +256,11 @@ fn nothing_is_planned_for_commands_that_are_cheap_or_wrong() {
         Action::Pin { particle: 1 },
         Action::Reset,
     ] {
-        assert!(solver.plan(&action).is_none(), "{action:?}");
+        assert!(solver.plan([action]).is_none(), "{action:?}");
     }
     assert!(solver.plan_state(&solver.keyframe()).is_none());
     let small = Solver::new(&Scene::from_toml("version = 1", "small").unwrap());
-    assert!(small.plan(&action("compliance", 1e-3)).is_none());
+    assert!(small.plan([action("compliance", 1e-3)]).is_none());
 }
 
 #[test]
@@ -230,14 +268,14 @@ fn constraints_of_another_scene_are_ignored() {
     let mut first = solver(SCENE);
     let mut second = solver(&SCENE.replace("columns = 28", "columns = 29"));
     let action = set(Parameter::Compliance, 1e-4);
-    first.offer(second.plan(&action).unwrap().prepare(None));
+    first.offer(second.plan([action]).unwrap().prepare(None));
     assert!(first.withdraw().is_none());
     // A spare of another scene is of no use, either.
-    second.offer(second.plan(&action).unwrap().prepare(None));
+    second.offer(second.plan([action]).unwrap().prepare(None));
     let spare = second.withdraw();
     assert!(spare.is_some());
     let mut plain = first.clone();
-    first.offer(first.plan(&action).unwrap().prepare(spare));
+    first.offer(first.plan([action]).unwrap().prepare(spare));
     for solver in [&mut plain, &mut first] {
         solver.apply(1, &action).unwrap();
         for _ in 0..5 {

@@ -23,22 +23,22 @@ impl Node {
             // The next step shows it without further changes.
             return Ok(());
         }
-        let first = match self.finish_job(stop) {
-            None => None,
-            Some((request, Done::Scene(loaded))) => {
+        let prepared = match self.finish_job(stop) {
+            None => Vec::new(),
+            Some((requests, Done::Scene(loaded))) => {
                 self.publisher.publish_left_out(&self.solver, self.position())?;
-                return self.answer_load(&request, loaded);
+                return requests.first().map_or(Ok(()), |load| self.answer_load(load, loaded));
             }
-            Some((request, Done::Constraints(prepared))) => {
+            Some((requests, Done::Constraints(prepared))) => {
                 self.solver.offer(*prepared);
-                Some(request)
+                requests
             }
         };
-        let is_prepared = first.is_some();
+        let prepared_count = prepared.len();
         let lost =
             self.grab_connections.remove_lost(monotonic_ns(), || self.publisher.connections());
         // Together they are at most one turn, so that readers can keep up with the outcomes.
-        let turn = self.inbox.next_turn(COMMANDS_PER_STEP_MAX - lost.len(), first);
+        let turn = self.inbox.next_turn(COMMANDS_PER_STEP_MAX - lost.len(), prepared);
         let has_pause =
             turn.iter().any(|request| request.received.command.action() == Action::Pause);
         let has_any = !turn.is_empty() || !lost.is_empty();
@@ -53,12 +53,13 @@ impl Node {
             self.polling.on_commands(monotonic_ns());
         }
         let mut turn = turn.into_iter();
-        if is_prepared && let Some(request) = turn.next() {
+        for request in turn.by_ref().take(prepared_count) {
             self.apply(&request);
         }
         for request in turn {
             self.process(request, stop)?;
         }
+        self.begin_next_job();
         self.solver.finish_boundary();
         if let Some(spare) = self.solver.withdraw() {
             self.spare = Some(spare);
@@ -89,13 +90,16 @@ impl Node {
         if let Action::Load { scene } = request.received.command.action() {
             return self.load(request, scene, stop);
         }
-        if let Some(request) = self.prepare_beside(request) {
+        if self.is_long(&request) {
+            self.put_aside(request);
+        } else {
             self.apply(&request);
         }
         Ok(())
     }
 
-    fn apply(&mut self, request: &Request) {
+    /// Applies a command, and logs its outcome.
+    pub(super) fn apply(&mut self, request: &Request) {
         // A fresh status follows, so that `ctl status` shows the effect.
         self.next_status_ns = 0;
         let mut command = request.received.command;

@@ -86,17 +86,16 @@ impl Inbox {
         queue.insert((command.sequence, request.arrived_before), request);
     }
 
-    /// Removes the commands of one turn, at most `count_max`, in the order of application. `first` comes
+    /// Removes the commands of one turn, at most `count_max`, in the order of application. `first` come
     /// before all others. A turn ends with the first load, because a load takes long, and with a
     /// command that puts a state in place, because the next step shows this state without further
     /// changes.
-    pub(super) fn next_turn(&mut self, count_max: usize, first: Option<Request>) -> Vec<Request> {
+    pub(super) fn next_turn(&mut self, count_max: usize, first: Vec<Request>) -> Vec<Request> {
         let ends_turn = |request: &Request| {
             let action = request.received.command.action();
             matches!(action, Action::Load { .. } | Action::Rewind { .. } | Action::Restore { .. })
         };
-        let mut turn = Vec::new();
-        turn.extend(first);
+        let mut turn = first;
         while turn.len() < count_max
             && !turn.last().is_some_and(ends_turn)
             && let Some(request) = self.next()
@@ -104,6 +103,26 @@ impl Inbox {
             turn.push(request);
         }
         turn
+    }
+
+    /// Removes the next command of a client, and while all are settings the ones after it, at most
+    /// `count_max`.
+    pub(super) fn next_settings(&mut self, client_id: u64, count_max: usize) -> Vec<Request> {
+        let is_setting =
+            |request: &Request| matches!(request.received.command.action(), Action::Set { .. });
+        let mut settings = Vec::new();
+        while settings.len() < count_max
+            && settings.iter().all(is_setting)
+            && (settings.is_empty() || self.first(client_id).is_some_and(is_setting))
+            && let Some(request) = self.remove_first(client_id)
+        {
+            settings.push(request);
+        }
+        settings
+    }
+
+    fn first(&self, client_id: u64) -> Option<&Request> {
+        self.queues.get(&client_id)?.values().next()
     }
 
     /// Keeps the further commands of a client until [`Self::release`].
@@ -169,10 +188,10 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add([pin(9, 1), pin(9, 2), pin(4, 7), pin(9, 3), pin(4, 6)]);
         assert_eq!(
-            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)),
+            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new())),
             [(4, 6), (9, 1), (4, 7), (9, 2), (9, 3)]
         );
-        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX, None).is_empty());
+        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new()).is_empty());
     }
 
     #[test]
@@ -180,10 +199,10 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add((0..1500).map(|sequence| pin(1, sequence)));
         inbox.add([pin(2, 0)]);
-        let first = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None));
+        let first = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new()));
         assert_eq!(first.len(), COMMANDS_PER_STEP_MAX);
         assert_eq!(first[..3], [(1, 0), (2, 0), (1, 1)]);
-        let rest = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None));
+        let rest = order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new()));
         assert_eq!((rest.len(), rest[0]), (1501 - COMMANDS_PER_STEP_MAX, (1, 1023)));
     }
 
@@ -193,10 +212,10 @@ mod tests {
         let flood = |round| (0..COMMANDS_PER_STEP_MAX as u64).map(move |id| pin(id, round));
         inbox.add([pin(u64::MAX - 1, 0)]);
         inbox.add(flood(0));
-        assert_eq!(inbox.next_turn(COMMANDS_PER_STEP_MAX, None).len(), COMMANDS_PER_STEP_MAX);
+        assert_eq!(inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new()).len(), COMMANDS_PER_STEP_MAX);
         inbox.add(flood(1));
         assert_eq!(
-            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None))[..2],
+            order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new()))[..2],
             [(u64::MAX - 1, 0), (0, 1)]
         );
     }
@@ -213,7 +232,7 @@ mod tests {
         inbox.add([pin(u64::MAX, 0)]);
         let is_served = |turn: &[Request]| order(turn).contains(&(u64::MAX, 0));
         let turns = (1..=100).find(|_| {
-            let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
+            let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new());
             inbox.add(flood(COMMANDS_PER_STEP_MAX));
             is_served(&turn)
         });
@@ -230,8 +249,11 @@ mod tests {
             let command = Command::new(1, 2, action);
             let replaces = ReceivedCommand { command, connection: ConnectionId::default() };
             inbox.add([pin(1, 1), replaces, pin(1, 3)]);
-            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)), [(1, 1), (1, 2)]);
-            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)), [(1, 3)]);
+            assert_eq!(
+                order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new())),
+                [(1, 1), (1, 2)]
+            );
+            assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new())), [(1, 3)]);
         }
     }
 
@@ -247,7 +269,7 @@ mod tests {
         inbox.add([pin(1, 1), pin(1, 4)]);
         inbox.add_states((0..RESTORES_MAX as u64).map(|index| state(2 + 3 * index)));
         assert!(!inbox.has_room_for_states());
-        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
+        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new());
         assert_eq!(order(&turn), [(1, 1), (1, 2)]);
         assert!(turn[1].state.is_some());
         assert!(inbox.has_room_for_states());
@@ -258,11 +280,11 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.hold(5);
         inbox.add([pin(5, 1), pin(6, 1), pin(7, 1), pin(7, 2)]);
-        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
+        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new());
         assert_eq!(order(&turn), [(6, 1), (7, 1), (7, 2)]);
-        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX, None).is_empty());
+        assert!(inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new()).is_empty());
         inbox.release();
-        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, None)), [(5, 1)]);
+        assert_eq!(order(&inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new())), [(5, 1)]);
     }
 
     #[test]
@@ -272,14 +294,34 @@ mod tests {
         let arrivals = |turn: &[Request]| -> Vec<_> {
             turn.iter().map(|request| request.arrived_before).collect()
         };
-        let turn = inbox.next_turn(2, None);
+        let turn = inbox.next_turn(2, Vec::new());
         assert_eq!(arrivals(&turn), [0, 1]);
         for request in turn.into_iter().rev() {
             inbox.put_back(request);
         }
-        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
+        let turn = inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new());
         assert_eq!((order(&turn), arrivals(&turn)), (vec![(5, 1), (5, 1), (5, 2)], vec![0, 1, 2]));
         assert_eq!((inbox.waiting_count, inbox.state_count), (0, 0));
+    }
+
+    #[test]
+    fn settings_of_a_client_that_follow_each_other_are_removed_together() {
+        let set = |sequence| {
+            let (parameter, value) = (Text::cut("damping"), sim_contract::ParameterValue::Off);
+            let action = Action::Set { parameter, value, constraint_kind: None };
+            let command = Command::new(5, sequence, action);
+            ReceivedCommand { command, connection: ConnectionId::default() }
+        };
+        let mut inbox = Inbox::default();
+        inbox.hold(5);
+        inbox.add([set(1), set(2), set(3), pin(5, 4), set(5), pin(6, 1)]);
+        let order_of = |inbox: &mut Inbox, count_max| order(&inbox.next_settings(5, count_max));
+        assert_eq!(order_of(&mut inbox, 2), [(5, 1), (5, 2)]);
+        assert_eq!(order_of(&mut inbox, 9), [(5, 3)]);
+        assert_eq!(order_of(&mut inbox, 9), [(5, 4)]);
+        assert_eq!(order_of(&mut inbox, 9), [(5, 5)]);
+        assert_eq!(order_of(&mut inbox, 9), []);
+        assert_eq!(order(&inbox.next_turn(9, Vec::new())), [(6, 1)]);
     }
 
     #[test]
@@ -288,14 +330,14 @@ mod tests {
         let first = |inbox: &mut Inbox, action| {
             let command = Command::new(1, 1, action);
             inbox.add([ReceivedCommand { command, connection: ConnectionId::default() }]);
-            inbox.next_turn(1, None).pop()
+            inbox.next_turn(1, Vec::new())
         };
         let cheap = first(&mut inbox, Action::Pause);
         let rewind = first(&mut inbox, Action::Rewind { to_step: Some(3), back_steps: None });
         inbox.add([pin(0, 5), pin(0, 6)]);
         assert_eq!(order(&inbox.next_turn(2, cheap)), [(1, 1), (0, 5)]);
         assert_eq!(order(&inbox.next_turn(2, rewind)), [(1, 1)]);
-        assert_eq!(order(&inbox.next_turn(2, None)), [(0, 6)]);
+        assert_eq!(order(&inbox.next_turn(2, Vec::new())), [(0, 6)]);
     }
 
     #[test]
@@ -303,7 +345,7 @@ mod tests {
         let mut inbox = Inbox::default();
         inbox.add((0..INBOX_MAX as u64).map(|sequence| pin(1, sequence)));
         assert!(!inbox.has_room());
-        inbox.next_turn(COMMANDS_PER_STEP_MAX, None);
+        inbox.next_turn(COMMANDS_PER_STEP_MAX, Vec::new());
         assert!(inbox.has_room());
     }
 }

@@ -10,10 +10,11 @@ use self::scene::{Loaded, Refusal};
 use self::work::Work;
 use super::inbox::Request;
 
-/// A command whose work takes longer than the loop can wait.
+/// Commands of a client whose work takes longer than the loop can wait.
 #[derive(Debug)]
 pub(super) struct Job {
-    request: Request,
+    /// A single one, or settings.
+    requests: Vec<Request>,
     work: Work<Done>,
 }
 

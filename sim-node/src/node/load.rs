@@ -36,7 +36,7 @@ impl Node {
             return Ok(());
         }
         match self.finish_job(stop) {
-            Some((request, Done::Scene(loaded))) => self.answer_load(&request, loaded),
+            Some((_, Done::Scene(loaded))) => self.answer_load(&request, loaded),
             // This node ends.
             _ => Ok(()),
         }

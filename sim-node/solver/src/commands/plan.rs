@@ -6,7 +6,7 @@ use sim_types::{Action, KindFilter};
 
 use super::preparation::{Plan, Prepared, Spare};
 use crate::constraints::tethers::TetherBasis;
-use crate::parameters::Parameters;
+use crate::parameters::{Affected, Parameters};
 use crate::solver::Solver;
 use crate::state::keyframe::Keyframe;
 
@@ -15,24 +15,34 @@ use crate::state::keyframe::Keyframe;
 const CONSTRAINTS_MIN: usize = 2000;
 
 impl Solver {
-    /// Returns the work that makes an action cheap; None if it is cheap already, and for an action that
-    /// [`Self::apply`] rejects.
-    pub fn plan(&self, action: &Action) -> Option<Plan> {
-        match *action {
-            Action::Set { parameter, value, constraint_kind } => {
-                let kind = match constraint_kind {
-                    None => None,
-                    Some(KindFilter::Known(kind)) => Some(kind),
-                    Some(KindFilter::Unknown) => return None,
-                };
-                let mut parameters = self.parameters;
-                parameters.set(parameter.as_str(), value, kind, self.context()).ok()?;
-                self.plan_for(&parameters, self.torn(), || self.tether_basis())
+    /// Returns the work that makes a reset, or settings that follow each other, cheap. None if they are
+    /// cheap already, if [`Self::apply`] rejects them, and for other actions.
+    pub fn plan(&self, actions: impl IntoIterator<Item = Action>) -> Option<Plan> {
+        let (mut parameters, mut affected) = (self.parameters, Affected::Nothing);
+        for action in actions {
+            match action {
+                Action::Reset => {
+                    let basis = self.settings.tethers.then(|| self.initial_tether_basis());
+                    return self.plan_for(&self.initial_parameters, &[], basis);
+                }
+                Action::Set { parameter, value, constraint_kind } => {
+                    let kind = match constraint_kind {
+                        None => None,
+                        Some(KindFilter::Known(kind)) => Some(kind),
+                        Some(KindFilter::Unknown) => continue,
+                    };
+                    // A rejected setting changes nothing.
+                    let set = parameters.set(parameter.as_str(), value, kind, self.context());
+                    affected = affected.max(set.unwrap_or(Affected::Nothing));
+                }
+                _ => {}
             }
-            Action::Reset => {
-                self.plan_for(&self.initial_parameters, &[], || self.initial_tether_basis())
-            }
-            _ => None,
+        }
+        let has_new_tethers = self.settings.tethers && affected == Affected::RigidPaths;
+        let tether_basis = has_new_tethers.then(|| self.tether_basis());
+        match affected {
+            Affected::Nothing => None,
+            _ => self.plan_for(&parameters, self.torn(), tether_basis),
         }
     }
 
@@ -40,19 +50,19 @@ impl Solver {
     /// cheap already, and for a keyframe that they reject.
     pub fn plan_state(&self, keyframe: &Keyframe) -> Option<Plan> {
         self.check_keyframe(keyframe).ok()?;
-        self.plan_for(&keyframe.parameters, &keyframe.torn, || keyframe.tethers.clone())
+        let tether_basis = self.settings.tethers.then(|| keyframe.tethers.clone());
+        self.plan_for(&keyframe.parameters, &keyframe.torn, tether_basis)
     }
 
     fn plan_for(
         &self,
         parameters: &Parameters,
         torn: &[u32],
-        tether_basis: impl FnOnce() -> TetherBasis,
+        tether_basis: Option<TetherBasis>,
     ) -> Option<Plan> {
         if self.constraint_count() < CONSTRAINTS_MIN {
             return None;
         }
-        let tether_basis = self.settings.tethers.then(tether_basis);
         let has_tethers = tether_basis
             .as_ref()
             .is_none_or(|basis| self.tethers.are_derived_from(parameters, basis));

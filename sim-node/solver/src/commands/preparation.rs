@@ -27,7 +27,7 @@ pub struct Plan {
     pub(super) parameters: Parameters,
     /// In any order.
     pub(super) torn: Vec<u32>,
-    /// None in scenes without tethers.
+    /// None in scenes without tethers, and if they stay.
     pub(super) tether_basis: Option<TetherBasis>,
 }
 
@@ -59,10 +59,12 @@ impl Plan {
         let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup);
         // Nothing has a location that could move.
         let _moved = store.configure(&builder, self.fields, &is_torn);
-        let tethers = self.tether_basis.map(|basis| {
+        if self.fields.tethers {
+            // Those of the spare.
             store.detach_tethers(self.model.particle_count());
-            Tethers::new(&self.model, &self.parameters, basis)
-        });
+        }
+        let new_tethers = |basis| Tethers::new(&self.model, &self.parameters, basis);
+        let tethers = self.tether_basis.map(new_tethers);
         Prepared { store, tethers: tethers.unwrap_or_default(), model: self.model }
     }
 }

@@ -1,6 +1,6 @@
 //! The loop's side of a job: it starts the work, and takes the result over at a boundary.
 
-use sim_contract::{Action, Stop, Text};
+use sim_contract::{Action, COMMANDS_PER_STEP_MAX, Stop, Text};
 use sim_solver::{Keyframe, Plan};
 
 use super::scene::load;
@@ -26,66 +26,81 @@ impl Node {
         source: Text,
     ) -> Result<(), String> {
         let (overrides, rate_hz) = (self.options.overrides(), self.scene.solver.rate_hz);
-        self.begin_job("load", request, move || {
+        self.begin_job("load", std::slice::from_ref(request), move || {
             Done::Scene(load(source.as_str(), overrides, rate_hz).map(Box::new))
-        })
+        })?;
+        self.inbox.hold(request.received.command.client_id);
+        Ok(())
     }
 
     fn begin_job(
         &mut self,
         name: &str,
-        request: &Request,
+        requests: &[Request],
         work: impl FnOnce() -> Done + Send + 'static,
     ) -> Result<(), String> {
         let work = self.cpus.lend(|| Work::start(name, work))?;
-        self.inbox.hold(request.received.command.client_id);
-        self.job = Some(Job { request: request.clone(), work });
+        self.job = Some(Job { requests: requests.to_vec(), work });
         Ok(())
     }
 
     /// Returns the job whose work is done. If a member has joined meanwhile, it waits for the work.
-    pub(in crate::node) fn finish_job(&mut self, stop: &Stop) -> Option<(Request, Done)> {
+    pub(in crate::node) fn finish_job(&mut self, stop: &Stop) -> Option<(Vec<Request>, Done)> {
         let job = self.job.as_ref()?;
         let done = if self.works_beside() { job.work.poll() } else { job.work.wait(stop) };
         let done = done?;
         self.inbox.release();
-        self.job.take().map(|job| (job.request, done))
+        self.job.take().map(|job| (job.requests, done))
     }
 
-    /// Starts the work of a command beside the loop. Returns the command if it is cheap, or if nobody
-    /// waits for the loop.
-    pub(in crate::node) fn prepare_beside(&mut self, request: Request) -> Option<Request> {
-        if !self.works_beside() || !self.progress.is_stepping() {
-            return Some(request);
-        }
-        let Some(plan) = self.plan(&request) else { return Some(request) };
-        if self.job.is_some() {
-            self.inbox.hold(request.received.command.client_id);
-            self.inbox.put_back(request);
-            return None;
-        }
-        let spare = self.spare.take();
-        let prepare = || Done::Constraints(Box::new(plan.prepare(spare)));
-        match self.begin_job("prepare", &request, prepare) {
-            Ok(()) => None,
-            // Without a thread, the command does the work itself.
-            Err(_) => Some(request),
+    /// Returns `true` for a command whose work the loop cannot wait for.
+    pub(in crate::node) fn is_long(&self, request: &Request) -> bool {
+        self.works_beside()
+            && self.progress.is_stepping()
+            && self.plan(std::slice::from_ref(request)).is_some()
+    }
+
+    /// Makes a long command, and the further ones of its client, wait for their job.
+    pub(in crate::node) fn put_aside(&mut self, request: Request) {
+        let client_id = request.received.command.client_id;
+        self.inbox.hold(client_id);
+        self.inbox.put_back(request);
+        self.waiting.get_or_insert(client_id);
+    }
+
+    /// Starts the job of the first client that waits for one, unless another job is under way. Settings
+    /// that follow each other are one job, because a client may send them faster than they are derived.
+    pub(in crate::node) fn begin_next_job(&mut self) {
+        let Some(client_id) = self.waiting.take().filter(|_| self.job.is_none()) else { return };
+        let requests = self.inbox.next_settings(client_id, COMMANDS_PER_STEP_MAX / 2);
+        let is_begun = self.plan(&requests).is_some_and(|plan| {
+            let spare = self.spare.take();
+            let prepare = || Done::Constraints(Box::new(plan.prepare(spare)));
+            self.begin_job("prepare", &requests, prepare).is_ok()
+        });
+        if !is_begun {
+            // They cancel each other out, or no thread could be started.
+            for request in &requests {
+                self.apply(request);
+            }
+            self.inbox.release();
         }
     }
 
-    fn plan(&self, request: &Request) -> Option<Plan> {
-        match request.received.command.action() {
+    fn plan(&self, requests: &[Request]) -> Option<Plan> {
+        let first = requests.first()?;
+        match first.received.command.action() {
             Action::Rewind { to_step, back_steps } => {
                 let state = self.history.find(self.step, Target { to_step, back_steps }).ok()?;
                 self.solver.plan_state(&state.keyframe())
             }
             Action::Restore { .. } => {
-                let state = request.state.as_ref()?;
+                let state = first.state.as_ref()?;
                 let is_own = state.scene_hash == self.publisher.scene_hash();
                 let bytes = state.keyframe.as_ref().filter(|_| is_own)?;
                 self.solver.plan_state(&Keyframe::decode(bytes).ok()?)
             }
-            action => self.solver.plan(&action),
+            _ => self.solver.plan(requests.iter().map(|one| one.received.command.action())),
         }
     }
 }
