@@ -1,6 +1,7 @@
 //! Memory for the particles of many states.
 
 use std::collections::TryReserveError;
+use std::ops::Range;
 
 use crate::kernels::huge_pages::refill;
 use crate::kernels::stream::copy_past_caches;
@@ -15,8 +16,10 @@ pub struct Slots {
     particles: Vec<Particle>,
     /// Particles of a slot.
     particle_count: usize,
+    /// Slots that have held no state yet. They are taken before the released ones.
+    unused: Range<usize>,
     /// The last one is taken first.
-    free: Vec<Slot>,
+    released: Vec<Slot>,
 }
 
 /// A slot that holds a state.
@@ -41,8 +44,10 @@ impl Slots {
     pub fn divide(&mut self, particle_count: usize, count_max: usize) {
         let fitting = self.particles.len().checked_div(particle_count).unwrap_or(usize::MAX);
         self.particle_count = particle_count;
-        self.free.clear();
-        self.free.extend((0..count_max.min(fitting)).rev().map(Slot));
+        self.unused = 0..count_max.min(fitting);
+        self.released.clear();
+        // A release then does not allocate.
+        self.released.reserve(self.unused.len());
     }
 
     /// Copies a state into a free slot; None if there is none.
@@ -51,7 +56,7 @@ impl Slots {
     /// If the state has another number of particles than the slots.
     pub fn store(&mut self, particles: &[Particle]) -> Option<Slot> {
         assert_eq!(particles.len(), self.particle_count, "the slots are for another scene");
-        let slot = self.free.pop()?;
+        let slot = self.unused.next().map(Slot).or_else(|| self.released.pop())?;
         let first = slot.0 * self.particle_count;
         copy_past_caches(&mut self.particles[first..][..self.particle_count], particles);
         Some(slot)
@@ -64,7 +69,7 @@ impl Slots {
 
     /// Makes a slot free.
     pub fn release(&mut self, slot: Slot) {
-        self.free.push(slot);
+        self.released.push(slot);
     }
 }
 
