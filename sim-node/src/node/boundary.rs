@@ -33,6 +33,7 @@ impl Node {
                 self.solver.offer(*prepared);
                 requests
             }
+            Some((requests, Done::Nothing)) => requests,
         };
         let prepared_count = prepared.len();
         let lost =
@@ -59,11 +60,11 @@ impl Node {
         for request in turn {
             self.process(request, stop)?;
         }
-        self.begin_next_job();
         self.solver.finish_boundary();
         if let Some(spare) = self.solver.withdraw() {
             self.spare = Some(spare);
         }
+        self.begin_next_job();
         let time_scale = self.progress.time_scale;
         self.pace.set_time_scale(time_scale, monotonic_ns());
         self.publisher.publish_parameters(&self.solver, self.step + 1, time_scale)
@@ -99,7 +100,7 @@ impl Node {
     }
 
     /// Applies a command, and logs its outcome.
-    pub(super) fn apply(&mut self, request: &Request) {
+    fn apply(&mut self, request: &Request) {
         // A fresh status follows, so that `ctl status` shows the effect.
         self.next_status_ns = 0;
         let mut command = request.received.command;

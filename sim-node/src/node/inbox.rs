@@ -42,11 +42,16 @@ type ClientQueue = BTreeMap<(u64, u64), Request>;
 /// Number of commands from which on the inbox accepts no more. The rest waits in shared memory, where
 /// each connection has a bounded queue.
 const INBOX_MAX: usize = 16 * COMMANDS_PER_STEP_MAX;
+/// Number of commands of held clients from which on the inbox accepts no more from anybody. Below it, a
+/// held client that goes on sending keeps nobody else out.
+const HELD_MAX: usize = 4 * INBOX_MAX;
 
 impl Inbox {
     /// Returns `true` if the inbox accepts more commands.
     pub(super) fn has_room(&self) -> bool {
-        self.waiting_count < INBOX_MAX
+        let of_held = self.held.iter().filter_map(|client_id| self.queues.get(client_id));
+        let held_count: usize = of_held.map(BTreeMap::len).sum();
+        self.waiting_count - held_count < INBOX_MAX && held_count < HELD_MAX
     }
 
     /// Returns `true` if the inbox accepts more states.
@@ -338,6 +343,18 @@ mod tests {
         assert_eq!(order(&inbox.next_turn(2, cheap)), [(1, 1), (0, 5)]);
         assert_eq!(order(&inbox.next_turn(2, rewind)), [(1, 1)]);
         assert_eq!(order(&inbox.next_turn(2, Vec::new())), [(0, 6)]);
+    }
+
+    #[test]
+    fn commands_of_held_clients_take_no_room_from_the_others() {
+        let mut inbox = Inbox::default();
+        inbox.hold(1);
+        inbox.add((0..INBOX_MAX as u64).map(|sequence| pin(1, sequence)));
+        assert!(inbox.has_room());
+        inbox.add((INBOX_MAX as u64..HELD_MAX as u64).map(|sequence| pin(1, sequence)));
+        assert!(!inbox.has_room(), "their memory has a limit, too");
+        inbox.release();
+        assert!(!inbox.has_room());
     }
 
     #[test]

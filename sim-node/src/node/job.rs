@@ -15,7 +15,8 @@ use super::inbox::Request;
 pub(super) struct Job {
     /// A single one, or settings.
     requests: Vec<Request>,
-    work: Work<Done>,
+    /// None if nothing is left to do.
+    work: Option<Work<Done>>,
 }
 
 /// Result of the work.
@@ -23,6 +24,8 @@ pub(super) struct Job {
 pub(super) enum Done {
     /// Of a load.
     Scene(Result<Box<Loaded>, Refusal>),
-    /// Of a command that changes many constraints.
+    /// Of commands that change many constraints.
     Constraints(Box<Prepared>),
+    /// Of commands that do their work themselves.
+    Nothing,
 }

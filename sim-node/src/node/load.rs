@@ -103,7 +103,7 @@ impl Node {
                 Ok(Err(Refusal { problem, reason }))
             }
             Ok(()) => {
-                (self.scene, self.solver) = (scene, solver);
+                (self.scene, self.solver, self.spare) = (scene, solver, None);
                 Ok(Ok(run))
             }
         }

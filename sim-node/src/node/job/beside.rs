@@ -39,7 +39,7 @@ impl Node {
         requests: &[Request],
         work: impl FnOnce() -> Done + Send + 'static,
     ) -> Result<(), String> {
-        let work = self.cpus.lend(|| Work::start(name, work))?;
+        let work = Some(self.cpus.lend(|| Work::start(name, work))?);
         self.job = Some(Job { requests: requests.to_vec(), work });
         Ok(())
     }
@@ -47,8 +47,11 @@ impl Node {
     /// Returns the job whose work is done. If a member has joined meanwhile, it waits for the work.
     pub(in crate::node) fn finish_job(&mut self, stop: &Stop) -> Option<(Vec<Request>, Done)> {
         let job = self.job.as_ref()?;
-        let done = if self.works_beside() { job.work.poll() } else { job.work.wait(stop) };
-        let done = done?;
+        let done = match &job.work {
+            None => Done::Nothing,
+            Some(work) if self.works_beside() => work.poll()?,
+            Some(work) => work.wait(stop)?,
+        };
         self.inbox.release();
         self.job.take().map(|job| (job.requests, done))
     }
@@ -80,10 +83,7 @@ impl Node {
         });
         if !is_begun {
             // They cancel each other out, or no thread could be started.
-            for request in &requests {
-                self.apply(request);
-            }
-            self.inbox.release();
+            self.job = Some(Job { requests, work: None });
         }
     }
 
