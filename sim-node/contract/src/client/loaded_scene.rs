@@ -85,11 +85,20 @@ impl PendingLoads {
         &mut self.0[index]
     }
 
+    /// Returns `true` if the load of a snapshot is complete.
+    pub(crate) fn has(&self, snapshot: &SnapshotHeader) -> bool {
+        self.index_of(snapshot).is_some()
+    }
+
+    fn index_of(&self, snapshot: &SnapshotHeader) -> Option<usize> {
+        let key = LoadKey::from(snapshot);
+        self.0.iter().position(|load| load.key == key && load.is_complete())
+    }
+
     /// Removes the load of a snapshot, if it is complete, and all loads before it, which have no more
     /// states.
     pub(crate) fn remove(&mut self, snapshot: &SnapshotHeader) -> Option<LoadedScene> {
-        let key = LoadKey::from(snapshot);
-        let index = self.0.iter().position(|load| load.key == key && load.is_complete())?;
+        let index = self.index_of(snapshot)?;
         self.0.drain(..index);
         self.0.pop_front().and_then(PartialLoad::complete)
     }

@@ -82,6 +82,12 @@ impl StateAssembler {
         self.pending_changes.lost()
     }
 
+    /// Returns `true` if the load of a snapshot has arrived.
+    pub(crate) fn has_load(&self, header: &SnapshotHeader) -> bool {
+        let is_present = self.load.as_ref().is_some_and(|load| load.has_snapshot(header));
+        is_present || self.pending_loads.has(header)
+    }
+
     /// Assembles the state of a snapshot. Returns `None` if its load has not arrived, for example
     /// right after attaching; a later snapshot then contains all changes.
     pub(crate) fn assemble<'a>(
