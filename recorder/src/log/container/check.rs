@@ -134,7 +134,7 @@ impl Check {
             }
             Part::LongAttachment { attachment, checksum } => {
                 let what = attachment.check(checksum, &mut self.findings, &mut self.places);
-                what.into_iter().for_each(|what| self.not_checked(what));
+                what.map_or((), |what| self.not_checked(what));
                 Ok(SectionEnd::None)
             }
             Part::Damaged { bytes, cause } => {

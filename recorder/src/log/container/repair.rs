@@ -128,7 +128,6 @@ struct Repair<W: Write> {
     head_size_bytes: u64,
     /// A part before the metadata `run` is left out.
     is_head_damaged: bool,
-    has_scene: bool,
     /// The output, until it is created.
     out: Option<W>,
     salvage: Option<Salvage<W>>,
@@ -152,7 +151,6 @@ impl<W: Write> Repair<W> {
             head: Vec::new(),
             head_size_bytes: 0,
             is_head_damaged: false,
-            has_scene: false,
             out: Some(out),
             salvage: None,
             closing: None,
@@ -328,8 +326,6 @@ impl<W: Write> Repair<W> {
             return self.lose(byte, record_name(record.opcode()), what);
         }
         self.head_size_bytes = sum;
-        self.has_scene |=
-            matches!(&record, Record::Attachment { header, .. } if header.name == SCENE_ATTACHMENT);
         self.head.push(record);
         if self.content.is_some() && sum > HEADER_RECORD_SIZE_BYTES_MAX {
             self.begin()?;
@@ -357,7 +353,8 @@ impl<W: Write> Repair<W> {
         let Some(out) = self.out.take() else { return Ok(()) };
         let salvage = self.salvage.insert(Salvage::create(out, &self.format)?);
         if self.is_head_damaged {
-            let what = if self.has_scene { LOST_SELECTION } else { LOST_SCENE };
+            let is_scene = |one: &Record<'_>| matches!(one, Record::Attachment { header, .. } if header.name == SCENE_ATTACHMENT);
+            let what = if self.head.iter().any(is_scene) { LOST_SELECTION } else { LOST_SCENE };
             salvage.losses.lose_head(what);
         }
         for record in std::mem::take(&mut self.head) {
