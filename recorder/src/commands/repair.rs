@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use recorder::{Finding, PartFile, ReadError, RepairReport, Topic, open_regular_file, repair_file};
 use serde::Serialize;
-use sim_contract::{Stop, part_path, printable_line};
+use sim_contract::{Stop, is_being_written, part_path, printable_line};
 
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
@@ -50,6 +50,8 @@ struct Repaired<'a> {
     snapshot_count: u64,
     /// Number of messages that are missing, by topic, as far as the file tells.
     lost: BTreeMap<&'static str, u64>,
+    /// Content that damage before the description of the run may have taken.
+    lost_head: Option<&'static str>,
     /// Ranges of steps without snapshots.
     lost_steps: Vec<String>,
     /// The checksum of the data is wrong, and no damaged part explains it.
@@ -64,6 +66,13 @@ pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
     let source =
         open_regular_file(&args.input).map_err(ReadError::from).with_context(|| input.clone())?;
     refuse_own_input(&source, &args.output)?;
+    if is_being_written(&args.input) {
+        output::note(&format!(
+            "warning: {}: a recorder is still writing this file; the repair ends where the file ends now. \
+             Repeat it after the recorder has ended",
+            printable_line(&input)
+        ));
+    }
     let mut file = PartFile::create(&args.output, args.overwrite.existing())?;
     let bar = progress_bytes(0);
     let result = repair_file(source, &mut file, Some(&stop), &mut |at, size_bytes| {
@@ -115,6 +124,7 @@ impl<'a> Repaired<'a> {
             steps: report.steps,
             snapshot_count: report.counts[Topic::Particles].written,
             lost: losses.messages(),
+            lost_head: losses.head(),
             lost_steps,
             is_uncertain: report.is_uncertain,
             finding_count: report.findings.count(),
@@ -145,6 +155,9 @@ impl fmt::Display for Repaired<'_> {
         }
         if self.is_lossless {
             return write!(f, "\nmissing     nothing");
+        }
+        if let Some(what) = self.lost_head {
+            write!(f, "\nmissing     {what}")?;
         }
         if !self.lost_steps.is_empty() {
             write!(f, "\nmissing     steps {}", self.lost_steps.join(", "))?;

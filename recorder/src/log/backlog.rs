@@ -41,13 +41,17 @@ impl Backlog {
         self.size_bytes + message.size_bytes() <= limit
     }
 
-    /// Adds a message. Returns `false` if the messages now take more memory than they may.
+    /// Adds a message. Returns `false`, and adds nothing, if the messages would take more memory than
+    /// they may.
     #[must_use]
     pub fn add(&mut self, message: &Message) -> bool {
         let size_bytes = message.size_bytes();
+        if self.size_bytes.saturating_add(size_bytes) > self.size_bytes_max {
+            return false;
+        }
         *self.by_step.entry(message.step()).or_default() += size_bytes;
         self.size_bytes += size_bytes;
-        self.size_bytes <= self.size_bytes_max
+        true
     }
 
     /// Removes the messages up to a snapshot.

@@ -2,6 +2,7 @@
 //!
 //! [`super::read`] reads a recording up to its first damage. This module goes on behind it.
 
+mod attachment;
 pub(super) mod check;
 mod chunk;
 mod content;

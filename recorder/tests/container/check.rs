@@ -194,3 +194,31 @@ fn declared_gaps_and_foreign_messages_are_no_findings() {
     assert_eq!(findings(&bytes), [""; 0]);
     assert_eq!(check(&bytes).unwrap().extent.declared_missing, 2, "a row and a snapshot");
 }
+
+#[test]
+fn a_long_attachment_is_checked_like_a_short_one() {
+    let attachment_size_bytes = 20 << 20;
+    let mut bytes = Recording { attachment_size_bytes, ..Recording::default() }.write();
+    assert_eq!(findings(&bytes), [""; 0]);
+    assert_eq!(check(&bytes).unwrap().extent.not_checked, [""; 0]);
+    let place = records(&bytes).into_iter().find(|one| one.end - one.start > 20 << 20).unwrap();
+    bytes[place.end - 1000] ^= 1;
+    let expected = format!("byte {}: attachment: its checksum is wrong", place.start);
+    assert!(findings(&bytes)[0].starts_with(&expected), "{:?}", findings(&bytes));
+}
+
+#[test]
+fn a_tear_of_a_constraint_that_the_scene_lacks_is_found() {
+    for torn in [vec![u32::MAX], vec![0; 1000]] {
+        let bytes = Recording::default().write_changed(|messages| {
+            for message in messages {
+                if let Message::Tears(row) = message {
+                    row.causes = vec!["cut".to_owned(); torn.len()];
+                    row.constraints.clone_from(&torn);
+                }
+            }
+        });
+        let all = findings(&bytes);
+        assert!(all[0].contains("but the scene has"), "{all:?}");
+    }
+}

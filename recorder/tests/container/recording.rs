@@ -1,5 +1,6 @@
 //! Recordings of a rope with tears and a reset, and the positions of their records.
 
+use std::io::Read;
 use std::num::NonZeroU32;
 
 use recorder::{
@@ -41,6 +42,8 @@ pub(crate) struct Recording {
     pub(crate) compression: Compression,
     /// Number of snapshots that the file declares as lost.
     pub(crate) lost: u64,
+    /// Size of an attachment of another program.
+    pub(crate) attachment_size_bytes: u64,
     /// The file has an end.
     pub(crate) is_finished: bool,
     /// The part of the run in the file.
@@ -50,7 +53,13 @@ pub(crate) struct Recording {
 impl Default for Recording {
     fn default() -> Self {
         let selection = ContentSelection::default();
-        Self { compression: Compression::None, lost: 0, is_finished: true, selection }
+        Self {
+            compression: Compression::None,
+            lost: 0,
+            attachment_size_bytes: 0,
+            is_finished: true,
+            selection,
+        }
     }
 }
 
@@ -71,6 +80,10 @@ impl Recording {
         let text = scene.to_toml();
         let run = run(&Solver::new(&scene), scene.solver.rate_hz);
         let mut log = LogWriter::create(&mut bytes, options, &run, text.as_bytes(), 0).unwrap();
+        if self.attachment_size_bytes > 0 {
+            let content = std::io::repeat(7).take(self.attachment_size_bytes);
+            log.attach("video", self.attachment_size_bytes, content).unwrap();
+        }
         for message in &messages {
             log.write(message, run.time_of_step_ns(message.step())).unwrap();
         }

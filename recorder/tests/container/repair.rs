@@ -198,3 +198,47 @@ fn an_output_that_cannot_be_written_is_an_error() {
     let result = repair_file(Cursor::new(&bytes), Full, None, &mut |_, _| {});
     assert!(matches!(result, Err(RepairError::Write(_))), "{result:?}");
 }
+
+/// Larger than what a check keeps in memory.
+const LONG_SIZE_BYTES: u64 = 20 << 20;
+
+#[test]
+fn a_long_attachment_is_copied_and_one_with_a_wrong_byte_is_left_out_without_missing_steps() {
+    let attachment_size_bytes = LONG_SIZE_BYTES;
+    let mut bytes = Recording { attachment_size_bytes, ..Recording::default() }.write();
+    let (repaired, report) = repair(&bytes).unwrap();
+    assert!(report.losses.is_empty() && !report.is_uncertain, "{:?}", report.findings);
+    let report = check_file(Cursor::new(&repaired), None, &mut |_, _| {}).unwrap();
+    assert_eq!(report.findings.list(), []);
+    let long = |bytes: &[u8]| {
+        let place = records(bytes).into_iter().find(|one| one.end - one.start > 20 << 20);
+        place.map(|one| bytes[one.start..one.end].to_vec())
+    };
+    assert!(long(&repaired).is_some() && long(&repaired) == long(&bytes), "another attachment");
+
+    let place = records(&bytes).into_iter().find(|one| one.end - one.start > 20 << 20).unwrap();
+    bytes[place.end - 1000] ^= 1;
+    let (repaired, report) = repair(&bytes).unwrap();
+    assert_eq!(report.losses.messages()["attachments"], 1);
+    assert_eq!((report.losses.ranges(), long(&repaired)), (&[][..], None));
+    assert_repaired(&Recording::default().write(), &repaired, "without its attachment");
+}
+
+#[test]
+fn damage_before_the_description_of_the_run_is_a_loss_that_names_the_scene() {
+    let mut bytes = Recording::default().write();
+    let scene = records(&bytes).into_iter().find(|one| one.opcode == 9).unwrap();
+    bytes[scene.end - 20] ^= 1;
+    let (_, report) = repair(&bytes).unwrap();
+    assert!(!report.losses.is_empty() && report.losses.ranges().is_empty());
+    assert!(report.losses.head().unwrap().contains("the scene"), "{:?}", report.losses);
+}
+
+#[test]
+fn a_file_that_declares_the_largest_number_of_losses_is_repaired() {
+    let bytes = Recording { lost: u64::MAX, ..Recording::default() }.write();
+    let mut damaged = bytes.clone();
+    damaged[chunks(&bytes)[3].end - 100] ^= 4;
+    let (_, report) = repair(&damaged).unwrap();
+    assert!(!report.losses.is_empty());
+}

@@ -7,6 +7,7 @@ use mcap::records::{Footer, Header, MessageHeader, Metadata, Record, op};
 use serde::Serialize;
 use sim_contract::Stop;
 
+use super::attachment::no_checksum;
 use super::chunk::{Chunk, ChunkContent, InnerRecords};
 use super::content::ContentCheck;
 use super::finding::{Findings, record_name};
@@ -129,9 +130,11 @@ impl Check {
             Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run()),
             Part::Skipped { byte, opcode } => {
                 self.not_checked(format!("the {} at byte {byte}", record_name(opcode)));
-                if opcode == op::ATTACHMENT {
-                    self.places.statistics.attachment_count += 1;
-                }
+                Ok(SectionEnd::None)
+            }
+            Part::LongAttachment { attachment, checksum } => {
+                let what = attachment.check(checksum, &mut self.findings, &mut self.places);
+                what.map_or((), |what| self.not_checked(what));
                 Ok(SectionEnd::None)
             }
             Part::Damaged { bytes, cause } => {
@@ -182,11 +185,8 @@ impl Check {
         chunks: &mut ChunkContent,
     ) -> Result<SectionEnd, ReadError> {
         if opcode != op::MESSAGE_INDEX && self.places.end_chunk() {
-            self.findings.add_index(
-                byte,
-                "chunk",
-                "a message index is missing after the chunk before",
-            );
+            let what = "a message index is missing after the chunk before";
+            self.findings.add_index(byte, "chunk", what);
         }
         if opcode == op::CHUNK {
             self.add_chunk(byte, body, chunks)?;
@@ -228,8 +228,7 @@ impl Check {
             }
             Record::Attachment { header, data, crc } => {
                 if *crc == 0 {
-                    let what = format!("the attachment '{}', which has no checksum", header.name);
-                    self.not_checked(what);
+                    self.not_checked(no_checksum(&header.name));
                 }
                 if header.name == SCENE_ATTACHMENT && self.content.is_none() {
                     self.scene_size_bytes = data.len();

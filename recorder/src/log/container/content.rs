@@ -12,7 +12,7 @@ use crate::log::message::Message;
 use crate::log::read::decode::decode_message;
 use crate::log::read::gaps::GapCounter;
 use crate::log::read::limits::SizeLimits;
-use crate::log::rows::StepRow;
+use crate::log::rows::{StepRow, TearsRow};
 use crate::log::run::RunDescription;
 use crate::log::run::selection::ContentSelection;
 use crate::log::state_hash::hash_bytes;
@@ -174,6 +174,10 @@ impl ContentCheck {
             Message::Keyframe { bytes, .. } => {
                 Keyframe::decode(bytes).map_err(|error| error.to_string())?;
             }
+            Message::Tears(row) => self.check_tears(row)?,
+            _ => {}
+        }
+        match &message {
             Message::Tears(_) | Message::Outcome(_) if !self.backlog.add(&message) => {
                 return Err("too many messages belong to later steps".to_owned());
             }
@@ -188,6 +192,7 @@ impl ContentCheck {
             }
             Message::Step(row) => {
                 self.backlog.remove_to(row.step);
+                self.seeds.pass(row.step);
                 self.last_row = Some(row);
                 Ok(Sound::Update(topic))
             }
@@ -204,6 +209,23 @@ impl ContentCheck {
             return Err(format!("step {step}: its sequence is that of another step"));
         }
         Ok(())
+    }
+
+    /// Compares the list of torn constraints with the constraints of the scene.
+    fn check_tears(&self, row: &TearsRow) -> Result<(), String> {
+        let (step, count) = (row.step, self.run.constraint_count);
+        if row.constraints.len() as u64 > u64::from(count) {
+            let found = row.constraints.len();
+            return Err(format!(
+                "step {step}: {found} constraints tear, but the scene has {count}"
+            ));
+        }
+        match row.constraints.iter().find(|index| **index >= count) {
+            Some(index) => {
+                Err(format!("step {step}: constraint {index} tears, but the scene has {count}"))
+            }
+            None => Ok(()),
+        }
     }
 
     fn check_row(&self, row: &StepRow) -> Result<(), String> {

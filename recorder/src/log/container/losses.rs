@@ -43,6 +43,9 @@ pub struct Losses {
     /// Something is lost since the newest copied snapshot.
     is_open: bool,
     has_any: bool,
+    /// The content that damage before the description of the run may have taken.
+    head: Option<&'static str>,
+    lost_attachments: u64,
 }
 
 impl Losses {
@@ -59,13 +62,31 @@ impl Losses {
     /// Returns the number of lost messages by topic, as far as the file tells.
     pub fn messages(&self) -> BTreeMap<&'static str, u64> {
         let counts = self.counts.iter().map(|(topic, counts)| (topic.name(), counts.lost));
-        let all = counts.chain([("unknown", self.unknown_count)]);
+        let others = [("unknown", self.unknown_count), ("attachments", self.lost_attachments)];
+        let all = counts.chain(others);
         all.filter(|(_, count)| *count > 0).collect()
     }
 
     /// Returns `true` if nothing is lost.
     pub fn is_empty(&self) -> bool {
         !self.has_any
+    }
+
+    /// Returns the content that damage before the description of the run may have taken, for people.
+    pub fn head(&self) -> Option<&'static str> {
+        self.head
+    }
+
+    /// Counts an attachment that is left out. No message is missing by it.
+    pub(super) fn add_attachment(&mut self) {
+        self.lost_attachments = self.lost_attachments.saturating_add(1);
+        self.has_any = true;
+    }
+
+    /// Marks content before the description of the run as lost. No step is missing by it.
+    pub(super) fn lose_head(&mut self, what: &'static str) {
+        self.head = Some(what);
+        self.has_any = true;
     }
 
     pub(super) fn begin_gap(&mut self) {
@@ -93,7 +114,7 @@ impl Losses {
 
     /// Ends a gap at a sound snapshot.
     pub(super) fn end_gap(&mut self, step: u64) {
-        if self.is_open && self.last_step.is_none_or(|last| last + 1 < step) {
+        if self.is_open && self.last_step.is_none_or(|last| last.saturating_add(1) < step) {
             self.add_range(Some(step));
         }
         self.is_open = false;
@@ -127,10 +148,10 @@ impl Losses {
         let gaps = content.gaps.counts();
         for topic in Topic::ALL {
             let counts = &mut closing.counts[topic];
-            counts.lost += self.counts[topic].lost;
+            counts.lost = counts.lost.saturating_add(self.counts[topic].lost);
             let declared = counts.lost.saturating_add(counts.gaps);
             let more = gaps[topic].gaps.saturating_sub(declared);
-            counts.lost += more;
+            counts.lost = counts.lost.saturating_add(more);
             // Gaps of a file that declares no losses are those of the repair only if it left something out.
             if self.has_any {
                 self.counts[topic].lost = self.counts[topic].lost.max(more);
@@ -139,7 +160,7 @@ impl Losses {
             let is_counted = topic != Topic::Tf;
             counts.written = if is_counted { content.counts[topic].written } else { 0 };
             if !had_end {
-                counts.received = counts.written + counts.lost;
+                counts.received = counts.written.saturating_add(counts.lost);
             }
         }
         closing
@@ -150,6 +171,9 @@ impl Losses {
         for (topic, count) in self.messages() {
             let key = format!("lost.{}", topic.trim_start_matches('/'));
             repair.insert(key, count.to_string());
+        }
+        if let Some(what) = self.head {
+            repair.insert("lost_head".to_owned(), what.to_owned());
         }
         let texts: Vec<_> = self.ranges.iter().map(ToString::to_string).collect();
         repair.insert("lost_steps".to_owned(), texts.join(", "));

@@ -13,11 +13,12 @@ use mcap::Attachment;
 use mcap::records::{MessageIndex, Metadata, Record, op};
 use sim_contract::Stop;
 
+use super::attachment::{Checksum, LongAttachment, WRONG_CHECKSUM};
 use super::chunk::{ChunkContent, InnerRecords, compression};
 use super::content::ContentCheck;
 use super::finding::{Findings, record_name};
 use super::losses::Losses;
-use super::salvage::{Format, Salvage};
+use super::salvage::{Format, Salvage, size_in_memory};
 use super::walk::{Part, Walk};
 use super::window::Window;
 use crate::log::read::audit::is_current_format;
@@ -31,6 +32,13 @@ use crate::log::writer::WriteError;
 
 /// Bytes between two calls of the progress callback.
 const PROGRESS_PERIOD_BYTES: u64 = 16 << 20;
+
+/// Most memory of the records before the metadata `run`: a scene, and as much again.
+const HEAD_SIZE_BYTES_MAX: u64 = 2 * HEADER_RECORD_SIZE_BYTES_MAX;
+/// Content that damage before the metadata `run` has taken from a file without a scene.
+const LOST_SCENE: &str = "the scene, so the result cannot be verified, and perhaps the selection";
+/// Content that damage before the metadata `run` may have taken from a file with a scene.
+const LOST_SELECTION: &str = "a part before the metadata 'run', perhaps the selection";
 
 /// The reason why a file could not be repaired.
 #[derive(Debug, thiserror::Error)]
@@ -79,6 +87,10 @@ pub fn repair_file<R: Read + Seek, W: Write>(
             next_progress = walk.position() + PROGRESS_PERIOD_BYTES;
         }
         let Some(part) = walk.next()? else { break };
+        if let Part::LongAttachment { attachment, checksum } = part {
+            repair.add_long_attachment(&mut walk, attachment, checksum)?;
+            continue;
+        }
         if let Some(saved) = repair.add(part, &mut chunks)? {
             repair.has_wrong_checksum = saved != 0 && saved != walk.checksum_before();
             walk.restart_checksum();
@@ -114,6 +126,8 @@ struct Repair<W: Write> {
     /// Attachments and metadata before the first chunk.
     head: Vec<Record<'static>>,
     head_size_bytes: u64,
+    /// A part before the metadata `run` is left out.
+    is_head_damaged: bool,
     /// The output, until it is created.
     out: Option<W>,
     salvage: Option<Salvage<W>>,
@@ -136,6 +150,7 @@ impl<W: Write> Repair<W> {
             is_current_format: false,
             head: Vec::new(),
             head_size_bytes: 0,
+            is_head_damaged: false,
             out: Some(out),
             salvage: None,
             closing: None,
@@ -154,8 +169,10 @@ impl<W: Write> Repair<W> {
         match part {
             Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
             Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run().into()),
+            // It is copied in pieces from the walk.
+            Part::LongAttachment { .. } => Ok(None),
             Part::Skipped { byte, opcode } => {
-                self.lose(byte, record_name(opcode), "it is too long, or of another program")?;
+                self.lose(byte, record_name(opcode), "it is of another program")?;
                 Ok(None)
             }
             Part::Damaged { bytes, cause } => {
@@ -177,6 +194,38 @@ impl<W: Write> Repair<W> {
         }
     }
 
+    /// Copies a long attachment in pieces. No message is missing without it.
+    fn add_long_attachment<R: Read + Seek>(
+        &mut self,
+        walk: &mut Walk<R>,
+        attachment: LongAttachment,
+        checksum: Checksum,
+    ) -> Result<(), RepairError> {
+        let LongAttachment { byte, header, data, .. } = attachment;
+        if self.content.is_none() {
+            return self.lose(
+                byte,
+                "attachment",
+                "it is too long to stand before the metadata 'run'",
+            );
+        }
+        self.begin()?;
+        let Some(salvage) = &mut self.salvage else { return Ok(()) };
+        if checksum == Checksum::Wrong {
+            self.findings.add(byte, "attachment", WRONG_CHECKSUM);
+            salvage.losses.add_attachment();
+            return Ok(());
+        }
+        salvage.start_attachment(data.end - data.start, header)?;
+        let mut at = data.start;
+        while at < data.end {
+            let block = walk.block(at..data.end)?;
+            salvage.put_attachment_bytes(block)?;
+            at += block.len() as u64;
+        }
+        Ok(salvage.finish_attachment()?)
+    }
+
     /// Allows for a scene in a damaged part before the first message.
     fn allow_scene(&mut self, size_bytes: u64) {
         if self.content.is_none() {
@@ -195,8 +244,9 @@ impl<W: Write> Repair<W> {
         if self.content.is_some() {
             self.begin()?;
         }
-        if let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) {
-            salvage.mark_gap(content);
+        match (&mut self.salvage, &mut self.content) {
+            (Some(salvage), Some(content)) => salvage.mark_gap(content),
+            _ => self.is_head_damaged = true,
         }
         Ok(())
     }
@@ -233,23 +283,20 @@ impl<W: Write> Repair<W> {
                 (self.format.profile, self.format.library) = (header.profile, header.library);
             }
             Record::MessageIndex(index) => self.add_message_index(&index),
-            Record::Metadata(metadata) => self.add_metadata(metadata)?,
+            Record::Metadata(metadata) => self.add_metadata(byte, metadata)?,
             Record::Attachment { header, data, crc } => {
                 if header.name == SCENE_ATTACHMENT && self.content.is_none() {
                     self.scene_size_bytes = data.len();
                 }
-                self.add_head(Record::Attachment {
-                    header,
-                    data: Cow::Owned(data.into_owned()),
-                    crc,
-                })?;
+                let data = Cow::Owned(data.into_owned());
+                self.add_head(byte, Record::Attachment { header, data, crc })?;
             }
             other => self.add_content_record(byte, "record", &other)?,
         }
         Ok(None)
     }
 
-    fn add_metadata(&mut self, metadata: Metadata) -> Result<(), RepairError> {
+    fn add_metadata(&mut self, byte: u64, metadata: Metadata) -> Result<(), RepairError> {
         if metadata.name == CLOSING_METADATA {
             self.closing = Some(Closing::from_map(&metadata.metadata));
             return Ok(());
@@ -264,21 +311,23 @@ impl<W: Write> Repair<W> {
             self.new_limits = Some(*content.limits());
             self.content = Some(content);
         }
-        self.add_head(Record::Metadata(metadata))
+        self.add_head(byte, Record::Metadata(metadata))
     }
 
     /// Copies an attachment or a metadata record. Those before the first chunk wait for its compression,
     /// as long as they need little memory.
-    fn add_head(&mut self, record: Record<'static>) -> Result<(), RepairError> {
+    fn add_head(&mut self, byte: u64, record: Record<'static>) -> Result<(), RepairError> {
         if self.salvage.is_some() {
             return Ok(self.copy_head(&record)?);
         }
-        self.head_size_bytes += match &record {
-            Record::Attachment { data, .. } => data.len() as u64,
-            _ => 0,
-        };
+        let sum = self.head_size_bytes.saturating_add(size_in_memory(&record));
+        if self.content.is_none() && sum > HEAD_SIZE_BYTES_MAX {
+            let what = "the records before the metadata 'run' are too long";
+            return self.lose(byte, record_name(record.opcode()), what);
+        }
+        self.head_size_bytes = sum;
         self.head.push(record);
-        if self.content.is_some() && self.head_size_bytes > HEADER_RECORD_SIZE_BYTES_MAX {
+        if self.content.is_some() && sum > HEADER_RECORD_SIZE_BYTES_MAX {
             self.begin()?;
         }
         Ok(())
@@ -302,7 +351,12 @@ impl<W: Write> Repair<W> {
     /// Creates the output.
     fn begin(&mut self) -> Result<(), RepairError> {
         let Some(out) = self.out.take() else { return Ok(()) };
-        self.salvage = Some(Salvage::create(out, &self.format)?);
+        let salvage = self.salvage.insert(Salvage::create(out, &self.format)?);
+        if self.is_head_damaged {
+            let is_scene = |one: &Record<'_>| matches!(one, Record::Attachment { header, .. } if header.name == SCENE_ATTACHMENT);
+            let what = if self.head.iter().any(is_scene) { LOST_SELECTION } else { LOST_SCENE };
+            salvage.losses.lose_head(what);
+        }
         for record in std::mem::take(&mut self.head) {
             self.copy_head(&record)?;
         }

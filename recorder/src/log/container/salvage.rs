@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 
-use mcap::records::{Channel, MessageHeader, Metadata, SchemaHeader};
+use mcap::records::{AttachmentHeader, Channel, MessageHeader, Metadata, Record, SchemaHeader};
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
 
@@ -18,6 +18,8 @@ use crate::log::writer::WriteError;
 const CHUNK_SIZE_BYTES: u64 = 1 << 20;
 /// Most bytes of all schemas and channels. Those of a recorder have 20 kilobytes.
 const DECLARED_SIZE_BYTES_MAX: usize = 16 << 20;
+/// Memory of a record or of a text besides its bytes.
+const ENTRY_SIZE_BYTES: u64 = 128;
 /// Reason in the closing metadata of a file that had none.
 const UNKNOWN_STOP: &str = "unknown: the recording had no end, and was repaired";
 
@@ -106,6 +108,23 @@ impl<W: Write> Salvage<W> {
 
     pub(super) fn attach(&mut self, attachment: &Attachment<'_>) -> Result<(), WriteError> {
         self.write(|file| file.attach(attachment))
+    }
+
+    /// Begins an attachment, whose data follow in pieces.
+    pub(super) fn start_attachment(
+        &mut self,
+        size_bytes: u64,
+        header: AttachmentHeader,
+    ) -> Result<(), WriteError> {
+        self.write(|file| file.start_attachment(size_bytes, header))
+    }
+
+    pub(super) fn put_attachment_bytes(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
+        self.write(|file| file.put_attachment_bytes(bytes))
+    }
+
+    pub(super) fn finish_attachment(&mut self) -> Result<(), WriteError> {
+        self.write(Writer::finish_attachment)
     }
 
     pub(super) fn write_metadata(&mut self, metadata: &Metadata) -> Result<(), WriteError> {
@@ -312,5 +331,20 @@ impl<W: Write> Salvage<W> {
 impl<W: Write> Drop for Salvage<W> {
     fn drop(&mut self) {
         self.abandon();
+    }
+}
+
+/// Returns the memory that an attachment or a metadata record takes.
+pub(super) fn size_in_memory(record: &Record<'_>) -> u64 {
+    let text = |text: &str| text.len() as u64 + ENTRY_SIZE_BYTES;
+    match record {
+        Record::Attachment { header, data, .. } => {
+            text(&header.name) + text(&header.media_type) + data.len() as u64
+        }
+        Record::Metadata(Metadata { name, metadata }) => {
+            let entries = metadata.iter().map(|(key, value)| text(key) + text(value));
+            text(name) + entries.sum::<u64>()
+        }
+        _ => ENTRY_SIZE_BYTES,
     }
 }

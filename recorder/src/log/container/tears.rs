@@ -43,13 +43,17 @@ impl HashSeeds {
 
     /// Processes a message between snapshots.
     pub(super) fn process(&mut self, message: &Message) {
+        self.replacement_step = message.replacement_step().max(self.replacement_step);
+        // Without both topics, no list is known, so nothing is kept.
+        if !self.has_tears {
+            return;
+        }
         if let Message::Topology(row) = message
             && self.beginning.is_none()
         {
             self.tracker = TearTracker::new(row.torn_before());
             self.newest = None;
         }
-        self.replacement_step = message.replacement_step().max(self.replacement_step);
         self.tracker.process(message);
     }
 
@@ -57,6 +61,11 @@ impl HashSeeds {
     pub(super) fn mark_gap(&mut self) {
         self.tracker.mark_gap();
         self.newest = None;
+    }
+
+    /// Applies the messages up to a step, so that none of them stays in memory.
+    pub(super) fn pass(&mut self, step: u64) {
+        self.tracker.at(step);
     }
 
     /// Returns the seed for a snapshot, or `None` if its torn constraints are unknown.
@@ -68,6 +77,7 @@ impl HashSeeds {
         if is_new && !is_explained {
             self.mark_gap();
         }
+        self.pass(row.step);
         if row.torn_count == 0 {
             return Some(hash_seed(Vec::new()));
         }

@@ -12,6 +12,7 @@ use crc32fast::Hasher;
 use mcap::MAGIC;
 use mcap::records::op;
 
+use super::attachment::{Checksum, LongAttachment};
 use super::chunk::is_chunk;
 use super::window::Window;
 use crate::log::read::lengths::is_exact;
@@ -33,8 +34,9 @@ const PRIVATE_MIN: u8 = 0x80;
 pub(super) enum Part<'a> {
     /// A record whose form is intact.
     Record { byte: u64, opcode: u8, body: &'a [u8] },
-    /// A record that is not read: a long attachment of another program, a private record, or a chunk before
-    /// the description of the run.
+    /// An attachment that is too long for memory.
+    LongAttachment { attachment: LongAttachment, checksum: Checksum },
+    /// A record that is not read: a private record, or a chunk before the description of the run.
     Skipped { byte: u64, opcode: u8 },
     /// Bytes that are no records.
     Damaged { bytes: Range<u64>, cause: String },
@@ -45,6 +47,7 @@ pub(super) enum Part<'a> {
 /// The form of the bytes at a position.
 enum Form {
     Record { opcode: u8, size_bytes: usize },
+    LongAttachment(LongAttachment),
     Skipped { opcode: u8, size_bytes: u64 },
     EndOfFile,
     Wrong { cause: String, is_cut: bool },
@@ -120,6 +123,7 @@ impl<R: Read + Seek> Walk<R> {
 
     /// Returns the next part, or `None` at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<Part<'_>>, ReadError> {
+        self.window.check_stop()?;
         if self.is_done {
             return Ok(None);
         }
@@ -134,6 +138,7 @@ impl<R: Read + Seek> Walk<R> {
                 self.advance(byte + size_bytes)?;
                 Ok(Some(Part::Skipped { byte, opcode }))
             }
+            Form::LongAttachment(attachment) => self.long_attachment(attachment).map(Some),
             Form::EndOfFile => {
                 self.is_done = true;
                 Ok(Some(Part::Truncated { byte }))
@@ -152,6 +157,36 @@ impl<R: Read + Seek> Walk<R> {
         self.at = byte + size_bytes as u64;
         self.is_after_footer = opcode == op::FOOTER;
         Ok(Part::Record { byte, opcode, body: &record[RECORD_HEADER_SIZE_BYTES..] })
+    }
+
+    /// Compares a long attachment with its checksum, in pieces.
+    fn long_attachment(&mut self, attachment: LongAttachment) -> Result<Part<'_>, ReadError> {
+        let mut hasher = Hasher::new();
+        let LongAttachment { byte, size_bytes, data, .. } = &attachment;
+        let mut at = byte + RECORD_HEADER_SIZE_BYTES as u64;
+        self.advance(at)?;
+        while at < data.end {
+            let block = self.block(at..data.end)?;
+            hasher.update(block);
+            at += block.len() as u64;
+            self.advance(at)?;
+        }
+        let saved = self.window.bytes(data.end, size_of::<u32>())?;
+        let checksum = match u32::from_le_bytes(saved.try_into().map_err(|_| cut_while_read())?) {
+            0 => Checksum::Missing,
+            saved if saved == hasher.finalize() => Checksum::Right,
+            _ => Checksum::Wrong,
+        };
+        self.advance(byte + size_bytes)?;
+        Ok(Part::LongAttachment { attachment, checksum })
+    }
+
+    /// Returns the first bytes of a range of the file.
+    pub(super) fn block(&mut self, range: Range<u64>) -> Result<&[u8], ReadError> {
+        self.window.check_stop()?;
+        let left = usize::try_from(range.end - range.start).unwrap_or(usize::MAX);
+        let block = self.window.bytes(range.start, left.min(BLOCK_SIZE_BYTES))?;
+        if block.is_empty() { Err(cut_while_read().into()) } else { Ok(block) }
     }
 
     /// Returns the part that a damaged record spoils: up to the next record, or to the end.
@@ -209,6 +244,7 @@ impl<R: Read + Seek> Walk<R> {
     fn find_record(&mut self, from: u64) -> Result<Option<u64>, ReadError> {
         let mut at = from;
         loop {
+            self.window.check_stop()?;
             let block = self.window.bytes(at, BLOCK_SIZE_BYTES)?;
             if block.len() < RECORD_HEADER_SIZE_BYTES {
                 return Ok(None);
@@ -255,7 +291,14 @@ impl<R: Read + Seek> Walk<R> {
         // Without a scene, nothing bounds the memory for a chunk.
         let is_early_chunk = opcode == op::CHUNK && limits.is_none();
         let is_long_attachment = opcode == op::ATTACHMENT && length > limit;
-        if opcode >= PRIVATE_MIN || is_early_chunk || is_long_attachment {
+        if is_long_attachment {
+            let start = self.window.bytes(byte, BLOCK_SIZE_BYTES)?;
+            return match LongAttachment::read(byte, size_bytes, start) {
+                Some(attachment) => Ok(Form::LongAttachment(attachment)),
+                None => wrong("its length is not that of its fields".to_owned(), false),
+            };
+        }
+        if opcode >= PRIVATE_MIN || is_early_chunk {
             return Ok(Form::Skipped { opcode, size_bytes });
         }
         if length > limit {
@@ -274,6 +317,11 @@ impl<R: Read + Seek> Walk<R> {
             Err(cause) => wrong(cause, false),
         }
     }
+}
+
+/// Returns the error of a file that became shorter while it was read.
+fn cut_while_read() -> std::io::Error {
+    std::io::ErrorKind::UnexpectedEof.into()
 }
 
 /// Returns the opcode and the length of a record.

@@ -8,7 +8,7 @@ use crate::log::read::file_source::check_stop;
 use crate::log::read::read_error::ReadError;
 
 /// Bytes to read at a time. Memory grows only with bytes that the file has, and a signal is noticed
-/// between two reads.
+/// between two reads and before each record.
 const READ_SIZE_BYTES: usize = 4 << 20;
 
 /// The bytes of a file around the current record.
@@ -32,6 +32,11 @@ impl<R: Read + Seek> Window<R> {
     /// Returns the size of the file when it was opened. A file that grows is read up to there.
     pub(super) fn size_bytes(&self) -> u64 {
         self.size_bytes
+    }
+
+    /// Returns an error after a signal.
+    pub(super) fn check_stop(&self) -> Result<(), ReadError> {
+        Ok(check_stop(self.stop.as_ref())?)
     }
 
     /// Returns the bytes from a position on: `size_bytes`, or fewer at the end of the file.
