@@ -29,6 +29,8 @@ pub(super) struct Coverage {
     pub(super) has_run_hash: bool,
     /// The messages have the form of an older recorder.
     pub(super) is_older_format: bool,
+    /// The recording leaves the events out.
+    pub(super) lacks_events: bool,
     /// Snapshots before the first one with a keyframe.
     pub(super) skipped_count: u64,
     /// The first state was restored from the recording, not computed from the scene.
@@ -54,6 +56,9 @@ impl Coverage {
         }
         if self.is_older_format {
             all.push("the exact form of messages, because the format is older".to_owned());
+        }
+        if self.lacks_events {
+            all.push("/events, which the recording leaves out".to_owned());
         }
         if self.is_restored {
             all.push("the first state, from which the simulation started".to_owned());
