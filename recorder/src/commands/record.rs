@@ -91,6 +91,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         begin_ns,
         next_owner_check_ns: 0,
         is_owner_alive: true,
+        ended_run: None,
     };
     let result = recording.run(args, &stop);
     let report = recording.finish(result, args, &endpoint)?;
@@ -133,6 +134,8 @@ struct Recording {
     begin_ns: u64,
     next_owner_check_ns: u64,
     is_owner_alive: bool,
+    /// The run in the file when the owner was last found dead.
+    ended_run: Option<u64>,
 }
 
 impl Recording {
@@ -156,6 +159,7 @@ impl Recording {
         if now_ns >= self.next_owner_check_ns {
             self.next_owner_check_ns = now_ns + OWNER_CHECK_NS;
             self.is_owner_alive = self.tap.is_owner_alive();
+            self.ended_run = self.feed.run_id().filter(|_| !self.is_owner_alive);
         }
         let passed = Duration::from_nanos(now_ns - self.begin_ns);
         if stop.is_requested() {
@@ -190,10 +194,10 @@ impl Recording {
     }
 
     /// Ends the file of a node that has ended, and waits for the next one: the tap reads its messages
-    /// from the first.
+    /// from the first. The file of a node that has started since the last check goes on.
     fn end_file_of_owner(&mut self) {
-        if self.feed.has_file() {
-            self.feed.end_file(StopReason::OwnerGone.text().to_owned());
+        let reason = StopReason::OwnerGone.text();
+        if self.ended_run.is_some_and(|run_id| self.feed.end_file_of(run_id, reason)) {
             output::note("the node has ended; waiting for the next run");
         }
     }

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
-use recorder::{ContentSelection, LogEnd, LogReader, Topic};
+use recorder::{ContentSelection, LogEnd, LogReader};
 use serde::Serialize;
 use sim_contract::{Stop, printable_line};
 use sim_solver::SOLVER_VERSION;
@@ -116,8 +116,10 @@ pub(crate) fn verify<R: Read>(
     stop: &AtomicBool,
     on_progress: impl FnMut(u64),
 ) -> anyhow::Result<(Report, Option<LogEnd>)> {
-    let needed = [&ContentSelection::FOR_STATES[..], &[Topic::Events]].concat();
-    log.selection().require(&needed, "`recorder verify`").with_context(|| path.to_owned())?;
+    let selection = log.selection();
+    selection
+        .require(&ContentSelection::FOR_STATES, "`recorder verify`")
+        .with_context(|| path.to_owned())?;
     let recorded_version = log.run().solver_version;
     if recorded_version != SOLVER_VERSION {
         bail!(

@@ -34,7 +34,7 @@ pub(super) struct Lockstep {
     next_search_ns: u64,
     /// The changes of this run, for the status.
     pub(super) changes: MemberChanges,
-    /// Messages that are none of a member, or claim a step of the future.
+    /// Messages of clients that are not members, or that claim a step of the future.
     pub(super) refused_count: u64,
 }
 
@@ -88,7 +88,7 @@ impl Lockstep {
     }
 
     /// Waits until all members are ready for `step`, at most until `until_ns`. Returns `true` if they
-    /// are. Members that are gone, or have kept the node waiting for too long, are members no more.
+    /// are. Members that are gone, or have kept the node waiting for too long, are removed.
     pub(super) fn wait(
         &mut self,
         publisher: &Publisher,

@@ -30,8 +30,8 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     after_help = "Ends cleanly on Ctrl-C, on SIGTERM or SIGHUP, and at a limit. Without --follow, it also ends with the \
     node, when another scene is loaded, and when another run starts (as with play --loop).\n\n\
     With --follow or a limit of a file, -o run.mcap names the files run_0000.mcap, run_0001.mcap and so \
-    on. Each begins with the scene, the latest message of every topic and a keyframe, so it plays and \
-    verifies alone. No step is in two files.\n\n\
+    on. Each begins with the scene, the latest constraints, triangles, parameters, colliders and torn \
+    constraints, and a keyframe, so it plays and verifies alone. No step is in two files.\n\n\
     Exit codes: 0 all recorded; 1 failed; 3 messages lost.\n\nExamples:\n  \
     recorder record -o run.mcap\n  \
     recorder record --name left --duration 10s --compression none\n  \
@@ -51,7 +51,7 @@ pub(crate) struct RecordArgs {
     /// restart of the node
     #[arg(long, conflicts_with = "steps")]
     pub(super) follow: bool,
-    /// Wait for a node that is not there yet
+    /// Wait until a node is running
     #[arg(long)]
     pub(super) wait: bool,
     #[command(flatten)]

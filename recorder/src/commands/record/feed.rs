@@ -99,9 +99,18 @@ impl Feed {
         self.accepted.end.is_some()
     }
 
-    /// Returns `true` if a file has begun and not ended.
-    pub(crate) fn has_file(&self) -> bool {
-        self.intake.has_started()
+    /// Returns the run in the file, once one has begun.
+    pub(crate) fn run_id(&self) -> Option<u64> {
+        self.intake.run_id()
+    }
+
+    /// Ends the file if it belongs to this run. Returns `true` if it does.
+    pub(crate) fn end_file_of(&mut self, run_id: u64, stop_reason: &str) -> bool {
+        let is_of_run = self.run_id() == Some(run_id);
+        if is_of_run {
+            self.end_file(stop_reason.to_owned());
+        }
+        is_of_run
     }
 
     /// Ends the file, if one has begun.

@@ -197,6 +197,11 @@ impl Intake {
         self.started.as_ref().map(|started| started.first_step)
     }
 
+    /// Returns the run in the file, once it has begun.
+    pub(crate) fn run_id(&self) -> Option<u64> {
+        self.started.as_ref().map(|started| started.run_id)
+    }
+
     /// Sets the numbers of changes that the tap has dropped so far.
     pub(crate) fn set_lost(&mut self, lost: LostChanges) {
         self.lost = lost;

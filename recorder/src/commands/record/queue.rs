@@ -38,8 +38,9 @@ enum Entry {
 ///
 /// The limit applies to snapshots. Other messages are small, and later steps build on them, so their
 /// limit is twice as high. The first snapshot of a file and everything before it, without which the file
-/// is useless, and an item that finds the queue empty are always accepted. Beyond that, a reader must be able to collect the messages between
-/// two snapshots: the queue drops those for which the [`Backlog`] has no room.
+/// is useless, and an item that finds the queue empty are always accepted. Beyond that, a reader must be
+/// able to collect the messages between two snapshots: the queue drops those for which the [`Backlog`] has
+/// no room.
 #[derive(Debug)]
 pub(crate) struct Queue {
     state: Mutex<State>,

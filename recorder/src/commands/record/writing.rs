@@ -4,7 +4,7 @@ pub(crate) mod extras;
 pub(crate) mod names;
 
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
@@ -125,16 +125,10 @@ impl Files {
         }
     }
 
-    /// Begins the next file. In a ring, removes the file in whose place it comes.
+    /// Begins the next file. In a ring, removes the file in whose place it comes, once it is there.
     fn begin(&mut self, header: &RunHeader, log_time_ns: u64) -> anyhow::Result<()> {
         let number = self.next_number;
         self.next_number += 1;
-        if let Some(oldest) = self.options.files_max.and_then(|max| number.checked_sub(max)) {
-            let path = self.options.names.path(oldest);
-            fs::remove_file(&path)
-                .with_context(|| format!("cannot remove {}", output::path_text(&path)))?;
-            self.written.removed_count += 1;
-        }
         let file = self.created.take().map_or_else(|| self.options.create(number), Ok)?;
         let part_path = file.part_path().to_owned();
         let log_options =
@@ -144,6 +138,23 @@ impl Files {
         self.options.extras.write(&mut log).with_context(|| incomplete(&part_path))?;
         self.position.set(number, log.size_bytes());
         self.open = Some(OpenFile { number, part_path, log, steps: None });
+        if let Some(oldest) = self.options.files_max.and_then(|max| number.checked_sub(max)) {
+            self.remove(oldest)?;
+        }
+        Ok(())
+    }
+
+    /// Removes a finished file, unless another program has moved it.
+    fn remove(&mut self, number: u64) -> anyhow::Result<()> {
+        let path = self.options.names.path(number);
+        match fs::remove_file(&path) {
+            Ok(()) => self.written.removed_count += 1,
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => {
+                let text = format!("cannot remove {}", output::path_text(&path));
+                return Err(anyhow!(error).context(text));
+            }
+        }
         Ok(())
     }
 
@@ -208,3 +219,6 @@ pub(super) fn write_item<W: Write>(log: &mut LogWriter<W>, item: Item) -> Result
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

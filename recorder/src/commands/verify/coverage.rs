@@ -1,5 +1,7 @@
 //! The content of a recording that a verification does not compare.
 
+use recorder::Topic;
+
 /// Content that a file has only once, so that nothing in it can contradict an edit.
 const ALWAYS: [&str; 9] = [
     "the times of reception (log_time) of messages and of the scene",
@@ -29,6 +31,8 @@ pub(super) struct Coverage {
     pub(super) has_run_hash: bool,
     /// The messages have the form of an older recorder.
     pub(super) is_older_format: bool,
+    /// The topics that the recording leaves out.
+    pub(super) left_out: Vec<Topic>,
     /// Snapshots before the first one with a keyframe.
     pub(super) skipped_count: u64,
     /// The first state was restored from the recording, not computed from the scene.
@@ -55,6 +59,8 @@ impl Coverage {
         if self.is_older_format {
             all.push("the exact form of messages, because the format is older".to_owned());
         }
+        let left_out = self.left_out.iter();
+        all.extend(left_out.map(|one| format!("{}, which the recording leaves out", one.name())));
         if self.is_restored {
             all.push("the first state, from which the simulation started".to_owned());
         }

@@ -90,8 +90,8 @@ pub enum ReadError {
         /// The missing or invalid entry.
         key: String,
     },
-    /// The declaration of what the recording leaves out is none that a recorder writes.
-    #[error("its metadata 'selection' is not one that a recorder writes")]
+    /// The declaration of what the recording leaves out is invalid.
+    #[error("the metadata `selection` is invalid")]
     BadSelection,
     /// A message with a correct checksum and invalid content.
     #[error(

@@ -39,7 +39,7 @@ pub struct MemberChange {
 
 const _: () = assert!(size_of::<MemberChange>() == 24 && align_of::<MemberChange>() == 8);
 
-/// Kind of a change of the members, with the reason for which one is a member no more.
+/// Kind of a change of the members, with the reason why a member was removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum MemberChangeKind {

@@ -87,11 +87,13 @@ fn programs_name_the_topics_that_a_recording_leaves_out() {
         }
     }
     assert!(!Path::new(&pictures).exists());
-    // Without the status of the node, everything else works.
+    // Without the status and the events of the node, everything else works.
     let other = sandbox.path("other.mcap");
-    record_steps(&sandbox, &["-o", &other, "--exclude", "status"]);
+    record_steps(&sandbox, &["-o", &other, "--exclude", "status,events"]);
     let verified = recorder(&sandbox, &["verify", "--json", &other]).json();
     assert_eq!(verified["verdict"], "identical", "{verified}");
+    let not_covered = verified["not_covered"].as_array().unwrap();
+    assert!(not_covered.contains(&json!("/events, which the recording leaves out")), "{verified}");
     for (option, value, words) in [
         ("--exclude", "steps", "every reader needs it"),
         ("--topics", "partikles", "it must be topics of a recording: tf, topology"),

@@ -24,6 +24,8 @@ pub(super) struct PreviousFile {
     pub(super) next_outcome: u64,
     /// Number of the next change of the members; `None` before the first status.
     next_member_change: Option<u64>,
+    /// First step of the first file of this run.
+    first_step_of_run: u64,
     /// The last step to record.
     end_step: u64,
     /// Wall clock of step 0, in nanoseconds since 1970.
@@ -57,9 +59,11 @@ impl PreviousFile {
 /// The run that is being recorded.
 #[derive(Debug)]
 pub(super) struct Started {
-    run_id: u64,
+    pub(super) run_id: u64,
     topology_revision: u32,
     pub(super) first_step: u64,
+    /// First step of the first file of this run.
+    first_step_of_run: u64,
     /// The last step to record.
     end_step: u64,
     /// The last recorded state.
@@ -93,11 +97,14 @@ impl Started {
         lost_before: LostChanges,
     ) -> Self {
         let FirstState { header, torn_before, .. } = first;
+        let previous_of_run = previous.filter(|previous| previous.run_id == header.run_id);
         Self {
             run_id: header.run_id,
             end_step: previous.map_or(u64::MAX, |previous| previous.end_step),
             topology_revision: header.topology_revision,
             first_step: header.step,
+            first_step_of_run: previous_of_run
+                .map_or(header.step, |previous| previous.first_step_of_run),
             last: *header,
             next_snapshot: header.snapshot_index,
             // Earlier outcomes are part of the first state, or in the file before.
@@ -108,9 +115,7 @@ impl Started {
             torn_count: u32::try_from(torn_before.len()).unwrap_or(u32::MAX),
             state_gaps: previous.map_or(0, |previous| previous.missing_before(header)),
             next_collider_list: None,
-            next_member_change: previous
-                .filter(|previous| previous.run_id == header.run_id)
-                .and_then(|previous| previous.next_member_change),
+            next_member_change: previous_of_run.and_then(|previous| previous.next_member_change),
             lost_before,
             frozen: FrozenTracker::default(),
             counts: AllCounts::default(),
@@ -130,6 +135,7 @@ impl Started {
             next_snapshot: self.next_snapshot,
             next_outcome: self.next_outcome.max(self.last.outcome_count),
             next_member_change: self.next_member_change,
+            first_step_of_run: self.first_step_of_run,
             end_step: self.end_step,
             epoch_ns,
         }
@@ -296,12 +302,16 @@ impl Started {
         self.next_member_change = self.next_member_change.or(count);
     }
 
-    /// Accepts the changes of the members that no status before has named.
+    /// Accepts the changes of the members that no status before has named. Those between the file before
+    /// and this one are in neither, and missing.
     fn accept_member_changes(&mut self, status: &NodeStatus, accepted: &mut Accepted) {
         let changes = &status.member_changes;
         let next = self.next_member_change.unwrap_or(changes.oldest());
         self.counts[Topic::Events].gaps += changes.oldest().saturating_sub(next);
         self.next_member_change = Some(changes.count.max(next));
+        let steps_before = self.first_step_of_run..self.first_step;
+        let between = changes.iter_from(next).filter(|one| steps_before.contains(&one.step));
+        self.counts[Topic::Events].gaps += between.count() as u64;
         let steps = self.first_step..=self.end_step;
         for change in changes.iter_from(next).filter(|change| steps.contains(&change.step)) {
             self.counts[Topic::Events].received += 1;

@@ -12,8 +12,10 @@ use crate::cli::output;
 
 /// Name of the metadata record of `--meta`.
 const META_METADATA: &str = "meta";
-/// Most bytes of all names and values of `--meta`: readers of recordings read metadata up to 64 KiB.
+/// Most bytes of all entries of `--meta`: readers of recordings read metadata up to 64 KiB.
 const META_SIZE_BYTES_MAX: usize = 32 << 10;
+/// Bytes of an entry besides its name and value: the lengths of both.
+const META_ENTRY_SIZE_BYTES: usize = 8;
 /// Largest attached file. While a file is copied, snapshots wait in memory, and every file of a recording
 /// holds a copy.
 const ATTACHMENT_SIZE_BYTES_MAX: u64 = 256 << 20;
@@ -23,7 +25,8 @@ const ATTACHMENTS_MAX: usize = 64;
 /// Options for content of the user.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct ExtraArgs {
-    /// Add an entry to the metadata record 'meta' of each file. Can be repeated; 32 KiB in all
+    /// Add an entry to the metadata record 'meta' of each file. Can be repeated; 32 KiB in all,
+    /// with 8 bytes more for each entry
     #[arg(long, value_name = "NAME=VALUE", value_parser = meta_entry)]
     meta: Vec<(String, String)>,
     /// Attach a copy of a file to each file of the recording. Can be repeated; 256 MiB per file
@@ -62,8 +65,11 @@ impl Extras {
                 bail!("--meta: '{name}' is given twice; give each name once");
             }
         }
-        let size_bytes: usize =
-            args.meta.iter().map(|(name, value)| name.len() + value.len()).sum();
+        let size_bytes: usize = args
+            .meta
+            .iter()
+            .map(|(name, value)| META_ENTRY_SIZE_BYTES + name.len() + value.len())
+            .sum();
         if size_bytes > META_SIZE_BYTES_MAX {
             bail!(
                 "--meta: {size_bytes} bytes are too many (allowed: {META_SIZE_BYTES_MAX}); use --attach"
@@ -115,5 +121,23 @@ impl AttachedFile {
         // A file that cannot be read is an error of the start, not of a later file.
         (&file).read_exact(&mut [0; 1][..usize::from(size_bytes > 0)])?;
         Ok(Self { name, path: path.to_owned(), file, size_bytes })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn open(count: usize) -> anyhow::Result<Extras> {
+        let entry = |number| (format!("{number:04}"), String::new());
+        Extras::open(&ExtraArgs { meta: (0..count).map(entry).collect(), attach: Vec::new() })
+    }
+
+    #[test]
+    fn many_short_entries_stay_below_the_limit_of_readers() {
+        let count_max = META_SIZE_BYTES_MAX / (META_ENTRY_SIZE_BYTES + 4);
+        assert!(open(count_max).is_ok());
+        let error = open(count_max + 1).unwrap_err().to_string();
+        assert_eq!(error, "--meta: 32772 bytes are too many (allowed: 32768); use --attach");
     }
 }

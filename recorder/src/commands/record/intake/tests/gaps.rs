@@ -155,3 +155,21 @@ fn changes_of_the_lockstep_are_recorded_once_and_missing_ones_are_counted() {
     assert_eq!(rows(&change(40)).len(), 32);
     assert_eq!(intake.counts()[Topic::Events].gaps, 8);
 }
+
+#[test]
+fn changes_of_the_lockstep_between_two_files_are_missing() {
+    let mut status = NodeStatus { run_id: RUN_ID, step: 4, ..NodeStatus::default() };
+    let mut intake = started();
+    send(&mut intake, &[Update::Status(&status)]);
+    assert_eq!(intake.end_file(String::new()).missing(), [].into());
+    publish(&mut intake, header(8, 2), &[keyframe(8)]);
+    // The first precedes the recording, the second is in neither file, the third in this one.
+    for (client_id, step) in [(0, 3), (1, 6), (2, 8)] {
+        let kind = MemberChangeKind::TimedOut as u32;
+        status.member_changes.add(MemberChange { client_id, step, every: 1, kind });
+    }
+    status.step = 8;
+    let rows = side_rows(&send(&mut intake, &[Update::Status(&status)]));
+    assert_eq!(rows, ["8: client 2 was dropped from the lockstep: it was not ready in time"]);
+    assert_eq!(intake.counts()[Topic::Events].gaps, 1);
+}

@@ -1,8 +1,13 @@
 //! Files that follow each other: every message between two of them is in one, or declared.
 
+use std::sync::Arc;
+
 use sim_contract::SnapshotFlags;
 
 use super::*;
+use crate::commands::record::feed::Feed;
+use crate::commands::record::queue::Queue;
+use crate::commands::record::split::{SplitArgs, WritePosition};
 
 /// Ends the file before a state of [`Node::new`]. `messages` have arrived before it. Returns the last
 /// contents of the file, and the messages that it leaves to the next one.
@@ -53,6 +58,20 @@ fn messages_of_earlier_steps_end_a_file_and_those_of_its_step_begin_the_next_one
     // Snapshots 5 to 7 are in neither file.
     let missing = [("/particles", 3), ("/steps", 3)];
     assert_eq!(intake.closing(String::new()).missing(), missing.into());
+}
+
+#[test]
+fn the_end_of_a_node_ends_the_file_of_its_run_only() {
+    let mut feed = Feed::new(
+        started(),
+        Arc::new(Queue::new(1 << 20)),
+        Arc::new(WritePosition::default()),
+        SplitArgs::default(),
+    );
+    assert!(!feed.end_file_of(RUN_ID + 1, "owner gone"), "this run has just started");
+    assert_eq!(feed.run_id(), Some(RUN_ID));
+    assert!(feed.end_file_of(RUN_ID, "owner gone"));
+    assert_eq!(feed.run_id(), None);
 }
 
 #[test]

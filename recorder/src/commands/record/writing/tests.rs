@@ -1,0 +1,111 @@
+//! A ring of files whose older ones another program moves or blocks.
+
+use clap::Parser;
+use recorder::{AllCounts, RunDescription};
+
+use super::*;
+
+/// A folder of one test, which its end removes.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let name = format!("recorder-ring-{name}-{}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        fs::create_dir(&path).unwrap();
+        Self(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        fs::remove_dir_all(&self.0).unwrap();
+    }
+}
+
+#[derive(Debug, Parser)]
+struct Options {
+    #[command(flatten)]
+    file: FileArgs,
+}
+
+fn header() -> RunHeader {
+    let run = RunDescription {
+        run_id: 7,
+        epoch_ns: 0,
+        scene_name: "points".to_owned(),
+        origin: [0.0; 3],
+        rate_hz: 240,
+        method: 0,
+        particle_count: 1,
+        constraint_count: 0,
+        solver_version: 1,
+        contract_version: 1,
+        recorder_version: "0".to_owned(),
+    };
+    RunHeader { run, scene: b"version = 1".to_vec(), rows: Vec::new() }
+}
+
+/// A recording that keeps two files and has written two, `run_0000.mcap` and `run_0001.mcap`.
+fn full_ring(folder: &Folder) -> Files {
+    let options = WriteOptions {
+        file: Options::parse_from(["record"]).file,
+        names: FileNames::Numbered(folder.0.join("run.mcap")),
+        extras: Extras::default(),
+        selection: ContentSelection::default(),
+        files_max: Some(2),
+        is_synced: false,
+        flush_interval: Duration::from_secs(1),
+    };
+    let mut files = Files {
+        options,
+        position: Arc::new(WritePosition::default()),
+        created: None,
+        open: None,
+        next_number: 0,
+        written: Written::default(),
+    };
+    for _ in 0..2 {
+        files.begin(&header(), 0).unwrap();
+        files.finish(closing()).unwrap();
+    }
+    files
+}
+
+fn closing() -> Closing {
+    Closing { stop_reason: "split".to_owned(), counts: AllCounts::default(), unreadable: 0 }
+}
+
+/// Returns the names of the files in a folder.
+fn names_in(folder: &Folder) -> Vec<String> {
+    let entries = fs::read_dir(&folder.0).unwrap();
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_ring_goes_on_when_another_program_has_moved_its_oldest_file() {
+    let folder = Folder::new("moved");
+    let mut files = full_ring(&folder);
+    fs::remove_file(folder.0.join("run_0000.mcap")).unwrap();
+    files.begin(&header(), 0).unwrap();
+    files.finish(closing()).unwrap();
+    assert_eq!(files.written.removed_count, 0);
+    files.begin(&header(), 0).unwrap();
+    files.finish(closing()).unwrap();
+    assert_eq!(files.written.removed_count, 1);
+    assert_eq!(names_in(&folder), ["run_0002.mcap", "run_0003.mcap"]);
+}
+
+#[test]
+fn a_ring_keeps_its_oldest_file_when_the_next_one_cannot_be_created() {
+    let folder = Folder::new("blocked");
+    let mut files = full_ring(&folder);
+    fs::write(folder.0.join("run_0002.mcap"), "of another program").unwrap();
+    let error = format!("{:#}", files.begin(&header(), 0).unwrap_err());
+    assert!(error.contains("run_0002.mcap exists"), "{error}");
+    let names = names_in(&folder);
+    assert!(names.contains(&"run_0000.mcap".to_owned()), "{names:?}");
+}
