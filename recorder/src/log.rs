@@ -18,8 +18,8 @@ mod writer;
 
 pub use backlog::Backlog;
 pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_commands};
-pub use container::check::{CheckExtent, CheckReport, check_file};
-pub use container::finding::{Cure, Finding, Findings};
+pub use container::check::check_file;
+pub use container::finding::{CheckExtent, CheckReport, Cure, Finding, Findings};
 pub use container::losses::{Losses, LostSteps};
 pub use container::repair::{RepairError, RepairReport, repair_file};
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};

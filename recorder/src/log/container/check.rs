@@ -4,13 +4,12 @@ use std::collections::BTreeSet;
 use std::io::{Read, Seek};
 
 use mcap::records::{Footer, Header, MessageHeader, Metadata, Record, op};
-use serde::Serialize;
 use sim_contract::Stop;
 
 use super::attachment::no_checksum;
 use super::chunk::{Chunk, ChunkContent, InnerRecords};
 use super::content::ContentCheck;
-use super::finding::{Findings, record_name};
+use super::finding::{CheckExtent, CheckReport, Findings, record_name};
 use super::places::Places;
 use super::summary::{SummaryCheck, is_of_index};
 use super::walk::{Part, Walk};
@@ -27,36 +26,6 @@ const PROGRESS_PERIOD_BYTES: u64 = 16 << 20;
 
 /// Most parts of other programs that a report names.
 const NOT_CHECKED_MAX: usize = 16;
-
-/// The result of the check of a file.
-#[derive(Debug)]
-pub struct CheckReport {
-    /// The differences between the file and what its writer wrote.
-    pub findings: Findings,
-    /// The content that was checked.
-    pub extent: CheckExtent,
-}
-
-/// The content of a file that was checked, and the content that could not be.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct CheckExtent {
-    /// Size of the file.
-    pub size_bytes: u64,
-    /// Number of chunks.
-    pub chunk_count: u64,
-    /// Number of messages, those of other programs included.
-    pub message_count: u64,
-    /// Number of snapshots.
-    pub snapshot_count: u64,
-    /// The first and the last step of the snapshots.
-    pub steps: Option<[u64; 2]>,
-    /// Snapshots without a compared hash, because messages before them are missing.
-    pub unhashed_count: u64,
-    /// Missing messages that the file declares.
-    pub declared_missing: u64,
-    /// The content that could not be checked, for people.
-    pub not_checked: Vec<String>,
-}
 
 /// Checks every byte of a file. Calls `on_progress` with the position and the size of the file.
 ///
@@ -134,7 +103,9 @@ impl Check {
             }
             Part::LongAttachment { attachment, checksum } => {
                 let what = attachment.check(checksum, &mut self.findings, &mut self.places);
-                what.map_or((), |what| self.not_checked(what));
+                if let Some(what) = what {
+                    self.not_checked(what);
+                }
                 Ok(SectionEnd::None)
             }
             Part::Damaged { bytes, cause } => {

@@ -2,6 +2,36 @@
 
 use std::fmt;
 
+/// The result of the check of a file.
+#[derive(Debug)]
+pub struct CheckReport {
+    /// The differences between the file and what its writer wrote.
+    pub findings: Findings,
+    /// The content that was checked.
+    pub extent: CheckExtent,
+}
+
+/// The content of a file that was checked, and the content that could not be.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct CheckExtent {
+    /// Size of the file.
+    pub size_bytes: u64,
+    /// Number of chunks.
+    pub chunk_count: u64,
+    /// Number of messages, those of other programs included.
+    pub message_count: u64,
+    /// Number of snapshots.
+    pub snapshot_count: u64,
+    /// The first and the last step of the snapshots.
+    pub steps: Option<[u64; 2]>,
+    /// Snapshots without a compared hash, because messages before them are missing.
+    pub unhashed_count: u64,
+    /// Missing messages that the file declares.
+    pub declared_missing: u64,
+    /// The content that could not be checked, for people.
+    pub not_checked: Vec<String>,
+}
+
 use serde::Serialize;
 
 /// Most findings that a report lists. It counts the others.
