@@ -6,8 +6,8 @@ use std::path::Path;
 use fastrand::Rng;
 use recorder::{FrameReader, LogReader};
 use sim_contract::{
-    Action, Client, Endpoint, GivenState, Outcome, ParameterValue, ParticleState, Reason,
-    RestoreContents, Text, scene_hash,
+    Action, Client, ELEMENTS_MAX, Endpoint, GivenState, Outcome, ParameterValue, ParticleState,
+    Reason, RestoreContents, Text, scene_hash,
 };
 
 use crate::process::{Process, ctl, record};
@@ -76,6 +76,10 @@ impl HeldState {
         Self { scene_hash, particles: frame.particles, keyframe }
     }
 
+    fn particle_count(&self) -> u32 {
+        u32::try_from(self.particles.len()).expect("a scene of an allowed size")
+    }
+
     /// Returns the complete state.
     pub fn state(&self) -> GivenState<'_> {
         let Self { scene_hash, particles, keyframe } = self;
@@ -88,14 +92,15 @@ impl HeldState {
     }
 }
 
-/// Runs a storm on a node of its own, records it, and verifies the recording in another process.
+/// Runs a storm on a node of its own with a built-in scene, records it, and verifies the recording in another process.
 ///
 /// # Panics
 /// If a program fails, or the recording is not bit-identical up to the last step.
-pub fn run(storm: Storm) -> Summary {
+pub fn run(scene: &str, rate_hz: u32, storm: Storm) -> Summary {
     let sandbox = Sandbox::new();
     let file = sandbox.path("storm.mcap");
-    let args = ["run", "curtain", "--rate", "1000"];
+    let rate = rate_hz.to_string();
+    let args = ["run", scene, "--rate", &rate];
     let node = Process::start_ready(Program::SimNode, &sandbox, &args);
     let held = HeldState::read(&sandbox);
     let recording = record(&sandbox, &file);
@@ -149,12 +154,12 @@ fn disturb(endpoint: &Endpoint, held: &HeldState, mut rng: Rng, count: u64) -> C
                 outcome
             }
             3 => {
-                let outcome = request(&mut client, bad_action(&mut rng));
+                let outcome = request(&mut client, bad_action(held, &mut rng));
                 assert!(!outcome.is_applied(), "{outcome:?}");
                 outcome
             }
             _ => {
-                let outcome = request(&mut client, action(&mut rng));
+                let outcome = request(&mut client, action(held, &mut rng));
                 assert_ne!(outcome.reason(), Some(Reason::InvalidState), "{outcome:?}");
                 outcome
             }
@@ -177,10 +182,11 @@ fn request(client: &mut Client, action: Action) -> Outcome {
 }
 
 /// Returns an action that the node may apply or reject.
-fn action(rng: &mut Rng) -> Action {
-    let particle = rng.u32(0..200);
+fn action(held: &HeldState, rng: &mut Rng) -> Action {
+    // Some are just past the last one.
+    let particle = rng.u32(0..held.particle_count() + 32);
     let target = [rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5];
-    match rng.u32(0..12) {
+    match rng.u32(0..14) {
         0 => Action::Rewind { to_step: None, back_steps: Some(rng.u32(0..100)) },
         1 => Action::Rewind { to_step: Some(rng.u64(0..2000)), back_steps: None },
         2 => Action::Reset,
@@ -190,16 +196,19 @@ fn action(rng: &mut Rng) -> Action {
         6 => Action::Release { particle, force: true },
         7 => Action::Push { center: target, radius: 0.3, delta: target, limit: Some(0.01) },
         8 => set("damping", rng.f32()),
+        // They change every constraint, which a node prepares beside the loop if there are many.
+        9 => set("compliance", rng.f32() * 1e-4),
+        10 => set("tear_stretch", 2.0 + rng.f32()),
         _ => Action::Grab { particle, target, over_s: 0.05 },
     }
 }
 
 /// Returns an action that every node rejects.
-fn bad_action(rng: &mut Rng) -> Action {
+fn bad_action(held: &HeldState, rng: &mut Rng) -> Action {
     let (target, over_s) = ([f32::NAN, 0.0, f32::INFINITY], 0.05);
     match rng.u32(0..7) {
-        0 => Action::Pin { particle: rng.u32(168..) },
-        1 => Action::Cut { constraint: rng.u32(10_000..) },
+        0 => Action::Pin { particle: rng.u32(held.particle_count()..) },
+        1 => Action::Cut { constraint: rng.u32(ELEMENTS_MAX..) },
         2 => Action::Grab { particle: 90, target, over_s },
         3 => Action::CutRadius { center: target, radius: 0.05 },
         4 => set("substeps", 0.5),

@@ -5,11 +5,12 @@ pub(crate) mod error;
 pub(crate) mod load;
 
 use std::cell::Cell;
+use std::io;
 use std::path::PathBuf;
 
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::ipc;
+use iceoryx2::prelude::{PortFactory, ipc_threadsafe};
 
 use crate::endpoint::Endpoint;
 use crate::limits::{COMMANDS_BUFFERED, CONTRACT_VERSION, READY_BUFFERED, RESTORES_MAX};
@@ -49,9 +50,9 @@ pub struct Owner {
     // is gone when they wake. The name is free once all services are removed.
     writers: LoadWriters,
     outcomes: ValueWriter<Outcome>,
-    commands: Subscriber<ipc::Service, Command, ()>,
-    ready: Subscriber<ipc::Service, Ready, ()>,
-    restore: Subscriber<ipc::Service, [u8], RestoreHeader>,
+    commands: Subscriber<ipc_threadsafe::Service, Command, ()>,
+    ready: Subscriber<ipc_threadsafe::Service, Ready, ()>,
+    restore: Subscriber<ipc_threadsafe::Service, [u8], RestoreHeader>,
     status: ValueWriter<NodeStatus>,
     wake: WakeSender,
     /// Number of readers at the last refresh, to notice new readers.
@@ -334,9 +335,20 @@ impl Owner {
         }
     }
 
-    /// Wakes all waiting processes, with one system call for each of them.
+    /// Wakes all waiting processes, with one system call for each of them, or only one after
+    /// [`Owner::start_wake_thread`].
     pub fn wake(&self, event: Wake) {
-        self.wake.wake(event);
+        let listener_count = self.services.wake.dynamic_config().number_of_listeners();
+        self.wake.wake(event, listener_count);
+    }
+
+    /// Starts a thread that wakes the waiting processes if there are several, so that their number does
+    /// not delay the owner. The thread inherits the scheduling of the calling thread.
+    ///
+    /// # Errors
+    /// The system starts no thread.
+    pub fn start_wake_thread(&mut self) -> io::Result<()> {
+        self.wake.start_thread()
     }
 
     /// Returns the first file of this owner that is missing in the root of the domain, or its lock in shared
@@ -383,6 +395,7 @@ mod tests {
     use crate::messages::topology::Triangle;
     use crate::ports::service::SURFACE;
     use crate::ports::session::Slices;
+    use crate::ports::wake::{WakeCause, WakeListener};
     use crate::testing::TestDomain;
 
     /// Longer than any step of the test takes.
@@ -427,6 +440,31 @@ mod tests {
         drop(other_publishers);
         owner.load(&load(2)).unwrap();
         assert_eq!(revision(&mut client), Some(2));
+    }
+
+    #[test]
+    fn a_wake_thread_wakes_each_waiting_process_also_at_the_end_of_the_owner() {
+        let domain = TestDomain::new();
+        let mut owner = Owner::create(&domain.endpoint(), &load(1)).unwrap();
+        owner.start_wake_thread().unwrap();
+        let session = Session::join(&domain.endpoint()).unwrap();
+        let service = session.events(Access::Open).unwrap();
+        let listeners: Vec<_> = (0..3)
+            .map(|_| WakeListener::new(service.listener_builder().create().unwrap()))
+            .collect();
+        for _ in 0..100 {
+            owner.wake(Wake::Frame);
+            for listener in &listeners {
+                assert_eq!(listener.wait(DEADLINE), WakeCause::Event);
+            }
+        }
+        owner.wake(Wake::Outcome);
+        drop(owner);
+        for listener in &listeners {
+            // The last two events may arrive together.
+            let mut causes = std::iter::repeat_with(|| listener.wait(DEADLINE)).take(2);
+            assert!(causes.any(|cause| cause == WakeCause::OwnerGone));
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use anyhow::Context;
 use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader, NodeStatus,
+    CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader,
     OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, Owner, OwnerError, ParameterValues,
     ParticleState, Ready, Reason, ReceivedCommand, ReceivedState, SnapshotFlags, SnapshotHeader,
     TearsHeader, TornConstraint, Wake, scene_hash,
@@ -468,6 +468,11 @@ impl Publisher {
         }
     }
 
+    /// Same as [`Owner::start_wake_thread`].
+    pub(crate) fn start_wake_thread(&mut self) -> anyhow::Result<()> {
+        self.owner.start_wake_thread().context("no thread that wakes readers")
+    }
+
     /// Gives late subscribers the latest message of each service that is seldom written.
     pub(crate) fn refresh(&self) {
         self.owner.refresh();
@@ -476,12 +481,6 @@ impl Publisher {
     /// Same as [`Owner::missing_file`].
     pub(crate) fn missing_file(&self) -> Option<PathBuf> {
         self.owner.missing_file()
-    }
-
-    pub(crate) fn publish_status(&self, status: &NodeStatus) -> anyhow::Result<()> {
-        self.owner.publish_status(status)?;
-        self.owner.wake(Wake::Status);
-        Ok(())
     }
 }
 

@@ -1,4 +1,5 @@
-//! The threads of a node: that of the loop, and those of the solver, whose number changes no bit.
+//! The threads of a node: that of the loop, one that wakes readers, and those of the solver, whose number
+//! changes no bit.
 
 use sim_solver::{Solver, THREADS_MAX};
 
@@ -12,17 +13,18 @@ use super::real_time::rest::Rest;
 const SHARED_MIN: usize = 4000;
 
 impl Node {
-    /// Obtains the real-time properties of the options and starts the solver's threads. Call it on the
-    /// thread of the loop, after everything that takes long. Returns lines for people.
+    /// Obtains the real-time properties of the options and starts the threads. Call it on the thread of the
+    /// loop, after everything that takes long. Returns lines for people.
     ///
     /// # Errors
-    /// The system refuses a property that the options require.
+    /// The system refuses a property that the options require, or a thread.
     pub(crate) fn prepare(&mut self) -> anyhow::Result<Vec<String>> {
         let Prepared { real_time, lines } = prepare(self.options.real_time, &mut self.cpus)?;
         self.real_time = real_time;
         self.rest = real_time.fifo_priority.map(|_| Rest::default());
         // They inherit the scheduling of this thread.
         start_threads(&mut self.solver, self.options.threads, &self.cpus);
+        self.cpus.lend(|| self.publisher.start_wake_thread())?;
         Ok(lines)
     }
 }

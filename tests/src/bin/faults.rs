@@ -13,19 +13,23 @@ const HELP: &str = "Perform random actions on a node, recorders, a viewer and cl
 Check after each that no recording is damaged, no loss is undeclared, and no program hangs or panics.
 
 Usage: cargo faults [--seed N] [--actions K] [--verbose]
-       cargo faults --storm K
+       cargo faults --storm K [--scene NAME] [--rate HZ]
 
 --seed N     schedule to perform [default: a random one]
 --actions K  number of actions [default: 300]
 --verbose    print each action
 --storm K    let four clients send K random commands each, bad ones, rewinds and states included, record
              it, and verify the recording
+--scene NAME built-in scene of the storm [default: curtain]
+--rate HZ    rate of the storm in steps per second [default: 1000]
 
 A failure names the seed and the action, and shows the output of the programs. Ctrl-C ends the run
 after the current action.";
 
 /// Number of actions without `--actions`.
 const ACTIONS_DEFAULT: u64 = 300;
+/// Rate of `--storm` without `--rate`.
+const RATE_DEFAULT_HZ: u32 = 1000;
 /// Number of clients of `--storm`.
 const STORM_CLIENTS: u64 = 4;
 /// Actions between two lines of progress.
@@ -34,7 +38,12 @@ const ACTIONS_PER_LINE: usize = 50;
 fn main() -> anyhow::Result<()> {
     let mut words = std::env::args().skip(1);
     let (mut seed, mut actions, mut is_verbose, mut storm) = (None, ACTIONS_DEFAULT, false, None);
+    let (mut scene, mut rate_hz) = ("curtain".to_owned(), RATE_DEFAULT_HZ);
     while let Some(word) = words.next() {
+        if word == "--scene" {
+            scene = words.next().context("--scene needs a name")?;
+            continue;
+        }
         let mut number = || -> anyhow::Result<u64> {
             let text = words.next().with_context(|| format!("{word} needs a number"))?;
             text.parse().with_context(|| format!("{word} needs a number, not '{text}'"))
@@ -43,6 +52,7 @@ fn main() -> anyhow::Result<()> {
             "--seed" => seed = Some(number()?),
             "--actions" => actions = number()?,
             "--storm" => storm = Some(number()?),
+            "--rate" => rate_hz = u32::try_from(number()?)?,
             "--verbose" => is_verbose = true,
             "--help" | "-h" => {
                 eprintln!("{HELP}");
@@ -52,7 +62,7 @@ fn main() -> anyhow::Result<()> {
         }
     }
     if let Some(commands) = storm {
-        run_storm(commands);
+        run_storm(&scene, rate_hz, commands);
         return Ok(());
     }
     let stop = Stop::install()?;
@@ -75,9 +85,10 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn run_storm(commands: u64) {
+fn run_storm(scene: &str, rate_hz: u32, commands: u64) {
+    let storm = Storm { clients: STORM_CLIENTS, commands };
     let Summary { counts, last_step, size_bytes, recorded, verified } =
-        storm::run(Storm { clients: STORM_CLIENTS, commands });
+        storm::run(scene, rate_hz, storm);
     let Counts { applied, rejected } = counts;
     eprintln!("{recorded}");
     eprintln!(

@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, Node, NodeState, PortFactory, ipc};
+use iceoryx2::prelude::{CallbackProgression, Node, NodeState, PortFactory, ipc_threadsafe};
 
 use crate::ports::domain::unfinished;
 
@@ -14,24 +14,24 @@ use crate::ports::domain::unfinished;
 const TIMEOUT: Duration = Duration::from_millis(100);
 
 /// Cleans up after all dead processes of the domain that no other process cleans up after.
-pub(crate) fn clean_domain(node: &Node<ipc::Service>) {
+pub(crate) fn clean_domain(node: &Node<ipc_threadsafe::Service>) {
     clean_up(node, Duration::ZERO);
 }
 
 /// Frees the places of dead processes in the services of the domain. Waits for other processes that
 /// clean up.
-pub(crate) fn free_places(node: &Node<ipc::Service>) {
+pub(crate) fn free_places(node: &Node<ipc_threadsafe::Service>) {
     clean_up(node, TIMEOUT);
 }
 
-fn clean_up(node: &Node<ipc::Service>, timeout: Duration) {
+fn clean_up(node: &Node<ipc_threadsafe::Service>, timeout: Duration) {
     unfinished::remove_connections(node.config());
     node.blocking_cleanup_dead_nodes(timeout);
     unfinished::remove_listeners(node.config());
 }
 
 /// Frees the places of dead processes in one service.
-pub(crate) fn free_ports(service: &impl PortFactory<Service = ipc::Service>) {
+pub(crate) fn free_ports(service: &impl PortFactory<Service = ipc_threadsafe::Service>) {
     // Without a list, there is nothing to clean up.
     let _ = service.nodes(|node| {
         if let NodeState::Dead(dead) = node

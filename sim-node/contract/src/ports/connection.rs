@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{CallbackProgression, NodeState, PortFactory, ZeroCopySend, ipc};
+use iceoryx2::prelude::{
+    CallbackProgression, NodeState, PortFactory, ZeroCopySend, ipc_threadsafe,
+};
 
 use crate::limits::BORROWED_UPDATES_MAX;
 use crate::messages::command::Command;
@@ -28,7 +30,7 @@ pub struct ReceivedCommand {
 /// most one queue of `buffered` messages of each, so that a client that sends without a pause keeps no
 /// other waiting. Ends early at a client with a broken connection.
 pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
-    subscriber: &Subscriber<ipc::Service, T, ()>,
+    subscriber: &Subscriber<ipc_threadsafe::Service, T, ()>,
     buffered: usize,
     mut add: impl FnMut(T, ConnectionId),
 ) {
@@ -50,7 +52,7 @@ pub(crate) fn receive_round<T: Copy + Debug + ZeroCopySend>(
 /// Receives messages with a payload, at most `count_max`, and of each connection at most as many as a
 /// reader may hold. Ends early at a client with a broken connection.
 pub(crate) fn receive_held<H: Debug + ZeroCopySend>(
-    subscriber: &Subscriber<ipc::Service, [u8], H>,
+    subscriber: &Subscriber<ipc_threadsafe::Service, [u8], H>,
     count_max: usize,
     mut add: impl FnMut(&H, &[u8], ConnectionId),
 ) {

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc};
+use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe};
 use iceoryx2::service::port_factory::publish_subscribe;
 
 use crate::messages::collider::CollidersHeader;
@@ -64,7 +64,7 @@ impl SliceHeader for RestoreHeader {
 
 /// Returns the number of readers of a service. Killed readers count until their ports are freed.
 pub(crate) fn reader_count<P, H>(
-    service: &publish_subscribe::PortFactory<ipc::Service, P, H>,
+    service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
 ) -> usize
 where
     P: Debug + IceoryxSend + ?Sized,
@@ -83,7 +83,7 @@ pub(crate) struct PortLimit {
 
 /// Creates a port, unless shared memory is full. At the limit, frees the ports of dead processes and tries again.
 pub(crate) fn create_port<T, E: PartialEq + Debug>(
-    service: &impl PortFactory<Service = ipc::Service>,
+    service: &impl PortFactory<Service = ipc_threadsafe::Service>,
     full: &E,
     limit: PortLimit,
     create: impl Fn() -> Result<T, E>,

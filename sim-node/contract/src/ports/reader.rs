@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use iceoryx2::port::ReceiveError;
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
-use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc};
+use iceoryx2::prelude::{IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::header::payload_header::PayloadHeader;
 use iceoryx2::service::port_factory::publish_subscribe;
@@ -56,12 +56,12 @@ pub(crate) struct Drained {
 }
 
 /// A message in shared memory whose header agrees with its payload.
-pub(crate) type SliceSample<T, H> = Sample<ipc::Service, [T], H>;
+pub(crate) type SliceSample<T, H> = Sample<ipc_threadsafe::Service, [T], H>;
 
 /// A reader of a service of slices.
 #[derive(Debug)]
 pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
-    subscriber: Subscriber<ipc::Service, [T], H>,
+    subscriber: Subscriber<ipc_threadsafe::Service, [T], H>,
     service: String,
     buffered: usize,
     borrowed: usize,
@@ -141,7 +141,7 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
 /// A reader of a service of single values.
 #[derive(Debug)]
 pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
-    subscriber: Subscriber<ipc::Service, T, ()>,
+    subscriber: Subscriber<ipc_threadsafe::Service, T, ()>,
     service: String,
     buffered: usize,
     /// Accepted publishers; `None` accepts all.
@@ -195,8 +195,8 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
 }
 
 pub(crate) fn subscribe<P, H>(
-    service: &publish_subscribe::PortFactory<ipc::Service, P, H>,
-) -> Result<Subscriber<ipc::Service, P, H>, ServiceError>
+    service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
+) -> Result<Subscriber<ipc_threadsafe::Service, P, H>, ServiceError>
 where
     P: Debug + IceoryxSend + ?Sized,
     H: Debug + ZeroCopySend,
@@ -209,15 +209,15 @@ where
 /// Receives the next message of an accepted publisher.
 fn next_accepted<P, H>(
     source: Option<&Source>,
-    receive: impl Fn() -> Result<Option<Sample<ipc::Service, P, H>>, ReceiveError>,
-) -> Result<Option<Sample<ipc::Service, P, H>>, ReceiveError>
+    receive: impl Fn() -> Result<Option<Sample<ipc_threadsafe::Service, P, H>>, ReceiveError>,
+) -> Result<Option<Sample<ipc_threadsafe::Service, P, H>>, ReceiveError>
 where
     P: Debug + IceoryxSend + ?Sized,
     H: Debug + ZeroCopySend,
 {
     for _ in 0..REFUSALS_MAX {
         let received = receive()?;
-        let is_refused = |sample: &Sample<ipc::Service, P, H>| {
+        let is_refused = |sample: &Sample<ipc_threadsafe::Service, P, H>| {
             source.is_some_and(|source| !source.accepts(sample.header().node_id()))
         };
         if !received.as_ref().is_some_and(is_refused) {

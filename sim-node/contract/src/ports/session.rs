@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use iceoryx2::prelude::{
     AttributeVerifier, Config, IceoryxSend, Node, NodeBuilder, Service, ServiceName,
-    SignalHandlingMode, ZeroCopySend, ipc,
+    SignalHandlingMode, ZeroCopySend, ipc_threadsafe,
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
@@ -23,11 +23,13 @@ use crate::ports::service::{Cause, ServiceError, ServiceSpec, VERSION_KEY, WAKE,
 use crate::ports::wake::Wake;
 
 /// A publish-subscribe service whose messages are slices of `T` with the header `H`.
-pub(crate) type Slices<T, H> = port_factory::publish_subscribe::PortFactory<ipc::Service, [T], H>;
+pub(crate) type Slices<T, H> =
+    port_factory::publish_subscribe::PortFactory<ipc_threadsafe::Service, [T], H>;
 /// A publish-subscribe service whose messages are single values.
-pub(crate) type Values<T> = port_factory::publish_subscribe::PortFactory<ipc::Service, T, ()>;
+pub(crate) type Values<T> =
+    port_factory::publish_subscribe::PortFactory<ipc_threadsafe::Service, T, ()>;
 /// An event service.
-pub(crate) type Events = port_factory::event::PortFactory<ipc::Service>;
+pub(crate) type Events = port_factory::event::PortFactory<ipc_threadsafe::Service>;
 
 /// Pause before another attempt, while another process creates or removes the same service.
 const RETRY_PAUSE: Duration = Duration::from_millis(5);
@@ -38,7 +40,7 @@ const ATTEMPTS_MAX: usize = 20;
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) endpoint: Endpoint,
-    node: Node<ipc::Service>,
+    node: Node<ipc_threadsafe::Service>,
     /// Version of the services that are created and opened: [`CONTRACT_VERSION`], except in tests.
     contract_version: u32,
     /// The version as an attribute of services.
@@ -91,7 +93,7 @@ impl Session {
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
-            .create::<ipc::Service>()
+            .create::<ipc_threadsafe::Service>()
             .map_err(|error| refused(&error))?;
         cleanup::clean_domain(&node);
         if is_named {
@@ -268,7 +270,8 @@ impl Session {
     /// Returns the contract version that an existing service was created with.
     fn existing_version(&self, spec: &ServiceSpec, service: &str) -> Option<String> {
         let name = ServiceName::new(service).ok()?;
-        let details = ipc::Service::details(&name, self.node.config(), spec.pattern).ok()??;
+        let details =
+            ipc_threadsafe::Service::details(&name, self.node.config(), spec.pattern).ok()??;
         let attributes = details.static_details.attributes();
         attributes.key_value(&VERSION_KEY.try_into().ok()?, 0).map(ToString::to_string)
     }
@@ -282,9 +285,9 @@ fn version_attribute(contract_version: u32) -> Result<AttributeVerifier, Box<dyn
 }
 
 fn with_quality<P, H>(
-    builder: Builder<P, H, ipc::Service>,
+    builder: Builder<P, H, ipc_threadsafe::Service>,
     spec: &ServiceSpec,
-) -> Builder<P, H, ipc::Service>
+) -> Builder<P, H, ipc_threadsafe::Service>
 where
     P: Debug + IceoryxSend + ?Sized,
     H: Debug + ZeroCopySend,

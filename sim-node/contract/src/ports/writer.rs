@@ -6,7 +6,7 @@ use iceoryx2::identifiers::UniquePublisherId;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{
-    BackpressureStrategy, Config, IceoryxSend, PortFactory, ZeroCopySend, ipc,
+    BackpressureStrategy, Config, IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe,
 };
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
@@ -75,7 +75,7 @@ impl Capacity {
 /// A writer of a service of slices.
 #[derive(Debug)]
 pub(crate) struct SliceWriter<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
-    publisher: Publisher<ipc::Service, [T], H>,
+    publisher: Publisher<ipc_threadsafe::Service, [T], H>,
     service: String,
     len_max: usize,
 }
@@ -145,7 +145,7 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
 /// A writer of a service of single values.
 #[derive(Debug)]
 pub(crate) struct ValueWriter<T: Debug + Copy + ZeroCopySend + 'static> {
-    publisher: Publisher<ipc::Service, T, ()>,
+    publisher: Publisher<ipc_threadsafe::Service, T, ()>,
     service: String,
 }
 
@@ -192,7 +192,7 @@ fn allocate(config: &Config, id: UniquePublisherId, service: &str) -> Result<(),
 }
 
 fn create_publisher<P, H, W>(
-    service: &publish_subscribe::PortFactory<ipc::Service, P, H>,
+    service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
     create: impl Fn() -> Result<W, PublisherCreateError>,
 ) -> Result<W, ServiceError>
 where

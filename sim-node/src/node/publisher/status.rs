@@ -1,6 +1,6 @@
 //! The status message.
 
-use sim_contract::{CONTRACT_VERSION, NodeStatus, StatusFlags};
+use sim_contract::{CONTRACT_VERSION, NodeStatus, StatusFlags, Wake};
 use sim_solver::{SOLVER_VERSION, Scene, Solver};
 
 use super::load::count;
@@ -8,6 +8,12 @@ use super::{Position, Publisher};
 use crate::node::statistics::Statistics;
 
 impl Publisher {
+    pub(crate) fn publish_status(&self, status: &NodeStatus) -> anyhow::Result<()> {
+        self.owner.publish_status(status)?;
+        self.owner.wake(Wake::Status);
+        Ok(())
+    }
+
     /// Status of the node.
     pub(crate) fn status(
         &self,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, ipc};
+use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, ipc_threadsafe};
 
 use crate::clock;
 use crate::ports::domain::files::segments;
@@ -124,7 +124,7 @@ fn dead_nodes(config: &Config) -> Vec<(LeftoverKind, PathBuf)> {
     let directory = root::to_std(&config.global.node_dir());
     let mut dead = Vec::new();
     // After an error, the nodes that were not listed count as alive.
-    let _ = Node::<ipc::Service>::list(config, |node| {
+    let _ = Node::<ipc_threadsafe::Service>::list(config, |node| {
         if let NodeState::Dead(node) = node {
             let id = node.id().value();
             let process_id = u32::try_from(unfinished::process(id)).unwrap_or_default();
@@ -150,7 +150,8 @@ fn dead_services(config: &Config) -> Vec<ServiceFile> {
     // The services that were not listed count as open.
     unfinished::list_services(config, |service| {
         if let Some(file) = service_file(config, service.static_details.name().as_str()) {
-            let is_alive = |node: &NodeState<ipc::Service>| !matches!(node, NodeState::Dead(_));
+            let is_alive =
+                |node: &NodeState<ipc_threadsafe::Service>| !matches!(node, NodeState::Dead(_));
             let is_open = match &service.dynamic_details {
                 Some(details) => details.nodes.iter().any(is_alive),
                 // Another version of iceoryx2 may have it open, unless its segment is gone.

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::prelude::{
-    CallbackProgression, Config, IceoryxSend, Node, PortFactory, ZeroCopySend, ipc,
+    CallbackProgression, Config, IceoryxSend, Node, PortFactory, ZeroCopySend, ipc_threadsafe,
 };
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use iceoryx2::service::service_hash::ServiceHash;
@@ -29,7 +29,9 @@ pub(crate) struct Port {
 }
 
 /// Returns the publishers and subscribers of a service, living or dead.
-pub(crate) fn ports<P, H>(service: &publish_subscribe::PortFactory<ipc::Service, P, H>) -> Vec<Port>
+pub(crate) fn ports<P, H>(
+    service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
+) -> Vec<Port>
 where
     P: Debug + IceoryxSend + ?Sized,
     H: Debug + ZeroCopySend,
@@ -50,7 +52,7 @@ const READ_ONLY: u32 = 0o400;
 const WRITABLE: u32 = 0o600;
 
 /// Returns the notifiers and listeners of a service, living or dead.
-pub(crate) fn event_ports(service: &event::PortFactory<ipc::Service>) -> Vec<Port> {
+pub(crate) fn event_ports(service: &event::PortFactory<ipc_threadsafe::Service>) -> Vec<Port> {
     let mut ports = Vec::new();
     let mut add = |node, id| {
         ports.push(Port { node, id, service: *service.service_hash() });
@@ -67,7 +69,7 @@ pub(crate) fn event_ports(service: &event::PortFactory<ipc::Service>) -> Vec<Por
 /// Returns `true` if there were such nodes.
 pub(crate) fn restore_nodes(config: &Config, own: u128, ports: &[Port]) -> bool {
     let mut known = Vec::new();
-    let listed = Node::<ipc::Service>::list(config, |node| {
+    let listed = Node::<ipc_threadsafe::Service>::list(config, |node| {
         known.push(*node.node_id());
         CallbackProgression::Continue
     });

@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::node::NodeView;
-use iceoryx2::prelude::{CallbackProgression, Config, Node, NodeState, ServiceName, ipc};
+use iceoryx2::prelude::{
+    CallbackProgression, Config, Node, NodeState, ServiceName, ipc_threadsafe,
+};
 use iceoryx2::service::service_hash::ServiceHash;
 use iceoryx2::service::{Service, ServiceDetails};
 
@@ -90,13 +92,13 @@ pub(crate) fn old_segments(config: &Config) -> Vec<PathBuf> {
 /// creator without a limit, even for a dead one. An error ends the list.
 pub(crate) fn list_services(
     config: &Config,
-    each: impl FnMut(ServiceDetails<ipc::Service>) -> CallbackProgression,
+    each: impl FnMut(ServiceDetails<ipc_threadsafe::Service>) -> CallbackProgression,
 ) {
     let mut segments = segments(config, &config.global.service.dynamic_config_storage_suffix);
     let is_unfinished =
         |path: PathBuf| fs::metadata(path).is_ok_and(|file| is_unfinished_segment(&file));
     if !segments.any(is_unfinished) {
-        let _ = ipc::Service::list(config, each);
+        let _ = ipc_threadsafe::Service::list(config, each);
     }
 }
 
@@ -188,8 +190,10 @@ pub(crate) fn static_files(config: &Config, name: &str) -> Vec<PathBuf> {
 pub(crate) fn static_file(config: &Config, spec: &ServiceSpec, name: &str) -> Option<PathBuf> {
     let directory = root::to_std(&config.global.service_dir());
     let service = ServiceName::new(&spec.service_name(name)).ok()?;
-    let hash =
-        ServiceHash::new::<<ipc::Service as Service>::ServiceNameHasher>(&service, spec.pattern);
+    let hash = ServiceHash::new::<<ipc_threadsafe::Service as Service>::ServiceNameHasher>(
+        &service,
+        spec.pattern,
+    );
     let Config { global, .. } = config;
     let suffix = &global.service.static_config_storage_suffix;
     Some(directory.join(format!("{}{hash}{suffix}", global.prefix)))
@@ -218,7 +222,7 @@ pub(crate) fn dynamic_segment(config: &Config, static_file: &Path) -> Option<Pat
 pub(crate) fn remove_nodes(config: &Config) {
     // iceoryx2 cannot clean up after a dead node without details: they hold its configuration.
     let mut ids = Vec::new();
-    let listed = Node::<ipc::Service>::list(config, |node| {
+    let listed = Node::<ipc_threadsafe::Service>::list(config, |node| {
         if let NodeState::Dead(dead) = node
             && dead.details().is_none()
         {
