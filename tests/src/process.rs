@@ -285,7 +285,8 @@ impl Process {
     /// If the process has ended.
     pub fn limit_file_size(&self, size_bytes: u64) {
         let pid = Pid::from_child(&self.child);
-        let limit = Rlimit { current: Some(size_bytes), maximum: Some(size_bytes) };
+        // The hard limit stays that of this process, so that a later limit may be greater.
+        let limit = Rlimit { current: Some(size_bytes), ..getrlimit(Resource::Fsize) };
         prlimit(Some(pid), Resource::Fsize, limit)
             .unwrap_or_else(|error| panic!("{}: {error}", self.title));
     }
