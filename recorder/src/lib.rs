@@ -40,7 +40,7 @@
 //!
 //! let mut frames = FrameReader::new(LogReader::new(file.as_slice())?);
 //! let frame = frames.next_frame()?.expect("one snapshot");
-//! assert_eq!((frame.row, frame.particles.len()), (row, 1));
+//! assert_eq!((frame.row, frame.payload().len()), (row, 1));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

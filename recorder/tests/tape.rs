@@ -239,7 +239,7 @@ fn a_newly_opened_tape_shows_the_state_in_the_file() {
         // A newly opened tape has no cached chunks.
         if step % 37 == 0 {
             let state = file.open().unwrap().state_at(step).unwrap();
-            assert_eq!((state.row, &*state.particles), (frame.row, &frame.particles));
+            assert_eq!((state.row, state.particles.as_slice()), (frame.row, frame.payload()));
             assert_shows(&mut file.open().unwrap(), step, &all);
         }
         step += 1;

@@ -73,7 +73,7 @@ impl HeldState {
         let mut frames = FrameReader::new(log);
         let frame = frames.next_frame().expect("a readable file").expect("a state");
         let keyframe = frame.own_keyframe().expect("a state with its keyframe").to_vec();
-        Self { scene_hash, particles: frame.particles, keyframe }
+        Self { scene_hash, particles: frame.payload().to_vec(), keyframe }
     }
 
     fn particle_count(&self) -> u32 {

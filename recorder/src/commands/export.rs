@@ -119,6 +119,8 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let log = open().with_context(|| path.clone())?;
     let needed = log.selection().require(&ContentSelection::FOR_PICTURES, "`recorder export`");
     needed.with_context(|| path.clone())?;
+    let needed = log.selection().require_all_particles("`recorder export`");
+    needed.with_context(|| path.clone())?;
     let survey = Survey::read(log, &path)?;
     let selection = args.selection();
     let steps =

@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use recorder::{Closing, GapCounter, LogEnd, LogReader, Message, RunDescription, Topic};
+use recorder::{Closing, GapCounter, LogEnd, LogReader, RunDescription, Topic};
 use serde::Serialize;
 use sim_contract::printable_line;
 
@@ -47,6 +47,8 @@ pub(crate) struct Info {
     recorder_version: String,
     first_step: Option<u64>,
     last_step: Option<u64>,
+    #[serde(skip)]
+    snapshot_count: u64,
     /// From the first to the last snapshot, in simulated seconds.
     duration_s: f64,
     /// Number of messages in the file, by topic.
@@ -80,13 +82,19 @@ pub(crate) fn inspect<R: Read>(
     size_bytes: u64,
 ) -> Result<(Info, LogEnd), recorder::ReadError> {
     let mut info = Info::new(log.run(), file, size_bytes);
-    let mut gaps = GapCounter::for_selection(log.selection());
+    let selection = log.selection();
+    let mut gaps = GapCounter::for_selection(selection);
+    let has_all_particles = selection.has_topic(Topic::Particles) && !selection.is_only_commands();
+    // A header at the end of a truncated file has lost its particles.
+    let counted = if has_all_particles { Topic::Particles } else { Topic::Steps };
     while let Some(logged) = log.next_message()? {
         gaps.add(&logged.message);
         *info.messages.entry(logged.message.topic().name()).or_default() += 1;
-        if let Message::Particles { step, .. } = logged.message {
+        if logged.message.topic() == counted {
+            let step = logged.message.step();
             info.first_step.get_or_insert(step);
             info.last_step = Some(step);
+            info.snapshot_count += 1;
         }
     }
     let end = log.end().cloned().unwrap_or(LogEnd::Complete);
@@ -116,6 +124,7 @@ impl Info {
             recorder_version: run.recorder_version.clone(),
             first_step: None,
             last_step: None,
+            snapshot_count: 0,
             duration_s: 0.0,
             messages: decoded.map(|topic| (topic.name(), 0)).collect(),
             lost: BTreeMap::new(),
@@ -167,8 +176,7 @@ impl fmt::Display for Info {
         )?;
         match (self.first_step, self.last_step) {
             (Some(first), Some(last)) => {
-                let count = self.messages[Topic::Particles.name()];
-                let duration_s = self.duration_s;
+                let (count, duration_s) = (self.snapshot_count, self.duration_s);
                 writeln!(f, "steps       {first}..={last}, {count} recorded, {duration_s:.3} s")?;
             }
             _ => writeln!(f, "steps       none")?,
@@ -192,7 +200,7 @@ fn counted(count: u32, noun: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use recorder::{LogOptions, LogWriter, StepRow};
+    use recorder::{LogOptions, LogWriter, Message, StepRow};
 
     use super::*;
 

@@ -135,6 +135,7 @@ impl Pass {
     fn open(args: &PlayArgs, endpoint: &Endpoint, stop: &Stop) -> anyhow::Result<Self> {
         let log = LogReader::open_until(&args.file, stop)?;
         log.selection().require(&ContentSelection::FOR_STATES, "`recorder play`")?;
+        log.selection().require_all_particles("`recorder play`")?;
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let solver = Solver::new(&scene_in_recording(&log)?);
         let mut frames = FrameReader::new(log);

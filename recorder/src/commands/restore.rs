@@ -224,19 +224,19 @@ fn read_state(
             Some(simulation) => check(simulation.advance(&frame, stop.flag()))?,
         }
         if step == place.step {
-            let keyframe = simulation.map(|one| one.keyframe().encode()).unwrap_or_default();
-            return Ok(state(frame, scene_hash, keyframe));
+            let simulation = simulation.context("has no keyframe")?;
+            return Ok(state(&frame, scene_hash, &simulation));
         }
     }
     bail!("ends before step {}", place.step)
 }
 
-fn state(frame: Frame, scene_hash: u64, keyframe: Vec<u8>) -> RecordedState {
+fn state(frame: &Frame, scene_hash: u64, simulation: &Resimulation) -> RecordedState {
     RecordedState {
         step: frame.row.step,
         scene_hash,
-        particles: frame.particles,
-        keyframe,
+        particles: simulation.particles().to_vec(),
+        keyframe: simulation.keyframe().encode(),
         state_hash: frame.row.state_hash,
     }
 }

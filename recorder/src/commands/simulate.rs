@@ -1,49 +1,56 @@
-//! `recorder simulate`: simulates a scene in this process, without a node.
+//! `recorder simulate`: simulates a scene or a recording in this process, without a node.
+
+mod completion;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use recorder::{Closing, OutcomeRow};
+use clap::error::ErrorKind;
+use recorder::{Closing, LogEnd, LogReader, OutcomeRow, PartFile};
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Stop, printable_line};
 use sim_solver::Solver;
 
-use crate::cli::exit::Exit;
+use crate::cli::exit::{Exit, with_usage};
 use crate::cli::file_args::{FileArgs, LogFile};
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::whole_number;
-use crate::cli::progress::progress_bar;
+use crate::cli::progress::{progress_bar, progress_spinner};
 use crate::cli::thread_args::ThreadArgs;
 use crate::input::command_source::load_commands;
-use crate::input::scene_source::load_scene;
+use crate::input::scene_source::{is_recording, load_scene};
 use crate::simulation::{Job, SimulationResult, simulate};
+use completion::{Completed, Completion};
 
 /// Steps between two updates of the progress bar.
 const STEPS_PER_UPDATE: u64 = 256;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 all steps computed; 1 failed; 3 interrupted before the last \
-    step.\n\nExamples:\n  \
+    after_help = "A recording without --steps is simulated again from its first keyframe, compared with everything that it \
+    has, and written with the particles of every snapshot.\n\n\
+    Exit codes: 0 all steps computed; 1 failed; 3 interrupted before the last \
+    step, or recording truncated or damaged.\n\nExamples:\n  \
     recorder simulate curtain --steps 24000\n  \
     recorder simulate curtain --steps 2400 -o drag.mcap --commands drag.jsonl\n  \
+    recorder simulate flight.mcap -o run.mcap\n  \
     recorder simulate live.mcap --steps 2400 --commands live.mcap -o again.mcap"
 )]
 pub(crate) struct SimulateArgs {
     /// A built-in scene, a TOML file (a path with / or ending in .toml), or a recording with a
     /// scene (ending in .mcap)
     scene: String,
-    /// Number of steps to compute after step 0
+    /// Number of steps to compute after step 0 [default: those of the recording]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
-    steps: u64,
+    steps: Option<u64>,
     /// Recording to write [default: none, only the summary is printed]
     #[arg(short, long, value_name = "OUT.mcap")]
     output: Option<PathBuf>,
     /// Commands: a file of JSON lines, or a recording (ending in .mcap), whose outcomes are
     /// repeated [default: none]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "steps")]
     commands: Option<String>,
     #[command(flatten)]
     threads: ThreadArgs,
@@ -57,6 +64,7 @@ pub(crate) struct SimulateArgs {
 #[derive(Debug, Serialize)]
 struct Summary {
     scene: String,
+    first_step: u64,
     steps: u64,
     state_hash: String,
     applied: u64,
@@ -69,17 +77,73 @@ struct Summary {
 
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
-    let scene = load_scene(&args.scene, &stop)?;
+    match args.steps {
+        Some(steps) => run_scene(args, steps, &stop),
+        None if is_recording(&args.scene) => run_recording(args, &stop),
+        None => {
+            let text = "a scene needs --steps N; only a recording (ending in .mcap) has steps\n";
+            with_usage(&clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
+        }
+    }
+}
+
+/// Simulates a recording again, and completes it.
+fn run_recording(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
+    let path = Path::new(&args.scene);
+    let log = LogReader::open_until(path, stop).with_context(|| args.scene.clone())?;
+    let bar = progress_spinner();
+    let before_ns = monotonic_ns();
+    let completion =
+        Completion::new(log, args.threads.count()).with_context(|| args.scene.clone())?;
+    let create = || args.output.as_deref().map(|path| args.file.create(path)).transpose();
+    let (completed, file) = completion
+        .run(args.file.options(), create, stop.flag(), |step| {
+            if step.is_multiple_of(STEPS_PER_UPDATE) {
+                bar.set_message(format!("step {step}"));
+            }
+        })
+        .with_context(|| args.scene.clone())?;
+    bar.finish_and_clear();
+    let output = file.map(PartFile::finish).transpose()?;
+    let wall_ns = monotonic_ns() - before_ns;
+    let summary = summary_of_recording(&completed, wall_ns, output.as_deref());
+    output::result(args.as_json, &summary, &summary.to_string())?;
+    if completed.end != LogEnd::Complete {
+        output::warn_incomplete(path, &completed.end, "simulated as far as it goes");
+    }
+    let is_complete = completed.end == LogEnd::Complete && !completed.is_interrupted;
+    Ok(if is_complete { Exit::Done } else { Exit::Loss })
+}
+
+fn summary_of_recording(completed: &Completed, wall_ns: u64, path: Option<&Path>) -> Summary {
+    let steps = completed.last_step - completed.first_step;
+    let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
+    Summary {
+        scene: completed.scene.name.clone(),
+        first_step: completed.first_step,
+        steps,
+        state_hash: format!("{:016x}", completed.state_hash),
+        applied: completed.applied_count,
+        rejected: completed.rejected_count,
+        real_time_factor: steps as f64 / f64::from(completed.scene.solver.rate_hz) / wall_s,
+        wall_s,
+        output: path.map(output::path_text),
+    }
+}
+
+/// Simulates a scene from its first step.
+fn run_scene(args: &SimulateArgs, steps: u64, stop: &Stop) -> anyhow::Result<Exit> {
+    let scene = load_scene(&args.scene, stop)?;
     let commands =
-        args.commands.as_deref().map_or(Ok(Vec::new()), |source| load_commands(source, &stop))?;
-    let job = Job { scene, commands, steps: args.steps };
+        args.commands.as_deref().map_or(Ok(Vec::new()), |source| load_commands(source, stop))?;
+    let job = Job { scene, commands, steps };
     check_command_steps(&job).with_context(|| args.commands.clone().unwrap_or_default())?;
     let mut solver = Solver::new(&job.scene);
     solver.set_threads(args.threads.count());
     let mut log =
         args.output.as_deref().map(|path| begin(args, path, &job, &solver)).transpose()?;
 
-    let bar = progress_bar(args.steps);
+    let bar = progress_bar(steps);
     let before_ns = monotonic_ns();
     let result = simulate(&job, solver, log.as_mut(), stop.flag(), |step| {
         if step.is_multiple_of(STEPS_PER_UPDATE) {
@@ -88,14 +152,14 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     })
     .with_context(|| truncation(args))?;
     bar.finish_and_clear();
-    let path = log.map(|log| finish(log, &result, args.steps)).transpose();
+    let path = log.map(|log| finish(log, &result, steps)).transpose();
     let path = path.with_context(|| truncation(args))?;
     let wall_ns = monotonic_ns() - before_ns;
 
     note_rejections(&result);
     let summary = summary(&job, &result, wall_ns, path.as_deref());
     output::result(args.as_json, &summary, &summary.to_string())?;
-    Ok(if result.steps < args.steps { Exit::Loss } else { Exit::Done })
+    Ok(if result.steps < steps { Exit::Loss } else { Exit::Done })
 }
 
 /// Warns if some commands are for steps after the last one, and fails if all are.
@@ -162,6 +226,7 @@ fn summary(job: &Job, result: &SimulationResult, wall_ns: u64, path: Option<&Pat
     let simulated_s = result.steps as f64 / f64::from(job.scene.solver.rate_hz);
     Summary {
         scene: job.scene.name.clone(),
+        first_step: 0,
         steps: result.steps,
         state_hash: format!("{:016x}", result.state_hash),
         applied: result.applied_count,
@@ -175,7 +240,10 @@ fn summary(job: &Job, result: &SimulationResult, wall_ns: u64, path: Option<&Pat
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "scene       {}", printable_line(&self.scene))?;
-        writeln!(f, "steps       {}", self.steps)?;
+        match self.first_step {
+            0 => writeln!(f, "steps       {}", self.steps)?,
+            first => writeln!(f, "steps       {} after step {first}", self.steps)?,
+        }
         writeln!(f, "state_hash  {}", self.state_hash)?;
         writeln!(f, "commands    {} applied, {} rejected", self.applied, self.rejected)?;
         write!(f, "speed       {:.1} x real time ({:.2} s)", self.real_time_factor, self.wall_s)?;

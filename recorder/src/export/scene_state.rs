@@ -55,7 +55,7 @@ impl SceneState {
             self.apply_message(message)?;
         }
         self.row = frame.row;
-        self.particles = frame.particles;
+        self.particles = frame.particles.unwrap_or_default();
         Ok(())
     }
 

@@ -8,7 +8,7 @@ use recorder::{
 };
 use sim_contract::Stop;
 
-use super::scene_source::has_extension;
+use super::scene_source::is_recording;
 use super::text_file::read_text_file;
 
 /// Largest command file, in bytes: several hours of commands at 60 Hz.
@@ -20,7 +20,7 @@ const COMMANDS_MAX: usize = 1 << 20;
 /// Reads commands and sorts them in the order of application. They are the outcomes of a recording
 /// if `source` ends in `.mcap`, else the lines of a command file.
 pub(crate) fn load_commands(source: &str, stop: &Stop) -> anyhow::Result<Vec<TimedCommand>> {
-    if has_extension(source, ".mcap") {
+    if is_recording(source) {
         return commands_in_recording(Path::new(source), stop).with_context(|| source.to_owned());
     }
     let text = read_text_file(Path::new(source), COMMAND_FILE_SIZE_BYTES_MAX)

@@ -12,7 +12,7 @@ use sim_solver::scene::LoadError;
 /// Reads and validates a scene. `source` is a recording if it ends in `.mcap`, else a scene file if
 /// it contains `/` or ends in `.toml`, else the name of a built-in scene.
 pub(crate) fn load_scene(source: &str, stop: &Stop) -> anyhow::Result<Scene> {
-    if has_extension(source, ".mcap") {
+    if is_recording(source) {
         let log =
             LogReader::open_until(Path::new(source), stop).with_context(|| source.to_owned())?;
         return scene_in_recording(&log).with_context(|| source.to_owned());
@@ -33,9 +33,12 @@ pub(crate) fn scene_in_recording<R: Read>(log: &LogReader<R>) -> anyhow::Result<
     Ok(Scene::from_toml(text, "scene.toml")?)
 }
 
-/// Tests the suffix. The documented rule is case-sensitive.
-pub(super) fn has_extension(source: &str, extension: &str) -> bool {
-    source.ends_with(extension)
+/// Extension of recordings.
+const EXTENSION: &str = ".mcap";
+
+/// Returns `true` for the path of a recording, finished or not. The documented rule is case-sensitive.
+pub(crate) fn is_recording(source: &str) -> bool {
+    source.strip_suffix(".part").unwrap_or(source).ends_with(EXTENSION)
 }
 
 #[cfg(test)]

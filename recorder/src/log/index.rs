@@ -97,6 +97,7 @@ impl IndexedLog {
     ) -> Result<Self, ReadError> {
         let log = LogReader::open_file(path, stop.cloned())?;
         log.selection().require(&ContentSelection::FOR_PICTURES, "a reader of single steps")?;
+        log.selection().require_all_particles("a reader of single steps")?;
         let limits = log.limits();
         let (run, scene) = (log.run().clone(), log.scene().to_vec());
         let file = open_regular_file(path)?;

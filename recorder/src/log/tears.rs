@@ -206,7 +206,8 @@ mod tests {
             let first = Frame {
                 updates: vec![Message::Keyframe { step: 1, bytes }],
                 row: StepRow { step: 1, ..StepRow::default() },
-                particles: Vec::new(),
+                particles: None,
+                log_times_ns: Vec::new(),
             };
             let torn = torn_before_first(&topology, &first);
             torn.constraints.iter().map(TornConstraint::cause).collect::<Vec<_>>()

@@ -19,7 +19,7 @@ fn recorded(file: &str) -> Vec<Vec<[f32; 3]>> {
     let mut positions = Vec::new();
     while let Some(frame) = frames.next_frame().unwrap() {
         assert_eq!(frame.row.step, positions.len() as u64);
-        positions.push(frame.particles.iter().map(|one| one.position).collect());
+        positions.push(frame.payload().iter().map(|one| one.position).collect());
     }
     positions
 }

@@ -155,7 +155,7 @@ fn a_recording_that_starts_during_a_grab_verifies() {
     assert_eq!(recording.interrupt().code, Some(0));
     let first = &frames(&file)[0];
     assert!(first.row.step > 0);
-    assert_eq!(first.particles[101].inverse_mass, 0.0);
+    assert_eq!(first.payload()[101].inverse_mass, 0.0);
     assert!(assert_verifies(&sandbox, &file) > 200);
 }
 
@@ -239,8 +239,8 @@ fn a_recording_of_a_playback_equals_the_original() {
     for (one, two) in one.iter().zip(&two) {
         assert_eq!(one.row, two.row);
         assert_eq!(
-            bytemuck::cast_slice::<_, u8>(&one.particles),
-            bytemuck::cast_slice::<_, u8>(&two.particles)
+            bytemuck::cast_slice::<_, u8>(one.payload()),
+            bytemuck::cast_slice::<_, u8>(two.payload())
         );
     }
     assert_eq!(two.len(), 151);

@@ -53,10 +53,10 @@ fn states(file: &str) -> (Vec<State>, RunDescription) {
     let mut states = Vec::new();
     while let Some(frame) = frames.next_frame().unwrap() {
         apply_tears(&mut torn, &frame);
-        let pins = (0_u32..).zip(&frame.particles).filter(|(_, one)| one.flags != 0);
+        let pins = (0_u32..).zip(frame.payload()).filter(|(_, one)| one.flags != 0);
         states.push(State {
             step: frame.row.step,
-            positions: frame.particles.iter().map(|one| one.position).collect(),
+            positions: frame.payload().iter().map(|one| one.position).collect(),
             torn: torn.clone(),
             pins: pins
                 .map(|(particle, one)| FlaggedParticle { particle, flags: one.flags })

@@ -107,8 +107,9 @@ impl Replay {
 
     /// Publishes a snapshot and the messages that belong to it, in the order of a node.
     pub(crate) fn publish(&mut self, frame: &Frame) -> anyhow::Result<()> {
-        if frame.particles.len() != self.run.particle_count as usize {
-            let (step, count) = (frame.row.step, frame.particles.len());
+        let particles = frame.payload();
+        if particles.len() != self.run.particle_count as usize {
+            let (step, count) = (frame.row.step, particles.len());
             bail!(
                 "the snapshot of step {step} has {count} particles, but the scene has {}",
                 self.run.particle_count
@@ -126,7 +127,7 @@ impl Replay {
             self.publish_update(update)?;
         }
         let header = self.header(frame);
-        self.owner.publish_particles(&header, |index| frame.particles[index])?;
+        self.owner.publish_particles(&header, |index| particles[index])?;
         self.next_index = Some(header.snapshot_index.wrapping_add(1));
         self.owner.wake(Wake::Frame);
         self.step = Some(frame.row.step);

@@ -53,7 +53,7 @@ fn frame(step: u64, updates: Vec<Message>) -> Frame {
         snapshot_index: Some(40),
     };
     let particle = ParticleState { position: [-0.0, step as f32, 0.0], ..Default::default() };
-    Frame { updates, row, particles: vec![particle; 2] }
+    Frame { updates, row, particles: Some(vec![particle; 2]), log_times_ns: Vec::new() }
 }
 
 fn replay(domain: &TestDomain) -> Replay {
@@ -115,7 +115,7 @@ fn snapshots_equal_those_of_the_node_except_run_id_time_and_flag() {
     };
     assert_eq!(header, expected);
     assert_ne!(header.run_id, run().run_id);
-    assert_eq!(particles, frame(12, Vec::new()).particles);
+    assert_eq!(particles, frame(12, Vec::new()).payload());
     assert!(client.topology(Duration::ZERO).unwrap().is_none());
     replay.answer_commands(13).unwrap();
     assert_eq!(client.topology(TIMEOUT).unwrap().unwrap().constraints.len(), 4);
@@ -182,7 +182,7 @@ fn a_snapshot_of_another_size_is_refused() {
     let mut replay = replay(&domain);
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert!(client.colliders(Duration::ZERO).unwrap().colliders.is_empty());
-    let particles = vec![ParticleState::default()];
+    let particles = Some(vec![ParticleState::default()]);
     let short = Frame { particles, ..frame(1, vec![floor(1, 2.0)]) };
     let error = replay.publish(&short).unwrap_err();
     assert_eq!(error.to_string(), "the snapshot of step 1 has 1 particles, but the scene has 2");

@@ -38,7 +38,8 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     recorder record -o run.mcap --steps 2400 --json\n  \
     recorder record -o run.mcap --follow --wait\n  \
     recorder record -o run.mcap --split-size 1GB --max-files 10\n  \
-    recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada"
+    recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada\n  \
+    recorder record -o flight.mcap --only-commands && recorder simulate flight.mcap -o run.mcap"
 )]
 pub(crate) struct RecordArgs {
     #[command(flatten)]
@@ -147,6 +148,11 @@ impl RecordArgs {
 
     /// Checks options that are useful only with others.
     pub(super) fn check(&self) -> Result<(), clap::Error> {
+        if let Some(topic) = self.selection.needed_topic() {
+            let name = topic.name();
+            let text = format!("--only-commands needs {name}: remove it from --exclude\n");
+            return Err(clap::Error::raw(ErrorKind::ArgumentConflict, text));
+        }
         if self.split.files_max().is_none() || self.follow || self.split.is_given() {
             return Ok(());
         }

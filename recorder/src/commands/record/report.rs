@@ -37,7 +37,7 @@ impl Written {
 
     /// Describes a finished file in a line.
     pub(crate) fn file_line(path: &Path, closing: &Closing, steps: Option<(u64, u64)>) -> String {
-        let count = closing.counts[Topic::Particles].written;
+        let count = closing.counts[Topic::Steps].written;
         let steps = steps.map_or_else(|| "no step".to_owned(), |(a, b)| format!("steps {a}..={b}"));
         let missing: Vec<_> =
             closing.missing().iter().map(|one| format!("{} {}", one.0, one.1)).collect();
@@ -77,7 +77,7 @@ impl Report {
             removed_files: written.removed_count,
             first_step: written.steps.map(|(first, _)| first),
             last_step: written.steps.map(|(_, last)| last),
-            snapshots: counts[Topic::Particles].written,
+            snapshots: counts[Topic::Steps].written,
             outcomes: counts[Topic::Outcomes].written,
             lost: written.total.missing(),
             stop_reason,

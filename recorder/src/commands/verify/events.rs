@@ -21,8 +21,13 @@ impl EventCheck {
 
     /// Checks the events before a snapshot. `is_after_gap` if snapshots may be missing before it: a
     /// recorder then compared its particles with those of a snapshot that is not in the file.
-    pub(super) fn check(&mut self, frame: &Frame, is_after_gap: bool) -> Option<String> {
-        let Frame { row, particles, updates } = frame;
+    pub(super) fn check(
+        &mut self,
+        frame: &Frame,
+        particles: &[ParticleState],
+        is_after_gap: bool,
+    ) -> Option<String> {
+        let Frame { row, updates, .. } = frame;
         let expected = self.frozen.new_events(row.step, particles);
         let last_step = self.last_step.replace(row.step);
         let events: Vec<_> = updates.iter().filter_map(event).collect();

@@ -78,12 +78,14 @@ impl Resimulation {
     /// Starts at a snapshot. Returns `None` if it has no keyframe.
     pub(crate) fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, StartError> {
         let step = frame.row.step;
-        let Some(bytes) = frame.own_keyframe() else { return Ok(None) };
+        let Some(bytes) = frame.own_keyframe().filter(|_| frame.particles.is_some()) else {
+            return Ok(None);
+        };
         let keyframe =
             Keyframe::decode(bytes).map_err(|cause| StartError::Keyframe { step, cause })?;
         let mut solver = Solver::new(scene);
         solver
-            .restore(bytemuck::cast_slice(&frame.particles), &keyframe)
+            .restore(bytemuck::cast_slice(frame.payload()), &keyframe)
             .map_err(|cause| StartError::State { step, cause })?;
         let next_index = frame.row.outcome_count;
         let past = PastStates::from_first(step, &solver);
@@ -97,6 +99,11 @@ impl Resimulation {
             past,
             earlier_count: 0,
         }))
+    }
+
+    /// Returns the particles of the last compared snapshot.
+    pub(crate) fn particles(&self) -> &[ParticleState] {
+        bytemuck::cast_slice(self.solver.particles())
     }
 
     /// Returns the keyframe of the last compared snapshot.
@@ -290,14 +297,15 @@ impl Resimulation {
     /// with the states that the simulation has computed.
     fn put_in_place(&mut self, row: &OutcomeRow, frame: &Frame) -> Option<Finding> {
         let (step, index) = (row.step, row.index);
-        let keyframe = frame.own_keyframe().filter(|_| frame.row.step == step);
+        let is_state = frame.row.step == step && frame.particles.is_some();
+        let keyframe = frame.own_keyframe().filter(|_| is_state);
         let Some(bytes) = keyframe else {
             let what = format!(
                 "/outcomes: outcome {index} puts a state in place whose snapshot or keyframe is missing"
             );
             return Some(Finding::Incomplete { step, what });
         };
-        let result = self.put_state_in_place(row, &frame.particles, bytes);
+        let result = self.put_state_in_place(row, frame.payload(), bytes);
         let problem = result.err().or_else(|| self.past.compare(&row.action, &self.solver));
         let what = format!("/outcomes: outcome {index}: {}", problem?);
         Some(Finding::at_step(step, what))
@@ -370,26 +378,13 @@ fn has_other_tears(frame: &Frame, solver: &Solver) -> bool {
 
 /// Compares the recorded header, the recorded payload and the simulated state.
 fn compare(solver: &Solver, frame: &Frame) -> Finding {
-    let Frame { row, particles, .. } = frame;
+    let row = &frame.row;
     let diverged =
         |what: String, difference| Finding::Diverged { step: row.step, what, difference };
-    let expected_count = solver.particle_count();
-    if particles.len() != expected_count {
-        let what = format!(
-            "/particles: recorded {} particles, simulated {expected_count}",
-            particles.len()
-        );
-        return diverged(what, None);
-    }
     let simulated_hash = solver.state_hash();
-    if state_hash(particles, solver.torn()) != simulated_hash {
-        let simulated: Vec<ParticleState> =
-            (0..expected_count).map(|index| bytemuck::cast(solver.particle(index))).collect();
-        let difference = first_difference(particles, &simulated);
-        let what = difference.as_ref().map_or_else(
-            || "the torn constraints differ".to_owned(),
-            |difference| format!("/particles: {difference}"),
-        );
+    if let Some(particles) = &frame.particles
+        && let Some((what, difference)) = compare_particles(solver, particles)
+    {
         return diverged(what, difference);
     }
     let counts = [
@@ -404,11 +399,35 @@ fn compare(solver: &Solver, frame: &Frame) -> Finding {
         );
     }
     if row.state_hash != simulated_hash {
+        let of =
+            if frame.particles.is_some() { "its particles have" } else { "the simulation has" };
         let what = format!(
-            "its row in /steps has the hash {:016x}, but its particles have {simulated_hash:016x}",
+            "its row in /steps has the hash {:016x}, but {of} {simulated_hash:016x}",
             row.state_hash
         );
         return diverged(what, None);
     }
     Finding::Identical
+}
+
+/// Describes the first difference of recorded particles from the simulated state.
+fn compare_particles(
+    solver: &Solver,
+    recorded: &[ParticleState],
+) -> Option<(String, Option<Difference>)> {
+    let expected_count = solver.particle_count();
+    if recorded.len() != expected_count {
+        let count = recorded.len();
+        let what = format!("/particles: recorded {count} particles, simulated {expected_count}");
+        return Some((what, None));
+    }
+    if state_hash(recorded, solver.torn()) == solver.state_hash() {
+        return None;
+    }
+    let difference = first_difference(recorded, bytemuck::cast_slice(solver.particles()));
+    let what = difference.as_ref().map_or_else(
+        || "the torn constraints differ".to_owned(),
+        |difference| format!("/particles: {difference}"),
+    );
+    Some((what, difference))
 }

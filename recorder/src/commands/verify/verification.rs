@@ -4,7 +4,7 @@ use std::io::Read;
 use std::sync::atomic::AtomicBool;
 
 use recorder::{Frame, FrameReader, LogReader, Message, OutcomeRow, ReadError, TearsRow, Topic};
-use sim_contract::Action;
+use sim_contract::{Action, ParticleState};
 use sim_solver::{Scene, Solver};
 
 use super::coverage::Coverage;
@@ -128,10 +128,30 @@ impl<R: Read> Verification<R> {
             return finding;
         }
         let what = self.numbers.check(&frame.row);
-        let events = self.events.check(frame, self.numbers.is_after_gap());
-        let what =
-            what.or_else(|| events.filter(|_| !self.coverage.left_out.contains(&Topic::Events)));
-        what.map_or(Finding::Identical, diverged)
+        let events =
+            frame.particles.as_ref().and_then(|particles| self.check_events(frame, particles));
+        what.or(events).map_or(Finding::Identical, diverged)
+    }
+
+    /// Compares the events with particles.
+    fn check_events(&mut self, frame: &Frame, particles: &[ParticleState]) -> Option<String> {
+        let what = self.events.check(frame, particles, self.numbers.is_after_gap());
+        what.filter(|_| !self.coverage.left_out.contains(&Topic::Events))
+    }
+
+    /// Compares the events of a snapshot that has no particles with those of the simulation.
+    fn check_events_of_simulation(&mut self, frame: &Frame) -> Finding {
+        if frame.particles.is_some() {
+            return Finding::Identical;
+        }
+        let Some(simulation) = self.simulation.take() else { return Finding::Identical };
+        let what = self.check_events(frame, simulation.particles());
+        self.simulation = Some(simulation);
+        what.map_or(Finding::Identical, |what| Finding::Diverged {
+            step: frame.row.step,
+            what,
+            difference: None,
+        })
     }
 
     fn check_load(&mut self, frame: &Frame) -> Option<String> {
@@ -217,7 +237,10 @@ impl<R: Read> Verification<R> {
         stop: &AtomicBool,
     ) -> Result<Option<Finding>, StartError> {
         if let Some(simulation) = &mut self.simulation {
-            return Ok(Some(simulation.advance(frame, stop)));
+            return Ok(Some(match simulation.advance(frame, stop) {
+                Finding::Identical => self.check_events_of_simulation(frame),
+                finding => finding,
+            }));
         }
         let Some(mut start) = Resimulation::start(&self.scene, frame)? else { return Ok(None) };
         start.set_threads(self.threads);

@@ -46,7 +46,7 @@ pub(super) struct ContentCheck {
     limits: SizeLimits,
     channels: BTreeMap<u16, Option<Topic>>,
     log_time_ns: u64,
-    /// The header of a snapshot whose payload has not followed yet.
+    /// The last header, while its payload has not followed.
     row: Option<StepRow>,
     last_row: Option<StepRow>,
     seeds: HashSeeds,
@@ -137,7 +137,12 @@ impl ContentCheck {
 
     /// Returns the step of a header whose payload is missing, once.
     pub(super) fn take_row(&mut self) -> Option<u64> {
-        self.row.take().map(|row| row.step)
+        self.row.take().filter(|_| self.needs_payload()).map(|row| row.step)
+    }
+
+    /// Returns `true` if a payload must follow each header.
+    fn needs_payload(&self) -> bool {
+        self.selection.has_topic(Topic::Particles) && !self.selection.is_only_commands()
     }
 
     /// Checks a message. `Err` describes its fault; then it has no effect on later checks.
@@ -186,11 +191,13 @@ impl ContentCheck {
         self.gaps.add(&message);
         self.seeds.process(&message);
         match message {
-            Message::Step(row) if self.selection.has_topic(Topic::Particles) => {
+            Message::Step(row) if self.needs_payload() => {
                 self.row = Some(row);
                 Ok(Sound::Row)
             }
             Message::Step(row) => {
+                // A recording of commands has the payloads of some.
+                self.row = self.selection.is_only_commands().then_some(row);
                 self.backlog.remove_to(row.step);
                 self.seeds.pass(row.step);
                 self.last_row = Some(row);
@@ -230,7 +237,7 @@ impl ContentCheck {
 
     fn check_row(&self, row: &StepRow) -> Result<(), String> {
         let step = row.step;
-        if let Some(before) = &self.row {
+        if let Some(before) = self.row.filter(|_| self.needs_payload()) {
             return Err(format!("step {step}: the snapshot of step {} is missing", before.step));
         }
         let Some(last) = self.last_row else { return Ok(()) };

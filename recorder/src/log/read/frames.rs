@@ -10,6 +10,7 @@ use super::reader::LogReader;
 use crate::log::backlog::Backlog;
 use crate::log::message::Message;
 use crate::log::rows::StepRow;
+use crate::log::topic::Topic;
 
 /// A snapshot and the messages between the previous snapshot and this one.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,11 +19,21 @@ pub struct Frame {
     pub updates: Vec<Message>,
     /// The header of the snapshot.
     pub row: StepRow,
-    /// The payload of the snapshot. Shape: particle count.
-    pub particles: Vec<ParticleState>,
+    /// The payload of the snapshot. Shape: particle count. `None` only in a recording of commands
+    /// ([`ContentSelection::is_only_commands`]).
+    ///
+    /// [`ContentSelection::is_only_commands`]: crate::ContentSelection::is_only_commands
+    pub particles: Option<Vec<ParticleState>>,
+    /// Times of reception of the updates, and of the header after them.
+    pub log_times_ns: Vec<u64>,
 }
 
 impl Frame {
+    /// Returns the payload, which is empty without one.
+    pub fn payload(&self) -> &[ParticleState] {
+        self.particles.as_deref().unwrap_or_default()
+    }
+
     /// Returns the keyframe that completes this snapshot, if there is one.
     pub fn own_keyframe(&self) -> Option<&[u8]> {
         self.updates.iter().rev().find_map(|update| match update {
@@ -37,15 +48,28 @@ impl Frame {
 pub struct FrameReader<R> {
     log: LogReader<R>,
     updates: Vec<Message>,
+    log_times_ns: Vec<u64>,
     backlog: Backlog,
     row: Option<StepRow>,
+    /// The message that showed that the snapshot before it has no payload.
+    next: Option<LoggedMessage>,
+    is_only_commands: bool,
 }
 
 impl<R: Read> FrameReader<R> {
     /// Continues from the current position of `log`.
     pub fn new(log: LogReader<R>) -> Self {
         let backlog = Backlog::new(log.run(), log.scene().len());
-        Self { log, updates: Vec::new(), backlog, row: None }
+        let is_only_commands = log.selection().is_only_commands();
+        Self {
+            log,
+            updates: Vec::new(),
+            log_times_ns: Vec::new(),
+            backlog,
+            row: None,
+            next: None,
+            is_only_commands,
+        }
     }
 
     /// Returns the recording.
@@ -64,24 +88,55 @@ impl<R: Read> FrameReader<R> {
     /// Like [`LogReader::next_message`], and if a snapshot has no row in `/steps`, a row has no snapshot,
     /// or the messages before a snapshot need more memory than a [`Backlog`] may.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, ReadError> {
-        while let Some(LoggedMessage { message, .. }) = self.log.next_message()? {
+        while let Some(logged) = self.next_message()? {
+            if self.is_only_commands
+                && let Some(row) = self.row
+                && logged.message.topic() != Topic::Particles
+            {
+                self.next = Some(logged);
+                return Ok(Some(self.take_frame(row, None)));
+            }
+            let LoggedMessage { message, log_time_ns, .. } = logged;
             match message {
                 Message::Step(row) => {
                     if let Some(StepRow { step, .. }) = self.row.replace(row) {
                         return Err(ReadError::NoSnapshot { step });
                     }
+                    self.log_times_ns.push(log_time_ns);
                 }
                 Message::Particles { step, particles } => {
-                    let row = self.row.take().filter(|row| row.step == step);
+                    let row = self.row.filter(|row| row.step == step);
                     let row = row.ok_or(ReadError::NoRow { step })?;
-                    let updates = std::mem::take(&mut self.updates);
-                    self.backlog.remove_to(step);
-                    return Ok(Some(Frame { updates, row, particles }));
+                    return Ok(Some(self.take_frame(row, Some(particles))));
                 }
-                update => self.add_update(update)?,
+                update => {
+                    self.add_update(update)?;
+                    self.log_times_ns.push(log_time_ns);
+                }
             }
         }
-        Ok(None)
+        match self.row.filter(|_| self.is_only_commands) {
+            Some(row) => Ok(Some(self.take_frame(row, None))),
+            None => Ok(None),
+        }
+    }
+
+    fn next_message(&mut self) -> Result<Option<LoggedMessage>, ReadError> {
+        match self.next.take() {
+            Some(logged) => Ok(Some(logged)),
+            None => self.log.next_message(),
+        }
+    }
+
+    fn take_frame(&mut self, row: StepRow, particles: Option<Vec<ParticleState>>) -> Frame {
+        self.row = None;
+        self.backlog.remove_to(row.step);
+        Frame {
+            updates: std::mem::take(&mut self.updates),
+            row,
+            particles,
+            log_times_ns: std::mem::take(&mut self.log_times_ns),
+        }
     }
 
     fn add_update(&mut self, update: Message) -> Result<(), ReadError> {
@@ -97,6 +152,11 @@ impl<R: Read> FrameReader<R> {
     /// [`FrameReader::next_frame`] has returned `None`.
     pub fn trailing_row(&self) -> Option<&StepRow> {
         self.row.as_ref()
+    }
+
+    /// Returns the times of reception of the trailing row and of the trailing updates, in their order.
+    pub fn trailing_log_times_ns(&self) -> &[u64] {
+        &self.log_times_ns
     }
 
     /// Returns the messages after the last snapshot, once [`FrameReader::next_frame`] has returned

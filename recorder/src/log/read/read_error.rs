@@ -137,6 +137,15 @@ pub enum ReadError {
         /// The program that needs them.
         purpose: &'static str,
     },
+    /// The recording has the particles of some snapshots.
+    #[error(
+        "has the particles of few steps (--only-commands of its recorder), and {purpose} needs those of all: \
+         compute them with `recorder simulate IN.mcap -o OUT.mcap`"
+    )]
+    OnlyCommands {
+        /// The program that needs them.
+        purpose: &'static str,
+    },
     /// A header of a snapshot that another one follows.
     #[error("the row of step {step} in /steps is not followed by its snapshot in /particles")]
     NoSnapshot {

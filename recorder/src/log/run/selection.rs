@@ -12,6 +12,8 @@ pub(in crate::log) const SELECTION_METADATA: &str = "selection";
 const EVERY: &str = "every";
 /// Key of the topics that are left out.
 const LEFT_OUT: &str = "left_out";
+/// Key of a recording of commands. Only such a recording has it.
+const ONLY_COMMANDS: &str = "only_commands";
 
 /// The topics and snapshots of a recording: metadata `selection`, before the metadata `run`. The default
 /// is everything, and a file with everything has no such record.
@@ -20,11 +22,16 @@ pub struct ContentSelection {
     every: NonZeroU32,
     /// In the order of [`Topic::ALL`].
     left_out: [bool; Topic::ALL.len()],
+    is_only_commands: bool,
 }
 
 impl Default for ContentSelection {
     fn default() -> Self {
-        Self { every: NonZeroU32::MIN, left_out: [false; Topic::ALL.len()] }
+        Self {
+            every: NonZeroU32::MIN,
+            left_out: [false; Topic::ALL.len()],
+            is_only_commands: false,
+        }
     }
 }
 
@@ -66,6 +73,23 @@ impl ContentSelection {
         selection
     }
 
+    /// Leaves out the particles of most snapshots, which follow from an earlier state and the commands.
+    #[must_use]
+    pub fn with_only_commands(self) -> Self {
+        Self { is_only_commands: true, ..self }
+    }
+
+    /// Returns the selection of the same recording with the particles of all its snapshots.
+    #[must_use]
+    pub fn with_all_particles(self) -> Self {
+        Self { is_only_commands: false, ..self }
+    }
+
+    /// Returns `true` if only some snapshots have particles.
+    pub fn is_only_commands(&self) -> bool {
+        self.is_only_commands
+    }
+
     /// Returns `true` if nothing is left out.
     pub fn is_everything(&self) -> bool {
         *self == Self::default()
@@ -104,13 +128,25 @@ impl ContentSelection {
         Err(ReadError::LeftOut { topics: missing.join(", "), purpose })
     }
 
+    /// Checks that each snapshot has its particles.
+    ///
+    /// # Errors
+    /// If some do not; `purpose` needs them.
+    pub fn require_all_particles(&self, purpose: &'static str) -> Result<(), ReadError> {
+        if self.is_only_commands { Err(ReadError::OnlyCommands { purpose }) } else { Ok(()) }
+    }
+
     pub(in crate::log) fn to_map(self) -> BTreeMap<String, String> {
         let left_out = Topic::ALL.into_iter().filter(|topic| !self.has_topic(*topic));
         let left_out: Vec<_> = left_out.map(Topic::name).collect();
-        BTreeMap::from([
+        let mut map = BTreeMap::from([
             (EVERY.to_owned(), self.every.to_string()),
             (LEFT_OUT.to_owned(), left_out.join(" ")),
-        ])
+        ]);
+        if self.is_only_commands {
+            map.insert(ONLY_COMMANDS.to_owned(), true.to_string());
+        }
+        map
     }
 
     /// Reads the metadata record.
@@ -124,7 +160,12 @@ impl ContentSelection {
         let topics = map.get(LEFT_OUT)?.split(' ').filter(|name| !name.is_empty());
         let topics = topics
             .map(|name| Topic::from_name(name).filter(|topic| Self::OPTIONAL.contains(topic)));
-        Some(Self::new(every, &topics.collect::<Option<Vec<_>>>()?))
+        let selection = Self::new(every, &topics.collect::<Option<Vec<_>>>()?);
+        match map.get(ONLY_COMMANDS).map(String::as_str) {
+            None => Some(selection),
+            Some("true") => Some(selection.with_only_commands()),
+            Some(_) => None,
+        }
     }
 }
 
@@ -138,12 +179,16 @@ mod tests {
 
     #[test]
     fn a_selection_survives_a_round_trip_and_refuses_what_no_recorder_writes() {
-        for selection in [ContentSelection::default(), every(7)] {
+        for selection in [ContentSelection::default(), every(7), every(1).with_only_commands()] {
             assert_eq!(ContentSelection::from_map(&selection.to_map()), Some(selection));
         }
-        for (key, value) in
-            [("every", "0"), ("every", "x"), ("left_out", "/steps"), ("left_out", "?")]
-        {
+        for (key, value) in [
+            ("every", "0"),
+            ("every", "x"),
+            ("left_out", "/steps"),
+            ("left_out", "?"),
+            ("only_commands", "no"),
+        ] {
             let mut map = every(2).to_map();
             map.insert(key.to_owned(), value.to_owned());
             assert_eq!(ContentSelection::from_map(&map), None, "{key}={value}");

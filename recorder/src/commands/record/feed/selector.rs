@@ -24,11 +24,16 @@ pub(crate) struct SelectionArgs {
     #[arg(long, value_name = "N", default_value = "1", allow_hyphen_values = true,
         value_parser = period)]
     every: NonZeroU32,
+    /// Record the commands, and the particles of the first step and then about every ten seconds.
+    /// `recorder simulate` computes the others, bit for bit
+    #[arg(long, conflicts_with_all = ["topics", "every"])]
+    only_commands: bool,
 }
 
 impl Default for SelectionArgs {
     fn default() -> Self {
-        Self { topics: Vec::new(), exclude: Vec::new(), every: NonZeroU32::MIN }
+        let (topics, exclude) = (Vec::new(), Vec::new());
+        Self { topics, exclude, every: NonZeroU32::MIN, only_commands: false }
     }
 }
 
@@ -38,7 +43,15 @@ impl SelectionArgs {
             self.exclude.contains(topic) || !self.topics.is_empty() && !self.topics.contains(topic)
         };
         let left_out: Vec<_> = ContentSelection::OPTIONAL.into_iter().filter(is_left_out).collect();
-        ContentSelection::new(self.every, &left_out)
+        let selection = ContentSelection::new(self.every, &left_out);
+        if self.only_commands { selection.with_only_commands() } else { selection }
+    }
+
+    /// Returns a topic that is left out although the commands are useless without it.
+    pub(crate) fn needed_topic(&self) -> Option<Topic> {
+        let is_left_out = |topic: &Topic| self.exclude.contains(topic);
+        let is_used = |_: &Topic| self.only_commands;
+        ContentSelection::FOR_STATES.into_iter().find(is_left_out).filter(is_used)
     }
 }
 
@@ -64,37 +77,61 @@ fn period(text: &str) -> Result<NonZeroU32, String> {
     u32::try_from(number).and_then(NonZeroU32::try_from).map_err(|error| error.to_string())
 }
 
+/// In a recording of commands, one keyframe of this number has particles: about one each ten seconds.
+const KEYFRAMES_PER_STATE: u32 = 10;
+
 /// Leaves out what is not selected, and counts it.
 #[derive(Debug)]
 pub(super) struct Selector {
     selection: ContentSelection,
     /// Step of the newest keyframe.
     keyframe_step: Option<u64>,
+    /// Number of keyframes in the file.
+    keyframe_count: u32,
+    /// Step of the newest state that a command put in place. Its particles follow from nothing else.
+    in_place_step: Option<u64>,
     /// Only `left_out` is set.
     counts: AllCounts,
 }
 
 impl Selector {
     pub(super) fn new(selection: ContentSelection) -> Self {
-        Self { selection, keyframe_step: None, counts: AllCounts::default() }
+        Self {
+            selection,
+            keyframe_step: None,
+            keyframe_count: 0,
+            in_place_step: None,
+            counts: AllCounts::default(),
+        }
     }
 
     /// Returns the part of a content that is recorded.
     pub(super) fn select(&mut self, content: Content) -> Option<Content> {
         match content {
             Content::Update(message) => {
-                if let Message::Keyframe { step, .. } = &message {
-                    self.keyframe_step = Some(*step);
+                match &message {
+                    Message::Keyframe { step, .. } => {
+                        self.keyframe_step = Some(*step);
+                        self.keyframe_count += 1;
+                    }
+                    Message::Outcome(row) if row.puts_state_in_place() && row.is_applied() => {
+                        self.in_place_step = Some(row.step);
+                    }
+                    _ => {}
                 }
                 let is_selected = self.has(message.topic());
                 is_selected.then_some(Content::Update(message))
             }
             Content::Snapshot(row, particles) => {
                 let is_due = row.snapshot_index.is_none_or(|one| self.selection.has_snapshot(one));
-                if !is_due && self.keyframe_step != Some(row.step) {
+                let has_keyframe = self.keyframe_step == Some(row.step);
+                if !is_due && !has_keyframe {
                     self.counts[Topic::Steps].left_out += 1;
                     self.counts[Topic::Particles].left_out += 1;
                     None
+                } else if self.selection.is_only_commands() && !self.is_state(row.step) {
+                    self.counts[Topic::Particles].left_out += 1;
+                    Some(Content::Update(Message::Step(row)))
                 } else if self.has(Topic::Particles) {
                     Some(Content::Snapshot(row, particles))
                 } else {
@@ -102,6 +139,12 @@ impl Selector {
                 }
             }
         }
+    }
+
+    /// Returns `true` for a snapshot with particles in a recording of commands.
+    fn is_state(&self, step: u64) -> bool {
+        let is_due = self.keyframe_count % KEYFRAMES_PER_STATE == 1;
+        self.keyframe_step == Some(step) && (is_due || self.in_place_step == Some(step))
     }
 
     /// Returns `true` for a selected topic, and counts a message of any other.
@@ -113,13 +156,15 @@ impl Selector {
 
     /// Returns the counts of a file, and begins with those of the next one.
     pub(super) fn take_counts(&mut self) -> AllCounts {
+        self.keyframe_count = 0;
         std::mem::take(&mut self.counts)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use recorder::StepRow;
+    use recorder::{OutcomeRow, StepRow};
+    use sim_contract::{Action, Command, Outcome, Reason};
 
     use super::*;
 
@@ -145,6 +190,30 @@ mod tests {
         assert_eq!((counts[Topic::Particles].left_out, counts[Topic::Steps].left_out), (6, 6));
         assert_eq!(counts[Topic::Keyframe].left_out, 1);
         assert_eq!(selector.take_counts(), AllCounts::default());
+    }
+
+    #[test]
+    fn a_recording_of_commands_has_the_particles_of_the_first_state_and_of_those_put_in_place() {
+        let selection = ContentSelection::default().with_only_commands();
+        let mut selector = Selector::new(selection);
+        let states = |selector: &mut Selector, steps: std::ops::Range<u32>| {
+            let is_state = |step: &u32| {
+                selector.select(keyframe(u64::from(*step)));
+                matches!(selector.select(snapshot(*step)), Some(Content::Snapshot(..)))
+            };
+            steps.filter(is_state).collect::<Vec<_>>()
+        };
+        assert_eq!(states(&mut selector, 0..25), [0, 10, 20]);
+        let rewind = Action::Rewind { to_step: Some(3), back_steps: None };
+        for (step, result, expected) in
+            [(25, Ok(()), vec![25]), (27, Err(Reason::UnknownStep), vec![])]
+        {
+            let outcome = Outcome::new(0, step.into(), Command::new(1, 1, rewind), result);
+            selector.select(Content::Update(Message::Outcome(OutcomeRow::from(&outcome))));
+            assert_eq!(states(&mut selector, step..step + 2), expected);
+        }
+        assert_eq!(selector.take_counts()[Topic::Particles].left_out, 29 - 4);
+        assert_eq!(states(&mut selector, 40..42), [40], "the first one of the next file");
     }
 
     #[test]

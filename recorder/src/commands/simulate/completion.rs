@@ -1,0 +1,211 @@
+//! Simulates a recording again and writes it with the particles of every snapshot.
+
+use std::io::{Read, Write};
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, bail};
+use recorder::{
+    Closing, ContentSelection, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
+    Message, Topic, WriteError,
+};
+use sim_solver::{SOLVER_VERSION, Scene};
+
+use crate::commands::verify::resimulation::{Finding, Resimulation};
+use crate::input::scene_source::scene_in_recording;
+
+/// The result of a completion.
+#[derive(Debug)]
+pub(super) struct Completed {
+    pub(super) scene: Scene,
+    pub(super) first_step: u64,
+    pub(super) last_step: u64,
+    pub(super) state_hash: u64,
+    pub(super) applied_count: u64,
+    pub(super) rejected_count: u64,
+    /// The end of the input.
+    pub(super) end: LogEnd,
+    pub(super) is_interrupted: bool,
+}
+
+/// A recording that is simulated again.
+pub(super) struct Completion<R: Read> {
+    frames: FrameReader<R>,
+    scene: Scene,
+    simulation: Option<Resimulation>,
+    threads: usize,
+    result: Option<(u64, u64, u64)>,
+    applied_count: u64,
+    rejected_count: u64,
+}
+
+impl<R: Read> Completion<R> {
+    /// Starts with a recording that has its commands and keyframes.
+    pub(super) fn new(log: LogReader<R>, threads: usize) -> anyhow::Result<Self> {
+        log.selection().require(&ContentSelection::FOR_STATES, "`recorder simulate`")?;
+        let version = log.run().solver_version;
+        if version != SOLVER_VERSION {
+            bail!(
+                "was recorded with solver version {version}, but this program has version \
+                 {SOLVER_VERSION}, whose bits differ. Use the program that recorded it"
+            );
+        }
+        let scene = scene_in_recording(&log)?;
+        Ok(Self {
+            frames: FrameReader::new(log),
+            scene,
+            simulation: None,
+            threads,
+            result: None,
+            applied_count: 0,
+            rejected_count: 0,
+        })
+    }
+
+    /// Writes the complete recording to what `create` returns, if that is a file. Ends early if `stop`
+    /// becomes true. Calls `on_step` after each snapshot.
+    pub(super) fn run<W: Write>(
+        mut self,
+        options: LogOptions,
+        create: impl FnOnce() -> anyhow::Result<Option<W>>,
+        stop: &AtomicBool,
+        mut on_step: impl FnMut(u64),
+    ) -> anyhow::Result<(Completed, Option<W>)> {
+        let mut next = self.frames.next_frame()?;
+        let first_time_ns = next.as_ref().and_then(|frame| frame.log_times_ns.first().copied());
+        let mut out = match create()? {
+            Some(out) => Some(self.begin(out, options, first_time_ns.unwrap_or(0))?),
+            None => None,
+        };
+        let mut is_interrupted = false;
+        while let Some(frame) = next {
+            is_interrupted = !self.advance(&frame, stop)?;
+            if is_interrupted {
+                break;
+            }
+            if let Some(out) = &mut out {
+                self.write(out, &frame)?;
+            }
+            on_step(frame.row.step);
+            next = self.frames.next_frame()?;
+        }
+        if let (Some(out), false) = (&mut out, is_interrupted) {
+            self.write_trailing(out)?;
+        }
+        let finish = |out: LogWriter<W>| {
+            let closing = self.closing(&out, is_interrupted);
+            out.finish(&closing)
+        };
+        let out = out.map(finish).transpose()?;
+        Ok((self.completed(is_interrupted)?, out))
+    }
+
+    fn begin<W: Write>(
+        &self,
+        out: W,
+        options: LogOptions,
+        log_time_ns: u64,
+    ) -> Result<LogWriter<W>, WriteError> {
+        let log = self.frames.log();
+        let options = LogOptions { selection: log.selection().with_all_particles(), ..options };
+        LogWriter::create(out, options, log.run(), log.scene(), log_time_ns)
+    }
+
+    /// Simulates up to a snapshot and compares everything that the recording has of it. Returns `false`
+    /// after a signal.
+    fn advance(&mut self, frame: &Frame, stop: &AtomicBool) -> anyhow::Result<bool> {
+        let finding = match &mut self.simulation {
+            Some(simulation) => simulation.advance(frame, stop),
+            None => match Resimulation::start(&self.scene, frame)? {
+                Some(mut start) => {
+                    start.set_threads(self.threads);
+                    self.simulation.insert(start).compare_start(frame)
+                }
+                None if frame.particles.is_some() => Finding::Identical,
+                None => bail!(
+                    "step {} has no particles, and no keyframe before it to start from",
+                    frame.row.step
+                ),
+            },
+        };
+        match finding {
+            Finding::Identical => {}
+            Finding::Interrupted => return Ok(false),
+            Finding::Diverged { step, what, .. } | Finding::Incomplete { step, what } => {
+                bail!(
+                    "step {step} cannot be simulated: {what} (`recorder verify` shows the details)"
+                );
+            }
+            Finding::OtherContent { what } => bail!("{what}"),
+        }
+        let first = self.result.map_or(frame.row.step, |(first, ..)| first);
+        self.result = Some((first, frame.row.step, frame.row.state_hash));
+        for update in &frame.updates {
+            if let Message::Outcome(row) = update {
+                let is_applied = row.is_applied();
+                self.applied_count += u64::from(is_applied);
+                self.rejected_count += u64::from(!is_applied);
+            }
+        }
+        Ok(true)
+    }
+
+    fn write<W: Write>(&self, out: &mut LogWriter<W>, frame: &Frame) -> Result<(), WriteError> {
+        let mut times_ns = frame.log_times_ns.iter().copied();
+        let mut time_ns = move || times_ns.next().unwrap_or(0);
+        for update in &frame.updates {
+            out.write(update, time_ns())?;
+        }
+        let row_time_ns = time_ns();
+        let step = frame.row.step;
+        out.write(&Message::Step(frame.row), row_time_ns)?;
+        let simulated = || self.simulation.as_ref().map(|one| one.particles().to_vec());
+        let particles = frame.particles.clone().or_else(simulated).unwrap_or_default();
+        out.write(&Message::Particles { step, particles }, row_time_ns)
+    }
+
+    /// Writes the messages after the last snapshot. A header without particles is at the end of a
+    /// truncated file.
+    fn write_trailing<W: Write>(&self, out: &mut LogWriter<W>) -> Result<(), WriteError> {
+        if self.frames.trailing_row().is_some() {
+            return Ok(());
+        }
+        let times_ns = self.frames.trailing_log_times_ns();
+        let mut updates = self.frames.trailing_updates().iter().zip(times_ns);
+        updates.try_for_each(|(update, time_ns)| out.write(update, *time_ns))
+    }
+
+    /// Returns the end of the new file: that of the recording, with the particles that were added.
+    fn closing<W: Write>(&self, out: &LogWriter<W>, is_interrupted: bool) -> Closing {
+        let (written, recorded) = (*out.counts(), self.frames.log().closing());
+        let stop_reason = match recorded {
+            _ if is_interrupted => "interrupted",
+            Some(recorded) => &recorded.stop_reason,
+            None => "end of the readable part",
+        };
+        let stop_reason = stop_reason.to_owned();
+        let mut closing = Closing { stop_reason, ..recorded.cloned().unwrap_or_default() };
+        let is_completed = self.frames.log().selection().is_only_commands();
+        closing.counts.set_written(&written);
+        if is_completed {
+            closing.counts[Topic::Particles].left_out = 0;
+        }
+        if recorded.is_none() {
+            closing.counts.set_received_to_written();
+        }
+        closing
+    }
+
+    fn completed(self, is_interrupted: bool) -> anyhow::Result<Completed> {
+        let (first_step, last_step, state_hash) = self.result.context("has no snapshot")?;
+        Ok(Completed {
+            scene: self.scene,
+            first_step,
+            last_step,
+            state_hash,
+            applied_count: self.applied_count,
+            rejected_count: self.rejected_count,
+            end: self.frames.end().cloned().unwrap_or(LogEnd::Complete),
+            is_interrupted,
+        })
+    }
+}
