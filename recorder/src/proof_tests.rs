@@ -18,7 +18,7 @@ use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
 use crate::commands::verify::{Report, Verdict, verify};
-use crate::simulation::{Job, SimulationResult, simulate};
+use crate::simulation::{Job, SimulationResult, States, simulate};
 
 const COMMANDS: &str = r#"
     {"step":10,"kind":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.1}
@@ -34,7 +34,7 @@ const COMMANDS: &str = r#"
 
 fn job(scene: &str, commands: &str, steps: u64) -> Job {
     let scene = Scene::from_toml(builtin::text(scene).unwrap(), scene).unwrap();
-    Job { scene, commands: parse_commands(commands, "test").unwrap(), steps }
+    Job::new(scene, parse_commands(commands, "test").unwrap(), steps)
 }
 
 fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
@@ -43,7 +43,9 @@ fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
     // Small chunks, so that a truncated file still has some.
     let options = LogOptions { chunk_size_bytes: 100_000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, scene.as_bytes(), 0).unwrap();
-    let outcomes = simulate(job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
+    let outcomes =
+        simulate(job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {})
+            .unwrap();
     (finish(log, 0), outcomes)
 }
 

@@ -11,19 +11,22 @@ pub(crate) mod state_writer;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use recorder::{LogWriter, OutcomeRow, TimedCommand, WriteError};
+use recorder::{LogWriter, OutcomeRow, TimedCommand};
 use sim_contract::{Action, Command, Outcome, Reason};
 use sim_solver::{Applied, Solver};
 
 use apply::apply;
-pub(crate) use job::Job;
+pub(crate) use job::{Job, Start};
 use kept_states::KeptStates;
+pub(crate) use kept_states::State;
 use state_writer::{KeyframeDue, StateWriter};
 
 /// The result of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SimulationResult {
-    /// Number of computed steps.
+    /// Index of the first outcome.
+    first_index: u64,
+    /// The last computed step.
     pub(crate) steps: u64,
     /// Hash of the last state.
     pub(crate) state_hash: u64,
@@ -36,34 +39,64 @@ pub(crate) struct SimulationResult {
 /// Most rejected commands to report one by one.
 const REJECTIONS_SHOWN_MAX: usize = 5;
 
-/// Computes the steps of `job` and writes them to `log`. Calls `on_step` after each step. Ends early,
-/// even within a step, if `stop` becomes true.
+/// The states of a simulation that it does not compute.
+pub(crate) struct States<G> {
+    /// The first one.
+    pub(crate) solver: Solver,
+    /// Returns the one that a command puts in place, if it is none that the simulation has computed.
+    pub(crate) given: G,
+}
+
+/// Returns the state of a command.
+pub(crate) type GiveState = fn(&TimedCommand) -> anyhow::Result<Option<State>>;
+
+impl States<GiveState> {
+    /// Only the first state.
+    pub(crate) fn first(solver: Solver) -> Self {
+        Self { solver, given: |_| Ok(None) }
+    }
+}
+
+/// Computes the steps of `job` and writes them to `log`. Calls `on_step` after each step. Ends early, even
+/// within a step, if `stop` becomes true.
 pub(crate) fn simulate<W: Write>(
     job: &Job,
-    mut solver: Solver,
+    states: States<impl FnMut(&TimedCommand) -> anyhow::Result<Option<State>>>,
     log: Option<&mut LogWriter<W>>,
     stop: &AtomicBool,
     mut on_step: impl FnMut(u64),
-) -> Result<SimulationResult, WriteError> {
+) -> anyhow::Result<SimulationResult> {
+    let States { mut solver, mut given } = states;
     let run = job.description(&solver);
-    let mut writer = log.map(|log| StateWriter::new(log, run, &solver)).transpose()?;
-    let mut result = SimulationResult::at_start(&solver);
+    let Start { step: first_step, .. } = job.start;
+    let mut writer = log.map(|log| StateWriter::new(log, run, job, &solver)).transpose()?;
+    let mut result = SimulationResult::at_start(job.start, &solver);
     if let Some(writer) = &mut writer {
-        writer.write_state(&solver, 0, KeyframeDue::Now)?;
+        writer.write_state(&solver, first_step, KeyframeDue::Now)?;
     }
     let mut pending = job.commands.as_slice();
     let mut kept = KeptStates::for_commands(pending);
-    kept.add(0, &solver);
-    for step in 1..=job.steps {
+    kept.add(first_step, &solver);
+    for step in first_step + 1..=job.steps {
         let mut keyframe = KeyframeDue::OnTheSecond;
         let mut rows = Vec::new();
         while let Some((command, rest)) = pending.split_first().filter(|(c, _)| c.step <= step) {
-            let is_rewind = matches!(command.action, Action::Rewind { .. });
-            let answer = match command.action {
-                Action::Rewind { to_step: Some(to_step), back_steps: None } => {
-                    kept.rewind(&mut solver, to_step).map(|()| Applied::InPlace)
+            let kept_state = match command.action {
+                Action::Rewind { to_step: Some(to_step), back_steps: None } => kept.take(to_step),
+                _ => None,
+            };
+            let state = match kept_state {
+                Some(state) => Some(state),
+                None => given(command)?,
+            };
+            let answer = match (command.action, state) {
+                (Action::Rewind { .. } | Action::Restore { .. }, Some(state)) => {
+                    state.put_in_place(&mut solver, &command.action)
                 }
-                action => apply(&mut solver, command.client_id, &action),
+                (Action::Rewind { to_step: Some(_), back_steps: None }, None) => {
+                    Err(Reason::OutOfRange)
+                }
+                (action, _) => apply(&mut solver, command.client_id, &action),
             };
             if answer.is_ok_and(|applied| applied != Applied::Target) {
                 keyframe = KeyframeDue::Now;
@@ -71,7 +104,7 @@ pub(crate) fn simulate<W: Write>(
             let outcome = result.count(command, step, answer.map(|_| ()));
             rows.push(OutcomeRow::from(&outcome));
             pending = rest;
-            if is_rewind && answer.is_ok() {
+            if answer == Ok(Applied::InPlace) {
                 // This step shows the state without further changes, as in a node.
                 break;
             }
@@ -95,9 +128,10 @@ pub(crate) fn simulate<W: Write>(
 }
 
 impl SimulationResult {
-    fn at_start(solver: &Solver) -> Self {
+    fn at_start(start: Start, solver: &Solver) -> Self {
         Self {
-            steps: 0,
+            first_index: start.outcome_count,
+            steps: start.step,
             state_hash: solver.state_hash(),
             applied_count: 0,
             rejected_count: 0,
@@ -108,7 +142,7 @@ impl SimulationResult {
     /// Counts a command at the boundary before `step`, and returns its outcome.
     fn count(&mut self, command: &TimedCommand, step: u64, result: Result<(), Reason>) -> Outcome {
         let TimedCommand { client_id, sequence, action, .. } = *command;
-        let index = self.applied_count + self.rejected_count;
+        let index = self.first_index + self.applied_count + self.rejected_count;
         let outcome = Outcome::new(index, step, Command::new(client_id, sequence, action), result);
         self.applied_count += u64::from(outcome.is_applied());
         if !outcome.is_applied() {

@@ -1,5 +1,6 @@
 //! `recorder simulate`: simulates a scene or a recording in this process, without a node.
 
+mod changes;
 mod completion;
 
 use std::fmt;
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use recorder::{Closing, LogEnd, LogReader, OutcomeRow, PartFile};
+use recorder::{Closing, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand};
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Stop, printable_line};
@@ -21,7 +22,8 @@ use crate::cli::progress::{progress_bar, progress_spinner};
 use crate::cli::thread_args::ThreadArgs;
 use crate::input::command_source::load_commands;
 use crate::input::scene_source::{is_recording, load_scene};
-use crate::simulation::{Job, SimulationResult, simulate};
+use crate::simulation::{Job, SimulationResult, State, States, simulate};
+use changes::{Changed, Changes, parse_setting};
 use completion::{Completed, Completion};
 
 /// Steps between two updates of the progress bar.
@@ -30,12 +32,15 @@ const STEPS_PER_UPDATE: u64 = 256;
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "A recording without --steps is simulated again from its first keyframe, compared with everything that it \
-    has, and written with the particles of every snapshot.\n\n\
+    has, and written with the particles of every snapshot. With --drop, --set or --commands, it is \
+    simulated with other commands, from the last complete state before the first change to its last step; \
+    `recorder diff` shows the effect.\n\n\
     Exit codes: 0 all steps computed; 1 failed; 3 interrupted before the last \
     step, or recording truncated or damaged.\n\nExamples:\n  \
     recorder simulate curtain --steps 24000\n  \
     recorder simulate curtain --steps 2400 -o drag.mcap --commands drag.jsonl\n  \
     recorder simulate flight.mcap -o run.mcap\n  \
+    recorder simulate run.mcap --drop 3 --set 480:damping=0.1 -o changed.mcap\n  \
     recorder simulate live.mcap --steps 2400 --commands live.mcap -o again.mcap"
 )]
 pub(crate) struct SimulateArgs {
@@ -49,9 +54,17 @@ pub(crate) struct SimulateArgs {
     #[arg(short, long, value_name = "OUT.mcap")]
     output: Option<PathBuf>,
     /// Commands: a file of JSON lines, or a recording (ending in .mcap), whose outcomes are
-    /// repeated [default: none]
-    #[arg(long, value_name = "FILE", requires = "steps")]
+    /// repeated [default: none, or those of the recording]
+    #[arg(long, value_name = "FILE")]
     commands: Option<String>,
+    /// Leave out the command with this index in /outcomes of the recording. Can be repeated
+    #[arg(long, value_name = "INDEX", conflicts_with_all = ["steps", "commands"],
+        allow_hyphen_values = true, value_parser = whole_number)]
+    drop: Vec<u64>,
+    /// Change a parameter from this step of the recording on. Can be repeated
+    #[arg(long, value_name = "STEP:PARAMETER=VALUE", conflicts_with = "steps",
+        allow_hyphen_values = true, value_parser = parse_setting)]
+    set: Vec<TimedCommand>,
     #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
@@ -79,11 +92,12 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     match args.steps {
         Some(steps) => run_scene(args, steps, &stop),
-        None if is_recording(&args.scene) => run_recording(args, &stop),
-        None => {
+        None if !is_recording(&args.scene) => {
             let text = "a scene needs --steps N; only a recording (ending in .mcap) has steps\n";
             with_usage(&clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
         }
+        None if args.has_changes() => run_changed(args, &stop),
+        None => run_recording(args, &stop),
     }
 }
 
@@ -131,35 +145,69 @@ fn summary_of_recording(completed: &Completed, wall_ns: u64, path: Option<&Path>
     }
 }
 
+/// Simulates a recording again with changed commands.
+fn run_changed(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
+    let replaced =
+        args.commands.as_deref().map(|source| load_commands(source, stop)).transpose()?;
+    let changes = Changes { dropped: args.drop.clone(), added: args.set.clone(), replaced };
+    let path = Path::new(&args.scene);
+    let changed = Changed::new(path, changes, stop).with_context(|| args.scene.clone())?;
+    let end = changed.end.clone();
+    let (job, solver, mut given) = changed.into_parts();
+    let states = States { solver, given: |command: &TimedCommand| given.of(command) };
+    let exit = run_job(args, &job, states, stop)?;
+    if end == LogEnd::Complete {
+        return Ok(exit);
+    }
+    output::warn_incomplete(path, &end, "simulated as far as it goes");
+    Ok(Exit::Loss)
+}
+
 /// Simulates a scene from its first step.
 fn run_scene(args: &SimulateArgs, steps: u64, stop: &Stop) -> anyhow::Result<Exit> {
     let scene = load_scene(&args.scene, stop)?;
     let commands =
         args.commands.as_deref().map_or(Ok(Vec::new()), |source| load_commands(source, stop))?;
-    let job = Job { scene, commands, steps };
+    let job = Job::new(scene, commands, steps);
     check_command_steps(&job).with_context(|| args.commands.clone().unwrap_or_default())?;
-    let mut solver = Solver::new(&job.scene);
-    solver.set_threads(args.threads.count());
-    let mut log =
-        args.output.as_deref().map(|path| begin(args, path, &job, &solver)).transpose()?;
+    let solver = Solver::new(&job.scene);
+    run_job(args, &job, States::first(solver), stop)
+}
 
-    let bar = progress_bar(steps);
+/// Simulates, and prints the summary.
+fn run_job(
+    args: &SimulateArgs,
+    job: &Job,
+    mut states: States<impl FnMut(&TimedCommand) -> anyhow::Result<Option<State>>>,
+    stop: &Stop,
+) -> anyhow::Result<Exit> {
+    states.solver.set_threads(args.threads.count());
+    let output = args.output.as_deref();
+    let mut log = output.map(|path| begin(args, path, job, &states.solver)).transpose()?;
+    let first_step = job.start.step;
+    let bar = progress_bar(job.steps - first_step);
     let before_ns = monotonic_ns();
-    let result = simulate(&job, solver, log.as_mut(), stop.flag(), |step| {
+    let result = simulate(job, states, log.as_mut(), stop.flag(), |step| {
         if step.is_multiple_of(STEPS_PER_UPDATE) {
-            bar.set_position(step);
+            bar.set_position(step - first_step);
         }
     })
     .with_context(|| truncation(args))?;
     bar.finish_and_clear();
-    let path = log.map(|log| finish(log, &result, steps)).transpose();
+    let path = log.map(|log| finish(log, &result, job.steps)).transpose();
     let path = path.with_context(|| truncation(args))?;
     let wall_ns = monotonic_ns() - before_ns;
 
     note_rejections(&result);
-    let summary = summary(&job, &result, wall_ns, path.as_deref());
+    let summary = summary(job, &result, wall_ns, path.as_deref());
     output::result(args.as_json, &summary, &summary.to_string())?;
-    Ok(if result.steps < steps { Exit::Loss } else { Exit::Done })
+    Ok(if result.steps < job.steps { Exit::Loss } else { Exit::Done })
+}
+
+impl SimulateArgs {
+    fn has_changes(&self) -> bool {
+        self.commands.is_some() || !self.drop.is_empty() || !self.set.is_empty()
+    }
 }
 
 /// Warns if some commands are for steps after the last one, and fails if all are.
@@ -223,11 +271,12 @@ fn note_rejections(result: &SimulationResult) {
 
 fn summary(job: &Job, result: &SimulationResult, wall_ns: u64, path: Option<&Path>) -> Summary {
     let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
-    let simulated_s = result.steps as f64 / f64::from(job.scene.solver.rate_hz);
+    let steps = result.steps - job.start.step;
+    let simulated_s = steps as f64 / f64::from(job.scene.solver.rate_hz);
     Summary {
         scene: job.scene.name.clone(),
-        first_step: 0,
-        steps: result.steps,
+        first_step: job.start.step,
+        steps,
         state_hash: format!("{:016x}", result.state_hash),
         applied: result.applied_count,
         rejected: result.rejected_count,
@@ -261,7 +310,7 @@ mod tests {
     fn job(steps: u64) -> Job {
         let scene = Scene::from_toml(builtin::text("rope").unwrap(), "rope").unwrap();
         let lines = "{\"step\":10,\"kind\":\"pause\"}\n{\"step\":40,\"kind\":\"pause\"}";
-        Job { scene, commands: parse_commands(lines, "test").unwrap(), steps }
+        Job::new(scene, parse_commands(lines, "test").unwrap(), steps)
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::text_file::read_text_file;
 const COMMAND_FILE_SIZE_BYTES_MAX: u64 = 1 << 30;
 
 /// Most commands of a recording to repeat: hours of a drag at 60 Hz. They take about 250 MB of memory.
-const COMMANDS_MAX: usize = 1 << 20;
+pub(crate) const COMMANDS_MAX: usize = 1 << 20;
 
 /// Reads commands and sorts them in the order of application. They are the outcomes of a recording
 /// if `source` ends in `.mcap`, else the lines of a command file.
@@ -61,7 +61,7 @@ fn commands_in_recording(path: &Path, stop: &Stop) -> anyhow::Result<Vec<TimedCo
     Ok(commands)
 }
 
-fn timed_command(row: &OutcomeRow) -> TimedCommand {
+pub(crate) fn timed_command(row: &OutcomeRow) -> TimedCommand {
     TimedCommand {
         step: row.step,
         index: Some(row.index),

@@ -126,7 +126,7 @@ pub(super) fn job(commands: &str) -> Job {
 
 pub(super) fn job_of(scene: &str, commands: &str) -> Job {
     let scene = Scene::from_toml(scene, "proof").unwrap();
-    Job { scene, commands: parse_commands(commands, "test").unwrap(), steps: STEPS }
+    Job::new(scene, parse_commands(commands, "test").unwrap(), STEPS)
 }
 
 /// Collects the values that `pick` returns for the messages of a recording.

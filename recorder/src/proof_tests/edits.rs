@@ -27,7 +27,7 @@ use not_compared::not_compared;
 
 use crate::commands::verify::{Verdict, verify};
 use crate::proof_tests::finish;
-use crate::simulation::{Job, simulate};
+use crate::simulation::{Job, States, simulate};
 
 /// A scene whose recording has every topic: a particle that freezes, a cut, and a moving collider.
 const SCENE: &str = "
@@ -69,14 +69,14 @@ type Record = (u8, Vec<u8>);
 fn written() -> Vec<u8> {
     let scene = Scene::from_toml(SCENE, "edits.toml").unwrap();
     let commands = parse_commands(COMMANDS, "test").unwrap();
-    let job = Job { scene, commands, steps: STEPS };
+    let job = Job::new(scene, commands, STEPS);
     let solver = Solver::new(&job.scene);
     let (run, scene) = (job.description(&solver), job.scene.to_toml());
     let mut log =
         LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0).unwrap();
     let status = StatusRow::from(&NodeStatus { step: 0, ..NodeStatus::default() });
     log.write(&Message::Status(status), 0).unwrap();
-    simulate(&job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
+    simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     let stop_reason = "steps reached".to_owned();
     let mut closing = Closing { stop_reason, unreadable: 0, counts: *log.counts() };
     closing.counts.set_received_to_written();

@@ -12,11 +12,25 @@ pub(crate) struct Job {
     pub(crate) scene: Scene,
     /// In the order of application.
     pub(crate) commands: Vec<TimedCommand>,
-    /// Steps to compute after step 0.
+    /// The last step to compute.
     pub(crate) steps: u64,
+    pub(crate) start: Start,
+}
+
+/// The state before the first step to compute. The default is that of step 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Start {
+    pub(crate) step: u64,
+    /// Number of the commands of the run up to this state.
+    pub(crate) outcome_count: u64,
 }
 
 impl Job {
+    /// A simulation from step 0.
+    pub(crate) fn new(scene: Scene, commands: Vec<TimedCommand>, steps: u64) -> Self {
+        Self { scene, commands, steps, start: Start::default() }
+    }
+
     /// Returns the number of commands whose step is after the last one.
     pub(crate) fn commands_beyond_the_end(&self) -> usize {
         self.commands.iter().filter(|command| command.step > self.steps).count()
@@ -42,6 +56,9 @@ impl Job {
     /// Returns the id of the run. Commands after the last step have no part in it.
     fn run_id(&self) -> u64 {
         let mut id = RunId::new(self.scene.to_toml().as_bytes());
+        if self.start != Start::default() {
+            id.add_start(self.start.step, self.start.outcome_count);
+        }
         for command in self.commands.iter().filter(|command| command.step <= self.steps) {
             id.add(command.step, command.client_id, command.sequence, command.action);
         }

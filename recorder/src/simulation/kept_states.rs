@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use recorder::TimedCommand;
-use sim_contract::{Action, Reason};
-use sim_solver::{Keyframe, Particle, Solver};
+use sim_contract::{Action, Reason, RestoreContents};
+use sim_solver::{Applied, Keyframe, Particle, Solver};
 
 /// The states of the steps that the commands of a simulation name. A node that keeps every step would have
 /// them.
@@ -14,10 +14,28 @@ pub(super) struct KeptStates {
     by_step: BTreeMap<u64, (usize, Option<State>)>,
 }
 
-#[derive(Debug)]
-struct State {
-    particles: Vec<Particle>,
-    keyframe: Keyframe,
+/// A complete state.
+#[derive(Debug, Clone)]
+pub(crate) struct State {
+    pub(crate) particles: Vec<Particle>,
+    pub(crate) keyframe: Keyframe,
+}
+
+impl State {
+    /// Puts the state in place, or only its positions and velocities if the action says so.
+    pub(super) fn put_in_place(
+        &self,
+        solver: &mut Solver,
+        action: &Action,
+    ) -> Result<Applied, Reason> {
+        let result = match action {
+            Action::Restore { contents: RestoreContents::Motion, .. } => {
+                solver.put_motion_in_place(&self.particles)
+            }
+            _ => solver.put_in_place(&self.particles, &self.keyframe),
+        };
+        result.map(|()| Applied::InPlace).map_err(|_| Reason::InvalidState)
+    }
 }
 
 impl KeptStates {
@@ -40,16 +58,14 @@ impl KeptStates {
         }
     }
 
-    /// Puts the state of a step in place.
-    pub(super) fn rewind(&mut self, solver: &mut Solver, to_step: u64) -> Result<(), Reason> {
-        let Some((use_count, Some(state))) = self.by_step.get_mut(&to_step) else {
-            return Err(Reason::OutOfRange);
-        };
-        solver.put_in_place(&state.particles, &state.keyframe).map_err(|_| Reason::InvalidState)?;
+    /// Returns the state of a step, if it was computed.
+    pub(super) fn take(&mut self, step: u64) -> Option<State> {
+        let (use_count, state) = self.by_step.get_mut(&step)?;
+        let state = state.clone()?;
         *use_count -= 1;
         if *use_count == 0 {
-            self.by_step.remove(&to_step);
+            self.by_step.remove(&step);
         }
-        Ok(())
+        Some(state)
     }
 }

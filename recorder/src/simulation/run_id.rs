@@ -22,6 +22,12 @@ impl RunId {
         self.0.update(bytemuck::bytes_of(&wire));
     }
 
+    /// Adds the place of a first state other than that of the scene.
+    pub(crate) fn add_start(&mut self, step: u64, outcome_count: u64) {
+        self.0.update(&step.to_le_bytes());
+        self.0.update(&outcome_count.to_le_bytes());
+    }
+
     /// Returns the id.
     pub(crate) fn value(&self) -> u64 {
         self.0.digest()

@@ -11,7 +11,7 @@ use sim_contract::{ConstraintState, LoadHeader, ParameterValues, ParticleState, 
 use sim_solver::Solver;
 
 use super::frozen::FrozenTracker;
-use super::job::count;
+use super::job::{Job, count};
 use super::solver_rows::{colliders_row, new_tears_row};
 
 /// The time of the next keyframe.
@@ -38,23 +38,28 @@ pub(super) struct StateWriter<'a, W: Write> {
 }
 
 impl<'a, W: Write> StateWriter<'a, W> {
-    /// Starts with the load.
+    /// Starts with the load. `solver` has the first state.
     pub(super) fn new(
         log: &'a mut LogWriter<W>,
         run: RunDescription,
+        job: &Job,
         solver: &Solver,
     ) -> Result<Self, WriteError> {
         let header = LoadHeader { method: run.method, ..LoadHeader::default() };
-        let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+        // A command may have changed the constraints of the state.
+        let loaded = Solver::new(&job.scene);
+        let constraints: Vec<_> = loaded.constraints().map(constraint_state).collect();
         let triangles: Vec<_> =
             solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-        log.write(&Message::Topology(TopologyRow::new(&header, &constraints)), 0)?;
+        let topology = TopologyRow::new(&header, &constraints);
+        let topology = TopologyRow { torn: solver.torn().to_vec(), ..topology };
+        log.write(&Message::Topology(topology), 0)?;
         log.write(&Message::Surface(SurfaceRow::new(&header, &triangles)), 0)?;
         Ok(Self {
             log,
             run,
             outcomes: Vec::new(),
-            outcome_count: 0,
+            outcome_count: job.start.outcome_count,
             // A scene without colliders has no row.
             colliders: CollidersRow { step: 0, colliders: Vec::new() },
             parameters: None,

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::storm::{self, HeldState, Storm};
-use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record, wait_for};
+use integration_tests::{DEADLINE, Finished, Process, Program, Sandbox, ctl, record, wait_for};
 use recorder::{Frame, FrameReader, LogReader, Message};
 use sim_contract::{
     Action, Client, GivenState, Outcome, ParticleFlags, ParticleState, Reason, RestoreContents, Tap,
@@ -32,8 +32,13 @@ fn frames(file: &str) -> Vec<Frame> {
     std::iter::from_fn(|| reader.next_frame().unwrap()).collect()
 }
 
-/// Ends a recorder after the last step of a paused node.
+/// Ends a recorder after the last step of a paused node, and expects that it has lost nothing.
 fn end_after(sandbox: &Sandbox, recording: Process, file: &str) {
+    interrupt_after(sandbox, recording, file).success();
+}
+
+/// Ends a recorder after the last step of a paused node.
+fn interrupt_after(sandbox: &Sandbox, recording: Process, file: &str) -> Finished {
     let last = ctl(sandbox, &["status"])["step"].as_u64().unwrap();
     wait_for("the recording of the last step", || {
         let log = LogReader::open(Path::new(&format!("{file}.part"))).ok()?;
@@ -41,7 +46,7 @@ fn end_after(sandbox: &Sandbox, recording: Process, file: &str) {
         let frames = std::iter::from_fn(|| reader.next_frame().ok().flatten());
         frames.last().filter(|frame| frame.row.step == last)
     });
-    recording.interrupt().success();
+    recording.interrupt()
 }
 
 /// Records 1,000 steps with commands, and returns the hash of the last one.
@@ -228,17 +233,25 @@ fn a_live_recording_with_rewinds_and_states_verifies() {
     for options in [&[][..], &["--every", "7"], &["--history", "1MiB"]] {
         let sandbox = Sandbox::new();
         let file = sandbox.path("run.mcap");
-        let args = [&["run", "curtain", "--rate", "500"], options].concat();
+        let args = [&["run", "curtain", "--rate", "240"], options].concat();
         let node = node(&sandbox, &args);
         let held = HeldState::read(&sandbox);
         let recording = record(&sandbox, &file);
         let counts = storm::send(&sandbox, &held, Storm { clients: 2, commands: 300 });
         assert!(counts.applied > 0 && counts.rejected > 0, "{counts:?}");
         ctl(&sandbox, &["pause"]);
-        end_after(&sandbox, recording, &file);
+        let recorded = interrupt_after(&sandbox, recording, &file);
         node.interrupt().success();
-        let verified = recorder(&sandbox, &["verify", &file]);
-        assert!(verified.contains("steps bit-identical"), "{verified}");
+        let verified = Process::run(Program::Recorder, &sandbox, &["verify", "--json", &file]);
+        let report: serde_json::Value = serde_json::from_str(&verified.stdout).unwrap();
+        if recorded.code == Some(3) {
+            // A busy machine may lose the keyframe of a state that a command put in place.
+            assert_ne!(report["lost"], serde_json::json!({}), "{report}");
+            assert_ne!(report["verdict"], "diverged", "{report}");
+            continue;
+        }
+        recorded.success();
+        assert_eq!(report["verdict"], "identical", "{report}");
         assert_rewinds_go_to_recorded_states(&file);
     }
 }

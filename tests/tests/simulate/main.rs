@@ -1,5 +1,6 @@
 //! Simulations of recordings, by the built programs.
 
+mod changes;
 mod flight;
 
 use std::path::Path;

@@ -15,7 +15,7 @@ use super::*;
 use crate::export::scene_state::SceneState;
 use crate::export::shape::{Picture, Shape};
 use crate::export::{png, svg};
-use crate::simulation::{Job, simulate};
+use crate::simulation::{Job, States, simulate};
 
 /// A square of cloth in front of a sphere and above a floor, with a pinned particle at its side.
 const TINY: &str = r#"
@@ -63,12 +63,12 @@ fn run_at(rate_hz: u32) -> RunDescription {
 }
 
 fn record(scene: &str, steps: u64) -> Vec<u8> {
-    let job = Job { scene: Scene::from_toml(scene, "test").unwrap(), commands: Vec::new(), steps };
+    let job = Job::new(Scene::from_toml(scene, "test").unwrap(), Vec::new(), steps);
     let (solver, toml) = (Solver::new(&job.scene), job.scene.to_toml());
     let run = job.description(&solver);
     let options = LogOptions { chunk_size_bytes: 2000, ..LogOptions::default() };
     let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
-    simulate(&job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
+    simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     log.finish(&Closing::default()).unwrap()
 }
 
@@ -213,12 +213,12 @@ fn a_reset_restores_torn_constraints() {
         {"step":20,"kind":"reset"}"#;
     let scene = Scene::from_toml(TINY, "test").unwrap();
     let commands = recorder::parse_commands(reset, "test").unwrap();
-    let job = Job { scene, commands, steps: 30 };
+    let job = Job::new(scene, commands, 30);
     let solver = Solver::new(&job.scene);
     let (run, toml) = (job.description(&solver), job.scene.to_toml());
     let options = LogOptions::default();
     let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
-    simulate(&job, solver, Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
+    simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     let file = log.finish(&Closing::default()).unwrap();
     let lines: Vec<_> =
         pictures(&file, &[9, 10, 19, 20], STYLE).iter().map(|one| counts(one)[1]).collect();

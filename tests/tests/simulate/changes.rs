@@ -1,0 +1,139 @@
+//! Simulations of a recording with changed commands. They begin at a recorded state, so up to the first
+//! change they are the recording, and a change of the same commands in a new run gives the same states.
+
+use std::fs;
+
+use integration_tests::{Sandbox, ctl};
+use recorder::{Frame, Message, OutcomeRow};
+
+use super::{frames, node, record, recorder, step, wait_for_step};
+
+/// Records a node with commands, from a step after some of them. Returns the last step.
+fn record_mid_run(sandbox: &Sandbox, file: &str) -> u64 {
+    let node = node(sandbox, &["run", "curtain", "--paused"]);
+    ctl(sandbox, &["cut", "40"]);
+    step(sandbox, 130);
+    let recording = record(sandbox, &["-o", file, "--flush-interval", "100ms"]);
+    step(sandbox, 200);
+    ctl(sandbox, &["grab", "90", "0.5", "-0.2", "0.3", "--over", "0.1"]);
+    step(sandbox, 200);
+    ctl(sandbox, &["cut-radius", "0.3", "0.3", "0", "--radius", "0.1"]);
+    step(sandbox, 200);
+    ctl(sandbox, &["rewind", "--to-step", "600"]);
+    step(sandbox, 100);
+    let last = ctl(sandbox, &["status"])["step"].as_u64().unwrap();
+    wait_for_step(file, last);
+    recording.interrupt().success();
+    node.interrupt().success();
+    last
+}
+
+fn outcomes(frames: &[Frame]) -> Vec<OutcomeRow> {
+    let updates = frames.iter().flat_map(|frame| &frame.updates);
+    let rows = updates.filter_map(|update| match update {
+        Message::Outcome(row) => Some(row.clone()),
+        _ => None,
+    });
+    // Those of a paused node have no effect on states.
+    rows.filter(|row| !matches!(row.action, sim_contract::Action::Step { .. })).collect()
+}
+
+fn index_of(frames: &[Frame], kind: &str) -> (u64, u64) {
+    let rows = outcomes(frames);
+    let row = rows.iter().find(|row| serde_json::to_value(row.action).unwrap()["kind"] == kind);
+    let row = row.unwrap();
+    (row.index, row.step)
+}
+
+fn is_same(one: &Frame, other: &Frame) -> bool {
+    one.row.state_hash == other.row.state_hash && one.particles == other.particles
+}
+
+#[test]
+fn a_dropped_command_changes_nothing_before_it_and_everything_after_it() {
+    let sandbox = Sandbox::new();
+    let (run, changed) = (sandbox.path("run.mcap"), sandbox.path("changed.mcap"));
+    let last = record_mid_run(&sandbox, &run);
+    let recorded = frames(&run);
+    let (index, change) = index_of(&recorded, "cut_radius");
+    let index = index.to_string();
+    recorder(&sandbox, &["simulate", &run, "--drop", &index, "-o", &changed]).success();
+    let verified = recorder(&sandbox, &["verify", "--json", &changed]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    recorder(&sandbox, &["check", &changed]).success();
+
+    let new = frames(&changed);
+    let first = new.first().unwrap().row.step;
+    assert!(first > 130 && first < change, "{first}");
+    assert_eq!(new.last().unwrap().row.step, last);
+    for (one, other) in new.iter().zip(recorded.iter().filter(|frame| frame.row.step >= first)) {
+        assert_eq!(one.row.step, other.row.step);
+        let is_before = one.row.step < change;
+        assert_eq!(is_same(one, other), is_before, "step {}", one.row.step);
+    }
+    let torn = |frames: &[Frame]| frames.last().unwrap().row.torn_count;
+    assert!(torn(&new) < torn(&recorded));
+    let repeated = outcomes(&recorded).into_iter().filter(|row| row.step > first);
+    assert_eq!(outcomes(&new).len() + 1, repeated.count());
+}
+
+#[test]
+fn a_rewind_to_before_the_change_starts_before_it() {
+    let sandbox = Sandbox::new();
+    let (run, changed) = (sandbox.path("run.mcap"), sandbox.path("changed.mcap"));
+    record_mid_run(&sandbox, &run);
+    let recorded = frames(&run);
+    let (_, rewind) = index_of(&recorded, "rewind");
+    // After the step that the rewind goes back to.
+    let setting = format!("{}:damping=0.5", 650);
+    recorder(&sandbox, &["simulate", &run, "--set", &setting, "-o", &changed]).success();
+    let verified = recorder(&sandbox, &["verify", "--json", &changed]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    let new = frames(&changed);
+    let first = new.first().unwrap().row.step;
+    assert!(first <= 600, "{first}");
+    let at = |frames: &[Frame], step| {
+        frames.iter().find(|frame| frame.row.step == step).cloned().unwrap()
+    };
+    assert!(!is_same(&at(&new, 700), &at(&recorded, 700)));
+    // The state in place is older than the change, and has its parameters.
+    for step in [rewind, rewind + 1, rewind + 99] {
+        assert!(is_same(&at(&new, step), &at(&recorded, step)), "step {step}");
+    }
+}
+
+#[test]
+fn the_same_commands_from_a_file_give_the_same_states() {
+    let sandbox = Sandbox::new();
+    let (run, changed) = (sandbox.path("run.mcap"), sandbox.path("changed.mcap"));
+    record_mid_run(&sandbox, &run);
+    let recorded = frames(&run);
+    let rows = outcomes(&recorded);
+    let lines = rows.iter().map(|row| serde_json::to_string(row).unwrap() + "\n");
+    let commands = sandbox.write("commands.jsonl", &lines.collect::<String>());
+    recorder(&sandbox, &["simulate", &run, "--commands", &commands, "-o", &changed]).success();
+    let new = frames(&changed);
+    assert_eq!(new.len(), recorded.len());
+    assert!(new.iter().zip(&recorded).all(|(one, other)| is_same(one, other)));
+}
+
+#[test]
+fn changes_without_a_place_in_the_recording_are_refused() {
+    let sandbox = Sandbox::new();
+    let (run, out) = (sandbox.path("run.mcap"), sandbox.path("out.mcap"));
+    let last = record_mid_run(&sandbox, &run);
+    let too_late = format!("{}:damping=0.5", last + 1);
+    for (change, code, problem) in [
+        (["--drop", "99"], 1, "has no outcome 99 (allowed: "),
+        (["--set", "20:damping=0.5"], 1, "a change of step 20 has no effect: "),
+        (["--set", &too_late], 1, "(allowed: 1"),
+        (["--set", "damping=0.5"], 2, "it must be STEP:PARAMETER=VALUE"),
+        (["--drop", "x"], 2, "whole number"),
+    ] {
+        let args = ["simulate", &run, change[0], change[1], "-o", &out];
+        let refused = recorder(&sandbox, &args);
+        assert_eq!(refused.code, Some(code), "{refused:?}");
+        assert!(refused.stderr.contains(problem), "{refused:?}");
+        assert!(!fs::exists(&out).unwrap());
+    }
+}
