@@ -90,8 +90,8 @@ pub(crate) fn simulate<W: Write>(
                 None => given(command)?,
             };
             let answer = match (command.action, state) {
-                (Action::Rewind { .. } | Action::Restore { .. }, Some(state)) => {
-                    state.put_in_place(&mut solver, &command.action)
+                (action, Some(state)) if puts_state_in_place(&action) => {
+                    state.put_in_place(&mut solver, &action)
                 }
                 (Action::Rewind { to_step: Some(_), back_steps: None }, None) => {
                     Err(Reason::OutOfRange)
@@ -104,7 +104,7 @@ pub(crate) fn simulate<W: Write>(
             let outcome = result.count(command, step, answer.map(|_| ()));
             rows.push(OutcomeRow::from(&outcome));
             pending = rest;
-            if answer == Ok(Applied::InPlace) {
+            if puts_state_in_place(&command.action) && answer.is_ok() {
                 // This step shows the state without further changes, as in a node.
                 break;
             }
@@ -125,6 +125,10 @@ pub(crate) fn simulate<W: Write>(
     }
     result.state_hash = solver.state_hash();
     Ok(result)
+}
+
+fn puts_state_in_place(action: &Action) -> bool {
+    matches!(action, Action::Rewind { .. } | Action::Restore { .. })
 }
 
 impl SimulationResult {
