@@ -15,8 +15,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use cli::exit::{self, Exit};
 use commands::{
-    check, export as export_command, info, play, record, repair, restore, scene, simulate, state,
-    verify,
+    check, diff, export as export_command, info, play, record, repair, restore, scene, simulate,
+    state, verify,
 };
 
 /// Record a simulation, play it back, and prove that it can be re-simulated bit for bit
@@ -31,6 +31,7 @@ use commands::{
         recorder simulate curtain --steps 2400 -o curtain.mcap\n  \
         recorder info curtain.mcap\n  \
         recorder check curtain.mcap\n  \
+        recorder diff curtain.mcap changed.mcap\n  \
         recorder repair run.mcap.part repaired.mcap\n  \
         recorder export curtain.mcap --png pictures\n  \
         recorder scene curtain.mcap > curtain.toml\n  \
@@ -47,6 +48,8 @@ struct Args {
 enum Command {
     /// Test every byte of recordings: structure, checksums, index, steps and hashes
     Check(check::CheckArgs),
+    /// Show where two recordings come apart, and how their distance grows
+    Diff(diff::DiffArgs),
     /// Draw pictures of a recording
     Export(export_command::ExportArgs),
     /// Show what a recording contains
@@ -78,6 +81,7 @@ fn run(command: &Command) -> anyhow::Result<Exit> {
     sim_contract::report_file_size_limit()?;
     match command {
         Command::Check(args) => check::run(args),
+        Command::Diff(args) => diff::run(args),
         Command::Export(args) => export_command::run(args),
         Command::Info(args) => info::run(args),
         Command::Play(args) => play::run(args),

@@ -2,7 +2,7 @@
 //! the messages that it lacks.
 
 mod coverage;
-mod difference;
+pub(crate) mod difference;
 mod events;
 mod load;
 mod past_states;

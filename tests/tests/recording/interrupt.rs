@@ -15,7 +15,7 @@ struct Reader<'a> {
 /// Returns a recording that takes seconds to read.
 fn large_recording(sandbox: &Sandbox) -> String {
     let file = sandbox.path("large.mcap");
-    let args = ["simulate", "curtain", "--steps", "9600", "--compression", "none", "-o", &file];
+    let args = ["simulate", "curtain", "--steps", "24000", "--compression", "none", "-o", &file];
     Process::run(Program::Recorder, sandbox, &args).success();
     file
 }

@@ -103,6 +103,39 @@ fn a_rewind_to_before_the_change_starts_before_it() {
 }
 
 #[test]
+fn a_state_of_another_process_is_put_in_place_again() {
+    let sandbox = Sandbox::new();
+    let [state, run, changed] =
+        ["state.mcap", "run.mcap", "changed.mcap"].map(|name| sandbox.path(name));
+    let node = node(&sandbox, &["run", "curtain", "--paused"]);
+    ctl(&sandbox, &["pin", "100"]);
+    step(&sandbox, 50);
+    recorder(&sandbox, &["state", "-o", &state]).success();
+    ctl(&sandbox, &["unpin", "100"]);
+    step(&sandbox, 1);
+    let recording = record(&sandbox, &["-o", &run, "--flush-interval", "100ms"]);
+    step(&sandbox, 100);
+    recorder(&sandbox, &["restore", &state]).success();
+    step(&sandbox, 100);
+    let last = ctl(&sandbox, &["status"])["step"].as_u64().unwrap();
+    wait_for_step(&run, last);
+    recording.interrupt().success();
+    node.interrupt().success();
+
+    recorder(&sandbox, &["simulate", &run, "--set", "100:damping=0.5", "-o", &changed]).success();
+    let verified = recorder(&sandbox, &["verify", "--json", &changed]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    let (new, recorded) = (frames(&changed), frames(&run));
+    let (_, restored) = index_of(&recorded, "restore");
+    for one in &new {
+        let other = recorded.iter().find(|frame| frame.row.step == one.row.step).unwrap();
+        let is_changed = (100..restored).contains(&one.row.step);
+        assert_eq!(is_same(one, other), !is_changed, "step {}", one.row.step);
+    }
+    assert!(new.first().unwrap().row.step < 100 && restored < last);
+}
+
+#[test]
 fn the_same_commands_from_a_file_give_the_same_states() {
     let sandbox = Sandbox::new();
     let (run, changed) = (sandbox.path("run.mcap"), sandbox.path("changed.mcap"));
