@@ -205,7 +205,7 @@ mod tests {
     }
 
     /// Returns the point of a primitive's own axes in the scene: position + R·point.
-    fn placed(pose: &Option<Pose>, point: Vector) -> Vector {
+    fn placed(pose: Option<Pose>, point: Vector) -> Vector {
         let Pose { position, orientation } = pose.unwrap();
         let (position, q) = (position.unwrap(), orientation.unwrap());
         let u = [q.x, q.y, q.z];
@@ -232,7 +232,7 @@ mod tests {
             assert!(size.x >= 10.0 && size.y == size.x && size.z < 0.01, "{size:?}");
             for corner in [[0.5, 0.5], [-0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]] {
                 let point =
-                    placed(&cube.pose, [corner[0] * size.x, corner[1] * size.y, 0.5 * size.z]);
+                    placed(cube.pose, [corner[0] * size.x, corner[1] * size.y, 0.5 * size.z]);
                 let height = dot(point, wide(normal)) - f64::from(offset);
                 assert!(height.abs() < 1e-4, "{normal:?}: a corner at height {height}");
             }
@@ -250,12 +250,12 @@ mod tests {
         let cube = &entity.cubes[0];
         assert_eq!(cube.size, Some(vector([1.0, 2.0, 4.0])));
         // Rotation about y by the angle a with sin(a / 2) = 0.6: cos a = 0.28, sin a = 0.96.
-        assert_near(placed(&cube.pose, [1.0, 0.0, 0.0]), [1.28, 2.0, 2.04]);
+        assert_near(placed(cube.pose, [1.0, 0.0, 0.0]), [1.28, 2.0, 2.04]);
         let sphere =
             ColliderState { center: [1.0; 3], radius: 0.25, ..with(ColliderShape::Sphere) };
         let entity = drawn(sphere);
         assert_eq!(entity.spheres[0].size, Some(vector([0.5; 3])));
-        assert_near(placed(&entity.spheres[0].pose, [0.0; 3]), [1.0; 3]);
+        assert_near(placed(entity.spheres[0].pose, [0.0; 3]), [1.0; 3]);
     }
 
     #[test]
@@ -269,10 +269,10 @@ mod tests {
             let entity = drawn(ColliderState { a, b, radius: 0.5, ..with(ColliderShape::Capsule) });
             let (cylinder, spheres) = (&entity.cylinders[0], &entity.spheres);
             let half = 0.5 * cylinder.size.unwrap().z;
-            assert_near(placed(&cylinder.pose, [0.0, 0.0, -half]), wide(a));
-            assert_near(placed(&cylinder.pose, [0.0, 0.0, half]), wide(b));
-            assert_near(placed(&spheres[0].pose, [0.0; 3]), wide(a));
-            assert_near(placed(&spheres[1].pose, [0.0; 3]), wide(b));
+            assert_near(placed(cylinder.pose, [0.0, 0.0, -half]), wide(a));
+            assert_near(placed(cylinder.pose, [0.0, 0.0, half]), wide(b));
+            assert_near(placed(spheres[0].pose, [0.0; 3]), wide(a));
+            assert_near(placed(spheres[1].pose, [0.0; 3]), wide(b));
             assert_eq!((cylinder.size.unwrap().x, spheres[0].size.unwrap().x), (1.0, 1.0));
         }
     }
