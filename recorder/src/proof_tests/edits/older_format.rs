@@ -1,11 +1,12 @@
-//! A recording of format 4 is proved as before, and a recording of today does not pass as an older one.
+//! A recording of format 4 is proved as before, and a recording of today does not pass as an older one,
+//! nor as one of a scene that is turned.
 
 use mcap::records::op;
 
 use super::bytes::{metadata_bytes, metadata_of};
 use super::{Record, file_of, records, topics, verified, written};
 use crate::proof_tests::edits::edit::MESSAGE_HEADER_SIZE_BYTES;
-use recorder::Topic;
+use recorder::{LogOptions, LogReader, LogWriter, RunDescription, Topic, Up};
 
 /// Changes the metadata of a record, if it has this name.
 fn change_entry((opcode, body): &mut Record, name: &str, key: &str, value: Option<&str>) {
@@ -52,6 +53,21 @@ fn a_recording_of_format_4_is_identical_except_for_the_form_of_its_messages() {
     let (finding, not_covered) = verified(&file_of(&records));
     assert_eq!(finding, None);
     assert!(not_covered.iter().any(|line| line.contains("because the format is older")));
+}
+
+#[test]
+fn a_recording_with_another_axis_up_than_its_scene_is_found() {
+    let file = written();
+    let mut log = LogReader::new(file.as_slice()).unwrap();
+    let run = RunDescription { up: Up::Z, ..log.run().clone() };
+    let options = LogOptions::default();
+    let mut turned = LogWriter::create(Vec::new(), options, &run, log.scene(), 0).unwrap();
+    while let Some(logged) = log.next_message().unwrap() {
+        turned.write(&logged.message, logged.log_time_ns).unwrap();
+    }
+    let (finding, _) = verified(&turned.finish(log.closing().unwrap()).unwrap());
+    let expected = "its 'up' is not that of the scene";
+    assert!(finding.as_ref().is_some_and(|text| text.contains(expected)), "{finding:?}");
 }
 
 #[test]
