@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use clap::{CommandFactory, Parser};
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
-use viewer_bridge::source::replay::Start;
+use viewer_bridge::source::replay::InitialPlayback;
 use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 
 /// Show a running simulation in a browser, and interact with it there.
@@ -98,8 +98,8 @@ impl Args {
     }
 
     /// Playback of the recording before the first request.
-    pub(crate) fn start(&self) -> Start {
-        if self.play { Start::Looping } else { Start::Paused }
+    pub(crate) fn start(&self) -> InitialPlayback {
+        if self.play { InitialPlayback::Looping } else { InitialPlayback::Paused }
     }
 
     /// Options of the Foxglove server, if one is requested.

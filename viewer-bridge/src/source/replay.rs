@@ -34,12 +34,12 @@ use player::Player;
 #[derive(Debug)]
 pub struct Replay {
     recording: Recording,
-    start: Start,
+    start: InitialPlayback,
 }
 
 /// The playback before the first request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Start {
+pub enum InitialPlayback {
     /// Paused at the first step.
     Paused,
     /// Playing, again and again, for viewers that cannot control the playback.
@@ -53,7 +53,7 @@ impl Replay {
     /// The file is not a recording, or has no state to show. The message names the remedy.
     pub fn open(
         path: &Path,
-        start: Start,
+        start: InitialPlayback,
         stop: &Stop,
         note: &mut dyn FnMut(&str),
     ) -> anyhow::Result<Self> {
@@ -98,7 +98,7 @@ impl Source for Replay {
                 .spawn_scoped(scope, || check(job, &sender, &is_cancelled))
                 .context("starting the thread that checks the recording")?;
             let mut player = Player::new(&mut self.recording, reports, sinks);
-            if self.start == Start::Looping {
+            if self.start == InitialPlayback::Looping {
                 player.start_looping();
             }
             let played = player.run(requests);
