@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use recorder::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message};
-//! use recorder::{RunDescription, StepRow};
+//! use recorder::{RunDescription, StepRow, Up};
 //! use sim_contract::ParticleState;
 //!
 //! let run = RunDescription {
@@ -14,6 +14,7 @@
 //!     epoch_ns: 0,
 //!     scene_name: "point".to_owned(),
 //!     origin: [0.0; 3],
+//!     up: Up::Y,
 //!     rate_hz: 240,
 //!     method: 0,
 //!     particle_count: 1,
@@ -52,3 +53,4 @@ mod log;
 
 pub use log::*;
 pub use sim_contract::{Existing, PartFile, PartFileError};
+pub use sim_solver::scene::Up;

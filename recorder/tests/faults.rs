@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use recorder::{
     Closing, Compression, LogEnd, LogOptions, LogReader, LogWriter, Message, RunDescription,
-    StepRow, WriteError,
+    StepRow, Up, WriteError,
 };
 use sim_contract::ParticleState;
 
@@ -103,6 +103,7 @@ fn run() -> RunDescription {
         epoch_ns: 0,
         scene_name: "three points".to_owned(),
         origin: [0.0; 3],
+        up: Up::Y,
         rate_hz: 240,
         method: 0,
         particle_count: 3,

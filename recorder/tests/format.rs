@@ -8,7 +8,7 @@ use std::io::{Cursor, Read};
 use recorder::{
     Closing, CollidersRow, EventRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
     LoggedMessage, Message, OutcomeRow, ParametersRow, ReadError, RunDescription, StatusRow,
-    StepRow, SurfaceRow, TearsRow, Topic, TopologyRow, WriteError,
+    StepRow, SurfaceRow, TearsRow, Topic, TopologyRow, Up, WriteError,
 };
 use sim_contract::{
     Action, ColliderState, Command, ConstraintState, LoadHeader, NodeStatus, Outcome,
@@ -21,6 +21,7 @@ fn run() -> RunDescription {
         epoch_ns: 1_700_000_000_000_000_001,
         scene_name: "two points".to_owned(),
         origin: [1.0, 2.0, 3.0],
+        up: Up::Y,
         rate_hz: 240,
         method: 0,
         particle_count: 2,
@@ -206,15 +207,15 @@ fn the_other_rows_have_the_documented_form() {
 fn recordings_of_older_formats_are_read_and_those_of_the_next_are_refused() {
     let with_version = |version: &str| {
         let mut file = write(LogOptions::default());
-        let needle = b"format_version\x01\0\0\x004";
+        let needle = b"format_version\x01\0\0\x005";
         let place = file.windows(needle.len()).position(|window| window == needle).unwrap();
         file[place + needle.len() - 1] = version.as_bytes()[0];
         LogReader::new(Cursor::new(file)).map(|_| ())
     };
-    assert!(["1", "2", "3"].iter().all(|version| with_version(version).is_ok()));
+    assert!(["1", "2", "3", "4"].iter().all(|version| with_version(version).is_ok()));
     assert_eq!(
-        with_version("5").unwrap_err().to_string(),
-        "has format version 5; this recorder reads versions 1 to 4"
+        with_version("6").unwrap_err().to_string(),
+        "has format version 6; this recorder reads versions 1 to 5"
     );
 }
 
@@ -227,6 +228,22 @@ fn log_times_never_decrease() {
     let file = log.finish(&Closing::default()).unwrap();
     let read = read_all(&mut LogReader::new(file.as_slice()).unwrap()).unwrap();
     assert_eq!(read.iter().map(|logged| logged.log_time_ns).collect::<Vec<_>>(), [60, 60, 70]);
+}
+
+#[test]
+fn snapshots_received_at_once_have_log_times_of_their_own() {
+    let mut log = LogWriter::create(Vec::new(), LogOptions::default(), &run(), SCENE, 50).unwrap();
+    for (step, log_time_ns) in [(0, 60), (1, 60), (2, 60), (3, 61), (4, 70)] {
+        log.write(&Message::Step(step_row(step)), log_time_ns).unwrap();
+        log.write(&Message::Particles { step, particles: particles(step) }, log_time_ns).unwrap();
+    }
+    let file = log.finish(&Closing::default()).unwrap();
+    let read = read_all(&mut LogReader::new(file.as_slice()).unwrap()).unwrap();
+    let all: Vec<_> = read.iter().map(|logged| logged.log_time_ns).collect();
+    assert!(all.is_sorted(), "{all:?}");
+    let is_snapshot = |one: &&LoggedMessage| one.message.topic() == Topic::Particles;
+    let snapshots = read.iter().filter(is_snapshot).map(|logged| logged.log_time_ns);
+    assert_eq!(snapshots.collect::<Vec<_>>(), [60, 61, 62, 63, 70]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use recorder::{
     Closing, IndexedLog, LogEnd, LogOptions, LogReader, LogWriter, LoggedMessage, Message,
-    ReadError, RunDescription, StepRow, TearsRow, Topic,
+    ReadError, RunDescription, StepRow, TearsRow, Topic, Up,
 };
 use sim_contract::ParticleState;
 
@@ -21,6 +21,7 @@ fn written() -> Vec<u8> {
         epoch_ns: 1_700_000_000_000_000_001,
         scene_name: "points".to_owned(),
         origin: [0.0; 3],
+        up: Up::Y,
         rate_hz: 240,
         method: 0,
         particle_count: 4,

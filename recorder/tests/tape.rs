@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use recorder::{
     Closing, CollidersRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message,
-    OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow, TopologyRow,
+    OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow, TopologyRow, Up,
     state_hash,
 };
 use sim_contract::{
@@ -125,6 +125,7 @@ fn written(style: Style) -> (Vec<u8>, Vec<Expected>) {
         epoch_ns: 1_700_000_000_000_000_001,
         scene_name: "cloth".to_owned(),
         origin: [0.0; 3],
+        up: Up::Y,
         rate_hz: 60,
         method: 0,
         particle_count: 36,

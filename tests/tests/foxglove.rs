@@ -132,12 +132,34 @@ fn a_client_can_seek_in_a_recording() {
 }
 
 #[test]
+fn a_recording_plays_again_and_again_for_viewers_that_cannot_control_it() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let args = ["simulate", "curtain", "--steps", "60", "-o", &file];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let args = ["--listen", "127.0.0.1:0", "--foxglove", "127.0.0.1:0", "--replay", &file];
+    let args = [&args[..], &["--play"]].concat();
+    let mut bridge = Process::start(Program::ViewerBridge, &sandbox, &args);
+    let url = bridge.wait_for_line("foxglove ws://").replace("foxglove ", "");
+    let (mut client, _) = Client::start(&url);
+    client.subscribe(1, "/steps");
+    let mut next_step = || client.json(1)["step"].as_u64().unwrap();
+    let (mut newest, mut round_count) = (next_step(), 0);
+    while round_count < 3 {
+        let step = next_step();
+        round_count += u32::from(step < newest);
+        newest = step;
+    }
+}
+
+#[test]
 fn invalid_options_are_refused_with_the_reason() {
     let sandbox = Sandbox::new();
     for (options, reason) in [
         (&["--foxglove", "0.0.0.0:8765"][..], "ssh -L"),
         (&["--foxglove", "here"], "127.0.0.1:8765"),
         (&["--allow-commands"], "--foxglove"),
+        (&["--play"], "--replay"),
         (&["--foxglove-origin", "https://viewer.example"], "--foxglove"),
     ] {
         let ended = Process::run(Program::ViewerBridge, &sandbox, options);
@@ -173,8 +195,11 @@ fn the_official_client_decodes_the_published_state() {
     );
     assert_eq!(numbers(&report["parameters"]["gravity"]), [0.0, -9.81, 0.0]);
     assert_eq!(report["capabilities"], json!(["parameters", "parametersSubscribe"]));
-    let topics = ["/outcomes", "/particles", "/scene", "/status", "/steps", "/tears", "/tf"]
-        .map(Value::from);
+    let rotation = &transform["rotation"];
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    assert_eq!((&rotation["x"], &rotation["w"]), (&json!(half), &json!(half)), "y becomes z");
+    let topics = "/colliders /outcomes /particles /scene /status /steps /tears /tf".split(' ');
+    let topics: Vec<_> = topics.map(Value::from).collect();
     assert_eq!(report["topics"], json!(topics));
 }
 

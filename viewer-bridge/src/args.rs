@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use clap::{CommandFactory, Parser};
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
+use viewer_bridge::source::replay::InitialPlayback;
 use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 
 /// Show a running simulation in a browser, and interact with it there.
@@ -29,7 +30,8 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
         viewer-bridge --replay run.mcap             show a recording; needs no node\n  \
         viewer-bridge --listen 0.0.0.0:8080         serve other machines; the address has a token\n  \
         viewer-bridge --foxglove                    also serve Foxglove viewers at ws://127.0.0.1:8765\n  \
-        viewer-bridge --foxglove --allow-commands   let them pause, step, reset and set as well"
+        viewer-bridge --foxglove --allow-commands   let them pause, step, reset and set as well\n  \
+        viewer-bridge --foxglove --replay run.mcap --play   show them a recording, again and again"
 )]
 pub(crate) struct Args {
     /// Address and port to listen on; port 0 is any free port. Beyond loopback, pages need the token
@@ -49,6 +51,10 @@ pub(crate) struct Args {
     /// incomplete file is shown as far as it goes
     #[arg(long, value_name = "FILE.mcap", conflicts_with_all = ["name", "domain"])]
     pub(crate) replay: Option<PathBuf>,
+    /// Play the recording at once, again and again, for viewers that cannot control the playback. Pages
+    /// can pause it and turn the repetition off [default: paused at its first step]
+    #[arg(long, requires = "replay")]
+    play: bool,
     /// Also serve viewers that speak the Foxglove protocol (foxglove.sdk.v1) at this address; port 0
     /// is any free port. Loopback only: the protocol cannot authenticate clients
     #[arg(
@@ -89,6 +95,11 @@ pub(crate) fn parse(
 impl Args {
     pub(crate) fn endpoint(&self) -> Result<Endpoint, EndpointError> {
         Endpoint::from_options(self.domain.as_deref(), Some(&self.name))
+    }
+
+    /// Playback of the recording before the first request.
+    pub(crate) fn start(&self) -> InitialPlayback {
+        if self.play { InitialPlayback::Looping } else { InitialPlayback::Paused }
     }
 
     /// Options of the Foxglove server, if one is requested.

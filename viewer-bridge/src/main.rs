@@ -72,7 +72,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
 
 fn open_source(args: &Args, stop: &Stop) -> anyhow::Result<Box<dyn Source>> {
     Ok(match &args.replay {
-        Some(path) => Box::new(Replay::open(path, stop, &mut note)?),
+        Some(path) => Box::new(Replay::open(path, args.start(), stop, &mut note)?),
         None => Box::new(Live::new(args.endpoint()?)),
     })
 }

@@ -97,6 +97,7 @@ pub(crate) fn inspect<R: Read>(
             info.snapshot_count += 1;
         }
     }
+    info.messages.insert(Topic::Tf.name(), log.transform_count());
     let end = log.end().cloned().unwrap_or(LogEnd::Complete);
     info.file_end = end.to_string();
     if let (Some(first), Some(last)) = (info.first_step, info.last_step) {
@@ -108,7 +109,6 @@ pub(crate) fn inspect<R: Read>(
 
 impl Info {
     fn new(run: &RunDescription, file: String, size_bytes: u64) -> Self {
-        let decoded = Topic::ALL.into_iter().filter(|topic| *topic != Topic::Tf);
         Self {
             file,
             size_bytes,
@@ -126,7 +126,7 @@ impl Info {
             last_step: None,
             snapshot_count: 0,
             duration_s: 0.0,
-            messages: decoded.map(|topic| (topic.name(), 0)).collect(),
+            messages: Topic::ALL.map(|topic| (topic.name(), 0)).into(),
             lost: BTreeMap::new(),
             lost_unknown: Vec::new(),
             stop_reason: None,
@@ -200,7 +200,7 @@ fn counted(count: u32, noun: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use recorder::{LogOptions, LogWriter, Message, StepRow};
+    use recorder::{LogOptions, LogWriter, Message, StepRow, Up};
 
     use super::*;
 
@@ -211,6 +211,7 @@ mod tests {
             epoch_ns: 0,
             scene_name: "points".to_owned(),
             origin: [0.0; 3],
+            up: Up::Y,
             rate_hz: 240,
             method: 0,
             particle_count: 0,
@@ -237,6 +238,13 @@ mod tests {
         let text = info.to_string();
         let lost = text.lines().find(|line| line.starts_with("lost")).unwrap().to_owned();
         (info, lost)
+    }
+
+    #[test]
+    fn every_message_of_the_file_is_counted() {
+        let (info, _) = report([Some(0), Some(1)], None);
+        assert_eq!((info.messages["/tf"], info.messages["/steps"]), (1, 2));
+        assert_eq!(info.messages.values().sum::<u64>(), 3);
     }
 
     #[test]

@@ -52,7 +52,7 @@ mod tests {
     use std::path::Path;
 
     use clap::Parser;
-    use recorder::{LogOptions, LogWriter, RunDescription};
+    use recorder::{LogOptions, LogWriter, RunDescription, Up};
 
     use super::*;
 
@@ -71,6 +71,7 @@ mod tests {
             epoch_ns: 0,
             scene_name: "point".to_owned(),
             origin: [0.0; 3],
+            up: Up::Y,
             rate_hz: 240,
             method: 0,
             particle_count: 0,

@@ -75,7 +75,7 @@ pub(crate) fn timed_command(row: &OutcomeRow) -> TimedCommand {
 mod tests {
     use std::fs;
 
-    use recorder::{Closing, LogOptions, LogWriter, RunDescription, StepRow};
+    use recorder::{Closing, LogOptions, LogWriter, RunDescription, StepRow, Up};
 
     use super::*;
 
@@ -86,6 +86,7 @@ mod tests {
             epoch_ns: 0,
             scene_name: "point".to_owned(),
             origin: [0.0; 3],
+            up: Up::Y,
             rate_hz: 240,
             method: 0,
             particle_count: 0,

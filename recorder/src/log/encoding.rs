@@ -1,9 +1,11 @@
 //! The encoding and the schema of each topic, for files and for servers that send the same messages.
 
+pub(in crate::log) mod channel;
 mod descriptor;
+mod json_schema;
 mod protobuf;
 
-use schemars::{JsonSchema, schema_for};
+use schemars::JsonSchema;
 use serde::Serialize;
 use sim_contract::ParticleState;
 
@@ -13,21 +15,19 @@ use super::rows::{
     TopologyRow,
 };
 use super::topic::Topic;
-use descriptor::{FRAME_TRANSFORM, POINT_CLOUD, file_descriptor_set};
-use protobuf::PointCloudEncoder;
+use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, file_descriptor_set};
+use json_schema::row_schema;
+use protobuf::{PointCloudEncoder, encode_keyframe};
 pub use protobuf::{WORLD_FRAME, encode_transform};
-pub(super) use protobuf::{decode_particles, particle_bytes};
-
-/// Encoding of `/keyframe`: bytes that only the solver reads.
-const KEYFRAME_ENCODING: &str = "application/octet-stream";
+pub(super) use protobuf::{decode_keyframe, decode_particles, particle_bytes};
 
 /// The encoding of a topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TopicFormat {
-    /// "json", "protobuf", or a media type.
+    /// "json" or "protobuf".
     pub encoding: &'static str,
-    /// `None` if only the solver reads the messages.
-    pub schema: Option<TopicSchema>,
+    /// The schema of the messages.
+    pub schema: TopicSchema,
 }
 
 /// The schema of a topic.
@@ -54,7 +54,7 @@ impl TopicFormat {
             Topic::Status => json_format::<StatusRow>("catenary.Status"),
             Topic::Events => json_format::<EventRow>("catenary.Event"),
             Topic::Steps => json_format::<StepRow>("catenary.Step"),
-            Topic::Keyframe => Self { encoding: KEYFRAME_ENCODING, schema: None },
+            Topic::Keyframe => protobuf_format(KEYFRAME),
             Topic::Tf => protobuf_format(FRAME_TRANSFORM),
             Topic::Particles => protobuf_format(POINT_CLOUD),
         }
@@ -62,19 +62,13 @@ impl TopicFormat {
 }
 
 fn json_format<T: JsonSchema>(name: &'static str) -> TopicFormat {
-    let data = schema_for!(T).to_value().to_string().into_bytes();
-    TopicFormat {
-        encoding: "json",
-        schema: Some(TopicSchema { name, encoding: "jsonschema", data }),
-    }
+    let data = row_schema::<T>().to_string().into_bytes();
+    TopicFormat { encoding: "json", schema: TopicSchema { name, encoding: "jsonschema", data } }
 }
 
 fn protobuf_format(name: &'static str) -> TopicFormat {
     let data = file_descriptor_set(name);
-    TopicFormat {
-        encoding: "protobuf",
-        schema: Some(TopicSchema { name, encoding: "protobuf", data }),
-    }
+    TopicFormat { encoding: "protobuf", schema: TopicSchema { name, encoding: "protobuf", data } }
 }
 
 /// Encodes messages one by one and reuses its memory.
@@ -113,7 +107,7 @@ impl MessageEncoder {
             Message::Status(row) => json(row, scratch)?,
             Message::Event(row) => json(row, scratch)?,
             Message::Step(row) => json(row, scratch)?,
-            Message::Keyframe { bytes, .. } => return Ok(bytes),
+            Message::Keyframe { step, bytes } => encode_keyframe(*step, bytes, scratch),
             Message::Particles { particles, .. } => {
                 return Ok(self.encode_particles(particles, time_ns));
             }

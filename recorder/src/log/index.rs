@@ -18,6 +18,7 @@ use mcap::records::{Record, op};
 
 use sim_contract::Stop;
 
+use super::encoding::channel::TopicChannel;
 use super::read::decode::{LoggedMessage, decode_message};
 use super::read::file_source::check_stop;
 use super::read::limits::SizeLimits;
@@ -39,7 +40,7 @@ pub struct IndexedLog {
     limits: SizeLimits,
     /// `None` if the program does not handle signals.
     stop: Option<Stop>,
-    channels: BTreeMap<u16, Option<Topic>>,
+    channels: BTreeMap<u16, Option<TopicChannel>>,
     chunks: Vec<ChunkEntry>,
     end: LogEnd,
     has_index: bool,
@@ -142,7 +143,8 @@ impl IndexedLog {
             let known: Option<Vec<_>> = ids.map(|id| self.channels.get(&id)).collect();
             if let Some(known) = known {
                 chunk.topics = TopicSet::default();
-                known.into_iter().flatten().for_each(|topic| chunk.topics.add(*topic));
+                let known = known.into_iter().flatten();
+                known.for_each(|channel| chunk.topics.add(channel.topic));
             }
         }
         Ok(())
@@ -227,16 +229,17 @@ impl IndexedLog {
         let mut messages = Vec::new();
         while let Some(message) = records.next(|record, _| match record {
             Record::Channel(channel) => {
-                channels.insert(channel.id, Topic::from_name(&channel.topic));
+                let known = TopicChannel::new(&channel.topic, &channel.message_encoding);
+                channels.insert(channel.id, known);
                 Ok(None)
             }
             Record::Message { header, data } => {
-                let topic = channels.get(&header.channel_id).copied().flatten();
-                let Some(topic) = topic else { return Ok(None) };
-                let (byte, sequence) = (offset + size_bytes, header.sequence);
-                let malformed =
-                    |what| ReadError::Malformed { topic: topic.name(), sequence, byte, what };
-                decode_message(topic, &header, &data, run, limits).map_err(malformed)
+                let channel = channels.get(&header.channel_id).copied().flatten();
+                let Some(channel) = channel else { return Ok(None) };
+                let (topic, byte) = (channel.topic.name(), offset + size_bytes);
+                let sequence = header.sequence;
+                let malformed = |what| ReadError::Malformed { topic, sequence, byte, what };
+                decode_message(channel, &header, &data, run, limits).map_err(malformed)
             }
             _ => Ok(None),
         })? {

@@ -7,6 +7,7 @@ use std::fmt::Display;
 use std::str::FromStr;
 
 use sim_contract::{ELEMENTS_MAX, LoadHeader};
+use sim_solver::scene::Up;
 
 use super::rows::TopologyRow;
 use super::topic::{AllCounts, Topic};
@@ -15,8 +16,10 @@ use super::topic::{AllCounts, Topic};
 ///
 /// Version 2 added `/colliders`, the causes of tears, and the previously torn constraints in
 /// `/topology`. Version 3 added `/parameters`. Version 4 added the index of each snapshot in `/steps`,
-/// `force` and `disconnected` in `/outcomes`, and the number of unreadable messages at the end.
-pub const FORMAT_VERSION: u32 = 4;
+/// `force` and `disconnected` in `/outcomes`, and the number of unreadable messages at the end. Version 5
+/// made `/keyframe` a protobuf message, turned `/tf` by the scene's `up`, counts `/tf`, gives each
+/// snapshot a time of reception of its own, and has schemas that Foxglove viewers accept.
+pub const FORMAT_VERSION: u32 = 5;
 /// Oldest version that this recorder reads. Missing fields have defaults.
 pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 
@@ -49,6 +52,8 @@ pub struct RunDescription {
     pub scene_name: String,
     /// Origin that positions are relative to, in m.
     pub origin: [f64; 3],
+    /// Axis of the scene that points up. y in recordings of format 4 and earlier, which do not say.
+    pub up: Up,
     /// Steps per second, 1..=100000.
     pub rate_hz: u32,
     /// 0: xpbd, 1: pbd.
@@ -110,6 +115,7 @@ impl RunDescription {
                 ("epoch_ns", self.epoch_ns.to_string()),
                 ("scene", self.scene_name.clone()),
                 ("origin", format!("{x} {y} {z}")),
+                ("up", self.up.name().to_owned()),
                 ("rate_hz", self.rate_hz.to_string()),
                 ("method", self.method_name().to_owned()),
                 ("particle_count", self.particle_count.to_string()),
@@ -139,6 +145,7 @@ impl RunDescription {
             epoch_ns: parsed(map, "epoch_ns")?,
             scene_name: text(map, "scene")?.to_owned(),
             origin: origin(text(map, "origin")?).ok_or_else(|| "origin".to_owned())?,
+            up: up(map).ok_or_else(|| "up".to_owned())?,
             rate_hz,
             method: u32::from(text(map, "method")? != "xpbd"),
             particle_count: element_count(map, "particle_count")?,
@@ -235,6 +242,11 @@ fn element_count(map: &BTreeMap<String, String>, key: &str) -> Result<u32, Strin
     if count > ELEMENTS_MAX { Err(key.to_owned()) } else { Ok(count) }
 }
 
+/// Returns the axis that points up. Older formats do not have it.
+fn up(map: &BTreeMap<String, String>) -> Option<Up> {
+    map.get("up").map_or(Some(Up::default()), |name| Up::from_name(name))
+}
+
 fn origin(text: &str) -> Option<[f64; 3]> {
     let numbers: Vec<f64> = text.split(' ').map(str::parse).collect::<Result<_, _>>().ok()?;
     let origin: [f64; 3] = numbers.try_into().ok()?;
@@ -251,6 +263,7 @@ mod tests {
             epoch_ns: 1_700_000_000_123_456_789,
             scene_name: "curtain".to_owned(),
             origin: [0.1, -2.5e9, 1.0e-300],
+            up: Up::MinusY,
             rate_hz: 240,
             method: 1,
             particle_count: 3,

@@ -6,7 +6,7 @@ use std::ops::{Index, IndexMut};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Topic {
-    /// foxglove.FrameTransform: the position of the scene's origin. One message per file.
+    /// foxglove.FrameTransform: the scene's origin and its turn to z up. One message per file.
     Tf,
     /// [`crate::TopologyRow`]: the constraints. One message per file.
     Topology,
@@ -18,7 +18,7 @@ pub enum Topic {
     Tears,
     /// [`crate::ParametersRow`]: all parameters at the start and after each change.
     Parameters,
-    /// The part of the solver's state that the particles lack, in the solver's encoding.
+    /// catenary.Keyframe: the part of the solver's state that the particles lack, in its encoding.
     Keyframe,
     /// [`crate::OutcomeRow`]: every answered command, in order of application.
     Outcomes,
@@ -135,11 +135,12 @@ impl AllCounts {
         }
     }
 
-    /// Copies `written` from other counts.
+    /// Copies `written` from other counts. A writer makes `/tf` itself, so that counts as received.
     pub fn set_written(&mut self, written: &Self) {
         for (counts, other) in self.0.iter_mut().zip(&written.0) {
             counts.written = other.written;
         }
+        self[Topic::Tf].received = written[Topic::Tf].written;
     }
 
     /// Copies `left_out` from other counts.

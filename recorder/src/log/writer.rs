@@ -124,6 +124,8 @@ pub struct LogWriter<W: Write> {
     encoder: MessageEncoder,
     /// Newest time of reception. Log times never decrease.
     log_time_ns: u64,
+    /// The log time of the newest snapshot.
+    snapshot_log_time_ns: Option<u64>,
     /// Only `written` is set.
     counts: AllCounts,
 }
@@ -146,15 +148,20 @@ impl<W: Write> LogWriter<W> {
         let mut file = write_options(options).create(NoSeek::new(out))?;
         let selected = write_selection(&mut file, &options.selection);
         match selected.and_then(|()| write_header(&mut file, run, scene, log_time_ns)) {
-            Ok(channels) => Ok(Self {
-                file: Some(file),
-                size_bytes,
-                run: run.clone(),
-                channels,
-                encoder: MessageEncoder::default(),
-                log_time_ns,
-                counts: AllCounts::default(),
-            }),
+            Ok(channels) => {
+                let mut counts = AllCounts::default();
+                counts[Topic::Tf].written = 1;
+                Ok(Self {
+                    file: Some(file),
+                    size_bytes,
+                    run: run.clone(),
+                    channels,
+                    encoder: MessageEncoder::default(),
+                    log_time_ns,
+                    snapshot_log_time_ns: None,
+                    counts,
+                })
+            }
             Err(error) => {
                 drop(file.into_inner());
                 Err(error)
@@ -163,12 +170,18 @@ impl<W: Write> LogWriter<W> {
     }
 
     /// Appends a message. `log_time_ns` is the wall clock of its reception. A time earlier than
-    /// that of the previous message is replaced by it.
+    /// that of the previous message is replaced by it. Snapshots received at once get times of 1 ns
+    /// apart, because viewers show one snapshot at a time.
     ///
     /// # Errors
     /// If this or an earlier call failed.
     pub fn write(&mut self, message: &Message, log_time_ns: u64) -> Result<(), WriteError> {
         self.log_time_ns = self.log_time_ns.max(log_time_ns);
+        if message.topic() == Topic::Particles {
+            let after = self.snapshot_log_time_ns.map_or(0, |time_ns| time_ns.saturating_add(1));
+            self.log_time_ns = self.log_time_ns.max(after);
+            self.snapshot_log_time_ns = Some(self.log_time_ns);
+        }
         let publish_time_ns = self.run.time_of_step_ns(message.step());
         let data = self.encoder.encode(message, publish_time_ns)?;
         let header = MessageHeader {
@@ -340,7 +353,7 @@ fn write_header<W: Write>(
     let publish_time = run.time_of_step_ns(0);
     let channel_id = channels[Topic::Tf.index()];
     let header = MessageHeader { channel_id, sequence: 0, log_time: log_time_ns, publish_time };
-    file.write_to_known_channel(&header, &encode_transform(publish_time, run.origin))?;
+    file.write_to_known_channel(&header, &encode_transform(publish_time, run.origin, run.up))?;
     Ok(channels)
 }
 
@@ -372,10 +385,7 @@ fn add_channel<W: Write>(
     topic: Topic,
 ) -> mcap::McapResult<u16> {
     let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
-    let schema_id = match &schema {
-        Some(schema) => file.add_schema(schema.name, schema.encoding, &schema.data)?,
-        None => 0,
-    };
+    let schema_id = file.add_schema(schema.name, schema.encoding, &schema.data)?;
     file.add_channel(schema_id, topic.name(), encoding, &BTreeMap::new())
 }
 

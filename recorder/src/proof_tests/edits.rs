@@ -9,6 +9,7 @@ mod edit;
 mod insertions;
 mod json;
 mod not_compared;
+mod older_format;
 
 use std::sync::atomic::AtomicBool;
 

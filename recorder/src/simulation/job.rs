@@ -43,6 +43,7 @@ impl Job {
             epoch_ns: 0,
             scene_name: self.scene.name.clone(),
             origin: self.scene.origin,
+            up: self.scene.up,
             rate_hz: self.scene.solver.rate_hz,
             method: self.scene.solver.method as u32,
             particle_count: count(solver.particle_count()),

@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 
 use recorder::{
     Closing, Compression, ContentSelection, LogOptions, LogWriter, Message, OutcomeRow,
-    ParametersRow, RunDescription, StepRow, SurfaceRow, TearsRow, Topic, TopologyRow,
+    ParametersRow, RunDescription, StepRow, SurfaceRow, TearsRow, Topic, TopologyRow, Up,
 };
 use sim_contract::{Action, Command, ConstraintState, LoadHeader, Outcome, TornConstraint};
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
@@ -119,6 +119,7 @@ fn run(solver: &Solver, rate_hz: u32) -> RunDescription {
         epoch_ns: 1_700_000_000_000_000_000,
         scene_name: "rope".to_owned(),
         origin: [0.0; 3],
+        up: Up::Y,
         rate_hz,
         method: 0,
         particle_count: u32::try_from(solver.particle_count()).unwrap(),

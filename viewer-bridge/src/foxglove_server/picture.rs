@@ -1,17 +1,19 @@
-//! `/scene`: the drawing of sticks and surface.
+//! `/scene`: the drawing of sticks, surface and colliders.
+
+mod solids;
 
 use std::collections::BTreeSet;
 
 use foxglove::messages::line_primitive::Type;
 use foxglove::messages::{
-    Color, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate, Timestamp,
-    TriangleListPrimitive, Vector3,
+    Color, LinePrimitive, Point3, SceneEntity, SceneUpdate, Timestamp, TriangleListPrimitive,
 };
 use recorder::WORLD_FRAME;
 use sim_contract::clock::SECOND_NS;
-use sim_contract::{ConstraintKind, ParticleState, TornConstraint};
+use sim_contract::{ColliderState, ConstraintKind, ParticleState, TornConstraint};
 
 use crate::wire::Scene;
+use solids::{IDENTITY, PlaneExtent};
 
 /// Width of a stick in pixels, at any distance.
 const STICK_WIDTH_PX: f64 = 1.5;
@@ -19,12 +21,8 @@ const STICK_WIDTH_PX: f64 = 1.5;
 const STRUCTURAL_KIND: u8 = ConstraintKind::Structural as u8;
 const STICK_COLOR: Color = Color { r: 0.45, g: 0.6, b: 0.75, a: 1.0 };
 const SURFACE_COLOR: Color = Color { r: 0.72, g: 0.2, b: 0.18, a: 0.85 };
-const IDENTITY: Pose = Pose {
-    position: Some(Vector3 { x: 0.0, y: 0.0, z: 0.0 }),
-    orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
-};
 
-/// The drawing of a load: its constraints and triangles, without the torn ones.
+/// The drawing of a load: its constraints and triangles, without the torn ones, and its colliders.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
     sticks: Vec<[u32; 2]>,
@@ -34,6 +32,8 @@ pub(super) struct Picture {
     is_torn: Vec<bool>,
     /// A triangle is gone once any structural constraint along one of its edges is torn.
     is_gone: Vec<bool>,
+    colliders: Vec<ColliderState>,
+    plane_extent: PlaneExtent,
 }
 
 impl Picture {
@@ -45,7 +45,14 @@ impl Picture {
             is_gone: vec![false; scene.triangles.len()],
             sticks: scene.ends.clone(),
             triangles: scene.triangles.clone(),
+            colliders: Vec::new(),
+            plane_extent: PlaneExtent::around(scene.bounds()),
         }
+    }
+
+    /// Replaces the colliders.
+    pub(super) fn set_colliders(&mut self, colliders: &[ColliderState]) {
+        self.colliders = colliders.to_vec();
     }
 
     /// Replaces the list of torn constraints.
@@ -66,7 +73,7 @@ impl Picture {
         }
     }
 
-    /// Draws a state. The two entities have the same ids each time, so each replaces its predecessor.
+    /// Draws a state. The entities have the same ids each time, so each replaces its predecessor.
     pub(super) fn draw(&self, time_ns: u64, particles: &[ParticleState]) -> SceneUpdate {
         let has_place = |particle: &u32| {
             let particle = particles.get(*particle as usize);
@@ -92,11 +99,14 @@ impl Picture {
             indices: sticks,
             ..LinePrimitive::default()
         };
+        let mut colliders = entity("colliders", time_ns);
+        solids::draw(&self.colliders, self.plane_extent, &mut colliders);
         SceneUpdate {
             deletions: Vec::new(),
             entities: vec![
                 SceneEntity { lines: vec![sticks], ..entity("sticks", time_ns) },
                 SceneEntity { triangles: vec![surface], ..entity("surface", time_ns) },
+                colliders,
             ],
         }
     }

@@ -11,19 +11,26 @@ use foxglove::{
     Channel, Context, Encode, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId,
 };
 use recorder::{
-    Message, MessageEncoder, OutcomeRow, RunDescription, StatusRow, StepRow, TearsRow, Topic,
-    TopicFormat, encode_transform,
+    CollidersRow, Message, MessageEncoder, OutcomeRow, RunDescription, StatusRow, StepRow,
+    TearsRow, Topic, TopicFormat, Up, encode_transform,
 };
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
 use super::picture::Picture;
 use crate::sink::{State, Torn};
 use crate::source::recording_times::RecordingTimes;
-use crate::wire::Scene;
+use crate::wire::{Colliders, Scene};
 
 /// Topics with the messages of a recording.
-const TOPICS: [Topic; 6] =
-    [Topic::Tf, Topic::Tears, Topic::Outcomes, Topic::Status, Topic::Steps, Topic::Particles];
+const TOPICS: [Topic; 7] = [
+    Topic::Tf,
+    Topic::Colliders,
+    Topic::Tears,
+    Topic::Outcomes,
+    Topic::Status,
+    Topic::Steps,
+    Topic::Particles,
+];
 const SCENE_TOPIC: &str = "/scene";
 /// Time between two messages on `/scene`. Each is twice as large as the particles and encoded anew.
 const SCENE_PERIOD_NS: u64 = SECOND_NS / 10;
@@ -62,6 +69,7 @@ struct PublisherState {
     /// Number of messages that were encoded on `/particles` and `/scene`.
     encoded_count: u64,
     /// Earlier messages for late subscribers.
+    colliders: Option<CollidersRow>,
     torn: Option<TearsRow>,
     status: Option<StatusRow>,
     step: Option<StepRow>,
@@ -77,6 +85,7 @@ struct StateId {
 struct PublishedLoad {
     run_id: String,
     origin: [f64; 3],
+    up: Up,
     rate_hz: u32,
     /// Time of step 0 in ns since 1970, if the node had never paused.
     epoch_ns: u64,
@@ -203,7 +212,8 @@ impl Publisher {
 
     fn send_transform(&self, load: &PublishedLoad, step: u64, sink: Option<SinkId>) {
         let time_ns = load.time_ns(step);
-        self.send_bytes(Topic::Tf, &encode_transform(time_ns, load.origin), time_ns, sink);
+        let bytes = encode_transform(time_ns, load.origin, load.up);
+        self.send_bytes(Topic::Tf, &bytes, time_ns, sink);
     }
 
     /// Begins a new load.
@@ -214,6 +224,7 @@ impl Publisher {
         let load = PublishedLoad {
             run_id: run_id.clone(),
             origin: scene.origin,
+            up: Up::from_name(&scene.text.up).unwrap_or_default(),
             rate_hz: scene.rate_hz,
             epoch_ns: match (self.recording, before) {
                 (Some(times), _) => times.epoch_ns,
@@ -230,9 +241,24 @@ impl Publisher {
             self.settle(Topic::Tf);
         }
         state.load = Some(load);
+        state.colliders = None;
         state.torn = None;
         state.step = None;
         self.is_scene_due.store(true, Ordering::Relaxed);
+    }
+
+    /// Publishes the poses of the colliders. The next picture has them.
+    pub(super) fn publish_colliders(&self, colliders: &Colliders) {
+        let mut state = self.state();
+        let Some(load) = &mut state.load else { return };
+        load.picture.set_colliders(&colliders.colliders);
+        // A shape of a later contract has no row.
+        let row = CollidersRow::new(colliders.stamp.step, &colliders.colliders);
+        if let Some(row) = row.clone().filter(|_| self.has_subscribers(Topic::Colliders)) {
+            self.send(&mut state, &Message::Colliders(row), None);
+            self.settle(Topic::Colliders);
+        }
+        state.colliders = row;
     }
 
     /// Publishes a change of the list of torn constraints.
@@ -321,6 +347,7 @@ impl Publisher {
                     }
                     continue;
                 }
+                Topic::Colliders => state.colliders.clone().map(Message::Colliders),
                 Topic::Tears => state.torn.clone().map(Message::Tears),
                 Topic::Status => state.status.clone().map(Message::Status),
                 Topic::Steps => state.step.map(Message::Step),
@@ -340,7 +367,7 @@ fn schema(topic: Topic) -> Option<Schema> {
         Topic::Particles => PointCloud::get_schema(),
         _ => {
             let schema = TopicFormat::for_topic(topic).schema;
-            schema.map(|schema| Schema::new(schema.name, schema.encoding, schema.data))
+            Some(Schema::new(schema.name, schema.encoding, schema.data))
         }
     }
 }

@@ -14,7 +14,9 @@ const NAMES: [&str; 4] = ["pause", "resume", "step", "reset"];
 
 const STEP_SCHEMA: &str = r#"{"type":"object","additionalProperties":false,"properties":{"count":{"type":"integer","minimum":1,"maximum":10000,"default":1}}}"#;
 const EMPTY_SCHEMA: &str = r#"{"type":"object","additionalProperties":false,"properties":{}}"#;
-const OUTCOME_SCHEMA: &str = r#"{"type":"object","properties":{"kind":{"type":"string"},"status":{"type":"string"},"step":{"type":["integer","null"]},"applied":{"type":"integer"},"rejected":{"type":"integer"},"reason":{"type":"string"},"text":{"type":"string"}}}"#;
+/// The schema of the outcome of an applied command, which always has an id and a step. A failure is a
+/// message of the protocol. Viewers accept one type for each property.
+const OUTCOME_SCHEMA: &str = r#"{"type":"object","properties":{"kind":{"type":"string"},"id":{"type":"integer"},"status":{"type":"string"},"step":{"type":"integer"},"applied":{"type":"integer"},"rejected":{"type":"integer"},"reason":{"type":"string"},"text":{"type":"string"}}}"#;
 
 /// Creates all services.
 pub(super) fn services(bridge: &Arc<RequestBridge>) -> Vec<Service> {

@@ -47,6 +47,7 @@ impl Sink for FoxgloveSink {
                 self.bridge.set_epoch(scene.stamp.epoch);
                 self.publisher.begin_load(scene);
             }
+            Update::Colliders(colliders) => self.publisher.publish_colliders(colliders),
             Update::Torn(torn) => self.publisher.publish_torn(&torn),
             Update::State(state) => self.publisher.publish_state(&state),
             Update::Status(row) => self.publisher.publish_status(row),
@@ -66,7 +67,6 @@ impl Sink for FoxgloveSink {
             // The protocol has no messages for these, or they are for pages.
             Update::LoadRefused { .. }
             | Update::Pins(_)
-            | Update::Colliders(_)
             | Update::SameState
             | Update::Statistics(_)
             | Update::Node(_)

@@ -3,22 +3,31 @@
 
 use std::sync::{Arc, Mutex};
 
-use foxglove::{ChannelId, Context, FoxgloveError, Metadata, RawChannel, Sink, SinkId};
+use foxglove::messages::{FrameTransform, SceneEntity, SceneUpdate, Vector3};
+use foxglove::{ChannelId, Context, Decode, FoxgloveError, Metadata, RawChannel, Sink, SinkId};
 use recorder::StepRow;
+use serde_json::{Value, json};
 use sim_contract::clock::SECOND_NS;
-use sim_contract::{ParticleState, TornConstraint};
+use sim_contract::{ColliderShape, ColliderState, ParticleState, TornConstraint};
 
 use super::publisher::Publisher;
 use crate::sink::{State, Torn};
 use crate::source::recording_times::RecordingTimes;
-use crate::wire::{Scene, Stamp};
+use crate::wire::{Colliders, Scene, SceneText, Stamp};
+
+/// A message.
+#[derive(Debug, Clone, PartialEq)]
+struct Received {
+    topic: String,
+    log_time_ns: u64,
+    bytes: Vec<u8>,
+}
 
 /// A subscriber that keeps its messages.
 struct Listener {
     id: SinkId,
     channels: Mutex<Vec<(String, ChannelId)>>,
-    /// Topic, time and size of each message.
-    messages: Mutex<Vec<(String, u64, usize)>>,
+    messages: Mutex<Vec<Received>>,
 }
 
 impl Sink for Listener {
@@ -32,8 +41,9 @@ impl Sink for Listener {
         bytes: &[u8],
         metadata: &Metadata,
     ) -> Result<(), FoxgloveError> {
-        let message = (channel.topic().to_owned(), metadata.log_time, bytes.len());
-        self.messages.lock().unwrap().push(message);
+        let (topic, log_time_ns) = (channel.topic().to_owned(), metadata.log_time);
+        let received = Received { topic, log_time_ns, bytes: bytes.to_vec() };
+        self.messages.lock().unwrap().push(received);
         Ok(())
     }
 
@@ -103,7 +113,19 @@ impl Bench {
 
 impl Listener {
     fn topics(&self) -> Vec<String> {
-        self.messages.lock().unwrap().drain(..).map(|(topic, ..)| topic).collect()
+        self.messages.lock().unwrap().drain(..).map(|one| one.topic).collect()
+    }
+
+    /// Returns the newest message on a topic.
+    fn newest(&self, topic: &str) -> Vec<u8> {
+        let messages = self.messages.lock().unwrap();
+        messages.iter().rfind(|one| one.topic == topic).unwrap().bytes.clone()
+    }
+
+    /// Returns the colliders in the newest picture.
+    fn drawn_colliders(&self) -> SceneEntity {
+        let picture = SceneUpdate::decode(self.newest("/scene").as_slice()).unwrap();
+        picture.entities.into_iter().find(|one| one.id == "colliders").unwrap()
     }
 }
 
@@ -169,7 +191,64 @@ fn recorded_messages_have_the_times_of_the_recording() {
     bench.begin_load(1);
     bench.show(0, 50);
     let messages = listener.messages.lock().unwrap().clone();
-    let size = messages[0].2;
-    assert_eq!(messages, [("/particles".to_owned(), epoch_ns + SECOND_NS / 2, size)]);
-    assert!(size > 64);
+    assert_eq!(messages.len(), 1);
+    assert_eq!(messages[0].topic, "/particles");
+    assert_eq!(messages[0].log_time_ns, epoch_ns + SECOND_NS / 2);
+    assert!(messages[0].bytes.len() > 64);
+}
+
+#[test]
+fn the_transform_turns_the_up_of_the_scene_to_z() {
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let (origin, place) = ([1.0, 2.0, 3.0], |x, y, z| Vector3 { x, y, z });
+    for (up, x, w, expected) in [
+        ("y", half, half, place(1.0, -3.0, 2.0)),
+        ("-y", -half, half, place(1.0, 3.0, -2.0)),
+        ("z", 0.0, 1.0, place(1.0, 2.0, 3.0)),
+    ] {
+        let bench = Bench::new(None);
+        let listener = bench.listen(&["/tf"]);
+        let text = SceneText { up: up.to_owned(), ..SceneText::default() };
+        bench.publisher.begin_load(&Scene { origin, text, rate_hz: 100, ..Scene::default() });
+        let transform = FrameTransform::decode(listener.newest("/tf").as_slice()).unwrap();
+        let rotation = transform.rotation.unwrap();
+        assert_eq!((rotation.x, rotation.y, rotation.z, rotation.w), (x, 0.0, 0.0, w), "{up}");
+        assert_eq!(transform.translation, Some(expected), "{up}");
+    }
+}
+
+#[test]
+fn colliders_are_drawn_where_they_are_and_late_subscribers_receive_them() {
+    let bench = Bench::new(None);
+    let listener = bench.listen(&["/scene"]);
+    bench.begin_load(1);
+    let move_to = |step: u64, x: f32| {
+        let shape = ColliderShape::Sphere as u32;
+        let center = [x, 0.5, 0.0];
+        let ball = ColliderState { shape, center, radius: 0.25, ..ColliderState::default() };
+        let stamp = Stamp { epoch: 1, step };
+        bench.publisher.publish_colliders(&Colliders { stamp, colliders: vec![ball] });
+    };
+    for (step, x) in [(1, 0.5), (2, 2.0)] {
+        move_to(step, x);
+        bench.show(step * SECOND_NS, step);
+        let ball = listener.drawn_colliders().spheres.remove(0);
+        let center = Vector3 { x: f64::from(x), y: 0.5, z: 0.0 };
+        assert_eq!(ball.pose.unwrap().position, Some(center));
+        assert_eq!(ball.size, Some(Vector3 { x: 0.5, y: 0.5, z: 0.5 }));
+    }
+    let late = bench.listen(&["/colliders"]);
+    bench.show(3 * SECOND_NS, 3);
+    let row: Value = serde_json::from_slice(&late.newest("/colliders")).unwrap();
+    assert_eq!(row["step"], 2);
+    assert_eq!(row["colliders"][0]["center"], json!([2.0, 0.5, 0.0]));
+    move_to(4, 3.0);
+    assert_eq!(late.topics(), ["/colliders", "/colliders"]);
+    // A load without colliders has none of the previous one.
+    bench.begin_load(2);
+    bench.show(5 * SECOND_NS, 0);
+    assert_eq!(listener.drawn_colliders().spheres, []);
+    let later = bench.listen(&["/colliders"]);
+    bench.show(6 * SECOND_NS, 0);
+    assert_eq!(later.topics(), Vec::<String>::new());
 }

@@ -56,7 +56,7 @@ impl Load {
             text: SceneText {
                 name: summary.name.clone(),
                 unit: summary.unit.clone(),
-                up: summary.up.to_owned(),
+                up: summary.up.name().to_owned(),
                 run_id: format!("{:016x}", self.header.run_id),
             },
             ..Scene::default()

@@ -11,8 +11,8 @@ pub struct SceneSummary {
     pub name: String,
     /// Unit of lengths.
     pub unit: String,
-    /// Direction of up: "y", "-y" or "z".
-    pub up: &'static str,
+    /// Direction of up.
+    pub up: Up,
     /// The scene has two dimensions.
     pub is_planar: bool,
     /// Steps per second.
@@ -30,11 +30,7 @@ impl SceneSummary {
             parameters: parameters(&scene),
             name: scene.name,
             unit: scene.unit,
-            up: match scene.up {
-                Up::Y => "y",
-                Up::MinusY => "-y",
-                Up::Z => "z",
-            },
+            up: scene.up,
             is_planar: scene.dimensions == 2,
             rate_hz: scene.solver.rate_hz,
         })
@@ -47,7 +43,7 @@ impl Default for SceneSummary {
         Self {
             name: String::new(),
             unit: "m".to_owned(),
-            up: "y",
+            up: Up::default(),
             is_planar: false,
             rate_hz: 0,
             parameters: ParameterValues::default(),
@@ -101,7 +97,7 @@ mod tests {
             [wind]
             velocity = [1, 0, 0]";
         let summary = SceneSummary::from_toml(text).unwrap();
-        assert_eq!((summary.name.as_str(), summary.up, summary.is_planar), ("a", "-y", true));
+        assert_eq!((summary.name.as_str(), summary.up, summary.is_planar), ("a", Up::MinusY, true));
         let parameters = summary.parameters;
         assert_eq!((parameters.gravity[1], parameters.substeps), (-1.5, 7));
         assert_eq!((parameters.tear_force, parameters.wind_velocity[0]), (Some(20.0), 1.0));

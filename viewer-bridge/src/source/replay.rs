@@ -32,19 +32,37 @@ use player::Player;
 
 /// A recording as a source.
 #[derive(Debug)]
-pub struct Replay(Recording);
+pub struct Replay {
+    recording: Recording,
+    start: InitialPlayback,
+}
+
+/// The playback before the first request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InitialPlayback {
+    /// Paused at the first step.
+    Paused,
+    /// Playing, again and again, for viewers that cannot control the playback.
+    Looping,
+}
 
 impl Replay {
     /// Opens a recording, until a signal arrives. `note` receives messages for the user.
     ///
     /// # Errors
     /// The file is not a recording, or has no state to show. The message names the remedy.
-    pub fn open(path: &Path, stop: &Stop, note: &mut dyn FnMut(&str)) -> anyhow::Result<Self> {
-        open::open(path, stop, note).map(Self).with_context(|| path.display().to_string())
+    pub fn open(
+        path: &Path,
+        start: InitialPlayback,
+        stop: &Stop,
+        note: &mut dyn FnMut(&str),
+    ) -> anyhow::Result<Self> {
+        let recording = open::open(path, stop, note).with_context(|| path.display().to_string())?;
+        Ok(Self { recording, start })
     }
 
     fn job(&self) -> anyhow::Result<Job> {
-        let Recording { tape, first, .. } = &self.0;
+        let Recording { tape, first, .. } = &self.recording;
         Ok(Job {
             log: tape.log().try_clone()?,
             first: first.row,
@@ -60,7 +78,7 @@ impl Source for Replay {
     }
 
     fn recording(&self) -> Option<RecordingTimes> {
-        let tape = &self.0.tape;
+        let tape = &self.recording.tape;
         let run = tape.run();
         Some(RecordingTimes {
             epoch_ns: run.epoch_ns,
@@ -71,7 +89,7 @@ impl Source for Replay {
     }
 
     fn run(&mut self, sinks: &Sinks, requests: &Requests) -> anyhow::Result<()> {
-        let (job, file) = (self.job()?, self.0.file.clone());
+        let (job, file) = (self.job()?, self.recording.file.clone());
         let (sender, reports) = channel();
         let is_cancelled = AtomicBool::new(false);
         thread::scope(|scope| {
@@ -79,7 +97,11 @@ impl Source for Replay {
                 .name("check".to_owned())
                 .spawn_scoped(scope, || check(job, &sender, &is_cancelled))
                 .context("starting the thread that checks the recording")?;
-            let played = Player::new(&mut self.0, reports, sinks).run(requests);
+            let mut player = Player::new(&mut self.recording, reports, sinks);
+            if self.start == InitialPlayback::Looping {
+                player.start_looping();
+            }
+            let played = player.run(requests);
             is_cancelled.store(true, Ordering::Relaxed);
             match played {
                 // The signal also ends the program.

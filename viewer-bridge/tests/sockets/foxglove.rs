@@ -154,7 +154,8 @@ fn a_client_receives_only_the_topics_that_it_subscribed_to() {
     let (mut client, server) = Client::start(&site.url);
     assert_eq!(server["name"], "catenary");
     let topics =
-        ["/tf", "/tears", "/outcomes", "/status", "/steps", "/particles", "/scene"].map(Some);
+        ["/tf", "/colliders", "/tears", "/outcomes", "/status", "/steps", "/particles", "/scene"]
+            .map(Some);
     let mut advertised: Vec<_> = client.topics().into_iter().map(Some).collect();
     advertised.sort_by_key(|topic| topics.iter().position(|one| one == topic));
     assert_eq!(advertised, topics);

@@ -6,6 +6,7 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use sim_contract::clock::monotonic_ns;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::{HeaderValue, header};
 use tungstenite::{Message, WebSocket};
@@ -22,6 +23,23 @@ pub(crate) enum Binary {
     Response { call: u32, payload: Value },
     /// The state of playback: 0 playing, 1 paused, 3 ended.
     Playback { status: u8, time_ns: u64, speed: f32, did_seek: bool, request: String },
+}
+
+/// A wait for one message. Pings and other messages do not extend it.
+#[derive(Debug, Clone, Copy)]
+struct Wait {
+    start_ns: u64,
+}
+
+impl Wait {
+    fn start() -> Self {
+        Self { start_ns: monotonic_ns() }
+    }
+
+    fn check(self, what: &str) {
+        let waited = Duration::from_nanos(monotonic_ns() - self.start_ns);
+        assert!(waited < DEADLINE, "{what} did not come within {DEADLINE:?}");
+    }
 }
 
 /// A connected client.
@@ -169,24 +187,28 @@ impl Client {
 
     /// Waits for the next text with an operation, and drops the texts before it.
     pub(crate) fn text(&mut self, op: &str) -> Value {
+        let wait = Wait::start();
         loop {
             while let Some(text) = self.texts.pop_front() {
                 if text["op"] == op {
                     return text;
                 }
             }
+            wait.check(op);
             assert!(self.read(), "the connection ended before {op}");
         }
     }
 
     /// Waits for the next binary message that `accept` maps to a value, and drops the messages before it.
     pub(crate) fn binary<T>(&mut self, accept: impl Fn(Binary) -> Option<T>) -> T {
+        let wait = Wait::start();
         loop {
             while let Some(binary) = self.binaries.pop_front() {
                 if let Some(value) = accept(binary) {
                     return value;
                 }
             }
+            wait.check("a message");
             assert!(self.read(), "the connection ended before a message");
         }
     }

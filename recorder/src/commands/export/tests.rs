@@ -7,7 +7,7 @@ use std::io::Cursor;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
-use recorder::{Closing, LogOptions, LogWriter, Message, RunDescription, StepRow};
+use recorder::{Closing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
 use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
 use sim_solver::Solver;
 
@@ -52,6 +52,7 @@ fn run_at(rate_hz: u32) -> RunDescription {
         epoch_ns: 0,
         scene_name: "tiny".to_owned(),
         origin: [0.0; 3],
+        up: Up::Y,
         rate_hz,
         method: 0,
         particle_count: 0,

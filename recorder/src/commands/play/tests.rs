@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use recorder::{
     CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TearsRow,
-    TopologyRow,
+    TopologyRow, Up,
 };
 use sim_contract::testing::TestDomain;
 use sim_contract::{
@@ -25,6 +25,7 @@ fn run() -> RunDescription {
         epoch_ns: 1_000,
         scene_name: "dot".to_owned(),
         origin: [0.5, 0.0, 0.0],
+        up: Up::Y,
         rate_hz: 240,
         method: 0,
         particle_count: 2,

@@ -88,6 +88,7 @@ impl Load {
             epoch_ns: self.epoch_ns,
             scene_name: self.scene.name.clone(),
             origin: self.header.origin,
+            up: self.scene.up,
             rate_hz: self.scene.solver.rate_hz,
             method: self.header.method,
             particle_count: first.particle_count,

@@ -6,7 +6,7 @@ use std::thread;
 
 use recorder::{
     AllCounts, Closing, Compression, FrameReader, GapCounter, LogEnd, LogOptions, LogReader,
-    LogWriter, Message, OutcomeRow, RunDescription, StepRow, Topic,
+    LogWriter, Message, OutcomeRow, RunDescription, StepRow, Topic, Up,
 };
 use sim_contract::{Action, Command, Outcome, ParticleState};
 
@@ -71,6 +71,7 @@ fn description() -> RunDescription {
         epoch_ns: 0,
         scene_name: "points".to_owned(),
         origin: [0.0; 3],
+        up: Up::Y,
         rate_hz: 240,
         method: 0,
         particle_count: 1000,
@@ -155,6 +156,7 @@ fn what_is_recorded_and_what_is_declared_lost_add_up_to_what_was_received() {
             recorded[logged.message.topic().index()] += 1;
             gaps.add(&logged.message);
         }
+        recorded[Topic::Tf.index()] = log.transform_count();
         assert_eq!((log.end(), log.closing()), (Some(&LogEnd::Complete), Some(&closing)));
         for (topic, counts) in closing.counts.iter() {
             let found = recorded[topic.index()];
@@ -173,14 +175,14 @@ fn written_count(counts: &AllCounts) -> u64 {
     counts.iter().map(|(_, counts)| counts.written).sum()
 }
 
-/// Returns the number of messages that a reader of snapshots finds in a file.
+/// Returns the number of messages that a reader of snapshots finds in a file, with `/tf`.
 fn count_in_frames(bytes: &[u8]) -> u64 {
     let mut frames = FrameReader::new(LogReader::new(bytes).unwrap());
     let mut count = 0;
     while let Some(frame) = frames.next_frame().unwrap() {
         count += frame.updates.len() + 2;
     }
-    (count + frames.trailing_updates().len()) as u64
+    (count + frames.trailing_updates().len()) as u64 + frames.log().transform_count()
 }
 
 #[test]

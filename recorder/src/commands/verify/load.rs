@@ -1,14 +1,17 @@
 //! The copies of the scene in a recording, compared with the scene itself.
 
-use recorder::{Message, RunDescription, SurfaceRow, TopologyRow};
+use std::io::Read;
+
+use recorder::{LogReader, Message, RunDescription, SurfaceRow, TopologyRow};
 use sim_contract::{LoadHeader, Triangle};
 use sim_solver::{Scene, Solver};
 
 use crate::simulation::state_writer::constraint_state;
 
 /// Compares the metadata of the run with the scene. Returns a description of the first difference.
-pub(super) fn compare_run(run: &RunDescription, text: &[u8], scene: &Scene) -> Option<String> {
-    if text != scene.to_toml().as_bytes() {
+pub(super) fn compare_run<R: Read>(log: &LogReader<R>, scene: &Scene) -> Option<String> {
+    let run = log.run();
+    if log.scene() != scene.to_toml().as_bytes() {
         return Some(
             "the attachment scene.toml is not the complete scene of a recorder".to_owned(),
         );
@@ -17,6 +20,8 @@ pub(super) fn compare_run(run: &RunDescription, text: &[u8], scene: &Scene) -> O
     let fields = [
         ("scene", run.scene_name == scene.name),
         ("origin", is_same_origin),
+        // Older formats do not say.
+        ("up", run.up == scene.up || !log.is_current_format()),
         ("rate_hz", run.rate_hz == scene.solver.rate_hz),
         ("method", run.method == scene.solver.method as u32),
     ];

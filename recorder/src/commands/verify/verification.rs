@@ -14,6 +14,9 @@ use super::resimulation::{Finding, Resimulation, StartError};
 use super::snapshot_numbers::SnapshotNumbers;
 use crate::simulation::run_id::RunId;
 
+/// The format version from which on snapshots are numbered and tears have their causes.
+const NUMBERED_VERSION: u32 = 4;
+
 /// The reason why a recording cannot be verified.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum VerifyError {
@@ -48,6 +51,7 @@ impl<R: Read> Verification<R> {
     pub(super) fn new(log: LogReader<R>, scene: Scene, threads: usize) -> Self {
         let is_simulated = log.run().epoch_ns == 0;
         let is_older_format = !log.is_current_format();
+        let has_numbers = log.format_version() >= NUMBERED_VERSION;
         let selection = log.selection();
         let left_out =
             Topic::ALL.into_iter().filter(|topic| !selection.has_topic(*topic)).collect();
@@ -62,7 +66,7 @@ impl<R: Read> Verification<R> {
             revision: None,
             load_topics: Vec::new(),
             is_simulated,
-            numbers: SnapshotNumbers::new(is_simulated, !is_older_format, selection),
+            numbers: SnapshotNumbers::new(is_simulated, has_numbers, selection),
             events: EventCheck::default(),
             has_all_commands: false,
         }
@@ -72,7 +76,7 @@ impl<R: Read> Verification<R> {
     pub(super) fn check_header(&self) -> Finding {
         let log = self.frames.log();
         let what = match self.audit_finding() {
-            Finding::Identical => compare_run(log.run(), log.scene(), &self.scene),
+            Finding::Identical => compare_run(log, &self.scene),
             finding => return finding,
         };
         what.map_or(Finding::Identical, Finding::in_file)
@@ -109,11 +113,9 @@ impl<R: Read> Verification<R> {
         if finding != Finding::Identical {
             return finding;
         }
-        let has_parameters = frame.updates.iter().any(|one| matches!(one, Message::Parameters(_)));
-        if self.coverage.is_older_format && has_parameters {
-            return Finding::in_file(
-                "the metadata 'run': its format_version is older than /parameters".to_owned(),
-            );
+        if let Some(topic) = self.frames.log().newer_topic() {
+            let what = format!("its format_version is older than {}", topic.name());
+            return Finding::in_file(format!("the metadata 'run': {what}"));
         }
         let diverged = |what| Finding::Diverged { step: frame.row.step, what, difference: None };
         self.add_commands(frame);
@@ -206,8 +208,8 @@ impl<R: Read> Verification<R> {
         let is_complete = row.causes.len() == row.constraints.len();
         let unknown_count = row.causes.iter().filter(|cause| *cause == "unknown").count();
         self.coverage.unknown_cause_count += unknown_count;
-        let is_wrong = !self.coverage.is_older_format && !is_complete
-            || self.is_simulated && unknown_count > 0;
+        let has_causes = self.frames.log().format_version() >= NUMBERED_VERSION;
+        let is_wrong = has_causes && !is_complete || self.is_simulated && unknown_count > 0;
         is_wrong.then(|| "/tears: it has no cause for one of its constraints".to_owned())
     }
 

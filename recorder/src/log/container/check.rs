@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::{Read, Seek};
 
-use mcap::records::{Footer, Header, MessageHeader, Metadata, Record, op};
+use mcap::records::{Channel, Footer, Header, MessageHeader, Metadata, Record, op};
 use sim_contract::Stop;
 
 use super::attachment::no_checksum;
@@ -16,9 +16,8 @@ use super::walk::{Part, Walk};
 use super::window::Window;
 use crate::log::read::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
 use crate::log::read::read_error::{LogEnd, ReadError};
-use crate::log::read::reader::read_run;
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
-use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, RunDescription, SCENE_ATTACHMENT};
+use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};
 use crate::log::topic::Topic;
 
 /// Bytes between two calls of the progress callback.
@@ -223,7 +222,7 @@ impl Check {
                 self.add_schema(header.id);
                 Ok(())
             }
-            Record::Channel(channel) => self.add_channel(channel.id, &channel.topic),
+            Record::Channel(channel) => self.add_channel(channel),
             Record::DataEnd(_) => Ok(()),
             Record::Footer(_) => Err("the end of the data is missing before it".to_owned()),
             other if is_of_index(other.opcode()) => {
@@ -239,8 +238,7 @@ impl Check {
 
     fn add_metadata(&mut self, metadata: &Metadata) -> Result<(), ReadError> {
         if metadata.name == RUN_METADATA && self.content.is_none() {
-            let run = read_run(&metadata.metadata)?;
-            self.begin_content(run);
+            self.begin_content(metadata)?;
         } else if metadata.name == SELECTION_METADATA {
             self.selection = ContentSelection::read(&metadata.metadata)?;
         } else if metadata.name == CLOSING_METADATA {
@@ -249,10 +247,11 @@ impl Check {
         Ok(())
     }
 
-    fn begin_content(&mut self, run: RunDescription) {
-        let content = ContentCheck::new(run, self.selection, self.scene_size_bytes);
+    fn begin_content(&mut self, run: &Metadata) -> Result<(), ReadError> {
+        let content = ContentCheck::new(&run.metadata, self.selection, self.scene_size_bytes)?;
         self.new_limits = Some(*content.limits());
         self.content = Some(content);
+        Ok(())
     }
 
     fn add_schema(&mut self, id: u16) {
@@ -261,10 +260,10 @@ impl Check {
         self.places.statistics.schema_count = count;
     }
 
-    fn add_channel(&mut self, id: u16, topic: &str) -> Result<(), String> {
+    fn add_channel(&mut self, channel: &Channel) -> Result<(), String> {
         let content = self.content.as_mut().ok_or("it stands before the metadata 'run'")?;
-        self.places.statistics.channel_count += u32::from(!content.is_declared(id));
-        content.add_channel(id, topic)
+        self.places.statistics.channel_count += u32::from(!content.is_declared(channel.id));
+        content.add_channel(channel)
     }
 
     fn add_chunk(
@@ -308,7 +307,7 @@ impl Check {
             let result = record.and_then(|inner| {
                 match mcap::parse_record(inner.opcode, inner.body) {
                     Ok(Record::Schema { header, .. }) => self.add_schema(header.id),
-                    Ok(Record::Channel(channel)) => self.add_channel(channel.id, &channel.topic)?,
+                    Ok(Record::Channel(channel)) => self.add_channel(&channel)?,
                     Ok(Record::Message { header, data }) => {
                         let place = InFile { byte, record: "chunk, message" };
                         self.add_message(place, &header, &data, inner.offset);
@@ -444,8 +443,9 @@ impl Check {
                 );
                 self.findings.add_index(end, "metadata 'recorder'", what);
             }
-            // A recorder does not count /tf, which it writes into the header.
-            if topic != Topic::Tf && claimed.written != counted.written {
+            // Recorders of older formats do not count /tf, which belongs to the header.
+            let is_counted = topic != Topic::Tf || content.is_current_format;
+            if is_counted && claimed.written != counted.written {
                 let what = format!(
                     "it counts {} messages on {name}, but the file has {}",
                     claimed.written, counted.written

@@ -2,16 +2,20 @@
 
 use std::collections::BTreeMap;
 
-use mcap::records::MessageHeader;
+use mcap::records::{Channel, MessageHeader};
 use sim_solver::Keyframe;
 
 use super::tears::HashSeeds;
 use crate::log::backlog::Backlog;
+use crate::log::encoding::channel::TopicChannel;
 use crate::log::encoding::particle_bytes;
 use crate::log::message::Message;
+use crate::log::read::audit::is_current_format;
 use crate::log::read::decode::decode_message;
 use crate::log::read::gaps::GapCounter;
 use crate::log::read::limits::SizeLimits;
+use crate::log::read::read_error::ReadError;
+use crate::log::read::reader::read_run;
 use crate::log::rows::{StepRow, TearsRow};
 use crate::log::run::RunDescription;
 use crate::log::run::selection::ContentSelection;
@@ -42,9 +46,11 @@ pub(super) enum Sound {
 #[derive(Debug)]
 pub(super) struct ContentCheck {
     run: RunDescription,
+    /// The file has the format that this recorder writes.
+    pub(super) is_current_format: bool,
     selection: ContentSelection,
     limits: SizeLimits,
-    channels: BTreeMap<u16, Option<Topic>>,
+    channels: BTreeMap<u16, Option<TopicChannel>>,
     log_time_ns: u64,
     /// The last header, while its payload has not followed.
     row: Option<StepRow>,
@@ -60,12 +66,16 @@ pub(super) struct ContentCheck {
 }
 
 impl ContentCheck {
+    /// Starts with the metadata `run` of a file.
     pub(super) fn new(
-        run: RunDescription,
+        run: &BTreeMap<String, String>,
         selection: ContentSelection,
         scene_size_bytes: usize,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, ReadError> {
+        let is_current_format = is_current_format(run);
+        let run = read_run(run)?;
+        Ok(Self {
+            is_current_format,
             selection,
             limits: SizeLimits::new(&run, scene_size_bytes),
             backlog: Backlog::new(&run, scene_size_bytes),
@@ -78,7 +88,7 @@ impl ContentCheck {
             gaps: GapCounter::for_selection(selection),
             counts: AllCounts::default(),
             unhashed_count: 0,
-        }
+        })
     }
 
     pub(super) fn limits(&self) -> &SizeLimits {
@@ -95,10 +105,11 @@ impl ContentCheck {
     }
 
     /// Adds a channel. Returns a description of one that the file declares differently before.
-    pub(super) fn add_channel(&mut self, id: u16, topic: &str) -> Result<(), String> {
-        let topic = Topic::from_name(topic);
-        match self.channels.insert(id, topic) {
-            Some(other) if other != topic => Err(format!("channel {id} has two topics")),
+    pub(super) fn add_channel(&mut self, channel: &Channel) -> Result<(), String> {
+        let id = channel.id;
+        let known = TopicChannel::new(&channel.topic, &channel.message_encoding);
+        match self.channels.insert(id, known) {
+            Some(other) if other != known => Err(format!("channel {id} has two definitions")),
             _ => Ok(()),
         }
     }
@@ -126,7 +137,11 @@ impl ContentCheck {
 
     /// Returns the topic of a channel, and `None` for an undeclared one or one of another program.
     pub(super) fn topic(&self, channel_id: u16) -> Option<Topic> {
-        self.channels.get(&channel_id).copied().flatten()
+        self.channel(channel_id).map(|channel| channel.topic)
+    }
+
+    fn channel(&self, id: u16) -> Option<TopicChannel> {
+        self.channels.get(&id).copied().flatten()
     }
 
     /// Marks a part of the file as unreadable.
@@ -151,26 +166,26 @@ impl ContentCheck {
         if !self.is_declared(channel_id) {
             return Err(format!("its channel {channel_id} is not declared before it"));
         }
-        let Some(topic) = self.topic(channel_id) else { return Ok(Sound::Other) };
+        let Some(channel) = self.channel(channel_id) else { return Ok(Sound::Other) };
         if header.log_time < self.log_time_ns {
             return Err("its log_time is earlier than that of the message before it".to_owned());
         }
-        let sound = match topic {
+        let sound = match channel.topic {
             Topic::Particles => self.check_particles(header, data)?,
-            _ => self.check_decoded(topic, header, data)?,
+            _ => self.check_decoded(channel, header, data)?,
         };
         self.log_time_ns = header.log_time;
-        self.counts[topic].written += 1;
+        self.counts[channel.topic].written += 1;
         Ok(sound)
     }
 
     fn check_decoded(
         &mut self,
-        topic: Topic,
+        channel: TopicChannel,
         header: &MessageHeader,
         data: &[u8],
     ) -> Result<Sound, String> {
-        let logged = decode_message(topic, header, data, &self.run, &self.limits)?;
+        let logged = decode_message(channel, header, data, &self.run, &self.limits)?;
         let Some(logged) = logged else { return Ok(Sound::Other) };
         let message = logged.message;
         self.check_time(header, message.step())?;
@@ -201,9 +216,9 @@ impl ContentCheck {
                 self.backlog.remove_to(row.step);
                 self.seeds.pass(row.step);
                 self.last_row = Some(row);
-                Ok(Sound::Update(topic))
+                Ok(Sound::Update(Topic::Steps))
             }
-            _ => Ok(Sound::Update(topic)),
+            _ => Ok(Sound::Update(channel.topic)),
         }
     }
 

@@ -156,8 +156,8 @@ impl Losses {
             if self.has_any {
                 self.counts[topic].lost = self.counts[topic].lost.max(more);
             }
-            // A recorder does not count /tf, which it writes into the header.
-            let is_counted = topic != Topic::Tf;
+            // Recorders of older formats do not count /tf, which belongs to the header.
+            let is_counted = topic != Topic::Tf || content.is_current_format;
             counts.written = if is_counted { content.counts[topic].written } else { 0 };
             if !had_end {
                 counts.received = counts.written.saturating_add(counts.lost);

@@ -21,10 +21,8 @@ use super::losses::Losses;
 use super::salvage::{Format, Salvage, size_in_memory};
 use super::walk::{Part, Walk};
 use super::window::Window;
-use crate::log::read::audit::is_current_format;
 use crate::log::read::limits::{HEADER_RECORD_SIZE_BYTES_MAX, SizeLimits};
 use crate::log::read::read_error::{LogEnd, ReadError};
-use crate::log::read::reader::read_run;
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};
 use crate::log::topic::AllCounts;
@@ -122,7 +120,6 @@ struct Repair<W: Write> {
     selection: ContentSelection,
     content: Option<ContentCheck>,
     new_limits: Option<SizeLimits>,
-    is_current_format: bool,
     /// Attachments and metadata before the first chunk.
     head: Vec<Record<'static>>,
     head_size_bytes: u64,
@@ -147,7 +144,6 @@ impl<W: Write> Repair<W> {
             selection: ContentSelection::default(),
             content: None,
             new_limits: None,
-            is_current_format: false,
             head: Vec::new(),
             head_size_bytes: 0,
             is_head_damaged: false,
@@ -305,9 +301,8 @@ impl<W: Write> Repair<W> {
             self.selection = ContentSelection::read(&metadata.metadata)?;
         }
         if metadata.name == RUN_METADATA && self.content.is_none() {
-            let run = read_run(&metadata.metadata)?;
-            self.is_current_format = is_current_format(&metadata.metadata);
-            let content = ContentCheck::new(run, self.selection, self.scene_size_bytes);
+            let run = &metadata.metadata;
+            let content = ContentCheck::new(run, self.selection, self.scene_size_bytes)?;
             self.new_limits = Some(*content.limits());
             self.content = Some(content);
         }
@@ -403,7 +398,7 @@ impl<W: Write> Repair<W> {
         let (Some(salvage), Some(content)) = (&mut self.salvage, &mut self.content) else {
             return Ok(());
         };
-        if content.has_channels() || !self.is_current_format {
+        if content.has_channels() || !content.is_current_format {
             return Ok(());
         }
         salvage.declare_channels(content)
@@ -426,7 +421,7 @@ impl<W: Write> Repair<W> {
         let result = match record {
             Record::Schema { header, data } => salvage.add_schema(header, data)?,
             Record::Channel(channel) => match salvage.add_channel(channel)? {
-                Ok(()) => content.add_channel(channel.id, &channel.topic),
+                Ok(()) => content.add_channel(channel),
                 conflict => conflict,
             },
             Record::Message { header, data } => {

@@ -210,19 +210,23 @@ impl<W: Write> Salvage<W> {
     ) -> Result<(), WriteError> {
         for topic in Topic::ALL {
             let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
-            let mut id = 0;
+            let mut channel = Channel {
+                id: 0,
+                schema_id: 0,
+                topic: topic.name().to_owned(),
+                message_encoding: encoding.to_owned(),
+                metadata: BTreeMap::new(),
+            };
             self.write(|file| {
-                let schema_id = match &schema {
-                    Some(schema) => file.add_schema(schema.name, schema.encoding, &schema.data)?,
-                    None => 0,
-                };
-                id = file.add_channel(schema_id, topic.name(), encoding, &BTreeMap::new())?;
+                let schema_id = file.add_schema(schema.name, schema.encoding, &schema.data)?;
+                channel.id =
+                    file.add_channel(schema_id, topic.name(), encoding, &channel.metadata)?;
                 Ok(())
             })?;
             // A conflict is found with the first message of the channel.
-            let _ = content.add_channel(id, topic.name());
+            let _ = content.add_channel(&channel);
             if topic == Topic::Tf {
-                self.missing_transform = Some(id);
+                self.missing_transform = Some(channel.id);
             }
         }
         Ok(())
@@ -234,7 +238,7 @@ impl<W: Write> Salvage<W> {
         &mut self,
         header: &MessageHeader,
         topic: Option<Topic>,
-        content: &ContentCheck,
+        content: &mut ContentCheck,
     ) -> Result<(), WriteError> {
         match self.missing_transform.take() {
             Some(channel) if topic != Some(Topic::Tf) => {
@@ -248,11 +252,14 @@ impl<W: Write> Salvage<W> {
         &mut self,
         channel_id: u16,
         log_time: u64,
-        content: &ContentCheck,
+        content: &mut ContentCheck,
     ) -> Result<(), WriteError> {
-        let (time, origin) = (content.run().time_of_step_ns(0), content.run().origin);
-        let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: time };
-        self.write(|file| file.write_to_known_channel(&header, &encode_transform(time, origin)))
+        let run = content.run();
+        let publish_time = run.time_of_step_ns(0);
+        let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time };
+        let data = encode_transform(publish_time, run.origin, run.up);
+        content.counts[Topic::Tf].written += 1;
+        self.write(|file| file.write_to_known_channel(&header, &data))
     }
 
     /// Checks a message, and copies it if it is sound. Returns the fault of another one.

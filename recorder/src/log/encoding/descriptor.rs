@@ -11,6 +11,8 @@ use prost_types::{
 pub(super) const POINT_CLOUD: &str = "foxglove.PointCloud";
 /// Full name of the schema of `/tf`.
 pub(super) const FRAME_TRANSFORM: &str = "foxglove.FrameTransform";
+/// Full name of the schema of `/keyframe`.
+pub(super) const KEYFRAME: &str = "catenary.Keyframe";
 
 /// A message and the file that declares it.
 struct Declaration {
@@ -42,7 +44,7 @@ const VECTOR3: Kind = Kind::Message("foxglove.Vector3");
 const QUATERNION: Kind = Kind::Message("foxglove.Quaternion");
 
 /// Dependencies come before their users, as readers of a descriptor set expect.
-const DECLARATIONS: [Declaration; 7] = [
+const DECLARATIONS: [Declaration; 8] = [
     Declaration {
         package: "google.protobuf",
         name: "Timestamp",
@@ -97,6 +99,12 @@ const DECLARATIONS: [Declaration; 7] = [
             ("translation", 4, VECTOR3),
             ("rotation", 5, QUATERNION),
         ],
+    },
+    Declaration {
+        package: "catenary",
+        name: "Keyframe",
+        file: "catenary/Keyframe.proto",
+        fields: &[("step", 1, Kind::Plain(Type::Uint64)), ("data", 2, Kind::Plain(Type::Bytes))],
     },
 ];
 
@@ -198,9 +206,10 @@ mod tests {
 
     use prost::encoding::{WireType, decode_key, decode_varint};
     use sim_contract::ParticleState;
+    use sim_solver::scene::Up;
 
     use super::*;
-    use crate::log::encoding::protobuf::{PointCloudEncoder, encode_transform};
+    use crate::log::encoding::protobuf::{PointCloudEncoder, encode_keyframe, encode_transform};
 
     fn messages(root: &'static str) -> BTreeMap<String, DescriptorProto> {
         let set = FileDescriptorSet::decode(file_descriptor_set(root).as_slice()).unwrap();
@@ -231,7 +240,7 @@ mod tests {
             let (expected, length) = match field.r#type() {
                 Type::Double => (WireType::SixtyFourBit, 8),
                 Type::Fixed32 => (WireType::ThirtyTwoBit, 4),
-                Type::Int32 | Type::Int64 | Type::Enum => {
+                Type::Int32 | Type::Int64 | Type::Uint64 | Type::Enum => {
                     decode_varint(&mut wire).unwrap();
                     (WireType::Varint, 0)
                 }
@@ -264,14 +273,21 @@ mod tests {
 
     #[test]
     fn the_schema_of_tf_declares_every_written_field() {
-        let message = encode_transform(1_000_000_001, [1.0, 2.0, 3.0]);
+        let message = encode_transform(1_000_000_001, [1.0, 2.0, 3.0], Up::Y);
         let checked = check(&messages(FRAME_TRANSFORM), ".foxglove.FrameTransform", &message);
-        assert_eq!(checked, 5 + 2 + 3 + 1);
+        assert_eq!(checked, 5 + 2 + 3 + 2);
+    }
+
+    #[test]
+    fn the_schema_of_keyframes_declares_every_written_field() {
+        let mut message = Vec::new();
+        encode_keyframe(7, &[1, 2, 3], &mut message);
+        assert_eq!(check(&messages(KEYFRAME), ".catenary.Keyframe", &message), 2);
     }
 
     #[test]
     fn every_file_comes_after_its_imports() {
-        for root in [POINT_CLOUD, FRAME_TRANSFORM] {
+        for root in [POINT_CLOUD, FRAME_TRANSFORM, KEYFRAME] {
             let set = FileDescriptorSet::decode(file_descriptor_set(root).as_slice()).unwrap();
             for (place, file) in set.file.iter().enumerate() {
                 for import in &file.dependency {

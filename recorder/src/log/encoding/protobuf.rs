@@ -1,16 +1,21 @@
 //! The protobuf messages of a recording, which viewers draw.
 //!
-//! Names, numbers and types are those of the schemas that Foxglove publishes. `descriptor.rs`
-//! declares the same messages for readers of a file.
+//! Names, numbers and types are those of the schemas that Foxglove publishes, except for the keyframe.
+//! `descriptor.rs` declares the same messages for readers of a file.
+
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use prost::Message;
-use prost::encoding::{DecodeContext, WireType, decode_key, decode_varint, skip_field};
+use prost::encoding::{
+    DecodeContext, WireType, decode_key, decode_varint, encode_key, encode_varint, skip_field,
+};
 use prost_types::Timestamp;
 use sim_contract::ParticleState;
+use sim_solver::scene::Up;
 
-/// Name of the particles' frame. `/tf` gives its position in the frame `map`.
+/// Name of the particles' frame. `/tf` gives its pose in the frame `map`.
 pub const WORLD_FRAME: &str = "world";
-/// Frame of a scene's origin.
+/// Frame in which z points up.
 pub(super) const MAP_FRAME: &str = "map";
 
 /// `type` of a [`PackedElementField`]: u32.
@@ -110,6 +115,15 @@ pub(super) struct FrameTransform {
     pub(super) rotation: Option<Quaternion>,
 }
 
+/// The keyframe of a step in the solver's encoding.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Keyframe {
+    #[prost(uint64, tag = "1")]
+    pub(super) step: u64,
+    #[prost(bytes = "vec", tag = "2")]
+    pub(super) data: Vec<u8>,
+}
+
 const IDENTITY: Quaternion = Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
 
 /// Encodes snapshots as foxglove.PointCloud. Only the time and the data differ between messages.
@@ -148,7 +162,7 @@ impl PointCloudEncoder {
         self.prefix.encode_raw(out);
         if !payload.is_empty() {
             out.push(DATA_KEY);
-            prost::encoding::encode_varint(payload.len() as u64, out);
+            encode_varint(payload.len() as u64, out);
             out.extend_from_slice(payload);
         }
     }
@@ -199,18 +213,59 @@ fn split_data(message: &[u8]) -> Option<(Vec<u8>, &[u8])> {
     Some((rest, data))
 }
 
-/// Returns the message on `/tf`: the scene's frame is at `origin` (m) of the map, without rotation.
-/// `time_ns` is the time of the step, in nanoseconds since 1970.
-pub fn encode_transform(time_ns: u64, origin: [f64; 3]) -> Vec<u8> {
-    let [x, y, z] = origin;
+/// Returns the message on `/tf`, which turns the scene so that `up` becomes z, the axis that viewers
+/// draw upwards. `origin` (m) is the origin of the scene in its own axes, and `time_ns` the time of the
+/// step, in nanoseconds since 1970.
+pub fn encode_transform(time_ns: u64, origin: [f64; 3], up: Up) -> Vec<u8> {
     FrameTransform {
         timestamp: Some(timestamp(time_ns)),
         parent_frame_id: MAP_FRAME.to_owned(),
         child_frame_id: WORLD_FRAME.to_owned(),
-        translation: Some(Vector3 { x, y, z }),
-        rotation: Some(IDENTITY),
+        translation: Some(turned(origin, up)),
+        rotation: Some(rotation_to_z(up)),
     }
     .encode_to_vec()
+}
+
+/// Returns the rotation that takes `up` to z: none, or a quarter turn about x.
+fn rotation_to_z(up: Up) -> Quaternion {
+    let quarter = |x: f64| Quaternion { x, w: FRAC_1_SQRT_2, ..Quaternion::default() };
+    match up {
+        Up::Y => quarter(FRAC_1_SQRT_2),
+        Up::MinusY => quarter(-FRAC_1_SQRT_2),
+        Up::Z => IDENTITY,
+    }
+}
+
+/// Returns a vector after [`rotation_to_z`], without its rounding.
+fn turned([x, y, z]: [f64; 3], up: Up) -> Vector3 {
+    match up {
+        // 0 - z has no minus zero.
+        Up::Y => Vector3 { x, y: 0.0 - z, z: y },
+        Up::MinusY => Vector3 { x, y: z, z: 0.0 - y },
+        Up::Z => Vector3 { x, y, z },
+    }
+}
+
+/// Replaces `out` with the message on `/keyframe`. Like a generated encoder, it leaves out a step of 0
+/// and empty data.
+pub(super) fn encode_keyframe(step: u64, data: &[u8], out: &mut Vec<u8>) {
+    out.clear();
+    out.reserve(22 + data.len());
+    if step != 0 {
+        prost::encoding::uint64::encode(1, &step, out);
+    }
+    if !data.is_empty() {
+        encode_key(2, WireType::LengthDelimited, out);
+        encode_varint(data.len() as u64, out);
+        out.extend_from_slice(data);
+    }
+}
+
+/// Decodes a message on `/keyframe` to its step and the solver's encoding.
+pub(crate) fn decode_keyframe(message: &[u8]) -> Result<(u64, Vec<u8>), String> {
+    let Keyframe { step, data } = Keyframe::decode(message).map_err(|error| error.to_string())?;
+    Ok((step, data))
 }
 
 #[allow(clippy::cast_possible_wrap, reason = "seconds of 64-bit nanoseconds are below 2^35")]
@@ -259,6 +314,51 @@ mod tests {
             let mut expected = encoder.prefix.clone();
             expected.data = bytemuck::cast_slice(&particles).to_vec();
             assert_eq!(message, expected.encode_to_vec());
+        }
+    }
+
+    #[test]
+    fn a_keyframe_equals_the_output_of_the_generated_encoder() {
+        for (step, data) in [(0, Vec::new()), (0, vec![7]), (u64::MAX, vec![0; 300])] {
+            let mut message = Vec::new();
+            encode_keyframe(step, &data, &mut message);
+            assert_eq!(message, Keyframe { step, data: data.clone() }.encode_to_vec());
+            assert_eq!(decode_keyframe(&message), Ok((step, data)));
+        }
+        assert!(decode_keyframe(b"\x12\x05abc").is_err());
+    }
+
+    /// Rotates a vector by a quaternion: v + 2 w (u x v) + 2 u x (u x v).
+    fn rotated(q: &Quaternion, v: [f64; 3]) -> [f64; 3] {
+        let u = [q.x, q.y, q.z];
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        };
+        let (once, twice) = (cross(u, v), cross(u, cross(u, v)));
+        std::array::from_fn(|axis| v[axis] + 2.0 * (q.w * once[axis] + twice[axis]))
+    }
+
+    #[test]
+    fn the_transform_turns_up_to_z_and_the_origin_with_it() {
+        for (up, axis) in
+            [(Up::Y, [0.0, 1.0, 0.0]), (Up::MinusY, [0.0, -1.0, 0.0]), (Up::Z, [0.0, 0.0, 1.0])]
+        {
+            let origin = [1.0, 20.0, -300.0];
+            let message = encode_transform(0, origin, up);
+            let transform = FrameTransform::decode(message.as_slice()).unwrap();
+            let frames = [transform.parent_frame_id.as_str(), transform.child_frame_id.as_str()];
+            assert_eq!(frames, ["map", "world"]);
+            let rotation = transform.rotation.unwrap();
+            let Vector3 { x, y, z } = transform.translation.unwrap();
+            for (found, expected) in [
+                (rotated(&rotation, axis), [0.0, 0.0, 1.0]),
+                // The turn keeps x, so nothing is mirrored.
+                (rotated(&rotation, [1.0, 0.0, 0.0]), [1.0, 0.0, 0.0]),
+                ([x, y, z], rotated(&rotation, origin)),
+            ] {
+                let error = |axis: usize| (found[axis] - expected[axis]).abs();
+                assert!((0..3).all(|axis| error(axis) < 1e-12), "{up:?}: {found:?}");
+            }
         }
     }
 

@@ -40,7 +40,6 @@ pub struct Audit {
     schemas: BTreeMap<u16, Option<Topic>>,
     /// Only `written` is set.
     counts: AllCounts,
-    tf_count: u64,
 }
 
 /// The format of each topic, in the order of [`Topic::ALL`].
@@ -58,8 +57,8 @@ impl Formats {
     fn topic_of_schema(&self, header: &SchemaHeader, data: &[u8]) -> Option<Topic> {
         let found = (header.name.as_str(), header.encoding.as_str(), data);
         Topic::ALL.into_iter().find(|topic| {
-            let schema = self.0[topic.index()].schema.as_ref();
-            schema.is_some_and(|one| (one.name, one.encoding, one.data.as_slice()) == found)
+            let schema = &self.0[topic.index()].schema;
+            (schema.name, schema.encoding, schema.data.as_slice()) == found
         })
     }
 }
@@ -149,12 +148,9 @@ impl Audit {
             self.add_foreign(format!("topic '{}'", channel.topic));
             return;
         };
-        let TopicFormat { encoding, schema } = &self.formats.0[topic.index()];
-        let has_own_schema = match schema {
-            None => channel.schema_id == 0,
-            Some(_) => self.schemas.get(&channel.schema_id) == Some(&Some(topic)),
-        };
-        let has_own_encoding = channel.message_encoding == *encoding && channel.metadata.is_empty();
+        let encoding = self.formats.0[topic.index()].encoding;
+        let has_own_schema = self.schemas.get(&channel.schema_id) == Some(&Some(topic));
+        let has_own_encoding = channel.message_encoding == encoding && channel.metadata.is_empty();
         if !has_own_schema {
             self.report(None, format!("the schema of {} has another definition", topic.name()));
         }
@@ -198,12 +194,12 @@ impl Audit {
         data: &[u8],
         run: &RunDescription,
     ) {
-        self.tf_count += 1;
+        self.counts[Topic::Tf].written += 1;
         let time_ns = run.time_of_step_ns(0);
-        let is_same = data == encode_transform(time_ns, run.origin)
+        let is_same = data == encode_transform(time_ns, run.origin, run.up)
             && (header.sequence, header.publish_time) == (0, time_ns);
-        if !is_same || self.tf_count > 1 {
-            let what = "the message on /tf does not have the origin of the run".to_owned();
+        if !is_same || self.counts[Topic::Tf].written > 1 {
+            let what = "the message on /tf does not have the frame of the run".to_owned();
             self.report(Some(0), what);
         }
     }
@@ -235,7 +231,7 @@ impl Audit {
         if closing.is_none() {
             self.report(None, "the file ends without its metadata 'recorder'".to_owned());
         }
-        if self.tf_count == 0 {
+        if self.counts[Topic::Tf].written == 0 {
             self.report(None, "the file has no message on /tf".to_owned());
         }
     }

@@ -4,7 +4,8 @@ use mcap::records::MessageHeader;
 use serde::de::DeserializeOwned;
 
 use super::limits::SizeLimits;
-use crate::log::encoding::decode_particles;
+use crate::log::encoding::channel::{KeyframeForm, TopicChannel};
+use crate::log::encoding::{decode_keyframe, decode_particles};
 use crate::log::message::Message;
 use crate::log::run::RunDescription;
 use crate::log::topic::Topic;
@@ -32,12 +33,13 @@ impl LoggedMessage {
 /// Decodes a message. Returns `None` for `/tf`, which no reader of ours needs. `Err` describes the
 /// error in the content.
 pub(in crate::log) fn decode_message(
-    topic: Topic,
+    channel: TopicChannel,
     header: &MessageHeader,
     data: &[u8],
     run: &RunDescription,
     limits: &SizeLimits,
 ) -> Result<Option<LoggedMessage>, String> {
+    let TopicChannel { topic, keyframe_form } = channel;
     let size_bytes_max = limits.message_size_bytes_max(topic);
     if data.len() as u64 > size_bytes_max {
         return Err(format!(
@@ -58,7 +60,13 @@ pub(in crate::log) fn decode_message(
         Topic::Status => Message::Status(row(data)?),
         Topic::Events => Message::Event(row(data)?),
         Topic::Steps => Message::Step(row(data)?),
-        Topic::Keyframe => Message::Keyframe { step: step()?, bytes: data.to_vec() },
+        Topic::Keyframe => match keyframe_form {
+            KeyframeForm::Plain => Message::Keyframe { step: step()?, bytes: data.to_vec() },
+            KeyframeForm::Message => {
+                let (step, bytes) = decode_keyframe(data)?;
+                Message::Keyframe { step, bytes }
+            }
+        },
         Topic::Particles => {
             Message::Particles { step: step()?, particles: decode_particles(data)? }
         }

@@ -14,6 +14,7 @@ use super::limits::SizeLimits;
 use super::open::open_regular_file;
 use super::read_error::{LogEnd, ReadError};
 use super::records::RecordReader;
+use crate::log::encoding::channel::TopicChannel;
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
 use crate::log::run::{
     CLOSING_METADATA, Closing, FORMAT_VERSION, FORMAT_VERSION_MIN, RUN_METADATA, RunDescription,
@@ -31,13 +32,14 @@ const FORMAT_VERSION_KEY: &str = "format_version";
 pub struct LogReader<R> {
     records: RecordReader<R>,
     limits: SizeLimits,
-    channels: BTreeMap<u16, Option<Topic>>,
+    channels: BTreeMap<u16, Option<TopicChannel>>,
     run: RunDescription,
     scene: Vec<u8>,
     selection: ContentSelection,
     closing: Option<Closing>,
     header: HeaderText,
     audit: Option<Box<Audit>>,
+    transform_count: u64,
 }
 
 impl LogReader<FileSource> {
@@ -111,6 +113,7 @@ impl<R: Read> LogReader<R> {
                         closing: None,
                         header,
                         audit: None,
+                        transform_count: 0,
                     });
                 }
                 Some(HeaderRecord::Selection(map)) => {
@@ -175,6 +178,26 @@ impl<R: Read> LogReader<R> {
         self.audit.as_deref()
     }
 
+    /// Returns the version of the format of the file.
+    pub fn format_version(&self) -> u32 {
+        // Any other text was refused at the start.
+        let version = self.header.run.get(FORMAT_VERSION_KEY);
+        version.and_then(|text| text.parse().ok()).unwrap_or(FORMAT_VERSION_MIN)
+    }
+
+    /// Returns a topic in a form that the format of the file does not have yet. Only an edited file has
+    /// one.
+    pub fn newer_topic(&self) -> Option<Topic> {
+        let version = self.format_version();
+        let newer = |channel: &&TopicChannel| channel.first_version() > version;
+        self.channels.values().flatten().find(newer).map(|channel| channel.topic)
+    }
+
+    /// Returns the number of messages on `/tf` so far, which [`LogReader::next_message`] skips.
+    pub fn transform_count(&self) -> u64 {
+        self.transform_count
+    }
+
     /// Returns `true` if the file has the format that this recorder writes.
     pub fn is_current_format(&self) -> bool {
         is_current_format(&self.header.run)
@@ -196,8 +219,8 @@ impl<R: Read> LogReader<R> {
     /// # Errors
     /// If the operating system reports an error or the content of a message is invalid.
     pub fn next_message(&mut self) -> Result<Option<LoggedMessage>, ReadError> {
-        let Self { records, limits, channels, run, closing, audit, .. } = self;
-        let mut content = Content { limits, channels, run, closing, audit };
+        let Self { records, limits, channels, run, closing, audit, transform_count, .. } = self;
+        let mut content = Content { limits, channels, run, closing, audit, transform_count };
         loop {
             match records.next(|record, byte| content.read(record, byte))? {
                 Some(Some(logged)) => return Ok(Some(logged)),
@@ -215,10 +238,11 @@ impl<R: Read> LogReader<R> {
 /// The records after the header, and the parts of a reader that they change.
 struct Content<'a> {
     limits: &'a SizeLimits,
-    channels: &'a mut BTreeMap<u16, Option<Topic>>,
+    channels: &'a mut BTreeMap<u16, Option<TopicChannel>>,
     run: &'a RunDescription,
     closing: &'a mut Option<Closing>,
     audit: &'a mut Option<Box<Audit>>,
+    transform_count: &'a mut u64,
 }
 
 impl Content<'_> {
@@ -233,7 +257,8 @@ impl Content<'_> {
                 if let Some(audit) = self.audit {
                     audit.check_channel(&channel);
                 }
-                self.channels.insert(channel.id, Topic::from_name(&channel.topic));
+                let known = TopicChannel::new(&channel.topic, &channel.message_encoding);
+                self.channels.insert(channel.id, known);
             }
             Record::Metadata(metadata) if metadata.name == CLOSING_METADATA => {
                 let closing = Closing::from_map(&metadata.metadata);
@@ -273,16 +298,17 @@ impl Content<'_> {
         byte: u64,
     ) -> Result<Option<LoggedMessage>, ReadError> {
         let channel = self.channels.get(&header.channel_id).copied();
-        let Some(topic) = channel.flatten() else {
+        let Some(channel) = channel.flatten() else {
             if let (None, Some(audit)) = (channel, &mut self.audit) {
                 audit.report_unknown_channel(header.channel_id);
             }
             return Ok(None);
         };
-        let sequence = header.sequence;
+        let (topic, sequence) = (channel.topic, header.sequence);
         let malformed = |what| ReadError::Malformed { topic: topic.name(), sequence, byte, what };
-        let logged = decode_message(topic, header, data, self.run, self.limits);
+        let logged = decode_message(channel, header, data, self.run, self.limits);
         let logged = logged.map_err(malformed)?;
+        *self.transform_count += u64::from(logged.is_none());
         match (&logged, &mut self.audit) {
             (_, None) => {}
             (Some(logged), Some(audit)) => audit.check_message(logged, data, self.run),

@@ -4,8 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sim_contract::{ColliderShape, ColliderState, PlainF32};
 
-use super::json::JsonNumber;
-
 /// Three numbers, which JSON stores bit for bit.
 type Vector = [PlainF32; 3];
 
@@ -23,77 +21,105 @@ pub struct CollidersRow {
 pub struct ColliderRow {
     /// The shape and its pose.
     #[serde(flatten)]
+    #[schemars(with = "ShapeSchema")]
     pub shape: ShapeRow,
     /// Ratio of the separation speed to the approach speed, 0..=1.
-    #[schemars(with = "JsonNumber")]
+    #[schemars(with = "f32")]
     pub restitution: PlainF32,
     /// Coefficient of friction.
-    #[schemars(with = "JsonNumber")]
+    #[schemars(with = "f32")]
     pub friction: PlainF32,
     /// In m/s.
-    #[schemars(with = "[JsonNumber; 3]")]
+    #[schemars(with = "[f32; 3]")]
     pub velocity: Vector,
     /// Boxes only: about the center, in rad/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<[JsonNumber; 3]>")]
+    #[schemars(with = "Option<[f32; 3]>")]
     pub angular_velocity: Option<Vector>,
 }
 
 /// The shape and pose of a collider, in m.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "shape", rename_all = "lowercase")]
 pub enum ShapeRow {
     /// A half-space. The free side is normal·x >= offset.
     Plane {
         /// Unit vector.
-        #[schemars(with = "[JsonNumber; 3]")]
         normal: Vector,
         /// Distance of the surface from the origin, along the normal.
-        #[schemars(with = "JsonNumber")]
         offset: PlainF32,
     },
     /// A solid box.
     Box {
         /// Center.
-        #[schemars(with = "[JsonNumber; 3]")]
         center: Vector,
         /// Half the side lengths, along the box's own axes.
-        #[schemars(with = "[JsonNumber; 3]")]
         half_extents: Vector,
         /// Quaternion x, y, z, w.
-        #[schemars(with = "[JsonNumber; 4]")]
         rotation: [PlainF32; 4],
     },
     /// A solid sphere.
     Sphere {
         /// Center.
-        #[schemars(with = "[JsonNumber; 3]")]
         center: Vector,
         /// > 0.
-        #[schemars(with = "JsonNumber")]
         radius: PlainF32,
     },
     /// All points within a radius of a segment.
     Capsule {
         /// One end of the segment.
-        #[schemars(with = "[JsonNumber; 3]")]
         a: Vector,
         /// The other end.
-        #[schemars(with = "[JsonNumber; 3]")]
         b: Vector,
         /// > 0.
-        #[schemars(with = "JsonNumber")]
         radius: PlainF32,
     },
     /// A box that particles stay inside.
     Bounds {
         /// Lowest coordinates.
-        #[schemars(with = "[JsonNumber; 3]")]
         min: Vector,
         /// Highest coordinates.
-        #[schemars(with = "[JsonNumber; 3]")]
         max: Vector,
     },
+}
+
+/// The schema of a shape: the keys of all shapes, because viewers accept no alternatives.
+#[derive(JsonSchema)]
+#[allow(dead_code, reason = "only its schema is used")]
+struct ShapeSchema {
+    shape: ShapeName,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    normal: Option<[f32; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    offset: Option<f32>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    center: Option<[f32; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    half_extents: Option<[f32; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    rotation: Option<[f32; 4]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    radius: Option<f32>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    a: Option<[f32; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    b: Option<[f32; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    min: Option<[f32; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    max: Option<[f32; 3]>,
+}
+
+/// The names of the shapes.
+#[derive(JsonSchema)]
+#[schemars(rename_all = "lowercase")]
+#[allow(dead_code, reason = "only its schema is used")]
+enum ShapeName {
+    Plane,
+    Box,
+    Sphere,
+    Capsule,
+    Bounds,
 }
 
 impl CollidersRow {

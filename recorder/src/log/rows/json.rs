@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-/// The schema of a number. Non-finite numbers are strings.
+/// The schema of a number from a command, which may be any. Those of a state are finite.
 pub(super) struct JsonNumber;
 
 impl JsonSchema for JsonNumber {
@@ -13,6 +13,6 @@ impl JsonSchema for JsonNumber {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "anyOf": [{ "type": "number" }, { "enum": ["nan", "inf", "-inf"] }] })
+        json_schema!({ "type": ["number", "string"], "pattern": "^(nan|-?inf)$" })
     }
 }

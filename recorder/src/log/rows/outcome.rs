@@ -107,55 +107,55 @@ impl From<&OutcomeRow> for Outcome {
 #[allow(dead_code, reason = "only its schema is used")]
 struct ActionSchema {
     kind: String,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     particle: Option<u32>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     force: Option<bool>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     target: Option<[JsonNumber; 3]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     over_s: Option<JsonNumber>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     count: Option<u32>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     center: Option<[JsonNumber; 3]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     radius: Option<JsonNumber>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     delta: Option<[JsonNumber; 3]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     limit: Option<JsonNumber>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     constraint: Option<u32>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     from: Option<[JsonNumber; 3]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     to: Option<[JsonNumber; 3]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     direction: Option<[JsonNumber; 3]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     anchor: Option<u32>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     collider: Option<u32>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     translation: Option<[JsonNumber; 3]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     rotation: Option<[JsonNumber; 4]>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     parameter: Option<String>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     value: Option<ParameterValueSchema>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     constraint_kind: Option<String>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     scene: Option<String>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     to_step: Option<u64>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     back_steps: Option<u32>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     contents: Option<String>,
-    #[schemars(default)]
+    #[schemars(skip_serializing_if = "Option::is_none")]
     state_hash: Option<String>,
 }
 

@@ -4,8 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sim_contract::ParameterValues;
 
-use super::json::JsonNumber;
-
 /// The values of all parameters, at the start and after each change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ParametersRow {
@@ -21,19 +19,19 @@ pub struct ParametersRow {
 #[derive(JsonSchema)]
 #[allow(dead_code, reason = "only its schema is used")]
 struct ValuesSchema {
-    gravity: [JsonNumber; 3],
-    damping: JsonNumber,
-    wind_velocity: [JsonNumber; 3],
-    wind_drag: JsonNumber,
+    gravity: [f32; 3],
+    damping: f32,
+    wind_velocity: [f32; 3],
+    wind_drag: f32,
     substeps: u32,
     iterations: u32,
-    relaxation: JsonNumber,
-    max_stretch: Option<JsonNumber>,
-    tear_stretch: Option<JsonNumber>,
-    tear_distance: Option<JsonNumber>,
-    tear_force: Option<JsonNumber>,
-    max_speed: JsonNumber,
-    time_scale: JsonNumber,
+    relaxation: f32,
+    max_stretch: Option<f32>,
+    tear_stretch: Option<f32>,
+    tear_distance: Option<f32>,
+    tear_force: Option<f32>,
+    max_speed: f32,
+    time_scale: f32,
     compliance: PerKindSchema,
     stiffness: PerKindSchema,
 }
@@ -42,10 +40,10 @@ struct ValuesSchema {
 #[derive(JsonSchema)]
 #[allow(dead_code, reason = "only its schema is used")]
 struct PerKindSchema {
-    structural: Option<JsonNumber>,
-    shear: Option<JsonNumber>,
-    bend: Option<JsonNumber>,
-    tether: Option<JsonNumber>,
+    structural: Option<f32>,
+    shear: Option<f32>,
+    bend: Option<f32>,
+    tether: Option<f32>,
 }
 
 #[cfg(test)]

@@ -4,8 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sim_contract::{ConstraintState, LoadHeader, PlainF32, Torn, TornConstraint, Triangle};
 
-use super::json::JsonNumber;
-
 /// The constraints of a scene in columns. The position in a column is the constraint's index.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Columns")]
@@ -20,7 +18,7 @@ pub struct TopologyRow {
     /// Second particles.
     pub b: Vec<u32>,
     /// Rest lengths in m.
-    #[schemars(with = "Vec<JsonNumber>")]
+    #[schemars(with = "Vec<f32>")]
     pub rest_length: Vec<PlainF32>,
     /// Compliances in m/N (method xpbd) or stiffnesses (method pbd).
     #[serde(flatten)]
@@ -75,10 +73,10 @@ impl TryFrom<Columns> for TopologyRow {
 #[derive(JsonSchema)]
 #[allow(dead_code, reason = "only its schema is used")]
 struct SoftnessSchema {
-    #[schemars(default)]
-    compliance: Option<Vec<JsonNumber>>,
-    #[schemars(default)]
-    stiffness: Option<Vec<JsonNumber>>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    compliance: Option<Vec<f32>>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    stiffness: Option<Vec<f32>>,
 }
 
 impl TopologyRow {

@@ -1,5 +1,6 @@
 //! The edits that only the report can tell of.
 
+use prost::encoding::{decode_key, decode_varint};
 use sim_solver::Keyframe;
 
 use super::edit::{Edit, MESSAGE_HEADER_SIZE_BYTES};
@@ -42,11 +43,27 @@ pub(super) fn not_compared(edit: &Edit) -> Option<&'static str> {
 fn is_only_paused(edit: &Edit) -> bool {
     let (old_header, old) = edit.original.split_at(MESSAGE_HEADER_SIZE_BYTES);
     let (new_header, new) = edit.bytes.split_at(MESSAGE_HEADER_SIZE_BYTES);
-    let (Ok(mut old), Ok(new)) = (Keyframe::decode(old), Keyframe::decode(new)) else {
+    let (Some((old_fields, mut old)), Some((new_fields, new))) = (keyframe(old), keyframe(new))
+    else {
         return false;
     };
     old.paused = new.paused;
-    old_header == new_header && old == new
+    old_header == new_header && old_fields == new_fields && old == new
+}
+
+/// Splits a message on `/keyframe` into everything before the data, its last field, and the data.
+pub(super) fn keyframe(message: &[u8]) -> Option<(&[u8], Keyframe)> {
+    let mut rest = message;
+    while !rest.is_empty() {
+        let (number, _) = decode_key(&mut rest).ok()?;
+        let value = decode_varint(&mut rest).ok()?;
+        if number == 2 {
+            let keyframe = Keyframe::decode(rest).ok()?;
+            return (value == rest.len() as u64)
+                .then(|| (&message[..message.len() - rest.len()], keyframe));
+        }
+    }
+    None
 }
 
 fn is_pause(edit: &Edit) -> bool {

@@ -91,6 +91,12 @@ impl<'a> Player<'a> {
         }
     }
 
+    /// Plays from now on, again and again.
+    pub(super) fn start_looping(&mut self) {
+        self.playhead.is_looping = true;
+        self.playhead.resume(monotonic_ns());
+    }
+
     /// Plays until the program ends.
     pub(super) fn run(mut self, requests: &Requests) -> Result<(), ReadError> {
         let scene = self.recording.load.to_scene(self.state.row.step, &self.state.particles);

@@ -1,7 +1,7 @@
 //! A ring of files whose older ones another program moves or blocks.
 
 use clap::Parser;
-use recorder::{AllCounts, RunDescription};
+use recorder::{AllCounts, RunDescription, Up};
 
 use super::*;
 
@@ -35,6 +35,7 @@ fn header() -> RunHeader {
         epoch_ns: 0,
         scene_name: "points".to_owned(),
         origin: [0.0; 3],
+        up: Up::Y,
         rate_hz: 240,
         method: 0,
         particle_count: 1,

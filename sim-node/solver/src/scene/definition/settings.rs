@@ -30,6 +30,20 @@ impl Up {
     /// The names in a scene.
     pub(crate) const NAMES: [(&'static str, Self); 3] =
         [("y", Self::Y), ("-y", Self::MinusY), ("z", Self::Z)];
+
+    /// Returns the name in a scene.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::MinusY => "-y",
+            Self::Z => "z",
+        }
+    }
+
+    /// Returns the axis with this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|(one, _)| *one == name).map(|(_, up)| *up)
+    }
 }
 
 /// Order in which constraints are projected.
