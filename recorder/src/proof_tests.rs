@@ -17,7 +17,7 @@ use recorder::{
 use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
-use crate::commands::verify::{Report, Verdict, verify};
+use crate::commands::verify::{Report, StepRange, Verdict, VerifyOptions, verify};
 use crate::simulation::{Job, SimulationResult, States, simulate};
 
 const COMMANDS: &str = r#"
@@ -31,6 +31,10 @@ const COMMANDS: &str = r#"
     {"step":100,"kind":"reset"}
     {"step":110,"kind":"pin","particle":4000}
 "#;
+
+/// All steps, on one thread.
+const ALL: VerifyOptions =
+    VerifyOptions { threads: 1, range: StepRange { start: 0, last: u64::MAX } };
 
 fn job(scene: &str, commands: &str, steps: u64) -> Job {
     let scene = Scene::from_toml(builtin::text(scene).unwrap(), scene).unwrap();
@@ -50,7 +54,8 @@ fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
 }
 
 fn check(file: &[u8]) -> (Report, Option<LogEnd>) {
-    verify(LogReader::new(file).unwrap(), "test.mcap", 1, &AtomicBool::new(false), |_| {}).unwrap()
+    verify(LogReader::new(file).unwrap(), "test.mcap", ALL, &AtomicBool::new(false), |_| {})
+        .unwrap()
 }
 
 /// Rebuilds a recording. `change` returns the new message, or `None` to leave it out.
@@ -296,6 +301,41 @@ fn a_recording_that_starts_late_and_declares_missing_snapshots_is_bit_identical(
 }
 
 #[test]
+fn a_range_of_steps_is_compared_and_no_others() {
+    // One keyframe a second: 0, 240, 480, 720.
+    let (file, _) = record(&job("curtain", "", 900));
+    let damaged = rebuild(&file, |mut message| {
+        if let Message::Particles { step: 600, particles } = &mut message {
+            particles[150].position[0] += 1e-6;
+        }
+        Some(message)
+    });
+    let verified = |start, last| {
+        let options = VerifyOptions { threads: 1, range: StepRange { start, last } };
+        let log = LogReader::new(damaged.as_slice()).unwrap();
+        verify(log, "test.mcap", options, &AtomicBool::new(false), |_| {}).unwrap().0
+    };
+    for (start, last, expected) in [
+        (0, 599, Ok((0, 599))),
+        (240, 480, Ok((240, 480))),
+        (720, u64::MAX, Ok((720, 900))),
+        (0, 600, Err(600)),
+        (480, 700, Err(600)),
+    ] {
+        let report = verified(start, last);
+        match expected {
+            Ok((first, last)) => {
+                assert_eq!(report.verdict, Verdict::Identical, "{report}");
+                let steps = (report.first_step, report.last_identical_step);
+                assert_eq!(steps, (first, Some(last)), "{report}");
+                assert_eq!(report.steps_identical, last - first);
+            }
+            Err(step) => assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(step))),
+        }
+    }
+}
+
+#[test]
 fn a_recording_without_a_keyframe_is_an_error() {
     let (file, _) = record(&job("curtain", "", 10));
     let without =
@@ -303,7 +343,7 @@ fn a_recording_without_a_keyframe_is_an_error() {
     let error = verify(
         LogReader::new(without.as_slice()).unwrap(),
         "x.mcap",
-        1,
+        ALL,
         &AtomicBool::new(false),
         |_| {},
     );
@@ -323,7 +363,7 @@ fn a_recording_of_another_solver_version_is_refused() {
     let error = verify(
         LogReader::new(file.as_slice()).unwrap(),
         "x.mcap",
-        1,
+        ALL,
         &AtomicBool::new(false),
         |_| {},
     );

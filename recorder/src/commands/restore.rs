@@ -19,6 +19,7 @@ use crate::cli::parse::{self, whole_number};
 use crate::cli::thread_args::ThreadArgs;
 use crate::commands::verify::resimulation::{Finding, Resimulation};
 use crate::input::scene_source::scene_in_recording;
+use crate::input::state_place::{Place, Wanted, find_state};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -82,15 +83,6 @@ struct RecordedState {
     state_hash: u64,
 }
 
-/// The state to look for.
-#[derive(Debug, Clone, Copy)]
-enum Wanted {
-    Last,
-    Step(u64),
-    /// The last one up to this step.
-    UpTo(u64),
-}
-
 pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     report_bus_errors()?;
@@ -106,7 +98,7 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
         (None, Some(time)) => Wanted::UpTo(step_at(time, log.run().rate_hz)),
         (None, None) => Wanted::Last,
     };
-    let place = find(log, wanted).with_context(|| path.clone())?;
+    let place = find_state(log, wanted).with_context(|| path.clone())?;
     let state = read_state(&args.file, place, args.threads.count(), &stop).context(path)?;
     let given = GivenState {
         scene_hash: state.scene_hash,
@@ -145,46 +137,6 @@ fn check_scene<R: std::io::Read>(
 fn step_at(time: Duration, rate_hz: u32) -> u64 {
     let steps = time.as_nanos() * u128::from(rate_hz) / 1_000_000_000;
     u64::try_from(steps).unwrap_or(u64::MAX)
-}
-
-/// The steps of a state and of the keyframe to start from.
-#[derive(Debug, Clone, Copy)]
-struct Place {
-    step: u64,
-    keyframe_step: u64,
-}
-
-/// Finds the wanted state, and the last keyframe up to it.
-fn find<R: std::io::Read>(log: LogReader<R>, wanted: Wanted) -> anyhow::Result<Place> {
-    let mut frames = FrameReader::new(log);
-    let (mut found, mut keyframe_step, mut first) = (None, None, None);
-    while let Some(frame) = frames.next_frame()? {
-        let step = frame.row.step;
-        first.get_or_insert(step);
-        let is_later = match wanted {
-            Wanted::Last => false,
-            Wanted::Step(wanted) | Wanted::UpTo(wanted) => step > wanted,
-        };
-        if is_later {
-            break;
-        }
-        if frame.own_keyframe().is_some() {
-            keyframe_step = Some(step);
-        }
-        found = keyframe_step.map(|keyframe_step| Place { step, keyframe_step });
-    }
-    let found = found.filter(|place| match wanted {
-        Wanted::Step(wanted) => place.step == wanted,
-        Wanted::Last | Wanted::UpTo(_) => true,
-    });
-    found.with_context(|| match (wanted, first) {
-        (_, None) => "has no snapshot".to_owned(),
-        (Wanted::Step(step) | Wanted::UpTo(step), Some(first)) => format!(
-            "has no complete state of step {step}: it begins with step {first}, and `recorder info` \
-             shows its steps"
-        ),
-        (Wanted::Last, Some(_)) => "has no keyframe".to_owned(),
-    })
 }
 
 /// Reads the state, and simulates it from the keyframe if it has none of its own.

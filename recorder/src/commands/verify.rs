@@ -25,11 +25,14 @@ use sim_solver::SOLVER_VERSION;
 
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
-use crate::cli::progress::progress_spinner;
+use crate::cli::parse::whole_number;
+use crate::cli::progress::progress_bytes;
 use crate::cli::thread_args::ThreadArgs;
 use crate::input::scene_source::scene_in_recording;
+use crate::input::state_place::{Wanted, find_state};
 use difference::Difference;
 use resimulation::Finding;
+pub(crate) use verification::{StepRange, VerifyOptions};
 use verification::{Verification, VerifyError};
 
 /// Snapshots between two updates of the progress bar.
@@ -43,11 +46,18 @@ const SNAPSHOTS_PER_UPDATE: u64 = 64;
     Exit codes: 0 every recorded step is bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
+    recorder verify run.mcap --from 4800 --to 9600\n  \
     recorder verify run.mcap --json"
 )]
 pub(crate) struct VerifyArgs {
     /// Recording to re-simulate, from its first snapshot with a keyframe
     file: PathBuf,
+    /// Compare the states from this step on. The simulation starts at the last complete state up to it
+    #[arg(long, value_name = "STEP", allow_hyphen_values = true, value_parser = whole_number)]
+    from: Option<u64>,
+    /// Compare the states up to this step
+    #[arg(long, value_name = "STEP", allow_hyphen_values = true, value_parser = whole_number)]
+    to: Option<u64>,
     #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
@@ -90,11 +100,13 @@ pub(crate) enum Verdict {
 pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     let path = output::path_text(&args.file);
-    let log = LogReader::open_until(&args.file, &stop).with_context(|| path.clone())?;
-    let bar = progress_spinner();
-    let (report, end) = verify(log, &path, args.threads.count(), stop.flag(), |step| {
-        bar.set_message(format!("step {step}"));
-    })?;
+    let open = || LogReader::open_until(&args.file, &stop).with_context(|| path.clone());
+    let range = args.range(open)?;
+    let size_bytes = std::fs::metadata(&args.file).map_or(0, |file| file.len());
+    let bar = progress_bytes(size_bytes);
+    let options = VerifyOptions { threads: args.threads.count(), range };
+    let (report, end) =
+        verify(open()?, &path, options, stop.flag(), |bytes| bar.set_position(bytes))?;
     bar.finish_and_clear();
     output::result(args.as_json, &report, &report.text())?;
     if let Some(end) = &end {
@@ -107,12 +119,29 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     })
 }
 
-/// Re-simulates a recording with `threads` threads. Calls `on_progress` periodically, with the step.
+impl VerifyArgs {
+    /// Returns the steps to compare, with the one to start from.
+    fn range<R: Read>(
+        &self,
+        open: impl FnOnce() -> anyhow::Result<LogReader<R>>,
+    ) -> anyhow::Result<StepRange> {
+        let last = self.to.unwrap_or(u64::MAX);
+        let Some(from) = self.from else { return Ok(StepRange { start: 0, last }) };
+        if from > last {
+            bail!("--from {from} is after --to {last}");
+        }
+        let place = find_state(open()?, Wanted::UpTo(from));
+        let place = place.with_context(|| output::path_text(&self.file))?;
+        Ok(StepRange { start: place.keyframe_step, last })
+    }
+}
+
+/// Re-simulates a recording. Calls `on_progress` periodically, with the number of bytes that are read.
 /// Ends early, even within a step, if `stop` becomes true.
 pub(crate) fn verify<R: Read>(
     log: LogReader<R>,
     path: &str,
-    threads: usize,
+    options: VerifyOptions,
     stop: &AtomicBool,
     on_progress: impl FnMut(u64),
 ) -> anyhow::Result<(Report, Option<LogEnd>)> {
@@ -128,7 +157,7 @@ pub(crate) fn verify<R: Read>(
         );
     }
     let scene = scene_in_recording(&log).with_context(|| path.to_owned())?;
-    let mut verification = Verification::new(log, scene, threads);
+    let mut verification = Verification::new(log, scene, options);
     let mut report = Report::new();
     match verification.check_header() {
         Finding::Identical => {
@@ -160,7 +189,7 @@ fn compare_states<R: Read>(
     while let Some((step, finding)) = verification.next(stop)? {
         count += 1;
         if count % SNAPSHOTS_PER_UPDATE == 0 {
-            on_progress(step);
+            on_progress(verification.frames.log().intact_count());
         }
         if report.is_empty() {
             report.first_step = step;
@@ -169,7 +198,7 @@ fn compare_states<R: Read>(
             return Ok(());
         }
     }
-    if verification.simulation.is_some() {
+    if verification.simulation.is_some() && verification.coverage.last_step.is_none() {
         let finding = verification.check_end();
         report.add_end(finding);
     }

@@ -7,7 +7,7 @@ use recorder::{LogReader, Message, OutcomeRow, parse_commands};
 use sim_contract::ActionFields;
 use sim_solver::{PARAMETERS, Scene};
 
-use super::{check, rebuild, record};
+use super::{ALL, check, rebuild, record};
 use crate::commands::verify::{Verdict, verify};
 use crate::simulation::Job;
 
@@ -182,7 +182,7 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
 fn a_request_to_stop_interrupts_the_verification_within_a_step() {
     let (file, _) = record(&job(COMMANDS));
     let log = LogReader::new(file.as_slice()).unwrap();
-    let (report, _) = verify(log, "test.mcap", 1, &AtomicBool::new(true), |_| {}).unwrap();
+    let (report, _) = verify(log, "test.mcap", ALL, &AtomicBool::new(true), |_| {}).unwrap();
     assert_eq!((report.verdict, report.steps_identical), (Verdict::Interrupted, 0));
 }
 

@@ -27,7 +27,7 @@ use json::json_edits;
 use not_compared::not_compared;
 
 use crate::commands::verify::{Verdict, verify};
-use crate::proof_tests::finish;
+use crate::proof_tests::{ALL, finish};
 use crate::simulation::{Job, States, simulate};
 
 /// A scene whose recording has every topic: a particle that freezes, a cut, and a moving collider.
@@ -140,7 +140,7 @@ fn verified(file: &[u8]) -> (Option<String>, Vec<String>) {
         Ok(log) => log,
         Err(error) => return (Some(error.to_string()), Vec::new()),
     };
-    match verify(log, "x.mcap", 1, &AtomicBool::new(false), |_| {}) {
+    match verify(log, "x.mcap", ALL, &AtomicBool::new(false), |_| {}) {
         Err(error) => (Some(format!("{error:#}")), Vec::new()),
         Ok((_, Some(end))) => (Some(end.to_string()), Vec::new()),
         Ok((report, None)) if report.verdict == Verdict::Identical => (None, report.not_covered),

@@ -60,6 +60,14 @@ fn a_recording_of_commands_becomes_the_full_one_bit_for_bit() {
         let info = recorder(&sandbox, &["info", "--json", file]).json();
         assert_eq!((&info["last_step"], &info["lost"]), (&last.into(), &serde_json::json!({})));
     }
+    let args = ["verify", "--json", &flight, "--from", "380", "--to", "390"];
+    let verified = recorder(&sandbox, &args).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    assert_eq!(verified["last_identical_step"], 390, "{verified}");
+    assert!(verified["first_step"].as_u64().unwrap() <= 380, "{verified}");
+    let refused = recorder(&sandbox, &["verify", &flight, "--from", "390", "--to", "380"]);
+    assert!(refused.stderr.contains("--from 390 is after --to 380"), "{refused:?}");
+
     let completed = frames(&completed);
     assert_eq!(completed.len(), direct.len());
     for (one, other) in completed.iter().zip(&direct) {

@@ -35,6 +35,8 @@ pub(super) struct Coverage {
     pub(super) left_out: Vec<Topic>,
     /// Snapshots before the first one with a keyframe.
     pub(super) skipped_count: u64,
+    /// The last step to compare, if the recording has later ones.
+    pub(super) last_step: Option<u64>,
     /// The first state was restored from the recording, not computed from the scene.
     pub(super) is_restored: bool,
     /// States that a command put in place, and that the simulation had not computed before.
@@ -70,7 +72,10 @@ impl Coverage {
         }
         if self.skipped_count > 0 {
             let count = self.skipped_count;
-            all.push(format!("{count} snapshots before the first one with a keyframe"));
+            all.push(format!("{count} snapshots before the state to start from"));
+        }
+        if let Some(step) = self.last_step {
+            all.push(format!("everything after step {step}, the last one to compare"));
         }
         if self.earlier_count > 0 {
             all.push(format!("{} messages that precede the first state", self.earlier_count));

@@ -26,12 +26,30 @@ pub(crate) enum VerifyError {
     Start(#[from] StartError),
 }
 
+/// The steps of a verification.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepRange {
+    /// The step to start from, if it has a complete state, or the next one that has.
+    pub(crate) start: u64,
+    /// The last step to compare.
+    pub(crate) last: u64,
+}
+
+/// Options of a verification.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct VerifyOptions {
+    /// Threads of the solver.
+    pub(crate) threads: usize,
+    pub(crate) range: StepRange,
+}
+
 /// A recording that is being verified.
 #[derive(Debug)]
 pub(super) struct Verification<R> {
     pub(super) frames: FrameReader<R>,
     scene: Scene,
     threads: usize,
+    range: StepRange,
     pub(super) simulation: Option<Resimulation>,
     pub(super) coverage: Coverage,
     /// Number of scene loads, from `/topology`.
@@ -48,7 +66,8 @@ pub(super) struct Verification<R> {
 }
 
 impl<R: Read> Verification<R> {
-    pub(super) fn new(log: LogReader<R>, scene: Scene, threads: usize) -> Self {
+    pub(super) fn new(log: LogReader<R>, scene: Scene, options: VerifyOptions) -> Self {
+        let VerifyOptions { threads, range } = options;
         let is_simulated = log.run().epoch_ns == 0;
         let is_older_format = !log.is_current_format();
         let has_numbers = log.format_version() >= NUMBERED_VERSION;
@@ -61,6 +80,7 @@ impl<R: Read> Verification<R> {
             frames: FrameReader::new(log.with_audit()),
             scene,
             threads,
+            range,
             simulation: None,
             coverage,
             revision: None,
@@ -96,6 +116,10 @@ impl<R: Read> Verification<R> {
                 Err(error) => return Err(error.into()),
             };
             let step = frame.row.step;
+            if step > self.range.last {
+                self.coverage.last_step = Some(self.range.last);
+                return Ok(None);
+            }
             let finding = self.check_content(&frame);
             if finding != Finding::Identical {
                 return Ok(Some((step, finding)));
@@ -243,6 +267,9 @@ impl<R: Read> Verification<R> {
                 Finding::Identical => self.check_events_of_simulation(frame),
                 finding => finding,
             }));
+        }
+        if frame.row.step < self.range.start {
+            return Ok(None);
         }
         let Some(mut start) = Resimulation::start(&self.scene, frame)? else { return Ok(None) };
         start.set_threads(self.threads);

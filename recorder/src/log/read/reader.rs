@@ -142,7 +142,7 @@ impl<R: Read> LogReader<R> {
     }
 
     /// Returns the number of bytes of the file that are read and intact.
-    pub(in crate::log) fn intact_count(&self) -> u64 {
+    pub fn intact_count(&self) -> u64 {
         self.records.intact_count()
     }
 
