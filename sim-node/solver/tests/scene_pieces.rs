@@ -141,6 +141,10 @@ fn errors_in_divided_tables_count_the_elements_of_earlier_pieces() {
             "syntax: missing comma between array elements (allowed: `,`)",
         ),
         (mesh("[0, 2, 3]]\nmass = 0.5", "[0, 2, 3]"), "syntax: unclosed array (allowed: `]`)"),
+        (
+            mesh("[0, 2, 3]]\n", "[0, 2, 3]\n"),
+            "syntax: missing comma between array elements (allowed: `,`)",
+        ),
         (mesh("mass = 0.5", "pinned = []"), "pinned: occurs twice (allowed: once)"),
         (
             anchor("path = [{ time = 0 }, @ { time = 1 }, @ { at = 2 }]"),

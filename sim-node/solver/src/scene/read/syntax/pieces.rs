@@ -186,9 +186,12 @@ impl<'t> Divider<'t> {
 
     /// Returns the pieces, unless the text cannot be divided.
     fn finish(mut self) -> Option<Vec<Piece<'t>>> {
-        if self.list.as_ref().is_some_and(|list| !list.cuts.is_empty()) {
-            // The list has no end. The parser finds that at the end of the piece with its start.
-            self.start = self.text.trim_end().len();
+        if let Some(cut) = self.list.as_ref().and_then(|list| list.cuts.last().copied()) {
+            // The list has no end. The parser finds the reason behind the last cut, or else the missing
+            // bracket at the end of the text.
+            let end = self.text.floor_char_boundary(cut + PIECE_SIZE_BYTES + LIST_SIZE_BYTES);
+            self.ranges.push(cut..end);
+            self.start = self.text.trim_end().len().max(end);
         }
         self.end_piece(self.text.len());
         (!self.has_stray_header).then_some(self.pieces)
