@@ -68,12 +68,12 @@ fn keys_of_different_pieces_must_differ() {
 
 /// Four particles, and an anchor of three of them.
 const ANCHOR: &str = "version = 1\n@[[generate]]\nshape = \"rope\"\ncount = 4\nfrom = [0, 0, 0]\n\
-    to = [1, 0, 0]\n@[[anchor]]\nparticles = [0, @ 1, @ 3]\n";
+    to = [1, 0, 0]\n@[[anchor]]\nparticles = [@ 0, @ 1, @ 3]\n";
 
 #[test]
 fn an_anchor_can_be_divided_between_particles_and_points_of_its_path() {
     for path in [
-        "path = [{ time = 0 }, @ { time = 1 }, @ { time = 2, translation = [0, 1, 0] }, @]",
+        "path = [@ { time = 0 }, @ { time = 1 }, @ { time = 2, translation = [0, 1, 0] }, @]",
         "@[[anchor.path]]\ntime = 0\n@[[anchor.path]]\ntime = 1\n@[[anchor.path]]\ntime = 2\n\
          translation = [0, 1, 0]\n@[[particle]]\nposition = [2, 0, 0]\n@[[generate]]\n\
          shape = \"ragdoll\"\nheight = 1",
@@ -96,8 +96,8 @@ fn tables_below_other_tables_are_read_in_any_order() {
 
 /// A mesh of two triangles.
 const MESH: &str = "version = 1\n@[[generate]]\nshape = \"obj\"\n\
-    vertices = [[0, 0, 0], @ [1, 0, 0], # ], [\n@ [1, 1, 0], @@ [0, 1, 0]@]\n\
-    pinned = [0, @ 3, @ 1,]\nfaces = [[0, 1, 2], @ [0, 2, 3]]\nmass = 0.5\n";
+    vertices = [@ [0, 0, 0], @ [1, 0, 0], # ], [\n@ [1, 1, 0], @@ [0, 1, 0]@]\n\
+    pinned = [@ 0, @ 3, @ 1,]\nfaces = [@ [0, 1, 2], @ [0, 2, 3]]\nmass = 0.5\n";
 
 #[test]
 fn a_mesh_can_be_divided_between_vertices_faces_and_pinned_vertices() {
@@ -135,7 +135,7 @@ fn errors_in_divided_tables_count_the_elements_of_earlier_pieces() {
             "generate[0].faces: face 1 is [0, 2, 4] (allowed: 3 or more different vertices below 4)",
         ),
         (mesh("3, @ 1,", "3, @ -1,"), "generate[0].pinned: -1 is out of range (allowed: 0 to 3)"),
-        (mesh("[0, @ 3,", "[0, @ , 3,"), "syntax: extra comma in array (allowed: value)"),
+        (mesh("0, @ 3,", "0, @ , 3,"), "syntax: extra comma in array (allowed: value)"),
         (
             mesh("[1, 0, 0], ", "[1, 0, 0] "),
             "syntax: missing comma between array elements (allowed: `,`)",
@@ -147,11 +147,11 @@ fn errors_in_divided_tables_count_the_elements_of_earlier_pieces() {
         ),
         (mesh("mass = 0.5", "pinned = []"), "pinned: occurs twice (allowed: once)"),
         (
-            anchor("path = [{ time = 0 }, @ { time = 1 }, @ { at = 2 }]"),
+            anchor("path = [@ { time = 0 }, @ { time = 1 }, @ { at = 2 }]"),
             "anchor[0].path[2].at: unknown key (allowed: time, translation, rotation)",
         ),
         (
-            anchor("path = [{ time = 0 }, @ { time = 1 }, @ { time = 1 }]"),
+            anchor("path = [@ { time = 0 }, @ { time = 1 }, @ { time = 1 }]"),
             "anchor[0].path[2].time: 1 is not after 1 (allowed: ascending times)",
         ),
         (

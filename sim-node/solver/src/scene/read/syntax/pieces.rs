@@ -53,7 +53,8 @@ struct Divider<'t> {
     ranges: Vec<Range<usize>>,
     start: usize,
     continued: Option<&'t str>,
-    /// The pieces with the rest of the long lists of the current table.
+    /// The pieces with the rest of the long lists of the current table. It is the last one of the
+    /// current piece, which is full when it divides a list.
     rests: Vec<Piece<'t>>,
     /// The last header with a single key.
     table: Option<Header<'t>>,
@@ -118,7 +119,7 @@ impl<'t> Divider<'t> {
         let is_full = self.is_full(start);
         self.lists = header.lists();
         if header.has_single_key() {
-            if self.table.is_none() || is_full || !self.rests.is_empty() {
+            if self.table.is_none() || is_full {
                 self.end_piece(start);
             }
             self.table = Some(header);
@@ -191,7 +192,7 @@ impl<'t> Divider<'t> {
             // bracket at the end of the text.
             let end = self.text.floor_char_boundary(cut + PIECE_SIZE_BYTES + LIST_SIZE_BYTES);
             self.ranges.push(cut..end);
-            self.start = self.text.trim_end().len().max(end);
+            self.start = self.text.len();
         }
         self.end_piece(self.text.len());
         (!self.has_stray_header).then_some(self.pieces)
