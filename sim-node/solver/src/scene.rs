@@ -32,6 +32,7 @@ pub use generate::ragdoll::Ragdoll;
 pub use generate::rope::Rope;
 pub use generate::web::Web;
 pub use generate::{Generator, Shape};
+pub use mesh::pins::check_pin_expression;
 pub use mesh::{Mesh, ParsedMesh};
-pub use read::pins::check_pin_expression;
+
 pub use source::{LoadError, is_path};

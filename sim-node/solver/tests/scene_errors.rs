@@ -64,13 +64,19 @@ fn a_scene_with_too_many_colliders_is_refused() {
 fn a_scene_whose_complete_text_is_too_long_is_refused() {
     let with_unit = |length| error(&format!("version = 1\nunit = \"{}\"", "m".repeat(length)));
     assert_eq!(with_unit(SCENE_SIZE_BYTES_MAX - 1000), "accepted");
-    let error = with_unit(SCENE_SIZE_BYTES_MAX - 20);
+    let error = with_unit(SCENE_SIZE_BYTES_MAX - 21);
     let (size_bytes, rest) = error
         .strip_prefix("f.toml:1: scene: has ")
         .and_then(|error| error.split_once(" bytes of text "))
         .unwrap_or_else(|| panic!("{}", &error[..100.min(error.len())]));
     assert!(size_bytes.parse::<usize>().unwrap() > SCENE_SIZE_BYTES_MAX);
     assert_eq!(rest, "with every default and mesh written out (allowed: 16777216)");
+}
+
+#[test]
+fn a_text_that_is_too_long_is_refused() {
+    let error = error(&"#".repeat(SCENE_SIZE_BYTES_MAX + 1));
+    assert_eq!(error, "f.toml:1: scene: has 16777217 bytes of text (allowed: 16777216)");
 }
 
 #[test]

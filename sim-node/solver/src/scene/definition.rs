@@ -12,8 +12,8 @@ pub(crate) mod wind;
 use serde::Serialize;
 use sim_types::STEP_WORK_MAX;
 
-use super::generate::{Generator, Shape};
-use super::model::Model;
+use super::generate::Generator;
+use super::model::{Model, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
 use collider::SceneCollider;
@@ -121,11 +121,10 @@ impl Scene {
     }
 
     fn step_size(&self) -> StepSize {
-        let shapes = || self.generators.iter().map(|generator| &generator.shape);
-        let generated = |count: fn(&Shape) -> u64| shapes().map(count).sum::<u64>();
+        let generated = self.generators.iter().map(|generator| generator.shape.constraint_count());
         StepSize {
-            particles: self.particles.len() as u64 + generated(Shape::particle_count),
-            constraints: self.constraints.len() as u64 + generated(Shape::constraint_count),
+            particles: self.particle_count(),
+            constraints: self.constraints.len() as u64 + generated.sum::<u64>(),
             colliders: self.colliders.len() as u64,
         }
     }
@@ -146,14 +145,48 @@ impl Scene {
     /// Expands the scene: explicit particles first, then those of each generator, and constraints
     /// likewise.
     pub(crate) fn model(&self) -> Model {
-        let mut model = Model::new(self.solver.method, self.particles.clone());
+        let mut particles = self.room_for_particles();
+        self.for_each_particle(&mut |particle| particles.push(particle));
+        let mut model = Model::new(self.solver.method, particles);
         for constraint in &self.constraints {
             model.push_explicit(constraint);
         }
+        let mut first = self.particles.len() as u64;
         for generator in &self.generators {
-            generator.build(self.up, &mut model);
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "a scene has at most 2^24 particles"
+            )]
+            generator.build_constraints(first as u32, &mut model);
+            first += generator.shape.particle_count();
         }
         model
+    }
+
+    /// Returns the positions of all particles.
+    pub(crate) fn positions(&self) -> Positions {
+        let mut positions = self.room_for_particles();
+        self.for_each_particle(&mut |particle| positions.push(particle.position));
+        Positions(positions)
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]
+    fn room_for_particles<T>(&self) -> Vec<T> {
+        Vec::with_capacity(self.particle_count() as usize)
+    }
+
+    /// Returns the number of particles, including the generated ones.
+    pub(crate) fn particle_count(&self) -> u64 {
+        let generated = self.generators.iter().map(|generator| generator.shape.particle_count());
+        self.particles.len() as u64 + generated.sum::<u64>()
+    }
+
+    /// Visits the explicit particles first, then those of each generator.
+    fn for_each_particle(&self, visit: &mut dyn FnMut(SceneParticle)) {
+        self.particles.iter().copied().for_each(&mut *visit);
+        for generator in &self.generators {
+            generator.for_each_particle(self.up, visit);
+        }
     }
 }
 

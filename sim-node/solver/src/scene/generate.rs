@@ -12,12 +12,13 @@ pub(super) mod web;
 use serde::Serialize;
 
 use super::definition::decimal;
+use super::definition::element::SceneParticle;
 use super::definition::limits::Limits;
 use super::definition::settings::Up;
 use super::definition::softness::KindSoftness;
 use super::model::Model;
 use bridge::Bridge;
-use builder::Builder;
+use builder::{ConstraintBuilder, ParticleBuilder};
 use cloth::Cloth;
 use obj::Obj;
 use pinned::Pinned;
@@ -92,19 +93,33 @@ impl Shape {
 }
 
 impl Generator {
-    /// Appends the shape's particles, constraints and triangles to a model.
-    pub(crate) fn build(&self, up: Up, model: &mut Model) {
-        let Self { shape, mass, pinned, softness, tear_stretch } = self;
-        model.set_limits(Limits { tear_stretch: *tear_stretch, ..Limits::default() });
-        let first = model.particle_count();
-        let mut builder = Builder { pinned, mass: *mass, softness: *softness, up, first, model };
+    /// Visits the shape's particles.
+    pub(crate) fn for_each_particle(&self, up: Up, visit: &mut dyn FnMut(SceneParticle)) {
+        let Self { shape, mass, pinned, .. } = self;
+        let mut builder = ParticleBuilder { pinned, mass: *mass, up, count: 0, visit };
         match shape {
-            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.build(&mut builder),
-            Shape::Rope(rope) => rope.build(&mut builder),
-            Shape::Web(web) => web.build(&mut builder),
-            Shape::Bridge(bridge) => bridge.build(&mut builder),
-            Shape::Ragdoll(ragdoll) => ragdoll.build(&mut builder),
-            Shape::Obj(obj) => obj.build(&mut builder),
+            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.build_particles(&mut builder),
+            Shape::Rope(rope) => rope.build_particles(&mut builder),
+            Shape::Web(web) => web.build_particles(&mut builder),
+            Shape::Bridge(bridge) => bridge.build_particles(&mut builder),
+            Shape::Ragdoll(ragdoll) => ragdoll.build_particles(&mut builder),
+            Shape::Obj(obj) => obj.build_particles(&mut builder),
+        }
+    }
+
+    /// Appends the shape's constraints and triangles to a model that has its particles. `first` is the
+    /// index of the first one.
+    pub(crate) fn build_constraints(&self, first: u32, model: &mut Model) {
+        let Self { shape, softness, tear_stretch, .. } = self;
+        model.set_limits(Limits { tear_stretch: *tear_stretch, ..Limits::default() });
+        let mut builder = ConstraintBuilder { softness: *softness, first, model };
+        match shape {
+            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.build_constraints(&mut builder),
+            Shape::Rope(rope) => rope.build_constraints(&mut builder),
+            Shape::Web(web) => web.build_constraints(&mut builder),
+            Shape::Bridge(bridge) => bridge.build_constraints(&mut builder),
+            Shape::Ragdoll(_) => Ragdoll::build_constraints(&mut builder),
+            Shape::Obj(obj) => obj.build_constraints(&mut builder),
         }
     }
 }

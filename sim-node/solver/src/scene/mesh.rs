@@ -1,5 +1,7 @@
 //! Meshes from Wavefront OBJ text. Vertices, faces and groups are read; everything else is ignored.
 
+pub(super) mod pins;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Vertices and the faces between them.

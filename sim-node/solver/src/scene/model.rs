@@ -25,7 +25,7 @@ pub(crate) struct Model {
 }
 
 impl Model {
-    /// Creates a model with the explicit particles of a scene.
+    /// Creates a model with all particles of a scene.
     pub(crate) fn new(method: Method, particles: Vec<SceneParticle>) -> Self {
         Self { particles, method, ..Self::default() }
     }
@@ -85,8 +85,27 @@ impl Model {
     }
 
     pub(crate) fn distance_squared(&self, a: u32, b: u32) -> f32 {
-        let (a, b) = (self.particles[a as usize].position, self.particles[b as usize].position);
-        let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        x * x + y * y + z * z
+        let position = |index: u32| self.particles[index as usize].position;
+        distance_squared(position(a), position(b))
     }
+}
+
+/// The positions of all particles of a scene: enough to read what refers to them.
+pub(crate) struct Positions(pub(crate) Vec<[f32; 3]>);
+
+impl Positions {
+    #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]
+    pub(crate) fn particle_count(&self) -> u32 {
+        self.0.len() as u32
+    }
+
+    /// Returns the distance between two particles in f32, as a step measures it.
+    pub(crate) fn distance(&self, a: u32, b: u32) -> f32 {
+        distance_squared(self.0[a as usize], self.0[b as usize]).sqrt()
+    }
+}
+
+fn distance_squared(a: [f32; 3], b: [f32; 3]) -> f32 {
+    let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+    x * x + y * y + z * z
 }

@@ -3,12 +3,12 @@
 mod anchor;
 mod collider;
 mod element;
+mod file_scene;
 mod generator;
 mod generator_fields;
 mod generator_file;
 mod limits;
 mod mesh;
-pub(super) mod pins;
 mod reader;
 mod settings;
 mod syntax;
@@ -16,56 +16,34 @@ mod value;
 mod wind;
 
 use std::cell::RefCell;
+use std::mem::take;
+use std::ops::Range;
 use std::path::Path;
 
-use serde::Deserialize;
 use sim_types::{
     COLLIDERS_MAX, COORDINATE_MAX, ELEMENTS_MAX, Method, ParameterValues, SCENE_SIZE_BYTES_MAX,
 };
 
+use super::definition::collider::SceneCollider;
 use super::definition::settings::Up;
 use super::definition::{SCENE_VERSION, Scene};
 use super::error::{Place, SceneError};
-use super::model::Model;
-use anchor::FileAnchor;
+use super::model::Positions;
 use collider::FileCollider;
-use element::{FileConstraint, FileParticle};
-use generator_file::FileGenerator;
+use file_scene::FileScene;
 use reader::Reader;
 use settings::FileSolver;
-use value::{Table, Tables, Vector, Whole, Word};
-use wind::FileWind;
+use value::{Spanned, Tables, Vector, Word};
 
-/// The scene file before any check. Every key is optional, and every value has its place in the
-/// text.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileScene {
-    version: Option<Whole>,
-    name: Option<Word>,
-    origin: Option<Vector>,
-    dimensions: Option<Whole>,
-    up: Option<Word>,
-    unit: Option<String>,
-    gravity: Option<Vector>,
-    #[serde(default)]
-    solver: Table<FileSolver>,
-    wind: Option<Table<FileWind>>,
-    #[serde(default)]
-    particle: Tables<FileParticle>,
-    #[serde(default)]
-    constraint: Tables<FileConstraint>,
-    #[serde(default)]
-    collider: Tables<FileCollider>,
-    #[serde(default)]
-    anchor: Tables<FileAnchor>,
-    #[serde(default)]
-    generate: Tables<FileGenerator>,
-}
+/// Most memory of all positions, and of the constraints and anchors of the file, in MiB. The greatest
+/// number of particles and the longest complete text need less.
+const REFERENCES_MAX_MIB: u64 = 232;
 
 impl Scene {
     /// Reads and checks a scene. `label` names the text in errors: the path of a file, or a name.
     /// Its stem is the name of a scene that has none.
+    ///
+    /// Takes at most 256 MiB of memory beyond the scene itself.
     ///
     /// # Errors
     /// The text is not TOML, or a value is wrong. The error names the line, the field and what is
@@ -79,7 +57,7 @@ impl Scene {
     ///
     /// `read_file` receives the path as it stands in the text, relative to the scene's own file. It
     /// returns the text of the file, or what is wrong. The scene then holds the contents and needs
-    /// the files no longer.
+    /// the files no longer. A mesh from a file takes further memory while it is read.
     ///
     /// # Errors
     /// As for [`Self::from_toml`], and the errors of `read_file`.
@@ -89,23 +67,27 @@ impl Scene {
         read_file: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Self, SceneError> {
         let place = Place { text, label };
-        let file: FileScene = syntax::parse(&place)?;
+        let mut file = syntax::parse(&place)?;
+        let solver = file.solver.take().unwrap_or_default();
         let (warnings, method) = (RefCell::default(), Method::default());
         let mut reader = Reader { place, read_file, warnings, is_planar: false, method };
         let version = reader.required(file.version.as_ref(), 0..0, "version", "1")?;
         reader.whole("version", version, SCENE_VERSION..=SCENE_VERSION)?;
-        reader.method = reader.method(&file.solver)?;
+        reader.method = reader.method(&solver)?;
         let dimensions = file.dimensions.as_ref();
         let dimensions = dimensions.map(|whole| reader.whole("dimensions", whole, 2..=3));
         let dimensions = dimensions.transpose()?.unwrap_or(3);
         reader.is_planar = dimensions == 2;
-        let mut scene = reader.without_references(&file, dimensions)?;
-        reader.check_size(&scene, &file)?;
-        let model = scene.model();
-        reader.check_generated(&scene, &file, &model)?;
-        reader.read_references(&mut scene, &file, &model)?;
+        let generator_places: Vec<_> = file.generate.iter().map(Spanned::span).collect();
+        let mut scene = reader.without_references(&mut file, &solver, dimensions)?;
+        reader.check_size(&scene, file.constraint.len(), &generator_places)?;
+        reader.check_memory(&scene, &file)?;
+        let positions = scene.positions();
+        reader.check_generated(&scene, &positions, &generator_places)?;
+        reader.read_references(&mut scene, file, &positions)?;
+        drop(positions);
         if let Err(problem) = scene.check_step_work() {
-            return reader.error(file.solver.place_of_passes(), "solver", problem);
+            return reader.error(solver.place_of_passes(), "solver", problem);
         }
         reader.check_text_size(&scene)?;
         scene.read_warnings = reader.warnings.take();
@@ -113,16 +95,23 @@ impl Scene {
     }
 }
 
+/// Reads the tables of a list, and drops them.
 fn enumerate<F, T>(
-    items: &[F],
+    tables: Vec<F>,
     mut read: impl FnMut(usize, &F) -> Result<T, SceneError>,
 ) -> Result<Vec<T>, SceneError> {
-    items.iter().enumerate().map(|(index, item)| read(index, item)).collect()
+    tables.into_iter().enumerate().map(|(index, table)| read(index, &table)).collect()
 }
 
 impl Reader<'_> {
-    /// Reads the scene except for its constraints and anchors, which refer to particles by index.
-    fn without_references(&self, file: &FileScene, dimensions: u32) -> Result<Scene, SceneError> {
+    /// Reads the scene except for its constraints and anchors, which refer to particles by index. Takes
+    /// the tables that it reads.
+    fn without_references(
+        &self,
+        file: &mut FileScene,
+        solver: &FileSolver,
+        dimensions: u32,
+    ) -> Result<Scene, SceneError> {
         let up = file.up.as_ref().map(|word| self.word("up", word, &Up::NAMES));
         Ok(Scene {
             version: SCENE_VERSION,
@@ -136,13 +125,15 @@ impl Reader<'_> {
                 file.gravity.as_ref(),
                 ParameterValues::DEFAULT.gravity,
             )?,
-            solver: self.solver(&file.solver)?,
+            solver: self.solver(solver)?,
             wind: file.wind.as_ref().map(|wind| self.wind(wind)).transpose()?,
-            particles: enumerate(&file.particle, |index, one| self.particle(index, one))?,
+            particles: enumerate(take(&mut file.particle), |index, one| self.particle(index, one))?,
             constraints: Vec::new(),
-            colliders: enumerate(&file.collider, |index, one| self.collider(index, one))?,
+            colliders: self.colliders(take(&mut file.collider))?,
             anchors: Vec::new(),
-            generators: enumerate(&file.generate, |index, one| self.generator(index, one))?,
+            generators: enumerate(take(&mut file.generate), |index, one| {
+                self.generator(index, one)
+            })?,
             read_warnings: Vec::new(),
         })
     }
@@ -151,15 +142,26 @@ impl Reader<'_> {
     fn read_references(
         &self,
         scene: &mut Scene,
-        file: &FileScene,
-        model: &Model,
+        file: FileScene,
+        positions: &Positions,
     ) -> Result<(), SceneError> {
         scene.constraints =
-            enumerate(&file.constraint, |index, one| self.constraint(index, one, model))?;
-        let mut is_anchored = vec![false; model.particles.len()];
-        scene.anchors =
-            enumerate(&file.anchor, |index, one| self.anchor(index, one, model, &mut is_anchored))?;
+            enumerate(file.constraint, |index, one| self.constraint(index, one, positions))?;
+        let mut is_anchored = vec![false; positions.0.len()];
+        scene.anchors = enumerate(file.anchor, |index, one| {
+            self.anchor(index, one, positions, &mut is_anchored)
+        })?;
         Ok(())
+    }
+
+    fn colliders(&self, tables: Tables<FileCollider>) -> Result<Vec<SceneCollider>, SceneError> {
+        if let Some(first_excess) = tables.get(COLLIDERS_MAX) {
+            let problem =
+                format!("is one of {} colliders (allowed: {COLLIDERS_MAX})", tables.len());
+            let field = format!("collider[{COLLIDERS_MAX}]");
+            return self.error(first_excess.span(), &field, problem);
+        }
+        enumerate(tables, |index, one| self.collider(index, one))
     }
 
     fn name(&self, name: Option<&Word>) -> Result<String, SceneError> {
@@ -189,15 +191,15 @@ impl Reader<'_> {
     fn check_generated(
         &self,
         scene: &Scene,
-        file: &FileScene,
-        model: &Model,
+        positions: &Positions,
+        generator_places: &[Range<usize>],
     ) -> Result<(), SceneError> {
         let mut first = scene.particles.len();
         for (index, generator) in scene.generators.iter().enumerate() {
             let count = usize::try_from(generator.shape.particle_count()).unwrap_or(usize::MAX);
-            let positions = model.particles[first..first + count].iter().map(|one| one.position);
+            let generated = &positions.0[first..first + count];
             first += count;
-            for position in positions {
+            for &position in generated {
                 // NaN fails this comparison, too.
                 let is_far = !position.iter().all(|axis| axis.abs() <= COORDINATE_MAX);
                 let problem = match position {
@@ -207,7 +209,7 @@ impl Reader<'_> {
                     }
                     _ => continue,
                 };
-                let span = file.generate[index].span();
+                let span = generator_places[index].clone();
                 return self.error(span, &format!("generate[{index}]"), problem);
             }
         }
@@ -215,9 +217,14 @@ impl Reader<'_> {
     }
 
     /// Refuses a scene that is too large, before anything of its size is allocated.
-    fn check_size(&self, scene: &Scene, file: &FileScene) -> Result<(), SceneError> {
+    fn check_size(
+        &self,
+        scene: &Scene,
+        explicit_constraints: usize,
+        generator_places: &[Range<usize>],
+    ) -> Result<(), SceneError> {
         let mut particles = scene.particles.len() as u64;
-        let mut constraints = file.constraint.len() as u64;
+        let mut constraints = explicit_constraints as u64;
         for (index, generator) in scene.generators.iter().enumerate() {
             particles = particles.saturating_add(generator.shape.particle_count());
             constraints = constraints.saturating_add(generator.shape.constraint_count());
@@ -226,15 +233,9 @@ impl Reader<'_> {
                     "increases the scene to {particles} particles and {constraints} constraints \
                      (allowed: {ELEMENTS_MAX} of each)"
                 );
-                let span = file.generate[index].span();
+                let span = generator_places[index].clone();
                 return self.error(span, &format!("generate[{index}]"), problem);
             }
-        }
-        if let Some(first_excess) = file.collider.get(COLLIDERS_MAX) {
-            let problem =
-                format!("is one of {} colliders (allowed: {COLLIDERS_MAX})", file.collider.len());
-            let field = format!("collider[{COLLIDERS_MAX}]");
-            return self.error(first_excess.span(), &field, problem);
         }
         if particles.max(constraints) > u64::from(ELEMENTS_MAX) {
             let problem = format!(
@@ -244,6 +245,20 @@ impl Reader<'_> {
             return self.error(0..0, "scene", problem);
         }
         Ok(())
+    }
+
+    /// Refuses a scene whose positions need too much memory beside the tables that refer to them.
+    fn check_memory(&self, scene: &Scene, file: &FileScene) -> Result<(), SceneError> {
+        let positions = scene.particle_count() * size_of::<[f32; 3]>() as u64;
+        let size_mib = (positions + file.size_bytes() as u64) >> 20;
+        if size_mib <= REFERENCES_MAX_MIB {
+            return Ok(());
+        }
+        let problem = format!(
+            "needs {size_mib} MiB for its particles, explicit constraints and anchors while it is \
+             read (allowed: {REFERENCES_MAX_MIB} MiB)"
+        );
+        self.error(0..0, "scene", problem)
     }
 
     /// Refuses a scene whose complete text is too long to be published.

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 use sim_types::ConstraintKind;
 
-use super::builder::{Builder, interpolate, round};
+use super::builder::{ConstraintBuilder, ParticleBuilder, interpolate, round};
 use super::pinned::is_pinned_end;
 use crate::scene::definition::decimal;
 
@@ -35,7 +35,7 @@ impl Bridge {
         5 * u64::from(self.planks) - 4
     }
 
-    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+    pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
         let side = self.side(builder.up());
         for plank in 0..self.planks {
             let share = f64::from(plank) / f64::from(self.planks - 1);
@@ -45,6 +45,9 @@ impl Bridge {
                 builder.particle(position, |word| is_pinned_end(word, plank, self.planks));
             }
         }
+    }
+
+    pub(super) fn build_constraints(&self, builder: &mut ConstraintBuilder<'_>) {
         for plank in 0..self.planks {
             let (left, right) = (2 * plank, 2 * plank + 1);
             builder.link([left, right], ConstraintKind::Structural);

@@ -1,4 +1,4 @@
-//! The builder that shapes append their particles and constraints to.
+//! The builders that shapes append their particles and constraints to.
 
 use glam::DVec3;
 use sim_types::ConstraintKind;
@@ -11,19 +11,19 @@ use crate::scene::definition::settings::Up;
 use crate::scene::definition::softness::KindSoftness;
 use crate::scene::model::Model;
 
-/// Appends the parts of one shape to a model. All indices count from the shape's first particle.
-pub(super) struct Builder<'a> {
+/// Creates the particles of one shape.
+pub(super) struct ParticleBuilder<'a> {
     pub(super) pinned: &'a Pinned,
     /// Mass of each particle, unless the shape gives another one, in kg.
     pub(super) mass: f32,
-    pub(super) softness: KindSoftness,
     pub(super) up: Up,
-    /// Index of the shape's first particle in the scene.
-    pub(super) first: u32,
-    pub(super) model: &'a mut Model,
+    /// Number of particles so far.
+    pub(super) count: u32,
+    /// Receives each particle.
+    pub(super) visit: &'a mut dyn FnMut(SceneParticle),
 }
 
-impl Builder<'_> {
+impl ParticleBuilder<'_> {
     /// Returns the unit vector that points up.
     pub(super) fn up(&self) -> DVec3 {
         match self.up {
@@ -33,14 +33,25 @@ impl Builder<'_> {
         }
     }
 
-    /// Appends a particle. `is_pinned_by` decides whether a word of the shape pins it.
+    /// Adds a particle. `is_pinned_by` decides whether a word of the shape pins it.
     pub(super) fn particle(&mut self, position: [f32; 3], is_pinned_by: impl FnOnce(&str) -> bool) {
-        let index = self.model.particle_count() - self.first;
-        let pinned = self.pinned.contains(index, is_pinned_by);
+        let pinned = self.pinned.contains(self.count, is_pinned_by);
+        self.count += 1;
         let (mass, velocity) = (self.mass, [0.0; 3]);
-        self.model.particles.push(SceneParticle { position, mass, pinned, velocity });
+        (self.visit)(SceneParticle { position, mass, pinned, velocity });
     }
+}
 
+/// Appends the constraints and triangles of one shape to a model with its particles. All indices count
+/// from the shape's first particle.
+pub(super) struct ConstraintBuilder<'a> {
+    pub(super) softness: KindSoftness,
+    /// Index of the shape's first particle in the scene.
+    pub(super) first: u32,
+    pub(super) model: &'a mut Model,
+}
+
+impl ConstraintBuilder<'_> {
     /// Appends a constraint whose rest length is the distance of its particles.
     pub(super) fn link(&mut self, pair: [u32; 2], kind: ConstraintKind) {
         self.push_link(pair, kind, None);

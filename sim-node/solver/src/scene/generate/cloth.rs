@@ -3,7 +3,7 @@
 use serde::Serialize;
 use sim_types::ConstraintKind;
 
-use super::builder::{Builder, round};
+use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use crate::constraints::families::Family;
 use crate::scene::definition::decimal;
 
@@ -71,8 +71,7 @@ impl Cloth {
         self.links.iter().map(|kind| self.link_count(*kind)).sum()
     }
 
-    /// Appends particles, constraints particle by particle, and two triangles per cell.
-    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+    pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let index = row * self.columns + column;
@@ -80,6 +79,10 @@ impl Cloth {
                 builder.particle(position, |word| self.is_pinned(word, index));
             }
         }
+    }
+
+    /// Appends constraints particle by particle, and two triangles per cell.
+    pub(super) fn build_constraints(&self, builder: &mut ConstraintBuilder<'_>) {
         builder.sheet(self.columns, self.rows);
         for row in 0..self.rows {
             for column in 0..self.columns {

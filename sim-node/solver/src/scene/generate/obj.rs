@@ -1,11 +1,11 @@
 //! A mesh of triangles, quads and larger polygons, as a cloth.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use serde::Serialize;
 use sim_types::ConstraintKind;
 
-use super::builder::{Builder, round};
+use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use crate::scene::definition::decimal;
 use crate::scene::mesh::{Mesh, area, edges, fan};
 
@@ -26,8 +26,8 @@ pub struct Obj {
 
 impl Obj {
     /// Creates the shape of a mesh.
-    pub fn new(mesh: &Mesh, density: Option<f32>) -> Self {
-        Self { vertices: mesh.vertices.clone(), faces: mesh.faces.clone(), density }
+    pub fn new(mesh: Mesh, density: Option<f32>) -> Self {
+        Self { vertices: mesh.vertices, faces: mesh.faces, density }
     }
 
     pub(super) fn particle_count(&self) -> u64 {
@@ -35,10 +35,12 @@ impl Obj {
     }
 
     pub(super) fn constraint_count(&self) -> u64 {
-        self.links().len() as u64
+        let mut count = 0;
+        self.for_each_link(|_, _| count += 1);
+        count
     }
 
-    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+    pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
         let masses = self.density.map(|density| self.masses(f64::from(density)));
         for (index, vertex) in self.vertices.iter().enumerate() {
             if let Some(masses) = &masses {
@@ -46,9 +48,10 @@ impl Obj {
             }
             builder.particle(*vertex, |_| false);
         }
-        for (pair, kind) in self.links() {
-            builder.link(pair, kind);
-        }
+    }
+
+    pub(super) fn build_constraints(&self, builder: &mut ConstraintBuilder<'_>) {
+        self.for_each_link(|pair, kind| builder.link(pair, kind));
         for triangle in self.faces.iter().flat_map(|face| fan(face)) {
             builder.triangle(triangle);
         }
@@ -70,15 +73,14 @@ impl Obj {
             .collect()
     }
 
-    /// Returns edges face by face, then diagonals, then bends. A pair occurs once, with the kind that
+    /// Visits edges face by face, then diagonals, then bends. A pair occurs once, with the kind that
     /// comes first.
-    fn links(&self) -> Vec<([u32; 2], ConstraintKind)> {
-        let mut links = Vec::new();
+    fn for_each_link(&self, mut visit: impl FnMut([u32; 2], ConstraintKind)) {
         let mut seen = BTreeSet::new();
         let mut push = |[a, b]: [u32; 2], kind| {
             let pair = if a < b { [a, b] } else { [b, a] };
             if a != b && seen.insert(pair) {
-                links.push((pair, kind));
+                visit(pair, kind);
             }
         };
         for edge in self.faces.iter().flat_map(|face| edges(face)) {
@@ -93,59 +95,46 @@ impl Obj {
                 push([*second, *fourth], ConstraintKind::Shear);
             }
         }
-        for pair in self.bends() {
-            push(pair, ConstraintKind::Bend);
+        let sides = self.sides();
+        for sides_of_edge in sides.chunk_by(|one, next| one.edge == next.edge) {
+            let [left, right] = sides_of_edge else { continue };
+            for (from, to) in left.neighbours.into_iter().zip(right.neighbours) {
+                push([from, to], ConstraintKind::Bend);
+            }
         }
-        links
     }
 
-    /// Returns the bends across each edge of exactly two faces. A bend joins the neighbours that an
-    /// end of the edge has in the two faces. For two triangles, these are their third corners.
-    fn bends(&self) -> Vec<[u32; 2]> {
-        let faces: Vec<_> = self.faces.iter().map(|face| IndexedFace::new(face)).collect();
-        let mut faces_at: BTreeMap<[u32; 2], Vec<&IndexedFace<'_>>> = BTreeMap::new();
-        for face in &faces {
-            for edge in edges(face.corners) {
-                faces_at.entry(edge).or_default().push(face);
-            }
+    /// Returns the sides of all faces, ascending by edge.
+    fn sides(&self) -> Vec<Side> {
+        let mut sides = Vec::with_capacity(self.faces.iter().map(Vec::len).sum());
+        for face in &self.faces {
+            sides.extend((0..face.len()).map(|place| Side::new(face, place)));
         }
-        let mut bends = Vec::new();
-        for (edge, faces) in faces_at {
-            let [left, right] = faces.as_slice() else { continue };
-            for (end, other) in [(edge[0], edge[1]), (edge[1], edge[0])] {
-                let from = left.other_neighbour(end, other);
-                let to = right.other_neighbour(end, other);
-                bends.extend(from.zip(to).map(|(from, to)| [from, to]));
-            }
-        }
-        bends
+        sides.sort_unstable_by_key(|side| side.edge);
+        sides
     }
 }
 
-/// A face whose corners are found without a search through all of them: a face can have as many
-/// corners as the mesh.
-struct IndexedFace<'a> {
-    corners: &'a [u32],
-    /// Places of the corners, ascending by vertex, then by place.
-    places: Vec<usize>,
+/// An edge of a face. Across each edge of exactly two faces, bends join the neighbours that an end of the
+/// edge has in the two faces. For two triangles, these are their third corners.
+struct Side {
+    /// The ends, ascending.
+    edge: [u32; 2],
+    /// By end: the next corner of the face away from the edge.
+    neighbours: [u32; 2],
 }
 
-impl<'a> IndexedFace<'a> {
-    fn new(corners: &'a [u32]) -> Self {
-        let mut places: Vec<_> = (0..corners.len()).collect();
-        places.sort_by_key(|place| corners[*place]);
-        Self { corners, places }
-    }
-
-    /// Returns the neighbour of a corner in the face that is not `other`. The first of equal corners
-    /// counts.
-    fn other_neighbour(&self, corner: u32, other: u32) -> Option<u32> {
-        let Self { corners, places } = self;
-        let index = places.partition_point(|place| corners[*place] < corner);
-        let place = *places.get(index).filter(|place| corners[**place] == corner)?;
-        let next = corners[(place + 1) % corners.len()];
-        let previous = corners[(place + corners.len() - 1) % corners.len()];
-        if next == other { Some(previous) } else { Some(next) }
+impl Side {
+    /// Returns the side from the corner at a place of the face to the next one.
+    fn new(face: &[u32], place: usize) -> Self {
+        let corner = |offset| face[(place + offset) % face.len()];
+        let (start, end) = (corner(0), corner(1));
+        let (before, after) = (corner(face.len() - 1), corner(2));
+        if start < end {
+            Self { edge: [start, end], neighbours: [before, after] }
+        } else {
+            Self { edge: [end, start], neighbours: [after, before] }
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 use sim_types::ConstraintKind;
 
-use super::builder::{Builder, round};
+use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use crate::scene::definition::decimal;
 
 /// A standing human figure.
@@ -70,7 +70,7 @@ impl Ragdoll {
         (BONES.len() + BRACES.len()) as u64
     }
 
-    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+    pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
         let origin = Vec3::from_array(self.origin).as_dvec3();
         let up = builder.up();
         for (index, (side, height)) in (0_u32..).zip(PLACES) {
@@ -81,6 +81,9 @@ impl Ragdoll {
                 _ => false,
             });
         }
+    }
+
+    pub(super) fn build_constraints(builder: &mut ConstraintBuilder<'_>) {
         for bone in BONES {
             builder.link(bone, ConstraintKind::Structural);
         }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use sim_types::ConstraintKind;
 
-use super::builder::{Builder, interpolate};
+use super::builder::{ConstraintBuilder, ParticleBuilder, interpolate};
 use super::pinned::is_pinned_end;
 use crate::constraints::families::Family;
 use crate::scene::definition::decimal;
@@ -30,12 +30,15 @@ impl Rope {
         u64::from(self.count) - 1
     }
 
-    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+    pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
         for index in 0..self.count {
             let share = f64::from(index) / f64::from(self.count - 1);
             let position = interpolate(self.from, self.to, share);
             builder.particle(position, |word| is_pinned_end(word, index, self.count));
         }
+    }
+
+    pub(super) fn build_constraints(&self, builder: &mut ConstraintBuilder<'_>) {
         builder.sheet(self.count, 1);
         for index in 0..self.count - 1 {
             let family = Family::Horizontal.group(0, index as usize);

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 use sim_types::ConstraintKind;
 
-use super::builder::{Builder, round};
+use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use crate::frame::rotation_about;
 use crate::scene::definition::decimal;
 
@@ -41,7 +41,7 @@ impl Web {
         2 * u64::from(self.spokes) * u64::from(self.rings)
     }
 
-    pub(super) fn build(&self, builder: &mut Builder<'_>) {
+    pub(super) fn build_particles(&self, builder: &mut ParticleBuilder<'_>) {
         builder.particle(self.center, |word| word == "hub");
         for ring in 1..=self.rings {
             for spoke in 0..self.spokes {
@@ -49,6 +49,9 @@ impl Web {
                 builder.particle(position, |word| word == "rim" && ring == self.rings);
             }
         }
+    }
+
+    pub(super) fn build_constraints(&self, builder: &mut ConstraintBuilder<'_>) {
         for ring in 1..=self.rings {
             for spoke in 0..self.spokes {
                 let here = self.index(ring, spoke);

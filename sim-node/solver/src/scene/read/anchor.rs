@@ -1,13 +1,15 @@
 //! The table `[[anchor]]`.
 
 use serde::Deserialize;
-use toml::Spanned;
 
 use super::reader::Reader;
-use super::value::{Number, Quaternion, Table, TableKeys, Tables, Vector, Whole};
+use super::value::{
+    Number, Quaternion, Spanned, Table, TableKeys, Tables, Vector, Whole, append, append_elements,
+    element_count,
+};
 use crate::scene::definition::anchor::{SceneAnchor, Waypoint};
 use crate::scene::error::SceneError;
-use crate::scene::model::Model;
+use crate::scene::model::Positions;
 
 /// Largest time of a waypoint in seconds (30 years). In f64 it still resolves microseconds.
 const TIME_MAX: f64 = 1e9;
@@ -23,6 +25,28 @@ pub(super) struct FileAnchor {
 }
 
 impl TableKeys for FileAnchor {}
+
+impl FileAnchor {
+    /// The lists that a text can give in parts.
+    pub(super) const LISTS: [&str; 2] = ["particles", "path"];
+
+    /// Appends the lists of a part of the table.
+    pub(super) fn append(&mut self, part: Self) {
+        append_elements(self.particles.as_mut(), part.particles);
+        append(&mut self.path, part.path);
+    }
+
+    /// Returns the number of points of the path.
+    pub(super) fn point_count(&self) -> usize {
+        self.path.len()
+    }
+
+    /// Returns the size of the lists in memory.
+    pub(super) fn lists_size_bytes(&self) -> usize {
+        let particles = element_count(self.particles.as_ref()) * size_of::<Whole>();
+        particles + size_of_val(self.path.as_slice())
+    }
+}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -43,7 +67,7 @@ impl Reader<'_> {
         &self,
         index: usize,
         table: &Spanned<Table<FileAnchor>>,
-        model: &Model,
+        positions: &Positions,
         is_anchored: &mut [bool],
     ) -> Result<SceneAnchor, SceneError> {
         let field = |key: &str| format!("anchor[{index}].{key}");
@@ -52,7 +76,7 @@ impl Reader<'_> {
         let list = self.required(list, table.span(), &field("particles"), "a list of indices")?;
         let mut particles = Vec::with_capacity(list.get_ref().len());
         for particle in list.get_ref() {
-            let anchored = self.particle_index(&field("particles"), particle, model)?;
+            let anchored = self.particle_index(&field("particles"), particle, positions)?;
             if std::mem::replace(&mut is_anchored[anchored as usize], true) {
                 let problem =
                     format!("particle {anchored} occurs in an anchor twice (allowed: once)");

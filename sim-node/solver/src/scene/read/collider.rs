@@ -4,10 +4,9 @@ use std::ops::Range;
 
 use serde::Deserialize;
 use sim_types::{ColliderShape, NumberRange};
-use toml::Spanned;
 
 use super::reader::{ANGULAR_VELOCITY, Reader, SIZE};
-use super::value::{Number, Quaternion, Table, TableKeys, Vector, Word};
+use super::value::{Number, Quaternion, Spanned, Table, TableKeys, Vector, Word};
 use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
 use crate::scene::error::SceneError;
 

@@ -2,15 +2,14 @@
 
 use serde::Deserialize;
 use sim_types::{ConstraintKind, NumberRange};
-use toml::Spanned;
 
 use super::limits::FileLimits;
 use super::reader::Reader;
-use super::value::{Number, Table, TableKeys, Tuple, Vector, Whole, Word};
+use super::value::{Number, Spanned, Table, TableKeys, Tuple, Vector, Whole, Word};
 use crate::scene::definition::element::{SceneConstraint, SceneParticle};
 use crate::scene::definition::softness::Softness;
 use crate::scene::error::SceneError;
-use crate::scene::model::Model;
+use crate::scene::model::Positions;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -71,15 +70,15 @@ impl Reader<'_> {
         &self,
         index: usize,
         table: &Spanned<Table<FileConstraint>>,
-        model: &Model,
+        positions: &Positions,
     ) -> Result<SceneConstraint, SceneError> {
         let field = |key: &str| format!("constraint[{index}].{key}");
         let file = table.get_ref();
         let pair = file.particles.as_ref();
         let pair = self.required(pair, table.span(), &field("particles"), "two indices")?;
         let [a, b] = &**pair.get_ref();
-        let a = self.particle_index(&field("particles"), a, model)?;
-        let b = self.particle_index(&field("particles"), b, model)?;
+        let a = self.particle_index(&field("particles"), a, positions)?;
+        let b = self.particle_index(&field("particles"), b, positions)?;
         if a == b {
             let problem =
                 format!("joins particle {a} to itself (allowed: two different particles)");
@@ -89,7 +88,7 @@ impl Reader<'_> {
             Some(number) => {
                 self.ranged(&field("rest_length"), number, NumberRange::AT_LEAST_ZERO)?
             }
-            None => model.distance(a, b),
+            None => positions.distance(a, b),
         };
         let kinds = ConstraintKind::ALL.map(|kind| (kind.name(), kind));
         let kind = file.kind.as_ref().map(|word| self.word(&field("kind"), word, &kinds));

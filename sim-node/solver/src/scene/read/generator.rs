@@ -1,12 +1,11 @@
 //! The table `[[generate]]`.
 
 use sim_types::{ConstraintKind, NumberRange};
-use toml::Spanned;
 
 use super::generator_fields::GeneratorFields;
 use super::generator_file::FileGenerator;
 use super::reader::Reader;
-use super::value::Table;
+use super::value::{Spanned, Table};
 use crate::scene::error::SceneError;
 use crate::scene::generate::bridge::Bridge;
 use crate::scene::generate::cloth::{self, Cloth, Diagonals};

@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::value::{Number, Table, TableKeys, Vector, Whole, Word};
+use super::value::{
+    Number, Spanned, Table, TableKeys, Vector, Whole, Word, append, append_elements, element_count,
+};
 
 /// The keys of all shapes. The keys of each shape are checked later.
 #[derive(Debug, Deserialize)]
@@ -69,7 +70,40 @@ pub(super) enum FilePinned {
     List(Vec<i64>),
 }
 
+impl FilePinned {
+    fn list(&self) -> &[i64] {
+        match self {
+            Self::Word(_) => &[],
+            Self::List(list) => list,
+        }
+    }
+}
+
 impl FileGenerator {
+    /// The lists that a text can give in parts.
+    pub(super) const LISTS: [&str; 3] = ["vertices", "faces", "pinned"];
+
+    /// Appends the lists of a part of the table.
+    pub(super) fn append(&mut self, part: Self) {
+        append_elements(self.vertices.as_mut(), part.vertices);
+        append_elements(self.faces.as_mut(), part.faces);
+        let pinned = self.pinned.as_mut().map(Spanned::get_mut);
+        if let (Some(FilePinned::List(list)), Some(FilePinned::List(more))) =
+            (pinned, part.pinned.map(Spanned::into_inner))
+        {
+            append(list, more);
+        }
+    }
+
+    /// Returns the size of the lists in memory.
+    pub(super) fn lists_size_bytes(&self) -> usize {
+        let faces = self.faces.iter().flat_map(Spanned::get_ref);
+        let pinned = self.pinned.as_ref().map_or(&[][..], |pinned| pinned.get_ref().list());
+        element_count(self.vertices.as_ref()) * size_of::<Vector>()
+            + faces.map(|face| size_of_val(face) + size_of_val(face.as_slice())).sum::<usize>()
+            + size_of_val(pinned)
+    }
+
     /// Returns the places of the keys that belong to single shapes.
     pub(super) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 23] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {

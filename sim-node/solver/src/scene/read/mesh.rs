@@ -1,17 +1,16 @@
 //! The keys of a mesh, from a file or written out.
 
 use sim_types::NumberRange;
-use toml::Spanned;
 
 use super::generator_fields::GeneratorFields;
 use super::generator_file::FilePinned;
-use super::pins;
-use super::value::{Vector, Word};
+
+use super::value::{Spanned, Vector, Word};
 use crate::scene::error::SceneError;
 use crate::scene::generate::obj::Obj;
 use crate::scene::generate::pinned::Pinned;
 use crate::scene::generate::{Generator, Shape};
-use crate::scene::mesh::Mesh;
+use crate::scene::mesh::{Mesh, pins};
 
 impl GeneratorFields<'_, '_> {
     /// Checks the keys of the shape "obj".
@@ -30,10 +29,11 @@ impl GeneratorFields<'_, '_> {
             .density
             .as_ref()
             .map(|number| self.reader.ranged(&self.name("density"), number, NumberRange::POSITIVE));
+        let density = density.transpose()?;
         Ok(Generator {
-            shape: Shape::Obj(Obj::new(&mesh, density.transpose()?)),
             mass: self.mass()?,
             pinned: self.pinned_vertices(&mesh)?,
+            shape: Shape::Obj(Obj::new(mesh, density)),
             tear_stretch: self.tear_stretch()?,
             softness: self.softness()?,
         })

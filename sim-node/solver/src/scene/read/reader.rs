@@ -4,12 +4,11 @@ use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
 use sim_types::{Method, NumberRange, Parameter};
-use toml::Spanned;
 
-use super::value::{Number, Quaternion, Vector, Whole, Word};
+use super::value::{Number, Quaternion, Spanned, Vector, Whole, Word};
 use crate::scene::definition::anchor::NO_ROTATION;
 use crate::scene::error::{Place, SceneError};
-use crate::scene::model::Model;
+use crate::scene::model::Positions;
 
 /// Checks values and creates errors at their place in the text.
 pub(super) struct Reader<'a> {
@@ -256,9 +255,9 @@ impl Reader<'_> {
         &self,
         field: &str,
         index: &Whole,
-        model: &Model,
+        positions: &Positions,
     ) -> Result<u32, SceneError> {
-        let Some(last) = model.particle_count().checked_sub(1) else {
+        let Some(last) = positions.particle_count().checked_sub(1) else {
             let problem = format!(
                 "{} is out of range: the scene has no particles (allowed: none)",
                 index.get_ref()

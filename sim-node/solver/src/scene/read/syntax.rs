@@ -1,23 +1,101 @@
 //! The TOML parser, with its errors in the words of this program.
 
+mod document;
 mod parse_cost;
+mod pieces;
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use serde::de::DeserializeOwned;
+use sim_types::SCENE_SIZE_BYTES_MAX;
+use toml::de::{DeTable, Deserializer};
 
+use super::file_scene::FileScene;
 use crate::scene::error::{Place, SceneError};
+use document::Document;
 use parse_cost::check_parse_cost;
+use pieces::pieces;
 
-/// Parses TOML into a file structure. An error names the line, the field and what is allowed.
-pub(super) fn parse<T: DeserializeOwned>(place: &Place<'_>) -> Result<T, SceneError> {
-    check_parse_cost(place)?;
-    let deserializer = toml::Deserializer::parse(place.text)
-        .map_err(|error| syntax_error(place, &error, String::new()))?;
-    serde_path_to_error::deserialize(deserializer).map_err(|error| {
-        let path = field_path(&error.path().to_string());
-        syntax_error(place, error.inner(), path)
-    })
+/// Parses the text of a scene, a long one piece by piece. An error names the line, the field and what
+/// is allowed.
+pub(super) fn parse(place: &Place<'_>) -> Result<FileScene, SceneError> {
+    let size_bytes = place.text.len();
+    if size_bytes > SCENE_SIZE_BYTES_MAX {
+        let problem = format!("has {size_bytes} bytes of text (allowed: {SCENE_SIZE_BYTES_MAX})");
+        return Err(place.error(0..0, "scene", problem));
+    }
+    let mut file = FileScene::default();
+    let mut names = Names::default();
+    let mut kept_size_bytes = 0;
+    for (index, piece) in pieces(place.text).iter().enumerate() {
+        let document = Document::new(place.text, piece);
+        check_parse_cost(place, &document, kept_size_bytes)?;
+        let table = document.parse().map_err(|error| {
+            let span = error.span().map(|span| document.place(span));
+            syntax_error(place, span, error.message(), String::new())
+        })?;
+        names.add(place, table.get_ref(), index == 0)?;
+        let mut part: FileScene = serde_path_to_error::deserialize(Deserializer::from(table))
+            .map_err(|error| {
+                let path = field_path(&error.path().to_string());
+                let path = with_earlier_pieces(&path, &file, piece.continued);
+                syntax_error(place, error.inner().span(), error.inner().message(), path)
+            })?;
+        kept_size_bytes += part.size_bytes();
+        match piece.continued {
+            Some("anchor") => file.continue_anchor(&mut part),
+            Some(_) => file.continue_generator(&mut part),
+            None => {}
+        }
+        file.append(part);
+    }
+    Ok(file)
+}
+
+/// The keys of the scene in the pieces so far. `true` for a list of tables, to which later pieces can add.
+#[derive(Default)]
+struct Names(BTreeMap<String, bool>);
+
+impl Names {
+    /// Adds the keys of a piece. One that occurs twice is an error.
+    fn add(
+        &mut self,
+        place: &Place<'_>,
+        table: &DeTable<'_>,
+        is_first: bool,
+    ) -> Result<(), SceneError> {
+        for (key, value) in table {
+            // Before the first header, a list is complete.
+            let can_grow = value.get_ref().is_array() && !is_first;
+            let could_grow = self.0.insert(key.get_ref().to_string(), can_grow);
+            if could_grow.is_some_and(|could_grow| !(could_grow && can_grow)) {
+                return Err(syntax_error(place, Some(key.span()), "duplicate key", String::new()));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Adds the elements of earlier pieces to the indices of a path such as `particle[3].mass` or
+/// `anchor[0].path[3].time`.
+fn with_earlier_pieces(path: &str, file: &FileScene, continued: Option<&str>) -> String {
+    let Some((list, table, rest)) = split_index(path) else { return path.to_owned() };
+    let is_continued = continued == Some(list);
+    let first = file.table_count(list) - usize::from(is_continued);
+    let rest = match split_index(rest) {
+        Some((".path", point, rest)) if is_continued && table == 0 => {
+            format!(".path[{}]{rest}", point + file.last_point_count())
+        }
+        _ => rest.to_owned(),
+    };
+    format!("{list}[{}]{rest}", first + table)
+}
+
+/// Splits a path at its first index.
+fn split_index(path: &str) -> Option<(&str, usize, &str)> {
+    let (list, rest) = path.split_once('[')?;
+    let (index, rest) = rest.split_once(']')?;
+    Some((list, index.parse().ok()?, rest))
 }
 
 /// Removes the segments of serde's wrappers, which begin with `$`, from a path.
@@ -26,9 +104,14 @@ fn field_path(path: &str) -> String {
     segments.collect::<Vec<_>>().join(".")
 }
 
-fn syntax_error(place: &Place<'_>, error: &toml::de::Error, path: String) -> SceneError {
-    let span = error.span().unwrap_or(0..0);
-    let message = error.message().trim().replace('\n', ", ");
+fn syntax_error(
+    place: &Place<'_>,
+    span: Option<Range<usize>>,
+    message: &str,
+    path: String,
+) -> SceneError {
+    let span = span.unwrap_or(0..0);
+    let message = message.trim().replace('\n', ", ");
     let (field, problem) = match () {
         () if message.starts_with("unknown field ") => (path, unknown_key(&message)),
         () if message == "duplicate key" => duplicate_key(place, span.clone()),

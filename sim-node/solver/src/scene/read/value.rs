@@ -2,12 +2,50 @@
 
 use std::fmt;
 use std::marker::PhantomData;
-use std::ops::Deref;
+use std::num::NonZeroU32;
+use std::ops::{Deref, Range};
 
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{DeserializeOwned, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use toml::Spanned;
+
+/// A value with its place in the text, which is shorter than 4 GiB.
+#[derive(Debug)]
+pub(super) struct Spanned<T> {
+    value: T,
+    start: u32,
+    /// No value ends at the start of the text. That makes an `Option` as small as the value.
+    end: NonZeroU32,
+}
+
+impl<T> Spanned<T> {
+    /// Returns the place in the text, in bytes.
+    pub(super) fn span(&self) -> Range<usize> {
+        self.start as usize..self.end.get() as usize
+    }
+
+    pub(super) fn get_ref(&self) -> &T {
+        &self.value
+    }
+
+    pub(super) fn get_mut(&mut self) -> &mut T {
+        &mut self.value
+    }
+
+    pub(super) fn into_inner(self) -> T {
+        self.value
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Spanned<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let spanned = toml::Spanned::<T>::deserialize(deserializer)?;
+        let place = |offset| u32::try_from(offset).unwrap_or(u32::MAX);
+        let Range { start, end } = spanned.span();
+        let end = NonZeroU32::new(place(end)).unwrap_or(NonZeroU32::MIN);
+        Ok(Self { value: spanned.into_inner(), start: place(start), end })
+    }
+}
 
 /// A whole or decimal number.
 pub(super) type Number = Spanned<f64>;
@@ -22,6 +60,27 @@ pub(super) type Word = Spanned<String>;
 /// A list of tables.
 pub(super) type Tables<T> = Vec<Spanned<Table<T>>>;
 
+/// Appends a list without spare capacity, which would take up to as much memory as the elements.
+pub(super) fn append<T>(list: &mut Vec<T>, mut more: Vec<T>) {
+    list.reserve_exact(more.len());
+    list.append(&mut more);
+}
+
+/// Appends the further elements of a list that the text gives in parts.
+pub(super) fn append_elements<T>(
+    list: Option<&mut Spanned<Vec<T>>>,
+    more: Option<Spanned<Vec<T>>>,
+) {
+    if let (Some(list), Some(more)) = (list, more) {
+        append(list.get_mut(), more.into_inner());
+    }
+}
+
+/// Returns the number of elements of a list; 0 if the key is missing.
+pub(super) fn element_count<T>(list: Option<&Spanned<Vec<T>>>) -> usize {
+    list.map_or(0, |list| list.get_ref().len())
+}
+
 /// The keys of a table in a scene file.
 pub(super) trait TableKeys: DeserializeOwned {
     /// The table in words, for errors.
@@ -30,7 +89,7 @@ pub(super) trait TableKeys: DeserializeOwned {
 
 /// A table. Serde also fills a struct from a list, by position; a table refuses lists.
 #[derive(Debug, Default)]
-pub(super) struct Table<T>(T);
+pub(super) struct Table<T>(pub(super) T);
 
 impl<T> Deref for Table<T> {
     type Target = T;

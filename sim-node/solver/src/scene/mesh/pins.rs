@@ -1,9 +1,12 @@
 //! Expressions that pin vertices of a mesh: comparisons of coordinates, or a group.
 
-use crate::scene::mesh::Mesh;
+use super::Mesh;
 
 /// Returns the vertices that match an expression: `y > 1.9`, `x <= 0 and z < 0.5`, or `group NAME`.
-pub(super) fn matching_vertices(expression: &str, mesh: &Mesh) -> Result<Vec<u32>, String> {
+pub(in crate::scene) fn matching_vertices(
+    expression: &str,
+    mesh: &Mesh,
+) -> Result<Vec<u32>, String> {
     if let Some(name) = expression.trim().strip_prefix("group ") {
         return mesh.groups.get(name.trim()).cloned().ok_or_else(|| {
             let names: Vec<_> = mesh.groups.keys().map(String::as_str).collect();

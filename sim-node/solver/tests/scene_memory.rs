@@ -1,0 +1,220 @@
+//! Memory to read a scene: no text of the largest size takes more than a fixed amount beyond the scene
+//! itself. A counting allocator measures the peak.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use sim_solver::{Scene, SceneError};
+use sim_types::SCENE_SIZE_BYTES_MAX;
+
+/// Most memory that reading may take beyond the scene, in bytes.
+const MEMORY_MAX: usize = 256 << 20;
+
+struct Counting;
+
+thread_local! {
+    /// Bytes that this thread has allocated and not freed. Reading a scene uses one thread.
+    static LIVE: Cell<usize> = const { Cell::new(0) };
+    /// Largest value of `LIVE` since the last reset.
+    static PEAK: Cell<usize> = const { Cell::new(0) };
+}
+
+fn add(size: usize) {
+    let live = LIVE.get().wrapping_add(size);
+    LIVE.set(live);
+    PEAK.set(PEAK.get().max(live));
+}
+
+fn subtract(size: usize) {
+    LIVE.set(LIVE.get().wrapping_sub(size));
+}
+
+// SAFETY: every call is forwarded to the system's allocator unchanged. Counting touches none of its memory.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        add(layout.size());
+        // SAFETY: the caller upholds the contract of `alloc`, which is the system's.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        subtract(layout.size());
+        // SAFETY: the pointer came from `System.alloc` with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        subtract(layout.size());
+        add(size);
+        // SAFETY: the pointer came from `System.alloc` with this layout, and the caller upholds the
+        // contract of `realloc`, which is the system's.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Reads a text. Checks the most memory that this takes beyond the scene.
+fn read(text: &str) -> Result<Scene, SceneError> {
+    let before = LIVE.get();
+    PEAK.set(before);
+    let result = Scene::from_toml(text, "f");
+    let scene = if result.is_ok() { LIVE.get() - before } else { 0 };
+    let memory = PEAK.get() - before - scene;
+    let start = &text[..text.floor_char_boundary(200)];
+    assert!(memory <= MEMORY_MAX, "{} MiB: {result:.200?}: {start}", memory >> 20);
+    result
+}
+
+/// Returns the problem of a text that is refused.
+fn problem(text: &str) -> String {
+    read(text).unwrap_err().problem
+}
+
+/// Replaces the `@` of a text by as many copies of a part as the largest text allows. The `#` of a copy
+/// becomes its number from 1 on.
+fn longest(text: &str, part: &str) -> String {
+    let copy = |number: usize| part.replace('#', &number.to_string());
+    let count = (SCENE_SIZE_BYTES_MAX - text.len()) / copy(9_999_999).len();
+    text.replacen('@', &(1..=count).map(copy).collect::<String>(), 1)
+}
+
+const PAIR: &str =
+    "version = 1\n[[particle]]\nposition = [0, 0, 0]\n[[particle]]\nposition = [1, 0, 0]\n@";
+const ROPE: &str = "version = 1\n[[generate]]\nshape = \"rope\"\ncount = 1_000_000\n\
+    from = [0, 0, 0]\nto = [1, 0, 0]\n@";
+const ANCHOR: &str = "[[anchor]]\nparticles = [0]\n@";
+const MESH: &str =
+    "version = 1\n[[generate]]\nshape = \"obj\"\nvertices = [VERTICES]\nfaces = [@]\n";
+
+/// Part of the problem of a text whose parts are counted.
+const COMPLETE_TEXT: &str = "bytes of text with every default and mesh written out";
+const TOO_MUCH: &str = "MiB to parse";
+
+#[test]
+fn the_largest_complete_texts_with_many_tables_are_read() {
+    let particle = "[[particle]]\nposition = [0.0, 0.0, 0.0]\nmass = 1.0\npinned = false\n\
+        velocity = [0.0, 0.0, 0.0]\n\n";
+    let constraint = "[[constraint]]\nparticles = [0, 1]\nrest_length = 1.0\nkind = \"structural\"\n\
+        compliance = 0.0\n\n";
+    let ragdoll = "[[generate]]\nshape = \"ragdoll\"\norigin = [0.0, 0.0, 0.0]\nheight = 1.0\n\
+        mass = 1.0\npinned = \"none\"\n\n[generate.compliance]\nstructural = 0.0\nshear = 0.0\n\
+        bend = 0.0\n\n";
+    let anchor =
+        "[[anchor]]\nparticles = [#]\norigin = [0.0, 0.0, 0.0]\nrepeat = false\npath = []\n";
+    let point = "[[anchor.path]]\ntime = #.0\ntranslation = [0.0, 0.0, 0.0]\n\
+        rotation = [0.0, 0.0, 0.0, 1.0]\n\n";
+    let path = ROPE.replace('@', ANCHOR);
+    for (text, part) in
+        [(PAIR, particle), (PAIR, constraint), (PAIR, ragdoll), (ROPE, anchor), (&path, point)]
+    {
+        // Room for the defaults of the scene in the complete text.
+        let text = longest(&format!("#{}\n{text}", "-".repeat(1000)), part);
+        let size_bytes = read(&text).unwrap().to_toml().len();
+        assert!(size_bytes > SCENE_SIZE_BYTES_MAX * 9 / 10, "{size_bytes}: {part}");
+    }
+}
+
+#[test]
+fn the_largest_complete_texts_with_long_lists_are_read() {
+    let pinned = ROPE.replace("1_000_000", "10_000_000").replace('@', "pinned = [@]\n");
+    assert!(read(&longest(&pinned, "#, ")).is_ok());
+    let vertices = "[0.0, 0.0, 0.0], ".repeat(400_000);
+    let mesh = format!("#{}\n{}", "-".repeat(1000), MESH.replace("VERTICES", &vertices));
+    let faces = (1..480_000).map(|corner| format!("[0, {}, 399999], ", corner % 399_998 + 1));
+    let mesh = mesh.replace('@', &faces.collect::<String>());
+    let counts = read(&mesh).unwrap().counts();
+    assert_eq!((counts.particles, counts.triangles), (400_000, 479_999));
+}
+
+#[test]
+fn the_most_particles_are_read_beside_the_longest_complete_text() {
+    let sheet = "version = 1\n[solver]\nsubsteps = 1\n[[generate]]\nshape = \"cloth\"\n\
+        columns = 4096\nrows = 4096\nspacing = 1e-3\nlinks = []\n@";
+    let sheet = format!("#{}\n{sheet}", "-".repeat(1000));
+    let constraint = "[[constraint]]\nparticles = [0, 1]\nrest_length = 0.0\nkind = \"bend\"\n\
+        compliance = 0.0\n\n";
+    assert_eq!(read(&longest(&sheet, constraint)).err(), None);
+    let problem = problem(&longest(&sheet, "[[constraint]]\nparticles=[0,1]\n"));
+    assert!(problem.contains("for its particles, explicit constraints"), "{problem}");
+}
+
+/// Many edges between few vertices: each has two faces, and so two bends.
+#[test]
+fn a_dense_mesh_is_read() {
+    let vertices = "[0, 0, 0], ".repeat(1999);
+    let faces = (0..850_000).map(|face| {
+        let (corner, distance) = (face % 1999, face / 1999 + 1);
+        format!("[{corner}, {}, {}], ", (corner + distance) % 1999, (corner + 2 * distance) % 1999)
+    });
+    let mesh = MESH.replace("VERTICES", &vertices).replace('@', &faces.collect::<String>());
+    assert!(read(&mesh).is_ok());
+}
+
+#[test]
+fn short_texts_of_long_complete_texts_are_refused() {
+    let path = ROPE.replace('@', "[[anchor]]\nparticles=[0]\npath=[@]\n");
+    let vertices = "version=1\n[[generate]]\nshape=\"obj\"\nvertices=[@]\nfaces=[[0,1,2]]\n";
+    let faces = MESH.replace("VERTICES", "[0,0,0],[1,0,0],[0,1,0]");
+    for (text, part, expected) in [
+        (PAIR, "[[particle]]\nposition=[0,0,0]\n", COMPLETE_TEXT),
+        (vertices, "[0,0,0],", COMPLETE_TEXT),
+        (&faces, "[0,1,2],", COMPLETE_TEXT),
+        (PAIR, "[[generate]]\nshape=\"ragdoll\"\nheight=1\n", TOO_MUCH),
+        (&path, "{time=#},", TOO_MUCH),
+    ] {
+        let problem = problem(&longest(text, part));
+        assert!(problem.contains(expected), "{part}: {problem}");
+    }
+}
+
+#[test]
+fn empty_tables_and_elements_are_refused() {
+    let path = ROPE.replace('@', ANCHOR);
+    let particles = ROPE.replace('@', "[[anchor]]\nparticles = [@]\n");
+    let faces = MESH.replace("VERTICES", "[0,0,0],[1,0,0],[0,1,0]");
+    for (text, part, expected) in [
+        ("@", "[[particle]]\n", TOO_MUCH),
+        ("@", "[[generate]]\n", TOO_MUCH),
+        (&path, "[[anchor.path]]\n", TOO_MUCH),
+        (&faces, "[],", TOO_MUCH),
+        ("[[generate]]\nlinks=[@]", "\"\",", TOO_MUCH),
+        ("generate=[@]\n", "{},", TOO_MUCH),
+        ("particle=[@]\n", "{position=[0,0,0]},", TOO_MUCH),
+        (&particles, "0,", "twice"),
+    ] {
+        let problem = problem(&longest(text, part));
+        assert!(problem.contains(expected), "{part}: {problem}");
+    }
+}
+
+#[test]
+fn texts_that_are_not_scenes_are_refused() {
+    for (text, part, expected) in [
+        ("@", "a.b.c.d.e=1\n", TOO_MUCH),
+        ("[[generate]]\n@", "a.a.", TOO_MUCH),
+        ("@", "[a.b.c.d]\n", TOO_MUCH),
+        ("a=[@]", "[],", TOO_MUCH),
+        ("a=[@]", "[[[[1]]]],", TOO_MUCH),
+        ("x = 1 [\n@", "[[generate]]\n", TOO_MUCH),
+        ("[a\n@", "[[generate]]\n", TOO_MUCH),
+        ("[[anchor]]\n[[particle]]\n@", "[[anchor.path]]\n", TOO_MUCH),
+        ("a=@", "[", TOO_MUCH),
+        ("a=@", "{a=", TOO_MUCH),
+        ("@", "=", TOO_MUCH),
+        ("@", "\n", TOO_MUCH),
+        ("@", "[[a]]\n", "unknown key"),
+        ("[[generate]]\n@", "pinned=[0,0]\n", TOO_MUCH),
+        ("[[generate]]\nvertices=[@", "0,", "unclosed array"),
+        ("[[generate]]\nvertices=[@]", "[[[[0]]]],", "is a list"),
+        ("@", " ", "is missing"),
+        ("@", "\"", "key with no value"),
+        ("x=\"@\"", "\\n", "unknown key"),
+    ] {
+        let problem = problem(&longest(text, part));
+        assert!(problem.contains(expected), "{part}: {problem}");
+    }
+    assert_eq!(problem(&"#".repeat(SCENE_SIZE_BYTES_MAX)), "is missing (allowed: 1)");
+}
