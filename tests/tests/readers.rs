@@ -1,5 +1,5 @@
-//! Independent readers in Python: the stock MCAP reader finds the published bits in a recording, and
-//! the iceoryx2 package reads a running node. These tests need the virtual environment of `.ci/run`.
+//! Independent readers: the stock MCAP readers of Python and JavaScript find what was published in recordings,
+//! and the iceoryx2 package of Python reads a running node. These tests need what `.ci/run` installs.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::fmt::Write;
@@ -55,13 +55,17 @@ fn the_stock_python_reader_finds_the_published_bits() {
     );
 }
 
-#[test]
-#[ignore = "needs Python"]
-fn the_stock_python_reader_opens_a_repaired_recording() {
-    let sandbox = Sandbox::new();
+/// Counts the messages of a recording with `@mcap/core`.
+fn javascript_counts(sandbox: &Sandbox, file: &str) -> Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("node/count_messages.js");
+    Process::run(Program::Node, sandbox, &[script.to_str().unwrap(), file]).json()
+}
+
+/// Damages a recording and repairs it. Returns the repaired file, and the report.
+fn repaired_recording(sandbox: &Sandbox) -> (String, Value) {
     let (whole, damaged) = (sandbox.path("whole.mcap"), sandbox.path("damaged.mcap"));
     let args = ["simulate", "curtain", "--steps", "2400", "-o", &whole];
-    Process::run(Program::Recorder, &sandbox, &args).success();
+    Process::run(Program::Recorder, sandbox, &args).success();
     let mut bytes = std::fs::read(&whole).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle..middle + 5000].fill(0);
@@ -69,11 +73,36 @@ fn the_stock_python_reader_opens_a_repaired_recording() {
     std::fs::write(&damaged, bytes).unwrap();
     let repaired = sandbox.path("repaired.mcap");
     let args = ["repair", &damaged, &repaired, "--json"];
-    let report = Process::run(Program::Recorder, &sandbox, &args);
-    let report: Value = serde_json::from_str(&report.stdout).unwrap();
+    let report = Process::run(Program::Recorder, sandbox, &args);
+    let report = serde_json::from_str(&report.stdout).unwrap();
+    (repaired, report)
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn the_stock_python_reader_opens_a_repaired_recording() {
+    let sandbox = Sandbox::new();
+    let (repaired, report) = repaired_recording(&sandbox);
     let read = python(&sandbox, "count_messages.py", &[&repaired]);
     assert_eq!(read["counts"]["/particles"], report["snapshot_count"]);
     assert_eq!(read["repair"]["lost_steps"], report["lost_steps"][0]);
+}
+
+#[test]
+#[ignore = "needs Node"]
+fn the_stock_javascript_reader_opens_simulated_and_repaired_recordings() {
+    let sandbox = Sandbox::new();
+    let (repaired, report) = repaired_recording(&sandbox);
+    let counts = javascript_counts(&sandbox, &repaired);
+    assert_eq!(counts["/particles"], report["snapshot_count"]);
+    let args = ["simulate", "rope", "--steps", "240"];
+    for compression in ["none", "lz4", "zstd"] {
+        let file = sandbox.path(&format!("{compression}.mcap"));
+        let args = [&args[..], &["--compression", compression, "-o", &file]].concat();
+        Process::run(Program::Recorder, &sandbox, &args).success();
+        let counts = javascript_counts(&sandbox, &file);
+        assert_eq!((&counts["/particles"], &counts["/keyframe"]), (&json!(241), &json!(2)));
+    }
 }
 
 #[test]
