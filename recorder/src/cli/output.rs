@@ -1,11 +1,15 @@
 //! Output of the program: results on stdout, everything else on stderr.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use anyhow::Context;
+use indicatif::ProgressBar;
 use recorder::LogEnd;
 use serde::Serialize;
 use sim_contract::{console, is_being_written, printable, printable_line};
+
+use super::progress::live_line;
 
 /// The option that selects the format of a result.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -30,9 +34,22 @@ pub(crate) fn bytes(bytes: &[u8]) -> anyhow::Result<()> {
     console::write_result(bytes).context("cannot write to stdout")
 }
 
+/// The last line of a terminal, which changes in place.
+static LIVE_LINE: LazyLock<ProgressBar> = LazyLock::new(live_line);
+
+/// Shows a line on stderr in the place of the last one, if that is a terminal.
+pub(crate) fn show_live(text: String) {
+    LIVE_LINE.set_message(text);
+}
+
+/// Removes the line.
+pub(crate) fn end_live() {
+    LIVE_LINE.finish_and_clear();
+}
+
 /// Prints a line on stderr, or drops it.
 pub(crate) fn note(text: &str) {
-    console::note(text);
+    LIVE_LINE.suspend(|| console::note(text));
 }
 
 /// Warns about a file without its end, on stderr. `done` is the work that was done with it.

@@ -19,6 +19,13 @@ pub(crate) fn progress_spinner() -> ProgressBar {
     if io::stderr().is_terminal() { ProgressBar::new_spinner() } else { ProgressBar::hidden() }
 }
 
+/// Returns a line of text that changes in place.
+pub(crate) fn live_line() -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg}");
+    let style = style.unwrap_or_else(|_| ProgressStyle::default_spinner());
+    progress_spinner().with_style(style)
+}
+
 /// Returns a progress bar for a known number of bytes.
 pub(crate) fn progress_bytes(bytes: u64) -> ProgressBar {
     if !io::stderr().is_terminal() {

@@ -5,6 +5,7 @@ mod args;
 mod feed;
 mod first_state;
 mod intake;
+mod live;
 mod load;
 mod messages;
 mod queue;
@@ -29,6 +30,7 @@ use crate::cli::output;
 pub(crate) use args::{RecordArgs, SingleStateArgs};
 use feed::Feed;
 use intake::Intake;
+use live::LiveLine;
 use load::LoadError;
 use messages::Messages;
 use queue::Queue;
@@ -82,10 +84,12 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let position = Arc::new(WritePosition::default());
     let intake = Intake::new(args.steps);
     let writing = writing::start(Arc::clone(&queue), Arc::clone(&position), options, file)?;
+    let live = LiveLine::new(Arc::clone(&queue), Arc::clone(&position));
     let feed = Feed::new(intake, Arc::clone(&queue), position, args.split.clone());
     let mut recording = Recording {
         tap,
         feed: feed.following(args.follow).selecting(selection),
+        live,
         queue,
         writing,
         begin_ns,
@@ -129,6 +133,7 @@ fn attach(args: &RecordArgs, endpoint: &Endpoint, stop: &Stop) -> anyhow::Result
 struct Recording {
     tap: Tap,
     feed: Feed,
+    live: LiveLine,
     queue: Arc<Queue>,
     writing: JoinHandle<anyhow::Result<Written>>,
     begin_ns: u64,
@@ -150,6 +155,7 @@ impl Recording {
                 Some(reason) => return Ok(reason),
                 None => {}
             }
+            self.live.update(&self.feed);
             self.tap.wait(WAIT_MAX);
         }
     }
@@ -213,6 +219,7 @@ impl Recording {
             Ok(reason) => reason.text().to_owned(),
             Err(error) => format!("{error:#}"),
         };
+        output::end_live();
         self.feed.end_file(stop_reason.clone());
         self.queue.close();
         let written = self.writing.join().map_err(|_| anyhow!("the writing thread panicked"))??;

@@ -4,7 +4,7 @@ pub(crate) mod selector;
 
 use std::sync::Arc;
 
-use recorder::ContentSelection;
+use recorder::{Closing, ContentSelection};
 use sim_contract::clock::{monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State};
 
@@ -146,6 +146,17 @@ impl Feed {
         if let Some(warning) = self.intake.count_unreadable(errors) {
             output::note(&warning);
         }
+    }
+
+    /// Returns the counts of the newest file so far, with what the queue has dropped.
+    pub(crate) fn closing(&self) -> Closing {
+        let mut closing = if self.intake.has_started() {
+            self.intake.closing(String::new())
+        } else {
+            Closing::default()
+        };
+        closing.counts.set_lost(&self.queue.lost());
+        closing
     }
 
     /// Sets the numbers of changes that the tap has dropped so far.

@@ -130,6 +130,11 @@ impl Queue {
         self.changed.notify_one();
     }
 
+    /// Returns the numbers of dropped messages of the newest file.
+    pub(crate) fn lost(&self) -> AllCounts {
+        self.lock().lost
+    }
+
     /// Returns the size of what waits, in bytes.
     pub(crate) fn size_bytes(&self) -> usize {
         self.lock().size_bytes

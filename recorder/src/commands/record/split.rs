@@ -73,6 +73,12 @@ impl WritePosition {
             Some(FilePosition { number, size_bytes });
     }
 
+    /// Returns the number and the size of the file.
+    pub(crate) fn get(&self) -> Option<(u64, u64)> {
+        let position = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        position.map(|position| (position.number, position.size_bytes))
+    }
+
     /// Returns the size of a file; `None` if the writing thread has not begun it.
     fn size_bytes_of(&self, number: u64) -> Option<u64> {
         let position = *self.0.lock().unwrap_or_else(PoisonError::into_inner);

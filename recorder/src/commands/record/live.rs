@@ -1,0 +1,123 @@
+//! The line on a terminal that shows a recording in progress.
+
+use std::fmt::Write;
+use std::sync::Arc;
+
+use recorder::{Closing, Topic};
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
+
+use super::feed::Feed;
+use super::queue::Queue;
+use super::split::WritePosition;
+use crate::cli::output;
+
+/// Time from one update to the next.
+const PERIOD_NS: u64 = SECOND_NS / 4;
+/// Time over which the speed is measured: several flushes.
+const SPEED_PERIOD_NS: u64 = 3 * SECOND_NS;
+const BYTES_PER_MB: f64 = 1e6;
+
+/// Shows a line, and replaces it four times a second.
+#[derive(Debug)]
+pub(super) struct LiveLine {
+    queue: Arc<Queue>,
+    position: Arc<WritePosition>,
+    begin_ns: u64,
+    next_ns: u64,
+    last: Sample,
+    bytes_per_s: f64,
+}
+
+/// The place in the files at a time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Sample {
+    monotonic_ns: u64,
+    file_number: u64,
+    size_bytes: u64,
+}
+
+impl LiveLine {
+    pub(super) fn new(queue: Arc<Queue>, position: Arc<WritePosition>) -> Self {
+        let now_ns = monotonic_ns();
+        let last = Sample { monotonic_ns: now_ns, ..Sample::default() };
+        Self {
+            queue,
+            position,
+            begin_ns: now_ns,
+            next_ns: now_ns + PERIOD_NS,
+            last,
+            bytes_per_s: 0.0,
+        }
+    }
+
+    /// Replaces the line if it is time to.
+    pub(super) fn update(&mut self, feed: &Feed) {
+        let now_ns = monotonic_ns();
+        if now_ns < self.next_ns {
+            return;
+        }
+        self.next_ns = now_ns + PERIOD_NS;
+        let (file_number, size_bytes) = self.position.get().unwrap_or_default();
+        let now = Sample { monotonic_ns: now_ns, file_number, size_bytes };
+        if now_ns - self.last.monotonic_ns >= SPEED_PERIOD_NS {
+            self.bytes_per_s = bytes_per_s(self.last, now);
+            self.last = now;
+        }
+        let seconds = (now_ns - self.begin_ns) as f64 / SECOND_NS as f64;
+        let line = text(seconds, &feed.closing(), self.bytes_per_s, self.queue.size_bytes());
+        output::show_live(line);
+    }
+}
+
+/// Speed of the writing thread. In a new file, only what is in it counts.
+fn bytes_per_s(last: Sample, now: Sample) -> f64 {
+    let before = if last.file_number == now.file_number { last.size_bytes } else { 0 };
+    let seconds = (now.monotonic_ns - last.monotonic_ns).max(1) as f64 / SECOND_NS as f64;
+    now.size_bytes.saturating_sub(before) as f64 / seconds
+}
+
+fn text(seconds: f64, closing: &Closing, bytes_per_s: f64, queue_bytes: usize) -> String {
+    let steps = closing.counts[Topic::Steps].received;
+    let speed = bytes_per_s / BYTES_PER_MB;
+    let queue = queue_bytes as f64 / BYTES_PER_MB;
+    let mut text = format!(
+        "{seconds:.1} s, {steps} snapshots, {speed:.1} MB/s, {queue:.1} MB in the queue, lost"
+    );
+    let missing = closing.missing();
+    if missing.is_empty() {
+        text += " none";
+    }
+    for (topic, count) in missing {
+        // Writing to a text cannot fail.
+        let _ = write!(text, " {topic} {count}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_has_the_time_the_speed_the_queue_and_the_losses() {
+        let mut closing = Closing::default();
+        closing.counts[Topic::Steps].received = 240;
+        let line = text(1.04, &closing, 5_260_000.0, 120_000);
+        assert_eq!(line, "1.0 s, 240 snapshots, 5.3 MB/s, 0.1 MB in the queue, lost none");
+        closing.counts[Topic::Steps].lost = 3;
+        closing.counts[Topic::Particles].gaps = 3;
+        let line = text(1.04, &closing, 0.0, 0);
+        assert!(line.ends_with("lost /particles 3 /steps 3"), "{line}");
+    }
+
+    #[test]
+    fn the_speed_counts_a_new_file_from_its_start() {
+        let at = |monotonic_ns, file_number, size_bytes| Sample {
+            monotonic_ns,
+            file_number,
+            size_bytes,
+        };
+        assert!((bytes_per_s(at(0, 0, 100), at(SECOND_NS / 2, 0, 400)) - 600.0).abs() < 1e-9);
+        assert!((bytes_per_s(at(0, 0, 900), at(SECOND_NS, 1, 50)) - 50.0).abs() < 1e-9);
+    }
+}
