@@ -27,6 +27,9 @@ pub(super) struct Completed {
     pub(super) is_interrupted: bool,
 }
 
+/// The place of an error in the output.
+const OUTPUT: &str = "the new file, whose readable part ends with .part";
+
 /// A recording that is simulated again.
 pub(super) struct Completion<R: Read> {
     frames: FrameReader<R>,
@@ -73,7 +76,9 @@ impl<R: Read> Completion<R> {
         let mut next = self.frames.next_frame()?;
         let first_time_ns = next.as_ref().and_then(|frame| frame.log_times_ns.first().copied());
         let mut out = match create()? {
-            Some(out) => Some(self.begin(out, options, first_time_ns.unwrap_or(0))?),
+            Some(out) => {
+                Some(self.begin(out, options, first_time_ns.unwrap_or(0)).context(OUTPUT)?)
+            }
             None => None,
         };
         let mut is_interrupted = false;
@@ -83,19 +88,19 @@ impl<R: Read> Completion<R> {
                 break;
             }
             if let Some(out) = &mut out {
-                self.write(out, &frame)?;
+                self.write(out, &frame).context(OUTPUT)?;
             }
             on_step(frame.row.step);
             next = self.frames.next_frame()?;
         }
         if let (Some(out), false) = (&mut out, is_interrupted) {
-            self.write_trailing(out)?;
+            self.write_trailing(out).context(OUTPUT)?;
         }
         let finish = |out: LogWriter<W>| {
             let closing = self.closing(&out, is_interrupted);
             out.finish(&closing)
         };
-        let out = out.map(finish).transpose()?;
+        let out = out.map(finish).transpose().context(OUTPUT)?;
         Ok((self.completed(is_interrupted)?, out))
     }
 
