@@ -1,19 +1,27 @@
 //! `recorder info`: the content of a recording.
 
 mod bins;
+mod columns;
+mod graph;
 mod report;
 mod survey;
 mod timing;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Context;
-use recorder::{LogEnd, LogReader};
+use anyhow::{Context, bail};
+use recorder::{LogEnd, LogReader, Message, PartFile};
 
 use crate::cli::exit::Exit;
+use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
+use crate::export::svg;
+use columns::{ColumnCollector, Columns};
+use graph::{COLUMNS_MAX, Graph};
+use report::Info;
 use survey::inspect;
+use timing::{Timing, period_ns};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -22,34 +30,97 @@ use survey::inspect;
     Exit codes: 0 complete; 1 not a recording; 3 messages lost, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder info run.mcap\n  \
-    recorder info run.mcap --json"
+    recorder info run.mcap --json\n  \
+    recorder info run.mcap --timing --svg timing.svg"
 )]
 pub(crate) struct InfoArgs {
     /// Recording to read. Every checksum is verified
     file: PathBuf,
+    /// Print only the late steps and the measured times. Fails if no time was measured
+    #[arg(long)]
+    timing: bool,
+    /// Draw wake-up lateness and solver time over the steps into this SVG file
+    #[arg(long, value_name = "OUT.svg", requires = "timing")]
+    svg: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
     #[command(flatten)]
     as_json: AsJson,
 }
 
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<Exit> {
+    if let Some(svg) = &args.svg {
+        check_output(args, svg)?;
+    }
     let path = output::path_text(&args.file);
     let mut log = LogReader::open(&args.file).with_context(|| path.clone())?;
     let size_bytes = fs::metadata(&args.file).with_context(|| path.clone())?.len();
     let (info, end) = inspect(&mut log, path.clone(), size_bytes).with_context(|| path.clone())?;
-    output::result(args.as_json, &info, &info.to_string())?;
+    if args.timing {
+        print_timing(args, &info).with_context(|| path.clone())?;
+    } else {
+        output::result(args.as_json, &info, &info.to_string())?;
+    }
     if end != LogEnd::Complete {
         output::warn_incomplete(&args.file, &end, "read as far as it goes");
     }
     Ok(if end == LogEnd::Complete && info.lost.is_empty() { Exit::Done } else { Exit::Loss })
 }
 
+/// Fails if the graph may not be written.
+fn check_output(args: &InfoArgs, svg: &Path) -> anyhow::Result<()> {
+    let is_input = |path: &Path| path.canonicalize().ok() == args.file.canonicalize().ok();
+    if svg.exists() && is_input(svg) {
+        bail!("{}: is the recording itself; name another file for --svg", svg.display());
+    }
+    Ok(args.overwrite.existing().check(svg)?)
+}
+
+/// Prints the measured times, and draws them if asked to.
+fn print_timing(args: &InfoArgs, info: &Info) -> anyhow::Result<()> {
+    let Some(timing) = &info.timing else {
+        bail!(
+            "has no measured times ({}); `recorder record` records those of a running node",
+            info.untimed_reason()
+        );
+    };
+    if let Some(svg) = &args.svg {
+        let graph = graph(args, info, timing)?;
+        PartFile::write_whole(svg, args.overwrite.existing(), graph.as_bytes())?;
+    }
+    output::result(args.as_json, timing, &timing.to_string())
+}
+
+/// Reads the recording again, and returns the graph of its times as SVG.
+fn graph(args: &InfoArgs, info: &Info, timing: &Timing) -> anyhow::Result<String> {
+    let [wake_late, solve] = columns(&args.file, timing)?;
+    let graph = Graph {
+        title: format!("{}: {}, {} Hz", info.file_name(), info.scene, info.rate_hz),
+        steps: timing.steps,
+        period_ns: period_ns(info.rate_hz),
+        wake_late: &wake_late,
+        solve: &solve,
+    };
+    Ok(svg::encode(&graph.draw()))
+}
+
+/// Returns the columns of the wake-up lateness and of the solver time.
+fn columns(file: &Path, timing: &Timing) -> anyhow::Result<[Columns; 2]> {
+    let measured_count = usize::try_from(timing.measured_steps).unwrap_or(usize::MAX);
+    let mut collector = ColumnCollector::new(timing.steps, measured_count.min(COLUMNS_MAX))?;
+    let mut log = LogReader::open(file)?;
+    while let Some(logged) = log.next_message()? {
+        if let Message::Step(row) = &logged.message {
+            collector.add(row);
+        }
+    }
+    Ok(collector.finish())
+}
+
 #[cfg(test)]
 mod tests {
-    use recorder::{
-        Closing, LogOptions, LogWriter, Message, RunDescription, StepRow, TearsRow, Up,
-    };
+    use recorder::{Closing, LogOptions, LogWriter, RunDescription, StepRow, TearsRow, Up};
 
-    use super::report::Info;
     use super::*;
 
     /// Returns a recorded run with this wall clock of step 0.

@@ -57,7 +57,7 @@ impl Bins {
     }
 }
 
-/// Bins as lines of text, with bars in proportion to the counts.
+/// Bins as lines of text, each after a line break, with bars in proportion to the counts.
 pub(super) struct Bars<'a>(pub(super) &'a [Bin]);
 
 impl fmt::Display for Bars<'_> {
@@ -68,7 +68,8 @@ impl fmt::Display for Bars<'_> {
                 Some(to_us) => format!("{} to {to_us} µs", bin.from_us),
                 None => format!("from {} µs", bin.from_us),
             };
-            writeln!(f, "{limits:>24} {:>10}  {}", bin.count, bar(bin.count, greatest))?;
+            let line = format!("{limits:>24} {:>10}  {}", bin.count, bar(bin.count, greatest));
+            write!(f, "\n{}", line.trim_end())?;
         }
         Ok(())
     }

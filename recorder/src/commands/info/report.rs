@@ -92,12 +92,17 @@ impl Info {
         }
     }
 
+    /// Returns the name of the file without its folder.
+    pub(super) fn file_name(&self) -> &str {
+        self.file.rsplit('/').next().unwrap_or(&self.file)
+    }
+
     /// Returns the reason why a recording has no measured times.
     pub(super) fn untimed_reason(&self) -> &'static str {
         if self.simulated {
             "simulated, so no time was measured"
         } else {
-            "no recorded step has measured times"
+            "no step was computed while it was recorded"
         }
     }
 
@@ -181,7 +186,7 @@ impl fmt::Display for Info {
         self.write_end(f)?;
         self.write_topics(f)?;
         match &self.timing {
-            Some(timing) => write!(f, "\n{}", timing.to_string().trim_end()),
+            Some(timing) => write!(f, "\n{timing}"),
             None => write!(f, "\ntiming      none ({})", self.untimed_reason()),
         }
     }

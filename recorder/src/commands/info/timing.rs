@@ -15,6 +15,8 @@ const DIGITS: u8 = 3;
 #[derive(Debug)]
 pub(super) struct TimingCollector {
     rate_hz: u32,
+    /// First and last measured step.
+    steps: Option<[u64; 2]>,
     measured_count: u64,
     late_count: u64,
     wake_late: TimeCollector,
@@ -24,6 +26,9 @@ pub(super) struct TimingCollector {
 /// The measured times of the steps, as printed.
 #[derive(Debug, PartialEq, Serialize)]
 pub(super) struct Timing {
+    /// First and last step with measured times.
+    #[serde(skip)]
+    pub(super) steps: [u64; 2],
     /// Recorded steps with measured times.
     pub(super) measured_steps: u64,
     /// Those whose wake-up was more than a period of the scene's rate late.
@@ -65,13 +70,15 @@ pub(super) fn period_ns(rate_hz: u32) -> f64 {
 impl TimingCollector {
     pub(super) fn new(rate_hz: u32) -> anyhow::Result<Self> {
         let (wake_late, solve) = (TimeCollector::new()?, TimeCollector::new()?);
-        Ok(Self { rate_hz, measured_count: 0, late_count: 0, wake_late, solve })
+        Ok(Self { rate_hz, steps: None, measured_count: 0, late_count: 0, wake_late, solve })
     }
 
     pub(super) fn add(&mut self, row: &StepRow) {
         if !is_measured(row) {
             return;
         }
+        let [first, last] = self.steps.unwrap_or([row.step; 2]);
+        self.steps = Some([first.min(row.step), last.max(row.step)]);
         self.measured_count += 1;
         self.late_count += u64::from(row.wake_late_ns as f64 > period_ns(self.rate_hz));
         self.wake_late.add(row.wake_late_ns);
@@ -80,7 +87,8 @@ impl TimingCollector {
 
     /// Returns the times. `None` if there are none.
     pub(super) fn timing(&self) -> Option<Timing> {
-        (self.measured_count > 0).then(|| Timing {
+        self.steps.map(|steps| Timing {
+            steps,
             measured_steps: self.measured_count,
             late_steps: self.late_count,
             period_us: period_ns(self.rate_hz) / 1e3,
@@ -129,15 +137,15 @@ impl fmt::Display for Timing {
             "late        {} of {} measured steps woke up more than a period ({:.1} µs) late",
             self.late_steps, self.measured_steps, self.period_us
         )?;
-        write!(f, "\nwake-up lateness: {}\nsolver time: {}", self.wake_late, self.solve)
+        write!(f, "\nwake-up lateness: {}\n\nsolver time: {}", self.wake_late, self.solve)
     }
 }
 
 impl fmt::Display for TimeSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { p50_us, p99_us, max_us, bins } = self;
-        writeln!(f, "p50 {p50_us:.1} µs, p99 {p99_us:.1} µs, max {max_us:.1} µs")?;
-        write!(f, "{}", Bars(bins))
+        let bars = Bars(bins);
+        write!(f, "p50 {p50_us:.1} µs, p99 {p99_us:.1} µs, max {max_us:.1} µs{bars}")
     }
 }
 
