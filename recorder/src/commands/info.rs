@@ -250,4 +250,14 @@ mod tests {
         assert_eq!(info.last_step, Some(48));
         assert_eq!(info.last_state_hash.as_deref(), Some("0000000000000030"));
     }
+
+    #[test]
+    fn a_snapshot_without_its_header_has_no_hash() {
+        let mut messages = ten_steps(0, 0);
+        messages.push((Message::Particles { step: 50, particles: Vec::new() }, 0));
+        let info = inspected(&file(0, &messages, None));
+        assert_eq!(info.last_step, Some(50));
+        assert_eq!((info.last_state_hash, info.torn_count_last), (None, None));
+        assert_eq!(info.torn_count_first, Some(1));
+    }
 }

@@ -217,3 +217,103 @@ fn power_of_ten(exponent: u32) -> String {
 fn text(corner: DVec2, cell: u32, line: String) -> Shape {
     Shape::Text(Text { corner, cell, color: TEXT, line })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn graph(wake_late: &Columns) -> Picture {
+        let title = "run.mcap".to_owned();
+        Graph { title, steps: [1, 4], period_ns: 1e5, wake_late, solve: &vec![None; 4] }.draw()
+    }
+
+    /// Powers of ten from 1 µs at the lower edge to 1 ms at the upper one.
+    fn y(power: f64) -> f64 {
+        TOPS[0] + HEIGHT * (6.0 - power) / 3.0
+    }
+
+    #[allow(clippy::unnecessary_wraps, reason = "columns are optional")]
+    fn column(min_ns: u64, median_ns: u64, max_ns: u64) -> Option<Column> {
+        Some(Column { min_ns, median_ns, max_ns })
+    }
+
+    #[test]
+    fn a_band_spans_the_times_of_adjacent_columns_and_a_line_their_medians() {
+        let columns = vec![
+            column(1_000, 10_000, 100_000),
+            column(10_000, 10_000, 10_000),
+            None,
+            column(1_000, 1_000, 1_000),
+        ];
+        let shapes = graph(&columns).shapes;
+        let bands: Vec<_> = shapes
+            .iter()
+            .filter_map(|shape| match shape {
+                Shape::Polygon { corners, .. } => Some(corners.clone()),
+                _ => None,
+            })
+            .collect();
+        let at = |quarter: f64, power: f64| DVec2::new(LEFT + WIDTH * quarter / 4.0, y(power));
+        let upper = [at(0.0, 5.0), at(1.0, 5.0), at(1.0, 4.0), at(2.0, 4.0)];
+        let lower = [at(2.0, 4.0), at(1.0, 4.0), at(1.0, 3.0), at(0.0, 3.0)];
+        assert_eq!(bands.len(), 2, "a column without steps divides the band");
+        let close = |a: &DVec2, b: &DVec2| (*a - *b).length() < 1e-9;
+        let expected = upper.iter().chain(&lower);
+        assert!(bands[0].len() == 8 && bands[0].iter().zip(expected).all(|(a, b)| close(a, b)));
+
+        let medians: Vec<_> = shapes
+            .iter()
+            .filter_map(|shape| match shape {
+                Shape::Segment { ends, stroke } if stroke.color == MEDIAN => Some(*ends),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(medians.len(), 3);
+        assert!(close(&medians[0][0], &at(0.5, 4.0)) && close(&medians[0][1], &at(1.5, 4.0)));
+        // The ends of a line are one pixel long, so that a single column shows.
+        assert!(close(&medians[1][1], &(at(1.5, 4.0) + DVec2::X)));
+        assert!(close(&medians[2][0], &at(3.5, 3.0)));
+    }
+
+    #[test]
+    fn the_period_is_marked_at_its_height_if_the_panel_reaches_it() {
+        let period = |columns: &Columns| {
+            let shapes = graph(columns).shapes;
+            shapes.into_iter().find_map(|shape| match shape {
+                Shape::Segment { ends, stroke } if stroke.color == PERIOD => Some(ends[0].y),
+                _ => None,
+            })
+        };
+        let marked = period(&vec![column(1_000, 1_000, 200_000)]).unwrap();
+        assert!((marked - y(5.0)).abs() < 1e-9);
+        assert_eq!(period(&vec![column(1_000, 1_000, 2_000)]), None);
+    }
+
+    #[test]
+    fn times_of_any_length_have_a_scale() {
+        assert_eq!(exponents(&vec![None]), [2, 3]);
+        assert_eq!(exponents(&vec![column(0, 0, 0)]), [2, 3]);
+        assert_eq!(exponents(&vec![column(u64::MAX, u64::MAX, u64::MAX)]), [19, 20]);
+        assert_eq!(["100 ns", "1 µs", "10 ms", "1 s"], [2, 3, 7, 9].map(power_of_ten).as_slice());
+        assert_eq!(power_of_ten(20), "100000000000 s");
+    }
+
+    #[test]
+    fn every_step_of_a_short_recording_has_its_number() {
+        let numbers = |first, last| {
+            let columns = vec![column(1, 1, 1)];
+            let title = "run.mcap".to_owned();
+            let steps = [first, last];
+            let graph =
+                Graph { title, steps, period_ns: 1.0, wake_late: &columns, solve: &columns };
+            let texts = graph.draw().shapes.into_iter().filter_map(|shape| match shape {
+                Shape::Text(text) => text.line.parse::<u64>().ok(),
+                _ => None,
+            });
+            texts.collect::<Vec<_>>()
+        };
+        assert_eq!(numbers(5, 5), [5, 5]);
+        assert_eq!(numbers(5, 7), [5, 6, 7, 5, 6, 7]);
+        assert_eq!(numbers(0, u64::MAX)[4], u64::MAX);
+    }
+}

@@ -71,11 +71,11 @@ impl Survey {
         self.info.first_step.get_or_insert(step);
         self.info.last_step = Some(step);
         self.info.snapshot_count += 1;
-        if let Some(row) = self.newest.filter(|row| row.step == step) {
-            self.info.torn_count_first.get_or_insert(row.torn_count);
-            self.info.torn_count_last = Some(row.torn_count);
-            self.info.last_state_hash = Some(format!("{:016x}", row.state_hash));
-        }
+        let row = self.newest.filter(|row| row.step == step);
+        let torn_count = row.map(|row| row.torn_count);
+        self.info.torn_count_first = self.info.torn_count_first.or(torn_count);
+        self.info.torn_count_last = torn_count;
+        self.info.last_state_hash = row.map(|row| format!("{:016x}", row.state_hash));
     }
 
     fn finish(mut self, run: &RunDescription, closing: Option<&Closing>, end: &LogEnd) -> Info {
