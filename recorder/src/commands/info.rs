@@ -27,7 +27,7 @@ use timing::{Timing, period_ns};
 #[command(
     after_help = "Lateness and solver times are those of the recorded steps. A step counts as late if it \
     woke up more than a period of the scene's rate after its deadline.\n\n\
-    Exit codes: 0 complete; 1 not a recording; 3 messages lost, or file truncated \
+    Exit codes: 0 complete; 1 not a recording, no measured times, or OUT.svg exists; 3 messages lost, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder info run.mcap\n  \
     recorder info run.mcap --json\n  \
