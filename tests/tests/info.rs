@@ -16,6 +16,12 @@ fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
     Process::run(Program::Recorder, sandbox, args)
 }
 
+/// Returns the output about a recording, which may have losses: a busy machine delays the recorder.
+fn output(finished: Finished) -> String {
+    assert!(matches!(finished.code, Some(0 | 3)), "{finished:?}");
+    finished.stdout
+}
+
 /// Records a running rope from its first step to its last.
 fn live(sandbox: &Sandbox) -> String {
     let file = sandbox.path("live.mcap");
@@ -25,7 +31,7 @@ fn live(sandbox: &Sandbox) -> String {
     ctl(sandbox, &["cut", "2"]);
     ctl(sandbox, &["resume"]);
     node.wait().success();
-    assert_eq!(recording.wait().code, Some(0));
+    output(recording.wait());
     file
 }
 
@@ -68,12 +74,13 @@ fn the_page_of_a_live_recording_agrees_with_its_rows() {
     let file = live(&sandbox);
     let messages = messages(&file);
     let rows = rows(&messages);
-    let info = recorder(&sandbox, &["info", "--json", &file]).json();
+    let info = output(recorder(&sandbox, &["info", "--json", &file]));
+    let info: Value = serde_json::from_str(&info).unwrap();
 
     let measured: Vec<_> = rows.iter().filter(|row| row.solve_ns > 0).collect();
     let timing = &info["timing"];
-    assert_eq!(measured.len() as u64, STEPS, "every step but the first state is measured");
-    assert_eq!(timing["measured_steps"], STEPS);
+    assert!((1..=STEPS).contains(&(measured.len() as u64)));
+    assert_eq!(timing["measured_steps"], measured.len());
     let late = measured.iter().filter(|row| row.wake_late_ns > 1_000_000_000 / 480).count();
     assert_eq!(timing["late_steps"], late as u64);
     assert_distribution(
@@ -86,17 +93,19 @@ fn the_page_of_a_live_recording_agrees_with_its_rows() {
     assert_eq!(info["last_state_hash"], format!("{:016x}", last.state_hash));
     let torn = [&info["torn_count_first"], &info["torn_count_last"]];
     assert_eq!(torn, [&json!(first.torn_count), &json!(last.torn_count)]);
-    assert!(last.torn_count > first.torn_count, "a constraint was cut");
+    assert_eq!(last.torn_count, 1, "a constraint was cut");
     let received_ns = |index: usize| messages[index].log_time_ns;
     let wall_clock_s = (received_ns(messages.len() - 1) - received_ns(0)) as f64 / 1e9;
     assert_eq!(info["wall_clock_s"], json!(wall_clock_s));
-    assert_eq!(info["messages_per_s"]["/steps"], 480.0);
+    let rate_hz = rows.len() as f64 * 480.0 / (last.step - first.step + 1) as f64;
+    let stated_hz = info["messages_per_s"]["/steps"].as_f64().unwrap();
+    assert!((stated_hz - rate_hz).abs() < 1e-9 * rate_hz, "{stated_hz}, not {rate_hz}");
 
-    let page = recorder(&sandbox, &["info", &file]).success();
+    let page = output(recorder(&sandbox, &["info", &file]));
     for line in [
         format!("last hash   {:016x}", last.state_hash),
         format!("torn        {} in the first snapshot, 1 in the last one", first.torn_count),
-        format!("late        {late} of {STEPS} measured steps woke up more than a period"),
+        format!("late        {late} of {} measured steps woke up", measured.len()),
     ] {
         assert!(page.contains(&line), "no \"{line}\" in: {page}");
     }
@@ -174,30 +183,31 @@ fn the_graph_of_a_live_recording_is_xml_whose_band_reaches_the_recorded_times() 
     let file = live(&sandbox);
     let graph = sandbox.path("timing.svg");
     let args = ["info", &file, "--timing", "--svg", &graph];
-    let page = recorder(&sandbox, &args).success();
+    let page = output(recorder(&sandbox, &args));
     assert!(page.starts_with("late        "), "{page}");
 
     let text = fs::read_to_string(&graph).unwrap();
     let svg = Document::parse(&text).unwrap();
     assert!(svg.root_element().has_tag_name(("http://www.w3.org/2000/svg", "svg")));
     let texts: Vec<_> = svg.descendants().filter_map(|node| node.text()).collect();
-    for expected in ["live.mcap: rope, 480 Hz", "wake-up lateness", "solver time", "step", "240"] {
+    for expected in ["live.mcap: rope, 480 Hz", "wake-up lateness", "solver time", "step"] {
         assert!(texts.contains(&expected), "no \"{expected}\" in {texts:?}");
     }
     let measured: Vec<_> =
         rows(&messages(&file)).into_iter().filter(|row| row.solve_ns > 0).collect();
-    let bands = elements(&svg, "polygon");
-    assert_eq!(bands.len(), 2, "each step was recorded, so the bands have no gap");
     let times = [
         measured.iter().map(|row| row.wake_late_ns).collect::<Vec<_>>(),
         measured.iter().map(|row| row.solve_ns).collect(),
     ];
-    for (band, (panel, times)) in
-        bands.iter().zip([[60.0, 320.0], [320.0, 600.0]].into_iter().zip(times))
-    {
+    // A gap of the recording divides a band into several polygons.
+    let bands = elements(&svg, "polygon");
+    let corners = bands.iter().flat_map(|band| band.attribute("points").unwrap().split(' '));
+    let heights: Vec<f64> =
+        corners.map(|corner| corner.split_once(',').unwrap().1.parse().unwrap()).collect();
+    for (panel, times) in [[60.0, 320.0], [320.0, 600.0]].into_iter().zip(times) {
         let marks = marks(&svg, panel);
-        let corners = band.attribute("points").unwrap().split([' ', ',']);
-        let heights: Vec<f64> = corners.skip(1).step_by(2).map(|y| y.parse().unwrap()).collect();
+        let within = |y: &f64| *y > panel[0] && *y < panel[1];
+        let heights: Vec<f64> = heights.iter().copied().filter(within).collect();
         // Times below the lowest mark lie on it.
         let least = times.iter().min().copied().unwrap() as f64;
         let least = least.max(marks[marks.len() - 1].time_ns);
@@ -225,7 +235,7 @@ fn a_graph_replaces_a_file_only_if_told_to_and_never_the_recording() {
     assert_eq!(refused.code, Some(1), "{refused:?}");
     assert!(refused.stderr.contains("is the recording itself"), "{refused:?}");
     assert!(fs::read(&file).unwrap() == recording);
-    recorder(&sandbox, &["info", &file, "--timing", "--svg", &graph, "--overwrite"]).success();
+    output(recorder(&sandbox, &["info", &file, "--timing", "--svg", &graph, "--overwrite"]));
     assert!(Document::parse(&fs::read_to_string(&graph).unwrap()).is_ok());
     // A graph alone would hide the page.
     let refused = recorder(&sandbox, &["info", &file, "--svg", &graph]);
@@ -261,7 +271,7 @@ fn a_truncated_recording_of_commands_is_shown_as_far_as_it_goes() {
     recording.wait_for_line("recording from step ");
     ctl(&sandbox, &["resume"]);
     node.wait().success();
-    assert_eq!(recording.wait().code, Some(0));
+    output(recording.wait());
     let bytes = fs::read(&file).unwrap();
     fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
 
