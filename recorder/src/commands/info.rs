@@ -1,231 +1,154 @@
 //! `recorder info`: the content of a recording.
 
-use std::collections::BTreeMap;
-use std::fmt;
-use std::fs;
-use std::io::Read;
-use std::path::PathBuf;
+mod bins;
+mod columns;
+mod graph;
+mod report;
+mod survey;
+mod timing;
 
-use anyhow::Context;
-use recorder::{Closing, GapCounter, LogEnd, LogReader, RunDescription, Topic};
-use serde::Serialize;
-use sim_contract::printable_line;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use recorder::{LogEnd, LogReader, Message, PartFile};
 
 use crate::cli::exit::Exit;
+use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
+use crate::export::svg;
+use columns::{ColumnCollector, Columns};
+use graph::{COLUMNS_MAX, Graph};
+use report::Info;
+use survey::inspect;
+use timing::{Timing, period_ns};
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 complete; 1 not a recording; 3 messages lost, or file truncated \
+    after_help = "Lateness and solver times are those of the recorded steps. A step counts as late if it \
+    woke up more than a period of the scene's rate after its deadline.\n\n\
+    Exit codes: 0 complete; 1 not a recording, no measured times, or OUT.svg exists; 3 messages lost, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder info run.mcap\n  \
-    recorder info run.mcap --json"
+    recorder info run.mcap --json\n  \
+    recorder info run.mcap --timing --svg timing.svg"
 )]
 pub(crate) struct InfoArgs {
     /// Recording to read. Every checksum is verified
     file: PathBuf,
+    /// Print only the late steps and the measured times. Fails if no time was measured
+    #[arg(long)]
+    timing: bool,
+    /// Draw wake-up lateness and solver time over the steps into this SVG file
+    #[arg(long, value_name = "OUT.svg", requires = "timing")]
+    svg: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
     #[command(flatten)]
     as_json: AsJson,
 }
 
-/// The content of a recording, as printed.
-#[derive(Debug, Serialize)]
-pub(crate) struct Info {
-    file: String,
-    size_bytes: u64,
-    /// "complete", "truncated ..." or "damaged ...".
-    file_end: String,
-    scene: String,
-    particle_count: u32,
-    constraint_count: u32,
-    rate_hz: u32,
-    method: &'static str,
-    /// 16 hex digits.
-    run_id: String,
-    solver_version: u32,
-    contract_version: u32,
-    recorder_version: String,
-    first_step: Option<u64>,
-    last_step: Option<u64>,
-    #[serde(skip)]
-    snapshot_count: u64,
-    /// From the first to the last snapshot, in simulated seconds.
-    duration_s: f64,
-    /// Number of messages in the file, by topic.
-    messages: BTreeMap<&'static str, u64>,
-    /// Messages that the recorder lost or that never reached it, for topics with such messages, and
-    /// "unreadable" ones. In a file without an end, only those that are missing between recorded ones.
-    lost: BTreeMap<&'static str, u64>,
-    /// Topics with an unknown number of missing messages: those of the snapshots in a file without an end,
-    /// of a format that does not number them.
-    lost_unknown: Vec<&'static str>,
-    /// Reason why the recorder stopped. Absent if it was killed.
-    stop_reason: Option<String>,
-}
-
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<Exit> {
+    if let Some(svg) = &args.svg {
+        check_output(args, svg)?;
+    }
     let path = output::path_text(&args.file);
     let mut log = LogReader::open(&args.file).with_context(|| path.clone())?;
     let size_bytes = fs::metadata(&args.file).with_context(|| path.clone())?.len();
     let (info, end) = inspect(&mut log, path.clone(), size_bytes).with_context(|| path.clone())?;
-    output::result(args.as_json, &info, &info.to_string())?;
+    if args.timing {
+        print_timing(args, &info).with_context(|| path.clone())?;
+    } else {
+        output::result(args.as_json, &info, &info.to_string())?;
+    }
     if end != LogEnd::Complete {
         output::warn_incomplete(&args.file, &end, "read as far as it goes");
     }
     Ok(if end == LogEnd::Complete && info.lost.is_empty() { Exit::Done } else { Exit::Loss })
 }
 
-/// Reads the whole recording.
-pub(crate) fn inspect<R: Read>(
-    log: &mut LogReader<R>,
-    file: String,
-    size_bytes: u64,
-) -> Result<(Info, LogEnd), recorder::ReadError> {
-    let mut info = Info::new(log.run(), file, size_bytes);
-    let selection = log.selection();
-    let mut gaps = GapCounter::for_selection(selection);
-    let has_all_particles = selection.has_topic(Topic::Particles) && !selection.is_only_commands();
-    // A header at the end of a truncated file has lost its particles.
-    let counted = if has_all_particles { Topic::Particles } else { Topic::Steps };
+/// Fails if the graph may not be written.
+fn check_output(args: &InfoArgs, svg: &Path) -> anyhow::Result<()> {
+    let is_input = |path: &Path| path.canonicalize().ok() == args.file.canonicalize().ok();
+    if svg.exists() && is_input(svg) {
+        bail!("{}: is the recording itself; name another file for --svg", svg.display());
+    }
+    Ok(args.overwrite.existing().check(svg)?)
+}
+
+/// Prints the measured times, and draws them if asked to.
+fn print_timing(args: &InfoArgs, info: &Info) -> anyhow::Result<()> {
+    let Some(timing) = &info.timing else {
+        bail!(
+            "has no measured times ({}); `recorder record` records those of a running node",
+            info.untimed_reason()
+        );
+    };
+    if let Some(svg) = &args.svg {
+        let graph = graph(args, info, timing)?;
+        PartFile::write_whole(svg, args.overwrite.existing(), graph.as_bytes())?;
+    }
+    output::result(args.as_json, timing, &timing.to_string())
+}
+
+/// Reads the recording again, and returns the graph of its times as SVG.
+fn graph(args: &InfoArgs, info: &Info, timing: &Timing) -> anyhow::Result<String> {
+    let [wake_late, solve] = columns(&args.file, timing)?;
+    let graph = Graph {
+        title: format!("{}: {}, {} Hz", info.file_name(), info.scene, info.rate_hz),
+        steps: timing.steps,
+        period_ns: period_ns(info.rate_hz),
+        wake_late: &wake_late,
+        solve: &solve,
+    };
+    Ok(svg::encode(&graph.draw()))
+}
+
+/// Returns the columns of the wake-up lateness and of the solver time.
+fn columns(file: &Path, timing: &Timing) -> anyhow::Result<[Columns; 2]> {
+    let measured_count = usize::try_from(timing.measured_steps).unwrap_or(usize::MAX);
+    let mut collector = ColumnCollector::new(timing.steps, measured_count.min(COLUMNS_MAX))?;
+    let mut log = LogReader::open(file)?;
     while let Some(logged) = log.next_message()? {
-        gaps.add(&logged.message);
-        *info.messages.entry(logged.message.topic().name()).or_default() += 1;
-        if logged.message.topic() == counted {
-            let step = logged.message.step();
-            info.first_step.get_or_insert(step);
-            info.last_step = Some(step);
-            info.snapshot_count += 1;
+        if let Message::Step(row) = &logged.message {
+            collector.add(row);
         }
     }
-    info.messages.insert(Topic::Tf.name(), log.transform_count());
-    let end = log.end().cloned().unwrap_or(LogEnd::Complete);
-    info.file_end = end.to_string();
-    if let (Some(first), Some(last)) = (info.first_step, info.last_step) {
-        info.duration_s = last.saturating_sub(first) as f64 / f64::from(info.rate_hz);
-    }
-    info.count_lost(log.closing(), &gaps);
-    Ok((info, end))
-}
-
-impl Info {
-    fn new(run: &RunDescription, file: String, size_bytes: u64) -> Self {
-        Self {
-            file,
-            size_bytes,
-            file_end: String::new(),
-            scene: run.scene_name.clone(),
-            particle_count: run.particle_count,
-            constraint_count: run.constraint_count,
-            rate_hz: run.rate_hz,
-            method: run.method_name(),
-            run_id: format!("{:016x}", run.run_id),
-            solver_version: run.solver_version,
-            contract_version: run.contract_version,
-            recorder_version: run.recorder_version.clone(),
-            first_step: None,
-            last_step: None,
-            snapshot_count: 0,
-            duration_s: 0.0,
-            messages: Topic::ALL.map(|topic| (topic.name(), 0)).into(),
-            lost: BTreeMap::new(),
-            lost_unknown: Vec::new(),
-            stop_reason: None,
-        }
-    }
-
-    /// Sets the losses: those that the end of the file states, or more if the file shows more.
-    fn count_lost(&mut self, closing: Option<&Closing>, gaps: &GapCounter) {
-        if closing.is_none() && gaps.has_unnumbered_snapshots() {
-            self.lost_unknown = [Topic::Steps, Topic::Particles].map(Topic::name).to_vec();
-        }
-        let shown = gaps.counts();
-        self.stop_reason = closing.map(|closing| closing.stop_reason.clone());
-        self.lost = closing.map(Closing::missing).unwrap_or_default();
-        for (topic, shown) in shown.iter().filter(|(_, shown)| shown.gaps > 0) {
-            let lost = self.lost.entry(topic.name()).or_default();
-            *lost = shown.gaps.max(*lost);
-        }
-    }
-}
-
-impl fmt::Display for Info {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let join = |counts: &BTreeMap<&str, u64>| {
-            let parts = counts.iter().filter(|(_, count)| **count > 0);
-            parts.map(|(topic, count)| format!("{topic} {count}")).collect::<Vec<_>>().join(", ")
-        };
-        let none_if_empty = |text: String| if text.is_empty() { "none".to_owned() } else { text };
-        let (file, file_end) = (printable_line(&self.file), printable_line(&self.file_end));
-        writeln!(f, "file        {file}, {} bytes, {file_end}", self.size_bytes)?;
-        writeln!(
-            f,
-            "scene       {}: {}, {}, {} Hz, {}",
-            printable_line(&self.scene),
-            counted(self.particle_count, "particle"),
-            counted(self.constraint_count, "constraint"),
-            self.rate_hz,
-            self.method
-        )?;
-        writeln!(
-            f,
-            "run         {} (solver version {}, contract version {}, recorder {})",
-            self.run_id,
-            self.solver_version,
-            self.contract_version,
-            printable_line(&self.recorder_version)
-        )?;
-        match (self.first_step, self.last_step) {
-            (Some(first), Some(last)) => {
-                let (count, duration_s) = (self.snapshot_count, self.duration_s);
-                writeln!(f, "steps       {first}..={last}, {count} recorded, {duration_s:.3} s")?;
-            }
-            _ => writeln!(f, "steps       none")?,
-        }
-        writeln!(f, "messages    {}", none_if_empty(join(&self.messages)))?;
-        let scope = if self.stop_reason.is_none() { ", as far as the file goes" } else { "" };
-        let unknown = self.lost_unknown.iter().map(|topic| format!("{topic} unknown"));
-        let known = Some(join(&self.lost)).filter(|known| !known.is_empty());
-        let lost = unknown.chain(known).collect::<Vec<_>>().join(", ");
-        writeln!(f, "lost        {}{scope}", none_if_empty(lost))?;
-        let reason = self.stop_reason.as_deref().unwrap_or("unknown");
-        write!(f, "stopped     {}", printable_line(reason))
-    }
-}
-
-/// Returns a number with its noun, such as "1 particle" or "2 particles".
-fn counted(count: u32, noun: &str) -> String {
-    let ending = if count == 1 { "" } else { "s" };
-    format!("{count} {noun}{ending}")
+    Ok(collector.finish())
 }
 
 #[cfg(test)]
 mod tests {
-    use recorder::{LogOptions, LogWriter, Message, StepRow, Up};
+    use recorder::{Closing, LogOptions, LogWriter, RunDescription, StepRow, TearsRow, Up};
 
     use super::*;
 
-    /// Returns the report on a file with two snapshots.
-    fn report(indices: [Option<u32>; 2], closing: Option<&Closing>) -> (Info, String) {
-        let run = RunDescription {
+    /// Returns a recorded run with this wall clock of step 0.
+    fn run(epoch_ns: u64) -> RunDescription {
+        RunDescription {
             run_id: 7,
-            epoch_ns: 0,
+            epoch_ns,
             scene_name: "points".to_owned(),
             origin: [0.0; 3],
             up: Up::Y,
-            rate_hz: 240,
+            rate_hz: 100,
             method: 0,
             particle_count: 0,
-            constraint_count: 0,
+            constraint_count: 9,
             solver_version: 1,
             contract_version: 1,
             recorder_version: "0".to_owned(),
-        };
+        }
+    }
+
+    /// Returns a file with these messages and their times of reception.
+    fn file(epoch_ns: u64, messages: &[(Message, u64)], closing: Option<&Closing>) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut log =
-            LogWriter::create(&mut bytes, LogOptions::default(), &run, b"version = 1", 0).unwrap();
-        for (step, snapshot_index) in (0..).zip(indices) {
-            let row = StepRow { step, snapshot_index, ..StepRow::default() };
-            log.write(&Message::Step(row), 0).unwrap();
+            LogWriter::create(&mut bytes, LogOptions::default(), &run(epoch_ns), b"version = 1", 0)
+                .unwrap();
+        for (message, log_time_ns) in messages {
+            log.write(message, *log_time_ns).unwrap();
         }
         log.flush().unwrap();
         if let Some(closing) = closing {
@@ -233,8 +156,25 @@ mod tests {
         } else {
             drop(log);
         }
-        let mut log = LogReader::new(bytes.as_slice()).unwrap();
-        let (info, _) = inspect(&mut log, "run.mcap".to_owned(), 0).unwrap();
+        bytes
+    }
+
+    fn inspected(bytes: &[u8]) -> Info {
+        let mut log = LogReader::new(bytes).unwrap();
+        inspect(&mut log, "run.mcap".to_owned(), 1000).unwrap().0
+    }
+
+    fn snapshot(row: StepRow) -> [Message; 2] {
+        [Message::Step(row), Message::Particles { step: row.step, particles: Vec::new() }]
+    }
+
+    /// Returns the report on a file with the headers of two snapshots.
+    fn report(indices: [Option<u32>; 2], closing: Option<&Closing>) -> (Info, String) {
+        let rows = (0..).zip(indices);
+        let rows =
+            rows.map(|(step, index)| StepRow { step, snapshot_index: index, ..StepRow::default() });
+        let messages: Vec<_> = rows.map(|row| (Message::Step(row), 0)).collect();
+        let info = inspected(&file(0, &messages, closing));
         let text = info.to_string();
         let lost = text.lines().find(|line| line.starts_with("lost")).unwrap().to_owned();
         (info, lost)
@@ -258,5 +198,66 @@ mod tests {
         assert_eq!(lost, "lost        /particles 1, /steps 1, as far as the file goes");
         let (_, lost) = report([None, None], Some(&Closing::default()));
         assert_eq!(lost, "lost        none");
+    }
+
+    /// Ten steps of 10 ms that begin at step 40, each received 12 ms after the one before it, with a
+    /// tear in step 45. A step is as many µs late as its number.
+    fn ten_steps(epoch_ns: u64, measured: u64) -> Vec<(Message, u64)> {
+        let mut messages = Vec::new();
+        for step in 40..=49 {
+            let log_time_ns = epoch_ns + (step - 40) * 12_000_000;
+            if step == 45 {
+                let tears = TearsRow { step, constraints: vec![3, 8], causes: Vec::new() };
+                messages.push((Message::Tears(tears), log_time_ns));
+            }
+            let row = StepRow {
+                step,
+                state_hash: step << 60 | step,
+                torn_count: if step < 45 { 1 } else { 3 },
+                wake_late_ns: measured * step * 1000,
+                solve_ns: measured * 30_000_000,
+                snapshot_index: u32::try_from(step).ok(),
+                ..StepRow::default()
+            };
+            messages.extend(snapshot(row).map(|message| (message, log_time_ns)));
+        }
+        messages
+    }
+
+    #[test]
+    fn the_page_of_a_live_recording_has_rates_times_and_tears() {
+        let closing = Closing { stop_reason: "signal".to_owned(), ..Closing::default() };
+        let info = inspected(&file(1 << 60, &ten_steps(1 << 60, 1), Some(&closing)));
+        insta::assert_snapshot!(info.to_string());
+        let json = serde_json::to_value(&info).unwrap();
+        assert_eq!((&json["duration_s"], &json["wall_clock_s"]), (&0.09.into(), &0.108.into()));
+        assert_eq!(json["last_state_hash"], "1000000000000031");
+        assert_eq!(json["timing"]["wake_late"]["max_us"], 49.0);
+    }
+
+    #[test]
+    fn the_page_of_a_simulated_recording_says_that_no_time_was_measured() {
+        let info = inspected(&file(0, &ten_steps(0, 0), Some(&Closing::default())));
+        assert_eq!((info.wall_clock_s, &info.timing), (None, &None));
+        insta::assert_snapshot!(info.to_string());
+    }
+
+    #[test]
+    fn the_hash_of_a_truncated_file_is_that_of_its_last_complete_snapshot() {
+        let mut messages = ten_steps(0, 0);
+        messages.truncate(messages.len() - 1);
+        let info = inspected(&file(0, &messages, None));
+        assert_eq!(info.last_step, Some(48));
+        assert_eq!(info.last_state_hash.as_deref(), Some("0000000000000030"));
+    }
+
+    #[test]
+    fn a_snapshot_without_its_header_has_no_hash() {
+        let mut messages = ten_steps(0, 0);
+        messages.push((Message::Particles { step: 50, particles: Vec::new() }, 0));
+        let info = inspected(&file(0, &messages, None));
+        assert_eq!(info.last_step, Some(50));
+        assert_eq!((info.last_state_hash, info.torn_count_last), (None, None));
+        assert_eq!(info.torn_count_first, Some(1));
     }
 }

@@ -1,0 +1,199 @@
+//! The content of a recording, as printed.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use recorder::RunDescription;
+use serde::Serialize;
+use sim_contract::printable_line;
+
+use super::timing::Timing;
+
+/// The content of a recording, as printed.
+#[derive(Debug, Serialize)]
+pub(crate) struct Info {
+    pub(super) file: String,
+    pub(super) size_bytes: u64,
+    /// "complete", "truncated ..." or "damaged ...".
+    pub(super) file_end: String,
+    pub(super) scene: String,
+    pub(super) particle_count: u32,
+    pub(super) constraint_count: u32,
+    pub(super) rate_hz: u32,
+    pub(super) method: &'static str,
+    /// 16 hex digits.
+    pub(super) run_id: String,
+    pub(super) solver_version: u32,
+    pub(super) contract_version: u32,
+    pub(super) recorder_version: String,
+    /// `true` for a recording by `simulate`, which has no wall clock.
+    pub(super) simulated: bool,
+    pub(super) first_step: Option<u64>,
+    pub(super) last_step: Option<u64>,
+    #[serde(skip)]
+    pub(super) snapshot_count: u64,
+    /// From the first to the last snapshot, in simulated seconds.
+    pub(super) duration_s: f64,
+    /// From the reception of the first message to that of the last one. Absent if simulated.
+    pub(super) wall_clock_s: Option<f64>,
+    /// Number of messages in the file, by topic.
+    pub(super) messages: BTreeMap<&'static str, u64>,
+    /// Messages per simulated second, for topics with messages. A step lasts for its period, so one
+    /// message in each step has the rate of the scene. Empty if there are fewer than two steps.
+    pub(super) messages_per_s: BTreeMap<&'static str, f64>,
+    /// Messages that the recorder lost or that never reached it, for topics with such messages, and
+    /// "unreadable" ones. In a file without an end, only those that are missing between recorded ones.
+    pub(super) lost: BTreeMap<&'static str, u64>,
+    /// Topics with an unknown number of missing messages: those of the snapshots in a file without an end,
+    /// of a format that does not number them.
+    pub(super) lost_unknown: Vec<&'static str>,
+    /// Torn constraints in the first and in the last snapshot.
+    pub(super) torn_count_first: Option<u32>,
+    pub(super) torn_count_last: Option<u32>,
+    /// Hash of the last snapshot: 16 hex digits.
+    pub(super) last_state_hash: Option<String>,
+    /// Absent if no time was measured, as in a simulated recording.
+    pub(super) timing: Option<Timing>,
+    /// Reason why the recorder stopped. Absent if it was killed.
+    pub(super) stop_reason: Option<String>,
+}
+
+impl Info {
+    /// Returns a report without content.
+    pub(super) fn new(run: &RunDescription, file: String, size_bytes: u64) -> Self {
+        Self {
+            file,
+            size_bytes,
+            file_end: String::new(),
+            scene: run.scene_name.clone(),
+            particle_count: run.particle_count,
+            constraint_count: run.constraint_count,
+            rate_hz: run.rate_hz,
+            method: run.method_name(),
+            run_id: format!("{:016x}", run.run_id),
+            solver_version: run.solver_version,
+            contract_version: run.contract_version,
+            recorder_version: run.recorder_version.clone(),
+            simulated: run.epoch_ns == 0,
+            first_step: None,
+            last_step: None,
+            snapshot_count: 0,
+            duration_s: 0.0,
+            wall_clock_s: None,
+            messages: BTreeMap::new(),
+            messages_per_s: BTreeMap::new(),
+            lost: BTreeMap::new(),
+            lost_unknown: Vec::new(),
+            torn_count_first: None,
+            torn_count_last: None,
+            last_state_hash: None,
+            timing: None,
+            stop_reason: None,
+        }
+    }
+
+    /// Returns the name of the file without its folder.
+    pub(super) fn file_name(&self) -> &str {
+        self.file.rsplit('/').next().unwrap_or(&self.file)
+    }
+
+    /// Returns the reason why a recording has no measured times.
+    pub(super) fn untimed_reason(&self) -> &'static str {
+        if self.simulated {
+            "simulated, so no time was measured"
+        } else {
+            "no step was computed while it was recorded"
+        }
+    }
+
+    /// Sets the rates of the topics in a file whose steps last for `duration_s` seconds.
+    pub(super) fn set_rates(&mut self, duration_s: f64) {
+        let filled = self.messages.iter().filter(|(_, count)| **count > 0);
+        self.messages_per_s =
+            filled.map(|(topic, count)| (*topic, *count as f64 / duration_s)).collect();
+    }
+
+    fn write_run(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (file, file_end) = (printable_line(&self.file), printable_line(&self.file_end));
+        writeln!(f, "file        {file}, {} bytes, {file_end}", self.size_bytes)?;
+        writeln!(
+            f,
+            "scene       {}: {}, {}, {} Hz, {}",
+            printable_line(&self.scene),
+            counted(self.particle_count, "particle"),
+            counted(self.constraint_count, "constraint"),
+            self.rate_hz,
+            self.method
+        )?;
+        writeln!(
+            f,
+            "run         {} (solver version {}, contract version {}, recorder {})",
+            self.run_id,
+            self.solver_version,
+            self.contract_version,
+            printable_line(&self.recorder_version)
+        )
+    }
+
+    fn write_steps(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.first_step, self.last_step) {
+            (Some(first), Some(last)) => {
+                let (count, duration_s) = (self.snapshot_count, self.duration_s);
+                writeln!(f, "steps       {first}..={last}, {count} recorded, {duration_s:.3} s")?;
+            }
+            _ => writeln!(f, "steps       none")?,
+        }
+        match self.wall_clock_s {
+            Some(wall_clock_s) => {
+                writeln!(f, "wall clock  {wall_clock_s:.3} s from the first to the last message")?;
+            }
+            None if self.simulated => writeln!(f, "wall clock  none (simulated)")?,
+            None => writeln!(f, "wall clock  none")?,
+        }
+        if let (Some(first), Some(last)) = (self.torn_count_first, self.torn_count_last) {
+            writeln!(f, "torn        {first} in the first snapshot, {last} in the last one")?;
+        }
+        let hash = self.last_state_hash.as_deref();
+        hash.map_or(Ok(()), |hash| writeln!(f, "last hash   {hash}"))
+    }
+
+    fn write_end(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let scope = if self.stop_reason.is_none() { ", as far as the file goes" } else { "" };
+        let unknown = self.lost_unknown.iter().map(|topic| format!("{topic} unknown"));
+        let known = self.lost.iter().map(|(topic, count)| format!("{topic} {count}"));
+        let lost = unknown.chain(known).collect::<Vec<_>>().join(", ");
+        let lost = if lost.is_empty() { "none" } else { &lost };
+        writeln!(f, "lost        {lost}{scope}")?;
+        let reason = self.stop_reason.as_deref().unwrap_or("unknown");
+        writeln!(f, "stopped     {}", printable_line(reason))
+    }
+
+    fn write_topics(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\n{:<12}{:>10} {:>16}", "topic", "messages", "per simulated s")?;
+        for (topic, count) in self.messages.iter().filter(|(_, count)| **count > 0) {
+            let rate = self.messages_per_s.get(topic);
+            let rate = rate.map_or("-".to_owned(), |rate| format!("{rate:.2}"));
+            writeln!(f, "{topic:<12}{count:>10} {rate:>16}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write_run(f)?;
+        self.write_steps(f)?;
+        self.write_end(f)?;
+        self.write_topics(f)?;
+        match &self.timing {
+            Some(timing) => write!(f, "\n{timing}"),
+            None => write!(f, "\ntiming      none ({})", self.untimed_reason()),
+        }
+    }
+}
+
+/// Returns a number with its noun, such as "1 particle" or "2 particles".
+fn counted(count: u32, noun: &str) -> String {
+    let ending = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{ending}")
+}
