@@ -186,7 +186,7 @@ impl Group {
 
     fn loop_row(&self, bare: Percentiles) -> LoopRow {
         let wake_late = self.wake_late.percentiles();
-        let [drain, solve, publish, wake, observe] =
+        let [drain, solve, publish, wake, keep, observe] =
             self.phases.each_ref().map(Samples::percentiles);
         let outside_solver = self.outside_solver.percentiles();
         LoopRow {
@@ -195,7 +195,7 @@ impl Group {
             wake_late_ratio_p50: ratio(wake_late.p50_ns, bare.p50_ns),
             wake_late_ratio_p99: ratio(wake_late.p99_ns, bare.p99_ns),
             late_step_count: self.late_step_count,
-            phases: PhaseRow { drain, solve, publish, wake, observe, outside_solver },
+            phases: PhaseRow { drain, solve, publish, wake, keep, observe, outside_solver },
         }
     }
 

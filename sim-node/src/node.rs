@@ -357,6 +357,7 @@ impl Node {
         self.boundary = Boundary::Open;
         let is_commanded = std::mem::take(&mut self.is_commanded);
         self.history.keep(self.step, &self.solver, is_commanded);
+        self.publisher.phases.end(Phase::Keep);
     }
 
     /// Serves late subscribers, calls the observer, and publishes the status.

@@ -53,6 +53,7 @@ pub(super) struct PhaseRow {
     pub(super) solve: Percentiles,
     pub(super) publish: Percentiles,
     pub(super) wake: Percentiles,
+    pub(super) keep: Percentiles,
     pub(super) observe: Percentiles,
     pub(super) outside_solver: Percentiles,
 }

@@ -82,12 +82,13 @@ fn phases(report: &Report) -> String {
     let mut table =
         Table::new([("readers", Align::Right), ("phase", Align::Left), p50, p99, p999, max]);
     for row in &report.loops {
-        let PhaseRow { drain, solve, publish, wake, observe, outside_solver } = row.phases;
+        let PhaseRow { drain, solve, publish, wake, keep, observe, outside_solver } = row.phases;
         let named = [
             ("drain", drain),
             ("solve", solve),
             ("publish", publish),
             ("wake", wake),
+            ("keep", keep),
             ("observe", observe),
             ("outside solver", outside_solver),
         ];

@@ -17,13 +17,15 @@ pub(crate) enum Phase {
     Publish,
     /// Waiting readers are woken.
     Wake,
+    /// The state is kept for rewinds.
+    Keep,
     /// Late subscribers are served, and the status is published when it is due.
     Observe,
 }
 
 impl Phase {
-    pub(crate) const ALL: [Self; 5] =
-        [Self::Drain, Self::Solve, Self::Publish, Self::Wake, Self::Observe];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Drain, Self::Solve, Self::Publish, Self::Wake, Self::Keep, Self::Observe];
 }
 
 /// Recorder of phases. The default one is off.
@@ -124,11 +126,12 @@ mod tests {
         {
             recorder.end(phase, now_ns);
         }
-        recorder.end(Phase::Observe, 74);
+        recorder.end(Phase::Keep, 73);
+        recorder.end(Phase::Observe, 75);
         recorder.record();
         let times = phases.times().unwrap();
         let recorded: Vec<_> = times.phases.iter().map(|one| (one.len(), one.max())).collect();
-        assert_eq!(recorded, [(1, 3), (1, 50), (1, 7), (1, 5), (1, 2)]);
-        assert_eq!((times.outside_solver.len(), times.outside_solver.max()), (1, 17));
+        assert_eq!(recorded, [(1, 3), (1, 50), (1, 7), (1, 5), (1, 1), (1, 2)]);
+        assert_eq!((times.outside_solver.len(), times.outside_solver.max()), (1, 18));
     }
 }
