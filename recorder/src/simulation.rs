@@ -43,7 +43,7 @@ const REJECTIONS_SHOWN_MAX: usize = 5;
 pub(crate) struct States<G> {
     /// The first one.
     pub(crate) solver: Solver,
-    /// Returns the one that a command puts in place, if it is none that the simulation has computed.
+    /// Returns the one that a command puts in place, for a state that the simulation has not computed.
     pub(crate) given: G,
 }
 

@@ -22,7 +22,7 @@ const STEPS_PER_UPDATE: u64 = 256;
 #[command(
     after_help = "Compares the scenes, the commands that act on states, and every bit of the particles in the steps that both \
     files have. The distance of two states is the greatest distance of a particle's two positions.\n\n\
-    Exit codes: 0 equal; 1 failed; 3 different, or a file truncated or damaged.\n\nExamples:\n  \
+    Exit codes: 0 equal in all common steps; 1 failed, or different numbers of particles; 3 different, or a file truncated or damaged.\n\nExamples:\n  \
     recorder diff run.mcap changed.mcap\n  \
     recorder diff run.mcap changed.mcap --json"
 )]

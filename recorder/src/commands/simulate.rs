@@ -154,7 +154,7 @@ fn run_changed(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     let changed = Changed::new(path, changes, stop).with_context(|| args.scene.clone())?;
     let end = changed.end.clone();
     let (job, solver, mut given) = changed.into_parts();
-    let states = States { solver, given: |command: &TimedCommand| given.of(command) };
+    let states = States { solver, given: |command: &TimedCommand| given.state_of(command) };
     let exit = run_job(args, &job, states, stop)?;
     if end == LogEnd::Complete {
         return Ok(exit);

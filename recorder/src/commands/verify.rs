@@ -169,6 +169,9 @@ pub(crate) fn verify<R: Read>(
     let end = verification.frames.end().cloned().filter(|end| *end != LogEnd::Complete);
     if verification.simulation.is_none() && report.verdict == Verdict::Identical {
         let end = end.map_or_else(String::new, |end| format!(" (the file is {end})"));
+        if let Some(last) = verification.coverage.last_step {
+            bail!("{path}: has no complete state up to step {last} to start from");
+        }
         bail!("{path}: has no snapshot with a keyframe to start from{end}");
     }
     let end_text = verification.frames.end().map(ToString::to_string);
@@ -198,6 +201,7 @@ fn compare_states<R: Read>(
             return Ok(());
         }
     }
+    verification.finish_coverage();
     if verification.simulation.is_some() && verification.coverage.last_step.is_none() {
         let finding = verification.check_end();
         report.add_end(finding);

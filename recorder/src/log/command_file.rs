@@ -78,9 +78,14 @@ pub fn sort_commands(commands: &mut [TimedCommand]) {
         (command.step, index, command.client_id, command.sequence)
     });
     let mut first_step = 0;
-    for command in commands.iter_mut().filter(|command| command.index.is_none()) {
-        command.step = command.step.max(first_step);
-        if let Action::Rewind { .. } = command.action {
+    for command in commands {
+        if command.index.is_none() {
+            command.step = command.step.max(first_step);
+        }
+        // Only those of a recording have a state to restore.
+        let is_restore = matches!(command.action, Action::Restore { .. });
+        if matches!(command.action, Action::Rewind { .. }) || is_restore && command.index.is_some()
+        {
             first_step = command.step.saturating_add(1);
         }
     }

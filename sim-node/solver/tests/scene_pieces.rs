@@ -71,6 +71,13 @@ const ANCHOR: &str = "version = 1\n@[[generate]]\nshape = \"rope\"\ncount = 4\nf
     to = [1, 0, 0]\n@[[anchor]]\nparticles = [@ 0, @ 1, @ 3]\n";
 
 #[test]
+fn a_word_in_the_place_of_a_list_does_not_take_the_list_of_a_later_quoted_key() {
+    let text = "version = 1\n@[[generate]]\nshape = \"rope\"\ncount = 4\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n\
+        pinned = \"first\"\n[[anchor]]\nparticles = [1]\n\"path\" = [{ time = 0 },@ { time = 1 }]\n";
+    assert_eq!(read(text).unwrap().anchors.len(), 1);
+}
+
+#[test]
 fn an_anchor_can_be_divided_between_particles_and_points_of_its_path() {
     for path in [
         "path = [@ { time = 0 }, @ { time = 1 }, @ { time = 2, translation = [0, 1, 0] }, @]",

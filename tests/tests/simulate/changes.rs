@@ -150,6 +150,67 @@ fn the_same_commands_from_a_file_give_the_same_states() {
     assert!(new.iter().zip(&recorded).all(|(one, other)| is_same(one, other)));
 }
 
+/// Simulates 500 steps of a rope with commands.
+fn simulate_rope(sandbox: &Sandbox, name: &str, commands: &str) -> String {
+    let file = sandbox.path(&format!("{name}.mcap"));
+    let commands = sandbox.write(&format!("{name}.jsonl"), commands);
+    let args = ["simulate", "rope", "--steps", "500", "--commands", &commands, "-o", &file];
+    recorder(sandbox, &args).success();
+    file
+}
+
+#[test]
+fn a_change_in_the_step_of_a_rewind_comes_after_it() {
+    let sandbox = Sandbox::new();
+    let rewind = "{\"step\":250,\"kind\":\"rewind\",\"to_step\":100}\n";
+    let (run, changed) = (simulate_rope(&sandbox, "a", rewind), sandbox.path("changed.mcap"));
+    let set = "250:damping=0.1";
+    recorder(&sandbox, &["simulate", &run, "--set", set, "-o", &changed]).success();
+    let verified = recorder(&sandbox, &["verify", "--json", &changed]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    assert_eq!(index_of(&frames(&changed), "set").1, 251);
+
+    let late = "{\"step\":500,\"kind\":\"rewind\",\"to_step\":100}\n";
+    let run = simulate_rope(&sandbox, "b", late);
+    let refused = recorder(&sandbox, &["simulate", &run, "--set", "500:damping=0.1"]);
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.stderr.contains("would take effect in step 501"), "{refused:?}");
+}
+
+#[test]
+fn new_commands_can_go_back_to_before_the_first_of_them() {
+    let sandbox = Sandbox::new();
+    let run = simulate_rope(&sandbox, "a", "{\"step\":1,\"kind\":\"unpin\",\"particle\":40}\n");
+    let rewind = "{\"step\":450,\"kind\":\"rewind\",\"to_step\":100}\n";
+    let (commands, changed) = (sandbox.write("d.jsonl", rewind), sandbox.path("changed.mcap"));
+    let args = ["simulate", &run, "--commands", &commands, "-o", &changed, "--json"];
+    let summary = recorder(&sandbox, &args).json();
+    assert_eq!((&summary["applied"], &summary["rejected"]), (&1.into(), &0.into()), "{summary}");
+    let direct = frames(&simulate_rope(&sandbox, "b", rewind));
+    let new = frames(&changed);
+    assert!(is_same(new.last().unwrap(), direct.last().unwrap()));
+}
+
+#[test]
+fn settings_come_after_the_commands_of_a_file_in_the_same_step() {
+    let sandbox = Sandbox::new();
+    let run = simulate_rope(&sandbox, "a", "{\"step\":1,\"kind\":\"unpin\",\"particle\":40}\n");
+    let [pin, strong, weak] = [
+        "{\"step\":250,\"kind\":\"pin\",\"particle\":20}\n",
+        "{\"step\":250,\"kind\":\"set\",\"parameter\":\"damping\",\"value\":0.5}\n",
+        "{\"step\":250,\"kind\":\"set\",\"parameter\":\"damping\",\"value\":0.1}\n",
+    ];
+    let hash = |name: &str, lines: String, set: &[&str]| {
+        let commands = sandbox.write(name, &lines);
+        let args = [&["simulate", &run, "--commands", &commands, "--json"], set].concat();
+        recorder(&sandbox, &args).json()["state_hash"].clone()
+    };
+    let expected = hash("all.jsonl", [pin, strong, weak].concat(), &[]);
+    let added = hash("two.jsonl", [pin, strong].concat(), &["--set", "250:damping=0.1"]);
+    assert_eq!(added, expected);
+    assert_ne!(hash("two.jsonl", [pin, strong].concat(), &[]), expected);
+}
+
 #[test]
 fn changes_without_a_place_in_the_recording_are_refused() {
     let sandbox = Sandbox::new();

@@ -122,3 +122,29 @@ fn a_killed_recorder_of_commands_leaves_a_file_that_simulates_as_far_as_it_goes(
     assert_eq!(completed.last().map(|frame| frame.row.step), Some(last));
     assert!(completed.iter().all(|frame| frame.particles.is_some()));
 }
+
+/// Two particles that freeze soon, because they repel each other beyond all numbers.
+const FREEZES: &str = "version = 1\n[solver]\nrate_hz = 60\nmax_speed = 3e38\n[[particle]]\n\
+    position = [0, 9, 0]\n[[particle]]\nposition = [1, 9, 0]\n[[constraint]]\nparticles = [0, 1]\n\
+    rest_length = 1e30\n";
+
+#[test]
+fn events_of_a_recording_of_commands_are_checked_from_any_state_on() {
+    let sandbox = Sandbox::new();
+    let flight = sandbox.path("flight.mcap");
+    let scene = sandbox.write("fall.toml", FREEZES);
+    let node = node(&sandbox, &["run", &scene, "--paused"]);
+    let args = ["-o", &flight, "--only-commands", "--flush-interval", "100ms"];
+    let recording = record(&sandbox, &args);
+    step(&sandbox, 1300);
+    wait_for_step(&flight, 1300);
+    recording.interrupt().success();
+    node.interrupt().success();
+    let events = frames(&flight);
+    let events = events.iter().flat_map(|frame| &frame.updates);
+    assert!(events.into_iter().any(|one| matches!(one, recorder::Message::Event(_))));
+    for from in ["0", "700", "1250"] {
+        let verified = recorder(&sandbox, &["verify", "--json", &flight, "--from", from]).json();
+        assert_eq!(verified["verdict"], "identical", "--from {from}: {verified}");
+    }
+}

@@ -173,9 +173,9 @@ impl Comparison {
         (a.row.state_hash != b.row.state_hash).then(|| StateDifference {
             step,
             particle: None,
-            field: "the torn constraints",
-            a: a.row.torn_count.to_string(),
-            b: b.row.torn_count.to_string(),
+            field: "the torn constraints, state hash",
+            a: format!("{:016x}", a.row.state_hash),
+            b: format!("{:016x}", b.row.state_hash),
         })
     }
 
@@ -190,6 +190,7 @@ impl Comparison {
                 text(&self.b)
             );
         }
+        (self.report.steps_of_a, self.report.steps_of_b) = (self.a.steps, self.b.steps);
         self.report.growth = self.growth.rows();
         self.report.greatest = self.growth.greatest;
         Ok(self.report)

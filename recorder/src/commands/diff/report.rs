@@ -16,6 +16,9 @@ pub(crate) struct Report {
     /// First and last step that both files have.
     pub(super) first_step: Option<u64>,
     pub(super) last_step: Option<u64>,
+    /// First and last step of each file.
+    pub(super) steps_of_a: Option<(u64, u64)>,
+    pub(super) steps_of_b: Option<(u64, u64)>,
     /// Number of steps that both files have.
     pub(super) common_steps: u64,
     /// Number of those with different states.
@@ -104,6 +107,11 @@ impl fmt::Display for Report {
             f,
             "steps       {first}..={last} in both: {common} compared, {different} different"
         )?;
+        if let (Some(a), Some(b)) = (self.steps_of_a, self.steps_of_b)
+            && a != b
+        {
+            write!(f, " (A has {}..={}, B {}..={})", a.0, a.1, b.0, b.1)?;
+        }
         if self.growth.is_empty() {
             return Ok(());
         }

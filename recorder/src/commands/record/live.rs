@@ -81,7 +81,7 @@ fn text(seconds: f64, closing: &Closing, bytes_per_s: f64, queue_bytes: usize) -
     let speed = bytes_per_s / BYTES_PER_MB;
     let queue = queue_bytes as f64 / BYTES_PER_MB;
     let mut text = format!(
-        "{seconds:.1} s, {steps} snapshots, {speed:.1} MB/s, {queue:.1} MB in the queue, lost"
+        "{seconds:.1} s, {steps} snapshots in this file, {speed:.1} MB/s, {queue:.1} MB in the queue, lost"
     );
     let missing = closing.missing();
     if missing.is_empty() {
@@ -103,7 +103,10 @@ mod tests {
         let mut closing = Closing::default();
         closing.counts[Topic::Steps].received = 240;
         let line = text(1.04, &closing, 5_260_000.0, 120_000);
-        assert_eq!(line, "1.0 s, 240 snapshots, 5.3 MB/s, 0.1 MB in the queue, lost none");
+        assert_eq!(
+            line,
+            "1.0 s, 240 snapshots in this file, 5.3 MB/s, 0.1 MB in the queue, lost none"
+        );
         closing.counts[Topic::Steps].lost = 3;
         closing.counts[Topic::Particles].gaps = 3;
         let line = text(1.04, &closing, 0.0, 0);

@@ -121,11 +121,13 @@ impl Survey {
 
     /// Returns the step of the state to start from: the last one before the change to which no later
     /// command goes back.
-    fn start(&self, first_change: u64) -> anyhow::Result<u64> {
+    fn start(&self, first_change: u64, changes: &Changes) -> anyhow::Result<u64> {
         let first_state = self.states.first().copied().unwrap_or_default();
-        let later = self.outcomes.iter().filter(|row| row.step >= first_change);
-        let back = later.filter_map(|row| match row.action {
-            Action::Rewind { to_step, .. } if row.is_applied() => to_step,
+        let later = self.outcomes.iter().filter(|row| row.step >= first_change && row.is_applied());
+        let replaced = changes.replaced.iter().flatten();
+        let actions = later.map(|row| row.action).chain(replaced.map(|command| command.action));
+        let back = actions.filter_map(|action| match action {
+            Action::Rewind { to_step, .. } => to_step,
             _ => None,
         });
         let earliest = back.filter(|step| *step >= first_state).min();
@@ -157,10 +159,11 @@ impl Changed {
         }
         let scene = scene_in_recording(&log)?;
         let survey = Survey::read(path, stop)?;
-        let start_step = survey.start(survey.first_change(&changes)?)?;
+        let start_step = survey.start(survey.first_change(&changes)?, &changes)?;
         let mut frames = FrameReader::new(log);
         let (solver, outcome_count) = restore(&scene, &mut frames, start_step)?;
-        let commands = commands(&survey, changes, start_step, outcome_count);
+        let commands = commands(&survey, changes, outcome_count);
+        check_last_step(&commands, survey.last_step)?;
         let given = GivenStates::new(frames, &survey.outcomes);
         let start = Start { step: start_step, outcome_count };
         let job = Job { scene, commands, steps: survey.last_step, start };
@@ -212,12 +215,7 @@ fn state_at<R: std::io::Read>(
 }
 
 /// The commands after the start. A recording ends with a load, so none is repeated.
-fn commands(
-    survey: &Survey,
-    changes: Changes,
-    start_step: u64,
-    outcome_count: u64,
-) -> Vec<TimedCommand> {
+fn commands(survey: &Survey, changes: Changes, outcome_count: u64) -> Vec<TimedCommand> {
     let dropped: BTreeSet<_> = changes.dropped.into_iter().collect();
     let recorded = survey.outcomes.iter().filter(|row| {
         row.index >= outcome_count
@@ -225,14 +223,29 @@ fn commands(
             && !matches!(row.action, Action::Load { .. })
     });
     let mut commands: Vec<_> = match changes.replaced {
-        Some(replaced) => {
-            replaced.into_iter().filter(|command| command.step > start_step).collect()
-        }
+        Some(replaced) => replaced,
         None => recorded.map(timed_command).collect(),
     };
-    commands.extend(changes.added);
+    // They come last in their step, in their order.
+    let others = || commands.iter().filter(|command| command.index.is_none());
+    let client_id = others().map(|command| command.client_id).max().unwrap_or(0);
+    let sequence = others().map(|command| command.sequence).max().unwrap_or(0);
+    let added = (sequence + 1..).zip(changes.added);
+    commands.extend(added.map(|(sequence, one)| TimedCommand { client_id, sequence, ..one }));
     sort_commands(&mut commands);
     commands
+}
+
+/// Refuses commands that come after the last step, because a rewind in their own step comes before them.
+fn check_last_step(commands: &[TimedCommand], last_step: u64) -> anyhow::Result<()> {
+    match commands.iter().find(|command| command.step > last_step) {
+        Some(command) => bail!(
+            "a command would take effect in step {}, but the recording ends at step {last_step}: a step \
+             with a rewind has no later commands",
+            command.step
+        ),
+        None => Ok(()),
+    }
 }
 
 /// The states that commands of the recording put in place: those of other processes, and those of steps
@@ -250,7 +263,7 @@ impl GivenStates {
     }
 
     /// Returns the state that a recorded command put in place.
-    pub(super) fn of(&mut self, command: &TimedCommand) -> anyhow::Result<Option<State>> {
+    pub(super) fn state_of(&mut self, command: &TimedCommand) -> anyhow::Result<Option<State>> {
         let is_known = command.index.is_some_and(|index| self.applied.contains(&index));
         if !is_known {
             return Ok(None);

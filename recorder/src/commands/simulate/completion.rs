@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, bail};
 use recorder::{
     Closing, ContentSelection, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
-    Message, Topic, WriteError,
+    Message, ReadError, Topic, WriteError,
 };
 use sim_solver::{SOLVER_VERSION, Scene};
 
@@ -73,7 +73,8 @@ impl<R: Read> Completion<R> {
         stop: &AtomicBool,
         mut on_step: impl FnMut(u64),
     ) -> anyhow::Result<(Completed, Option<W>)> {
-        let mut next = self.frames.next_frame()?;
+        let mut is_interrupted = false;
+        let mut next = self.next_frame(&mut is_interrupted)?;
         let first_time_ns = next.as_ref().and_then(|frame| frame.log_times_ns.first().copied());
         let mut out = match create()? {
             Some(out) => {
@@ -81,17 +82,16 @@ impl<R: Read> Completion<R> {
             }
             None => None,
         };
-        let mut is_interrupted = false;
         while let Some(frame) = next {
-            is_interrupted = !self.advance(&frame, stop)?;
-            if is_interrupted {
+            if !self.advance(&frame, stop)? {
+                is_interrupted = true;
                 break;
             }
             if let Some(out) = &mut out {
                 self.write(out, &frame).context(OUTPUT)?;
             }
             on_step(frame.row.step);
-            next = self.frames.next_frame()?;
+            next = self.next_frame(&mut is_interrupted)?;
         }
         if let (Some(out), false) = (&mut out, is_interrupted) {
             self.write_trailing(out).context(OUTPUT)?;
@@ -102,6 +102,17 @@ impl<R: Read> Completion<R> {
         };
         let out = out.map(finish).transpose().context(OUTPUT)?;
         Ok((self.completed(is_interrupted)?, out))
+    }
+
+    /// Returns the next snapshot; `None` after a signal, too.
+    fn next_frame(&mut self, is_interrupted: &mut bool) -> Result<Option<Frame>, ReadError> {
+        match self.frames.next_frame() {
+            Err(ReadError::Interrupted) => {
+                *is_interrupted = true;
+                Ok(None)
+            }
+            frame => frame,
+        }
     }
 
     fn begin<W: Write>(

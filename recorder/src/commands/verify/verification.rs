@@ -161,6 +161,10 @@ impl<R: Read> Verification<R> {
 
     /// Compares the events with particles.
     fn check_events(&mut self, frame: &Frame, particles: &[ParticleState]) -> Option<String> {
+        if self.range.start > 0 && self.simulation.is_none() && frame.particles.is_some() {
+            self.events.skip(frame.row.step, particles);
+            return None;
+        }
         let what = self.events.check(frame, particles, self.numbers.is_after_gap());
         what.filter(|_| !self.coverage.left_out.contains(&Topic::Events))
     }
@@ -277,8 +281,8 @@ impl<R: Read> Verification<R> {
         Ok(Some(self.simulation.insert(start).compare_start(frame)))
     }
 
-    /// Checks the end of the file, once [`Self::next`] has returned `None`.
-    pub(super) fn check_end(&mut self) -> Finding {
+    /// Completes the description of what was compared, once [`Self::next`] has returned `None`.
+    pub(super) fn finish_coverage(&mut self) {
         let waiting_count = self.simulation.as_ref().map_or(0, Resimulation::waiting_count);
         self.coverage.trailing_count = self.frames.trailing_updates().len()
             + usize::from(self.frames.trailing_row().is_some())
@@ -289,6 +293,11 @@ impl<R: Read> Verification<R> {
         let log = self.frames.log();
         let foreign = log.audit().into_iter().flat_map(recorder::Audit::foreign);
         self.coverage.foreign = foreign.map(ToOwned::to_owned).collect();
+    }
+
+    /// Checks the end of the file, once [`Self::next`] has returned `None`.
+    pub(super) fn check_end(&mut self) -> Finding {
+        let log = self.frames.log();
         let finding = self.audit_finding();
         if finding != Finding::Identical {
             return finding;

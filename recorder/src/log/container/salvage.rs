@@ -285,6 +285,10 @@ impl<W: Write> Salvage<W> {
                 self.write(|file| file.write_to_known_channel(header, data))?;
             }
             Ok(Sound::Other | Sound::Update(_)) => {
+                // A header without a payload ends a gap, too.
+                if let (Some(Topic::Steps), Some(row)) = (topic, content.last_row()) {
+                    self.losses.end_gap(row.step);
+                }
                 self.write(|file| file.write_to_known_channel(header, data))?;
             }
             Err(what) => {

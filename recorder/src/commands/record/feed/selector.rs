@@ -86,8 +86,9 @@ pub(super) struct Selector {
     selection: ContentSelection,
     /// Step of the newest keyframe.
     keyframe_step: Option<u64>,
-    /// Number of keyframes in the file.
-    keyframe_count: u32,
+    /// Number of snapshots with a keyframe since the last one with particles; `None` before the first of
+    /// the file.
+    keyframes_since_state: Option<u32>,
     /// Step of the newest state that a command put in place. Its particles follow from nothing else.
     in_place_step: Option<u64>,
     /// Only `left_out` is set.
@@ -99,7 +100,7 @@ impl Selector {
         Self {
             selection,
             keyframe_step: None,
-            keyframe_count: 0,
+            keyframes_since_state: None,
             in_place_step: None,
             counts: AllCounts::default(),
         }
@@ -110,10 +111,7 @@ impl Selector {
         match content {
             Content::Update(message) => {
                 match &message {
-                    Message::Keyframe { step, .. } => {
-                        self.keyframe_step = Some(*step);
-                        self.keyframe_count += 1;
-                    }
+                    Message::Keyframe { step, .. } => self.keyframe_step = Some(*step),
                     Message::Outcome(row) if row.puts_state_in_place() && row.is_applied() => {
                         self.in_place_step = Some(row.step);
                     }
@@ -142,9 +140,15 @@ impl Selector {
     }
 
     /// Returns `true` for a snapshot with particles in a recording of commands.
-    fn is_state(&self, step: u64) -> bool {
-        let is_due = self.keyframe_count % KEYFRAMES_PER_STATE == 1;
-        self.keyframe_step == Some(step) && (is_due || self.in_place_step == Some(step))
+    fn is_state(&mut self, step: u64) -> bool {
+        if self.keyframe_step != Some(step) {
+            return false;
+        }
+        let count = self.keyframes_since_state.map(|count| count + 1);
+        let is_due = count.is_none_or(|count| count >= KEYFRAMES_PER_STATE);
+        let is_state = is_due || self.in_place_step == Some(step);
+        self.keyframes_since_state = if is_state { Some(0) } else { count };
+        is_state
     }
 
     /// Returns `true` for a selected topic, and counts a message of any other.
@@ -156,7 +160,7 @@ impl Selector {
 
     /// Returns the counts of a file, and begins with those of the next one.
     pub(super) fn take_counts(&mut self) -> AllCounts {
-        self.keyframe_count = 0;
+        self.keyframes_since_state = None;
         std::mem::take(&mut self.counts)
     }
 }

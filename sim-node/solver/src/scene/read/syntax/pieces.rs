@@ -103,8 +103,8 @@ impl<'t> Divider<'t> {
             TokenKind::Atom if self.depth == 0 && self.is_line_start => {
                 self.key = self.lists.contains(&&self.text[start..end]).then_some(start);
             }
-            // A dotted key is not the key of a list.
-            TokenKind::Dot if self.depth == 0 => self.key = None,
+            // A dotted key is not the key of a list, nor is a key on a line before it.
+            TokenKind::Dot | TokenKind::Newline if self.depth == 0 => self.key = None,
             _ => {}
         }
         self.is_line_start = match token.kind() {
