@@ -367,8 +367,8 @@ fn a_recording_of_another_solver_version_is_refused() {
         &AtomicBool::new(false),
         |_| {},
     );
-    let error = error.unwrap_err().to_string();
-    let found = format!("recorded with solver version {}, but this program", SOLVER_VERSION + 1);
+    let error = format!("{:#}", error.unwrap_err());
+    let found = format!("x.mcap: recorded with solver version {}, but this program", SOLVER_VERSION + 1);
     assert!(error.contains(&found), "{error}");
 }
 

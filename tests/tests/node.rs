@@ -280,7 +280,9 @@ fn a_run_with_a_duration_ends_and_reports_in_json() {
 fn ctrl_c_and_sigterm_end_a_node_cleanly() {
     for signal in [Signal::INT, Signal::TERM] {
         let sandbox = Sandbox::new();
-        let node = node(&sandbox, &["run", "curtain"]);
+        let mut node = node(&sandbox, &["run", "curtain"]);
+        // It ends with the node.
+        node.wait_for_thread("wake");
         node.signal(signal);
         let finished = node.wait();
         assert_eq!(finished.code, Some(0), "{}", finished.stderr);

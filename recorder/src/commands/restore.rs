@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use recorder::{ContentSelection, Frame, FrameReader, LogReader};
 use serde::Serialize;
 use sim_contract::{
@@ -17,7 +17,7 @@ use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson, path_text};
 use crate::cli::parse::{self, whole_number};
 use crate::cli::thread_args::ThreadArgs;
-use crate::commands::verify::resimulation::{Finding, Resimulation};
+use crate::commands::verify::resimulation::Resimulation;
 use crate::input::scene_source::scene_in_recording;
 use crate::input::state_place::{Place, Wanted, find_state};
 
@@ -170,10 +170,10 @@ fn read_state(
             None => {
                 let mut start = Resimulation::start(&scene, &frame)?.context("has no keyframe")?;
                 start.set_threads(threads);
-                check(start.compare_start(&frame))?;
+                start.compare_start(&frame).require_identical()?;
                 simulation = Some(start);
             }
-            Some(simulation) => check(simulation.advance(&frame, stop.flag()))?,
+            Some(simulation) => simulation.advance(&frame, stop.flag()).require_identical()?,
         }
         if step == place.step {
             let simulation = simulation.context("has no keyframe")?;
@@ -190,17 +190,6 @@ fn state(frame: &Frame, scene_hash: u64, simulation: &Resimulation) -> RecordedS
         particles: simulation.particles().to_vec(),
         keyframe: simulation.keyframe().encode(),
         state_hash: frame.row.state_hash,
-    }
-}
-
-fn check(finding: Finding) -> anyhow::Result<()> {
-    match finding {
-        Finding::Identical => Ok(()),
-        Finding::Interrupted => bail!("interrupted"),
-        Finding::Diverged { step, what, .. } | Finding::Incomplete { step, what } => Err(anyhow!(
-            "the state cannot be simulated: step {step} differs: {what} (`recorder verify` shows the details)"
-        )),
-        Finding::OtherContent { what } => bail!("{what}"),
     }
 }
 

@@ -12,7 +12,7 @@ use recorder::{Closing, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand};
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Stop, printable_line};
-use sim_solver::Solver;
+use sim_solver::{Scene, Solver};
 
 use crate::cli::exit::{Exit, with_usage};
 use crate::cli::file_args::{FileArgs, LogFile};
@@ -24,7 +24,7 @@ use crate::input::command_source::load_commands;
 use crate::input::scene_source::{is_recording, load_scene};
 use crate::simulation::{Job, SimulationResult, State, States, simulate};
 use changes::{Changed, Changes, parse_setting};
-use completion::{Completed, Completion};
+use completion::Completion;
 
 /// Steps between two updates of the progress bar.
 const STEPS_PER_UPDATE: u64 = 256;
@@ -120,29 +120,21 @@ fn run_recording(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     bar.finish_and_clear();
     let output = file.map(PartFile::finish).transpose()?;
     let wall_ns = monotonic_ns() - before_ns;
-    let summary = summary_of_recording(&completed, wall_ns, output.as_deref());
+    let simulated = Simulated {
+        scene: &completed.scene,
+        first_step: completed.first_step,
+        last_step: completed.last_step,
+        state_hash: completed.state_hash,
+        applied_count: completed.applied_count,
+        rejected_count: completed.rejected_count,
+    };
+    let summary = simulated.summary(wall_ns, output.as_deref());
     output::result(args.as_json, &summary, &summary.to_string())?;
     if completed.end != LogEnd::Complete {
         output::warn_incomplete(path, &completed.end, "simulated as far as it goes");
     }
     let is_complete = completed.end == LogEnd::Complete && !completed.is_interrupted;
     Ok(if is_complete { Exit::Done } else { Exit::Loss })
-}
-
-fn summary_of_recording(completed: &Completed, wall_ns: u64, path: Option<&Path>) -> Summary {
-    let steps = completed.last_step - completed.first_step;
-    let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
-    Summary {
-        scene: completed.scene.name.clone(),
-        first_step: completed.first_step,
-        steps,
-        state_hash: format!("{:016x}", completed.state_hash),
-        applied: completed.applied_count,
-        rejected: completed.rejected_count,
-        real_time_factor: steps as f64 / f64::from(completed.scene.solver.rate_hz) / wall_s,
-        wall_s,
-        output: path.map(output::path_text),
-    }
 }
 
 /// Simulates a recording again with changed commands.
@@ -192,14 +184,22 @@ fn run_job(
             bar.set_position(step - first_step);
         }
     })
-    .with_context(|| truncation(args))?;
+    .map_err(|error| in_output(args, error))?;
     bar.finish_and_clear();
     let path = log.map(|log| finish(log, &result, job.steps)).transpose();
     let path = path.with_context(|| truncation(args))?;
     let wall_ns = monotonic_ns() - before_ns;
 
     note_rejections(&result);
-    let summary = summary(job, &result, wall_ns, path.as_deref());
+    let simulated = Simulated {
+        scene: &job.scene,
+        first_step,
+        last_step: result.steps,
+        state_hash: result.state_hash,
+        applied_count: result.applied_count,
+        rejected_count: result.rejected_count,
+    };
+    let summary = simulated.summary(wall_ns, path.as_deref());
     output::result(args.as_json, &summary, &summary.to_string())?;
     Ok(if result.steps < job.steps { Exit::Loss } else { Exit::Done })
 }
@@ -230,6 +230,11 @@ fn check_command_steps(job: &Job) -> anyhow::Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Names the file that an error has left, if there is one.
+fn in_output(args: &SimulateArgs, error: anyhow::Error) -> anyhow::Error {
+    if args.output.is_some() { error.context(truncation(args)) } else { error }
 }
 
 /// Describes the file after a write error.
@@ -269,20 +274,32 @@ fn note_rejections(result: &SimulationResult) {
     }
 }
 
-fn summary(job: &Job, result: &SimulationResult, wall_ns: u64, path: Option<&Path>) -> Summary {
-    let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
-    let steps = result.steps - job.start.step;
-    let simulated_s = steps as f64 / f64::from(job.scene.solver.rate_hz);
-    Summary {
-        scene: job.scene.name.clone(),
-        first_step: job.start.step,
-        steps,
-        state_hash: format!("{:016x}", result.state_hash),
-        applied: result.applied_count,
-        rejected: result.rejected_count,
-        real_time_factor: simulated_s / wall_s,
-        wall_s,
-        output: path.map(output::path_text),
+/// The part of a summary that depends on the kind of simulation.
+struct Simulated<'a> {
+    scene: &'a Scene,
+    first_step: u64,
+    last_step: u64,
+    state_hash: u64,
+    applied_count: u64,
+    rejected_count: u64,
+}
+
+impl Simulated<'_> {
+    fn summary(&self, wall_ns: u64, path: Option<&Path>) -> Summary {
+        let wall_s = wall_ns.max(1) as f64 / SECOND_NS as f64;
+        let steps = self.last_step - self.first_step;
+        let simulated_s = steps as f64 / f64::from(self.scene.solver.rate_hz);
+        Summary {
+            scene: self.scene.name.clone(),
+            first_step: self.first_step,
+            steps,
+            state_hash: format!("{:016x}", self.state_hash),
+            applied: self.applied_count,
+            rejected: self.rejected_count,
+            real_time_factor: simulated_s / wall_s,
+            wall_s,
+            output: path.map(output::path_text),
+        }
     }
 }
 
@@ -303,7 +320,7 @@ impl fmt::Display for Summary {
 #[cfg(test)]
 mod tests {
     use recorder::parse_commands;
-    use sim_solver::{Scene, builtin};
+    use sim_solver::builtin;
 
     use super::*;
 

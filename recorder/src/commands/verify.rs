@@ -18,17 +18,16 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
-use recorder::{ContentSelection, LogEnd, LogReader};
+use recorder::{LogEnd, LogReader};
 use serde::Serialize;
 use sim_contract::{Stop, printable_line};
-use sim_solver::SOLVER_VERSION;
 
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::whole_number;
 use crate::cli::progress::progress_bytes;
 use crate::cli::thread_args::ThreadArgs;
-use crate::input::scene_source::scene_in_recording;
+use crate::input::scene_source::scene_to_simulate;
 use crate::input::state_place::{Wanted, find_state};
 use difference::Difference;
 use resimulation::Finding;
@@ -145,18 +144,7 @@ pub(crate) fn verify<R: Read>(
     stop: &AtomicBool,
     on_progress: impl FnMut(u64),
 ) -> anyhow::Result<(Report, Option<LogEnd>)> {
-    let selection = log.selection();
-    selection
-        .require(&ContentSelection::FOR_STATES, "`recorder verify`")
-        .with_context(|| path.to_owned())?;
-    let recorded_version = log.run().solver_version;
-    if recorded_version != SOLVER_VERSION {
-        bail!(
-            "{path}: recorded with solver version {recorded_version}, but this program has version \
-             {SOLVER_VERSION}, whose bits differ. Verify it with the program that recorded it"
-        );
-    }
-    let scene = scene_in_recording(&log).with_context(|| path.to_owned())?;
+    let scene = scene_to_simulate(&log, "`recorder verify`").with_context(|| path.to_owned())?;
     let mut verification = Verification::new(log, scene, options);
     let mut report = Report::new();
     match verification.check_header() {

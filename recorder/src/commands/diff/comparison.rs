@@ -37,6 +37,16 @@ impl Side {
         Ok(())
     }
 
+    /// Reads the snapshots that the other recording does not have at its end.
+    fn read_rest(&mut self) -> anyhow::Result<()> {
+        while self.frame.is_some() {
+            self.advance()?;
+            // There is nothing to compare them with.
+            self.commands.clear();
+        }
+        Ok(())
+    }
+
     fn step(&self) -> Option<u64> {
         self.frame.as_ref().map(|frame| frame.row.step)
     }
@@ -102,9 +112,7 @@ impl Comparison {
             }
         }
         for (side, name) in [(&mut self.a, "the first file"), (&mut self.b, "the second file")] {
-            while side.frame.is_some() {
-                side.advance().context(name)?;
-            }
+            side.read_rest().context(name)?;
         }
         Ok([self.a.end(), self.b.end()])
     }
@@ -197,7 +205,7 @@ impl Comparison {
     }
 }
 
-/// A command without the names of its client, which have no effect on a state.
+/// A command without its numbers. Its status shows whether its client had the right to it.
 fn json(row: &OutcomeRow) -> Value {
     let mut value = serde_json::to_value(row).unwrap_or_default();
     if let Some(fields) = value.as_object_mut() {

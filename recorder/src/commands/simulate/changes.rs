@@ -1,19 +1,19 @@
 //! Simulates a recording again with changed commands, from the last complete state before the first
 //! change.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use recorder::{
-    ContentSelection, FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand,
-    parse_commands, sort_commands,
+    FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands,
+    sort_commands,
 };
 use sim_contract::{Action, Stop};
-use sim_solver::{Keyframe, SOLVER_VERSION, Scene, Solver};
+use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::input::command_source::{COMMANDS_MAX, timed_command};
-use crate::input::scene_source::scene_in_recording;
+use crate::input::scene_source::scene_to_simulate;
 use crate::simulation::{Job, Start, State};
 
 /// Changes of the commands of a recording.
@@ -149,15 +149,7 @@ pub(super) struct Changed {
 impl Changed {
     pub(super) fn new(path: &Path, changes: Changes, stop: &Stop) -> anyhow::Result<Self> {
         let log = LogReader::open_until(path, stop)?;
-        log.selection().require(&ContentSelection::FOR_STATES, "`recorder simulate`")?;
-        let version = log.run().solver_version;
-        if version != SOLVER_VERSION {
-            bail!(
-                "was recorded with solver version {version}, but this program has version \
-                 {SOLVER_VERSION}, whose bits differ"
-            );
-        }
-        let scene = scene_in_recording(&log)?;
+        let scene = scene_to_simulate(&log, "`recorder simulate`")?;
         let survey = Survey::read(path, stop)?;
         let start_step = survey.start(survey.first_change(&changes)?, &changes)?;
         let mut frames = FrameReader::new(log);
@@ -252,20 +244,21 @@ fn check_last_step(commands: &[TimedCommand], last_step: u64) -> anyhow::Result<
 /// before the start.
 pub(super) struct GivenStates {
     frames: FrameReader<recorder::FileSource>,
-    /// Indices of the applied commands with a state.
-    applied: BTreeSet<u64>,
+    /// The applied commands with a state, by index.
+    applied: BTreeMap<u64, OutcomeRow>,
 }
 
 impl GivenStates {
     fn new(frames: FrameReader<recorder::FileSource>, outcomes: &[OutcomeRow]) -> Self {
         let given = outcomes.iter().filter(|row| row.puts_state_in_place() && row.is_applied());
-        Self { frames, applied: given.map(|row| row.index).collect() }
+        Self { frames, applied: given.map(|row| (row.index, row.clone())).collect() }
     }
 
     /// Returns the state that a recorded command put in place.
     pub(super) fn state_of(&mut self, command: &TimedCommand) -> anyhow::Result<Option<State>> {
-        let is_known = command.index.is_some_and(|index| self.applied.contains(&index));
-        if !is_known {
+        let row = command.index.and_then(|index| self.applied.get(&index));
+        // A command of another recording may have the same index.
+        if row.is_none_or(|row| (row.step, row.action) != (command.step, command.action)) {
             return Ok(None);
         }
         Ok(state_at(&mut self.frames, command.step)?.map(|(state, _)| state))

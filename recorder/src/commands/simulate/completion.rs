@@ -5,13 +5,13 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
 use recorder::{
-    Closing, ContentSelection, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter,
-    Message, ReadError, Topic, WriteError,
+    Closing, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message, ReadError,
+    Topic, WriteError,
 };
-use sim_solver::{SOLVER_VERSION, Scene};
+use sim_solver::Scene;
 
 use crate::commands::verify::resimulation::{Finding, Resimulation};
-use crate::input::scene_source::scene_in_recording;
+use crate::input::scene_source::scene_to_simulate;
 
 /// The result of a completion.
 #[derive(Debug)]
@@ -44,15 +44,7 @@ pub(super) struct Completion<R: Read> {
 impl<R: Read> Completion<R> {
     /// Starts with a recording that has its commands and keyframes.
     pub(super) fn new(log: LogReader<R>, threads: usize) -> anyhow::Result<Self> {
-        log.selection().require(&ContentSelection::FOR_STATES, "`recorder simulate`")?;
-        let version = log.run().solver_version;
-        if version != SOLVER_VERSION {
-            bail!(
-                "was recorded with solver version {version}, but this program has version \
-                 {SOLVER_VERSION}, whose bits differ. Use the program that recorded it"
-            );
-        }
-        let scene = scene_in_recording(&log)?;
+        let scene = scene_to_simulate(&log, "`recorder simulate`")?;
         Ok(Self {
             frames: FrameReader::new(log),
             scene,
@@ -143,16 +135,10 @@ impl<R: Read> Completion<R> {
                 ),
             },
         };
-        match finding {
-            Finding::Identical => {}
-            Finding::Interrupted => return Ok(false),
-            Finding::Diverged { step, what, .. } | Finding::Incomplete { step, what } => {
-                bail!(
-                    "step {step} cannot be simulated: {what} (`recorder verify` shows the details)"
-                );
-            }
-            Finding::OtherContent { what } => bail!("{what}"),
+        if finding == Finding::Interrupted {
+            return Ok(false);
         }
+        finding.require_identical()?;
         let first = self.result.map_or(frame.row.step, |(first, ..)| first);
         self.result = Some((first, frame.row.step, frame.row.state_hash));
         for update in &frame.updates {

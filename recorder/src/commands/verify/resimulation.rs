@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
+use anyhow::bail;
 use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, state_hash};
 use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
@@ -40,6 +41,20 @@ impl Finding {
     /// Returns the finding for content that belongs to no step.
     pub(crate) fn in_file(what: String) -> Self {
         Self::OtherContent { what }
+    }
+
+    /// Returns an error for a difference, and after a signal.
+    pub(crate) fn require_identical(self) -> anyhow::Result<()> {
+        match self {
+            Self::Identical => Ok(()),
+            Self::Interrupted => bail!("interrupted"),
+            Self::Diverged { step, what, .. } | Self::Incomplete { step, what } => {
+                bail!(
+                    "step {step} cannot be simulated: {what} (`recorder verify` shows the details)"
+                )
+            }
+            Self::OtherContent { what } => bail!("{what}"),
+        }
     }
 
     /// Returns the finding for content of a step.

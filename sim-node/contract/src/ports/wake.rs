@@ -110,7 +110,7 @@ impl WakeThread {
     }
 
     fn request(&self, bit: u32) {
-        // What was published before is visible to the processes that this wakes.
+        // Release: the thread wakes the processes after everything that was published before.
         if self.requested.fetch_or(bit, Ordering::Release) == 0
             && let Some(thread) = &self.thread
         {
