@@ -26,6 +26,7 @@ use history::History;
 use inbox::Inbox;
 use job::Job;
 use job::scene::Overrides;
+use job::work::Work;
 use lockstep::{Event, Lockstep};
 use pace::Pace;
 use pace::polling::Polling;
@@ -116,6 +117,8 @@ pub(crate) struct Node {
     history: History,
     /// Commands that are prepared beside the loop.
     job: Option<Job>,
+    /// Another thread that drops what a load has replaced.
+    disposal: Option<Work<()>>,
     /// Client whose next command needs a job.
     waiting: Option<u64>,
     /// Memory for the next one.
@@ -167,6 +170,7 @@ impl Node {
             lockstep: Lockstep::new(options.lockstep_timeout),
             history: History::new(options.history_bytes, &solver)?,
             job: None,
+            disposal: None,
             waiting: None,
             spare: None,
             is_commanded: false,

@@ -91,6 +91,7 @@ pub use messages::update::Update;
 pub use owner::Owner;
 pub use owner::error::OwnerError;
 pub use owner::load::Load;
+pub use owner::preparation::{LoadPreparer, ReplacedMemory};
 pub use ports::connection::{ConnectionId, ReceivedCommand};
 pub use ports::domain::leftovers::{Leftover, LeftoverKind};
 pub use ports::domain::root::RootError;

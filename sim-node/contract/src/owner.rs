@@ -3,10 +3,13 @@
 mod claim;
 pub(crate) mod error;
 pub(crate) mod load;
+pub(crate) mod preparation;
 
 use std::cell::Cell;
 use std::io;
+use std::mem;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use iceoryx2::port::notifier::NotifierCreateError;
 use iceoryx2::port::subscriber::Subscriber;
@@ -26,6 +29,7 @@ use crate::messages::topology::{KeyframeHeader, LoadHeader};
 use crate::owner::claim::{claim_name, take_lock};
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
+use crate::owner::preparation::{LoadPreparer, Preparation, ReplacedMemory};
 use crate::ports::connection::{self, ConnectionId, ReceivedCommand, receive_held, receive_round};
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::unfinished;
@@ -48,6 +52,7 @@ use sim_types::ParameterValues;
 pub struct Owner {
     // Dropped in this order: the writers go first, then `status`, so that readers notice that the owner
     // is gone when they wake. The name is free once all services are removed.
+    preparation: Preparation,
     writers: LoadWriters,
     outcomes: ValueWriter<Outcome>,
     commands: Subscriber<ipc_threadsafe::Service, Command, ()>,
@@ -61,7 +66,7 @@ pub struct Owner {
     wakes_due: Cell<u32>,
     /// The run of the last list of colliders, and the number of lists that it has published.
     collider_lists: Cell<(u64, u32)>,
-    services: Services,
+    services: Arc<Services>,
     status_service: Values<NodeStatus>,
     // Dropped after the services, which belong to its node.
     session: Session,
@@ -97,9 +102,10 @@ impl Owner {
         // The memory of a killed predecessor is free now.
         check_memory(load)?;
         let status = claim_name(&session, &status_service)?;
-        let services = Services::access(&session, Access::Create)?;
+        let services = Arc::new(Services::access(&session, Access::Create)?);
         session.restore_orphans(&services.ports());
         let owner = Self {
+            preparation: Preparation::new(Arc::clone(&services)),
             wake: wake_sender(&services.wake)?,
             commands: subscribe(&services.commands)?,
             ready: subscribe(&services.ready)?,
@@ -125,16 +131,23 @@ impl Owner {
     /// only the new load. Publish its colliders and its first snapshot next. The old load occupies
     /// its memory until this returns, and longer while a reader holds a snapshot.
     ///
+    /// Another thread can take the memory in advance; see [`Owner::preparer`].
+    ///
     /// # Errors
     /// The load exceeds a limit of the contract or of shared memory, or a writer could not be created:
     /// nothing has changed, and the old load can continue. After [`OwnerError::Publish`] it
     /// cannot continue, because its writers are gone.
     pub fn load(&mut self, load: &Load<'_>) -> Result<(), OwnerError> {
-        self.load_after(load, |_| Ok(()))
+        self.load_after(load, |_| Ok(())).map(drop)
+    }
+
+    /// Returns a handle with which another thread prepares loads.
+    pub fn preparer(&self) -> LoadPreparer {
+        self.preparation.preparer()
     }
 
     /// Same as [`Owner::load`]. Calls `publish_last` once nothing but memory can fail, before anything of the
-    /// new load is published.
+    /// new load is published. The caller chooses when to free the memory of the old load.
     ///
     /// # Errors
     /// Same as [`Owner::load`], or those of `publish_last`.
@@ -142,18 +155,16 @@ impl Owner {
         &mut self,
         load: &Load<'_>,
         publish_last: impl FnOnce(&Self) -> Result<(), PublishError>,
-    ) -> Result<(), OwnerError> {
-        check_limits(load)?;
-        check_memory(load)?;
+    ) -> Result<ReplacedMemory, OwnerError> {
         // All new writers exist before the old ones are dropped, so an error leaves the old load as
         // it was. The old ones are dropped before the new ones publish: readers empty the buffers of
         // dropped writers first, so they never see the new load before the old.
-        let writers = LoadWriters::create(&self.services, load)?;
+        let writers = self.preparation.take(&self.services, load)?;
         publish_last(self)?;
-        self.writers = writers;
+        let replaced = ReplacedMemory::of(mem::replace(&mut self.writers, writers));
         self.publish_load(load)?;
         self.wake(Wake::Load);
-        Ok(())
+        Ok(replaced)
     }
 
     /// Publishes a snapshot of `header.particle_count` particles: `particle(0)`, `particle(1)`, ...
@@ -465,29 +476,5 @@ mod tests {
             let mut causes = std::iter::repeat_with(|| listener.wait(DEADLINE)).take(2);
             assert!(causes.any(|cause| cause == WakeCause::OwnerGone));
         }
-    }
-
-    #[test]
-    fn lists_of_colliders_are_numbered_over_loads_with_and_without_colliders() {
-        let domain = TestDomain::new();
-        let mut owner = Owner::create(&domain.endpoint(), &load(1)).unwrap();
-        let mut client = Client::attach(&domain.endpoint()).unwrap();
-        let index = |client: &mut Client, owner: &Owner| {
-            client.colliders(Duration::ZERO).unwrap();
-            owner.refresh();
-            client.colliders(DEADLINE).unwrap().header.list_index
-        };
-        assert_eq!(index(&mut client, &owner), 0);
-        owner.load(&Load { collider_count: 1, ..load(2) }).unwrap();
-        for expected in [1, 2] {
-            let header = CollidersHeader::default();
-            owner.publish_colliders(header, &[ColliderState::default()]).unwrap();
-            assert_eq!(index(&mut client, &owner), expected);
-        }
-        owner.load(&load(3)).unwrap();
-        assert_eq!(index(&mut client, &owner), 3);
-        let header = CollidersHeader { run_id: 7, ..CollidersHeader::default() };
-        owner.publish_colliders(header, &[]).unwrap();
-        assert_eq!(index(&mut client, &owner), 0, "another run");
     }
 }

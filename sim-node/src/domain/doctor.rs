@@ -43,7 +43,7 @@ pub(crate) fn doctor(args: &DoctorArgs) -> anyhow::Result<Exit> {
         return print_config(&endpoint, &domain).map(|()| Exit::Done);
     }
     let scene = scene_source::load(&args.scene)?;
-    let needed_bytes = shared_memory_bytes(&scene, &Solver::new(&scene))?;
+    let needed_bytes = shared_memory_bytes(&scene, &Solver::new(&scene));
     let mut findings = check_domain(args, &endpoint, &domain);
     findings.extend(check_limits(&scene.name, needed_bytes));
     findings.extend(check_clocks());

@@ -2,7 +2,7 @@
 
 mod beside;
 pub(super) mod scene;
-mod work;
+pub(super) mod work;
 
 use sim_solver::Prepared;
 

@@ -1,5 +1,7 @@
 //! Loads: a scene replaces another one in the same run, or begins a new run if it has another rate.
 
+use std::mem;
+
 use anyhow::Context;
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{Command, OwnerError, Reason, Stop, Text};
@@ -9,7 +11,8 @@ use super::inbox::Request;
 use super::job::Done;
 use super::job::scene::{Loaded, Refusal};
 use super::pace::Pace;
-use super::publisher::{Run, StepTimes};
+use super::publisher::StepTimes;
+use super::publisher::run::Run;
 use super::statistics::Statistics;
 use super::threads::start_threads;
 use super::{Boundary, Node};
@@ -85,7 +88,7 @@ impl Node {
         loaded: Loaded,
         command: Command,
     ) -> anyhow::Result<Result<Run, Refusal>> {
-        let Loaded { scene, mut solver, begins_run } = loaded;
+        let Loaded { scene, mut solver, messages, begins_run } = loaded;
         start_threads(&mut solver, self.options.threads, &self.cpus);
         let run = if begins_run {
             let run_id = getrandom::u64().context("no random number for the run")?;
@@ -94,7 +97,7 @@ impl Node {
             Run::Same { step: self.step + 1 }
         };
         let time_scale = self.progress.time_scale;
-        match self.publisher.load(&scene, &solver, &run, time_scale) {
+        match self.publisher.load(&messages, &solver, &run, time_scale) {
             Err(error @ OwnerError::Publish(_)) => {
                 Err(error).context("publishing the loaded scene")
             }
@@ -102,8 +105,11 @@ impl Node {
                 let (problem, reason) = (error.to_string(), Reason::NoEffectHere);
                 Ok(Err(Refusal { problem, reason }))
             }
-            Ok(()) => {
-                (self.scene, self.solver, self.spare) = (scene, solver, None);
+            Ok(memory) => {
+                let scene = mem::replace(&mut self.scene, scene);
+                let solver = mem::replace(&mut self.solver, solver);
+                let spare = self.spare.take();
+                self.dispose((scene, solver, spare, memory, messages));
                 Ok(Ok(run))
             }
         }

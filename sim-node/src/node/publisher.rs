@@ -1,6 +1,7 @@
 //! Publishes the state of the solver to other processes.
 
 mod load;
+pub(super) mod run;
 mod status;
 
 use std::path::PathBuf;
@@ -10,15 +11,16 @@ use bytemuck::cast_slice;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
     CONTRACT_VERSION, CollidersHeader, Command, ConnectionId, Endpoint, KeyframeHeader,
-    OUTCOME_FLAG_DISCONNECTED, OUTCOME_FLAG_NEW_RUN, Outcome, Owner, OwnerError, ParameterValues,
-    ParticleState, Ready, Reason, ReceivedCommand, ReceivedState, SnapshotFlags, SnapshotHeader,
-    TearsHeader, TornConstraint, Wake, scene_hash,
+    LoadPreparer, OUTCOME_FLAG_DISCONNECTED, Outcome, Owner, ParameterValues, ParticleState, Ready,
+    Reason, ReceivedCommand, ReceivedState, SnapshotFlags, SnapshotHeader, TearsHeader,
+    TornConstraint, Wake,
 };
 use sim_solver::{Applied, PlacedCollider, SOLVER_VERSION, Scene, Solver};
 
 use super::statistics::phases::{Phase, Phases};
+pub(super) use load::LoadMessages;
 pub(crate) use load::shared_memory_bytes;
-use load::{LoadPlace, count, to_collider_state, with_load};
+use load::{LoadPlace, count, to_collider_state};
 
 /// Solver time and lateness of a step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -36,22 +38,6 @@ pub(crate) struct Position {
     pub(crate) time_scale: f64,
     /// No further step follows for now, so late subscribers need this one.
     pub(crate) is_last: bool,
-}
-
-/// Run of a loaded scene.
-#[derive(Debug)]
-pub(crate) enum Run {
-    /// The run goes on, because the rate is the same.
-    Same {
-        /// The first step that shows the scene.
-        step: u64,
-    },
-    /// A new run.
-    New {
-        run_id: u64,
-        /// Outcome of the load, which ends the log of the old run.
-        last: Box<Outcome>,
-    },
 }
 
 /// Numbers of readers of two services.
@@ -116,12 +102,13 @@ impl Publisher {
         let run_id = getrandom::u64().context("no random number for the run")?;
         let parameters = parameter_values(solver, 1.0);
         let place = LoadPlace { run_id, step: 0, topology_revision: 0, parameters };
-        let owner = with_load(scene, solver, place, |load| Owner::create(endpoint, load))?;
+        let messages = LoadMessages::new(scene, solver);
+        let owner = Owner::create(endpoint, &messages.at(place))?;
         Ok(Self {
             owner,
             run_id,
             rate_hz: scene.solver.rate_hz,
-            scene_hash: scene_hash(scene.to_toml().as_bytes()),
+            scene_hash: messages.scene_hash(),
             topology_revision: 0,
             every,
             times: StepTimes::default(),
@@ -144,58 +131,9 @@ impl Publisher {
         })
     }
 
-    /// Publishes another scene. A new run begins with [`Self::begin_run`].
-    ///
-    /// # Errors
-    /// The scene exceeds a limit of the contract or of shared memory; the old one stays published.
-    pub(crate) fn load(
-        &mut self,
-        scene: &Scene,
-        solver: &Solver,
-        run: &Run,
-        time_scale: f64,
-    ) -> Result<(), OwnerError> {
-        let (run_id, step, topology_revision) = match *run {
-            Run::Same { step } => (self.run_id, step, self.topology_revision + 1),
-            Run::New { run_id, .. } => (run_id, 0, 0),
-        };
-        let parameters = parameter_values(solver, time_scale);
-        let place = LoadPlace { run_id, step, topology_revision, parameters };
-        let Self { owner, outcomes, .. } = self;
-        with_load(scene, solver, place, |load| {
-            owner.load_after(load, |owner| match run {
-                Run::Same { .. } => Ok(()),
-                // The outcomes of the old run come before anything of the new one.
-                Run::New { last, .. } => {
-                    let mut all = outcomes.drain(..).chain([**last]);
-                    all.try_for_each(|outcome| owner.publish_outcome(&outcome))?;
-                    owner.wake(Wake::Outcome);
-                    Ok(())
-                }
-            })
-        })?;
-        self.scene_hash = scene_hash(scene.to_toml().as_bytes());
-        self.parameters = parameters;
-        self.topology_revision = topology_revision;
-        self.torn_count = 0;
-        self.since_step = step;
-        self.colliders.clear();
-        Ok(())
-    }
-
-    /// Returns the outcome of a load that begins another run: the last one of this run.
-    pub(crate) fn last_outcome(&self, step: u64, command: Command) -> Box<Outcome> {
-        let outcome = Outcome::new(self.outcome_count, step, command, Ok(()));
-        Box::new(Outcome { run_id: self.run_id, flags: OUTCOME_FLAG_NEW_RUN, ..outcome })
-    }
-
-    /// Begins a run, whose scene is published. Publish its step 0 next.
-    pub(crate) fn begin_run(&mut self, run_id: u64, rate_hz: u32) {
-        (self.run_id, self.rate_hz) = (run_id, rate_hz);
-        (self.last, self.snapshot_count, self.keyframe_step) = (SnapshotHeader::default(), 0, 0);
-        (self.outcome_count, self.rejected_count) = (0, 0);
-        (self.since_step, self.included_step) = (0, 0);
-        self.is_keyframe_due = true;
+    /// Returns a handle with which another thread takes the memory of a load.
+    pub(crate) fn preparer(&self) -> LoadPreparer {
+        self.owner.preparer()
     }
 
     /// Appends the commands that have arrived.

@@ -1,5 +1,7 @@
 //! The data that an owner publishes per load, and the writers whose sizes follow from it.
 
+use std::fs::File;
+
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::restore::scene_hash;
@@ -59,8 +61,8 @@ pub(crate) struct LoadWriters {
 }
 
 /// Memory of the writers of a load.
-#[derive(Debug)]
-struct Capacities {
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Capacities {
     particles: Capacity,
     keyframe: Capacity,
     scene: Capacity,
@@ -72,7 +74,7 @@ struct Capacities {
 }
 
 impl Capacities {
-    fn of(load: &Load<'_>) -> Self {
+    pub(super) fn of(load: &Load<'_>) -> Self {
         let single = |len_max| Capacity { len_max, samples: 1 };
         let many =
             |spec: &ServiceSpec, len_max| Capacity { len_max, samples: spec.samples_in_use_max() };
@@ -114,6 +116,20 @@ impl LoadWriters {
             parameters: SliceWriter::create(config, &services.parameters, capacities.parameters)?,
             colliders: SliceWriter::create(config, &services.colliders, capacities.colliders)?,
         })
+    }
+
+    /// Removes the writers, and returns their segments, which keep their memory until they are closed.
+    pub(super) fn close(self) -> Vec<File> {
+        vec![
+            self.particles.close(),
+            self.keyframe.close(),
+            self.scene.close(),
+            self.topology.close(),
+            self.surface.close(),
+            self.tears.close(),
+            self.parameters.close(),
+            self.colliders.close(),
+        ]
     }
 
     /// Returns the size of the longest state of the load: its particles and a keyframe.

@@ -2,7 +2,7 @@
 //! written, and SIGBUS ends a process that writes to one when none is left. So every segment is
 //! allocated before its first use.
 
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io;
 
 use iceoryx2::prelude::Config;
@@ -66,8 +66,8 @@ pub(crate) enum AllocateError {
     System(io::Error),
 }
 
-/// Allocates all pages of the segment that holds the messages of a publisher.
-pub(crate) fn allocate(config: &Config, publisher_id: u128) -> Result<(), AllocateError> {
+/// Allocates all pages of the segment that holds the messages of a publisher. Returns the segment.
+pub(crate) fn allocate(config: &Config, publisher_id: u128) -> Result<File, AllocateError> {
     let Some(path) = segment(config, &config.global.service.data_segment_suffix, publisher_id)
     else {
         let missing = io::Error::new(io::ErrorKind::NotFound, "its segment is missing");
@@ -76,7 +76,7 @@ pub(crate) fn allocate(config: &Config, publisher_id: u128) -> Result<(), Alloca
     let file = OpenOptions::new().write(true).open(&path).map_err(AllocateError::System)?;
     let size_bytes = file.metadata().map_err(AllocateError::System)?.len();
     match fallocate(&file, FallocateFlags::empty(), 0, size_bytes) {
-        Ok(()) => Ok(()),
+        Ok(()) => Ok(file),
         Err(Errno::NOSPC) => Err(AllocateError::Full(MemoryError {
             needed_mib: size_bytes.div_ceil(1 << 20),
             available_mib: available_bytes().unwrap_or_default() >> 20,

@@ -1,6 +1,7 @@
 //! Writers of the publish-subscribe services. They never wait for a reader.
 
 use std::fmt::Debug;
+use std::fs::File;
 
 use iceoryx2::identifiers::UniquePublisherId;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
@@ -49,7 +50,7 @@ impl PublishError {
 }
 
 /// Memory of a writer of slices.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Capacity {
     /// Most elements of a message.
     pub(crate) len_max: usize,
@@ -76,6 +77,8 @@ impl Capacity {
 #[derive(Debug)]
 pub(crate) struct SliceWriter<T: Debug + ZeroCopySend + 'static, H: SliceHeader> {
     publisher: Publisher<ipc_threadsafe::Service, [T], H>,
+    /// The memory of its messages.
+    segment: File,
     service: String,
     len_max: usize,
 }
@@ -98,8 +101,8 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
                 .create()
         })?;
         let service = service.name().to_string();
-        allocate(config, publisher.id(), &service)?;
-        Ok(Self { publisher, service, len_max })
+        let segment = allocate(config, publisher.id(), &service)?;
+        Ok(Self { publisher, segment, service, len_max })
     }
 
     /// Publishes `element(0)`, `element(1)`, ... as one message of `header.element_count()` elements.
@@ -135,6 +138,11 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
         sample.send().map_err(|error| failed(&error))
     }
 
+    /// Removes the writer, and returns its segment, which keeps its memory until it is closed.
+    pub(crate) fn close(self) -> File {
+        self.segment
+    }
+
     /// Sends the latched message to readers that joined since it was written.
     pub(crate) fn refresh(&self) {
         // A reader that cannot be reached does not concern the owner.
@@ -166,7 +174,7 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
                 .create()
         })?;
         let service = service.name().to_string();
-        allocate(config, publisher.id(), &service)?;
+        let _segment = allocate(config, publisher.id(), &service)?;
         Ok(Self { publisher, service })
     }
 
@@ -183,7 +191,7 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
 }
 
 /// Allocates the memory of a publisher, so that writing a message never ends in SIGBUS.
-fn allocate(config: &Config, id: UniquePublisherId, service: &str) -> Result<(), ServiceError> {
+fn allocate(config: &Config, id: UniquePublisherId, service: &str) -> Result<File, ServiceError> {
     let service = service.to_owned();
     memory::allocate(config, id.value()).map_err(|error| match error {
         AllocateError::Full(memory) => ServiceError::Memory { service, memory },

@@ -230,3 +230,39 @@ fn a_load_beyond_a_limit_leaves_the_old_one_as_it_was() {
     publish_step(&owner, 6);
     assert_eq!(client.latest_snapshot(DEADLINE).unwrap().unwrap().header().step, 6);
 }
+
+fn with_colliders(collider_count: usize) -> Load<'static> {
+    Load {
+        header: LoadHeader::default(),
+        scene: b"version = 1",
+        constraints: &[],
+        triangles: &[],
+        collider_count,
+        keyframe_size_bytes_max: 0,
+        parameters: ParameterValues::default(),
+    }
+}
+
+#[test]
+fn lists_of_colliders_are_numbered_over_loads_with_and_without_colliders() {
+    let domain = TestDomain::new();
+    let mut owner = Owner::create(&domain.endpoint(), &with_colliders(0)).unwrap();
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    let index = |client: &mut Client, owner: &Owner| {
+        client.colliders(MOMENT).unwrap();
+        owner.refresh();
+        client.colliders(DEADLINE).unwrap().header.list_index
+    };
+    assert_eq!(index(&mut client, &owner), 0);
+    owner.load(&with_colliders(1)).unwrap();
+    for expected in [1, 2] {
+        let header = CollidersHeader::default();
+        owner.publish_colliders(header, &[ColliderState::default()]).unwrap();
+        assert_eq!(index(&mut client, &owner), expected);
+    }
+    owner.load(&with_colliders(0)).unwrap();
+    assert_eq!(index(&mut client, &owner), 3);
+    let header = CollidersHeader { run_id: 7, ..CollidersHeader::default() };
+    owner.publish_colliders(header, &[]).unwrap();
+    assert_eq!(index(&mut client, &owner), 0, "another run");
+}

@@ -26,11 +26,21 @@ impl Node {
         source: Text,
     ) -> Result<(), String> {
         let (overrides, rate_hz) = (self.options.overrides(), self.scene.solver.rate_hz);
+        let (preparer, disposal) = (self.publisher.preparer(), self.disposal.take());
         self.begin_job("load", std::slice::from_ref(request), move || {
-            Done::Scene(load(source.as_str(), overrides, rate_hz).map(Box::new))
+            // Its memory counts as free for this load.
+            disposal.into_iter().for_each(Work::join);
+            Done::Scene(load(source.as_str(), overrides, rate_hz, &preparer).map(Box::new))
         })?;
         self.inbox.hold(request.received.command.client_id);
         Ok(())
+    }
+
+    /// Drops something large beside the loop.
+    pub(in crate::node) fn dispose(&mut self, replaced: impl Send + 'static) {
+        let start = || Work::start("dispose", || drop(replaced));
+        // Without a thread it was dropped here.
+        self.disposal = self.cpus.lend(start).ok();
     }
 
     fn begin_job(

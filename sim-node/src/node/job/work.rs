@@ -14,7 +14,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// Work that runs without real-time scheduling. A panic of the work is passed on.
 #[derive(Debug)]
-pub(super) struct Work<T>(Receiver<thread::Result<T>>);
+pub(in crate::node) struct Work<T>(Receiver<thread::Result<T>>);
 
 impl<T: Send + 'static> Work<T> {
     /// Starts a thread with this name.
@@ -39,6 +39,13 @@ impl<T: Send + 'static> Work<T> {
         match self.0.try_recv() {
             Ok(result) => Some(result.unwrap_or_else(|panic| resume_unwind(panic))),
             Err(TryRecvError::Empty | TryRecvError::Disconnected) => None,
+        }
+    }
+
+    /// Waits for the end of the work.
+    pub(in crate::node) fn join(self) {
+        if let Ok(Err(panic)) = self.0.recv() {
+            resume_unwind(panic);
         }
     }
 

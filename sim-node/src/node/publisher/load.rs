@@ -1,8 +1,8 @@
 //! Messages that are published once per load.
 
 use sim_contract::{
-    ColliderShape, ColliderState, ConstraintState, Load, LoadHeader, OwnerError, ParameterValues,
-    Triangle,
+    ColliderShape, ColliderState, ConstraintState, Load, LoadHeader, ParameterValues, Triangle,
+    scene_hash,
 };
 use sim_solver::{PlacedCollider, Scene, Solver, scene};
 
@@ -16,45 +16,67 @@ pub(super) struct LoadPlace {
     pub(super) parameters: ParameterValues,
 }
 
-/// Calls `publish` with the load of a scene.
-pub(super) fn with_load<T>(
-    scene: &Scene,
-    solver: &Solver,
-    place: LoadPlace,
-    publish: impl FnOnce(&Load<'_>) -> Result<T, OwnerError>,
-) -> Result<T, OwnerError> {
-    let constraints: Vec<_> = solver.constraints().map(to_constraint_state).collect();
-    let triangles: Vec<_> =
-        solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
-    publish(&Load {
-        header: LoadHeader {
-            run_id: place.run_id,
-            step: place.step,
-            origin: scene.origin,
-            topology_revision: place.topology_revision,
-            particle_count: count(solver.particle_count()),
-            rate_hz: scene.solver.rate_hz,
-            method: scene.solver.method as u32,
-            ..LoadHeader::default()
-        },
-        scene: scene.to_toml().as_bytes(),
-        constraints: &constraints,
-        triangles: &triangles,
-        collider_count: solver.collider_count(),
-        keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
-        parameters: place.parameters,
-    })
+/// The messages of a load, which follow from its scene.
+#[derive(Debug)]
+pub(in crate::node) struct LoadMessages {
+    /// Without its place.
+    header: LoadHeader,
+    text: String,
+    constraints: Vec<ConstraintState>,
+    triangles: Vec<Triangle>,
+    collider_count: usize,
+    keyframe_size_bytes_max: usize,
+}
+
+impl LoadMessages {
+    pub(in crate::node) fn new(scene: &Scene, solver: &Solver) -> Self {
+        let text = scene.to_toml();
+        Self {
+            header: LoadHeader {
+                scene_hash: scene_hash(text.as_bytes()),
+                origin: scene.origin,
+                particle_count: count(solver.particle_count()),
+                rate_hz: scene.solver.rate_hz,
+                method: scene.solver.method as u32,
+                ..LoadHeader::default()
+            },
+            text,
+            constraints: solver.constraints().map(to_constraint_state).collect(),
+            triangles: solver.triangles().iter().map(|&corners| Triangle { corners }).collect(),
+            collider_count: solver.collider_count(),
+            keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
+        }
+    }
+
+    /// Identifies the scene.
+    pub(super) fn scene_hash(&self) -> u64 {
+        self.header.scene_hash
+    }
+
+    /// Returns the load at its place.
+    pub(super) fn at(&self, place: LoadPlace) -> Load<'_> {
+        let LoadPlace { run_id, step, topology_revision, parameters } = place;
+        Load {
+            header: LoadHeader { run_id, step, topology_revision, ..self.header },
+            scene: self.text.as_bytes(),
+            constraints: &self.constraints,
+            triangles: &self.triangles,
+            collider_count: self.collider_count,
+            keyframe_size_bytes_max: self.keyframe_size_bytes_max,
+            parameters,
+        }
+    }
+
+    /// Returns a load with the sizes of the messages, at no place.
+    pub(in crate::node) fn sizes(&self) -> Load<'_> {
+        let parameters = ParameterValues::DEFAULT;
+        self.at(LoadPlace { run_id: 0, step: 0, topology_revision: 0, parameters })
+    }
 }
 
 /// Returns the free shared memory that a node needs to run a scene, in bytes.
-pub(crate) fn shared_memory_bytes(scene: &Scene, solver: &Solver) -> Result<u64, OwnerError> {
-    let place = LoadPlace {
-        run_id: 0,
-        step: 0,
-        topology_revision: 0,
-        parameters: ParameterValues::DEFAULT,
-    };
-    with_load(scene, solver, place, |load| Ok(load.shared_memory_bytes()))
+pub(crate) fn shared_memory_bytes(scene: &Scene, solver: &Solver) -> u64 {
+    LoadMessages::new(scene, solver).sizes().shared_memory_bytes()
 }
 
 fn to_constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
