@@ -166,7 +166,9 @@ fn is_valid(name: &str, value: &Value) -> bool {
         "to_step" => value.is_u64(),
         "contents" => value == "state" || value == "motion",
         "state_hash" => value.as_str().is_some_and(|text| u64::from_str_radix(text, 16).is_ok()),
-        "parameter" | "scene" => value.as_str().is_some_and(|text| Text::new(text).is_ok()),
+        "parameter" | "scene" | "text" => {
+            value.as_str().is_some_and(|text| Text::new(text).is_ok())
+        }
         _ => value.as_u64().is_some_and(|number| u32::try_from(number).is_ok()),
     }
 }
@@ -186,6 +188,7 @@ fn allowed_values(name: &str) -> &'static str {
         "state_hash" => "16 hex digits in a string",
         "constraint_kind" => "structural, shear, bend or tether",
         "scene" => "the name of a scene, at most 160 bytes",
+        "text" => "a text of at most 160 bytes",
         _ => "whole numbers 0..=4294967295",
     }
 }
@@ -291,8 +294,8 @@ mod tests {
         drag.jsonl:2: step: is missing (allowed: whole numbers from 1)
         drag.jsonl:2: step: 0 is invalid (allowed: whole numbers from 1)
         drag.jsonl:2: step: 1.5 is invalid (allowed: whole numbers from 1)
-        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore)
-        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore)
+        drag.jsonl:2: kind: is missing (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark)
+        drag.jsonl:2: kind: "dance" is unknown (allowed: pin, unpin, grab, move, release, pause, resume, step, reset, push, cut, cut_radius, cut_segment, move_anchor, move_collider, set, load, rewind, restore, mark)
         drag.jsonl:2: particle: is missing (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: particle: -1 is invalid (allowed: whole numbers 0..=4294967295)
         drag.jsonl:2: colour: is not a field of "pin" (allowed: particle, step, kind, client_id, sequence, index, status, reason, disconnected, new_run)

@@ -101,6 +101,8 @@ pub(super) const COMMANDS: &str = r#"
     {"step":52,"kind":"set","parameter":"compliance","value":1e-5}
     {"step":53,"kind":"set","parameter":"stiffness","value":0.5}
     {"step":60,"kind":"release","particle":60}
+    {"step":61,"kind":"mark","text":"the sleeve slips"}
+    {"step":61,"kind":"mark","text":""}
     {"step":62,"kind":"grab","particle":61,"target":[0.5,0.2,0.3],"client_id":9}
     {"step":66,"kind":"release","particle":61,"client_id":8}
     {"step":67,"kind":"release","particle":61,"client_id":8,"force":true}
@@ -160,6 +162,8 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
         // A load belongs to another file, and this scene has no stiffness.
         (22, "no_effect_here"),
         (53, "no_effect_here"),
+        // A mark without a text.
+        (61, "out_of_range"),
         (66, "grabbed_by_other"),
         // A rewind goes to an earlier step that it names, and a restore needs a state.
         (108, "out_of_range"),

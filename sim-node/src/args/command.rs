@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
 use sim_contract::{
     ConstraintKind, GRAB_OVER_S_DEFAULT, PARAMETERS, ParameterInfo, ParameterValue,
@@ -114,6 +114,16 @@ pub(crate) enum CommandVerb {
         sim-node ctl rewind 2s\n  \
         sim-node ctl rewind --to-step 480")]
     Rewind(RewindArgs),
+    /// Mark the next step in the log with a text; nothing else changes
+    ///
+    /// The mark is an outcome like that of any other command, so every recording has it. A recorder with
+    /// --black-box then writes what it has kept.
+    #[command(after_help = "Example: sim-node ctl mark 'the sleeve slips'")]
+    Mark {
+        /// Text of at most 160 bytes
+        #[arg(value_parser = NonEmptyStringValueParser::new())]
+        text: String,
+    },
 }
 
 #[derive(Debug, ClapArgs)]

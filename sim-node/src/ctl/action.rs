@@ -64,6 +64,7 @@ pub(super) fn from_verb(
         CommandVerb::Resume => Action::Resume,
         CommandVerb::Step { count } => Action::Step { count: *count },
         CommandVerb::Reset => Action::Reset,
+        CommandVerb::Mark { text: words } => Action::Mark { text: text(words)? },
         CommandVerb::Rewind(RewindArgs { time, to_step }) => Action::Rewind {
             to_step: *to_step,
             back_steps: match time {

@@ -147,6 +147,7 @@ fn allowed_values(action: &Action) -> Option<String> {
         }
         Action::Load { .. } => "a scene that the node can read; see its messages",
         Action::Step { .. } => "1 or more",
+        Action::Mark { .. } => "a text that is not empty",
         Action::Rewind { .. } => "a step of this run that the node has made",
         _ => return None,
     };

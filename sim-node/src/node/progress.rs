@@ -41,6 +41,7 @@ impl Progress {
             Control::Step { count: 0 } => return Err(Reason::OutOfRange),
             Control::Step { count } if self.is_paused => self.steps_due += u64::from(count),
             Control::TimeScale(scale) => self.time_scale = f64::from(scale),
+            Control::Mark => {}
             // A running node needs no `step`.
             Control::Step { .. }
             | Control::Load { .. }

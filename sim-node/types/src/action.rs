@@ -165,6 +165,11 @@ pub enum Action {
         #[serde(with = "hash")]
         state_hash: u64,
     },
+    /// Marks the step in the log. Changes nothing else.
+    Mark {
+        /// Text for people and for programs that read the log. Empty text is rejected.
+        text: Text,
+    },
     /// A kind that this version does not know. Always rejected.
     Unknown {
         /// Number of the kind on the wire. The number of a known kind becomes `u32::MAX` there, which
@@ -186,7 +191,7 @@ pub struct ActionFields {
 
 impl ActionFields {
     /// All kinds, in the order of their numbers on the wire.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::new("pin", &["particle"], &[]),
         Self::new("unpin", &["particle"], &[]),
         Self::new("grab", &["particle", "target"], &["over_s"]),
@@ -206,6 +211,7 @@ impl ActionFields {
         Self::new("load", &["scene"], &[]),
         Self::new("rewind", &[], &["to_step", "back_steps"]),
         Self::new("restore", &["contents", "state_hash"], &[]),
+        Self::new("mark", &["text"], &[]),
         Self::new("unknown", &["number"], &[]),
     ];
 
@@ -341,6 +347,7 @@ impl Action {
             Self::Rewind { to_step: None, back_steps: Some(480) },
             Self::Restore { contents: RestoreContents::State, state_hash: 0x0123_4567_89ab_cdef },
             Self::Restore { contents: RestoreContents::Motion, state_hash: 0 },
+            Self::Mark { text: Text::cut("the sleeve slips, größer") },
             Self::Unknown { number: 99 },
         ]
     }

@@ -40,6 +40,7 @@ pub fn parse(payload: &[u8], epoch: u32) -> Result<Command, String> {
             Command::Set { parameter: parameter.as_str().to_owned(), value, constraint_kind }
         }
         Action::Load { scene } => Command::Load { scene: scene.as_str().to_owned() },
+        Action::Mark { text } => Command::Mark { text: text.as_str().to_owned() },
         Action::Push { .. } => return Err("push is not accepted here".to_owned()),
         Action::Rewind { .. } => return Err("rewind is not accepted here".to_owned()),
         Action::Restore { .. } => return Err("restore is not accepted here".to_owned()),
@@ -61,6 +62,8 @@ mod tests {
         let text = r#"{"kind":"grab","particle":1,"target":[0,1,2],"over_s":0.1}"#;
         assert_eq!(read(text), Ok(grab));
         assert_eq!(read(r#"{"kind":"pause"}"#), Ok(Command::Pause {}));
+        let mark = Command::Mark { text: "slips".to_owned() };
+        assert_eq!(read(r#"{"kind":"mark","text":"slips"}"#), Ok(mark));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Range checks of the numbers in a command, before it reaches the source.
 
-use sim_contract::{COORDINATE_MAX, ParameterValue, Reason};
+use sim_contract::{COORDINATE_MAX, ParameterValue, Reason, Text};
 use sim_solver::GRAB_OVER_S_MAX;
 
 use super::from_page::Command;
@@ -10,8 +10,6 @@ use crate::limits::{CONSTRAINTS_PER_CUT_MAX, STEPS_AT_ONCE_MAX};
 const BRUSH_OVER_S_MIN: f32 = 1e-3;
 /// Range of `rate`.
 const RATES: std::ops::RangeInclusive<f32> = 0.1..=10.0;
-/// Longest name of a scene or parameter, as in the contract.
-const NAME_SIZE_BYTES_MAX: usize = sim_contract::Text::SIZE_BYTES_MAX;
 
 /// Checks that the numbers are finite and in range.
 ///
@@ -49,9 +47,11 @@ pub fn check(command: &Command) -> Result<(), Reason> {
         Command::Step { count } => {
             at_most(count.unsigned_abs() as usize, STEPS_AT_ONCE_MAX as usize)
         }
-        Command::Load { scene } => at_most(scene.len(), NAME_SIZE_BYTES_MAX),
+        Command::Load { scene } => at_most(scene.len(), Text::SIZE_BYTES_MAX),
+        Command::Mark { text } if text.is_empty() => Err(Reason::OutOfRange),
+        Command::Mark { text } => at_most(text.len(), Text::SIZE_BYTES_MAX),
         Command::Set { parameter, value, .. } => {
-            at_most(parameter.len(), NAME_SIZE_BYTES_MAX)?;
+            at_most(parameter.len(), Text::SIZE_BYTES_MAX)?;
             match value {
                 ParameterValue::Number(number) => within(*number, f32::MIN, f32::MAX),
                 ParameterValue::Vector(vector) => numbers(vector),

@@ -128,6 +128,9 @@ pub enum Command {
         #[serde(default)]
         constraint_kind: Option<KindFilter>,
     },
+    Mark {
+        text: String,
+    },
     Seek {
         step: u64,
     },
@@ -171,6 +174,7 @@ impl Command {
             Self::Step { .. } => "step",
             Self::Reset {} => "reset",
             Self::Load { .. } => "load",
+            Self::Mark { .. } => "mark",
             Self::Set { .. } => "set",
             Self::Seek { .. } => "seek",
             Self::Rate { .. } => "rate",

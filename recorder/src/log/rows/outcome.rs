@@ -157,6 +157,8 @@ struct ActionSchema {
     contents: Option<String>,
     #[schemars(skip_serializing_if = "Option::is_none")]
     state_hash: Option<String>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    text: Option<String>,
 }
 
 /// The schema of a parameter's value. No value means off.

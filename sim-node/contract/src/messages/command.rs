@@ -120,6 +120,7 @@ mod kind {
     pub(super) const LOAD: u32 = 17;
     pub(super) const REWIND: u32 = 18;
     pub(super) const RESTORE: u32 = 19;
+    pub(super) const MARK: u32 = 20;
     /// No version will assign it.
     pub(super) const UNKNOWN: u32 = u32::MAX;
 }
@@ -186,6 +187,9 @@ impl Command {
                 },
                 ..Self::with_kind(kind::RESTORE, 0).with_long(state_hash)
             },
+            Action::Mark { text } => {
+                Self { text: text.to_wire(), ..Self::with_kind(kind::MARK, 0) }
+            }
             Action::Unknown { number } => Self::unknown(number),
         }
     }
@@ -289,6 +293,7 @@ impl Command {
                 Some(contents) => Action::Restore { contents, state_hash: self.long() },
                 None => Action::Unknown { number: kind::RESTORE },
             },
+            kind::MARK => Action::Mark { text: Text::from_wire(&self.text) },
             number => Action::Unknown { number },
         }
     }
@@ -352,7 +357,7 @@ mod tests {
         let mut numbers: Vec<_> =
             Action::samples().into_iter().map(|action| Command::new(0, 0, action).kind).collect();
         numbers.dedup();
-        let expected: Vec<_> = (1..=19).chain([99]).collect();
+        let expected: Vec<_> = (1..=20).chain([99]).collect();
         assert_eq!(numbers, expected);
         for kind in (0..=1000).filter(|kind| !numbers.contains(kind)) {
             let action = Command { kind, ..Command::new(0, 0, Action::Pause) }.action();
@@ -365,7 +370,7 @@ mod tests {
         for number in (0..=100).chain([u32::MAX - 1, u32::MAX]) {
             let decoded = Command::new(0, 0, Action::Unknown { number }).action();
             let is_known =
-                (1..=19).contains(&number) && ![kind::SET, kind::RESTORE].contains(&number);
+                (1..=20).contains(&number) && ![kind::SET, kind::RESTORE].contains(&number);
             let expected = if is_known { u32::MAX } else { number };
             assert_eq!(decoded, Action::Unknown { number: expected });
         }

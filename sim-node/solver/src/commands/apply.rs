@@ -48,6 +48,8 @@ pub enum Control {
     },
     /// Put a state in place that belongs to the command.
     Restore,
+    /// Nothing: the log has the mark.
+    Mark,
 }
 
 impl Solver {
@@ -100,6 +102,8 @@ impl Solver {
                 return Ok(Applied::Control(Control::Rewind { to_step, back_steps }));
             }
             Action::Restore { .. } => return Ok(Applied::Control(Control::Restore)),
+            Action::Mark { text } if text.as_str().is_empty() => return Err(Reason::OutOfRange),
+            Action::Mark { .. } => return Ok(Applied::Control(Control::Mark)),
             Action::Unknown { .. } => return Err(Reason::NoEffectHere),
         }
         Ok(Applied::State)

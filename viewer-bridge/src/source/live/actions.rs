@@ -51,6 +51,9 @@ pub(super) fn actions(
         Command::Load { scene } => {
             Action::Load { scene: Text::new(&scene).map_err(|_| Reason::OutOfRange)? }
         }
+        Command::Mark { text } => {
+            Action::Mark { text: Text::new(&text).map_err(|_| Reason::OutOfRange)? }
+        }
         Command::Set { parameter, value, constraint_kind } => {
             let parameter = Text::new(&parameter).map_err(|_| Reason::UnknownParameter)?;
             Action::Set { parameter, value, constraint_kind }
