@@ -29,6 +29,7 @@ use crate::cli::file_args::default_path;
 use crate::cli::output;
 pub(crate) use args::{RecordArgs, SingleStateArgs};
 use feed::Feed;
+use feed::trigger::Trigger;
 use intake::Intake;
 use live::LiveLine;
 use load::LoadError;
@@ -38,6 +39,7 @@ use report::{Report, Written};
 use split::WritePosition;
 use stop_reason::StopReason;
 use writing::WriteOptions;
+use writing::black_box::BlackBox;
 use writing::extras::Extras;
 
 /// Longest wait for messages before the next check for signals.
@@ -60,14 +62,17 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
     let selection = args.selection.selection();
+    let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
+    let trigger = args.black_box.map(Trigger::install).transpose()?;
     let options = WriteOptions {
         selection,
         file: args.file.clone(),
         names,
-        files_max: args.split.files_max(),
+        ring: args.split.ring(),
         is_synced: !args.no_sync,
         flush_interval: args.flush_interval,
         extras,
+        black_box: args.black_box.map(|span| BlackBox::new(span, queue_bytes)),
     };
     let file = options.create(0)?;
     let path = output::path_text(&options.names.path(0));
@@ -77,9 +82,16 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
              file with its number begins"
         ));
     }
-    output::note(&format!("ready recording {endpoint} into {path}"));
+    match args.black_box {
+        Some(span) => {
+            let span = humantime::format_duration(span);
+            output::note(&format!(
+                "ready keeping the last {span} of {endpoint}; the first file is {path}"
+            ));
+        }
+        None => output::note(&format!("ready recording {endpoint} into {path}")),
+    }
 
-    let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
     let queue = Arc::new(Queue::new(queue_bytes));
     let position = Arc::new(WritePosition::default());
     let intake = Intake::new(args.steps);
@@ -88,7 +100,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let feed = Feed::new(intake, Arc::clone(&queue), position, args.split.clone());
     let mut recording = Recording {
         tap,
-        feed: feed.following(args.follow).selecting(selection),
+        feed: feed.following(args.follows()).selecting(selection).triggered_by(trigger),
         live,
         queue,
         writing,
@@ -151,7 +163,7 @@ impl Recording {
             let reason = self.reason_to_stop(args, stop);
             let end = self.read()?.map(StopReason::Run);
             match end.or(reason) {
-                Some(StopReason::OwnerGone) if args.follow => self.end_file_of_owner(),
+                Some(StopReason::OwnerGone) if args.follows() => self.end_file_of_owner(),
                 Some(reason) => return Ok(reason),
                 None => {}
             }
@@ -224,16 +236,18 @@ impl Recording {
         self.queue.close();
         let written = self.writing.join().map_err(|_| anyhow!("the writing thread panicked"))??;
         let reason = result?;
-        if !args.follow
+        if !args.follows()
             && let Some(hint) = reason.hint()
         {
             console::note(&format!("note: {hint}"));
         }
-        Report::new(&written, stop_reason.clone()).ok_or_else(|| {
-            anyhow!(
+        let report = Report::new(&written, stop_reason.clone());
+        if !report.has_files() && args.black_box.is_none() {
+            bail!(
                 "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe"
-            )
-        })
+            );
+        }
+        Ok(report)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Recordings of several files: across loads, runs and restarts of the node, and at limits. Each file
 //! verifies alone, and together they have every published step.
 
+mod black_box;
 mod extras;
 mod kills;
 mod selection;

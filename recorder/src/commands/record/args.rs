@@ -20,6 +20,9 @@ const QUEUE_BYTES_DEFAULT: u64 = 256 << 20;
 
 /// Flush interval of a recording of one step.
 const FLUSH_INTERVAL_DEFAULT: Duration = Duration::from_secs(1);
+/// Times that a black box can keep.
+const BLACK_BOX_SPANS: RangeInclusive<Duration> = Duration::from_secs(1)..=Duration::from_hours(1);
+
 /// Flush intervals. Each flush closes a chunk, and waits for the disk.
 const FLUSH_INTERVALS: RangeInclusive<Duration> =
     Duration::from_millis(100)..=Duration::from_hours(1);
@@ -29,7 +32,7 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
 #[command(
     after_help = "Ends cleanly on Ctrl-C, on SIGTERM or SIGHUP, and at a limit. Without --follow, it also ends with the \
     node, when another scene is loaded, and when another run starts (as with play --loop).\n\n\
-    With --follow or a limit of a file, -o run.mcap names the files run_0000.mcap, run_0001.mcap and so \
+    With --follow, --black-box or a limit of a file, -o run.mcap names the files run_0000.mcap, run_0001.mcap and so \
     on. Each begins with the scene, the latest constraints, triangles, parameters, colliders and torn \
     constraints, and a keyframe, so it plays and verifies alone. No step is in two files.\n\n\
     Exit codes: 0 all recorded; 1 failed; 3 messages lost.\n\nExamples:\n  \
@@ -37,7 +40,8 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     recorder record --name left --duration 10s --compression none\n  \
     recorder record -o run.mcap --steps 2400 --json\n  \
     recorder record -o run.mcap --follow --wait\n  \
-    recorder record -o run.mcap --split-size 1GB --max-files 10\n  \
+    recorder record -o run.mcap --split-size 1GB --max-files 10 --min-free 5GB\n  \
+    recorder record -o incident.mcap --black-box 30s --max-files 10\n  \
     recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada\n  \
     recorder record -o flight.mcap --only-commands && recorder simulate flight.mcap -o run.mcap"
 )]
@@ -57,6 +61,11 @@ pub(crate) struct RecordArgs {
     pub(super) wait: bool,
     #[command(flatten)]
     pub(super) split: SplitArgs,
+    /// Keep the last TIME in memory, such as 30s or 30, from 1s to 1h. Write it, and a second more, on
+    /// `sim-node ctl mark`, on a tear, on a frozen particle and on SIGUSR1, each time into another file
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = black_box_span,
+        conflicts_with_all = ["steps", "split_size", "split_duration"])]
+    pub(super) black_box: Option<Duration>,
     #[command(flatten)]
     pub(super) selection: SelectionArgs,
     /// End after this time, such as 10s or 500ms. It counts from the start of the program, so it
@@ -68,7 +77,7 @@ pub(crate) struct RecordArgs {
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
     pub(super) steps: Option<u64>,
     /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
-    /// not fit are lost and counted
+    /// not fit are lost and counted. With --black-box, also the memory for what is kept
     #[arg(long, value_name = "BYTES", default_value_t = QUEUE_BYTES_DEFAULT,
         allow_hyphen_values = true, value_parser = queue_bytes)]
     pub(super) queue_bytes: u64,
@@ -115,6 +124,7 @@ impl From<SingleStateArgs> for RecordArgs {
             follow: false,
             wait: false,
             split: SplitArgs::default(),
+            black_box: None,
             selection: SelectionArgs::default(),
             duration: Some(timeout),
             steps: Some(0),
@@ -134,6 +144,14 @@ fn flush_interval(text: &str) -> Result<Duration, String> {
     is_valid.then_some(interval).ok_or_else(|| "it must be a time from 100ms to 1h".to_owned())
 }
 
+/// Parses a time. A number without a unit is in seconds.
+fn black_box_span(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().map(Duration::from_secs);
+    let span = seconds.or_else(|_| parse::duration(text))?;
+    let is_valid = BLACK_BOX_SPANS.contains(&span);
+    is_valid.then_some(span).ok_or_else(|| "it must be a time from 1s to 1h".to_owned())
+}
+
 fn queue_bytes(text: &str) -> Result<u64, String> {
     whole_number_in(text, &(1 << 20..=1 << 40))
 }
@@ -142,8 +160,13 @@ impl RecordArgs {
     /// Returns the names of the files.
     pub(super) fn names(&self, default: PathBuf) -> FileNames {
         let path = self.output.clone().unwrap_or(default);
-        let is_numbered = self.follow || self.split.is_given();
+        let is_numbered = self.follows() || self.split.is_given();
         if is_numbered { FileNames::Numbered(path) } else { FileNames::Single(path) }
+    }
+
+    /// Returns `true` if the recording goes on with another load or run. A black box always does.
+    pub(super) fn follows(&self) -> bool {
+        self.follow || self.black_box.is_some()
     }
 
     /// Checks options that are useful only with others.
@@ -153,11 +176,13 @@ impl RecordArgs {
             let text = format!("--only-commands needs {name}: remove it from --exclude\n");
             return Err(clap::Error::raw(ErrorKind::ArgumentConflict, text));
         }
-        if self.split.files_max().is_none() || self.follow || self.split.is_given() {
+        let ring = self.split.ring().option();
+        let Some(option) = ring.filter(|_| !self.follows() && !self.split.is_given()) else {
             return Ok(());
-        }
-        let text = "--max-files needs a limit of a file, or --follow: add --split-size or \
-            --split-duration\n";
+        };
+        let text = format!(
+            "{option} needs a limit of a file, or --follow: add --split-size or --split-duration\n"
+        );
         Err(clap::Error::raw(ErrorKind::MissingRequiredArgument, text))
     }
 }

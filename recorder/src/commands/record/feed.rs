@@ -1,23 +1,28 @@
 //! The way from the states of a tap into the queue: one file after the other.
 
 pub(crate) mod selector;
+pub(crate) mod trigger;
 
 use std::sync::Arc;
 
 use recorder::{Closing, ContentSelection};
-use sim_contract::clock::{monotonic_ns, realtime_ns};
-use sim_contract::{LostChanges, ReadError, State};
+use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
+use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 
 use super::accepted::{Accepted, RunEnd};
 use super::first_state::FirstState;
 use super::intake::Intake;
 use super::load::{LoadError, Now};
 use super::messages::Messages;
-use super::queue::{Item, Queue};
+use super::queue::{FileEnd, Item, Queue};
 use super::split::{FileBegin, SplitArgs, WritePosition};
 use super::stop_reason::StopReason;
 use crate::cli::output;
 use selector::Selector;
+use trigger::Trigger;
+
+/// Shortest part of a black box. A part repeats the scene and the constraints.
+const PART_MIN_NS: u64 = SECOND_NS;
 
 /// Feeds the queue with the files of a recording.
 #[derive(Debug)]
@@ -29,6 +34,9 @@ pub(crate) struct Feed {
     /// Another load and another run begin the next file.
     is_following: bool,
     selector: Selector,
+    /// Decides when the black box is written, if this is one.
+    trigger: Option<Trigger>,
+    is_paused: bool,
     /// The newest file.
     file: Option<FileBegin>,
     /// Contents of the newest file that are not in the queue yet.
@@ -44,7 +52,23 @@ impl Feed {
     ) -> Self {
         let accepted = Accepted::default();
         let selector = Selector::new(ContentSelection::default());
-        Self { intake, queue, position, split, is_following: false, selector, file: None, accepted }
+        Self {
+            intake,
+            queue,
+            position,
+            split,
+            is_following: false,
+            selector,
+            trigger: None,
+            is_paused: false,
+            file: None,
+            accepted,
+        }
+    }
+
+    /// Feeds a black box.
+    pub(crate) fn triggered_by(self, trigger: Option<Trigger>) -> Self {
+        Self { trigger, ..self }
     }
 
     /// Goes on in the next file with another load or run.
@@ -65,7 +89,7 @@ impl Feed {
     ) -> Result<(), LoadError> {
         if let Some(reason) = self.end_before(state) {
             self.intake.accept_before(state, messages, &mut self.accepted);
-            self.end_file(reason.text().to_owned());
+            self.end_part(reason.text().to_owned(), reason == StopReason::Split);
         }
         self.intake.accept_state(state, Now::read(), &mut self.accepted)
     }
@@ -81,16 +105,25 @@ impl Feed {
 
     fn is_split_before(&self, state: &State<'_>) -> bool {
         let Some(file) = self.file.filter(|_| self.intake.has_started()) else { return false };
-        let waiting_bytes = self.queue.size_bytes();
-        self.split.is_due(file, &self.position, waiting_bytes, monotonic_ns())
-            && FirstState::is_complete(state)
+        let now_ns = monotonic_ns();
+        let is_due = match &self.trigger {
+            Some(trigger) => {
+                now_ns.saturating_sub(file.monotonic_ns) >= PART_MIN_NS || trigger.is_due(now_ns)
+            }
+            None => self.split.is_due(file, &self.position, self.queue.size_bytes(), now_ns),
+        };
+        is_due && FirstState::is_complete(state)
     }
 
     /// Accepts messages that arrived between states, and passes everything to the queue. Returns the end
     /// of the recording, if it is reached.
     pub(crate) fn accept_messages(&mut self, messages: Messages) -> Option<RunEnd> {
+        if let Some(status) = messages.statuses.last() {
+            self.is_paused = status.flags & StatusFlags::PAUSED != 0;
+        }
         self.intake.accept_messages(messages, Now::read(), &mut self.accepted);
         self.enqueue();
+        self.end_part_in_pause();
         self.accepted.end.take()
     }
 
@@ -115,11 +148,32 @@ impl Feed {
 
     /// Ends the file, if one has begun.
     pub(crate) fn end_file(&mut self, stop_reason: String) {
+        self.end_part(stop_reason, false);
+    }
+
+    /// Ends the file, or a part of a black box that the next one may continue.
+    fn end_part(&mut self, stop_reason: String, is_continued: bool) {
         self.enqueue();
-        if self.intake.has_started() {
-            let mut closing = self.intake.end_file(stop_reason);
-            closing.counts.set_left_out(&self.selector.take_counts());
-            self.queue.end(closing);
+        if !self.intake.has_started() {
+            return;
+        }
+        let (stop_reason, end) = match &mut self.trigger {
+            Some(trigger) => trigger.end_part(stop_reason, is_continued, monotonic_ns()),
+            None => (stop_reason, FileEnd::Write),
+        };
+        let mut closing = self.intake.end_file(stop_reason);
+        closing.counts.set_left_out(&self.selector.take_counts());
+        self.queue.end(closing, end);
+    }
+
+    /// Ends a part for which the black box is to be written while no state arrives. The state after a pause
+    /// has a keyframe, so the next part begins with it.
+    fn end_part_in_pause(&mut self) {
+        let now_ns = monotonic_ns();
+        let Some(trigger) = &mut self.trigger else { return };
+        trigger.poll_signal(now_ns);
+        if self.is_paused && trigger.is_due(now_ns) {
+            self.end_part(StopReason::Split.text().to_owned(), true);
         }
     }
 
@@ -130,12 +184,18 @@ impl Feed {
         if let Some(header) = self.accepted.header.take() {
             let number = self.file.map_or(0, |file| file.number + 1);
             self.file = Some(FileBegin { number, monotonic_ns: monotonic_ns() });
-            if let Some(step) = self.intake.first_step() {
+            if let Some(step) = self.intake.first_step()
+                && self.trigger.is_none()
+            {
                 output::note(&format!("recording from step {step}"));
             }
             self.queue.begin(header, log_time_ns);
         }
+        let now_ns = monotonic_ns();
         for content in self.accepted.contents.drain(..) {
+            if let Some(trigger) = &mut self.trigger {
+                trigger.watch(&content, now_ns);
+            }
             let Some(content) = self.selector.select(content) else { continue };
             self.queue.push(Item { content, log_time_ns });
         }
@@ -146,6 +206,11 @@ impl Feed {
         if let Some(warning) = self.intake.count_unreadable(errors) {
             output::note(&warning);
         }
+    }
+
+    /// Returns `true` if a black box is fed.
+    pub(crate) fn is_of_black_box(&self) -> bool {
+        self.trigger.is_some()
     }
 
     /// Returns the counts of the newest file so far, with what the queue has dropped.

@@ -64,6 +64,10 @@ impl LiveLine {
             self.last = now;
         }
         let seconds = (now_ns - self.begin_ns) as f64 / SECOND_NS as f64;
+        if feed.is_of_black_box() {
+            output::show_live(black_box_text(seconds, size_bytes, file_number));
+            return;
+        }
         let line = text(seconds, &feed.closing(), self.bytes_per_s, self.queue.size_bytes());
         output::show_live(line);
     }
@@ -92,6 +96,12 @@ fn text(seconds: f64, closing: &Closing, bytes_per_s: f64, queue_bytes: usize) -
         let _ = write!(text, " {topic} {count}");
     }
     text
+}
+
+/// The line of a black box, with the number of files that it has written.
+fn black_box_text(seconds: f64, kept_bytes: u64, file_count: u64) -> String {
+    let kept = kept_bytes as f64 / BYTES_PER_MB;
+    format!("{seconds:.1} s, {kept:.1} MB kept, {file_count} files written")
 }
 
 #[cfg(test)]

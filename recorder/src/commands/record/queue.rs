@@ -25,13 +25,26 @@ pub(crate) struct Item {
     pub(crate) log_time_ns: u64,
 }
 
+/// Treatment of a file that has ended. Without a black box, each is written as its contents arrive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FileEnd {
+    /// It is written, after those before it that are kept, as one file.
+    Write,
+    /// It is kept, and the next one continues it.
+    Keep,
+    /// It is kept, and those before it whatever their age, because a file of them will be written.
+    KeepAll,
+    /// It is dropped, with those before it.
+    Drop,
+}
+
 /// An entry of the queue: the start of a file, a content, or the end of a file.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "nearly every entry is an item")]
 enum Entry {
     Begin { header: Box<RunHeader>, log_time_ns: u64 },
     Item(Item),
-    End(Box<Closing>),
+    End(Box<Closing>, FileEnd),
 }
 
 /// A queue that never blocks the reading thread: it drops and counts items that do not fit.
@@ -72,7 +85,7 @@ pub(crate) enum Popped {
     },
     Item(Item),
     /// The file ends.
-    End(Box<Closing>),
+    End(Box<Closing>, FileEnd),
     /// No item arrived before the timeout.
     Timeout,
     /// The queue is closed and empty.
@@ -121,11 +134,11 @@ impl Queue {
     }
 
     /// Ends the file, and adds the numbers of its dropped messages to its end.
-    pub(crate) fn end(&self, mut closing: Closing) {
+    pub(crate) fn end(&self, mut closing: Closing, end: FileEnd) {
         let mut state = self.lock();
         closing.counts.set_lost(&std::mem::take(&mut state.lost));
         state.is_beginning = false;
-        state.push(Entry::End(Box::new(closing)));
+        state.push(Entry::End(Box::new(closing), end));
         drop(state);
         self.changed.notify_one();
     }
@@ -161,7 +174,7 @@ impl Queue {
         match entry {
             Some(Entry::Begin { header, log_time_ns }) => Popped::Begin { header, log_time_ns },
             Some(Entry::Item(item)) => Popped::Item(item),
-            Some(Entry::End(closing)) => Popped::End(closing),
+            Some(Entry::End(closing, end)) => Popped::End(closing, end),
             None if state.is_closed => Popped::Closed,
             None => Popped::Timeout,
         }
@@ -206,21 +219,21 @@ impl Entry {
         match self {
             Self::Begin { header, .. } => size_of::<RunHeader>() + header.scene.len(),
             Self::Item(item) => item.content.size_bytes(),
-            Self::End(_) => size_of::<Closing>(),
+            Self::End(..) => size_of::<Closing>(),
         }
     }
 }
 
 impl Content {
     /// Returns the step of a snapshot, with its particles or without.
-    fn snapshot_step(&self) -> Option<u64> {
+    pub(crate) fn snapshot_step(&self) -> Option<u64> {
         match self {
             Self::Snapshot(row, _) | Self::Update(Message::Step(row)) => Some(row.step),
             Self::Update(_) => None,
         }
     }
 
-    fn size_bytes(&self) -> usize {
+    pub(crate) fn size_bytes(&self) -> usize {
         match self {
             Self::Update(message) => message.size_bytes(),
             Self::Snapshot(_, particles) => size_of::<Item>() + size_of_val(particles.as_slice()),

@@ -50,8 +50,8 @@ impl Written {
 /// The report, for one file or the sum of several.
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
-    /// The newest file.
-    output: String,
+    /// The newest file, if there is one.
+    output: Option<String>,
     /// Number of files, with the removed ones.
     files: u64,
     /// Number of the oldest files that were removed again.
@@ -68,11 +68,10 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Returns `None` if no file was written.
-    pub(crate) fn new(written: &Written, stop_reason: String) -> Option<Self> {
+    pub(crate) fn new(written: &Written, stop_reason: String) -> Self {
         let counts = &written.total.counts;
-        (written.file_count > 0).then(|| Self {
-            output: output::path_text(&written.last_path),
+        Self {
+            output: (written.file_count > 0).then(|| output::path_text(&written.last_path)),
             files: written.file_count,
             removed_files: written.removed_count,
             first_step: written.steps.map(|(first, _)| first),
@@ -81,7 +80,12 @@ impl Report {
             outcomes: counts[Topic::Outcomes].written,
             lost: written.total.missing(),
             stop_reason,
-        })
+        }
+    }
+
+    /// Returns `true` if a file was written.
+    pub(crate) fn has_files(&self) -> bool {
+        self.files > 0
     }
 
     /// Returns `true` if every published message was recorded.
@@ -92,7 +96,13 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "written     {}", self.output)?;
+        match &self.output {
+            Some(path) => writeln!(f, "written     {path}")?,
+            // Only a black box can end so.
+            None => {
+                writeln!(f, "written     nothing: no mark, tear, frozen particle or SIGUSR1 came")?;
+            }
+        }
         if self.files > 1 {
             let (files, removed) = (self.files, self.removed_files);
             writeln!(f, "files       {files}, {removed} of them removed")?;

@@ -25,6 +25,26 @@ pub(crate) struct SplitArgs {
     /// Keep the newest N files, at least 2, and remove older ones of this recording
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = file_count)]
     max_files: Option<u64>,
+    /// Remove the oldest files of this recording while less than this is free on their disk, such as 10GB
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true, value_parser = size_bytes)]
+    min_free: Option<u64>,
+}
+
+/// The limits at which a recording removes its oldest files.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Ring {
+    /// Most files to keep.
+    pub(crate) files_max: Option<u64>,
+    /// Least free space of the disk, in bytes.
+    pub(crate) free_min_bytes: Option<u64>,
+}
+
+impl Ring {
+    /// Returns the option of a limit, if there is one.
+    pub(crate) fn option(self) -> Option<&'static str> {
+        let max_files = self.files_max.map(|_| "--max-files");
+        max_files.or(self.free_min_bytes.map(|_| "--min-free"))
+    }
 }
 
 impl SplitArgs {
@@ -33,9 +53,9 @@ impl SplitArgs {
         self.split_size.is_some() || self.split_duration.is_some()
     }
 
-    /// Returns the most files to keep.
-    pub(crate) fn files_max(&self) -> Option<u64> {
-        self.max_files
+    /// Returns the limits of a ring of files.
+    pub(crate) fn ring(&self) -> Ring {
+        Ring { files_max: self.max_files, free_min_bytes: self.min_free }
     }
 }
 
@@ -124,7 +144,7 @@ mod tests {
         let args = SplitArgs {
             split_size: Some(1000),
             split_duration: Some(Duration::from_secs(10)),
-            max_files: None,
+            ..SplitArgs::default()
         };
         let position = WritePosition::default();
         let is_due = |waiting, now_ns| args.is_due(FILE, &position, waiting, now_ns);

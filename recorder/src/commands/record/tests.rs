@@ -11,7 +11,7 @@ use recorder::{
 use sim_contract::{Action, Command, Outcome, ParticleState};
 
 use super::load::RunHeader;
-use super::queue::{Content, Item, Popped};
+use super::queue::{Content, FileEnd, Item, Popped};
 use super::writing::write_item;
 use super::*;
 
@@ -102,7 +102,7 @@ fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> (LogWriter<W>, Closi
     loop {
         match queue.pop(WAIT_MAX) {
             Popped::Item(item) => write_item(&mut log, item).unwrap(),
-            Popped::End(mut closing) => {
+            Popped::End(mut closing, _) => {
                 closing.counts.set_written(log.counts());
                 return (log, *closing);
             }
@@ -139,7 +139,7 @@ fn record(seed: u64) -> (Vec<u8>, Closing) {
             }
         }
         disk.set_stalled(false);
-        queue.end(closing);
+        queue.end(closing, FileEnd::Write);
         writing.join().unwrap()
     });
     (log.finish(&closing).unwrap().bytes, closing)
@@ -197,7 +197,7 @@ fn messages_of_a_stall_without_a_snapshot_can_be_read_and_outcomes_are_kept() {
         push(Content::Update(Message::Outcome(OutcomeRow::from(&outcome))));
     }
     push(snapshot(7000));
-    queue.end(Closing::default());
+    queue.end(Closing::default(), FileEnd::Write);
     let options = LogOptions::default();
     let log = LogWriter::create(Vec::new(), options, &description(), SCENE, 0).unwrap();
     let (log, Closing { counts, .. }) = write(&queue, log);

@@ -1,5 +1,6 @@
 //! The writing thread: writes the queue into one file after the other.
 
+pub(crate) mod black_box;
 pub(crate) mod extras;
 pub(crate) mod names;
 
@@ -12,14 +13,16 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow};
 use recorder::{Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, WriteError};
+use rustix::fs::statvfs;
 use sim_contract::clock::monotonic_ns;
 
 use super::load::RunHeader;
-use super::queue::{Content, Item, Popped, Queue};
+use super::queue::{Content, FileEnd, Item, Popped, Queue};
 use super::report::Written;
-use super::split::WritePosition;
+use super::split::{Ring, WritePosition};
 use crate::cli::file_args::{FileArgs, LogFile};
 use crate::cli::output;
+use black_box::{BlackBox, KeptFile};
 use extras::Extras;
 use names::FileNames;
 
@@ -33,12 +36,13 @@ pub(crate) struct WriteOptions {
     pub(crate) names: FileNames,
     pub(crate) extras: Extras,
     pub(crate) selection: ContentSelection,
-    /// Most files to keep.
-    pub(crate) files_max: Option<u64>,
+    pub(crate) ring: Ring,
     /// Every flush waits until the data is on the disk.
     pub(crate) is_synced: bool,
     /// The most that a killed recorder or a power cut loses, besides the open chunk.
     pub(crate) flush_interval: Duration,
+    /// Keeps everything until a file is to be written.
+    pub(crate) black_box: Option<BlackBox>,
 }
 
 impl WriteOptions {
@@ -73,6 +77,7 @@ pub(crate) fn start(
             created: Some(first),
             open: None,
             next_number: 0,
+            oldest_number: 0,
             written: Written::default(),
         };
         files.write_all(&queue.0)?;
@@ -90,6 +95,8 @@ struct Files {
     created: Option<PartFile>,
     open: Option<OpenFile>,
     next_number: u64,
+    /// Number of the oldest file that was not removed.
+    oldest_number: u64,
     written: Written,
 }
 
@@ -111,9 +118,9 @@ impl Files {
         let mut next_flush_ns = monotonic_ns().saturating_add(interval_ns);
         loop {
             match queue.pop(WAIT_MAX) {
-                Popped::Begin { header, log_time_ns } => self.begin(&header, log_time_ns)?,
-                Popped::Item(item) => self.write(item)?,
-                Popped::End(closing) => self.finish(*closing)?,
+                Popped::Begin { header, log_time_ns } => self.on_begin(header, log_time_ns)?,
+                Popped::Item(item) => self.on_item(item)?,
+                Popped::End(closing, end) => self.on_end(*closing, end)?,
                 Popped::Timeout => {}
                 Popped::Closed => return Ok(()),
             }
@@ -123,6 +130,33 @@ impl Files {
                 self.flush()?;
             }
         }
+    }
+
+    fn on_begin(&mut self, header: Box<RunHeader>, log_time_ns: u64) -> anyhow::Result<()> {
+        match &mut self.options.black_box {
+            Some(black_box) => black_box.begin(header, log_time_ns),
+            None => self.begin(&header, log_time_ns)?,
+        }
+        Ok(())
+    }
+
+    fn on_item(&mut self, item: Item) -> anyhow::Result<()> {
+        let Some(black_box) = &mut self.options.black_box else { return self.write(item) };
+        black_box.push(item);
+        self.position.set(self.next_number, black_box.size_bytes() as u64);
+        Ok(())
+    }
+
+    fn on_end(&mut self, closing: Closing, end: FileEnd) -> anyhow::Result<()> {
+        let Some(black_box) = &mut self.options.black_box else { return self.finish(closing) };
+        black_box.end(closing, end).map_or(Ok(()), |file| self.write_kept(file))
+    }
+
+    /// Writes a file of the black box.
+    fn write_kept(&mut self, file: KeptFile) -> anyhow::Result<()> {
+        self.begin(&file.header, file.log_time_ns)?;
+        file.items.into_iter().try_for_each(|item| self.write(item))?;
+        self.finish(file.closing)
     }
 
     /// Begins the next file. In a ring, removes the file in whose place it comes, once it is there.
@@ -138,15 +172,29 @@ impl Files {
         self.options.extras.write(&mut log).with_context(|| incomplete(&part_path))?;
         self.position.set(number, log.size_bytes());
         self.open = Some(OpenFile { number, part_path, log, steps: None });
-        if let Some(oldest) = self.options.files_max.and_then(|max| number.checked_sub(max)) {
-            self.remove(oldest)?;
+        let files_max = self.options.ring.files_max.unwrap_or(u64::MAX);
+        while self.next_number - self.oldest_number > files_max {
+            self.remove_oldest()?;
+        }
+        self.free_space()
+    }
+
+    /// Removes the oldest files while less than the reserve is free. Keeps the one in progress.
+    fn free_space(&mut self) -> anyhow::Result<()> {
+        let Some(free_min_bytes) = self.options.ring.free_min_bytes else { return Ok(()) };
+        while self.oldest_number + 1 < self.next_number
+            && free_bytes(&self.options.names.path(self.oldest_number))
+                .is_some_and(|free_bytes| free_bytes < free_min_bytes)
+        {
+            self.remove_oldest()?;
         }
         Ok(())
     }
 
     /// Removes a finished file, unless another program has moved it.
-    fn remove(&mut self, number: u64) -> anyhow::Result<()> {
-        let path = self.options.names.path(number);
+    fn remove_oldest(&mut self) -> anyhow::Result<()> {
+        let path = self.options.names.path(self.oldest_number);
+        self.oldest_number += 1;
         match fs::remove_file(&path) {
             Ok(()) => self.written.removed_count += 1,
             Err(error) if error.kind() == ErrorKind::NotFound => {}
@@ -169,6 +217,7 @@ impl Files {
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {
+        self.free_space()?;
         let Some(open) = &mut self.open else { return Ok(()) };
         open.log.flush().with_context(|| incomplete(&open.part_path))
     }
@@ -202,6 +251,13 @@ impl Files {
         }
         Ok(self.written)
     }
+}
+
+/// Returns the free space of the disk of a file, in bytes; `None` if it is unknown.
+fn free_bytes(path: &Path) -> Option<u64> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let disk = statvfs(folder.unwrap_or(Path::new("."))).ok()?;
+    Some(disk.f_bavail * disk.f_frsize)
 }
 
 fn incomplete(part_path: &Path) -> String {

@@ -54,9 +54,10 @@ fn full_ring(folder: &Folder) -> Files {
         names: FileNames::Numbered(folder.0.join("run.mcap")),
         extras: Extras::default(),
         selection: ContentSelection::default(),
-        files_max: Some(2),
+        ring: Ring { files_max: Some(2), free_min_bytes: None },
         is_synced: false,
         flush_interval: Duration::from_secs(1),
+        black_box: None,
     };
     let mut files = Files {
         options,
@@ -64,6 +65,7 @@ fn full_ring(folder: &Folder) -> Files {
         created: None,
         open: None,
         next_number: 0,
+        oldest_number: 0,
         written: Written::default(),
     };
     for _ in 0..2 {
@@ -98,6 +100,22 @@ fn a_ring_goes_on_when_another_program_has_moved_its_oldest_file() {
     files.finish(closing()).unwrap();
     assert_eq!(files.written.removed_count, 1);
     assert_eq!(names_in(&folder), ["run_0002.mcap", "run_0003.mcap"]);
+}
+
+#[test]
+fn a_disk_without_its_reserve_keeps_only_the_file_in_progress() {
+    let folder = Folder::new("reserve");
+    let mut files = full_ring(&folder);
+    files.options.ring = Ring { files_max: None, free_min_bytes: Some(0) };
+    files.begin(&header(), 0).unwrap();
+    assert_eq!(names_in(&folder).len(), 3);
+    files.options.ring.free_min_bytes = Some(u64::MAX);
+    files.flush().unwrap();
+    assert_eq!(names_in(&folder), ["run_0002.mcap.part"]);
+    assert_eq!(files.written.removed_count, 2);
+    files.finish(closing()).unwrap();
+    files.begin(&header(), 0).unwrap();
+    assert_eq!(names_in(&folder), ["run_0003.mcap.part"]);
 }
 
 #[test]

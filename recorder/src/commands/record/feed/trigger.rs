@@ -1,0 +1,197 @@
+//! The events for which a black box is written.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use recorder::Message;
+use signal_hook::consts::SIGUSR1;
+use signal_hook::flag;
+use sim_contract::Action;
+
+use crate::commands::record::queue::{Content, FileEnd};
+
+/// Shortest time from the last event to the end of the file, so that the file shows what follows it. Events
+/// that follow each other within it are in one file.
+const TAIL: Duration = Duration::from_secs(1);
+/// Longest text of a reason, in characters. A file can have many events.
+const REASON_LENGTH_MAX: usize = 300;
+
+/// Decides when the black box is written, and why.
+#[derive(Debug)]
+pub(crate) struct Trigger {
+    /// Longest time from the first event to the end of the file.
+    span: Duration,
+    signalled: Arc<AtomicBool>,
+    /// The events since the last file.
+    events: Option<Events>,
+}
+
+#[derive(Debug)]
+struct Events {
+    reason: String,
+    /// CLOCK_MONOTONIC, in nanoseconds.
+    first_ns: u64,
+    last_ns: u64,
+}
+
+impl Trigger {
+    /// Watches for SIGUSR1, too.
+    ///
+    /// # Errors
+    /// The system refuses the handler.
+    pub(crate) fn install(span: Duration) -> io::Result<Self> {
+        let signalled = Arc::new(AtomicBool::new(false));
+        flag::register(SIGUSR1, Arc::clone(&signalled))?;
+        Ok(Self { span, signalled, events: None })
+    }
+
+    /// Notices the signal.
+    pub(crate) fn poll_signal(&mut self, now_ns: u64) {
+        if self.signalled.swap(false, Ordering::Relaxed) {
+            self.add("SIGUSR1".to_owned(), now_ns);
+        }
+    }
+
+    /// Notices the event of a content, if it is one.
+    pub(crate) fn watch(&mut self, content: &Content, now_ns: u64) {
+        if let Content::Update(message) = content
+            && let Some(reason) = event(message)
+        {
+            self.add(reason, now_ns);
+        }
+    }
+
+    fn add(&mut self, reason: String, now_ns: u64) {
+        let Some(events) = &mut self.events else {
+            self.events = Some(Events { reason, first_ns: now_ns, last_ns: now_ns });
+            return;
+        };
+        events.last_ns = now_ns;
+        if events.reason.len() + reason.len() <= REASON_LENGTH_MAX {
+            events.reason = format!("{}, {reason}", events.reason);
+        }
+    }
+
+    /// Returns `true` if the file can end.
+    pub(crate) fn is_due(&self, now_ns: u64) -> bool {
+        let since = |ns: u64| Duration::from_nanos(now_ns.saturating_sub(ns));
+        self.events.as_ref().is_some_and(|events| {
+            since(events.last_ns) >= TAIL || since(events.first_ns) >= self.span
+        })
+    }
+
+    /// Ends a part of the recording, which the next one may continue. Returns its reason, and the treatment
+    /// of the part.
+    pub(crate) fn end_part(
+        &mut self,
+        stop_reason: String,
+        is_continued: bool,
+        now_ns: u64,
+    ) -> (String, FileEnd) {
+        let is_written = !is_continued || self.is_due(now_ns);
+        match self.events.take_if(|_| is_written) {
+            Some(events) => (events.reason, FileEnd::Write),
+            None if self.events.is_some() => (stop_reason, FileEnd::KeepAll),
+            None if is_continued => (stop_reason, FileEnd::Keep),
+            None => (stop_reason, FileEnd::Drop),
+        }
+    }
+}
+
+/// Returns the description of an event that is worth a file.
+fn event(message: &Message) -> Option<String> {
+    match message {
+        Message::Outcome(row) if row.is_applied() => match &row.action {
+            Action::Mark { text } => Some(format!("mark '{}' at step {}", text.as_str(), row.step)),
+            _ => None,
+        },
+        Message::Tears(row) if !row.constraints.is_empty() => {
+            Some(format!("tear at step {}", row.step))
+        }
+        Message::Event(row) if row.kind == "frozen" => {
+            Some(format!("frozen particle at step {}", row.step))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use recorder::{EventRow, OutcomeRow, TearsRow};
+    use sim_contract::clock::SECOND_NS;
+    use sim_contract::{Command, Outcome, Reason, TearCause, Text, TornConstraint};
+
+    use super::*;
+
+    fn trigger() -> Trigger {
+        let signalled = Arc::new(AtomicBool::new(false));
+        Trigger { span: Duration::from_secs(10), signalled, events: None }
+    }
+
+    fn tear(step: u64) -> Content {
+        let torn = TornConstraint::new(3, Some(TearCause::Stretch));
+        Content::Update(Message::Tears(TearsRow::new(step, &[torn])))
+    }
+
+    fn mark(result: Result<(), Reason>) -> Content {
+        let action = Action::Mark { text: Text::cut("slips") };
+        let outcome = Outcome::new(0, 7, Command::new(1, 1, action), result);
+        Content::Update(Message::Outcome(OutcomeRow::from(&outcome)))
+    }
+
+    #[test]
+    fn a_mark_a_tear_a_frozen_particle_and_the_signal_are_events() {
+        let event = |kind: &str| {
+            let (kind, text) = (kind.to_owned(), String::new());
+            let row = EventRow { step: 9, kind, particle: Some(1), client_id: None, text };
+            Content::Update(Message::Event(row))
+        };
+        let mut trigger = trigger();
+        for content in [mark(Err(Reason::OutOfRange)), event("member_joined")] {
+            trigger.watch(&content, 0);
+        }
+        trigger.poll_signal(0);
+        assert!(trigger.events.is_none());
+        for content in [mark(Ok(())), tear(8), event("frozen")] {
+            trigger.watch(&content, 0);
+        }
+        trigger.signalled.store(true, Ordering::Relaxed);
+        trigger.poll_signal(0);
+        trigger.poll_signal(0);
+        assert_eq!(
+            trigger.end_part("split".to_owned(), false, 0).0,
+            "mark 'slips' at step 7, tear at step 8, frozen particle at step 9, SIGUSR1"
+        );
+    }
+
+    #[test]
+    fn a_file_ends_a_second_after_the_last_event_and_within_the_span_of_the_first() {
+        let mut trigger = trigger();
+        let end =
+            |trigger: &mut Trigger, now_ns| trigger.end_part("split".to_owned(), true, now_ns).1;
+        assert_eq!(end(&mut trigger, SECOND_NS), FileEnd::Keep);
+        trigger.watch(&tear(1), SECOND_NS);
+        assert_eq!(end(&mut trigger, 2 * SECOND_NS - 1), FileEnd::KeepAll);
+        assert_eq!(end(&mut trigger, 2 * SECOND_NS), FileEnd::Write);
+        assert_eq!(end(&mut trigger, 3 * SECOND_NS), FileEnd::Keep);
+        let mut written = Vec::new();
+        for half_s in 10..40 {
+            trigger.watch(&tear(half_s), half_s * SECOND_NS / 2);
+            if end(&mut trigger, half_s * SECOND_NS / 2) == FileEnd::Write {
+                written.push(half_s);
+            }
+        }
+        assert_eq!(written, [30], "10 s after the first tear");
+    }
+
+    #[test]
+    fn a_part_that_no_other_continues_is_written_only_after_an_event() {
+        let mut trigger = trigger();
+        let end = |trigger: &mut Trigger| trigger.end_part("signal".to_owned(), false, 0);
+        assert_eq!(end(&mut trigger), ("signal".to_owned(), FileEnd::Drop));
+        trigger.watch(&tear(4), 0);
+        assert_eq!(end(&mut trigger), ("tear at step 4".to_owned(), FileEnd::Write));
+    }
+}

@@ -1,0 +1,236 @@
+//! The black box: the last seconds of a recording, in memory until a file of them is to be written.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use recorder::{Closing, Message, Topic};
+
+use crate::cli::output;
+use crate::commands::record::load::RunHeader;
+use crate::commands::record::queue::{Content, FileEnd, Item};
+
+/// Keeps parts of a recording that follow each other. Each begins with everything that a file needs, so the
+/// oldest one kept begins the file.
+#[derive(Debug)]
+pub(crate) struct BlackBox {
+    span: Duration,
+    limit_bytes: usize,
+    parts: VecDeque<Part>,
+    size_bytes: usize,
+    is_warned: bool,
+}
+
+#[derive(Debug)]
+struct Part {
+    header: Box<RunHeader>,
+    log_time_ns: u64,
+    items: Vec<Item>,
+    size_bytes: usize,
+    closing: Closing,
+}
+
+/// A file to write.
+#[derive(Debug)]
+pub(crate) struct KeptFile {
+    pub(crate) header: Box<RunHeader>,
+    pub(crate) log_time_ns: u64,
+    pub(crate) items: Vec<Item>,
+    pub(crate) closing: Closing,
+}
+
+impl BlackBox {
+    /// Keeps what was received within `span`, and at most `limit_bytes` and the part in progress.
+    pub(crate) fn new(span: Duration, limit_bytes: usize) -> Self {
+        Self { span, limit_bytes, parts: VecDeque::new(), size_bytes: 0, is_warned: false }
+    }
+
+    /// Returns the size of what is kept, in bytes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.size_bytes
+    }
+
+    pub(crate) fn begin(&mut self, header: Box<RunHeader>, log_time_ns: u64) {
+        let size_bytes = header.scene.len();
+        self.size_bytes += size_bytes;
+        let (items, closing) = (Vec::new(), Closing::default());
+        self.parts.push_back(Part { header, log_time_ns, items, size_bytes, closing });
+    }
+
+    pub(crate) fn push(&mut self, item: Item) {
+        let Some(part) = self.parts.back_mut() else { return };
+        let size_bytes = item.content.size_bytes();
+        part.size_bytes += size_bytes;
+        part.items.push(item);
+        self.size_bytes += size_bytes;
+        while self.size_bytes > self.limit_bytes && self.parts.len() > 1 {
+            self.remove_oldest();
+            self.warn_once();
+        }
+    }
+
+    /// Ends a part. Returns the file to write, if there is one.
+    pub(crate) fn end(&mut self, closing: Closing, end: FileEnd) -> Option<KeptFile> {
+        let part = self.parts.back_mut()?;
+        let now_ns = part.items.last().map_or(part.log_time_ns, |item| item.log_time_ns);
+        part.closing = closing;
+        match end {
+            FileEnd::Write => self.take_all(),
+            FileEnd::KeepAll => None,
+            FileEnd::Keep => {
+                self.remove_before(now_ns);
+                None
+            }
+            FileEnd::Drop => {
+                (self.parts, self.size_bytes) = (VecDeque::new(), 0);
+                None
+            }
+        }
+    }
+
+    /// Removes the parts that the span does not reach.
+    fn remove_before(&mut self, now_ns: u64) {
+        let span_ns = u64::try_from(self.span.as_nanos()).unwrap_or(u64::MAX);
+        let begin_ns = now_ns.saturating_sub(span_ns);
+        while self.parts.get(1).is_some_and(|second| second.log_time_ns <= begin_ns) {
+            self.remove_oldest();
+        }
+    }
+
+    fn remove_oldest(&mut self) {
+        self.size_bytes -= self.parts.pop_front().map_or(0, |part| part.size_bytes);
+    }
+
+    fn warn_once(&mut self) {
+        if !std::mem::replace(&mut self.is_warned, true) {
+            output::note(&format!(
+                "warning: the black box keeps less than {}, because {} bytes hold no more; enlarge \
+                 --queue-bytes",
+                humantime::format_duration(self.span),
+                self.limit_bytes
+            ));
+        }
+    }
+
+    /// Joins all parts to one file.
+    fn take_all(&mut self) -> Option<KeptFile> {
+        self.size_bytes = 0;
+        let mut parts = std::mem::take(&mut self.parts).into_iter();
+        let Part { header, log_time_ns, items, closing, .. } = parts.next()?;
+        let mut file = KeptFile { header, log_time_ns, items, closing };
+        for mut part in parts {
+            let first_step = part.items.iter().find_map(|item| item.content.snapshot_step());
+            part.items.retain(|item| !repeats(&item.content, first_step, &mut part.closing));
+            file.items.append(&mut part.items);
+            file.closing.counts.add(&part.closing.counts);
+            file.closing.unreadable += part.closing.unreadable;
+            file.closing.stop_reason = part.closing.stop_reason;
+        }
+        Some(file)
+    }
+}
+
+/// Returns `true` for a message at the beginning of a part that a file needs only at its own beginning: the
+/// load, and values of earlier steps. Takes it out of the received ones.
+fn repeats(content: &Content, first_step: Option<u64>, closing: &mut Closing) -> bool {
+    let Content::Update(message) = content else { return false };
+    let topic = message.topic();
+    let is_load = matches!(topic, Topic::Topology | Topic::Surface);
+    let is_earlier = first_step.is_some_and(|first| message.step() < first);
+    let is_repeated = is_load || is_earlier && !matches!(message, Message::Step(_));
+    closing.counts[topic].received -= u64::from(is_repeated);
+    is_repeated
+}
+
+#[cfg(test)]
+mod tests {
+    use recorder::{AllCounts, ParametersRow, RunDescription, StepRow, Up};
+    use sim_contract::ParameterValues;
+    use sim_contract::clock::SECOND_NS;
+
+    use super::*;
+
+    fn header() -> Box<RunHeader> {
+        let run = RunDescription {
+            run_id: 7,
+            epoch_ns: 0,
+            scene_name: "points".to_owned(),
+            origin: [0.0; 3],
+            up: Up::Y,
+            rate_hz: 240,
+            method: 0,
+            particle_count: 1,
+            constraint_count: 0,
+            solver_version: 1,
+            contract_version: 1,
+            recorder_version: "0".to_owned(),
+        };
+        Box::new(RunHeader { run, scene: b"version = 1".to_vec(), rows: Vec::new() })
+    }
+
+    fn update(message: Message, second: u64) -> Item {
+        Item { content: Content::Update(message), log_time_ns: second * SECOND_NS }
+    }
+
+    fn parameters(step: u64) -> Message {
+        Message::Parameters(ParametersRow { step, values: ParameterValues::default() })
+    }
+
+    /// Adds a part of one second with one step each, whose parameters are those of step 0.
+    fn add_part(black_box: &mut BlackBox, second: u64, end: FileEnd) -> Option<KeptFile> {
+        black_box.begin(header(), second * SECOND_NS);
+        black_box.push(update(parameters(0), second));
+        let row = StepRow { step: second, ..StepRow::default() };
+        let content = Content::Snapshot(row, Vec::new());
+        black_box.push(Item { content, log_time_ns: second * SECOND_NS + 1 });
+        let mut counts = AllCounts::default();
+        counts[Topic::Parameters].received = 1;
+        counts[Topic::Steps].received = 1;
+        counts[Topic::Steps].gaps = u64::from(second == 4);
+        black_box.end(Closing { stop_reason: format!("end {second}"), counts, unreadable: 1 }, end)
+    }
+
+    fn steps(file: &KeptFile) -> Vec<u64> {
+        file.items.iter().filter_map(|item| item.content.snapshot_step()).collect()
+    }
+
+    #[test]
+    fn a_file_has_the_parts_within_the_span_and_repeats_nothing() {
+        let mut black_box = BlackBox::new(Duration::from_secs(3), usize::MAX);
+        for second in 0..6 {
+            assert!(add_part(&mut black_box, second, FileEnd::Keep).is_none());
+        }
+        let file = add_part(&mut black_box, 6, FileEnd::Write).unwrap();
+        assert_eq!(steps(&file), [2, 3, 4, 5, 6]);
+        let repeated = file.items.iter().filter(|item| item.content.snapshot_step().is_none());
+        assert_eq!(repeated.count(), 1, "the parameters at the beginning");
+        let counts = &file.closing.counts;
+        assert_eq!((counts[Topic::Steps].received, counts[Topic::Parameters].received), (5, 1));
+        assert_eq!((counts[Topic::Steps].gaps, file.closing.unreadable), (1, 5));
+        assert_eq!(file.closing.stop_reason, "end 6");
+        assert_eq!((black_box.parts.len(), black_box.size_bytes()), (0, 0));
+        let next = add_part(&mut black_box, 7, FileEnd::Write).unwrap();
+        assert_eq!(steps(&next), [7], "no step is in two files");
+    }
+
+    #[test]
+    fn a_file_to_come_keeps_older_parts_and_a_part_without_a_successor_is_dropped() {
+        let mut black_box = BlackBox::new(Duration::from_secs(1), usize::MAX);
+        for second in 0..6 {
+            add_part(&mut black_box, second, FileEnd::KeepAll);
+        }
+        assert_eq!(steps(&add_part(&mut black_box, 6, FileEnd::Write).unwrap()).len(), 7);
+        add_part(&mut black_box, 7, FileEnd::Keep);
+        assert!(add_part(&mut black_box, 8, FileEnd::Drop).is_none());
+        assert_eq!(steps(&add_part(&mut black_box, 9, FileEnd::Write).unwrap()), [9]);
+    }
+
+    #[test]
+    fn the_memory_is_limited_except_for_the_part_in_progress() {
+        let mut black_box = BlackBox::new(Duration::from_secs(100), 1);
+        for second in 0..6 {
+            add_part(&mut black_box, second, FileEnd::Keep);
+            assert_eq!(black_box.parts.len(), 1);
+        }
+        assert_eq!(steps(&add_part(&mut black_box, 6, FileEnd::Write).unwrap()), [6]);
+    }
+}
