@@ -251,6 +251,31 @@ fn a_missing_outcome_is_reported_and_the_solver_is_not_blamed() {
 }
 
 #[test]
+fn the_simulation_goes_on_from_the_first_complete_state_after_a_missing_outcome() {
+    let (file, _) = record(&job("curtain", COMMANDS, 700));
+    let edit = |is_divergent: bool| {
+        rebuild(&file, |message| match message {
+            Message::Outcome(row) if row.index == 4 => None,
+            Message::Particles { step: 600, mut particles } if is_divergent => {
+                particles[50].position[0] += 1e-6;
+                Some(Message::Particles { step: 600, particles })
+            }
+            other => Some(other),
+        })
+    };
+    let (report, _) = check(&edit(false));
+    assert_eq!((report.verdict, report.step), (Verdict::OutcomeLogIncomplete, Some(50)));
+    // The next keyframe after step 50 is that of the next command.
+    let [gap] = report.gaps[..] else { panic!("{report}") };
+    assert_eq!(gap.from, 50);
+    assert!((50..=240).contains(&gap.to), "{report}");
+    assert_eq!(report.last_identical_step, Some(700));
+    assert_eq!(report.steps_identical, 49 + 700 - gap.to, "{report}");
+    let (report, _) = check(&edit(true));
+    assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(600)));
+}
+
+#[test]
 fn outcomes_out_of_order_in_the_file_are_applied_in_order() {
     let (file, _) = record(&job("curtain", COMMANDS, 60));
     let mut first = None;

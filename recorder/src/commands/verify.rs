@@ -4,6 +4,7 @@
 mod coverage;
 pub(crate) mod difference;
 mod events;
+pub(crate) mod finding;
 mod load;
 mod past_states;
 pub(crate) mod resimulation;
@@ -30,7 +31,7 @@ use crate::cli::thread_args::ThreadArgs;
 use crate::input::scene_source::scene_to_simulate;
 use crate::input::state_place::{Wanted, find_state};
 use difference::Difference;
-use resimulation::Finding;
+use finding::{Finding, StepGap};
 pub(crate) use verification::{StepRange, VerifyOptions};
 use verification::{Verification, VerifyError};
 
@@ -41,7 +42,7 @@ const SNAPSHOTS_PER_UPDATE: u64 = 64;
 #[command(
     after_help = "Compares everything that a recorder writes, also where the checksums are gone, \
     and lists the messages that are missing and the content that nothing else in the file can \
-    contradict.\n\n\
+    contradict. Behind missing outcomes, it goes on from the next complete state.\n\n\
     Exit codes: 0 every recorded step is bit-identical; 1 not verifiable; 3 different, outcomes missing, or file truncated \
     or damaged.\n\nExamples:\n  \
     recorder verify run.mcap\n  \
@@ -76,6 +77,8 @@ pub(crate) struct Report {
     /// The step that the verdict concerns.
     pub(crate) step: Option<u64>,
     pub(crate) what: Option<String>,
+    /// Steps whose states could not be simulated, because outcomes are missing.
+    pub(crate) gaps: Vec<StepGap>,
     #[serde(flatten)]
     pub(crate) difference: Option<Difference>,
     /// The end of the file.
@@ -190,6 +193,7 @@ fn compare_states<R: Read>(
         }
     }
     verification.finish_coverage();
+    report.gaps = verification.gaps();
     if verification.simulation.is_some() && verification.coverage.last_step.is_none() {
         let finding = verification.check_end();
         report.add_end(finding);
@@ -206,6 +210,7 @@ impl Report {
             steps_identical: 0,
             step: None,
             what: None,
+            gaps: Vec::new(),
             difference: None,
             file_end: String::new(),
             lost: BTreeMap::new(),
@@ -235,6 +240,7 @@ impl Report {
     /// Adds the finding at `step`. Returns `true` to continue.
     fn add(&mut self, finding: Finding, step: u64) -> bool {
         match finding {
+            Finding::NotCompared => return true,
             Finding::Identical => {
                 self.last_identical_step = Some(step);
                 self.steps_identical += u64::from(step != self.first_step);
@@ -248,9 +254,14 @@ impl Report {
                 (self.verdict, self.what) = (Verdict::Diverged, Some(what));
             }
             Finding::Interrupted => self.verdict = Verdict::Interrupted,
+            // The report names the first one.
+            Finding::Incomplete { .. } if self.verdict == Verdict::OutcomeLogIncomplete => {
+                return true;
+            }
             Finding::Incomplete { step, what } => {
                 self.verdict = Verdict::OutcomeLogIncomplete;
                 (self.step, self.what) = (Some(step), Some(what));
+                return true;
             }
         }
         false
@@ -273,11 +284,16 @@ impl fmt::Display for Report {
             Verdict::Diverged => {
                 write!(f, "step {step} differs: {what} ({count} steps before it bit-identical)")
             }
-            Verdict::OutcomeLogIncomplete => write!(
-                f,
-                "outcome log incomplete from step {step}: {what} ({count} steps before it \
-                 bit-identical)"
-            ),
+            Verdict::OutcomeLogIncomplete => {
+                let gaps: Vec<_> =
+                    self.gaps.iter().map(|gap| format!("{}..={}", gap.from, gap.to)).collect();
+                write!(
+                    f,
+                    "outcome log incomplete from step {step}: {what} ({count} other steps \
+                     bit-identical; not compared: steps {})",
+                    gaps.join(", ")
+                )
+            }
             Verdict::Interrupted => write!(f, "interrupted; {count} steps so far bit-identical"),
         }
     }

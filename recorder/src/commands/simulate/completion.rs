@@ -10,7 +10,8 @@ use recorder::{
 };
 use sim_solver::Scene;
 
-use crate::commands::verify::resimulation::{Finding, Resimulation};
+use crate::commands::verify::finding::Finding;
+use crate::commands::verify::resimulation::Resimulation;
 use crate::input::scene_source::scene_to_simulate;
 
 /// The result of a completion.

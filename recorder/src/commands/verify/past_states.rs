@@ -29,6 +29,12 @@ impl PastStates {
         }
     }
 
+    /// Starts again with a state that was taken from the file.
+    pub(super) fn restart(&mut self, step: u64, solver: &Solver) {
+        let given_count = self.given_count;
+        *self = Self { given_count, ..Self::from_first(step, solver) };
+    }
+
     /// Adds the state after the next step.
     pub(super) fn add(&mut self, solver: &Solver) {
         let digest = digest(solver, solver.state_hash());

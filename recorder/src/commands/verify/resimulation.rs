@@ -3,65 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::bail;
 use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker, state_hash};
 use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
 use super::difference::{Difference, first_difference};
+use super::finding::{Finding, StepGap};
 use super::past_states::PastStates;
 use super::side_rows::SideRows;
 use crate::simulation::apply::apply;
-
-/// The result of the comparison of one snapshot. The texts are for people.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Finding {
-    /// Every bit is equal.
-    Identical,
-    /// Content that belongs to no step differs.
-    OtherContent { what: String },
-    /// A signal ended the simulation before the snapshot.
-    Interrupted,
-    /// The simulation differs from the recording.
-    Diverged {
-        /// The first step that differs.
-        step: u64,
-        what: String,
-        difference: Option<Difference>,
-    },
-    /// Outcomes are missing, so the states cannot be compared.
-    Incomplete {
-        /// The first step that may lack an outcome.
-        step: u64,
-        what: String,
-    },
-}
-
-impl Finding {
-    /// Returns the finding for content that belongs to no step.
-    pub(crate) fn in_file(what: String) -> Self {
-        Self::OtherContent { what }
-    }
-
-    /// Returns an error for a difference, and after a signal.
-    pub(crate) fn require_identical(self) -> anyhow::Result<()> {
-        match self {
-            Self::Identical => Ok(()),
-            Self::Interrupted => bail!("interrupted"),
-            Self::Diverged { step, what, .. } | Self::Incomplete { step, what } => {
-                bail!(
-                    "step {step} cannot be simulated: {what} (`recorder verify` shows the details)"
-                )
-            }
-            Self::OtherContent { what } => bail!("{what}"),
-        }
-    }
-
-    /// Returns the finding for content of a step.
-    fn at_step(step: u64, what: String) -> Self {
-        Self::Diverged { step, what, difference: None }
-    }
-}
 
 /// The reason why a recording cannot be re-simulated.
 #[derive(Debug, thiserror::Error)]
@@ -85,6 +35,9 @@ pub(crate) struct Resimulation {
     pending: BTreeMap<u64, OutcomeRow>,
     side_rows: SideRows,
     past: PastStates,
+    gaps: Vec<StepGap>,
+    /// The last one has no end yet.
+    is_in_gap: bool,
     /// Messages before the first state that do not describe it.
     earlier_count: usize,
 }
@@ -112,6 +65,8 @@ impl Resimulation {
             pending: BTreeMap::new(),
             side_rows: SideRows::after_start(step),
             past,
+            gaps: Vec::new(),
+            is_in_gap: false,
             earlier_count: 0,
         }))
     }
@@ -176,7 +131,8 @@ impl Resimulation {
         what.map_or(Finding::Identical, |what| Finding::at_step(self.step, what))
     }
 
-    /// Simulates up to the next snapshot and compares it, unless `stop` becomes true.
+    /// Simulates up to the next snapshot and compares it, unless `stop` becomes true. After missing outcomes,
+    /// goes on from the next complete state.
     pub(crate) fn advance(&mut self, frame: &Frame, stop: &AtomicBool) -> Finding {
         let row = &frame.row;
         if row.step <= self.step {
@@ -186,6 +142,23 @@ impl Resimulation {
         if let Some(finding) = self.add_updates(&frame.updates) {
             return finding;
         }
+        if self.is_in_gap {
+            return self.go_on_from(frame);
+        }
+        let finding = self.simulate_to(frame, stop);
+        if let Finding::Incomplete { step, .. } = &finding {
+            self.gaps.push(StepGap { from: *step, to: row.step });
+            self.is_in_gap = true;
+            let state = self.go_on_from(frame);
+            if state != Finding::NotCompared {
+                return state;
+            }
+        }
+        finding
+    }
+
+    fn simulate_to(&mut self, frame: &Frame, stop: &AtomicBool) -> Finding {
+        let row = &frame.row;
         if let Some(finding) = self.find_gap(row) {
             return finding;
         }
@@ -219,6 +192,41 @@ impl Resimulation {
         }
     }
 
+    /// Ends a gap if the snapshot is a complete state, which then replaces that of the simulation.
+    fn go_on_from(&mut self, frame: &Frame) -> Finding {
+        let row = &frame.row;
+        if let Some(gap) = self.gaps.last_mut() {
+            gap.to = row.step;
+        }
+        let Some(bytes) = frame.own_keyframe().filter(|_| frame.particles.is_some()) else {
+            return Finding::NotCompared;
+        };
+        let particles = bytemuck::cast_slice(frame.payload());
+        let restored = Keyframe::decode(bytes)
+            .map_err(|cause| StartError::Keyframe { step: row.step, cause })
+            .and_then(|keyframe| {
+                let restored = self.solver.restore(particles, &keyframe);
+                restored.map_err(|cause| StartError::State { step: row.step, cause })
+            });
+        if let Err(error) = restored {
+            return Finding::at_step(row.step, error.to_string());
+        }
+        (self.step, self.next_index) = (row.step, row.outcome_count);
+        self.pending = self.pending.split_off(&row.outcome_count);
+        self.side_rows.forget_to(row.step);
+        self.past.restart(row.step, &self.solver);
+        self.is_in_gap = false;
+        match compare(&self.solver, frame) {
+            Finding::Identical => Finding::NotCompared,
+            different => different,
+        }
+    }
+
+    /// Returns the steps whose states could not be simulated.
+    pub(crate) fn gaps(&self) -> &[StepGap] {
+        &self.gaps
+    }
+
     fn compare_side_rows(&mut self) -> Option<Finding> {
         let step = self.step;
         let what = self.side_rows.compare(&self.solver, step)?;
@@ -233,21 +241,30 @@ impl Resimulation {
     ) -> Option<Finding> {
         updates.into_iter().find_map(|update| {
             let what = match update {
-                Message::Outcome(row) => self.add_outcome(row),
+                Message::Outcome(row) => return self.add_outcome(row),
                 _ => self.side_rows.add(update, &self.solver, self.step),
             }?;
             Some(Finding::at_step(update.step(), what))
         })
     }
 
-    fn add_outcome(&mut self, row: &OutcomeRow) -> Option<String> {
-        let index = row.index;
-        let is_known = index < self.next_index || self.pending.contains_key(&index);
-        if is_known {
-            return Some(format!("/outcomes: outcome {index} is in the file twice"));
+    fn add_outcome(&mut self, row: &OutcomeRow) -> Option<Finding> {
+        let (index, step) = (row.index, row.step);
+        if index >= self.next_index && !self.pending.contains_key(&index) {
+            self.pending.insert(index, row.clone());
+            return None;
         }
-        self.pending.insert(index, row.clone());
-        None
+        // The number of outcomes of the state after a gap is only that of its row.
+        let state = self.gaps.last().filter(|gap| step > gap.to);
+        Some(match state {
+            Some(gap) => Finding::at_step(
+                gap.to,
+                format!("its row in /steps counts outcome {index}, which belongs to step {step}"),
+            ),
+            None => {
+                Finding::at_step(step, format!("/outcomes: outcome {index} is in the file twice"))
+            }
+        })
     }
 
     /// Returns the number of messages that belong to steps after the last snapshot.

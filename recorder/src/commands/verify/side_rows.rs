@@ -93,6 +93,16 @@ impl SideRows {
         }
     }
 
+    /// Removes the rows up to a step, whose keyframe is compared.
+    pub(super) fn forget_to(&mut self, step: u64) {
+        self.tears.retain(|one, _| *one > step);
+        self.colliders.retain(|one, _| *one > step);
+        self.parameters.retain(|one, _| *one > step);
+        self.keyframes.retain(|one, _| *one > step);
+        self.events.retain(|one, _| *one > step);
+        self.keyframe_step = Some(step);
+    }
+
     /// Returns the number of rows that are not compared.
     pub(super) fn count(&self) -> usize {
         self.tears.len()

@@ -9,8 +9,9 @@ use sim_solver::{Scene, Solver};
 
 use super::coverage::Coverage;
 use super::events::EventCheck;
+use super::finding::{Finding, StepGap};
 use super::load::{compare_counts, compare_load, compare_run};
-use super::resimulation::{Finding, Resimulation, StartError};
+use super::resimulation::{Resimulation, StartError};
 use super::snapshot_numbers::SnapshotNumbers;
 use crate::simulation::run_id::RunId;
 
@@ -293,6 +294,11 @@ impl<R: Read> Verification<R> {
         let log = self.frames.log();
         let foreign = log.audit().into_iter().flat_map(recorder::Audit::foreign);
         self.coverage.foreign = foreign.map(ToOwned::to_owned).collect();
+    }
+
+    /// Returns the steps whose states could not be simulated.
+    pub(super) fn gaps(&self) -> Vec<StepGap> {
+        self.simulation.as_ref().map_or_else(Vec::new, |simulation| simulation.gaps().to_vec())
     }
 
     /// Checks the end of the file, once [`Self::next`] has returned `None`.
