@@ -402,6 +402,17 @@ impl Finished {
         self.stdout
     }
 
+    /// Returns the stdout of a recorder of a running node. On a busy machine it may lose snapshots, which it
+    /// declares.
+    ///
+    /// # Panics
+    /// If it has failed.
+    pub fn recorded(self) -> String {
+        let is_recorded = matches!(self.code, Some(0 | 3));
+        assert!(is_recorded, "stdout: {}\nstderr: {}", self.stdout, self.stderr);
+        self.stdout
+    }
+
     /// Parses the stdout of a program that must have succeeded as JSON.
     ///
     /// # Panics

@@ -76,7 +76,7 @@ fn a_recording_of_prepared_commands_verifies() {
             }
         }
     }
-    recording.interrupt().success();
+    recording.interrupt().recorded();
     node.interrupt().success();
     let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
     assert!(verified.contains("bit-identical"), "{verified}");

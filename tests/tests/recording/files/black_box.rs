@@ -36,9 +36,7 @@ fn stop_reason(sandbox: &Sandbox, file: &str) -> String {
 }
 
 fn finish(recording: Process) -> Value {
-    let finished = recording.interrupt();
-    assert_eq!(finished.code, Some(0), "{finished:?}");
-    serde_json::from_str(&finished.stdout).unwrap()
+    serde_json::from_str(&recording.interrupt().recorded()).unwrap()
 }
 
 #[test]
@@ -57,17 +55,20 @@ fn each_event_writes_what_came_before_it_into_a_file_of_its_own() {
     recording.signal(Signal::USR1);
     wait_for_file(&numbered(&sandbox, 2));
     let report = finish(recording);
-    assert_eq!((&report["files"], &report["lost"]), (&json!(3), &json!({})), "{report}");
+    assert_eq!(report["files"], json!(3), "{report}");
 
     let files: Vec<_> = (0..3).map(|number| numbered(&sandbox, number)).collect();
     for file in &files {
         assert_verifies(&sandbox, file);
         recorder(&sandbox, &["check", file]).success();
     }
-    // The kept time is long enough for all, so the files follow each other.
+    // The kept time is long enough for all, so the files follow each other. What a busy machine has lost is
+    // declared.
     let all: Vec<_> = files.iter().flat_map(|file| steps(file)).collect();
-    let expected: Vec<_> = (all[0]..).take(all.len()).collect();
-    assert_eq!(all, expected);
+    assert!(all.is_sorted_by(|one, next| one < next));
+    let span = all[all.len() - 1] - all[0] + 1;
+    let lost = report["lost"]["/steps"].as_u64().unwrap_or(0);
+    assert_eq!(all.len() as u64 + lost, span, "{report}");
     let contains = |file: &String, step: &Value| steps(file).contains(&step.as_u64().unwrap());
     assert!(contains(&files[0], &mark["step"]) && contains(&files[1], &tear["step"]));
     assert_eq!(outcomes(&files[0]).len(), 1);
