@@ -21,6 +21,7 @@ pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_comm
 pub use container::check::check_file;
 pub use container::finding::{CheckExtent, CheckReport, Cure, Finding, Findings};
 pub use container::losses::{Losses, LostSteps};
+pub use container::lost_load::{LoadRows, LostLoad};
 pub use container::repair::{RepairError, RepairReport, repair_file};
 pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
 pub use index::{ChunkEntry, IndexedLog};

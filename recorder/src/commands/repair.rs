@@ -7,14 +7,19 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use recorder::{Finding, PartFile, ReadError, RepairReport, Topic, open_regular_file, repair_file};
+use recorder::{
+    Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow, Topic,
+    TopologyRow, open_regular_file, repair_file,
+};
 use serde::Serialize;
-use sim_contract::{Stop, is_being_written, part_path, printable_line};
+use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, part_path, printable_line};
+use sim_solver::{Scene, Solver};
 
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
 use crate::cli::progress::progress_bytes;
+use crate::simulation::state_writer::constraint_state;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -54,6 +59,8 @@ struct Repaired<'a> {
     lost_head: Option<&'static str>,
     /// Ranges of steps without snapshots.
     lost_steps: Vec<String>,
+    /// `/topology` and `/surface` were lost, and follow from the scene.
+    is_load_restored: bool,
     /// The checksum of the data is wrong, and no damaged part explains it.
     is_uncertain: bool,
     finding_count: u64,
@@ -63,9 +70,9 @@ struct Repaired<'a> {
 pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     let (input, output) = (output::path_text(&args.input), output::path_text(&args.output));
-    let source =
-        open_regular_file(&args.input).map_err(ReadError::from).with_context(|| input.clone())?;
-    refuse_own_input(&source, &args.output)?;
+    let open =
+        || open_regular_file(&args.input).map_err(ReadError::from).with_context(|| input.clone());
+    refuse_own_input(&open()?, &args.output)?;
     if is_being_written(&args.input) {
         output::note(&format!(
             "warning: {}: a recorder is still writing this file; the repair ends where the file ends now. \
@@ -73,24 +80,65 @@ pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
             printable_line(&input)
         ));
     }
+    let (mut file, mut report) = copy(args, open()?, None, &stop)?;
+    let load = lost_load(&report);
+    let is_load_restored = load.is_some();
+    if is_load_restored {
+        // It comes before everything that was written.
+        file.discard()?;
+        (file, report) = copy(args, open()?, load, &stop)?;
+    }
+    file.finish()?;
+    let repaired = Repaired { is_load_restored, ..Repaired::new(input, output, &report) };
+    output::result(args.as_json, &repaired, &repaired.to_string())?;
+    Ok(if repaired.is_lossless { Exit::Done } else { Exit::Loss })
+}
+
+/// Writes the repaired file, without giving it its name.
+fn copy(
+    args: &RepairArgs,
+    source: File,
+    load: Option<LoadRows>,
+    stop: &Stop,
+) -> anyhow::Result<(PartFile, RepairReport)> {
     let mut file = PartFile::create(&args.output, args.overwrite.existing())?;
     let bar = progress_bytes(0);
-    let result = repair_file(source, &mut file, Some(&stop), &mut |at, size_bytes| {
+    let result = repair_file(source, &mut file, load, Some(stop), &mut |at, size_bytes| {
         bar.set_length(size_bytes);
         bar.set_position(at);
     });
     bar.finish_and_clear();
-    let report = match result {
-        Ok(report) => report,
+    match result {
+        Ok(report) => Ok((file, report)),
         Err(error) => {
             file.discard()?;
-            return Err(error).with_context(|| input);
+            Err(error).with_context(|| output::path_text(&args.input))
         }
+    }
+}
+
+/// Returns the load that a repair could not copy, from the scene. `None` if the file has it, or if the
+/// scene is not intact.
+fn lost_load(report: &RepairReport) -> Option<LoadRows> {
+    let lost = report.lost_load.as_ref()?;
+    let text = std::str::from_utf8(report.scene.as_ref()?).ok()?;
+    let scene = Scene::from_toml(text, SCENE_ATTACHMENT).ok()?;
+    let solver = Solver::new(&scene);
+    let header = LoadHeader {
+        // The first load begins at step 0. Only its own row tells the step of a later one.
+        step: if lost.revision == 0 { 0 } else { lost.step },
+        topology_revision: lost.revision,
+        method: scene.solver.method as u32,
+        ..LoadHeader::default()
     };
-    file.finish()?;
-    let repaired = Repaired::new(input, output, &report);
-    output::result(args.as_json, &repaired, &repaired.to_string())?;
-    Ok(if repaired.is_lossless { Exit::Done } else { Exit::Loss })
+    let constraints: Vec<_> = solver.constraints().map(constraint_state).collect();
+    let triangles: Vec<_> =
+        solver.triangles().iter().map(|corners| Triangle { corners: *corners }).collect();
+    let topology = TopologyRow::new(&header, &constraints);
+    Some(LoadRows {
+        topology: TopologyRow { torn: lost.torn.clone(), ..topology },
+        surface: SurfaceRow::new(&header, &triangles),
+    })
 }
 
 /// Refuses an output that would replace the input: its own name, or its name without `.part`, whose
@@ -126,6 +174,7 @@ impl<'a> Repaired<'a> {
             lost: losses.messages(),
             lost_head: losses.head(),
             lost_steps,
+            is_load_restored: false,
             is_uncertain: report.is_uncertain,
             finding_count: report.findings.count(),
             findings: report.findings.list(),
@@ -147,6 +196,9 @@ impl fmt::Display for Repaired<'_> {
         let more = self.finding_count - self.findings.len() as u64;
         if more > 0 {
             write!(f, "\ndamage      {more} more")?;
+        }
+        if self.is_load_restored {
+            write!(f, "\nrestored    /topology and /surface, from the scene")?;
         }
         if self.is_uncertain {
             let what = "the checksum of the data is wrong, and no damaged part explains it: a byte outside \

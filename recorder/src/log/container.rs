@@ -8,6 +8,7 @@ mod chunk;
 mod content;
 pub(super) mod finding;
 pub(super) mod losses;
+pub(super) mod lost_load;
 mod places;
 pub(super) mod repair;
 mod salvage;

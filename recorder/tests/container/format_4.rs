@@ -107,7 +107,8 @@ fn a_repair_of_format_4_keeps_its_format() {
     let old = format_4_file(&Recording::default().write());
     let truncated = &old[..old.len() - 20];
     let mut repaired = Vec::new();
-    let report = repair_file(Cursor::new(truncated), &mut repaired, None, &mut |_, _| {}).unwrap();
+    let report =
+        repair_file(Cursor::new(truncated), &mut repaired, None, None, &mut |_, _| {}).unwrap();
     assert!(report.losses.is_empty());
     assert_eq!(LogReader::new(repaired.as_slice()).unwrap().format_version(), 4);
     assert_eq!(messages(&repaired), messages(&old));

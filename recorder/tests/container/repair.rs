@@ -16,7 +16,7 @@ const CHUNK: u8 = 6;
 
 fn repair(bytes: &[u8]) -> Result<(Vec<u8>, RepairReport), RepairError> {
     let mut out = Vec::new();
-    let report = repair_file(Cursor::new(bytes), &mut out, None, &mut |_, _| {})?;
+    let report = repair_file(Cursor::new(bytes), &mut out, None, None, &mut |_, _| {})?;
     Ok((out, report))
 }
 
@@ -195,7 +195,7 @@ impl Write for Full {
 #[test]
 fn an_output_that_cannot_be_written_is_an_error() {
     let bytes = Recording::default().write();
-    let result = repair_file(Cursor::new(&bytes), Full, None, &mut |_, _| {});
+    let result = repair_file(Cursor::new(&bytes), Full, None, None, &mut |_, _| {});
     assert!(matches!(result, Err(RepairError::Write(_))), "{result:?}");
 }
 

@@ -138,3 +138,39 @@ fn a_repaired_simulation_without_its_last_commands_is_verified_up_to_its_end() {
     assert!(verified.contains("steps bit-identical (0..="), "{verified}");
     assert!(verified.contains("missing: /outcomes 1"), "{verified}");
 }
+
+#[test]
+fn a_lost_first_chunk_costs_its_messages_but_not_the_constraints() {
+    let sandbox = Sandbox::new();
+    // Some constraints tear in the first chunk, and others at all later times.
+    let cuts: Vec<_> = (0_u64..40)
+        .map(|cut| {
+            let (step, constraint) = (3 + cut * 20, cut * 11);
+            format!(r#"{{"step":{step},"kind":"cut","constraint":{constraint}}}"#)
+        })
+        .collect();
+    let commands = sandbox.write("cuts.jsonl", &cuts.join("\n"));
+    let [whole, damaged, repaired] =
+        ["whole", "damaged", "repaired"].map(|name| sandbox.path(&format!("{name}.mcap")));
+    let args = ["simulate", "curtain", "--steps", "800", "--commands", &commands, "-o", &whole];
+    recorder(&sandbox, &args).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    // The chunks begin after the scene.
+    bytes[20_000] ^= 1;
+    fs::write(&damaged, &bytes).unwrap();
+    let report = recorder(&sandbox, &["repair", &damaged, &repaired, "--json"]);
+    assert_eq!(report.code, Some(3), "{}{}", report.stdout, report.stderr);
+    let report: Value = serde_json::from_str(&report.stdout).unwrap();
+    assert_eq!(report["is_load_restored"], true, "{report}");
+    assert!(report["lost"]["/topology"].is_null() && report["lost"]["/outcomes"].is_u64());
+    // The hash of each snapshot has the torn constraints, and the simulation compares the first list.
+    recorder(&sandbox, &["check", &repaired]).success();
+    let verified = recorder(&sandbox, &["verify", &repaired, "--json"]).json();
+    assert_eq!(verified["verdict"], "identical", "{verified}");
+    assert_eq!(verified["last_identical_step"], 800, "{verified}");
+    let info = recorder(&sandbox, &["info", &repaired, "--json"]).recorded();
+    let info: Value = serde_json::from_str(&info).unwrap();
+    assert_eq!(info["torn_count_first"], report["lost"]["/tears"], "{info}");
+    // It plays, which needs the constraints and triangles.
+    recorder(&sandbox, &["play", &repaired, "--rate", "100"]).recorded();
+}

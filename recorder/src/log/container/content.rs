@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use mcap::records::{Channel, MessageHeader};
 use sim_solver::Keyframe;
 
+use super::lost_load::{LoadRows, LoadWatch};
 use super::tears::HashSeeds;
 use crate::log::backlog::Backlog;
 use crate::log::encoding::channel::TopicChannel;
@@ -56,6 +57,7 @@ pub(super) struct ContentCheck {
     row: Option<StepRow>,
     last_row: Option<StepRow>,
     seeds: HashSeeds,
+    pub(super) load: LoadWatch,
     /// Bounds the memory of tears and commands of later steps.
     backlog: Backlog,
     pub(super) gaps: GapCounter,
@@ -85,6 +87,7 @@ impl ContentCheck {
             row: None,
             last_row: None,
             seeds: HashSeeds::new(selection),
+            load: LoadWatch::default(),
             gaps: GapCounter::for_selection(selection),
             counts: AllCounts::default(),
             unhashed_count: 0,
@@ -147,7 +150,16 @@ impl ContentCheck {
     /// Marks a part of the file as unreadable.
     pub(super) fn mark_gap(&mut self) {
         self.seeds.mark_gap();
+        self.load.mark_gap();
         self.row = None;
+    }
+
+    /// Adds a load that the output of a repair has and the input has lost.
+    pub(super) fn add_load(&mut self, load: &LoadRows) {
+        for message in load.messages() {
+            self.counts[message.topic()].written += 1;
+            self.seeds.process(&message);
+        }
     }
 
     /// Returns the step of a header whose payload is missing, once.
@@ -205,6 +217,7 @@ impl ContentCheck {
         }
         self.gaps.add(&message);
         self.seeds.process(&message);
+        self.load.process(&message);
         match message {
             Message::Step(row) if self.needs_payload() => {
                 self.row = Some(row);

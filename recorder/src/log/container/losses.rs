@@ -112,6 +112,12 @@ impl Losses {
         }
     }
 
+    /// Removes the loss of a message that follows from the rest of the file.
+    pub(super) fn restore(&mut self, topic: Topic) {
+        let lost = &mut self.counts[topic].lost;
+        *lost = lost.saturating_sub(1);
+    }
+
     /// Ends a gap at a sound snapshot.
     pub(super) fn end_gap(&mut self, step: u64) {
         if self.is_open && self.last_step.is_none_or(|last| last.saturating_add(1) < step) {

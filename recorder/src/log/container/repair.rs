@@ -18,6 +18,7 @@ use super::chunk::{ChunkContent, InnerRecords, compression};
 use super::content::ContentCheck;
 use super::finding::{Findings, record_name};
 use super::losses::Losses;
+use super::lost_load::{LoadRows, LostLoad};
 use super::salvage::{Format, Salvage, size_in_memory};
 use super::walk::{Part, Walk};
 use super::window::Window;
@@ -62,9 +63,14 @@ pub struct RepairReport {
     pub counts: AllCounts,
     /// The first and the last step of the snapshots in the output.
     pub steps: Option<[u64; 2]>,
+    /// The load that the output lacks, if it follows from the scene and this.
+    pub lost_load: Option<LostLoad>,
+    /// The scene, if the input has it.
+    pub scene: Option<Vec<u8>>,
 }
 
 /// Copies the intact part of a recording. Calls `on_progress` with the position and the size of the input.
+/// `load` is written if the first chunk, which has it, is lost: see [`RepairReport::lost_load`].
 ///
 /// # Errors
 /// If the input is not a recording, the operating system reports an error, or a signal has arrived. The
@@ -72,11 +78,12 @@ pub struct RepairReport {
 pub fn repair_file<R: Read + Seek, W: Write>(
     source: R,
     out: W,
+    load: Option<LoadRows>,
     stop: Option<&Stop>,
     on_progress: &mut dyn FnMut(u64, u64),
 ) -> Result<RepairReport, RepairError> {
     let mut walk = Walk::new(Window::new(source, stop.cloned())?)?;
-    let mut repair = Repair::new(walk.size_bytes(), out);
+    let mut repair = Repair { load, ..Repair::new(walk.size_bytes(), out) };
     let mut chunks = ChunkContent::default();
     let mut next_progress = 0;
     loop {
@@ -116,7 +123,10 @@ struct Repair<W: Write> {
     size_bytes: u64,
     findings: Findings,
     format: Format,
+    scene: Option<Vec<u8>>,
     scene_size_bytes: usize,
+    /// The load to write if the input has lost it.
+    load: Option<LoadRows>,
     selection: ContentSelection,
     content: Option<ContentCheck>,
     new_limits: Option<SizeLimits>,
@@ -140,7 +150,9 @@ impl<W: Write> Repair<W> {
             size_bytes,
             findings: Findings::default(),
             format: Format::default(),
+            scene: None,
             scene_size_bytes: 0,
+            load: None,
             selection: ContentSelection::default(),
             content: None,
             new_limits: None,
@@ -283,6 +295,7 @@ impl<W: Write> Repair<W> {
             Record::Attachment { header, data, crc } => {
                 if header.name == SCENE_ATTACHMENT && self.content.is_none() {
                     self.scene_size_bytes = data.len();
+                    self.scene = Some(data.to_vec());
                 }
                 let data = Cow::Owned(data.into_owned());
                 self.add_head(byte, Record::Attachment { header, data, crc })?;
@@ -401,7 +414,7 @@ impl<W: Write> Repair<W> {
         if content.has_channels() || !content.is_current_format {
             return Ok(());
         }
-        salvage.declare_channels(content)
+        salvage.declare_channels(content, self.load.take())
     }
 
     /// Copies a schema, a channel or a message.
@@ -477,6 +490,8 @@ impl<W: Write> Repair<W> {
             counts: content.counts,
             steps: self.first_step.zip(last).map(|(first, last)| [first, last]),
             losses,
+            lost_load: content.load.lost(),
+            scene: self.scene,
         })
     }
 }

@@ -9,7 +9,8 @@ use mcap::{Attachment, WriteOptions, Writer};
 
 use super::content::{ContentCheck, Sound};
 use super::losses::Losses;
-use crate::log::encoding::{TopicFormat, encode_transform};
+use super::lost_load::LoadRows;
+use crate::log::encoding::{MessageEncoder, TopicFormat, encode_transform};
 use crate::log::run::{CLOSING_METADATA, Closing, REPAIR_METADATA};
 use crate::log::topic::Topic;
 use crate::log::writer::WriteError;
@@ -38,6 +39,15 @@ enum Declared {
     Channel(u16),
 }
 
+/// The start of a recording that is lost.
+#[derive(Debug)]
+struct LostStart {
+    /// The channels, by topic.
+    ids: BTreeMap<&'static str, u16>,
+    /// The load, as far as it is known.
+    load: Option<LoadRows>,
+}
+
 /// The options of the output, from the input.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Format {
@@ -53,8 +63,8 @@ pub(super) struct Salvage<W: Write> {
     file: Option<Writer<NoSeek<W>>>,
     /// The header of a snapshot, until its payload has followed.
     row: Option<HeldRow>,
-    /// The channel of `/tf`, which the file has lost.
-    missing_transform: Option<u16>,
+    /// The lost start of the recording, until the first message.
+    lost_start: Option<LostStart>,
     /// The ids of the schemas and channels so far.
     declared: BTreeSet<Declared>,
     /// Memory of the schemas and channels, which stay in memory for the index.
@@ -82,7 +92,7 @@ impl<W: Write> Salvage<W> {
         Ok(Self {
             file: Some(file),
             row: None,
-            missing_transform: None,
+            lost_start: None,
             declared: BTreeSet::new(),
             declared_size_bytes: 0,
             losses: Losses::default(),
@@ -207,7 +217,9 @@ impl<W: Write> Salvage<W> {
     pub(super) fn declare_channels(
         &mut self,
         content: &mut ContentCheck,
+        load: Option<LoadRows>,
     ) -> Result<(), WriteError> {
+        let mut ids = BTreeMap::new();
         for topic in Topic::ALL {
             let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
             let mut channel = Channel {
@@ -225,27 +237,41 @@ impl<W: Write> Salvage<W> {
             })?;
             // A conflict is found with the first message of the channel.
             let _ = content.add_channel(&channel);
-            if topic == Topic::Tf {
-                self.missing_transform = Some(channel.id);
-            }
+            ids.insert(topic.name(), channel.id);
         }
+        content.load.is_start_lost = true;
+        self.lost_start = Some(LostStart { ids, load });
         Ok(())
     }
 
-    /// Writes `/tf` before the first message, if the file has lost it. `header` and `topic` are those of
-    /// this message.
-    fn add_transform(
+    /// Writes `/tf` and the load before the first message, if the file has lost them. `header` and `topic` are
+    /// those of this message.
+    fn add_start(
         &mut self,
         header: &MessageHeader,
         topic: Option<Topic>,
         content: &mut ContentCheck,
     ) -> Result<(), WriteError> {
-        match self.missing_transform.take() {
-            Some(channel) if topic != Some(Topic::Tf) => {
-                self.write_transform(channel, header.log_time, content)
-            }
-            _ => Ok(()),
+        let Some(LostStart { ids, load }) = self.lost_start.take() else { return Ok(()) };
+        if topic != Some(Topic::Tf) {
+            self.write_transform(ids[Topic::Tf.name()], header.log_time, content)?;
         }
+        let Some(load) = load else { return Ok(()) };
+        content.add_load(&load);
+        let mut encoder = MessageEncoder::default();
+        for message in load.messages() {
+            let (step, topic) = (message.step(), message.topic());
+            let publish_time = content.run().time_of_step_ns(step);
+            #[allow(clippy::cast_possible_truncation, reason = "as in a recording")]
+            let sequence = step as u32;
+            let (channel_id, log_time) = (ids[topic.name()], header.log_time);
+            let header = MessageHeader { channel_id, sequence, log_time, publish_time };
+            let data = encoder.encode(&message, publish_time);
+            let data = data.map_err(|error| WriteError::Failed(error.to_string()))?;
+            self.write(|file| file.write_to_known_channel(&header, data))?;
+            self.losses.restore(topic);
+        }
+        Ok(())
     }
 
     fn write_transform(
@@ -270,7 +296,7 @@ impl<W: Write> Salvage<W> {
         content: &mut ContentCheck,
     ) -> Result<Result<(), String>, WriteError> {
         let topic = content.topic(header.channel_id);
-        self.add_transform(header, topic, content)?;
+        self.add_start(header, topic, content)?;
         match content.check(header, data) {
             Ok(Sound::Row) => {
                 let step = content.row_step().unwrap_or(0);
