@@ -19,14 +19,14 @@ use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number_in};
-use crate::export::camera::{Basis, Camera, View};
-use crate::export::extent::ExtentTracker;
-use crate::export::mesh::Bend;
-use crate::export::renderer::Renderer;
+use crate::export::pictures::camera::{Basis, Camera, View};
+use crate::export::pictures::extent::ExtentTracker;
+use crate::export::pictures::mesh::Bend;
+use crate::export::pictures::renderer::Renderer;
+use crate::export::pictures::shape::Size;
+use crate::export::pictures::target::{Format, Target};
 use crate::export::scene_state::visit_states;
 use crate::export::selection::Selection;
-use crate::export::shape::Size;
-use crate::export::target::{Format, Target};
 use crate::input::scene_source::scene_in_recording;
 
 /// Number of pictures without an option that selects them.

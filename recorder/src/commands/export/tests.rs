@@ -12,9 +12,9 @@ use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
 use sim_solver::Solver;
 
 use super::*;
+use crate::export::pictures::shape::{Picture, Shape};
+use crate::export::pictures::{png, svg};
 use crate::export::scene_state::SceneState;
-use crate::export::shape::{Picture, Shape};
-use crate::export::{png, svg};
 use crate::simulation::{Job, States, simulate};
 
 /// A square of cloth in front of a sphere and above a floor, with a pinned particle at its side.

@@ -10,8 +10,8 @@ use sim_contract::{ConstraintKind, ParticleFlags};
 
 use super::camera::Camera;
 use super::extent::position;
-use super::scene_state::SceneState;
 use super::shape::{Color, Dash, Shape, Stroke};
+use crate::export::scene_state::SceneState;
 
 const SURFACE: Color = Color([0x8f, 0xb8, 0xde]);
 const STRUCTURAL: Color = Color([0x2b, 0x3a, 0x4a]);
