@@ -1,0 +1,77 @@
+//! The options that select the format of an export.
+
+use std::path::{Path, PathBuf};
+
+use super::data::DataFormat;
+use crate::export::pictures::target::PictureFormat;
+
+/// The formats. One of them is required.
+#[derive(Debug, clap::Args)]
+#[group(required = true, multiple = false)]
+pub(super) struct FormatArgs {
+    /// Draw PNG files named `NAME_STEP.png` into this folder. Creates the folder
+    #[arg(long, value_name = "DIR")]
+    png: Option<PathBuf>,
+    /// Draw SVG files named `NAME_STEP.svg` into this folder. Creates the folder
+    #[arg(long, value_name = "DIR")]
+    svg: Option<PathBuf>,
+    /// Write arrays for NumPy: steps, times, positions, velocities, inverse masses and flags
+    #[arg(long, value_name = "FILE")]
+    npz: Option<PathBuf>,
+    /// Write a table with a row for each particle of each snapshot
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write VTP files and a PVD file with their times into this folder, for ParaView: velocity,
+    /// inverse mass and flags of particles, stretch of untorn constraints, intact triangles
+    #[arg(long, value_name = "DIR")]
+    vtk: Option<PathBuf>,
+    /// Write OBJ files named `NAME_STEP.obj` into this folder: intact triangles, or else untorn
+    /// constraints as lines
+    #[arg(long, value_name = "DIR")]
+    obj: Option<PathBuf>,
+    /// Write a cache of positions for Blender's Mesh Cache, and FILE.obj, the mesh that it moves
+    #[arg(long, value_name = "FILE.pc2")]
+    pc2: Option<PathBuf>,
+    /// Write a USD stage whose time codes are steps. Its `upAxis` is the scene's; a scene with -y up is
+    /// turned by its transform
+    #[arg(long, value_name = "FILE")]
+    usda: Option<PathBuf>,
+}
+
+/// The format of an export and its target.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Format<'a> {
+    Pictures(PictureFormat, &'a Path),
+    Data(DataFormat, &'a Path),
+}
+
+impl Format<'_> {
+    /// Returns the file or the folder to write.
+    pub(super) fn target(&self) -> &Path {
+        match self {
+            Self::Pictures(_, target) | Self::Data(_, target) => target,
+        }
+    }
+}
+
+impl FormatArgs {
+    /// Returns the selected format.
+    pub(super) fn format(&self) -> Option<Format<'_>> {
+        let pictures = [(&self.png, PictureFormat::Png), (&self.svg, PictureFormat::Svg)];
+        let data = [
+            (&self.npz, DataFormat::Npz),
+            (&self.csv, DataFormat::Csv),
+            (&self.vtk, DataFormat::Vtk),
+            (&self.obj, DataFormat::Obj),
+            (&self.pc2, DataFormat::Pc2),
+            (&self.usda, DataFormat::Usda),
+        ];
+        let pictures = pictures
+            .into_iter()
+            .filter_map(|(path, format)| Some(Format::Pictures(format, path.as_deref()?)));
+        let data = data
+            .into_iter()
+            .filter_map(|(path, format)| Some(Format::Data(format, path.as_deref()?)));
+        pictures.chain(data).next()
+    }
+}
