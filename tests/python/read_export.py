@@ -189,6 +189,46 @@ def check_usda(recording, path):
     return len(recording.steps)
 
 
+def messages(path):
+    """Returns the raw messages of a file, without those on /scene, and its decoded scenes by sequence."""
+    with open(path, "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        raw = [
+            (channel.topic, schema.name, schema.data, message.sequence, message.log_time, message.publish_time, message.data)
+            for schema, channel, message in reader.iter_messages(log_time_order=False)
+            if channel.topic != "/scene"
+        ]
+        decoded = reader.iter_decoded_messages(topics=["/scene"])
+        scenes = {message.sequence: scene for _schema, _channel, message, scene in decoded}
+        metadata = [(record.name, record.metadata) for record in reader.iter_metadata()]
+        attachments = [(record.name, record.data) for record in reader.iter_attachments()]
+        return (raw, metadata, attachments), scenes
+
+
+def points(primitive):
+    return np.array([[point.x, point.y, point.z] for point in primitive.points])
+
+
+def check_foxglove(recording, path):
+    copied, scenes = messages(path)
+    original, none = messages(sys.argv[2])
+    assert copied == original and not none
+    period_s = 1 / 30
+    for step, scene in scenes.items():
+        sticks, surface, colliders = scene.entities
+        assert {sticks.frame_id, surface.frame_id, colliders.frame_id} == {"world"}
+        positions = recording.particles[recording.index(step), :, 0:3]
+        same(points(sticks.lines[0]), positions)
+        same(points(surface.triangles[0]), positions)
+        indices = np.array(sticks.lines[0].indices).reshape(-1, 2)
+        assert (indices == recording.ends[recording.untorn(step)]).all()
+        triangles = np.array(surface.triangles[0].indices).reshape(-1, 3)
+        assert triangles.tolist() == recording.intact_triangles(step)
+    times = np.array(sorted(scenes)) / recording.rate_hz
+    assert np.allclose(np.diff(times), period_s)
+    return len(scenes)
+
+
 CHECKS = {
     "npz": check_npz,
     "csv": check_csv,
@@ -196,6 +236,7 @@ CHECKS = {
     "obj": check_obj,
     "pc2": check_pc2,
     "usda": check_usda,
+    "foxglove": check_foxglove,
 }
 
 if len(sys.argv) != 4 or sys.argv[1] not in CHECKS:

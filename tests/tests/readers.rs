@@ -195,3 +195,10 @@ fn a_parser_of_pc2_and_the_library_of_usd_read_the_recorded_bits() {
     assert_export_is_read("pc2", "run.pc2", 61);
     assert_export_is_read("usda", "run.usda", 61);
 }
+
+#[test]
+#[ignore = "needs Python"]
+fn the_stock_python_reader_finds_every_message_and_the_scene_in_a_copy_for_viewers() {
+    // Steps 0 to 60 at 240 Hz, each eighth one.
+    assert_export_is_read("foxglove", "scene.mcap", 8);
+}

@@ -7,13 +7,13 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::{ContentSelection, LogEnd, LogReader, ReadError};
+use recorder::{ContentSelection, LogEnd, LogReader, ReadError, open_regular_file};
 use sim_contract::Stop;
 
 use crate::cli::exit::Exit;
@@ -26,12 +26,17 @@ use crate::export::pictures::mesh::Bend;
 use crate::export::pictures::shape::Size;
 use crate::export::scene_state::{SceneState, visit_states};
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
+use data::DataFormat;
 use format_args::{Format, FormatArgs};
 use pictures::Style;
 use survey::Survey;
 
 /// Number of pictures without an option that selects them.
 const FRAMES_DEFAULT: usize = 8;
+/// Bytes that a file is read ahead.
+const BUFFER_SIZE_BYTES: usize = 1 << 18;
+/// Simulated time between two messages on `/scene`.
+const SCENE_PERIOD: Duration = Duration::from_nanos(33_333_333);
 /// Longest and shortest side of a picture, in pixels. A picture takes 4 bytes of memory per pixel.
 const SIDE_MAX: u32 = 8192;
 const SIDE_MIN: u32 = 16;
@@ -100,7 +105,8 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let needed = log.selection().require_all_particles("`recorder export`");
     needed.with_context(|| path.clone())?;
     let format = args.format.format().context("one of the formats is required")?;
-    refuse_own_input(&recorder::open_regular_file(&args.file)?, format.target())?;
+    args.check_selection(&format)?;
+    refuse_own_input(&open_regular_file(&args.file)?, format.target())?;
     let survey = survey(args, log, &path)?;
     let selection = args.selection(&format);
     let steps =
@@ -145,7 +151,11 @@ fn export<R: Read>(
         bar.finish_and_clear();
         visited.with_context(|| output::path_text(&args.file))
     };
-    let snapshots = survey.snapshots(steps, &visit);
+    let open_bytes = || {
+        let file = open_regular_file(&args.file)?.take(survey.intact_count);
+        Ok(Box::new(BufReader::with_capacity(BUFFER_SIZE_BYTES, file)) as Box<dyn Read>)
+    };
+    let snapshots = survey.snapshots(steps, &visit, &open_bytes);
     let existing = args.overwrite.existing();
     match *format {
         Format::Pictures(format, folder) => {
@@ -161,12 +171,23 @@ fn export<R: Read>(
 }
 
 impl ExportArgs {
+    /// Refuses options without effect.
+    fn check_selection(&self, format: &Format<'_>) -> anyhow::Result<()> {
+        let has_part = self.from.or(self.to).is_some();
+        let has_choice = self.frames.is_some() || !self.at.is_empty();
+        if format.data() == Some(DataFormat::Foxglove) && (has_part || has_choice) {
+            bail!("--foxglove copies the whole recording; only --every applies, to /scene");
+        }
+        Ok(())
+    }
+
     fn selection(&self, format: &Format<'_>) -> Selection {
         let choice = match (self.every, self.frames) {
             (Some(period), _) => Choice::Every(period),
             (_, Some(count)) => Choice::Spread(count),
             _ if !self.at.is_empty() => Choice::At(self.at.clone()),
             _ if matches!(format, Format::Pictures(..)) => Choice::Spread(FRAMES_DEFAULT),
+            _ if format.data() == Some(DataFormat::Foxglove) => Choice::Every(SCENE_PERIOD),
             _ => Choice::All,
         };
         Selection { range: SnapshotRange { from: self.from, to: self.to }, choice }

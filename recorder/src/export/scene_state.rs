@@ -5,8 +5,10 @@ use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::{Context, bail};
-use recorder::{ColliderRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker};
-use sim_contract::{ConstraintKind, ConstraintState, ParticleState, Torn, Triangle};
+use recorder::{
+    ColliderRow, CollidersRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker,
+};
+use sim_contract::{ColliderState, ConstraintKind, ConstraintState, ParticleState, Torn, Triangle};
 
 const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 
@@ -89,6 +91,12 @@ impl SceneState {
             *is_torn = true;
         }
         Ok(())
+    }
+
+    /// Returns the colliders as a node publishes them.
+    pub(crate) fn collider_states(&self) -> Vec<ColliderState> {
+        let (step, colliders) = (self.row.step, self.colliders.clone());
+        CollidersRow { step, colliders }.states()
     }
 
     /// Returns the constraints that are not torn.

@@ -1,8 +1,10 @@
 //! The selected snapshots of a recording, which a format reads as often as it needs.
 
+use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::bail;
+use recorder::RunDescription;
 use sim_solver::scene::Up;
 
 use super::scene_state::SceneState;
@@ -11,14 +13,16 @@ use super::scene_state::SceneState;
 pub(crate) type VisitStates<'a> = dyn Fn(&mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>) -> anyhow::Result<()>
     + 'a;
 
+/// Opens the bytes of a recording.
+pub(crate) type OpenBytes<'a> = dyn Fn() -> std::io::Result<Box<dyn Read>> + 'a;
+
 /// The selected snapshots. Only one state at a time is in memory.
 pub(crate) struct Snapshots<'a> {
-    pub(crate) scene_name: &'a str,
+    pub(crate) run: &'a RunDescription,
     /// Axis of the scene that points up.
     pub(crate) up: Up,
     /// The scene has two dimensions.
     pub(crate) is_2d: bool,
-    pub(crate) rate_hz: u32,
     /// First step of the recording, at which times begin.
     pub(crate) first_step: u64,
     /// Steps of the selected snapshots, ascending. Not empty.
@@ -26,12 +30,14 @@ pub(crate) struct Snapshots<'a> {
     /// Number of particles of each snapshot.
     pub(crate) particle_count: usize,
     pub(crate) visit: &'a VisitStates<'a>,
+    /// Opens the file itself, up to the end of its readable part.
+    pub(crate) open_bytes: &'a OpenBytes<'a>,
 }
 
 impl Snapshots<'_> {
     /// Returns the simulated time since the first snapshot of the recording.
     pub(crate) fn time_s(&self, step: u64) -> f64 {
-        step.saturating_sub(self.first_step) as f64 / f64::from(self.rate_hz)
+        step.saturating_sub(self.first_step) as f64 / f64::from(self.run.rate_hz)
     }
 
     /// Reads the selected snapshots from first to last.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::cli::output;
 use crate::export::data::written_files::WrittenFiles;
-use crate::export::data::{csv, npz, obj, pc2, usda, vtk};
+use crate::export::data::{csv, foxglove, npz, obj, pc2, usda, vtk};
 use crate::export::snapshots::Snapshots;
 
 /// A format of numbers or meshes.
@@ -20,6 +20,7 @@ pub(super) enum DataFormat {
     Obj,
     Pc2,
     Usda,
+    Foxglove,
 }
 
 /// The result, as printed.
@@ -69,6 +70,7 @@ fn write_files(
         DataFormat::Obj => obj::write(snapshots, target, files),
         DataFormat::Pc2 => pc2::write(snapshots, target, files),
         DataFormat::Usda => files.add_streamed(target, |out| usda::write(snapshots, out)),
+        DataFormat::Foxglove => files.add_streamed(target, |out| foxglove::write(snapshots, out)),
     }
 }
 

@@ -36,6 +36,10 @@ pub(super) struct FormatArgs {
     /// turned by its transform
     #[arg(long, value_name = "FILE")]
     usda: Option<PathBuf>,
+    /// Write a copy of the recording with /scene, which Foxglove viewers draw: constraints, triangles and
+    /// colliders, 30 times per second of simulated time, or with --every
+    #[arg(long, value_name = "FILE.mcap")]
+    foxglove: Option<PathBuf>,
 }
 
 /// The format of an export and its target.
@@ -46,6 +50,14 @@ pub(super) enum Format<'a> {
 }
 
 impl Format<'_> {
+    /// Returns the format of data, or `None` for pictures.
+    pub(super) fn data(&self) -> Option<DataFormat> {
+        match self {
+            Self::Pictures(..) => None,
+            Self::Data(format, _) => Some(*format),
+        }
+    }
+
     /// Returns the file or the folder to write.
     pub(super) fn target(&self) -> &Path {
         match self {
@@ -65,6 +77,7 @@ impl FormatArgs {
             (&self.obj, DataFormat::Obj),
             (&self.pc2, DataFormat::Pc2),
             (&self.usda, DataFormat::Usda),
+            (&self.foxglove, DataFormat::Foxglove),
         ];
         let pictures = pictures
             .into_iter()

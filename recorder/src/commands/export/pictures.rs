@@ -38,7 +38,7 @@ pub(super) fn draw(
     (format, folder): (PictureFormat, &Path),
     existing: Existing,
 ) -> anyhow::Result<Vec<WrittenPicture>> {
-    let target = Target::new(folder, format, existing, snapshots.scene_name);
+    let target = Target::new(folder, format, existing, &snapshots.run.scene_name);
     target.prepare(snapshots.steps)?;
     let renderer = renderer(snapshots, style)?;
     let mut written = Vec::new();
@@ -68,6 +68,6 @@ pub(super) fn renderer(snapshots: &Snapshots<'_>, style: Style) -> anyhow::Resul
         extent,
         size: style.size,
         bend: style.bend,
-        scene_name: snapshots.scene_name.to_owned(),
+        scene_name: snapshots.run.scene_name.clone(),
     })
 }

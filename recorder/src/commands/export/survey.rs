@@ -7,7 +7,7 @@ use recorder::{FrameReader, LogEnd, LogReader, RunDescription};
 use sim_solver::Scene;
 use sim_solver::scene::Up;
 
-use crate::export::snapshots::{Snapshots, VisitStates};
+use crate::export::snapshots::{OpenBytes, Snapshots, VisitStates};
 use crate::input::scene_source::scene_in_recording;
 
 /// Most snapshots of a recording to export: 19 hours at 240 Hz. Their steps take 128 MiB of memory.
@@ -26,6 +26,8 @@ pub(super) struct Survey {
     /// Number of particles of the first snapshot.
     pub(super) particle_count: usize,
     pub(super) end: LogEnd,
+    /// Number of bytes of the file that are readable.
+    pub(super) intact_count: u64,
 }
 
 impl Survey {
@@ -53,25 +55,28 @@ impl Survey {
             }
         }
         let end = frames.end().cloned().unwrap_or(LogEnd::Complete);
-        Ok(Self { run, scene, steps, particle_count, end })
+        let intact_count = frames.log().intact_count();
+        Ok(Self { run, scene, steps, particle_count, end, intact_count })
     }
 
-    /// Returns the snapshots of `steps`, which `visit` visits. Without a scene, y is up.
+    /// Returns the snapshots of `steps`, which `visit` visits, of a file that `open_bytes` opens. Without a
+    /// scene, y is up.
     pub(super) fn snapshots<'a>(
         &'a self,
         steps: &'a [u64],
         visit: &'a VisitStates<'a>,
+        open_bytes: &'a OpenBytes<'a>,
     ) -> Snapshots<'a> {
         let scene = self.scene.as_ref().ok();
         Snapshots {
-            scene_name: &self.run.scene_name,
+            run: &self.run,
             up: scene.map_or(Up::Y, |scene| scene.up),
             is_2d: scene.is_some_and(|scene| scene.dimensions == 2),
-            rate_hz: self.run.rate_hz,
             first_step: self.steps.first().copied().unwrap_or_default(),
             steps,
             particle_count: self.particle_count,
             visit,
+            open_bytes,
         }
     }
 }

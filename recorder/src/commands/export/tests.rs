@@ -93,7 +93,9 @@ fn with_snapshots<T>(
     let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
         visit_states(LogReader::new(file)?, steps, visitor)
     };
-    work(&survey.snapshots(steps, &visit))
+    let bytes = file.to_vec();
+    let open_bytes = || Ok(Box::new(Cursor::new(bytes.clone())) as Box<dyn Read>);
+    work(&survey.snapshots(steps, &visit, &open_bytes))
 }
 
 fn survey_of(file: &[u8], path: &str) -> Survey {
@@ -320,6 +322,17 @@ fn the_error_names_a_wrong_option() {
         let error = parse(line).unwrap_err();
         assert!(error.contains(word), "{line}: {error}");
     }
+}
+
+#[test]
+fn a_copy_takes_no_part_of_the_recording() {
+    for option in ["--from 1s", "--to 480", "--frames 3", "--at 1s"] {
+        let args = parse(&format!("a.mcap --foxglove b.mcap {option}")).unwrap();
+        let error = args.check_selection(&args.format.format().unwrap()).unwrap_err().to_string();
+        assert!(error.starts_with("--foxglove copies the whole recording"), "{error}");
+    }
+    let args = parse("a.mcap --foxglove b.mcap --every 100ms").unwrap();
+    args.check_selection(&args.format.format().unwrap()).unwrap();
 }
 
 #[test]

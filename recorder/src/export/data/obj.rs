@@ -14,7 +14,7 @@ pub(crate) fn write(
     folder: &Path,
     files: &mut WrittenFiles,
 ) -> anyhow::Result<()> {
-    let names = FrameNames::new(folder, snapshots.scene_name, "obj");
+    let names = FrameNames::new(folder, &snapshots.run.scene_name, "obj");
     names.prepare(snapshots.steps, files.existing())?;
     snapshots
         .for_each(|state| files.add_whole(&names.path(state.row.step), mesh(state)?.as_bytes()))

@@ -40,7 +40,7 @@ fn write_header(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Resul
         ),
         Up::Z => ("Z", ""),
     };
-    let rate_hz = snapshots.rate_hz;
+    let rate_hz = snapshots.run.rate_hz;
     let (first, last) = (snapshots.steps[0], snapshots.steps[snapshots.steps.len() - 1]);
     write!(
         out,

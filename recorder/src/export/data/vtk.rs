@@ -16,7 +16,7 @@ pub(crate) fn write(
     folder: &Path,
     files: &mut WrittenFiles,
 ) -> anyhow::Result<()> {
-    let names = FrameNames::new(folder, snapshots.scene_name, "vtp");
+    let names = FrameNames::new(folder, &snapshots.run.scene_name, "vtp");
     let collection = names.index_path("pvd");
     files.existing().check(&collection)?;
     names.prepare(snapshots.steps, files.existing())?;

@@ -45,34 +45,34 @@ const FIELDS: [PackedField; 8] = [
     ("flags", 28, UINT32),
 ];
 
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Vector3 {
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct Vector3 {
     #[prost(double, tag = "1")]
-    pub(super) x: f64,
+    pub(crate) x: f64,
     #[prost(double, tag = "2")]
-    pub(super) y: f64,
+    pub(crate) y: f64,
     #[prost(double, tag = "3")]
-    pub(super) z: f64,
+    pub(crate) z: f64,
 }
 
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Quaternion {
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct Quaternion {
     #[prost(double, tag = "1")]
-    pub(super) x: f64,
+    pub(crate) x: f64,
     #[prost(double, tag = "2")]
-    pub(super) y: f64,
+    pub(crate) y: f64,
     #[prost(double, tag = "3")]
-    pub(super) z: f64,
+    pub(crate) z: f64,
     #[prost(double, tag = "4")]
-    pub(super) w: f64,
+    pub(crate) w: f64,
 }
 
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Pose {
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct Pose {
     #[prost(message, optional, tag = "1")]
-    pub(super) position: Option<Vector3>,
+    pub(crate) position: Option<Vector3>,
     #[prost(message, optional, tag = "2")]
-    pub(super) orientation: Option<Quaternion>,
+    pub(crate) orientation: Option<Quaternion>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -270,7 +270,7 @@ pub(crate) fn decode_keyframe(message: &[u8]) -> Result<(u64, Vec<u8>), String> 
 
 #[allow(clippy::cast_possible_wrap, reason = "seconds of 64-bit nanoseconds are below 2^35")]
 #[allow(clippy::cast_possible_truncation, reason = "the remainder is below 10^9")]
-fn timestamp(time_ns: u64) -> Timestamp {
+pub(crate) fn timestamp(time_ns: u64) -> Timestamp {
     let second_ns = 1_000_000_000;
     Timestamp { seconds: (time_ns / second_ns) as i64, nanos: (time_ns % second_ns) as i32 }
 }

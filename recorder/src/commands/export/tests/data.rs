@@ -9,7 +9,7 @@ use zip::ZipArchive;
 
 use super::super::data;
 use super::*;
-use crate::export::data::{csv, npz, usda};
+use crate::export::data::{csv, foxglove, npz, usda};
 
 /// A rope of three particles that are connected, and one that is not.
 const ROPE: &str = r#"
@@ -135,7 +135,7 @@ fn a_scene_without_triangles_is_exported_as_lines_and_loose_vertices() {
     let file = record(ROPE, 1);
     let folder = Folder::new("rope");
     with_snapshots(&file, Some(&[0]), |snapshots| {
-        for format in [data::DataFormat::Obj, data::DataFormat::Vtk] {
+        for format in [DataFormat::Obj, DataFormat::Vtk] {
             data::write(snapshots, format, &folder.0, Existing::Refuse).unwrap();
         }
     });
@@ -180,12 +180,13 @@ fn an_export_that_fails_leaves_no_file() {
     };
     let expected = "the file has changed: 4 of 5 snapshots are left";
     for (format, name) in [
-        (data::DataFormat::Npz, "a.npz"),
-        (data::DataFormat::Csv, "a.csv"),
-        (data::DataFormat::Pc2, "a.pc2"),
-        (data::DataFormat::Usda, "a.usda"),
-        (data::DataFormat::Vtk, ""),
-        (data::DataFormat::Obj, ""),
+        (DataFormat::Npz, "a.npz"),
+        (DataFormat::Csv, "a.csv"),
+        (DataFormat::Pc2, "a.pc2"),
+        (DataFormat::Usda, "a.usda"),
+        (DataFormat::Foxglove, "a.mcap"),
+        (DataFormat::Vtk, ""),
+        (DataFormat::Obj, ""),
     ] {
         assert_eq!(fails(format, folder.0.join(name)), expected, "{format:?}");
         assert!(folder.names().is_empty(), "{format:?}: {:?}", folder.names());
@@ -197,7 +198,7 @@ fn a_cache_needs_another_name_than_its_mesh() {
     let file = record(ROPE, 0);
     let error = with_snapshots(&file, None, |snapshots| {
         let path = std::path::Path::new("/nonexistent/a.obj");
-        data::write(snapshots, data::DataFormat::Pc2, path, Existing::Refuse).unwrap_err()
+        data::write(snapshots, DataFormat::Pc2, path, Existing::Refuse).unwrap_err()
     });
     let expected = "/nonexistent/a.obj: the mesh gets this name; name the cache FILE.pc2";
     assert_eq!(error.to_string(), expected);
@@ -212,4 +213,23 @@ fn a_changing_number_of_particles_is_refused() {
     });
     let expected = "the snapshot of step 0 has 4 particles, but the first one 3";
     assert_eq!(error.to_string(), expected);
+}
+
+/// The proof reads the copy as it reads the original, and the cut file ends where it ended.
+#[test]
+fn a_copy_for_viewers_is_a_recording_with_the_same_content() {
+    let file = record(TINY, 200);
+    for original in [&file[..], &file[..file.len() / 2]] {
+        let expected = survey_of(original, "a");
+        let intact = &original[..usize::try_from(expected.intact_count).unwrap()];
+        let copy = written(intact, foxglove::write);
+        assert_eq!(recorded(&copy), recorded(original));
+        let read = survey_of(&copy, "a");
+        assert_eq!(read.end, LogEnd::Complete);
+        assert_eq!((read.steps, read.run), (expected.steps, expected.run));
+    }
+    let twice = with_snapshots(&written(&file, foxglove::write), None, |snapshots| {
+        foxglove::write(snapshots, &mut Vec::new()).unwrap_err().to_string()
+    });
+    assert_eq!(twice, "has /scene already; export the recording that it is a copy of");
 }
