@@ -23,7 +23,8 @@ pub use container::finding::{CheckExtent, CheckReport, Cure, Finding, Findings};
 pub use container::losses::{Losses, LostSteps};
 pub use container::repair::{RepairError, RepairReport, repair_file};
 pub use encoding::{
-    MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform, scene_format,
+    MAP_FRAME, MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform,
+    map_from_world, scene_format,
 };
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;

@@ -229,6 +229,46 @@ def check_foxglove(recording, path):
     return len(scenes)
 
 
+def check_ros2(recording, folder):
+    from mcap_ros2.reader import read_ros2_messages
+    from rosbags.rosbag2 import Reader
+
+    # The metadata; the messages are read with the decoder of MCAP, because this reader leaves out a message
+    # that begins a chunk.
+    with Reader(folder) as bag:
+        types = {connection.topic: connection.msgtype for connection in bag.connections}
+        latched = {c.topic: [qos.durability.name for qos in c.ext.offered_qos_profiles] for c in bag.connections}
+        assert types == {"/tf_static": "tf2_msgs/msg/TFMessage", "/particles": "sensor_msgs/msg/PointCloud2"}
+        assert latched == {"/tf_static": ["TRANSIENT_LOCAL"], "/particles": []}
+        assert bag.message_count == len(recording.steps) + 1
+        assert bag.duration == (recording.steps[-1] - recording.steps[0]) * 10**9 // recording.rate_hz + 1
+    (file,) = Path(folder).glob("*.mcap")
+    with open(file, "rb") as stream:
+        assert make_reader(stream).get_header().profile == "ros2"
+    first, *clouds = read_ros2_messages(str(file))
+    assert first.channel.topic == "/tf_static"
+    (transform,) = first.ros_msg.transforms
+    assert (transform.header.frame_id, transform.child_frame_id) == ("map", "world")
+    rotation = transform.transform.rotation
+    half = 0.5**0.5
+    found = np.array([rotation.x, rotation.y, rotation.z, rotation.w])
+    assert np.allclose(found, [half, 0, 0, half], atol=1e-15, rtol=0), "y does not become z"
+    names = ["x", "y", "z", "inverse_mass", "vx", "vy", "vz", "flags"]
+    fields = [(name, 4 * i, 6 if name == "flags" else 7, 1) for i, name in enumerate(names)]
+    for step, message in zip(recording.steps, clouds, strict=True):
+        cloud = message.ros_msg
+        time_ns = step * 10**9 // recording.rate_hz
+        assert message.log_time_ns == time_ns
+        assert (cloud.header.stamp.sec, cloud.header.stamp.nanosec) == divmod(time_ns, 10**9)
+        assert [(f.name, f.offset, f.datatype, f.count) for f in cloud.fields] == fields
+        expected = recording.particles[recording.index(step)]
+        assert (cloud.header.frame_id, cloud.height, cloud.width) == ("world", 1, len(expected))
+        assert (cloud.point_step, cloud.row_step) == (32, 32 * len(expected))
+        assert cloud.is_dense and not cloud.is_bigendian
+        same(np.frombuffer(bytes(cloud.data), "<f4").reshape(-1, 8), expected)
+    return len(clouds)
+
+
 CHECKS = {
     "npz": check_npz,
     "csv": check_csv,
@@ -237,6 +277,7 @@ CHECKS = {
     "pc2": check_pc2,
     "usda": check_usda,
     "foxglove": check_foxglove,
+    "ros2": check_ros2,
 }
 
 if len(sys.argv) != 4 or sys.argv[1] not in CHECKS:

@@ -202,3 +202,9 @@ fn the_stock_python_reader_finds_every_message_and_the_scene_in_a_copy_for_viewe
     // Steps 0 to 60 at 240 Hz, each eighth one.
     assert_export_is_read("foxglove", "scene.mcap", 8);
 }
+
+#[test]
+#[ignore = "needs Python"]
+fn the_decoders_of_ros_2_read_the_recorded_bits_upright() {
+    assert_export_is_read("ros2", "bag", 61);
+}

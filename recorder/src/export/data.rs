@@ -7,6 +7,7 @@ pub(crate) mod obj;
 pub(crate) mod pc2;
 mod polydata;
 mod recording_copy;
+pub(crate) mod ros2;
 pub(crate) mod usda;
 pub(crate) mod vtk;
 pub(crate) mod written_files;

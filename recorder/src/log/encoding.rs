@@ -18,8 +18,8 @@ use super::rows::{
 use super::topic::Topic;
 use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, SCENE_UPDATE, file_descriptor_set};
 use json_schema::row_schema;
+pub use protobuf::{MAP_FRAME, WORLD_FRAME, encode_transform, map_from_world};
 use protobuf::{PointCloudEncoder, encode_keyframe};
-pub use protobuf::{WORLD_FRAME, encode_transform};
 pub(super) use protobuf::{decode_keyframe, decode_particles, particle_bytes};
 
 /// The encoding of a topic.

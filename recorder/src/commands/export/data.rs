@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::cli::output;
 use crate::export::data::written_files::WrittenFiles;
-use crate::export::data::{csv, foxglove, npz, obj, pc2, usda, vtk};
+use crate::export::data::{csv, foxglove, npz, obj, pc2, ros2, usda, vtk};
 use crate::export::snapshots::Snapshots;
 
 /// A format of numbers or meshes.
@@ -21,6 +21,7 @@ pub(super) enum DataFormat {
     Pc2,
     Usda,
     Foxglove,
+    Ros2,
 }
 
 /// The result, as printed.
@@ -71,6 +72,7 @@ fn write_files(
         DataFormat::Pc2 => pc2::write(snapshots, target, files),
         DataFormat::Usda => files.add_streamed(target, |out| usda::write(snapshots, out)),
         DataFormat::Foxglove => files.add_streamed(target, |out| foxglove::write(snapshots, out)),
+        DataFormat::Ros2 => ros2::write(snapshots, target, files),
     }
 }
 

@@ -40,6 +40,10 @@ pub(super) struct FormatArgs {
     /// colliders, 30 times per second of simulated time, or with --every
     #[arg(long, value_name = "FILE.mcap")]
     foxglove: Option<PathBuf>,
+    /// Write a bag of ROS 2 into this folder: `PointCloud2` on `/particles`, and on `/tf_static` the turn of
+    /// the scene's up axis to z
+    #[arg(long, value_name = "DIR")]
+    ros2: Option<PathBuf>,
 }
 
 /// The format of an export and its target.
@@ -78,6 +82,7 @@ impl FormatArgs {
             (&self.pc2, DataFormat::Pc2),
             (&self.usda, DataFormat::Usda),
             (&self.foxglove, DataFormat::Foxglove),
+            (&self.ros2, DataFormat::Ros2),
         ];
         let pictures = pictures
             .into_iter()

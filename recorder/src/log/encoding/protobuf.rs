@@ -16,7 +16,7 @@ use sim_solver::scene::Up;
 /// Name of the particles' frame. `/tf` gives its pose in the frame `map`.
 pub const WORLD_FRAME: &str = "world";
 /// Frame in which z points up.
-pub(super) const MAP_FRAME: &str = "map";
+pub const MAP_FRAME: &str = "map";
 
 /// `type` of a [`PackedElementField`]: u32.
 const UINT32: i32 = 5;
@@ -225,6 +225,14 @@ pub fn encode_transform(time_ns: u64, origin: [f64; 3], up: Up) -> Vec<u8> {
         rotation: Some(rotation_to_z(up)),
     }
     .encode_to_vec()
+}
+
+/// Returns the pose of the frame [`WORLD_FRAME`] in [`MAP_FRAME`], as in [`encode_transform`]: a translation
+/// in m, and a quaternion x, y, z, w.
+pub fn map_from_world(origin: [f64; 3], up: Up) -> ([f64; 3], [f64; 4]) {
+    let (translation, rotation) = (turned(origin, up), rotation_to_z(up));
+    let Quaternion { x, y, z, w } = rotation;
+    ([translation.x, translation.y, translation.z], [x, y, z, w])
 }
 
 /// Returns the rotation that takes `up` to z: none, or a quarter turn about x.

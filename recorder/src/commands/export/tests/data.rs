@@ -186,6 +186,7 @@ fn an_export_that_fails_leaves_no_file() {
         (DataFormat::Usda, "a.usda"),
         (DataFormat::Foxglove, "a.mcap"),
         (DataFormat::Vtk, ""),
+        (DataFormat::Ros2, ""),
         (DataFormat::Obj, ""),
     ] {
         assert_eq!(fails(format, folder.0.join(name)), expected, "{format:?}");
