@@ -56,6 +56,7 @@ const SIDE_MIN: u32 = 16;
     recorder export run.mcap --png pictures\n  \
     recorder export run.mcap --png pictures --every 100ms --view front --size 1280x720\n  \
     recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite\n  \
+    recorder export run.mcap --apng run.png --to 5s --size 480x360\n  \
     recorder export run.mcap --npz run.npz --from 2s --to 5s"
 )]
 pub(crate) struct ExportArgs {
@@ -79,6 +80,9 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration,
         group = "selection", conflicts_with_all = ["from", "to"])]
     at: Vec<Duration>,
+    /// Frames of an animation per second, 1 to 100
+    #[arg(long, value_name = "FPS", default_value_t = 25, allow_hyphen_values = true, value_parser = frames_per_s)]
+    fps: u16,
     /// Width and height of pictures in pixels, 16 to 8192 each
     #[arg(long, value_name = "WxH", default_value = "960x720", allow_hyphen_values = true, value_parser = size)]
     size: Size,
@@ -163,6 +167,11 @@ fn export<R: Read>(
             let files: Vec<_> = written.iter().map(|picture| picture.file.as_str()).collect();
             output::result(args.as_json, &written, &files.join("\n"))
         }
+        Format::Animation(path) => {
+            let style = args.style();
+            let written = pictures::animate(&snapshots, style, args.fps, path, existing)?;
+            output::result(args.as_json, &written, &written.to_string())
+        }
         Format::Data(format, target) => {
             let written = data::write(&snapshots, format, target, existing)?;
             output::result(args.as_json, &written, &written.to_string())
@@ -187,6 +196,9 @@ impl ExportArgs {
             (_, Some(count)) => Choice::Spread(count),
             _ if !self.at.is_empty() => Choice::At(self.at.clone()),
             _ if matches!(format, Format::Pictures(..)) => Choice::Spread(FRAMES_DEFAULT),
+            _ if matches!(format, Format::Animation(_)) => {
+                Choice::Every(Duration::from_secs(1) / u32::from(self.fps))
+            }
             _ if format.data() == Some(DataFormat::Foxglove) => Choice::Every(SCENE_PERIOD),
             _ => Choice::All,
         };
@@ -210,6 +222,11 @@ fn moment(text: &str) -> Result<Moment, String> {
 fn frames(text: &str) -> Result<usize, String> {
     let count = whole_number_in(text, &(1..=65_535))?;
     usize::try_from(count).map_err(|error| error.to_string())
+}
+
+fn frames_per_s(text: &str) -> Result<u16, String> {
+    let count = whole_number_in(text, &(1..=100))?;
+    u16::try_from(count).map_err(|error| error.to_string())
 }
 
 fn size(text: &str) -> Result<Size, String> {

@@ -1,5 +1,6 @@
 //! Draws states as pictures.
 
+pub(crate) mod apng;
 pub(crate) mod camera;
 pub(crate) mod extent;
 mod font;

@@ -44,13 +44,7 @@ pub(super) fn write(
 ) -> anyhow::Result<Written> {
     let mut files = WrittenFiles::new(existing);
     match write_files(snapshots, format, target, &mut files) {
-        Ok(()) => Ok(Written {
-            target: output::path_text(target),
-            file_count: files.paths().len(),
-            snapshot_count: snapshots.steps.len(),
-            first_step: snapshots.steps.first().copied().unwrap_or_default(),
-            last_step: snapshots.steps.last().copied().unwrap_or_default(),
-        }),
+        Ok(()) => Ok(Written::new(snapshots, target, files.paths().len())),
         Err(error) => {
             files.remove();
             Err(error)
@@ -73,6 +67,18 @@ fn write_files(
         DataFormat::Usda => files.add_streamed(target, |out| usda::write(snapshots, out)),
         DataFormat::Foxglove => files.add_streamed(target, |out| foxglove::write(snapshots, out)),
         DataFormat::Ros2 => ros2::write(snapshots, target, files),
+    }
+}
+
+impl Written {
+    pub(super) fn new(snapshots: &Snapshots<'_>, target: &Path, file_count: usize) -> Self {
+        Self {
+            target: output::path_text(target),
+            file_count,
+            snapshot_count: snapshots.steps.len(),
+            first_step: snapshots.steps.first().copied().unwrap_or_default(),
+            last_step: snapshots.steps.last().copied().unwrap_or_default(),
+        }
     }
 }
 

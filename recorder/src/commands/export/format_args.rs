@@ -15,6 +15,9 @@ pub(super) struct FormatArgs {
     /// Draw SVG files named `NAME_STEP.svg` into this folder. Creates the folder
     #[arg(long, value_name = "DIR")]
     svg: Option<PathBuf>,
+    /// Draw an animated PNG file, in real time [default: a frame for each 1/FPS of simulated time]
+    #[arg(long, value_name = "FILE")]
+    apng: Option<PathBuf>,
     /// Write arrays for NumPy: steps, times, positions, velocities, inverse masses and flags
     #[arg(long, value_name = "FILE")]
     npz: Option<PathBuf>,
@@ -50,6 +53,7 @@ pub(super) struct FormatArgs {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Format<'a> {
     Pictures(PictureFormat, &'a Path),
+    Animation(&'a Path),
     Data(DataFormat, &'a Path),
 }
 
@@ -57,7 +61,7 @@ impl Format<'_> {
     /// Returns the format of data, or `None` for pictures.
     pub(super) fn data(&self) -> Option<DataFormat> {
         match self {
-            Self::Pictures(..) => None,
+            Self::Pictures(..) | Self::Animation(_) => None,
             Self::Data(format, _) => Some(*format),
         }
     }
@@ -65,7 +69,7 @@ impl Format<'_> {
     /// Returns the file or the folder to write.
     pub(super) fn target(&self) -> &Path {
         match self {
-            Self::Pictures(_, target) | Self::Data(_, target) => target,
+            Self::Pictures(_, target) | Self::Animation(target) | Self::Data(_, target) => target,
         }
     }
 }
@@ -90,6 +94,7 @@ impl FormatArgs {
         let data = data
             .into_iter()
             .filter_map(|(path, format)| Some(Format::Data(format, path.as_deref()?)));
-        pictures.chain(data).next()
+        let animation = self.apng.as_deref().map(Format::Animation);
+        pictures.chain(animation).chain(data).next()
     }
 }

@@ -5,7 +5,10 @@ use std::path::Path;
 use recorder::Existing;
 use serde::Serialize;
 
+use super::data::Written;
 use crate::cli::output;
+use crate::export::data::written_files::WrittenFiles;
+use crate::export::pictures::apng::Animation;
 use crate::export::pictures::camera::{Basis, Camera, View};
 use crate::export::pictures::extent::ExtentTracker;
 use crate::export::pictures::mesh::Bend;
@@ -50,6 +53,27 @@ pub(super) fn draw(
         Ok(())
     })?;
     Ok(written)
+}
+
+/// Draws the snapshots as the frames of one animated PNG file.
+pub(super) fn animate(
+    snapshots: &Snapshots<'_>,
+    style: Style,
+    frames_per_s: u16,
+    path: &Path,
+    existing: Existing,
+) -> anyhow::Result<Written> {
+    let mut files = WrittenFiles::new(existing);
+    files.add_streamed(path, |out| {
+        let count = snapshots.steps.len();
+        let mut animation = Animation::begin(out, style.size, count, frames_per_s)?;
+        let renderer = renderer(snapshots, style)?;
+        snapshots.for_each(|state| {
+            animation.add(&renderer.draw(state, snapshots.time_s(state.row.step)))
+        })?;
+        animation.finish()
+    })?;
+    Ok(Written::new(snapshots, path, files.paths().len()))
 }
 
 /// Reads the selected states once, so that one camera shows all of them.

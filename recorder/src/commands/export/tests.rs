@@ -151,6 +151,33 @@ fn a_png_has_the_size_that_was_asked_for_and_several_colors() {
     assert!(counts.values().all(|count| *count < 160 * 120 * 9 / 10));
 }
 
+#[test]
+fn the_frames_of_an_animation_are_the_pictures() {
+    let file = record(TINY, 40);
+    let path = std::env::temp_dir().join(format!("recorder-apng-{}.png", std::process::id()));
+    with_snapshots(&file, Some(&[0, 20, 40]), |snapshots| {
+        pictures::animate(snapshots, STYLE, 50, &path, Existing::Refuse).unwrap();
+    });
+    let bytes = fs::read(&path).unwrap();
+    fs::remove_file(&path).unwrap();
+    let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    let control = *reader.info().animation_control().unwrap();
+    assert_eq!((control.num_frames, control.num_plays), (3, 0));
+    for picture in pictures(&file, &[0, 20, 40], STYLE) {
+        let mut frame = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut frame).unwrap();
+        let delay = reader.info().frame_control().unwrap();
+        assert_eq!((delay.delay_num, delay.delay_den), (1, 50));
+        let single = png::encode(&picture).unwrap();
+        let mut single = ::png::Decoder::new(Cursor::new(single)).read_info().unwrap();
+        let mut pixels = vec![0; single.output_buffer_size().unwrap()];
+        single.next_frame(&mut pixels).unwrap();
+        let rgb: Vec<u8> =
+            pixels.chunks_exact(4).flat_map(|pixel| pixel[..3].iter().copied()).collect();
+        assert!(frame == rgb);
+    }
+}
+
 /// Four particles in a square, two triangles with the edges 0-1, 1-2, 2-0 and 1-3, 3-2, and a
 /// diagonal of another kind across.
 fn square() -> SceneState {
@@ -343,6 +370,8 @@ fn options_select_the_snapshots_and_the_style() {
     };
     assert_eq!(selection("a.mcap --svg d").choice, Choice::Spread(8));
     assert_eq!(selection("a.mcap --npz d").choice, Choice::All);
+    let period = Choice::Every(Duration::from_millis(20));
+    assert_eq!(selection("a.mcap --apng f --fps 50").choice, period);
     assert_eq!(selection("a.mcap --svg d --frames 3").choice, Choice::Spread(3));
     let times = [1000, 500].map(Duration::from_millis).to_vec();
     assert_eq!(selection("a.mcap --svg d --at 1s --at 500ms").choice, Choice::At(times));
