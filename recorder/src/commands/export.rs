@@ -24,6 +24,7 @@ use crate::cli::progress::{progress_bar, progress_bytes};
 use crate::export::pictures::camera::View;
 use crate::export::pictures::mesh::Bend;
 use crate::export::pictures::shape::Size;
+use crate::export::pictures::target::Target;
 use crate::export::scene_state::{SceneState, visit_states};
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
 use data::DataFormat;
@@ -163,7 +164,8 @@ fn export<R: Read>(
     let existing = args.overwrite.existing();
     match *format {
         Format::Pictures(format, folder) => {
-            let written = pictures::draw(&snapshots, args.style(), (format, folder), existing)?;
+            let target = Target::new(folder, format, existing, &survey.run.scene_name);
+            let written = pictures::draw(&snapshots, args.style(), &target)?;
             let files: Vec<_> = written.iter().map(|picture| picture.file.as_str()).collect();
             output::result(args.as_json, &written, &files.join("\n"))
         }

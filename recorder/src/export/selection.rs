@@ -47,11 +47,7 @@ impl Selection {
     pub(crate) fn select(&self, steps: &[u64], rate_hz: u32) -> anyhow::Result<Vec<u64>> {
         let Some(first) = steps.first() else { return Ok(Vec::new()) };
         let times = Times { first: *first, rate_hz };
-        let steps = self.range.part(steps, times)?;
-        let mut places = self.choice.places(steps, times)?;
-        places.sort_unstable();
-        places.dedup();
-        Ok(places.into_iter().map(|place| steps[place]).collect())
+        self.choice.select(self.range.part(steps, times)?, times)
     }
 }
 
@@ -108,11 +104,12 @@ impl SnapshotRange {
 }
 
 impl Choice {
-    /// Returns the positions of the chosen steps. `steps` is not empty.
-    fn places(&self, steps: &[u64], times: Times) -> anyhow::Result<Vec<usize>> {
+    /// Returns the chosen steps. `steps` is not empty.
+    fn select(&self, steps: &[u64], times: Times) -> anyhow::Result<Vec<u64>> {
         let last = steps.len() - 1;
-        Ok(match self {
-            Self::All => (0..=last).collect(),
+        let mut places = match self {
+            // A list of their positions would take as much memory again.
+            Self::All => return Ok(steps.to_vec()),
             Self::Spread(1) => vec![last],
             Self::Spread(count) => {
                 let gaps = count.saturating_sub(1).clamp(1, last.max(1));
@@ -130,7 +127,10 @@ impl Choice {
                 }
                 places
             }
-        })
+        };
+        places.sort_unstable();
+        places.dedup();
+        Ok(places.into_iter().map(|place| steps[place]).collect())
     }
 }
 

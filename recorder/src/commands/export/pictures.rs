@@ -14,7 +14,7 @@ use crate::export::pictures::extent::ExtentTracker;
 use crate::export::pictures::mesh::Bend;
 use crate::export::pictures::renderer::Renderer;
 use crate::export::pictures::shape::Size;
-use crate::export::pictures::target::{PictureFormat, Target};
+use crate::export::pictures::target::Target;
 use crate::export::snapshots::Snapshots;
 
 /// The options that control the appearance of the pictures.
@@ -38,10 +38,8 @@ pub(super) struct WrittenPicture {
 pub(super) fn draw(
     snapshots: &Snapshots<'_>,
     style: Style,
-    (format, folder): (PictureFormat, &Path),
-    existing: Existing,
+    target: &Target<'_>,
 ) -> anyhow::Result<Vec<WrittenPicture>> {
-    let target = Target::new(folder, format, existing, &snapshots.run.scene_name);
     target.prepare(snapshots.steps)?;
     let renderer = renderer(snapshots, style)?;
     let mut written = Vec::new();

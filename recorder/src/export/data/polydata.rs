@@ -21,37 +21,39 @@ impl NumberType {
     }
 }
 
+/// The numbers of points and cells of a file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PolyDataCounts {
+    pub(super) points: usize,
+    pub(super) vertices: usize,
+    pub(super) lines: usize,
+    pub(super) polygons: usize,
+}
+
 /// A file that is being built.
 pub(super) struct PolyData {
     xml: String,
     /// The arrays, each with its length before it.
     appended: Vec<u8>,
-    piece: String,
 }
 
 impl PolyData {
-    /// Begins a file. The cells are vertices, lines and polygons.
-    pub(super) fn new(point_count: usize, [vertices, lines, polygons]: [usize; 3]) -> Self {
-        let xml = "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" \
-                   byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n";
-        let piece = format!(
-            "<Piece NumberOfPoints=\"{point_count}\" NumberOfVerts=\"{vertices}\" \
+    /// Begins the file of a state at a time, in seconds.
+    pub(super) fn new(counts: PolyDataCounts, time_s: f64) -> Self {
+        let PolyDataCounts { points, vertices, lines, polygons } = counts;
+        let xml = format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" \
+             byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n\
+             <FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" \
+             format=\"ascii\">{time_s:?}</DataArray></FieldData>\n\
+             <Piece NumberOfPoints=\"{points}\" NumberOfVerts=\"{vertices}\" \
              NumberOfLines=\"{lines}\" NumberOfStrips=\"0\" NumberOfPolys=\"{polygons}\">\n"
         );
-        Self { xml: xml.to_owned(), appended: Vec::new(), piece }
-    }
-
-    /// Adds a number that belongs to the whole file. Fields come before everything else.
-    pub(super) fn add_field(&mut self, name: &str, value: f64) {
-        self.xml.push_str(&format!(
-            "<FieldData><DataArray type=\"Float64\" Name=\"{name}\" NumberOfTuples=\"1\" \
-             format=\"ascii\">{value:?}</DataArray></FieldData>\n"
-        ));
+        Self { xml, appended: Vec::new() }
     }
 
     /// Begins a section of the piece.
     pub(super) fn begin(&mut self, section: &str) {
-        self.xml.push_str(&std::mem::take(&mut self.piece));
         self.xml.push_str(&format!("<{section}>\n"));
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sim_contract::ParticleState;
 
-use super::polydata::{NumberType, PolyData};
+use super::polydata::{NumberType, PolyData, PolyDataCounts};
 use super::written_files::WrittenFiles;
 use crate::export::frame_names::FrameNames;
 use crate::export::scene_state::SceneState;
@@ -54,9 +54,13 @@ fn polydata(state: &SceneState, time_s: f64) -> Vec<u8> {
         .chain(std::iter::repeat_n(f32::NAN, triangles.len()))
         .collect();
 
-    let mut file =
-        PolyData::new(state.particles.len(), [vertices.len(), lines.len(), triangles.len()]);
-    file.add_field("TimeValue", time_s);
+    let counts = PolyDataCounts {
+        points: state.particles.len(),
+        vertices: vertices.len(),
+        lines: lines.len(),
+        polygons: triangles.len(),
+    };
+    let mut file = PolyData::new(counts, time_s);
     file.begin("Points");
     file.add_array("positions", NumberType::Float32, 3, &column(state, |one| one.position));
     file.end("Points");
