@@ -82,7 +82,8 @@ pub(crate) struct ExportArgs {
         group = "selection", conflicts_with_all = ["from", "to"])]
     at: Vec<Duration>,
     /// Frames of an animation per second, 1 to 100
-    #[arg(long, value_name = "FPS", default_value_t = 25, allow_hyphen_values = true, value_parser = frames_per_s)]
+    #[arg(long, value_name = "FPS", default_value_t = 25, allow_hyphen_values = true,
+        value_parser = frames_per_s)]
     fps: u16,
     /// Width and height of pictures in pixels, 16 to 8192 each
     #[arg(long, value_name = "WxH", default_value = "960x720", allow_hyphen_values = true, value_parser = size)]
@@ -110,7 +111,6 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let needed = log.selection().require_all_particles("`recorder export`");
     needed.with_context(|| path.clone())?;
     let format = args.format.format().context("one of the formats is required")?;
-    args.check_selection(&format)?;
     refuse_own_input(&open_regular_file(&args.file)?, format.target())?;
     let survey = survey(args, log, &path)?;
     let selection = args.selection(&format);
@@ -182,16 +182,6 @@ fn export<R: Read>(
 }
 
 impl ExportArgs {
-    /// Refuses options without effect.
-    fn check_selection(&self, format: &Format<'_>) -> anyhow::Result<()> {
-        let has_part = self.from.or(self.to).is_some();
-        let has_choice = self.frames.is_some() || !self.at.is_empty();
-        if format.data() == Some(DataFormat::Foxglove) && (has_part || has_choice) {
-            bail!("--foxglove copies the whole recording; only --every applies, to /scene");
-        }
-        Ok(())
-    }
-
     fn selection(&self, format: &Format<'_>) -> Selection {
         let choice = match (self.every, self.frames) {
             (Some(period), _) => Choice::Every(period),

@@ -41,7 +41,7 @@ pub(super) struct FormatArgs {
     usda: Option<PathBuf>,
     /// Write a copy of the recording with /scene, which Foxglove viewers draw: constraints, triangles and
     /// colliders, 30 times per second of simulated time, or with --every
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(long, value_name = "FILE.mcap", conflicts_with_all = ["from", "to", "frames", "at"])]
     foxglove: Option<PathBuf>,
     /// Write a bag of ROS 2 into this folder: `PointCloud2` on `/particles`, and on `/tf_static` the turn of
     /// the scene's up axis to z

@@ -344,22 +344,16 @@ fn the_error_names_a_wrong_option() {
         ("a.mcap --png d --from soon", "it must be a step, such as 480, or a time with its unit"),
         ("a.mcap --png d --at 1s --from 2s", "cannot be used with"),
         ("a.mcap --png d --npz f", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --from 1s", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --to 480", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --frames 3", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --at 1s", "cannot be used with"),
+        ("a.mcap --apng f --fps 0", "it must be a whole number from 1 to 100"),
         ("a.mcap --png d --view below", "front, side, top, iso"),
     ] {
         let error = parse(line).unwrap_err();
         assert!(error.contains(word), "{line}: {error}");
     }
-}
-
-#[test]
-fn a_copy_takes_no_part_of_the_recording() {
-    for option in ["--from 1s", "--to 480", "--frames 3", "--at 1s"] {
-        let args = parse(&format!("a.mcap --foxglove b.mcap {option}")).unwrap();
-        let error = args.check_selection(&args.format.format().unwrap()).unwrap_err().to_string();
-        assert!(error.starts_with("--foxglove copies the whole recording"), "{error}");
-    }
-    let args = parse("a.mcap --foxglove b.mcap --every 100ms").unwrap();
-    args.check_selection(&args.format.format().unwrap()).unwrap();
 }
 
 #[test]
@@ -371,6 +365,8 @@ fn options_select_the_snapshots_and_the_style() {
     assert_eq!(selection("a.mcap --svg d").choice, Choice::Spread(8));
     assert_eq!(selection("a.mcap --npz d").choice, Choice::All);
     let period = Choice::Every(Duration::from_millis(20));
+    assert_eq!(selection("a.mcap --foxglove b.mcap").choice, Choice::Every(SCENE_PERIOD));
+    assert_eq!(selection("a.mcap --foxglove b.mcap --every 20ms").choice, period);
     assert_eq!(selection("a.mcap --apng f --fps 50").choice, period);
     assert_eq!(selection("a.mcap --svg d --frames 3").choice, Choice::Spread(3));
     let times = [1000, 500].map(Duration::from_millis).to_vec();

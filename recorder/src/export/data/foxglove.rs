@@ -20,10 +20,10 @@ pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::R
         copy.copy_through(state.row.step)?;
         let (channel, drawing) = match &mut drawing {
             Some(drawing) => drawing,
-            none => {
+            unset => {
                 // Only now, because numbers of channels are those of the source.
                 let channel = copy.add_channel(SCENE_TOPIC, &scene_format())?;
-                none.insert((channel, SceneDrawing::new(mesh(state))))
+                unset.insert((channel, SceneDrawing::new(mesh(state))))
             }
         };
         drawing.set_colliders(&state.collider_states());
