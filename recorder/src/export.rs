@@ -1,14 +1,8 @@
-//! Draws the states of a recording as pictures.
+//! Turns the states of a recording into files of other programs.
 
-pub(crate) mod camera;
-pub(crate) mod extent;
-mod font;
-pub(crate) mod mesh;
-pub(crate) mod png;
-pub(crate) mod renderer;
+pub(crate) mod data;
+pub(crate) mod frame_names;
+pub(crate) mod pictures;
 pub(crate) mod scene_state;
 pub(crate) mod selection;
-pub(crate) mod shape;
-mod solids;
-pub(crate) mod svg;
-pub(crate) mod target;
+pub(crate) mod snapshots;

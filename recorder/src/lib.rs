@@ -50,7 +50,9 @@
 #![forbid(unsafe_code)]
 
 mod log;
+mod scene_drawing;
 
 pub use log::*;
+pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
 pub use sim_contract::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;

@@ -4,7 +4,7 @@
 mod backlog;
 mod command_file;
 mod container;
-mod encoding;
+pub(crate) mod encoding;
 mod index;
 mod message;
 mod read;
@@ -23,7 +23,10 @@ pub use container::finding::{CheckExtent, CheckReport, Cure, Finding, Findings};
 pub use container::losses::{Losses, LostSteps};
 pub use container::lost_load::{LoadRows, LostLoad};
 pub use container::repair::{RepairError, RepairReport, repair_file};
-pub use encoding::{MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform};
+pub use encoding::{
+    MAP_FRAME, MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform,
+    map_from_world, scene_format,
+};
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;
 pub use read::audit::{Audit, AuditDifference};

@@ -50,7 +50,7 @@ enum Command {
     Check(check::CheckArgs),
     /// Show where two recordings come apart, and how their distance grows
     Diff(diff::DiffArgs),
-    /// Draw pictures of a recording
+    /// Turn a recording into pictures, or into files of other programs
     Export(export_command::ExportArgs),
     /// Show what a recording contains
     Info(info::InfoArgs),

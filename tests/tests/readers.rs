@@ -158,3 +158,53 @@ fn a_foreign_process_that_floods_ready_and_restore_changes_nothing() {
     assert!(!verified.contains("taken from the file"), "{verified}");
     assert_eq!(node.interrupt().code, Some(0));
 }
+
+/// Records a curtain that is cut, exports it in a format, and requires that the reader of another project
+/// finds `snapshot_count` snapshots with the recorded bits.
+fn assert_export_is_read(format: &str, target: &str, snapshot_count: u64) {
+    let sandbox = Sandbox::new();
+    let (file, target) = (sandbox.path("run.mcap"), sandbox.path(target));
+    let cut = r#"{"step":20,"kind":"cut_radius","center":[0,1,0],"radius":0.15}"#;
+    let commands = sandbox.write("cut.jsonl", cut);
+    let args = ["simulate", "curtain", "--steps", "60", "--commands", &commands, "-o", &file];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let option = format!("--{format}");
+    Process::run(Program::Recorder, &sandbox, &["export", &file, &option, &target]).success();
+    let read = python(&sandbox, "read_export.py", &[format, &file, &target]);
+    assert!(read["torn"].as_u64() > Some(5), "{read}");
+    assert_eq!((&read["snapshots"], &read["recorded"]), (&json!(snapshot_count), &json!(61)));
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn numpy_and_the_csv_module_read_the_recorded_bits() {
+    assert_export_is_read("npz", "run.npz", 61);
+    assert_export_is_read("csv", "run.csv", 61);
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn vtk_reads_the_recorded_bits_without_torn_constraints() {
+    assert_export_is_read("vtk", "vtk", 61);
+    assert_export_is_read("obj", "obj", 61);
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn a_parser_of_pc2_and_the_library_of_usd_read_the_recorded_bits() {
+    assert_export_is_read("pc2", "run.pc2", 61);
+    assert_export_is_read("usda", "run.usda", 61);
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn the_stock_python_reader_finds_every_message_and_the_scene_in_a_copy_for_viewers() {
+    // Steps 0 to 60 at 240 Hz, each eighth one.
+    assert_export_is_read("foxglove", "scene.mcap", 8);
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn the_decoders_of_ros_2_read_the_recorded_bits_upright() {
+    assert_export_is_read("ros2", "bag", 61);
+}

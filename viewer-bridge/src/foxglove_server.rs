@@ -8,7 +8,6 @@ mod client_events;
 mod options;
 mod parameter_requests;
 mod parameters;
-mod picture;
 mod playback;
 mod proxy;
 mod published_command;

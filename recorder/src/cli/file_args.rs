@@ -1,8 +1,12 @@
-//! Options of the subcommands that write a recording.
+//! Options of the subcommands that write files.
 
+use std::fs::{self, File};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use recorder::{Compression, Existing, LogOptions, LogWriter, PartFile, RunDescription};
+use sim_contract::part_path;
 
 /// The option to replace existing files.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -113,4 +117,20 @@ pub(crate) fn default_path(stem: &str, now_ns: u64) -> PathBuf {
     let now = std::time::UNIX_EPOCH + std::time::Duration::from_nanos(now_ns);
     let time = humantime::format_rfc3339_seconds(now).to_string().replace(':', "-");
     PathBuf::from(format!("{stem}_{time}.mcap"))
+}
+
+/// Refuses an output that would replace the input: its own name, or its name without `.part`, whose
+/// `.part` file it is.
+pub(crate) fn refuse_own_input(input: &File, output: &Path) -> anyhow::Result<()> {
+    let input = input.metadata()?;
+    for path in [output.to_owned(), part_path(output)] {
+        let Ok(existing) = fs::metadata(&path) else { continue };
+        if (existing.dev(), existing.ino()) == (input.dev(), input.ino()) {
+            bail!(
+                "{}: this is the input, or the name under which the output is written; choose another name",
+                path.display()
+            );
+        }
+    }
+    Ok(())
 }

@@ -1,115 +1,104 @@
-//! `recorder export`: draws pictures of a recording.
+//! `recorder export`: turns a recording into files of other programs.
 
+mod data;
+mod format_args;
+mod pictures;
+mod survey;
 #[cfg(test)]
 mod tests;
 
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::{ContentSelection, FrameReader, LogEnd, LogReader, ReadError, RunDescription};
-use serde::Serialize;
+use recorder::{ContentSelection, LogEnd, LogReader, ReadError, open_regular_file};
 use sim_contract::Stop;
-use sim_solver::Scene;
-use sim_solver::scene::Up;
 
 use crate::cli::exit::Exit;
-use crate::cli::file_args::OverwriteArgs;
+use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number_in};
-use crate::export::camera::{Basis, Camera, View};
-use crate::export::extent::ExtentTracker;
-use crate::export::mesh::Bend;
-use crate::export::renderer::Renderer;
-use crate::export::scene_state::visit_states;
-use crate::export::selection::Selection;
-use crate::export::shape::Size;
-use crate::export::target::{Format, Target};
-use crate::input::scene_source::scene_in_recording;
+use crate::cli::progress::{progress_bar, progress_bytes};
+use crate::export::pictures::camera::View;
+use crate::export::pictures::mesh::Bend;
+use crate::export::pictures::shape::Size;
+use crate::export::pictures::target::Target;
+use crate::export::scene_state::{SceneState, visit_states};
+use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
+use data::DataFormat;
+use format_args::{Format, FormatArgs};
+use pictures::Style;
+use survey::Survey;
 
 /// Number of pictures without an option that selects them.
 const FRAMES_DEFAULT: usize = 8;
-/// Most snapshots of a recording to draw: 19 hours at 240 Hz. Their steps take 128 MiB of memory.
-const SNAPSHOTS_MAX: usize = 1 << 24;
+/// Bytes that a file is read ahead.
+const BUFFER_SIZE_BYTES: usize = 1 << 18;
+/// Simulated time between two messages on `/scene`.
+const SCENE_PERIOD: Duration = Duration::from_nanos(33_333_333);
 /// Longest and shortest side of a picture, in pixels. A picture takes 4 bytes of memory per pixel.
 const SIDE_MAX: u32 = 8192;
 const SIDE_MIN: u32 = 16;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    group = clap::ArgGroup::new("format").required(true),
     group = clap::ArgGroup::new("selection"),
-    after_help = "Draws colliders, surface triangles, constraints (structural dark, shear lighter, \
-    bend dashed, tether dotted; torn ones are left out) and particles (pinned: red squares; grabbed \
-    orange, anchored green, frozen magenta). All pictures of a call have the same scale.\n\n\
-    Exit codes: 0 drawn; 1 failed; 3 the file is truncated or damaged and was drawn as far as it \
-    goes.\n\nExamples:\n  \
+    after_help = "Pictures show colliders, surface triangles, constraints (structural dark, shear \
+    lighter, bend dashed, tether dotted; torn ones are left out) and particles (pinned: red squares; \
+    grabbed orange, anchored green, frozen magenta). All pictures of a call have the same scale. \
+    Without an option that selects snapshots there are 8 of them; other formats have every \
+    snapshot.\n\n\
+    Coordinates are those of the recording, in m, relative to the origin of the scene: no format \
+    turns the scene.\n\n\
+    Exit codes: 0 exported; 1 failed; 3 the file is truncated or damaged and was exported as far as \
+    it goes.\n\nExamples:\n  \
     recorder export run.mcap --png pictures\n  \
     recorder export run.mcap --png pictures --every 100ms --view front --size 1280x720\n  \
-    recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite"
+    recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite\n  \
+    recorder export run.mcap --apng run.png --to 5s --size 480x360\n  \
+    recorder export run.mcap --npz run.npz --from 2s --to 5s"
 )]
 pub(crate) struct ExportArgs {
-    /// Recording to draw
+    /// Recording to export
     file: PathBuf,
-    /// Write PNG files named `NAME_STEP.png` into this folder. Creates the folder
-    #[arg(long, value_name = "DIR", group = "format")]
-    png: Option<PathBuf>,
-    /// Write SVG files named `NAME_STEP.svg` into this folder. Creates the folder
-    #[arg(long, value_name = "DIR", group = "format")]
-    svg: Option<PathBuf>,
-    /// Draw a picture at the start and after each period of simulated time, such as 500ms
+    #[command(flatten)]
+    format: FormatArgs,
+    /// Begin here: a step such as 480, or a simulated time after the first snapshot such as 2s
+    #[arg(long, value_name = "STEP|TIME", allow_hyphen_values = true, value_parser = moment)]
+    from: Option<Moment>,
+    /// End here, inclusive: a step or a simulated time
+    #[arg(long, value_name = "STEP|TIME", allow_hyphen_values = true, value_parser = moment)]
+    to: Option<Moment>,
+    /// Export a snapshot at the start and after each period of simulated time, such as 500ms
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = period, group = "selection")]
     every: Option<Duration>,
-    /// Draw N pictures, evenly spaced from the first to the last snapshot [default: 8]
+    /// Export N snapshots, evenly spaced from the first to the last one
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = frames, group = "selection")]
     frames: Option<usize>,
-    /// Draw a picture at this simulated time after the first snapshot. Can be repeated
-    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration, group = "selection")]
+    /// Export a snapshot at this simulated time after the first one. Can be repeated
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration,
+        group = "selection", conflicts_with_all = ["from", "to"])]
     at: Vec<Duration>,
-    /// Width and height in pixels, 16 to 8192 each
+    /// Frames of an animation per second, 1 to 100
+    #[arg(long, value_name = "FPS", default_value_t = 25, allow_hyphen_values = true,
+        value_parser = frames_per_s)]
+    fps: u16,
+    /// Width and height of pictures in pixels, 16 to 8192 each
     #[arg(long, value_name = "WxH", default_value = "960x720", allow_hyphen_values = true, value_parser = size)]
     size: Size,
-    /// Direction of view [default: front for a 2-D scene, along the thin axis of a flat scene, else
-    /// iso]
+    /// Direction of view of pictures [default: front for a 2-D scene, along the thin axis of a flat
+    /// scene, else iso]
     #[arg(long, value_enum)]
     view: Option<View>,
-    /// Leave out bend constraints
+    /// Leave bend constraints out of pictures
     #[arg(long)]
     no_bend: bool,
     #[command(flatten)]
     overwrite: OverwriteArgs,
     #[command(flatten)]
     as_json: AsJson,
-}
-
-/// A written picture, as printed.
-#[derive(Debug, Serialize)]
-struct WrittenPicture {
-    file: String,
-    step: u64,
-    /// Simulated time since the first snapshot.
-    time_s: f64,
-}
-
-/// The options that control the appearance of the pictures.
-#[derive(Debug, Clone, Copy)]
-struct Style {
-    size: Size,
-    view: Option<View>,
-    bend: Bend,
-}
-
-/// The properties of a recording that the drawing needs.
-#[derive(Debug)]
-struct Survey {
-    run: RunDescription,
-    /// The scene, which gives the up axis, or the reason why there is none.
-    scene: Result<Scene, String>,
-    /// Steps of all snapshots, ascending.
-    steps: Vec<u64>,
-    end: LogEnd,
 }
 
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
@@ -121,120 +110,115 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     needed.with_context(|| path.clone())?;
     let needed = log.selection().require_all_particles("`recorder export`");
     needed.with_context(|| path.clone())?;
-    let survey = Survey::read(log, &path)?;
-    let selection = args.selection();
+    let format = args.format.format().context("one of the formats is required")?;
+    refuse_own_input(&open_regular_file(&args.file)?, format.target())?;
+    let survey = survey(args, log, &path)?;
+    let selection = args.selection(&format);
     let steps =
         selection.select(&survey.steps, survey.run.rate_hz).with_context(|| path.clone())?;
     if steps.is_empty() {
-        bail!("{path}: has no snapshot to draw (the file is {})", survey.end);
+        bail!("{path}: has no snapshot to export (the file is {})", survey.end);
     }
     if let Err(reason) = &survey.scene {
-        output::note(&format!("warning: {reason}; drawn with y up"));
+        output::note(&format!("warning: {reason}; exported with y up"));
     }
-    let target = args.target(&survey.run);
-    target.prepare(&steps)?;
-    let renderer = renderer(open, &survey, &steps, args.style()).with_context(|| path.clone())?;
+    export(args, &survey, &steps, &format, open)?;
+    if survey.end == LogEnd::Complete {
+        return Ok(Exit::Done);
+    }
+    output::warn_incomplete(&args.file, &survey.end, "exported as far as it goes");
+    Ok(Exit::Loss)
+}
 
-    let mut written = Vec::new();
-    visit_states(open()?, &steps, |state| {
-        if stop.is_requested() {
-            return Ok(ControlFlow::Break(()));
+/// Reads the whole recording, with a progress bar.
+fn survey<R: Read>(args: &ExportArgs, log: LogReader<R>, path: &str) -> anyhow::Result<Survey> {
+    let size_bytes = std::fs::metadata(&args.file).map_or(0, |file| file.len());
+    let bar = progress_bytes(size_bytes);
+    let survey = Survey::read(log, path, |bytes| bar.set_position(bytes));
+    bar.finish_and_clear();
+    survey
+}
+
+/// Writes the files and prints the result.
+fn export<R: Read>(
+    args: &ExportArgs,
+    survey: &Survey,
+    steps: &[u64],
+    format: &Format<'_>,
+    open: impl Fn() -> Result<LogReader<R>, ReadError>,
+) -> anyhow::Result<()> {
+    let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
+        let bar = progress_bar(steps.len() as u64);
+        let visited = visit_states(open()?, steps, |state| {
+            bar.inc(1);
+            visitor(state)
+        });
+        bar.finish_and_clear();
+        visited.with_context(|| output::path_text(&args.file))
+    };
+    let open_bytes = || {
+        let file = open_regular_file(&args.file)?.take(survey.intact_count);
+        Ok(Box::new(BufReader::with_capacity(BUFFER_SIZE_BYTES, file)) as Box<dyn Read>)
+    };
+    let snapshots = survey.snapshots(steps, &visit, &open_bytes);
+    let existing = args.overwrite.existing();
+    match *format {
+        Format::Pictures(format, folder) => {
+            let target = Target::new(folder, format, existing, &survey.run.scene_name);
+            let written = pictures::draw(&snapshots, args.style(), &target)?;
+            let files: Vec<_> = written.iter().map(|picture| picture.file.as_str()).collect();
+            output::result(args.as_json, &written, &files.join("\n"))
         }
-        let step = state.row.step;
-        let time_s = survey.time_s(step);
-        let file = target.write(step, &renderer.draw(state, time_s))?;
-        written.push(WrittenPicture { file: output::path_text(&file), step, time_s });
-        Ok(ControlFlow::Continue(()))
-    })
-    .with_context(|| path.clone())?;
-
-    let files: Vec<_> = written.iter().map(|picture| picture.file.as_str()).collect();
-    output::result(args.as_json, &written, &files.join("\n"))?;
-    if survey.end != LogEnd::Complete {
-        output::warn_incomplete(&args.file, &survey.end, "drawn as far as it goes");
+        Format::Animation(path) => {
+            let style = args.style();
+            let written = pictures::animate(&snapshots, style, args.fps, path, existing)?;
+            output::result(args.as_json, &written, &written.to_string())
+        }
+        Format::Data(format, target) => {
+            let written = data::write(&snapshots, format, target, existing)?;
+            output::result(args.as_json, &written, &written.to_string())
+        }
     }
-    let is_complete = survey.end == LogEnd::Complete && written.len() == steps.len();
-    Ok(if is_complete { Exit::Done } else { Exit::Loss })
 }
 
 impl ExportArgs {
-    fn selection(&self) -> Selection {
-        match (self.every, self.frames) {
-            (Some(period), _) => Selection::Every(period),
-            (_, Some(count)) => Selection::Spread(count),
-            _ if !self.at.is_empty() => Selection::At(self.at.clone()),
-            _ => Selection::Spread(FRAMES_DEFAULT),
-        }
+    fn selection(&self, format: &Format<'_>) -> Selection {
+        let choice = match (self.every, self.frames) {
+            (Some(period), _) => Choice::Every(period),
+            (_, Some(count)) => Choice::Spread(count),
+            _ if !self.at.is_empty() => Choice::At(self.at.clone()),
+            _ if matches!(format, Format::Pictures(..)) => Choice::Spread(FRAMES_DEFAULT),
+            _ if matches!(format, Format::Animation(_)) => {
+                Choice::Every(Duration::from_secs(1) / u32::from(self.fps))
+            }
+            _ if format.data() == Some(DataFormat::Foxglove) => Choice::Every(SCENE_PERIOD),
+            _ => Choice::All,
+        };
+        Selection { range: SnapshotRange { from: self.from, to: self.to }, choice }
     }
 
     fn style(&self) -> Style {
         let bend = if self.no_bend { Bend::Hide } else { Bend::Draw };
         Style { size: self.size, view: self.view, bend }
     }
-
-    fn target(&self, run: &RunDescription) -> Target<'_> {
-        let (folder, format) = match (&self.png, &self.svg) {
-            (Some(folder), _) => (folder.as_path(), Format::Png),
-            (None, folder) => (folder.as_deref().unwrap_or(Path::new(".")), Format::Svg),
-        };
-        Target::new(folder, format, self.overwrite.existing(), &run.scene_name)
-    }
 }
 
-impl Survey {
-    /// Reads the whole recording for its steps and its end.
-    fn read<R: Read>(log: LogReader<R>, path: &str) -> anyhow::Result<Self> {
-        let scene = scene_in_recording(&log).map_err(|error| format!("{path}: {error:#}"));
-        let run = log.run().clone();
-        let mut frames = FrameReader::new(log);
-        let mut steps = Vec::new();
-        while let Some(frame) = frames.next_frame().with_context(|| path.to_owned())? {
-            if steps.len() == SNAPSHOTS_MAX {
-                bail!("{path}: has more than {SNAPSHOTS_MAX} snapshots");
-            }
-            steps.push(frame.row.step);
-        }
-        let end = frames.end().cloned().unwrap_or(LogEnd::Complete);
-        Ok(Self { run, scene, steps, end })
-    }
-
-    /// Returns the simulated time since the first snapshot.
-    fn time_s(&self, step: u64) -> f64 {
-        let first = self.steps.first().copied().unwrap_or(step);
-        step.saturating_sub(first) as f64 / f64::from(self.run.rate_hz)
-    }
-}
-
-/// Reads the selected states once, so that one camera shows all of them.
-fn renderer<R: Read>(
-    open: impl Fn() -> Result<LogReader<R>, ReadError>,
-    survey: &Survey,
-    steps: &[u64],
-    style: Style,
-) -> anyhow::Result<Renderer> {
-    let mut tracker = ExtentTracker::default();
-    visit_states(open()?, steps, |state| {
-        tracker.add(state);
-        Ok(ControlFlow::Continue(()))
-    })?;
-    let extent = tracker.extent();
-    let scene = survey.scene.as_ref().ok();
-    let up = scene.map_or(Up::Y, |scene| scene.up);
-    let is_2d = scene.is_some_and(|scene| scene.dimensions == 2);
-    let default_view = || if is_2d { View::Front } else { View::best_for(&extent, up) };
-    let view = style.view.unwrap_or_else(default_view);
-    Ok(Renderer {
-        camera: Camera::fit(Basis::new(view, up), &extent, style.size),
-        extent,
-        size: style.size,
-        bend: style.bend,
-        scene_name: survey.run.scene_name.clone(),
+fn moment(text: &str) -> Result<Moment, String> {
+    let step = text.parse().map(Moment::Step);
+    let time = || parse::duration(text).map(Moment::Time);
+    step.or_else(|_| time()).map_err(|_| {
+        "it must be a step, such as 480, or a time with its unit, such as 2s".to_owned()
     })
 }
 
 fn frames(text: &str) -> Result<usize, String> {
     let count = whole_number_in(text, &(1..=65_535))?;
     usize::try_from(count).map_err(|error| error.to_string())
+}
+
+fn frames_per_s(text: &str) -> Result<u16, String> {
+    let count = whole_number_in(text, &(1..=100))?;
+    u16::try_from(count).map_err(|error| error.to_string())
 }
 
 fn size(text: &str) -> Result<Size, String> {

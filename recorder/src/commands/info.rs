@@ -16,7 +16,7 @@ use recorder::{LogEnd, LogReader, Message, PartFile};
 use crate::cli::exit::Exit;
 use crate::cli::file_args::OverwriteArgs;
 use crate::cli::output::{self, AsJson};
-use crate::export::svg;
+use crate::export::pictures::svg;
 use columns::{ColumnCollector, Columns};
 use graph::{COLUMNS_MAX, Graph};
 use report::Info;

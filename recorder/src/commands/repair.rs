@@ -2,21 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::{self, File};
-use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use recorder::{
     Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow, Topic,
     TopologyRow, open_regular_file, repair_file,
 };
 use serde::Serialize;
-use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, part_path, printable_line};
+use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, printable_line};
 use sim_solver::{Scene, Solver};
 
 use crate::cli::exit::Exit;
-use crate::cli::file_args::OverwriteArgs;
+use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::progress::progress_bytes;
 use crate::simulation::state_writer::constraint_state;
@@ -139,23 +138,6 @@ fn lost_load(report: &RepairReport) -> Option<LoadRows> {
         topology: TopologyRow { torn: lost.torn.clone(), ..topology },
         surface: SurfaceRow::new(&header, &triangles),
     })
-}
-
-/// Refuses an output that would replace the input: its own name, or its name without `.part`, whose
-/// `.part` file it is.
-fn refuse_own_input(input: &File, output: &Path) -> anyhow::Result<()> {
-    let input = input.metadata()?;
-    for path in [output.to_owned(), part_path(output)] {
-        let Ok(existing) = fs::metadata(&path) else { continue };
-        if (existing.dev(), existing.ino()) == (input.dev(), input.ino()) {
-            bail!(
-                "{}: this is the input, or the name under which the output is written; choose another \
-                 name for OUT",
-                path.display()
-            );
-        }
-    }
-    Ok(())
 }
 
 impl<'a> Repaired<'a> {

@@ -1,11 +1,16 @@
 //! The state of a recording at the snapshots to draw.
 
+use std::collections::BTreeSet;
 use std::io::Read;
 use std::ops::ControlFlow;
 
 use anyhow::{Context, bail};
-use recorder::{ColliderRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker};
-use sim_contract::{ConstraintState, ParticleState, Torn, Triangle};
+use recorder::{
+    ColliderRow, CollidersRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker,
+};
+use sim_contract::{ColliderState, ConstraintKind, ConstraintState, ParticleState, Torn, Triangle};
+
+const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 
 /// The state at one snapshot.
 #[derive(Debug, Clone, Default)]
@@ -88,6 +93,43 @@ impl SceneState {
         Ok(())
     }
 
+    /// Returns the colliders as a node publishes them.
+    pub(crate) fn collider_states(&self) -> Vec<ColliderState> {
+        let (step, colliders) = (self.row.step, self.colliders.clone());
+        CollidersRow { step, colliders }.states()
+    }
+
+    /// Returns the constraints that are not torn.
+    pub(crate) fn untorn_constraints(&self) -> impl Iterator<Item = &ConstraintState> {
+        let constraints = self.constraints.iter().zip(&self.is_torn);
+        constraints.filter(|(_, is_torn)| !**is_torn).map(|(constraint, _)| constraint)
+    }
+
+    /// Returns the index and the corners of each triangle without a torn structural edge.
+    pub(crate) fn intact_triangles(&self) -> impl Iterator<Item = (usize, [u32; 3])> {
+        let torn_edges: BTreeSet<_> = (self.constraints.iter().zip(&self.is_torn))
+            .filter(|(constraint, is_torn)| **is_torn && constraint.kind == STRUCTURAL_KIND)
+            .map(|(constraint, _)| edge(constraint.a, constraint.b))
+            .collect();
+        let is_intact = move |[a, b, c]: [u32; 3]| {
+            let edges = [edge(a, b), edge(b, c), edge(c, a)];
+            torn_edges.is_empty() || !edges.iter().any(|edge| torn_edges.contains(edge))
+        };
+        let triangles = self.triangles.iter().map(|triangle| triangle.corners).enumerate();
+        triangles.filter(move |(_, corners)| is_intact(*corners))
+    }
+
+    /// Returns for each particle whether an untorn constraint or a triangle uses it.
+    pub(crate) fn connected(&self) -> Vec<bool> {
+        let mut is_connected = vec![false; self.particles.len()];
+        let ends = self.untorn_constraints().flat_map(|constraint| [constraint.a, constraint.b]);
+        let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);
+        for index in ends.chain(corners) {
+            is_connected[index as usize] = true;
+        }
+        is_connected
+    }
+
     /// Checks that all constraints and triangles refer to existing particles.
     pub(crate) fn check_indices(&self) -> anyhow::Result<()> {
         let ends = self.constraints.iter().flat_map(|constraint| [constraint.a, constraint.b]);
@@ -101,4 +143,9 @@ impl SceneState {
             _ => Ok(()),
         }
     }
+}
+
+/// Returns the edge with its ends in ascending order.
+fn edge(a: u32, b: u32) -> (u32, u32) {
+    (a.min(b), a.max(b))
 }

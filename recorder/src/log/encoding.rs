@@ -3,7 +3,8 @@
 pub(in crate::log) mod channel;
 mod descriptor;
 mod json_schema;
-mod protobuf;
+pub(crate) mod protobuf;
+pub(crate) mod scene_messages;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,10 +16,10 @@ use super::rows::{
     TopologyRow,
 };
 use super::topic::Topic;
-use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, file_descriptor_set};
+use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, SCENE_UPDATE, file_descriptor_set};
 use json_schema::row_schema;
+pub use protobuf::{MAP_FRAME, WORLD_FRAME, encode_transform, map_from_world};
 use protobuf::{PointCloudEncoder, encode_keyframe};
-pub use protobuf::{WORLD_FRAME, encode_transform};
 pub(super) use protobuf::{decode_keyframe, decode_particles, particle_bytes};
 
 /// The encoding of a topic.
@@ -59,6 +60,11 @@ impl TopicFormat {
             Topic::Particles => protobuf_format(POINT_CLOUD),
         }
     }
+}
+
+/// Returns the format of `/scene`, a topic that viewers draw and recordings lack.
+pub fn scene_format() -> TopicFormat {
+    protobuf_format(SCENE_UPDATE)
 }
 
 fn json_format<T: JsonSchema>(name: &'static str) -> TopicFormat {

@@ -100,6 +100,50 @@ fn export_names_a_file_that_it_cannot_draw_and_draws_a_truncated_one() {
 }
 
 #[test]
+fn export_never_replaces_its_recording_and_refuses_an_empty_range() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.path("run.mcap");
+    recorder(&sandbox, &["simulate", "rope", "--steps", "24", "-o", &run]).success();
+    let before = std::fs::read(&run).unwrap();
+    for option in ["--npz", "--csv", "--pc2", "--usda", "--vtk", "--png"] {
+        let refused = recorder(&sandbox, &["export", &run, option, &run, "--overwrite"]);
+        assert_refused(&refused, &[&run, "this is the input", "choose another name"]);
+    }
+    assert_eq!(std::fs::read(&run).unwrap(), before);
+    let table = sandbox.path("run.csv");
+    let refused = recorder(&sandbox, &["export", &run, "--csv", &table, "--from", "1h"]);
+    assert_refused(&refused, &[&run, "select no snapshot", "0 (0 s) to 24 (0.100 s)"]);
+    assert!(!std::path::Path::new(&table).exists());
+    let args = ["export", &run, "--csv", &table, "--from", "50ms", "--to", "13", "--json"];
+    let written = recorder(&sandbox, &args).success();
+    assert!(
+        written.contains("\"snapshot_count\":2,\"first_step\":12,\"last_step\":13"),
+        "{written}"
+    );
+    let rows = std::fs::read_to_string(&table).unwrap();
+    assert!(rows.lines().skip(1).all(|row| row.starts_with("12,") || row.starts_with("13,")));
+    assert_refused(&recorder(&sandbox, &args), &[&table, "exists", "--overwrite"]);
+}
+
+#[test]
+fn a_truncated_recording_is_exported_as_far_as_it_goes() {
+    let sandbox = Sandbox::new();
+    let (whole, cut) = (sandbox.path("whole.mcap"), sandbox.path("cut.mcap"));
+    recorder(&sandbox, &["simulate", "rope", "--steps", "2400", "-o", &whole]).success();
+    let bytes = std::fs::read(&whole).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() * 6 / 10]).unwrap();
+    let table = sandbox.path("cut.csv");
+    let exported = recorder(&sandbox, &["export", &cut, "--csv", &table, "--every", "1s"]);
+    assert_eq!(exported.code, Some(3), "{exported:?}");
+    assert!(exported.stderr.contains("exported as far as it goes"), "{exported:?}");
+    let text = std::fs::read_to_string(&table).unwrap();
+    let steps: std::collections::BTreeSet<_> =
+        text.lines().skip(1).map(|row| row.split(',').next().unwrap()).collect();
+    assert!(steps.contains("0") && steps.contains("240"), "{steps:?}");
+    assert!(!steps.contains("2400"), "{steps:?}");
+}
+
+#[test]
 fn a_start_after_the_end_is_refused_with_the_time_of_the_last_snapshot() {
     let sandbox = Sandbox::new();
     let run = sandbox.path("run.mcap");
@@ -160,6 +204,8 @@ fn an_output_that_is_not_a_file_is_refused_at_the_start_even_with_overwrite() {
         (vec!["scene", &run, "-o", &folder], format!("{folder} is a directory")),
         (vec!["scene", &run, "-o", &pipe], format!("{pipe} is a named pipe (FIFO)")),
         (vec!["export", &run, "--png", &pictures], format!("{picture} is a named pipe (FIFO)")),
+        (vec!["export", &run, "--npz", &folder], format!("{folder} is a directory")),
+        (vec!["export", &run, "--usda", &pipe], format!("{pipe} is a named pipe (FIFO)")),
     ] {
         for overwrite in [&[][..], &["--overwrite"]] {
             let refused = recorder(&sandbox, &[&args, overwrite].concat());
@@ -168,9 +214,9 @@ fn an_output_that_is_not_a_file_is_refused_at_the_start_even_with_overwrite() {
         }
     }
     assert_eq!(std::fs::read_dir(&pictures).unwrap().count(), 1, "no picture was drawn");
-    for not_a_folder in [&run, &pipe] {
-        let refused = recorder(&sandbox, &["export", &run, "--png", not_a_folder, "--overwrite"]);
-        let problem = format!("{not_a_folder} is not a folder; name a folder for the pictures");
+    for (option, not_a_folder) in [("--png", &pipe), ("--obj", &pipe), ("--vtk", &picture)] {
+        let refused = recorder(&sandbox, &["export", &run, option, not_a_folder, "--overwrite"]);
+        let problem = format!("{not_a_folder} is not a folder; name a folder for the files");
         assert_eq!((refused.code, refused.stderr), (Some(1), format!("error: {problem}\n")));
     }
     for part in [folder + ".part", pipe + ".part"] {

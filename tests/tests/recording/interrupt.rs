@@ -1,6 +1,6 @@
 //! Ctrl-C ends every program while it reads a large recording.
 
-use integration_tests::{Process, Program, Sandbox, Signal};
+use integration_tests::{Process, Program, Sandbox, Signal, wait_for};
 
 use super::raw::small;
 
@@ -29,9 +29,16 @@ fn every_reader_of_a_recording_stops_at_a_signal() {
     let commands = ["simulate", "rope", "--steps", "1", "--commands", file.as_str()];
     // To draw them all would take a minute.
     let export = ["export", &file, "--png", &pictures, "--frames", "400"];
+    let (table, vtk) = (sandbox.path("table.csv"), sandbox.path("vtk"));
     for Reader { args, code, output } in [
         Reader { args: vec!["verify", &file], code: 1, output: "interrupted" },
         Reader { args: export.to_vec(), code: 1, output: "interrupted" },
+        Reader { args: vec!["export", &file, "--csv", &table], code: 1, output: "interrupted" },
+        Reader {
+            args: vec!["export", &file, "--vtk", &vtk, "--every", "20ms"],
+            code: 1,
+            output: "interrupted",
+        },
         Reader { args: late.to_vec(), code: 0, output: "" },
         Reader { args: commands.to_vec(), code: 1, output: "interrupted" },
     ] {
@@ -42,6 +49,29 @@ fn every_reader_of_a_recording_stops_at_a_signal() {
         let text = finished.stdout + &finished.stderr;
         assert!(text.contains(output), "{args:?}: {text}");
     }
+}
+
+/// The other tests end programs while they read the recording for the first time.
+#[test]
+fn an_export_that_is_interrupted_while_it_writes_leaves_no_file() {
+    let sandbox = Sandbox::new();
+    let file = large_recording(&sandbox);
+    let folder = sandbox.path("frames");
+    let args = ["export", &file, "--obj", &folder, "--every", "20ms"];
+    let process = Process::start(Program::Recorder, &sandbox, &args);
+    let count = || std::fs::read_dir(&folder).map_or(0, Iterator::count);
+    wait_for("a written file", || (count() > 0).then_some(()));
+    let finished = process.interrupt();
+    assert_eq!((finished.code, count()), (Some(1), 0), "{finished:?}");
+    let folder = sandbox.path("cache");
+    std::fs::create_dir(&folder).unwrap();
+    let cache = format!("{folder}/run.pc2");
+    let args = ["export", &file, "--pc2", &cache];
+    let process = Process::start(Program::Recorder, &sandbox, &args);
+    let count = || std::fs::read_dir(&folder).map_or(0, Iterator::count);
+    wait_for("a begun file", || (count() > 0).then_some(()));
+    let finished = process.interrupt();
+    assert_eq!((finished.code, count()), (Some(1), 0), "{finished:?}");
 }
 
 #[test]

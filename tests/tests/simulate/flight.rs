@@ -87,9 +87,12 @@ fn programs_that_need_all_particles_name_the_cure() {
     node.wait().success();
     recording.wait().success();
     let pictures = sandbox.path("pictures");
-    for args in
-        [vec!["play", &flight, "--name", "played"], vec!["export", &flight, "--svg", &pictures]]
-    {
+    let arrays = sandbox.path("arrays.npz");
+    for args in [
+        vec!["play", &flight, "--name", "played"],
+        vec!["export", &flight, "--svg", &pictures],
+        vec!["export", &flight, "--npz", &arrays],
+    ] {
         let refused = recorder(&sandbox, &args);
         assert_eq!(refused.code, Some(1), "{refused:?}");
         assert!(refused.stderr.contains("`recorder simulate IN.mcap -o OUT.mcap`"), "{refused:?}");

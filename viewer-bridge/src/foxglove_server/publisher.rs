@@ -7,16 +7,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use foxglove::messages::{FrameTransform, PointCloud, SceneUpdate};
-use foxglove::{
-    Channel, Context, Encode, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId,
-};
+use foxglove::{Context, Encode, FoxgloveError, PartialMetadata, RawChannel, Schema, SinkId};
 use recorder::{
-    CollidersRow, Message, MessageEncoder, OutcomeRow, RunDescription, StatusRow, StepRow,
-    TearsRow, Topic, TopicFormat, Up, encode_transform,
+    CollidersRow, DrawnMesh, Message, MessageEncoder, OutcomeRow, RunDescription, SCENE_TOPIC,
+    SceneDrawing, StatusRow, StepRow, TearsRow, Topic, TopicFormat, Up, encode_transform,
+    scene_format,
 };
+use sim_contract::ConstraintKind;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 
-use super::picture::Picture;
 use crate::sink::{State, Torn};
 use crate::source::recording_times::RecordingTimes;
 use crate::wire::{Colliders, Scene};
@@ -31,7 +30,8 @@ const TOPICS: [Topic; 7] = [
     Topic::Steps,
     Topic::Particles,
 ];
-const SCENE_TOPIC: &str = "/scene";
+/// Number of the kind in [`Scene::kinds`].
+const STRUCTURAL_KIND: u8 = ConstraintKind::Structural as u8;
 /// Time between two messages on `/scene`. Each is twice as large as the particles and encoded anew.
 const SCENE_PERIOD_NS: u64 = SECOND_NS / 10;
 /// New subscriptions that wait for the source: more than all topics of all clients.
@@ -41,7 +41,7 @@ const NEW_SUBSCRIPTIONS_MAX: usize = 256;
 #[derive(Debug)]
 pub(super) struct Publisher {
     channels: [Arc<RawChannel>; TOPICS.len()],
-    scene: Channel<SceneUpdate>,
+    scene: Arc<RawChannel>,
     /// Times of the recording on show, which are those of the messages.
     recording: Option<RecordingTimes>,
     state: Mutex<PublisherState>,
@@ -89,7 +89,7 @@ struct PublishedLoad {
     rate_hz: u32,
     /// Time of step 0 in ns since 1970, if the node had never paused.
     epoch_ns: u64,
-    picture: Picture,
+    drawing: SceneDrawing,
 }
 
 impl PublishedLoad {
@@ -122,7 +122,11 @@ impl Publisher {
         let Ok(channels) = channels.try_into() else { unreachable!("one channel for each topic") };
         Ok(Self {
             channels,
-            scene: context.channel_builder(SCENE_TOPIC).build(),
+            scene: context
+                .channel_builder(SCENE_TOPIC)
+                .message_encoding(scene_format().encoding)
+                .schema(SceneUpdate::get_schema())
+                .build_raw()?,
             recording,
             state: Mutex::default(),
             new_subscriptions: Mutex::default(),
@@ -234,7 +238,7 @@ impl Publisher {
                     realtime_ns().saturating_sub(age_ns)
                 }
             },
-            picture: Picture::new(scene),
+            drawing: drawing(scene),
         };
         if self.has_subscribers(Topic::Tf) {
             self.send_transform(&load, scene.stamp.step, None);
@@ -251,7 +255,7 @@ impl Publisher {
     pub(super) fn publish_colliders(&self, colliders: &Colliders) {
         let mut state = self.state();
         let Some(load) = &mut state.load else { return };
-        load.picture.set_colliders(&colliders.colliders);
+        load.drawing.set_colliders(&colliders.colliders);
         // A shape of a later contract has no row.
         let row = CollidersRow::new(colliders.stamp.step, &colliders.colliders);
         if let Some(row) = row.clone().filter(|_| self.has_subscribers(Topic::Colliders)) {
@@ -265,7 +269,7 @@ impl Publisher {
     pub(super) fn publish_torn(&self, torn: &Torn<'_>) {
         let mut state = self.state();
         let Some(load) = &mut state.load else { return };
-        load.picture.set_torn(torn.all);
+        load.drawing.set_torn(torn.all);
         self.is_scene_due.store(true, Ordering::Relaxed);
         let row = |torn_list| TearsRow::new(torn.stamp.step, torn_list);
         let new = &torn.all[torn.known_count..];
@@ -319,8 +323,8 @@ impl Publisher {
         }
         let is_scene_due = self.is_scene_due.swap(false, Ordering::Relaxed);
         if is_scene_due || (is_new && now_ns >= state.next_scene_ns) {
-            let picture = load.picture.draw(time_ns, shown.particles);
-            self.scene.log_with_meta(&picture, self.metadata(time_ns));
+            let message = load.drawing.encode(time_ns, shown.particles);
+            self.scene.log_with_meta(&message, self.metadata(time_ns));
             state.next_scene_ns = now_ns + SCENE_PERIOD_NS;
             state.encoded_count += 1;
         }
@@ -358,6 +362,17 @@ impl Publisher {
             }
         }
     }
+}
+
+/// Creates the drawing of a load.
+fn drawing(scene: &Scene) -> SceneDrawing {
+    let bounds = scene.bounds();
+    SceneDrawing::new(DrawnMesh {
+        ends: scene.ends.clone(),
+        is_structural: scene.kinds.iter().map(|kind| *kind == STRUCTURAL_KIND).collect(),
+        triangles: scene.triangles.clone(),
+        bounds: [bounds.min, bounds.max],
+    })
 }
 
 /// The schema of a topic: the library's own where it has one, otherwise that of recordings.

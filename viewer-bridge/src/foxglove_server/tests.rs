@@ -1,11 +1,15 @@
 //! The publisher encodes what its subscribers need, and no more often. There is no server: the tests
 //! subscribe directly.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-use foxglove::messages::{FrameTransform, SceneEntity, SceneUpdate, Vector3};
-use foxglove::{ChannelId, Context, Decode, FoxgloveError, Metadata, RawChannel, Sink, SinkId};
-use recorder::StepRow;
+use foxglove::messages::{FrameTransform, PointCloud, SceneEntity, SceneUpdate, Vector3};
+use foxglove::{
+    ChannelId, Context, Decode, Encode, FoxgloveError, Metadata, RawChannel, Sink, SinkId,
+};
+use prost_types::{FileDescriptorProto, FileDescriptorSet};
+use recorder::{StepRow, Topic, TopicFormat, scene_format};
 use serde_json::{Value, json};
 use sim_contract::clock::SECOND_NS;
 use sim_contract::{ColliderShape, ColliderState, ParticleState, TornConstraint};
@@ -251,4 +255,33 @@ fn colliders_are_drawn_where_they_are_and_late_subscribers_receive_them() {
     let later = bench.listen(&["/colliders"]);
     bench.show(6 * SECOND_NS, 0);
     assert_eq!(later.topics(), Vec::<String>::new());
+}
+
+/// Returns the files of a set of descriptors by name, with their imports sorted. Options of generators and
+/// names for JSON, which follow from those of the fields, are left out.
+fn descriptors(data: &[u8]) -> BTreeMap<String, FileDescriptorProto> {
+    let set: FileDescriptorSet = prost::Message::decode(data).unwrap();
+    let files = set.file.into_iter();
+    let plain = files.map(|mut file| {
+        file.options = None;
+        file.dependency.sort();
+        let fields = file.message_type.iter_mut().flat_map(|message| &mut message.field);
+        fields.for_each(|field| field.json_name = None);
+        (file.name().to_owned(), file)
+    });
+    plain.collect()
+}
+
+/// Exports have the recorder's schemas, and clients receive those of the library.
+#[test]
+fn the_schemas_of_exports_are_those_of_the_library() {
+    for (ours, theirs) in [
+        (scene_format(), SceneUpdate::get_schema()),
+        (TopicFormat::for_topic(Topic::Particles), PointCloud::get_schema()),
+        (TopicFormat::for_topic(Topic::Tf), FrameTransform::get_schema()),
+    ] {
+        let theirs = theirs.unwrap();
+        assert_eq!(ours.schema.name, theirs.name);
+        assert_eq!(descriptors(&ours.schema.data), descriptors(&theirs.data));
+    }
 }

@@ -1,20 +1,26 @@
 //! From a recording to pictures: the drawn shapes, equal output for equal input, and incomplete
 //! recordings.
 
+mod data;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Cursor;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
-use recorder::{Closing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
+use recorder::{Closing, Existing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
 use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
-use sim_solver::Solver;
+use sim_solver::{Scene, Solver};
 
 use super::*;
+use crate::export::pictures::camera::{Basis, Camera};
+use crate::export::pictures::extent::ExtentTracker;
+use crate::export::pictures::renderer::Renderer;
+use crate::export::pictures::shape::{Picture, Shape};
+use crate::export::pictures::{png, svg};
 use crate::export::scene_state::SceneState;
-use crate::export::shape::{Picture, Shape};
-use crate::export::{png, svg};
+use crate::export::snapshots::Snapshots;
 use crate::simulation::{Job, States, simulate};
 
 /// A square of cloth in front of a sphere and above a floor, with a pinned particle at its side.
@@ -76,17 +82,38 @@ fn record(scene: &str, steps: u64) -> Vec<u8> {
 const STYLE: Style =
     Style { size: Size { width: 160, height: 120 }, view: Some(View::Front), bend: Bend::Draw };
 
+/// Calls `work` with the snapshots of `steps` of a recording, or with all of them.
+fn with_snapshots<T>(
+    file: &[u8],
+    steps: Option<&[u64]>,
+    work: impl FnOnce(&Snapshots<'_>) -> T,
+) -> T {
+    let survey = survey_of(file, "test.mcap");
+    let steps = steps.unwrap_or(&survey.steps);
+    let visit = |visitor: &mut dyn FnMut(&SceneState) -> anyhow::Result<ControlFlow<()>>| {
+        visit_states(LogReader::new(file)?, steps, visitor)
+    };
+    let bytes = file.to_vec();
+    let open_bytes = || Ok(Box::new(Cursor::new(bytes.clone())) as Box<dyn Read>);
+    work(&survey.snapshots(steps, &visit, &open_bytes))
+}
+
+fn survey_of(file: &[u8], path: &str) -> Survey {
+    Survey::read(LogReader::new(file).unwrap(), path, |_| {}).unwrap()
+}
+
 fn pictures(file: &[u8], steps: &[u64], style: Style) -> Vec<Picture> {
-    let open = || LogReader::new(file);
-    let survey = Survey::read(open().unwrap(), "test.mcap").unwrap();
-    let renderer = renderer(open, &survey, steps, style).unwrap();
-    let mut pictures = Vec::new();
-    visit_states(open().unwrap(), steps, |state| {
-        pictures.push(renderer.draw(state, survey.time_s(state.row.step)));
-        Ok(ControlFlow::Continue(()))
+    with_snapshots(file, Some(steps), |snapshots| {
+        let renderer = pictures::renderer(snapshots, style).unwrap();
+        let mut pictures = Vec::new();
+        snapshots
+            .for_each(|state| {
+                pictures.push(renderer.draw(state, snapshots.time_s(state.row.step)));
+                Ok(())
+            })
+            .unwrap();
+        pictures
     })
-    .unwrap();
-    pictures
 }
 
 #[test]
@@ -122,6 +149,33 @@ fn a_png_has_the_size_that_was_asked_for_and_several_colors() {
     }
     assert!(counts.len() > 10, "{} colors", counts.len());
     assert!(counts.values().all(|count| *count < 160 * 120 * 9 / 10));
+}
+
+#[test]
+fn the_frames_of_an_animation_are_the_pictures() {
+    let file = record(TINY, 40);
+    let path = std::env::temp_dir().join(format!("recorder-apng-{}.png", std::process::id()));
+    with_snapshots(&file, Some(&[0, 20, 40]), |snapshots| {
+        pictures::animate(snapshots, STYLE, 50, &path, Existing::Refuse).unwrap();
+    });
+    let bytes = fs::read(&path).unwrap();
+    fs::remove_file(&path).unwrap();
+    let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    let control = *reader.info().animation_control().unwrap();
+    assert_eq!((control.num_frames, control.num_plays), (3, 0));
+    for picture in pictures(&file, &[0, 20, 40], STYLE) {
+        let mut frame = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut frame).unwrap();
+        let delay = reader.info().frame_control().unwrap();
+        assert_eq!((delay.delay_num, delay.delay_den), (1, 50));
+        let single = png::encode(&picture).unwrap();
+        let mut single = ::png::Decoder::new(Cursor::new(single)).read_info().unwrap();
+        let mut pixels = vec![0; single.output_buffer_size().unwrap()];
+        single.next_frame(&mut pixels).unwrap();
+        let rgb: Vec<u8> =
+            pixels.chunks_exact(4).flat_map(|pixel| pixel[..3].iter().copied()).collect();
+        assert!(frame == rgb);
+    }
 }
 
 /// Four particles in a square, two triangles with the edges 0-1, 1-2, 2-0 and 1-3, 3-2, and a
@@ -236,7 +290,7 @@ fn a_recording_without_a_scene_is_drawn() {
     log.write(&Message::Step(row), 0).unwrap();
     log.write(&Message::Particles { step: 3, particles }, 0).unwrap();
     let file = log.finish(&Closing::default()).unwrap();
-    let survey = Survey::read(LogReader::new(file.as_slice()).unwrap(), "a.mcap").unwrap();
+    let survey = survey_of(&file, "a.mcap");
     assert_eq!(survey.scene.unwrap_err(), "a.mcap: has no scene (attachment scene.toml)");
     assert_eq!(survey.steps, [3]);
     assert_eq!(counts(&pictures(&file, &[3], STYLE)[0]), [0, 0, 4]);
@@ -246,7 +300,7 @@ fn a_recording_without_a_scene_is_drawn() {
 fn a_truncated_recording_is_drawn_as_far_as_it_goes() {
     let file = record(TINY, 200);
     let cut = &file[..file.len() / 2];
-    let survey = Survey::read(LogReader::new(cut).unwrap(), "test").unwrap();
+    let survey = survey_of(cut, "test");
     assert!(matches!(survey.end, LogEnd::Truncated { .. }), "{}", survey.end);
     let last = *survey.steps.last().unwrap();
     assert!(last > 10 && last < 190, "{last}");
@@ -287,6 +341,14 @@ fn the_error_names_a_wrong_option() {
         ("a.mcap --png d --frames 0", "--frames"),
         ("a.mcap --png d --size 960", "it must be WIDTHxHEIGHT with sides from 16 to 8192"),
         ("a.mcap --png d --size 960x9000", "it must be WIDTHxHEIGHT"),
+        ("a.mcap --png d --from soon", "it must be a step, such as 480, or a time with its unit"),
+        ("a.mcap --png d --at 1s --from 2s", "cannot be used with"),
+        ("a.mcap --png d --npz f", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --from 1s", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --to 480", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --frames 3", "cannot be used with"),
+        ("a.mcap --foxglove b.mcap --at 1s", "cannot be used with"),
+        ("a.mcap --apng f --fps 0", "it must be a whole number from 1 to 100"),
         ("a.mcap --png d --view below", "front, side, top, iso"),
     ] {
         let error = parse(line).unwrap_err();
@@ -296,27 +358,26 @@ fn the_error_names_a_wrong_option() {
 
 #[test]
 fn options_select_the_snapshots_and_the_style() {
-    let selection = |line| parse(line).unwrap().selection();
-    assert_eq!(selection("a.mcap --svg d"), Selection::Spread(8));
-    assert_eq!(selection("a.mcap --svg d --frames 3"), Selection::Spread(3));
+    let selection = |line| {
+        let args = parse(line).unwrap();
+        args.selection(&args.format.format().unwrap())
+    };
+    assert_eq!(selection("a.mcap --svg d").choice, Choice::Spread(8));
+    assert_eq!(selection("a.mcap --npz d").choice, Choice::All);
+    let period = Choice::Every(Duration::from_millis(20));
+    assert_eq!(selection("a.mcap --foxglove b.mcap").choice, Choice::Every(SCENE_PERIOD));
+    assert_eq!(selection("a.mcap --foxglove b.mcap --every 20ms").choice, period);
+    assert_eq!(selection("a.mcap --apng f --fps 50").choice, period);
+    assert_eq!(selection("a.mcap --svg d --frames 3").choice, Choice::Spread(3));
     let times = [1000, 500].map(Duration::from_millis).to_vec();
-    assert_eq!(selection("a.mcap --svg d --at 1s --at 500ms"), Selection::At(times));
+    assert_eq!(selection("a.mcap --svg d --at 1s --at 500ms").choice, Choice::At(times));
+    let range = selection("a.mcap --csv d --from 480 --to 2s").range;
+    let to = Moment::Time(Duration::from_secs(2));
+    assert_eq!(range, SnapshotRange { from: Some(Moment::Step(480)), to: Some(to) });
     let args = parse("a.mcap --svg d --size 20x30 --no-bend --view top").unwrap();
     let style = args.style();
     assert_eq!((style.size, style.view), (Size { width: 20, height: 30 }, Some(View::Top)));
     assert_eq!(style.bend, Bend::Hide);
-}
-
-#[test]
-fn files_are_named_after_the_scene() {
-    let target = |name: &str| {
-        let run = RunDescription { scene_name: name.to_owned(), ..run_at(100) };
-        let args = parse("a.mcap --png d").unwrap();
-        args.target(&run).path(37).display().to_string()
-    };
-    assert_eq!(target("curtain"), "d/curtain_00000037.png");
-    assert_eq!(target("../a b"), "d/.._a_b_00000037.png");
-    assert_eq!(target(".."), "d/scene_00000037.png");
 }
 
 #[test]
@@ -333,7 +394,7 @@ fn files_without_a_snapshot_are_an_error() {
     };
     let empty = LogWriter::create(Vec::new(), LogOptions::default(), &run_at(100), b"", 0);
     let empty = empty.unwrap().finish(&Closing::default()).unwrap();
-    assert_eq!(error_for(&empty), "a.mcap: has no snapshot to draw (the file is complete)");
+    assert_eq!(error_for(&empty), "a.mcap: has no snapshot to export (the file is complete)");
     assert_eq!(
         error_for(b"a text of some length, and no recording"),
         "a.mcap: is not an MCAP file"

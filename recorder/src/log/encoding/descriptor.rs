@@ -1,4 +1,6 @@
-//! The protobuf schemas in a recording, declared as a table.
+//! The protobuf schemas in a recording.
+
+mod declarations;
 
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
@@ -7,109 +9,16 @@ use prost_types::{
     FileDescriptorProto, FileDescriptorSet,
 };
 
+use declarations::{DECLARATIONS, Declaration, Field, Kind};
+
 /// Full name of the schema of `/particles`.
 pub(super) const POINT_CLOUD: &str = "foxglove.PointCloud";
 /// Full name of the schema of `/tf`.
 pub(super) const FRAME_TRANSFORM: &str = "foxglove.FrameTransform";
+/// Full name of the schema of `/scene`.
+pub(super) const SCENE_UPDATE: &str = "foxglove.SceneUpdate";
 /// Full name of the schema of `/keyframe`.
 pub(super) const KEYFRAME: &str = "catenary.Keyframe";
-
-/// A message and the file that declares it.
-struct Declaration {
-    package: &'static str,
-    name: &'static str,
-    file: &'static str,
-    fields: &'static [Field],
-}
-
-/// Name, number, type.
-type Field = (&'static str, i32, Kind);
-
-#[derive(Clone, Copy)]
-enum Kind {
-    Plain(Type),
-    /// A message, by its full name.
-    Message(&'static str),
-    /// A list of messages.
-    List(&'static str),
-    /// The enum with the values [`NUMERIC_TYPES`], nested in this message.
-    NumericType,
-}
-
-const DOUBLE: Kind = Kind::Plain(Type::Double);
-const FIXED32: Kind = Kind::Plain(Type::Fixed32);
-const STRING: Kind = Kind::Plain(Type::String);
-const TIMESTAMP: Kind = Kind::Message("google.protobuf.Timestamp");
-const VECTOR3: Kind = Kind::Message("foxglove.Vector3");
-const QUATERNION: Kind = Kind::Message("foxglove.Quaternion");
-
-/// Dependencies come before their users, as readers of a descriptor set expect.
-const DECLARATIONS: [Declaration; 8] = [
-    Declaration {
-        package: "google.protobuf",
-        name: "Timestamp",
-        file: "google/protobuf/timestamp.proto",
-        fields: &[("seconds", 1, Kind::Plain(Type::Int64)), ("nanos", 2, Kind::Plain(Type::Int32))],
-    },
-    Declaration {
-        package: "foxglove",
-        name: "Vector3",
-        file: "foxglove/Vector3.proto",
-        fields: &[("x", 1, DOUBLE), ("y", 2, DOUBLE), ("z", 3, DOUBLE)],
-    },
-    Declaration {
-        package: "foxglove",
-        name: "Quaternion",
-        file: "foxglove/Quaternion.proto",
-        fields: &[("x", 1, DOUBLE), ("y", 2, DOUBLE), ("z", 3, DOUBLE), ("w", 4, DOUBLE)],
-    },
-    Declaration {
-        package: "foxglove",
-        name: "Pose",
-        file: "foxglove/Pose.proto",
-        fields: &[("position", 1, VECTOR3), ("orientation", 2, QUATERNION)],
-    },
-    Declaration {
-        package: "foxglove",
-        name: "PackedElementField",
-        file: "foxglove/PackedElementField.proto",
-        fields: &[("name", 1, STRING), ("offset", 2, FIXED32), ("type", 3, Kind::NumericType)],
-    },
-    Declaration {
-        package: "foxglove",
-        name: "PointCloud",
-        file: "foxglove/PointCloud.proto",
-        fields: &[
-            ("timestamp", 1, TIMESTAMP),
-            ("frame_id", 2, STRING),
-            ("pose", 3, Kind::Message("foxglove.Pose")),
-            ("point_stride", 4, FIXED32),
-            ("fields", 5, Kind::List("foxglove.PackedElementField")),
-            ("data", 6, Kind::Plain(Type::Bytes)),
-        ],
-    },
-    Declaration {
-        package: "foxglove",
-        name: "FrameTransform",
-        file: "foxglove/FrameTransform.proto",
-        fields: &[
-            ("timestamp", 1, TIMESTAMP),
-            ("parent_frame_id", 2, STRING),
-            ("child_frame_id", 3, STRING),
-            ("translation", 4, VECTOR3),
-            ("rotation", 5, QUATERNION),
-        ],
-    },
-    Declaration {
-        package: "catenary",
-        name: "Keyframe",
-        file: "catenary/Keyframe.proto",
-        fields: &[("step", 1, Kind::Plain(Type::Uint64)), ("data", 2, Kind::Plain(Type::Bytes))],
-    },
-];
-
-const NUMERIC_TYPES: [&str; 9] =
-    ["UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32", "FLOAT32", "FLOAT64"];
 
 /// Returns the encoded `FileDescriptorSet` of `root` (a full name) and its dependencies.
 pub(super) fn file_descriptor_set(root: &'static str) -> Vec<u8> {
@@ -135,7 +44,7 @@ impl Declaration {
     fn dependencies(&self) -> impl Iterator<Item = &'static str> {
         self.fields.iter().filter_map(|(_, _, kind)| match kind {
             Kind::Message(name) | Kind::List(name) => Some(*name),
-            Kind::Plain(_) | Kind::NumericType => None,
+            Kind::Plain(_) | Kind::Numbers(_) | Kind::Enum { .. } => None,
         })
     }
 
@@ -157,11 +66,14 @@ impl Declaration {
     }
 
     fn descriptor(&self) -> DescriptorProto {
-        let has_enum = self.fields.iter().any(|(_, _, kind)| matches!(kind, Kind::NumericType));
+        let enums = self.fields.iter().filter_map(|(_, _, kind)| match kind {
+            Kind::Enum { name, values } => Some(enum_descriptor(name, values)),
+            _ => None,
+        });
         DescriptorProto {
             name: Some(self.name.to_owned()),
             field: self.fields.iter().map(|field| self.field(*field)).collect(),
-            enum_type: if has_enum { vec![numeric_type()] } else { Vec::new() },
+            enum_type: enums.collect(),
             ..DescriptorProto::default()
         }
     }
@@ -171,8 +83,9 @@ impl Declaration {
             Kind::Plain(plain) => (Label::Optional, plain, None),
             Kind::Message(message) => (Label::Optional, Type::Message, Some(format!(".{message}"))),
             Kind::List(message) => (Label::Repeated, Type::Message, Some(format!(".{message}"))),
-            Kind::NumericType => {
-                let full_name = format!(".{}.NumericType", self.full_name());
+            Kind::Numbers(number) => (Label::Repeated, number, None),
+            Kind::Enum { name, .. } => {
+                let full_name = format!(".{}.{name}", self.full_name());
                 (Label::Optional, Type::Enum, Some(full_name))
             }
         };
@@ -187,15 +100,15 @@ impl Declaration {
     }
 }
 
-fn numeric_type() -> EnumDescriptorProto {
+fn enum_descriptor(name: &str, values: &[&str]) -> EnumDescriptorProto {
     let value = |(number, name): (i32, &&str)| EnumValueDescriptorProto {
         name: Some((*name).to_owned()),
         number: Some(number),
         options: None,
     };
     EnumDescriptorProto {
-        name: Some("NumericType".to_owned()),
-        value: (0..).zip(&NUMERIC_TYPES).map(value).collect(),
+        name: Some(name.to_owned()),
+        value: (0..).zip(values).map(value).collect(),
         ..EnumDescriptorProto::default()
     }
 }
@@ -287,7 +200,7 @@ mod tests {
 
     #[test]
     fn every_file_comes_after_its_imports() {
-        for root in [POINT_CLOUD, FRAME_TRANSFORM, KEYFRAME] {
+        for root in [POINT_CLOUD, FRAME_TRANSFORM, SCENE_UPDATE, KEYFRAME] {
             let set = FileDescriptorSet::decode(file_descriptor_set(root).as_slice()).unwrap();
             for (place, file) in set.file.iter().enumerate() {
                 for import in &file.dependency {

@@ -16,7 +16,7 @@ use sim_solver::scene::Up;
 /// Name of the particles' frame. `/tf` gives its pose in the frame `map`.
 pub const WORLD_FRAME: &str = "world";
 /// Frame in which z points up.
-pub(super) const MAP_FRAME: &str = "map";
+pub const MAP_FRAME: &str = "map";
 
 /// `type` of a [`PackedElementField`]: u32.
 const UINT32: i32 = 5;
@@ -45,34 +45,34 @@ const FIELDS: [PackedField; 8] = [
     ("flags", 28, UINT32),
 ];
 
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Vector3 {
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct Vector3 {
     #[prost(double, tag = "1")]
-    pub(super) x: f64,
+    pub(crate) x: f64,
     #[prost(double, tag = "2")]
-    pub(super) y: f64,
+    pub(crate) y: f64,
     #[prost(double, tag = "3")]
-    pub(super) z: f64,
+    pub(crate) z: f64,
 }
 
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Quaternion {
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct Quaternion {
     #[prost(double, tag = "1")]
-    pub(super) x: f64,
+    pub(crate) x: f64,
     #[prost(double, tag = "2")]
-    pub(super) y: f64,
+    pub(crate) y: f64,
     #[prost(double, tag = "3")]
-    pub(super) z: f64,
+    pub(crate) z: f64,
     #[prost(double, tag = "4")]
-    pub(super) w: f64,
+    pub(crate) w: f64,
 }
 
-#[derive(Clone, PartialEq, Message)]
-pub(super) struct Pose {
+#[derive(Clone, Copy, PartialEq, Message)]
+pub(crate) struct Pose {
     #[prost(message, optional, tag = "1")]
-    pub(super) position: Option<Vector3>,
+    pub(crate) position: Option<Vector3>,
     #[prost(message, optional, tag = "2")]
-    pub(super) orientation: Option<Quaternion>,
+    pub(crate) orientation: Option<Quaternion>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -227,6 +227,14 @@ pub fn encode_transform(time_ns: u64, origin: [f64; 3], up: Up) -> Vec<u8> {
     .encode_to_vec()
 }
 
+/// Returns the pose of the frame [`WORLD_FRAME`] in [`MAP_FRAME`], as in [`encode_transform`]: a translation
+/// in m, and a quaternion x, y, z, w.
+pub fn map_from_world(origin: [f64; 3], up: Up) -> ([f64; 3], [f64; 4]) {
+    let (translation, rotation) = (turned(origin, up), rotation_to_z(up));
+    let Quaternion { x, y, z, w } = rotation;
+    ([translation.x, translation.y, translation.z], [x, y, z, w])
+}
+
 /// Returns the rotation that takes `up` to z: none, or a quarter turn about x.
 fn rotation_to_z(up: Up) -> Quaternion {
     let quarter = |x: f64| Quaternion { x, w: FRAC_1_SQRT_2, ..Quaternion::default() };
@@ -270,7 +278,7 @@ pub(crate) fn decode_keyframe(message: &[u8]) -> Result<(u64, Vec<u8>), String> 
 
 #[allow(clippy::cast_possible_wrap, reason = "seconds of 64-bit nanoseconds are below 2^35")]
 #[allow(clippy::cast_possible_truncation, reason = "the remainder is below 10^9")]
-fn timestamp(time_ns: u64) -> Timestamp {
+pub(crate) fn timestamp(time_ns: u64) -> Timestamp {
     let second_ns = 1_000_000_000;
     Timestamp { seconds: (time_ns / second_ns) as i64, nanos: (time_ns % second_ns) as i32 }
 }

@@ -3,15 +3,13 @@
 //! Triangles are sorted by the distance of their centers. A line or dot comes right after the last
 //! triangle that touches it, so that nearer triangles hide it and its own surface does not.
 
-use std::collections::BTreeSet;
-
 use glam::{DVec2, DVec3};
 use sim_contract::{ConstraintKind, ParticleFlags};
 
 use super::camera::Camera;
 use super::extent::position;
-use super::scene_state::SceneState;
 use super::shape::{Color, Dash, Shape, Stroke};
+use crate::export::scene_state::SceneState;
 
 const SURFACE: Color = Color([0x8f, 0xb8, 0xde]);
 const STRUCTURAL: Color = Color([0x2b, 0x3a, 0x4a]);
@@ -97,19 +95,9 @@ impl MeshDrawing<'_> {
     /// Returns the triangles without a torn structural edge, from back to front. Ties are sorted by
     /// index.
     fn triangles(&self) -> Vec<usize> {
-        let scene = self.state;
-        let torn_edges: BTreeSet<_> = (scene.constraints.iter().zip(&scene.is_torn))
-            .filter(|(constraint, is_torn)| **is_torn && constraint.kind == STRUCTURAL_KIND)
-            .map(|(constraint, _)| edge(constraint.a, constraint.b))
-            .collect();
-        let is_intact = |[a, b, c]: [u32; 3]| {
-            let edges = [edge(a, b), edge(b, c), edge(c, a)];
-            torn_edges.is_empty() || !edges.iter().any(|edge| torn_edges.contains(edge))
-        };
-        let mut order: Vec<_> = (scene.triangles.iter().enumerate())
-            .filter(|(_, triangle)| is_intact(triangle.corners))
-            .map(|(index, triangle)| {
-                let [a, b, c] = triangle.corners.map(|corner| self.point(corner));
+        let mut order: Vec<_> = (self.state.intact_triangles())
+            .map(|(index, corners)| {
+                let [a, b, c] = corners.map(|corner| self.point(corner));
                 (self.camera.nearness(a + b + c), index)
             })
             .collect();
@@ -128,10 +116,7 @@ impl MeshDrawing<'_> {
     }
 
     fn add_lines(&self, shapes: &mut Vec<OrderedShape>, last_at: &[Option<usize>]) {
-        let scene = self.state;
-        for (constraint, _) in
-            scene.constraints.iter().zip(&scene.is_torn).filter(|(_, is_torn)| !**is_torn)
-        {
+        for constraint in self.state.untorn_constraints() {
             if constraint.kind == BEND_KIND && self.bend == Bend::Hide {
                 continue;
             }
@@ -152,7 +137,7 @@ impl MeshDrawing<'_> {
 
     fn add_dots(&self, shapes: &mut Vec<OrderedShape>, last_at: &[Option<usize>]) {
         let particles = &self.state.particles;
-        let is_connected = self.connected();
+        let is_connected = self.state.connected();
         let ratio = self.mean_length().map_or(1.0, |length| self.width_ratio(length));
         let scale = self.camera.line_scale();
         let radius = RADIUS * scale * ratio.clamp(DOT_MIN, 1.0);
@@ -170,19 +155,6 @@ impl MeshDrawing<'_> {
         }
     }
 
-    /// Returns for each particle whether an untorn constraint or a triangle uses it.
-    fn connected(&self) -> Vec<bool> {
-        let scene = self.state;
-        let mut is_connected = vec![false; scene.particles.len()];
-        let untorn = scene.constraints.iter().zip(&scene.is_torn).filter(|(_, is_torn)| !**is_torn);
-        let ends = untorn.flat_map(|(constraint, _)| [constraint.a, constraint.b]);
-        let corners = scene.triangles.iter().flat_map(|triangle| triangle.corners);
-        for index in ends.chain(corners) {
-            is_connected[index as usize] = true;
-        }
-        is_connected
-    }
-
     /// Returns the factor for the width of a line, which is below 1 for lines that are short in the
     /// picture.
     fn width_ratio(&self, length: f64) -> f64 {
@@ -191,9 +163,9 @@ impl MeshDrawing<'_> {
 
     /// Returns the mean rest length of the untorn constraints except bend constraints.
     fn mean_length(&self) -> Option<f64> {
-        let lengths = (self.state.constraints.iter().zip(&self.state.is_torn))
-            .filter(|(constraint, is_torn)| !**is_torn && constraint.kind != BEND_KIND)
-            .map(|(constraint, _)| f64::from(constraint.rest_length));
+        let lengths = (self.state.untorn_constraints())
+            .filter(|constraint| constraint.kind != BEND_KIND)
+            .map(|constraint| f64::from(constraint.rest_length));
         let (count, sum) = lengths.fold((0_u32, 0.0), |(count, sum), one| (count + 1, sum + one));
         (count > 0).then(|| sum / f64::from(count))
     }
@@ -207,7 +179,6 @@ impl MeshDrawing<'_> {
     }
 }
 
-const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 const BEND_KIND: u32 = ConstraintKind::Bend as u32;
 const SHEAR_KIND: u32 = ConstraintKind::Shear as u32;
 const TETHER_KIND: u32 = ConstraintKind::Tether as u32;
@@ -246,9 +217,4 @@ fn dot(flags: u32, center: DVec2, radius: f64) -> Shape {
     } else {
         circle(FREE, radius)
     }
-}
-
-/// Returns the edge with its ends in ascending order.
-fn edge(a: u32, b: u32) -> (u32, u32) {
-    (a.min(b), a.max(b))
 }

@@ -11,6 +11,11 @@ use super::shape::{BACKGROUND, Color, Picture, Shape, Stroke, Text};
 
 /// Returns the bytes of the file. Equal pictures give equal bytes.
 pub(crate) fn encode(picture: &Picture) -> anyhow::Result<Vec<u8>> {
+    Ok(rasterize(picture)?.encode_png()?)
+}
+
+/// Returns the pixels of a picture, all of them opaque.
+pub(super) fn rasterize(picture: &Picture) -> anyhow::Result<Pixmap> {
     let size = picture.size;
     let mut pixmap = Pixmap::new(size.width, size.height).context("the picture has no pixels")?;
     let [red, green, blue] = BACKGROUND.0;
@@ -18,7 +23,7 @@ pub(crate) fn encode(picture: &Picture) -> anyhow::Result<Vec<u8>> {
     for shape in &picture.shapes {
         paint(&mut pixmap, shape);
     }
-    Ok(pixmap.encode_png()?)
+    Ok(pixmap)
 }
 
 fn paint(pixmap: &mut Pixmap, shape: &Shape) {

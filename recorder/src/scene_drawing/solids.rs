@@ -1,13 +1,12 @@
 //! The drawing of the colliders: cubes, spheres, cylinders, and the edges of bounds.
 
-use foxglove::messages::line_primitive::Type;
-use foxglove::messages::{
-    Color, CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, Pose, Quaternion, SceneEntity,
-    SpherePrimitive, Vector3,
-};
 use sim_contract::{ColliderShape, ColliderState};
 
-use crate::wire::Bounds;
+use crate::log::encoding::protobuf::{Pose, Quaternion, Vector3};
+use crate::log::encoding::scene_messages::{
+    Color, CubePrimitive, CylinderPrimitive, LINE_LIST, LinePrimitive, Point3, SceneEntity,
+    SpherePrimitive,
+};
 
 /// The origin of the scene.
 pub(super) const IDENTITY: Pose = Pose {
@@ -40,8 +39,8 @@ pub(super) struct PlaneExtent {
 
 impl PlaneExtent {
     /// Chooses the part of a plane for a scene whose positions lie in this box.
-    pub(super) fn around(bounds: Bounds) -> Self {
-        let (min, max) = (wide(bounds.min), wide(bounds.max));
+    pub(super) fn around([min, max]: [[f32; 3]; 2]) -> Self {
+        let (min, max) = (wide(min), wide(max));
         let diagonal = length(subtract(max, min));
         Self {
             middle: scale(add(min, max), 0.5),
@@ -52,7 +51,7 @@ impl PlaneExtent {
 
 impl Default for PlaneExtent {
     fn default() -> Self {
-        Self::around(Bounds::default())
+        Self::around([[0.0; 3]; 2])
     }
 }
 
@@ -134,14 +133,13 @@ fn edges(min: Vector, max: Vector) -> LinePrimitive {
         Point3 { x, y, z }
     };
     LinePrimitive {
-        r#type: Type::LineList as i32,
+        r#type: LINE_LIST,
         pose: Some(IDENTITY),
         thickness: EDGE_WIDTH_PX,
         scale_invariant: true,
         points: (0..8).map(corner).collect(),
         color: Some(SOLID_COLOR),
         indices: EDGES.into(),
-        ..LinePrimitive::default()
     }
 }
 
@@ -194,7 +192,7 @@ mod tests {
     use super::*;
 
     fn drawn(collider: ColliderState) -> SceneEntity {
-        let bounds = Bounds { min: [-1.0, 0.0, -1.0], max: [1.0, 2.0, 1.0] };
+        let bounds = [[-1.0, 0.0, -1.0], [1.0, 2.0, 1.0]];
         let mut entity = SceneEntity::default();
         draw(&[collider], PlaneExtent::around(bounds), &mut entity);
         entity

@@ -4,31 +4,40 @@ mod solids;
 
 use std::collections::BTreeSet;
 
-use foxglove::messages::line_primitive::Type;
-use foxglove::messages::{
-    Color, LinePrimitive, Point3, SceneEntity, SceneUpdate, Timestamp, TriangleListPrimitive,
-};
-use recorder::WORLD_FRAME;
-use sim_contract::clock::SECOND_NS;
-use sim_contract::{ColliderState, ConstraintKind, ParticleState, TornConstraint};
+use prost::Message as _;
+use sim_contract::{ColliderState, ParticleState, TornConstraint};
 
-use crate::wire::Scene;
+use crate::log::WORLD_FRAME;
+use crate::log::encoding::protobuf::timestamp;
+use crate::log::encoding::scene_messages::{
+    Color, LINE_LIST, LinePrimitive, Point3, SceneEntity, SceneUpdate, TriangleListPrimitive,
+};
 use solids::{IDENTITY, PlaneExtent};
 
+/// Name of the topic, whose format is that of [`scene_format`](crate::scene_format).
+pub const SCENE_TOPIC: &str = "/scene";
 /// Width of a stick in pixels, at any distance.
 const STICK_WIDTH_PX: f64 = 1.5;
-/// Number of the kind in [`Scene::kinds`].
-const STRUCTURAL_KIND: u8 = ConstraintKind::Structural as u8;
 const STICK_COLOR: Color = Color { r: 0.45, g: 0.6, b: 0.75, a: 1.0 };
 const SURFACE_COLOR: Color = Color { r: 0.72, g: 0.2, b: 0.18, a: 0.85 };
 
+/// The constraints and triangles of a load.
+#[derive(Debug, Clone, Default)]
+pub struct DrawnMesh {
+    /// Particles of each constraint.
+    pub ends: Vec<[u32; 2]>,
+    /// By constraint: it is structural.
+    pub is_structural: Vec<bool>,
+    /// Particles of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Least and greatest coordinates of the first state, which planes extend beyond.
+    pub bounds: [[f32; 3]; 2],
+}
+
 /// The drawing of a load: its constraints and triangles, without the torn ones, and its colliders.
 #[derive(Debug, Default)]
-pub(super) struct Picture {
-    sticks: Vec<[u32; 2]>,
-    triangles: Vec<[u32; 3]>,
-    /// Structural constraints, in the order of `sticks`.
-    is_structural: Vec<bool>,
+pub struct SceneDrawing {
+    mesh: DrawnMesh,
     is_torn: Vec<bool>,
     /// A triangle is gone once any structural constraint along one of its edges is torn.
     is_gone: Vec<bool>,
@@ -36,73 +45,73 @@ pub(super) struct Picture {
     plane_extent: PlaneExtent,
 }
 
-impl Picture {
+impl SceneDrawing {
     /// Creates the drawing of a load without torn constraints.
-    pub(super) fn new(scene: &Scene) -> Self {
+    pub fn new(mesh: DrawnMesh) -> Self {
         Self {
-            is_structural: scene.kinds.iter().map(|kind| *kind == STRUCTURAL_KIND).collect(),
-            is_torn: vec![false; scene.ends.len()],
-            is_gone: vec![false; scene.triangles.len()],
-            sticks: scene.ends.clone(),
-            triangles: scene.triangles.clone(),
+            is_torn: vec![false; mesh.ends.len()],
+            is_gone: vec![false; mesh.triangles.len()],
             colliders: Vec::new(),
-            plane_extent: PlaneExtent::around(scene.bounds()),
+            plane_extent: PlaneExtent::around(mesh.bounds),
+            mesh,
         }
     }
 
     /// Replaces the colliders.
-    pub(super) fn set_colliders(&mut self, colliders: &[ColliderState]) {
+    pub fn set_colliders(&mut self, colliders: &[ColliderState]) {
         self.colliders = colliders.to_vec();
     }
 
     /// Replaces the list of torn constraints.
-    pub(super) fn set_torn(&mut self, torn: &[TornConstraint]) {
+    pub fn set_torn(&mut self, torn: &[TornConstraint]) {
         self.is_torn.fill(false);
         let mut edges = BTreeSet::new();
         for constraint in torn.iter().map(|torn| torn.constraint as usize) {
-            if let Some(ends) = self.sticks.get(constraint) {
+            if let Some(ends) = self.mesh.ends.get(constraint) {
                 self.is_torn[constraint] = true;
-                if self.is_structural.get(constraint) == Some(&true) {
+                if self.mesh.is_structural.get(constraint) == Some(&true) {
                     edges.insert(ordered(*ends));
                 }
             }
         }
-        for (is_gone, [a, b, c]) in self.is_gone.iter_mut().zip(&self.triangles) {
+        for (is_gone, [a, b, c]) in self.is_gone.iter_mut().zip(&self.mesh.triangles) {
             *is_gone =
                 [[*a, *b], [*b, *c], [*c, *a]].map(ordered).iter().any(|edge| edges.contains(edge));
         }
     }
 
-    /// Draws a state. The entities have the same ids each time, so each replaces its predecessor.
-    pub(super) fn draw(&self, time_ns: u64, particles: &[ParticleState]) -> SceneUpdate {
+    /// Draws a state as a message on `/scene`. The entities have the same ids each time, so each replaces
+    /// its predecessor. `time_ns` is the time of the step, in nanoseconds since 1970.
+    pub fn encode(&self, time_ns: u64, particles: &[ParticleState]) -> Vec<u8> {
+        self.draw(time_ns, particles).encode_to_vec()
+    }
+
+    fn draw(&self, time_ns: u64, particles: &[ParticleState]) -> SceneUpdate {
         let has_place = |particle: &u32| {
             let particle = particles.get(*particle as usize);
             particle.is_some_and(|one| one.position.iter().all(|axis| axis.is_finite()))
         };
-        let sticks = remaining(&self.sticks, &self.is_torn, has_place);
-        let triangles = remaining(&self.triangles, &self.is_gone, has_place);
+        let sticks = remaining(&self.mesh.ends, &self.is_torn, has_place);
+        let triangles = remaining(&self.mesh.triangles, &self.is_gone, has_place);
         let points = points(particles);
         let surface = TriangleListPrimitive {
             pose: Some(IDENTITY),
             points: if triangles.is_empty() { Vec::new() } else { points.clone() },
             color: Some(SURFACE_COLOR),
             indices: triangles,
-            ..TriangleListPrimitive::default()
         };
         let sticks = LinePrimitive {
-            r#type: Type::LineList as i32,
+            r#type: LINE_LIST,
             pose: Some(IDENTITY),
             thickness: STICK_WIDTH_PX,
             scale_invariant: true,
             points: if sticks.is_empty() { Vec::new() } else { points },
             color: Some(STICK_COLOR),
             indices: sticks,
-            ..LinePrimitive::default()
         };
         let mut colliders = entity("colliders", time_ns);
         solids::draw(&self.colliders, self.plane_extent, &mut colliders);
         SceneUpdate {
-            deletions: Vec::new(),
             entities: vec![
                 SceneEntity { lines: vec![sticks], ..entity("sticks", time_ns) },
                 SceneEntity { triangles: vec![surface], ..entity("surface", time_ns) },
@@ -135,12 +144,8 @@ fn points(particles: &[ParticleState]) -> Vec<Point3> {
 }
 
 fn entity(id: &str, time_ns: u64) -> SceneEntity {
-    // Seconds fit until 2106.
-    let seconds = u32::try_from(time_ns / SECOND_NS).unwrap_or(u32::MAX);
-    #[allow(clippy::cast_possible_truncation, reason = "the remainder is below 10^9")]
-    let nanoseconds = (time_ns % SECOND_NS) as u32;
     SceneEntity {
-        timestamp: Timestamp::new_checked(seconds, nanoseconds),
+        timestamp: Some(timestamp(time_ns)),
         frame_id: WORLD_FRAME.to_owned(),
         id: id.to_owned(),
         ..SceneEntity::default()
@@ -157,12 +162,12 @@ mod tests {
         vec![at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)]
     }
 
-    fn picture() -> Picture {
-        Picture::new(&Scene {
+    fn drawing() -> SceneDrawing {
+        SceneDrawing::new(DrawnMesh {
             ends: vec![[0, 1], [1, 2], [2, 3], [2, 1], [0, 1]],
-            kinds: vec![0, 1, 0, 1, 2],
+            is_structural: vec![true, false, true, false, false],
             triangles: vec![[0, 1, 2], [3, 2, 1]],
-            ..Scene::default()
+            ..DrawnMesh::default()
         })
     }
 
@@ -172,7 +177,7 @@ mod tests {
 
     #[test]
     fn sticks_and_triangles_are_drawn_at_the_particles() {
-        let update = picture().draw(1_500_000_000, &particles());
+        let update = drawing().draw(1_500_000_000, &particles());
         assert_eq!(
             indices(&update),
             (&[0, 1, 1, 2, 2, 3, 2, 1, 0, 1][..], &[0, 1, 2, 3, 2, 1][..])
@@ -184,25 +189,25 @@ mod tests {
 
     #[test]
     fn torn_constraints_and_the_triangles_along_structural_ones_are_not_drawn() {
-        let mut picture = picture();
+        let mut drawing = drawing();
         let torn = |list: &[u32]| {
             list.iter().map(|one| TornConstraint::new(*one, None)).collect::<Vec<_>>()
         };
-        picture.set_torn(&torn(&[2, 99]));
+        drawing.set_torn(&torn(&[2, 99]));
         let sticks = &[0, 1, 1, 2, 2, 1, 0, 1][..];
-        assert_eq!(indices(&picture.draw(0, &particles())), (sticks, &[0, 1, 2][..]));
-        picture.set_torn(&torn(&[1, 3, 4]));
+        assert_eq!(indices(&drawing.draw(0, &particles())), (sticks, &[0, 1, 2][..]));
+        drawing.set_torn(&torn(&[1, 3, 4]));
         let all = &[0, 1, 2, 3, 2, 1][..];
-        assert_eq!(indices(&picture.draw(0, &particles())), (&[0, 1, 2, 3][..], all));
-        picture.set_torn(&[]);
-        assert_eq!(indices(&picture.draw(0, &particles())).1.len(), 6);
+        assert_eq!(indices(&drawing.draw(0, &particles())), (&[0, 1, 2, 3][..], all));
+        drawing.set_torn(&[]);
+        assert_eq!(indices(&drawing.draw(0, &particles())).1.len(), 6);
     }
 
     #[test]
     fn elements_of_a_particle_that_is_not_finite_are_not_drawn() {
         let mut particles = particles();
         particles[3].position[1] = f32::NAN;
-        let update = picture().draw(0, &particles);
+        let update = drawing().draw(0, &particles);
         assert_eq!(indices(&update), (&[0, 1, 1, 2, 2, 1, 0, 1][..], &[0, 1, 2][..]));
         assert!(update.entities[0].lines[0].points.iter().all(|point| point.y.is_finite()));
     }

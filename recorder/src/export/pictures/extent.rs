@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3};
 use recorder::ShapeRow;
 use sim_contract::{ParticleState, PlainF32};
 
-use super::scene_state::SceneState;
+use crate::export::scene_state::SceneState;
 
 /// One in this many particles may be an outlier, on each side of each axis.
 const PARTICLES_PER_OUTLIER: usize = 200;

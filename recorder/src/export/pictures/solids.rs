@@ -160,8 +160,8 @@ mod tests {
     use sim_solver::scene::Up;
 
     use super::*;
-    use crate::export::camera::{Basis, View};
-    use crate::export::shape::Size;
+    use crate::export::pictures::camera::{Basis, View};
+    use crate::export::pictures::shape::Size;
 
     const ROOM: Extent = Extent { min: DVec3::NEG_ONE, max: DVec3::ONE };
 

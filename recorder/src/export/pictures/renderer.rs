@@ -5,9 +5,9 @@ use glam::DVec2;
 use super::camera::Camera;
 use super::extent::Extent;
 use super::mesh::{Bend, MeshDrawing};
-use super::scene_state::SceneState;
 use super::shape::{Color, Picture, Shape, Size, Text};
 use super::solids;
+use crate::export::scene_state::SceneState;
 
 const CAPTION: Color = Color([0x30, 0x30, 0x30]);
 /// Distance that planes extend beyond the extent of the picture, relative to its longest side.

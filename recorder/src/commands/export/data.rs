@@ -1,0 +1,90 @@
+//! Exports states as numbers and meshes.
+
+use std::fmt;
+use std::path::Path;
+
+use recorder::Existing;
+use serde::Serialize;
+
+use crate::cli::output;
+use crate::export::data::written_files::WrittenFiles;
+use crate::export::data::{csv, foxglove, npz, obj, pc2, ros2, usda, vtk};
+use crate::export::snapshots::Snapshots;
+
+/// A format of numbers or meshes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum DataFormat {
+    Npz,
+    Csv,
+    Vtk,
+    Obj,
+    Pc2,
+    Usda,
+    Foxglove,
+    Ros2,
+}
+
+/// The result, as printed.
+#[derive(Debug, Serialize)]
+pub(super) struct Written {
+    /// The file or the folder.
+    target: String,
+    file_count: usize,
+    snapshot_count: usize,
+    first_step: u64,
+    last_step: u64,
+}
+
+/// Writes the files of a format. After an error, none of them is left.
+pub(super) fn write(
+    snapshots: &Snapshots<'_>,
+    format: DataFormat,
+    target: &Path,
+    existing: Existing,
+) -> anyhow::Result<Written> {
+    let mut files = WrittenFiles::new(existing);
+    match write_files(snapshots, format, target, &mut files) {
+        Ok(()) => Ok(Written::new(snapshots, target, files.paths().len())),
+        Err(error) => {
+            files.remove();
+            Err(error)
+        }
+    }
+}
+
+fn write_files(
+    snapshots: &Snapshots<'_>,
+    format: DataFormat,
+    target: &Path,
+    files: &mut WrittenFiles,
+) -> anyhow::Result<()> {
+    match format {
+        DataFormat::Npz => files.add_streamed(target, |out| npz::write(snapshots, out)),
+        DataFormat::Csv => files.add_streamed(target, |out| csv::write(snapshots, out)),
+        DataFormat::Vtk => vtk::write(snapshots, target, files),
+        DataFormat::Obj => obj::write(snapshots, target, files),
+        DataFormat::Pc2 => pc2::write(snapshots, target, files),
+        DataFormat::Usda => files.add_streamed(target, |out| usda::write(snapshots, out)),
+        DataFormat::Foxglove => files.add_streamed(target, |out| foxglove::write(snapshots, out)),
+        DataFormat::Ros2 => ros2::write(snapshots, target, files),
+    }
+}
+
+impl Written {
+    pub(super) fn new(snapshots: &Snapshots<'_>, target: &Path, file_count: usize) -> Self {
+        Self {
+            target: output::path_text(target),
+            file_count,
+            snapshot_count: snapshots.steps.len(),
+            first_step: snapshots.steps.first().copied().unwrap_or_default(),
+            last_step: snapshots.steps.last().copied().unwrap_or_default(),
+        }
+    }
+}
+
+impl fmt::Display for Written {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { target, snapshot_count, first_step, last_step, .. } = self;
+        write!(f, "{target}: {snapshot_count} snapshots (steps {first_step}..={last_step})")
+    }
+}

@@ -1,0 +1,82 @@
+//! The properties of a recording that an export needs before it begins.
+
+use std::io::Read;
+
+use anyhow::{Context, bail};
+use recorder::{FrameReader, LogEnd, LogReader, RunDescription};
+use sim_solver::Scene;
+use sim_solver::scene::Up;
+
+use crate::export::snapshots::{OpenBytes, Snapshots, VisitStates};
+use crate::input::scene_source::scene_in_recording;
+
+/// Most snapshots of a recording to export: 19 hours at 240 Hz. Their steps take 128 MiB of memory.
+const SNAPSHOTS_MAX: usize = 1 << 24;
+/// Snapshots between two updates of the progress bar.
+const SNAPSHOTS_PER_UPDATE: usize = 64;
+
+/// The properties of a recording.
+#[derive(Debug)]
+pub(super) struct Survey {
+    pub(super) run: RunDescription,
+    /// The scene, which gives the up axis, or the reason why there is none.
+    pub(super) scene: Result<Scene, String>,
+    /// Steps of all snapshots, ascending.
+    pub(super) steps: Vec<u64>,
+    /// Number of particles of the first snapshot.
+    pub(super) particle_count: usize,
+    pub(super) end: LogEnd,
+    /// Number of bytes of the file that are readable.
+    pub(super) intact_count: u64,
+}
+
+impl Survey {
+    /// Reads the whole recording for its steps and its end. Calls `on_progress` periodically, with the
+    /// number of bytes that are read.
+    pub(super) fn read<R: Read>(
+        log: LogReader<R>,
+        path: &str,
+        mut on_progress: impl FnMut(u64),
+    ) -> anyhow::Result<Self> {
+        let scene = scene_in_recording(&log).map_err(|error| format!("{path}: {error:#}"));
+        let run = log.run().clone();
+        let mut frames = FrameReader::new(log);
+        let (mut steps, mut particle_count) = (Vec::new(), 0);
+        while let Some(frame) = frames.next_frame().with_context(|| path.to_owned())? {
+            if steps.len() == SNAPSHOTS_MAX {
+                bail!("{path}: has more than {SNAPSHOTS_MAX} snapshots");
+            }
+            if steps.is_empty() {
+                particle_count = frame.payload().len();
+            }
+            steps.push(frame.row.step);
+            if steps.len().is_multiple_of(SNAPSHOTS_PER_UPDATE) {
+                on_progress(frames.log().intact_count());
+            }
+        }
+        let end = frames.end().cloned().unwrap_or(LogEnd::Complete);
+        let intact_count = frames.log().intact_count();
+        Ok(Self { run, scene, steps, particle_count, end, intact_count })
+    }
+
+    /// Returns the snapshots of `steps`, which `visit` visits, of a file that `open_bytes` opens. Without a
+    /// scene, y is up.
+    pub(super) fn snapshots<'a>(
+        &'a self,
+        steps: &'a [u64],
+        visit: &'a VisitStates<'a>,
+        open_bytes: &'a OpenBytes<'a>,
+    ) -> Snapshots<'a> {
+        let scene = self.scene.as_ref().ok();
+        Snapshots {
+            run: &self.run,
+            up: scene.map_or(Up::Y, |scene| scene.up),
+            is_2d: scene.is_some_and(|scene| scene.dimensions == 2),
+            first_step: self.steps.first().copied().unwrap_or_default(),
+            steps,
+            particle_count: self.particle_count,
+            visit,
+            open_bytes,
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Writes states as numbers and meshes for other programs.
+
+pub(crate) mod csv;
+pub(crate) mod foxglove;
+pub(crate) mod npz;
+pub(crate) mod obj;
+pub(crate) mod pc2;
+mod polydata;
+mod recording_copy;
+pub(crate) mod ros2;
+pub(crate) mod usda;
+pub(crate) mod vtk;
+pub(crate) mod written_files;

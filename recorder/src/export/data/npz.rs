@@ -1,0 +1,133 @@
+//! NPZ, the archive of NumPy: one array per column, in a ZIP file without compression.
+//!
+//! An array is written from its first number to its last, so each column reads the recording once.
+
+use std::io::Write;
+
+use sim_contract::ParticleState;
+use zip::write::{SimpleFileOptions, StreamWriter};
+use zip::{DateTime, ZipWriter};
+
+use crate::export::snapshots::Snapshots;
+
+/// The header of an array is padded to a multiple of this, so that its numbers are aligned.
+const HEADER_ALIGNMENT: usize = 64;
+/// Bytes of a header before its text: the magic string, the version, and the length of the text.
+const PREFIX_SIZE_BYTES: usize = 10;
+
+/// A column of the particles.
+struct Column {
+    name: &'static str,
+    number_type: &'static str,
+    /// Numbers per particle. One number has no axis of its own.
+    width: usize,
+    append: fn(&ParticleState, &mut Vec<u8>),
+}
+
+const COLUMNS: [Column; 4] = [
+    Column {
+        name: "positions",
+        number_type: "<f4",
+        width: 3,
+        append: |particle, bytes| bytes.extend_from_slice(bytemuck::bytes_of(&particle.position)),
+    },
+    Column {
+        name: "velocities",
+        number_type: "<f4",
+        width: 3,
+        append: |particle, bytes| bytes.extend_from_slice(bytemuck::bytes_of(&particle.velocity)),
+    },
+    Column {
+        name: "inverse_masses",
+        number_type: "<f4",
+        width: 1,
+        append: |particle, bytes| bytes.extend_from_slice(&particle.inverse_mass.to_le_bytes()),
+    },
+    Column {
+        name: "flags",
+        number_type: "<u4",
+        width: 1,
+        append: |particle, bytes| bytes.extend_from_slice(&particle.flags.to_le_bytes()),
+    },
+];
+
+/// Writes the arrays `steps` and `times` (s), and those of the particles.
+pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
+    let mut archive = Archive(ZipWriter::new_stream(out));
+    let steps = snapshots.steps.iter();
+    archive.begin("steps", "<u8", &[snapshots.steps.len()])?;
+    for step in steps.clone() {
+        archive.0.write_all(&step.to_le_bytes())?;
+    }
+    archive.begin("times", "<f8", &[snapshots.steps.len()])?;
+    for step in steps {
+        archive.0.write_all(&snapshots.time_s(*step).to_le_bytes())?;
+    }
+    for column in COLUMNS {
+        archive.add_column(snapshots, &column)?;
+    }
+    archive.0.finish()?;
+    Ok(())
+}
+
+/// An archive that is written without seeking.
+struct Archive<'a>(ZipWriter<StreamWriter<&'a mut dyn Write>>);
+
+impl Archive<'_> {
+    /// Begins an array. Its numbers follow in row-major order.
+    fn begin(&mut self, name: &str, number_type: &str, shape: &[usize]) -> anyhow::Result<()> {
+        // The time of day is left out, so that equal exports have equal bytes.
+        let options =
+            SimpleFileOptions::default().last_modified_time(DateTime::default()).large_file(true);
+        self.0.start_file(format!("{name}.npy"), options)?;
+        self.0.write_all(&header(number_type, shape))?;
+        Ok(())
+    }
+
+    fn add_column(&mut self, snapshots: &Snapshots<'_>, column: &Column) -> anyhow::Result<()> {
+        let shape = [snapshots.steps.len(), snapshots.particle_count, column.width];
+        let axis_count = if column.width == 1 { 2 } else { 3 };
+        self.begin(column.name, column.number_type, &shape[..axis_count])?;
+        let mut bytes = Vec::new();
+        snapshots.for_each(|state| {
+            bytes.clear();
+            for particle in &state.particles {
+                (column.append)(particle, &mut bytes);
+            }
+            Ok(self.0.write_all(&bytes)?)
+        })
+    }
+}
+
+/// Returns the header of an array, format 1.0: a text in the syntax of Python, padded with spaces.
+fn header(number_type: &str, shape: &[usize]) -> Vec<u8> {
+    // One axis is a tuple only with a comma at its end, which more axes may have, too.
+    let shape: Vec<_> = shape.iter().map(usize::to_string).collect();
+    let shape = shape.join(",");
+    let mut text =
+        format!("{{'descr': '{number_type}', 'fortran_order': False, 'shape': ({shape},), }}");
+    let size_bytes = PREFIX_SIZE_BYTES + text.len() + 1;
+    text.push_str(&" ".repeat(size_bytes.next_multiple_of(HEADER_ALIGNMENT) - size_bytes));
+    text.push('\n');
+    let mut header = b"\x93NUMPY\x01\x00".to_vec();
+    // Three axes of 20 digits need 150 characters.
+    header.extend_from_slice(&u16::try_from(text.len()).unwrap_or(u16::MAX).to_le_bytes());
+    header.extend_from_slice(text.as_bytes());
+    header
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_is_aligned_and_states_its_length() {
+        for shape in [&[5][..], &[5, 12], &[16_777_216, 16_777_216, 3]] {
+            let header = header("<f4", shape);
+            assert_eq!(header.len() % HEADER_ALIGNMENT, 0);
+            let length = u16::from_le_bytes([header[8], header[9]]);
+            assert_eq!(PREFIX_SIZE_BYTES + usize::from(length), header.len());
+            assert_eq!(header.last(), Some(&b'\n'));
+        }
+    }
+}

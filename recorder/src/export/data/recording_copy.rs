@@ -1,0 +1,143 @@
+//! A copy of a recording, record by record, into which other messages can be inserted.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Write};
+
+use anyhow::{Context, bail};
+use mcap::records::{MessageHeader, Record};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::write::NoSeek;
+use mcap::{Attachment, WriteOptions, Writer};
+use recorder::{Topic, TopicFormat};
+
+/// The copy of a recording, up to the record that was copied last.
+pub(super) struct RecordingCopy<'a> {
+    source: &'a mut dyn Read,
+    reader: LinearReader,
+    file: Writer<NoSeek<&'a mut dyn Write>>,
+    particles_channel: Option<u16>,
+    /// The header of the snapshot that was copied last.
+    snapshot: Option<MessageHeader>,
+}
+
+impl<'a> RecordingCopy<'a> {
+    /// Reads the header of `source` and begins a copy with the same one.
+    pub(super) fn begin(source: &'a mut dyn Read, out: &'a mut dyn Write) -> anyhow::Result<Self> {
+        // The end of the file may be missing.
+        let options = LinearReaderOptions::default().with_skip_end_magic(true);
+        let mut reader = LinearReader::new_with_options(options);
+        let Some(Record::Header(header)) = next_record(&mut reader, source)? else {
+            bail!("has no MCAP header");
+        };
+        let file = WriteOptions::new()
+            .profile(header.profile)
+            .library(header.library)
+            .disable_seeking(true)
+            .compression(Some(mcap::Compression::Zstd))
+            .compression_level(1)
+            .compression_threads(0)
+            .create(NoSeek::new(out))?;
+        Ok(Self { source, reader, file, particles_channel: None, snapshot: None })
+    }
+
+    /// Copies everything up to the snapshot of a step, and the snapshot.
+    pub(super) fn copy_through(&mut self, step: u64) -> anyhow::Result<()> {
+        // The sequence of a message is the low half of its step.
+        let sequence = step & u64::from(u32::MAX);
+        while let Some(record) = next_record(&mut self.reader, self.source)? {
+            if self.copy(record)?.is_some_and(|copied| u64::from(copied) == sequence) {
+                return Ok(());
+            }
+        }
+        bail!("has no snapshot of step {step}")
+    }
+
+    /// Copies the rest and writes the index.
+    pub(super) fn finish(mut self) -> anyhow::Result<()> {
+        while let Some(record) = next_record(&mut self.reader, self.source)? {
+            self.copy(record)?;
+        }
+        self.file.finish()?;
+        Ok(())
+    }
+
+    /// Adds a topic that the source lacks. Returns its channel.
+    pub(super) fn add_channel(&mut self, topic: &str, format: &TopicFormat) -> anyhow::Result<u16> {
+        let schema = &format.schema;
+        let schema_id = self.file.add_schema(schema.name, schema.encoding, &schema.data)?;
+        Ok(self.file.add_channel(schema_id, topic, format.encoding, &BTreeMap::new())?)
+    }
+
+    /// Writes a message with the times of the snapshot that was copied last.
+    pub(super) fn insert(&mut self, channel_id: u16, data: &[u8]) -> anyhow::Result<()> {
+        let snapshot = self.snapshot.context("no snapshot was copied")?;
+        let header = MessageHeader { channel_id, ..snapshot };
+        Ok(self.file.write_to_known_channel(&header, data)?)
+    }
+
+    /// Copies a record. Records of the index are left out, because the copy has one of its own. Returns the
+    /// sequence of a snapshot.
+    fn copy(&mut self, record: Record<'_>) -> anyhow::Result<Option<u32>> {
+        match record {
+            Record::Schema { header, data } => {
+                self.file.add_schema_with_id(header.id, &header.name, &header.encoding, &data)?;
+            }
+            Record::Channel(channel) => {
+                let mcap::records::Channel { id, schema_id, topic, message_encoding, metadata } =
+                    channel;
+                if topic == recorder::SCENE_TOPIC {
+                    bail!("has /scene already; export the recording that it is a copy of");
+                }
+                if topic == Topic::Particles.name() {
+                    self.particles_channel = Some(id);
+                }
+                self.file.add_channel_with_id(
+                    id,
+                    schema_id,
+                    &topic,
+                    &message_encoding,
+                    &metadata,
+                )?;
+            }
+            Record::Message { header, data } => {
+                self.file.write_to_known_channel(&header, &data)?;
+                if self.particles_channel == Some(header.channel_id) {
+                    self.snapshot = Some(header);
+                    return Ok(Some(header.sequence));
+                }
+            }
+            Record::Attachment { header, data, .. } => self.file.attach(&Attachment {
+                log_time: header.log_time,
+                create_time: header.create_time,
+                name: header.name,
+                media_type: header.media_type,
+                data,
+            })?,
+            Record::Metadata(metadata) => self.file.write_metadata(&metadata)?,
+            _ => {}
+        }
+        Ok(None)
+    }
+}
+
+/// Returns the next record, or `None` at the end of the source, also within a record.
+fn next_record(
+    reader: &mut LinearReader,
+    source: &mut dyn Read,
+) -> anyhow::Result<Option<Record<'static>>> {
+    loop {
+        let Some(event) = reader.next_event() else { return Ok(None) };
+        match event? {
+            LinearReadEvent::ReadRequest(size_bytes) => {
+                let count = source.read(reader.insert(size_bytes))?;
+                if count == 0 {
+                    return Ok(None);
+                }
+                reader.notify_read(count);
+            }
+            LinearReadEvent::Record { opcode, data } => {
+                return Ok(Some(mcap::parse_record(opcode, data)?.into_owned()));
+            }
+        }
+    }
+}

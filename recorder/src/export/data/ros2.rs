@@ -1,0 +1,171 @@
+//! A bag of ROS 2: an MCAP file with `PointCloud2` messages and the static transform that turns the scene's
+//! `up` to z, and the metadata that `ros2 bag` reads.
+
+mod cdr;
+mod schemas;
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
+use mcap::{WriteOptions, Writer};
+use recorder::{MAP_FRAME, WORLD_FRAME, map_from_world};
+use sim_contract::ParticleState;
+
+use super::written_files::WrittenFiles;
+use crate::export::frame_names::FrameNames;
+use crate::export::snapshots::Snapshots;
+use cdr::CdrMessage;
+use schemas::{MessageType, POINT_CLOUD, TRANSFORMS};
+
+const PARTICLES_TOPIC: &str = "/particles";
+const TRANSFORM_TOPIC: &str = "/tf_static";
+const METADATA_NAME: &str = "metadata.yaml";
+const SECOND_NS: u64 = 1_000_000_000;
+/// Numbers of types in a `PointField`.
+const UINT32: u8 = 6;
+const FLOAT32: u8 = 7;
+/// The columns of a [`ParticleState`], four bytes each.
+const FIELDS: [(&str, u8); 8] = [
+    ("x", FLOAT32),
+    ("y", FLOAT32),
+    ("z", FLOAT32),
+    ("inverse_mass", FLOAT32),
+    ("vx", FLOAT32),
+    ("vy", FLOAT32),
+    ("vz", FLOAT32),
+    ("flags", UINT32),
+];
+const FIELD_SIZE_BYTES: u32 = 4;
+/// Late subscribers receive a static transform: keep the last one, reliable, transient local.
+const TRANSFORM_QOS: &str = "- history: 1\\n  depth: 1\\n  reliability: 1\\n  durability: 1\\n  \
+    deadline:\\n    sec: 9223372036\\n    nsec: 854775807\\n  lifespan:\\n    sec: 9223372036\\n    \
+    nsec: 854775807\\n  liveliness: 1\\n  liveliness_lease_duration:\\n    sec: 9223372036\\n    \
+    nsec: 854775807\\n  avoid_ros_namespace_conventions: false";
+
+/// Writes the bag into `folder`.
+pub(crate) fn write(
+    snapshots: &Snapshots<'_>,
+    folder: &Path,
+    files: &mut WrittenFiles,
+) -> anyhow::Result<()> {
+    let names = FrameNames::new(folder, &snapshots.run.scene_name, "mcap");
+    let (path, metadata_path) = (names.index_path("mcap"), folder.join(METADATA_NAME));
+    files.existing().check(&metadata_path)?;
+    names.prepare(&[], files.existing())?;
+    files.add_streamed(&path, |out| write_messages(snapshots, out))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    files.add_whole(&metadata_path, metadata(snapshots, &name).as_bytes())
+}
+
+fn write_messages(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::Result<()> {
+    let mut file = WriteOptions::new()
+        .profile("ros2")
+        .library(concat!("catenary recorder ", env!("CARGO_PKG_VERSION")))
+        .disable_seeking(true)
+        .compression(Some(mcap::Compression::Zstd))
+        .compression_level(1)
+        .compression_threads(0)
+        .create(NoSeek::new(out))?;
+    let transforms = add_channel(&mut file, TRANSFORM_TOPIC, &TRANSFORMS)?;
+    let clouds = add_channel(&mut file, PARTICLES_TOPIC, &POINT_CLOUD)?;
+    let header = |channel_id, step: u64| {
+        let time_ns = snapshots.run.time_of_step_ns(step);
+        // The low half of the step, as in recordings.
+        let sequence = u32::try_from(step & u64::from(u32::MAX)).unwrap_or_default();
+        MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns }
+    };
+    let first = header(transforms, snapshots.steps[0]);
+    file.write_to_known_channel(&first, &transform(snapshots, first.log_time))?;
+    snapshots.for_each(|state| {
+        let header = header(clouds, state.row.step);
+        let message = point_cloud(&state.particles, header.log_time);
+        Ok(file.write_to_known_channel(&header, &message)?)
+    })?;
+    file.finish()?;
+    Ok(())
+}
+
+fn add_channel<W: Write>(
+    file: &mut Writer<NoSeek<W>>,
+    topic: &str,
+    message: &MessageType,
+) -> mcap::McapResult<u16> {
+    let schema_id = file.add_schema(message.name, "ros2msg", message.definition.as_bytes())?;
+    file.add_channel(schema_id, topic, "cdr", &BTreeMap::new())
+}
+
+/// Adds a `std_msgs/Header`.
+fn add_header(message: &mut CdrMessage, time_ns: u64, frame: &str) {
+    let part = |number: u64| u32::try_from(number).unwrap_or(u32::MAX);
+    // Seconds are signed and end in 2038.
+    message.add_u32(part(time_ns / SECOND_NS));
+    message.add_u32(part(time_ns % SECOND_NS));
+    message.add_text(frame);
+}
+
+/// Returns a `sensor_msgs/PointCloud2` with the bytes of the particles.
+fn point_cloud(particles: &[ParticleState], time_ns: u64) -> Vec<u8> {
+    let mut message = CdrMessage::new();
+    let point_step = FIELD_SIZE_BYTES * 8;
+    let bytes: &[u8] = bytemuck::cast_slice(particles);
+    add_header(&mut message, time_ns, WORLD_FRAME);
+    message.add_u32(1);
+    message.add_count(particles.len());
+    message.add_count(FIELDS.len());
+    for (offset, (name, number_type)) in (0..).step_by(FIELD_SIZE_BYTES as usize).zip(FIELDS) {
+        message.add_text(name);
+        message.add_u32(offset);
+        message.add_u8(number_type);
+        message.add_u32(1);
+    }
+    // Not big-endian.
+    message.add_u8(0);
+    message.add_u32(point_step);
+    message.add_count(bytes.len());
+    message.add_bytes(bytes);
+    // Every position is finite.
+    message.add_u8(1);
+    message.finish()
+}
+
+/// Returns a `tf2_msgs/TFMessage` with the turn of the scene's `up` to z.
+fn transform(snapshots: &Snapshots<'_>, time_ns: u64) -> Vec<u8> {
+    let (translation, rotation) = map_from_world(snapshots.run.origin, snapshots.up);
+    let mut message = CdrMessage::new();
+    message.add_count(1);
+    add_header(&mut message, time_ns, MAP_FRAME);
+    message.add_text(WORLD_FRAME);
+    for number in translation.into_iter().chain(rotation) {
+        message.add_f64(number);
+    }
+    message.finish()
+}
+
+/// Returns the metadata of the bag, version 5, which later versions of rosbag2 read.
+fn metadata(snapshots: &Snapshots<'_>, file_name: &str) -> String {
+    let time_ns = |step: Option<&u64>| snapshots.run.time_of_step_ns(step.copied().unwrap_or(0));
+    let start_ns = time_ns(snapshots.steps.first());
+    let duration_ns = time_ns(snapshots.steps.last()).saturating_sub(start_ns);
+    let (cloud_count, count) = (snapshots.steps.len(), snapshots.steps.len() + 1);
+    let topic = |name: &str, message: &MessageType, qos: &str, count: usize| {
+        let type_name = message.name;
+        format!(
+            "    - topic_metadata:\n        name: {name}\n        type: {type_name}\n        \
+             serialization_format: cdr\n        offered_qos_profiles: \"{qos}\"\n      \
+             message_count: {count}\n"
+        )
+    };
+    let topics = topic(TRANSFORM_TOPIC, &TRANSFORMS, TRANSFORM_QOS, 1)
+        + &topic(PARTICLES_TOPIC, &POINT_CLOUD, "", cloud_count);
+    format!(
+        "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    \
+         nanoseconds: {duration_ns}\n  starting_time:\n    nanoseconds_since_epoch: {start_ns}\n  \
+         message_count: {count}\n  topics_with_message_count:\n{topics}  compression_format: \"\"\n  \
+         compression_mode: \"\"\n  relative_file_paths:\n    - \"{file_name}\"\n  files:\n    \
+         - path: \"{file_name}\"\n      starting_time:\n        nanoseconds_since_epoch: {start_ns}\n      \
+         duration:\n        nanoseconds: {duration_ns}\n      message_count: {count}\n"
+    )
+}
