@@ -368,7 +368,8 @@ fn a_recording_of_another_solver_version_is_refused() {
         |_| {},
     );
     let error = format!("{:#}", error.unwrap_err());
-    let found = format!("x.mcap: recorded with solver version {}, but this program", SOLVER_VERSION + 1);
+    let found =
+        format!("x.mcap: recorded with solver version {}, but this program", SOLVER_VERSION + 1);
     assert!(error.contains(&found), "{error}");
 }
 

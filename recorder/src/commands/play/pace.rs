@@ -30,23 +30,37 @@ impl Pace {
         self.base = None;
     }
 
+    /// Changes the rate. The place in the recording stays the same.
+    pub(crate) fn set_rate(&mut self, rate: f64, now_ns: u64) {
+        if let Some(base) = &mut self.base {
+            let passed_ns = now_ns.saturating_sub(base.deadline_ns) as f64 * self.rate;
+            base.recorded_ns = base.recorded_ns.saturating_add(whole_ns(passed_ns));
+            base.deadline_ns = base.deadline_ns.max(now_ns);
+        }
+        self.rate = rate;
+    }
+
     /// Returns the deadline of the snapshot at `recorded_ns`. The previous snapshot is published
     /// already.
     pub(crate) fn deadline_ns(&mut self, recorded_ns: u64, now_ns: u64) -> u64 {
         let base = *self.base.get_or_insert(Base { recorded_ns, deadline_ns: now_ns });
         let passed_ns = recorded_ns.saturating_sub(base.recorded_ns) as f64 / self.rate;
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "positive, and saturating at the maximum"
-        )]
-        let deadline_ns = base.deadline_ns.saturating_add(passed_ns as u64);
+        let deadline_ns = base.deadline_ns.saturating_add(whole_ns(passed_ns));
         if deadline_ns.saturating_add(CATCH_UP_MAX_NS) < now_ns {
             self.base = Some(Base { recorded_ns, deadline_ns: now_ns });
             return now_ns;
         }
         deadline_ns
     }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "positive, and saturating at the maximum"
+)]
+fn whole_ns(ns: f64) -> u64 {
+    ns as u64
 }
 
 #[cfg(test)]
@@ -72,6 +86,17 @@ mod tests {
         pace.deadline_ns(0, 0);
         assert_eq!(pace.deadline_ns(STEP_NS, STEP_NS * 3), STEP_NS);
         assert_eq!(pace.deadline_ns(STEP_NS * 4, STEP_NS * 3), STEP_NS * 4);
+    }
+
+    #[test]
+    fn a_change_of_the_rate_keeps_the_place_in_the_recording() {
+        let mut pace = Pace::new(1.0);
+        pace.deadline_ns(0, 0);
+        // Half of a step has passed. The other half takes twice its time.
+        pace.set_rate(0.5, STEP_NS / 2);
+        assert_eq!(pace.deadline_ns(STEP_NS, STEP_NS / 2), STEP_NS / 2 + STEP_NS);
+        pace.set_rate(2.0, STEP_NS / 2 + STEP_NS);
+        assert_eq!(pace.deadline_ns(STEP_NS * 3, STEP_NS * 2), STEP_NS / 2 + STEP_NS * 2);
     }
 
     #[test]
