@@ -1,9 +1,9 @@
 //! Child processes that end with their guard.
 
 use std::fmt;
-use std::io::{BufRead, BufReader, Read, empty};
+use std::io::{BufRead, BufReader, Read, Write, empty};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
@@ -23,6 +23,8 @@ const EXIT_REJECTED: i32 = 4;
 pub struct Process {
     title: String,
     child: Child,
+    /// The keyboard of a program on a terminal.
+    stdin: Option<ChildStdin>,
     stdout: Captured,
     stderr: Captured,
 }
@@ -153,6 +155,39 @@ impl Process {
         Self::spawn(command, (program, sandbox.domain()), args, streams)
     }
 
+    /// Runs a shell script with job control on a terminal of its own, with a program as `"$0"` and its
+    /// arguments as `"$@"`. Everything on the terminal arrives as stderr.
+    ///
+    /// # Panics
+    /// If the terminal or the shell does not start.
+    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
+    pub fn start_on_terminal(
+        script: &str,
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+    ) -> Self {
+        let quoted = |text: &str| format!("'{}'", text.replace('\'', r"'\''"));
+        let program_path = program.path().display().to_string();
+        let words = [script, &program_path].into_iter().chain(args.iter().copied());
+        let words = words.map(quoted).collect::<Vec<_>>().join(" ");
+        let mut command = Command::new("sh");
+        command.args(["-c", r#"exec script -qfec "$0" /dev/null >&2"#]);
+        command.arg(format!("exec sh -mc {words}"));
+        command.env(DOMAIN_VARIABLE, sandbox.domain()).env("SHELL", "/bin/sh").process_group(0);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        Self::spawn_command(command, (program, args))
+    }
+
+    /// Presses keys on the terminal of the program.
+    ///
+    /// # Panics
+    /// If the program has no terminal, or its terminal is gone.
+    pub fn press(&mut self, keys: &str) {
+        let stdin = self.stdin.as_mut().expect("a program on a terminal");
+        stdin.write_all(keys.as_bytes()).expect("a terminal");
+    }
+
     fn spawn(
         mut command: Command,
         (program, domain): (Program, &str),
@@ -163,11 +198,16 @@ impl Process {
         // ends its children in order.
         command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
         command.stdin(Stdio::null()).stdout(stdout).stderr(stderr);
+        Self::spawn_command(command, (program, args))
+    }
+
+    fn spawn_command(mut command: Command, (program, args): (Program, &[&str])) -> Self {
         let title = format!("{program:?} {}", args.join(" "));
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{title}: {error}"));
         let stdout = child.stdout.take().map_or_else(|| Captured::new(empty()), Captured::new);
         let stderr = child.stderr.take().map_or_else(|| Captured::new(empty()), Captured::new);
-        Self { title, child, stdout, stderr }
+        let stdin = child.stdin.take();
+        Self { title, child, stdin, stdout, stderr }
     }
 
     /// Starts a program and waits for its line `ready ...`.
@@ -348,6 +388,11 @@ impl Process {
     /// Returns true if a line on stderr contains `part`. Does not wait for it.
     pub fn has_written_part(&self, part: &str) -> bool {
         self.stderr.text().contains(part)
+    }
+
+    /// Returns the lines on stderr so far.
+    pub fn text(&self) -> String {
+        self.stderr.text()
     }
 
     /// Returns the program and its arguments.

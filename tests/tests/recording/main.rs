@@ -10,6 +10,11 @@ mod interrupt;
 mod losses;
 mod outputs;
 mod physics;
+mod play {
+    mod files;
+    mod keys;
+    mod seek;
+}
 mod raw;
 mod repair;
 mod states;

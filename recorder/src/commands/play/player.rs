@@ -57,15 +57,6 @@ pub(super) struct Beginning {
     command: Option<Command>,
 }
 
-/// The end of a run.
-#[derive(Debug)]
-enum RunEnd {
-    /// Another run follows.
-    Next(Beginning),
-    /// The replay ends.
-    Last,
-}
-
 impl Player {
     /// Plays run after run. Calls `on_ready` once the services are there.
     pub(super) fn play(&mut self, stop: &Stop, on_ready: impl FnOnce()) -> anyhow::Result<()> {
@@ -81,10 +72,7 @@ impl Player {
                 let step = first.row.step;
                 replay.answer(moved_to(command, step), step, Ok(()))?;
             }
-            next = match self.play_run(&mut replay, first, stop)? {
-                RunEnd::Next(beginning) => Some(beginning),
-                RunEnd::Last => None,
-            };
+            next = self.play_run(&mut replay, first, stop)?;
             owner = Some(replay.into_owner());
         }
         Ok(())
@@ -102,19 +90,20 @@ impl Player {
         Ok((replay, frame))
     }
 
-    /// Publishes the snapshots of a run, until it ends or another place is asked for.
+    /// Publishes the snapshots of a run, until it ends or another place is asked for. Returns the next run;
+    /// `None` at the end of the replay.
     fn play_run(
         &mut self,
         replay: &mut Replay,
         first: Frame,
         stop: &Stop,
-    ) -> anyhow::Result<RunEnd> {
+    ) -> anyhow::Result<Option<Beginning>> {
         let mut last_step = first.row.step;
         let mut next = Some(first);
         let mut ended_ns = None;
         while !stop.is_requested() && !self.is_quit {
             if let Some(beginning) = self.attend(replay, next.as_ref(), last_step)? {
-                return Ok(RunEnd::Next(beginning));
+                return Ok(Some(beginning));
             }
             let now_ns = monotonic_ns();
             let due_ns = match &next {
@@ -126,11 +115,11 @@ impl Player {
                     last_step = frame.row.step;
                     next = self.publish(replay, &frame)?;
                 }
-                None if due_ns <= now_ns => return Ok(self.end_run()),
+                None if due_ns <= now_ns => return Ok(self.next_run()),
                 None => sleep_until(due_ns.min(now_ns + WAIT_MAX_NS)),
             }
         }
-        Ok(RunEnd::Last)
+        Ok(None)
     }
 
     /// Returns when a snapshot is due. `u64::MAX` while the replay is paused or waits for readers.
@@ -171,13 +160,12 @@ impl Player {
     }
 
     /// Returns the run after one that has ended.
-    fn end_run(&self) -> RunEnd {
+    fn next_run(&self) -> Option<Beginning> {
         let next = self.playlist.place_after_run();
         let next = next.filter(|place| self.playlist.time_of(*place) <= self.plan.end_ns);
         match next {
-            Some(place) => RunEnd::Next(Beginning { place, command: None }),
-            None if self.plan.loops => RunEnd::Next(self.beginning()),
-            None => RunEnd::Last,
+            Some(place) => Some(Beginning { place, command: None }),
+            None => self.plan.loops.then(|| self.beginning()),
         }
     }
 
@@ -266,7 +254,7 @@ impl Player {
             return Ok(());
         }
         self.next_status_ns = now_ns + STATUS_PERIOD_NS;
-        replay.publish_status(self.control)?;
+        replay.publish_status(self.control, step)?;
         let Plan { start_ns, end_ns, .. } = self.plan;
         let time_ns = self.playlist.time_ns(step).saturating_sub(start_ns);
         live::show(&Shown { time_ns, duration_ns: end_ns - start_ns, step, control: self.control });

@@ -1,6 +1,6 @@
 //! The state of a replay: the values for headers and for late subscribers.
 
-use recorder::{CollidersRow, Message, OutcomeRow, TapeState, TearTracker};
+use recorder::{CollidersRow, Message, OutcomeRow, StatusRow, TapeState, TearTracker};
 use sim_contract::{Action, Method, ParameterValues, Torn};
 use sim_solver::Keyframe;
 
@@ -12,6 +12,8 @@ pub(crate) struct Position {
     pub(super) latched_keyframe: Option<Vec<u8>>,
     /// The newest colliders before the first published snapshot.
     pub(super) latched_colliders: Option<CollidersRow>,
+    /// The newest status of the node before the first published snapshot.
+    pub(super) latched_status: Option<StatusRow>,
     /// The recorded node was paused.
     pub(super) is_paused: bool,
     /// Number of outcomes so far.
@@ -32,6 +34,7 @@ impl Position {
             keyframe_step: 0,
             latched_keyframe: None,
             latched_colliders: None,
+            latched_status: None,
             is_paused: false,
             outcome_count: 0,
             rejected_count: 0,
@@ -51,6 +54,7 @@ impl Position {
         position.outcome_count = state.row.outcome_count;
         position.rejected_count = state.status.as_ref().map_or(0, |row| row.rejected_count);
         position.latched_colliders.clone_from(&state.colliders);
+        position.latched_status.clone_from(&state.status);
         if let Some(row) = &state.parameters {
             position.apply_parameters(&Message::Parameters(row.clone()));
         }

@@ -54,7 +54,7 @@ impl Replay {
         endpoint: &Endpoint,
         owner: Option<Owner>,
         recorded: &Recorded<'_>,
-        position: Position,
+        mut position: Position,
     ) -> anyhow::Result<Self> {
         let Recorded { run, scene, topology, surface, .. } = *recorded;
         let run_id = getrandom::u64().context("cannot get a random run id")?;
@@ -81,10 +81,10 @@ impl Replay {
             run_id,
             published_torn: Torn::default(),
             published_parameters: position.parameters,
+            status: position.latched_status.take(),
             position,
             step: None,
             next_index: None,
-            status: None,
             commands: Vec::new(),
         })
     }
@@ -258,12 +258,13 @@ impl Replay {
     }
 
     /// Publishes the status of the replay, with the recorded timing of the node.
-    pub(crate) fn publish_status(&self, control: Control) -> anyhow::Result<()> {
+    /// `step` is the last published one, or the first one of the run.
+    pub(crate) fn publish_status(&self, control: Control, step: u64) -> anyhow::Result<()> {
         let mut status = NodeStatus {
             contract_version: CONTRACT_VERSION,
             solver_version: self.run.solver_version,
             run_id: self.run_id,
-            step: self.step.unwrap_or_default(),
+            step,
             real_time_factor: if control.is_moving() { control.rate } else { 0.0 },
             time_scale: control.rate,
             outcome_count: self.position.outcome_count,
