@@ -4,6 +4,7 @@ mod control;
 mod keyboard;
 mod keys;
 mod live;
+mod lockstep;
 mod pace;
 mod player;
 mod playlist;
@@ -25,10 +26,11 @@ use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::{self, Exit};
 use crate::cli::output;
 use crate::cli::parse::{self, whole_number};
-use control::{Control, RATES};
+use control::{Control, MAX_RATE, RATES};
 use keyboard::Keyboard;
+use lockstep::Lockstep;
 use pace::Pace;
-use player::{Plan, Player};
+use player::{Plan, Player, Speed};
 use playlist::Playlist;
 
 #[derive(Debug, clap::Args)]
@@ -40,7 +42,8 @@ pub(crate) struct PlayArgs {
     files: Vec<PathBuf>,
     #[command(flatten)]
     endpoint: EndpointArgs,
-    /// Simulated time per wall-clock time, 0.01 to 100. Pauses of the recorded run are skipped
+    /// Simulated time per wall-clock time, 0.01 to 100, or max: as fast as the members of the lockstep take
+    /// the snapshots. Pauses of the recorded run are skipped
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_hyphen_values = true, value_parser = rate)]
     rate: f64,
     /// Start again at the end, as a new run
@@ -64,7 +67,8 @@ fn after_help() -> String {
     format!(
         "Obeys these commands of clients; `sim-node ctl` sends them: pause, resume, step N, rewind TIME or \
          --to-step N (a step before or after the present one), and set time_scale 0.01 to 100. A paused replay \
-         stays at its last snapshot. Each pass of --loop, and each jump to another place, begins a new \
+         stays at its last snapshot. A reader that joins the lockstep (Client::join_lockstep) misses no snapshot \
+         at any rate: the replay waits for it. It does not wait for other readers. Each pass of --loop, and each jump to another place, begins a new \
          run.\n\n{}\n\nExit codes: 0 played; 1 failed; 3 a file is truncated or damaged and was played as \
          far as it goes.\n\nExamples:\n  \
          recorder play run.mcap\n  \
@@ -77,8 +81,9 @@ fn after_help() -> String {
 
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
+        _ if text == "max" => Ok(MAX_RATE),
         Ok(rate) if RATES.contains(&rate) => Ok(rate),
-        _ => Err("it must be a number from 0.01 to 100".to_owned()),
+        _ => Err("it must be a number from 0.01 to 100, or max".to_owned()),
     }
 }
 
@@ -104,6 +109,8 @@ fn play(args: &PlayArgs, stop: &Stop) -> anyhow::Result<Exit> {
         playlist,
         control: Control::new(args.paused, args.rate),
         pace: Pace::new(args.rate),
+        lockstep: Lockstep::default(),
+        speed: Speed::default(),
         keyboard: Keyboard::open(stop)?,
         commands: VecDeque::new(),
         next_status_ns: 0,

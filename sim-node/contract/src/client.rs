@@ -27,7 +27,7 @@ use crate::messages::parameters::to_values;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::restore::GivenState;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::{NodeStatus, StatusFlags};
+use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
 use crate::ports::latch::Latch;
@@ -327,7 +327,8 @@ impl Client {
     }
 
     /// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client
-    /// has called [`Client::ready`] for it. Dropping the client leaves the lockstep.
+    /// has called [`Client::ready`] for it. Dropping the client leaves the lockstep. A replay waits for its
+    /// members with the next snapshot, so they read every one, at any rate.
     ///
     /// The node applies the commands that the members send before they are ready, and those of other
     /// clients that have arrived until then. The order is that of their client ids, so members with fixed
@@ -335,7 +336,7 @@ impl Client {
     ///
     /// # Errors
     /// The lockstep already has [`crate::MEMBERS_MAX`] members, `/dev/shm` is full, or the node has not
-    /// answered within `timeout`: a replay has no lockstep.
+    /// answered within `timeout`.
     pub fn join_lockstep(&mut self, timeout: Duration) -> Result<(), LockstepError> {
         self.join_lockstep_every(NonZeroU32::MIN, timeout)
     }
@@ -364,10 +365,6 @@ impl Client {
         while let Some(status) = self.status(deadline.remaining())? {
             if status.members().iter().any(|member| member.client_id == self.id) {
                 return Ok(());
-            }
-            if status.flags & StatusFlags::REPLAY != 0 {
-                let endpoint = self.attachment.session.endpoint.clone();
-                return Err(LockstepError::Replay { endpoint });
             }
             // A node that waits only briefly may have dropped this client before it knew of its
             // membership.

@@ -7,6 +7,9 @@ use sim_contract::{Action, Parameter, ParameterValue, Reason};
 /// Simulated time per wall-clock time.
 pub(super) const RATES: RangeInclusive<f64> = 0.01..=100.0;
 
+/// The rate without deadlines.
+pub(super) const MAX_RATE: f64 = f64::INFINITY;
+
 /// The state of the playback.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Control {

@@ -25,7 +25,8 @@ fn text(shown: &Shown) -> String {
     let Shown { time_ns, duration_ns, step, control } = shown;
     let (time, duration) = (seconds(*time_ns), seconds(*duration_ns));
     let paused = if control.is_paused { ", paused" } else { "" };
-    format!("{time:.2} s of {duration:.2} s, step {step}, rate {}{paused}", control.rate)
+    let rate = if control.rate.is_finite() { control.rate.to_string() } else { "max".to_owned() };
+    format!("{time:.2} s of {duration:.2} s, step {step}, rate {rate}{paused}")
 }
 
 #[cfg(test)]
@@ -40,6 +41,9 @@ mod tests {
             text(&Shown { time_ns, duration_ns, step: 360, control })
         };
         assert_eq!(line(control), "1.50 s of 10.00 s, step 360, rate 0.25");
+        control.rate = f64::INFINITY;
+        assert_eq!(line(control), "1.50 s of 10.00 s, step 360, rate max");
+        control.rate = 0.25;
         control.set_paused(true);
         assert_eq!(line(control), "1.50 s of 10.00 s, step 360, rate 0.25, paused");
     }

@@ -7,7 +7,7 @@ const CATCH_UP_MAX_NS: u64 = 200_000_000;
 /// Maps recorded time to CLOCK_MONOTONIC. All times are in nanoseconds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pace {
-    /// Recorded time per wall-clock time.
+    /// Recorded time per wall-clock time. Infinite where every snapshot is due at once.
     rate: f64,
     /// `None` before the first snapshot and after a pause.
     base: Option<Base>,
@@ -32,7 +32,10 @@ impl Pace {
 
     /// Changes the rate. The place in the recording stays the same.
     pub(crate) fn set_rate(&mut self, rate: f64, now_ns: u64) {
-        if let Some(base) = &mut self.base {
+        if self.rate.is_infinite() {
+            // Nothing was due at a time.
+            self.restart();
+        } else if let Some(base) = &mut self.base {
             let passed_ns = now_ns.saturating_sub(base.deadline_ns) as f64 * self.rate;
             base.recorded_ns = base.recorded_ns.saturating_add(whole_ns(passed_ns));
             base.deadline_ns = base.deadline_ns.max(now_ns);
@@ -97,6 +100,17 @@ mod tests {
         assert_eq!(pace.deadline_ns(STEP_NS, STEP_NS / 2), STEP_NS / 2 + STEP_NS);
         pace.set_rate(2.0, STEP_NS / 2 + STEP_NS);
         assert_eq!(pace.deadline_ns(STEP_NS * 3, STEP_NS * 2), STEP_NS / 2 + STEP_NS * 2);
+    }
+
+    #[test]
+    fn without_a_limit_each_snapshot_is_due_at_once_until_a_rate_is_set() {
+        let mut pace = Pace::new(f64::INFINITY);
+        for step in 0..100 {
+            assert!(pace.deadline_ns(step * STEP_NS, 1000 + step) <= 1000 + step);
+        }
+        pace.set_rate(1.0, 2000);
+        assert_eq!(pace.deadline_ns(100 * STEP_NS, 2000), 2000);
+        assert_eq!(pace.deadline_ns(101 * STEP_NS, 2000), 2000 + STEP_NS);
     }
 
     #[test]

@@ -10,13 +10,16 @@ use super::control::{Control, Request, Target};
 use super::keyboard::Keyboard;
 use super::keys::Key;
 use super::live::{self, Shown};
+use super::lockstep::Lockstep;
 use super::pace::Pace;
 use super::playlist::{Place, Playlist};
 use super::recording::Start;
-use super::replay::Replay;
+use super::replay::{Playback, Replay};
 
 /// Longest wait before the next check for commands, keys, readers and signals.
 const WAIT_MAX_NS: u64 = SECOND_NS / 100;
+/// Pause between two checks for messages of the members of the lockstep.
+const MEMBERS_WAIT_NS: u64 = 50_000;
 /// Period of the status messages: 10 Hz.
 const STATUS_PERIOD_NS: u64 = SECOND_NS / 10;
 /// Time for which the services stay after the last snapshot, so that its readers can finish.
@@ -42,11 +45,38 @@ pub(super) struct Player {
     pub(super) plan: Plan,
     pub(super) control: Control,
     pub(super) pace: Pace,
+    pub(super) lockstep: Lockstep,
+    pub(super) speed: Speed,
     pub(super) keyboard: Option<Keyboard>,
     /// Received commands without an answer.
     pub(super) commands: VecDeque<ReceivedCommand>,
     pub(super) next_status_ns: u64,
     pub(super) is_quit: bool,
+}
+
+/// The measured speed of the playback.
+#[derive(Debug, Default)]
+pub(super) struct Speed {
+    /// Clock and time of the replay at the begin of the measurement.
+    since: Option<(u64, u64)>,
+    real_time_factor: f64,
+}
+
+impl Speed {
+    fn restart(&mut self) {
+        self.since = None;
+    }
+
+    /// Measures over the last second. Returns simulated time per wall-clock time.
+    fn update(&mut self, now_ns: u64, time_ns: u64) -> f64 {
+        let (since_ns, since_time_ns) = *self.since.get_or_insert((now_ns, time_ns));
+        if now_ns >= since_ns + SECOND_NS {
+            let passed_ns = time_ns.saturating_sub(since_time_ns) as f64;
+            self.real_time_factor = passed_ns / (now_ns - since_ns) as f64;
+            self.since = Some((now_ns, time_ns));
+        }
+        self.real_time_factor
+    }
 }
 
 /// The begin of a run.
@@ -86,7 +116,9 @@ impl Player {
         let Start { frame, position } = self.playlist.start_at(place)?;
         let replay = Replay::new(&self.endpoint, owner, &self.playlist.recorded()?, position)?;
         self.control.begin_run();
+        self.lockstep.begin_run();
         self.pace.restart();
+        self.speed.restart();
         Ok((replay, frame))
     }
 
@@ -107,6 +139,7 @@ impl Player {
             }
             let now_ns = monotonic_ns();
             let due_ns = match &next {
+                _ if self.awaits_members(replay, now_ns) => now_ns + MEMBERS_WAIT_NS,
                 Some(frame) => self.due_ns(replay, frame.row.step, now_ns),
                 None => self.end_ns(&mut ended_ns, now_ns),
             };
@@ -120,6 +153,18 @@ impl Player {
             }
         }
         Ok(None)
+    }
+
+    /// Returns `true` if the next snapshot, or the end, waits for members of the lockstep.
+    fn awaits_members(&mut self, replay: &Replay, now_ns: u64) -> bool {
+        self.lockstep.receive(replay.owner(), replay.published(), now_ns);
+        match replay.step() {
+            Some(step) if self.control.is_moving() => self.lockstep.is_waiting(step, now_ns),
+            _ => {
+                self.lockstep.rest();
+                false
+            }
+        }
     }
 
     /// Returns when a snapshot is due. `u64::MAX` while the replay is paused or waits for readers.
@@ -254,9 +299,11 @@ impl Player {
             return Ok(());
         }
         self.next_status_ns = now_ns + STATUS_PERIOD_NS;
-        replay.publish_status(self.control, step)?;
         let Plan { start_ns, end_ns, .. } = self.plan;
         let time_ns = self.playlist.time_ns(step).saturating_sub(start_ns);
+        let (control, lockstep) = (self.control, &self.lockstep);
+        let real_time_factor = self.speed.update(now_ns, time_ns);
+        replay.publish_status(&Playback { control, step, real_time_factor, lockstep })?;
         live::show(&Shown { time_ns, duration_ns: end_ns - start_ns, step, control: self.control });
         Ok(())
     }

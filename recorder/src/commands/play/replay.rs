@@ -12,6 +12,7 @@ use sim_contract::{
 };
 
 use super::control::Control;
+use super::lockstep::{Lockstep, Published};
 use super::position::Position;
 
 /// The part of a recording that the owner of a name needs.
@@ -24,6 +25,17 @@ pub(crate) struct Recorded<'a> {
     pub(crate) collider_count: usize,
     /// Size of the longest keyframe of the scene.
     pub(crate) keyframe_size_bytes_max: usize,
+}
+
+/// The playback, for the status.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Playback<'a> {
+    pub(super) control: Control,
+    /// The last published step, or the first one of the run.
+    pub(super) step: u64,
+    /// Simulated time per wall-clock time, as measured.
+    pub(super) real_time_factor: f64,
+    pub(super) lockstep: &'a Lockstep,
 }
 
 /// A run of recorded snapshots, with its own run id.
@@ -87,6 +99,16 @@ impl Replay {
             next_index: None,
             commands: Vec::new(),
         })
+    }
+
+    /// Returns the owner of the name.
+    pub(super) fn owner(&self) -> &Owner {
+        &self.owner
+    }
+
+    /// Returns the last published step, or step 0 of the run before the first.
+    pub(super) fn published(&self) -> Published {
+        Published { run_id: self.run_id, step: self.step.unwrap_or_default() }
     }
 
     /// Ends the run. The name stays owned.
@@ -258,15 +280,16 @@ impl Replay {
     }
 
     /// Publishes the status of the replay, with the recorded timing of the node.
-    /// `step` is the last published one, or the first one of the run.
-    pub(crate) fn publish_status(&self, control: Control, step: u64) -> anyhow::Result<()> {
+    pub(super) fn publish_status(&self, playback: &Playback<'_>) -> anyhow::Result<()> {
+        let Playback { control, step, real_time_factor, lockstep } = *playback;
         let mut status = NodeStatus {
             contract_version: CONTRACT_VERSION,
             solver_version: self.run.solver_version,
             run_id: self.run_id,
             step,
-            real_time_factor: if control.is_moving() { control.rate } else { 0.0 },
-            time_scale: control.rate,
+            real_time_factor,
+            // As for a node without deadlines.
+            time_scale: if control.rate.is_finite() { control.rate } else { 1.0 },
             outcome_count: self.position.outcome_count,
             rejected_count: self.position.rejected_count,
             rate_hz: self.run.rate_hz,
@@ -278,6 +301,10 @@ impl Replay {
             flags: StatusFlags::REPLAY | if control.is_paused { StatusFlags::PAUSED } else { 0 },
             ..NodeStatus::default()
         };
+        for (entry, member) in status.members.iter_mut().zip(lockstep.members(step)) {
+            *entry = member;
+            status.member_count += 1;
+        }
         if let Some(row) = &self.status {
             status.wake_late_ns_p50 = row.wake_late_ns_p50;
             status.wake_late_ns_p99 = row.wake_late_ns_p99;

@@ -7,7 +7,6 @@ use thiserror::Error;
 
 use crate::client::request::OwnerState;
 use crate::client::views::Snapshot;
-use crate::endpoint::Endpoint;
 use crate::messages::ready::Ready;
 use crate::ports::reader::ReadError;
 use crate::ports::service::{READY, ServiceError};
@@ -21,12 +20,6 @@ pub enum LockstepError {
     /// The client has not joined.
     #[error("this client is no member of the lockstep: call join_lockstep first")]
     NotJoined,
-    /// A replay publishes recorded steps, and waits for nobody.
-    #[error("{endpoint} is a replay, which has no lockstep: join the lockstep of a node")]
-    Replay {
-        /// The replay.
-        endpoint: Endpoint,
-    },
     /// The node did not confirm the membership.
     #[error("the lockstep did not admit this client within {timeout:?}: {owner}")]
     NotAdmitted {
