@@ -292,6 +292,42 @@ fn a_reader_continues_after_any_step_as_if_it_had_read_everything_before() {
     assert_eq!(reader.next_frame().unwrap().as_ref(), Some(&all[0].1));
 }
 
+/// Writes a file again, with each row of tears before the snapshot of the step before, as a recorder that
+/// receives several states at once may write it.
+fn with_early_tears(bytes: &[u8]) -> Vec<u8> {
+    let mut log = LogReader::new(bytes).unwrap();
+    let mut messages: Vec<Message> = Vec::new();
+    while let Some(logged) = log.next_message().unwrap() {
+        let is_row = |message: &Message| matches!(message, Message::Step(_));
+        let place = match &logged.message {
+            Message::Tears(_) => messages.iter().rposition(is_row).unwrap(),
+            _ => messages.len(),
+        };
+        messages.insert(place, logged.message);
+    }
+    let options = LogOptions { chunk_size_bytes: 6000, ..LogOptions::default() };
+    let mut copy = LogWriter::create(Vec::new(), options, log.run(), log.scene(), 0).unwrap();
+    messages.iter().for_each(|message| copy.write(message, 0).unwrap());
+    copy.finish(&Closing::default()).unwrap()
+}
+
+#[test]
+fn a_reader_continues_with_the_messages_of_later_steps_that_come_early() {
+    let (bytes, _) = written(PLAIN);
+    let file = TestFile::new("early", &with_early_tears(&bytes));
+    let mut tape = file.open().unwrap();
+    let mut reader = FrameReader::new(LogReader::open(&file.0).unwrap());
+    for (step, constraint) in CUTS {
+        tape.wind(&mut reader, step - 1).unwrap();
+        let next = reader.next_frame().unwrap().unwrap();
+        let tears = next.updates.iter().find_map(|update| match update {
+            Message::Tears(row) => Some((row.step, row.constraints.clone())),
+            _ => None,
+        });
+        assert_eq!((next.row.step, tears), (step, Some((step, vec![constraint]))));
+    }
+}
+
 #[test]
 fn a_reader_continues_behind_a_damaged_chunk() {
     let (mut bytes, _) = written(PLAIN);
