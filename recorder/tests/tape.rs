@@ -307,7 +307,9 @@ fn with_early_tears(bytes: &[u8]) -> Vec<u8> {
     }
     let options = LogOptions { chunk_size_bytes: 6000, ..LogOptions::default() };
     let mut copy = LogWriter::create(Vec::new(), options, log.run(), log.scene(), 0).unwrap();
-    messages.iter().for_each(|message| copy.write(message, 0).unwrap());
+    for message in &messages {
+        copy.write(message, 0).unwrap();
+    }
     copy.finish(&Closing::default()).unwrap()
 }
 

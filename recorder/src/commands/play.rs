@@ -67,7 +67,7 @@ fn after_help() -> String {
     format!(
         "Obeys these commands of clients; `sim-node ctl` sends them: pause, resume, step N, rewind TIME or \
          --to-step N (a step before or after the present one), and set time_scale 0.01 to 100. A paused replay \
-         stays at its last snapshot. A reader that joins the lockstep (Client::join_lockstep) misses no snapshot \
+         stays at its last snapshot. A reader in the lockstep (`recorder record --lockstep`) misses no snapshot \
          at any rate: the replay waits for it. It does not wait for other readers. Each pass of --loop, and each jump to another place, begins a new \
          run.\n\n{}\n\nExit codes: 0 played; 1 failed; 3 a file is truncated or damaged and was played as \
          far as it goes.\n\nExamples:\n  \

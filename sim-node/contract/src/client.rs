@@ -74,10 +74,7 @@ impl Client {
     /// # Errors
     /// No simulation runs there, it has another version of the contract, or `/dev/shm` is full.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
-        let random = getrandom::u64()
-            .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
-        // Ids below 2^53 are exact in JSON.
-        Self::attach_as(endpoint, (random >> 11).max(CONSOLE_CLIENT_ID + 1))
+        Self::attach_as(endpoint, random_client_id()?)
     }
 
     /// Attaches as the client `client_id`, below 2^53. Only clients with this id can move the particles
@@ -385,10 +382,10 @@ impl Client {
         let member = self.member.as_mut().ok_or(LockstepError::NotJoined)?;
         let reader = open_particles(&mut self.particles, &self.attachment)?;
         let snapshot = self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(reader.newest()?.map(Snapshot).filter(|snapshot| member.takes_part(snapshot)))
+            Ok(reader.newest()?.map(Snapshot).filter(|one| member.takes_part(one.header())))
         })?;
         if let Some(snapshot) = &snapshot {
-            member.begin_turn(snapshot);
+            member.begin_turn(snapshot.header());
         }
         Ok(snapshot)
     }
@@ -413,6 +410,13 @@ impl Client {
     pub fn was_owner_killed(&self) -> bool {
         self.attachment.session.is_lock_left() && !self.is_owner_alive()
     }
+}
+
+/// Returns the id of a new client. Ids below 2^53 are exact in JSON.
+pub(crate) fn random_client_id() -> Result<u64, AttachError> {
+    let random = getrandom::u64()
+        .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
+    Ok((random >> 11).max(CONSOLE_CLIENT_ID + 1))
 }
 
 impl Drop for Client {

@@ -13,6 +13,7 @@ mod physics;
 mod play {
     mod files;
     mod keys;
+    mod lockstep;
     mod seek;
 }
 mod raw;
