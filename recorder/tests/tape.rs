@@ -9,7 +9,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use recorder::{
-    Closing, CollidersRow, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message,
+    Closing, CollidersRow, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message,
     OutcomeRow, RunDescription, StepRow, SurfaceRow, Tape, TapeError, TearsRow, TopologyRow, Up,
     state_hash,
 };
@@ -258,6 +258,101 @@ fn neighboring_steps_are_found_across_chunks() {
         assert_eq!(tape.step_at(pair[1].step - 1).unwrap(), pair[0].step);
     }
     assert_eq!(tape.step_after(tape.last_step()).unwrap(), STEPS);
+}
+
+/// Reads a file from its start, and returns each frame with its step.
+fn frames(bytes: &[u8]) -> Vec<(u64, Frame)> {
+    let mut reader = FrameReader::new(LogReader::new(bytes).unwrap());
+    let frames = std::iter::from_fn(|| reader.next_frame().unwrap());
+    frames.map(|frame| (frame.row.step, frame)).collect()
+}
+
+#[test]
+fn a_reader_continues_after_any_step_as_if_it_had_read_everything_before() {
+    let (bytes, _) = written(Style { every: 3, ..PLAIN });
+    let file = TestFile::new("wind", &bytes);
+    let mut tape = file.open().unwrap();
+    let mut reader = FrameReader::new(LogReader::open(&file.0).unwrap());
+    let all = frames(&bytes);
+    for step in tour() {
+        tape.wind(&mut reader, step).unwrap();
+        let at = all.partition_point(|(of, _)| *of <= step);
+        for (_, expected) in all[at..].iter().take(2) {
+            assert_eq!(reader.next_frame().unwrap().as_ref(), Some(expected), "after step {step}");
+        }
+        if at == all.len() {
+            assert_eq!(reader.next_frame().unwrap(), None);
+        }
+        let keyframe = tape.keyframe_at(step).unwrap().map(|(step, _)| step);
+        // The last recorded step up to this one may precede the keyframe.
+        let recorded = all[at - 1].0;
+        assert_eq!(keyframe, Some(recorded / KEYFRAME_PERIOD * KEYFRAME_PERIOD), "{step}");
+    }
+    tape.rewind(&mut reader).unwrap();
+    assert_eq!(reader.next_frame().unwrap().as_ref(), Some(&all[0].1));
+}
+
+/// Writes a file again, with each row of tears before the snapshot of the step before, as a recorder that
+/// receives several states at once may write it.
+fn with_early_tears(bytes: &[u8]) -> Vec<u8> {
+    let mut log = LogReader::new(bytes).unwrap();
+    let mut messages: Vec<Message> = Vec::new();
+    while let Some(logged) = log.next_message().unwrap() {
+        let is_row = |message: &Message| matches!(message, Message::Step(_));
+        let place = match &logged.message {
+            Message::Tears(_) => messages.iter().rposition(is_row).unwrap(),
+            _ => messages.len(),
+        };
+        messages.insert(place, logged.message);
+    }
+    let options = LogOptions { chunk_size_bytes: 6000, ..LogOptions::default() };
+    let mut copy = LogWriter::create(Vec::new(), options, log.run(), log.scene(), 0).unwrap();
+    for message in &messages {
+        copy.write(message, 0).unwrap();
+    }
+    copy.finish(&Closing::default()).unwrap()
+}
+
+#[test]
+fn a_reader_continues_with_the_messages_of_later_steps_that_come_early() {
+    let (bytes, _) = written(PLAIN);
+    let file = TestFile::new("early", &with_early_tears(&bytes));
+    let mut tape = file.open().unwrap();
+    let mut reader = FrameReader::new(LogReader::open(&file.0).unwrap());
+    for (step, constraint) in CUTS {
+        tape.wind(&mut reader, step - 1).unwrap();
+        let next = reader.next_frame().unwrap().unwrap();
+        let tears = next.updates.iter().find_map(|update| match update {
+            Message::Tears(row) => Some((row.step, row.constraints.clone())),
+            _ => None,
+        });
+        assert_eq!((next.row.step, tears), (step, Some((step, vec![constraint]))));
+    }
+}
+
+#[test]
+fn a_reader_continues_behind_a_damaged_chunk() {
+    let (mut bytes, _) = written(PLAIN);
+    let all = frames(&bytes);
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    let file = TestFile::new("wind-damaged", &bytes);
+    let mut tape = file.open().unwrap();
+    let mut reader = FrameReader::new(LogReader::open(&file.0).unwrap());
+    let missing = (0..=STEPS).find(|step| tape.step_at(*step).unwrap() < *step).unwrap();
+    let behind = tape.step_after(missing - 1).unwrap();
+    assert!(behind > missing);
+    // The chunk before the one of this step is the damaged one.
+    for step in [behind, behind + 1, missing - 1, behind] {
+        tape.wind(&mut reader, step).unwrap();
+        let next = reader.next_frame().unwrap();
+        if step >= behind {
+            assert_eq!(next.unwrap(), all[usize::try_from(step).unwrap() + 1].1);
+        } else {
+            assert_eq!(next, None);
+            assert!(matches!(reader.end(), Some(LogEnd::Damaged { .. })));
+        }
+    }
 }
 
 #[test]

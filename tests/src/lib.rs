@@ -4,6 +4,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a panic is how a test fails")]
 
 pub mod faults;
+mod finished;
 mod process;
 mod programs;
 mod sandbox;
@@ -12,7 +13,8 @@ pub mod storm;
 mod streams;
 mod wait;
 
-pub use process::{Finished, Process, allow_many_open_files, ctl, record};
+pub use finished::Finished;
+pub use process::{Process, allow_many_open_files, ctl, record};
 pub use programs::{Program, build_products};
 pub use rustix::process::Signal;
 pub use sandbox::Sandbox;

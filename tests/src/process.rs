@@ -1,15 +1,16 @@
 //! Child processes that end with their guard.
 
 use std::fmt;
-use std::io::{BufRead, BufReader, Read, empty};
+use std::io::{BufRead, BufReader, Read, Write, empty};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit, setrlimit};
 use sim_contract::{DOMAIN_VARIABLE, console};
 
+use crate::finished::Finished;
 use crate::programs::Program;
 use crate::sandbox::Sandbox;
 use crate::signals::signal_mask;
@@ -23,21 +24,10 @@ const EXIT_REJECTED: i32 = 4;
 pub struct Process {
     title: String,
     child: Child,
+    /// The keyboard of a program on a terminal.
+    stdin: Option<ChildStdin>,
     stdout: Captured,
     stderr: Captured,
-}
-
-/// The exit code and output of a program that has ended.
-#[derive(Debug, Clone)]
-pub struct Finished {
-    /// Exit code, or `None` if a signal ended the program.
-    pub code: Option<i32>,
-    /// Number of the signal that ended the program, if one did.
-    pub signal: Option<i32>,
-    /// Everything on stdout.
-    pub stdout: String,
-    /// Everything on stderr.
-    pub stderr: String,
 }
 
 impl fmt::Debug for Process {
@@ -153,6 +143,39 @@ impl Process {
         Self::spawn(command, (program, sandbox.domain()), args, streams)
     }
 
+    /// Runs a shell script with job control on a terminal of its own, with a program as `"$0"` and its
+    /// arguments as `"$@"`. Everything on the terminal arrives as stderr.
+    ///
+    /// # Panics
+    /// If the terminal or the shell does not start.
+    #[allow(clippy::disallowed_methods, reason = "the harness starts processes")]
+    pub fn start_on_terminal(
+        script: &str,
+        program: Program,
+        sandbox: &Sandbox,
+        args: &[&str],
+    ) -> Self {
+        let quoted = |text: &str| format!("'{}'", text.replace('\'', r"'\''"));
+        let program_path = program.path().display().to_string();
+        let words = [script, &program_path].into_iter().chain(args.iter().copied());
+        let words = words.map(quoted).collect::<Vec<_>>().join(" ");
+        let mut command = Command::new("sh");
+        command.args(["-c", r#"exec script -qfec "$0" /dev/null >&2"#]);
+        command.arg(format!("exec sh -mc {words}"));
+        command.env(DOMAIN_VARIABLE, sandbox.domain()).env("SHELL", "/bin/sh").process_group(0);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        Self::spawn_command(command, (program, args))
+    }
+
+    /// Presses keys on the terminal of the program.
+    ///
+    /// # Panics
+    /// If the program has no terminal, or its terminal is gone.
+    pub fn press(&mut self, keys: &str) {
+        let stdin = self.stdin.as_mut().expect("a program on a terminal");
+        stdin.write_all(keys.as_bytes()).expect("a terminal");
+    }
+
     fn spawn(
         mut command: Command,
         (program, domain): (Program, &str),
@@ -163,11 +186,16 @@ impl Process {
         // ends its children in order.
         command.env(DOMAIN_VARIABLE, domain).args(args).process_group(0);
         command.stdin(Stdio::null()).stdout(stdout).stderr(stderr);
+        Self::spawn_command(command, (program, args))
+    }
+
+    fn spawn_command(mut command: Command, (program, args): (Program, &[&str])) -> Self {
         let title = format!("{program:?} {}", args.join(" "));
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{title}: {error}"));
         let stdout = child.stdout.take().map_or_else(|| Captured::new(empty()), Captured::new);
         let stderr = child.stderr.take().map_or_else(|| Captured::new(empty()), Captured::new);
-        Self { title, child, stdout, stderr }
+        let stdin = child.stdin.take();
+        Self { title, child, stdin, stdout, stderr }
     }
 
     /// Starts a program and waits for its line `ready ...`.
@@ -350,6 +378,11 @@ impl Process {
         self.stderr.text().contains(part)
     }
 
+    /// Returns the lines on stderr so far.
+    pub fn text(&self) -> String {
+        self.stderr.text()
+    }
+
     /// Returns the program and its arguments.
     pub(crate) fn title(&self) -> &str {
         &self.title
@@ -389,37 +422,6 @@ impl Process {
             format!("--- thread {name}, {state}, system call {call}\n{stack}")
         };
         tasks.into_iter().flatten().flatten().map(describe).collect()
-    }
-}
-
-impl Finished {
-    /// Returns the stdout of a program that must have succeeded.
-    ///
-    /// # Panics
-    /// If its exit code is not 0.
-    pub fn success(self) -> String {
-        assert_eq!(self.code, Some(0), "stdout: {}\nstderr: {}", self.stdout, self.stderr);
-        self.stdout
-    }
-
-    /// Returns the stdout of a recorder of a running node. On a busy machine it may lose snapshots, which it
-    /// declares.
-    ///
-    /// # Panics
-    /// If it has failed.
-    pub fn recorded(self) -> String {
-        let is_recorded = matches!(self.code, Some(0 | 3));
-        assert!(is_recorded, "stdout: {}\nstderr: {}", self.stdout, self.stderr);
-        self.stdout
-    }
-
-    /// Parses the stdout of a program that must have succeeded as JSON.
-    ///
-    /// # Panics
-    /// If its exit code is not 0, or its stdout is not JSON.
-    pub fn json(self) -> serde_json::Value {
-        let text = self.success();
-        serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error} in {text}"))
     }
 }
 

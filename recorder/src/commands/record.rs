@@ -21,7 +21,7 @@ use std::time::Duration;
 use anyhow::{anyhow, bail};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
-    AttachError, Endpoint, SNAPSHOTS_BUFFERED, Stop, Tap, console, report_bus_errors,
+    AttachError, Endpoint, LockstepError, SNAPSHOTS_BUFFERED, Stop, Tap, console, report_bus_errors,
 };
 
 use crate::cli::exit::{self, Exit};
@@ -121,13 +121,22 @@ fn attach(args: &RecordArgs, endpoint: &Endpoint, stop: &Stop) -> anyhow::Result
     let begin_ns = monotonic_ns();
     let mut is_told = false;
     loop {
-        match Tap::attach(endpoint) {
+        let tap = if args.lockstep {
+            Tap::attach_in_lockstep(endpoint)
+        } else {
+            Tap::attach(endpoint).map_err(LockstepError::Attach)
+        };
+        let error = match tap {
             Ok(tap) => return Ok(Some(tap)),
-            Err(AttachError::NoNode { .. } | AttachError::NoServices { .. }) if args.wait => {}
-            Err(error @ AttachError::NoNode { .. }) => {
+            Err(LockstepError::Attach(error)) => error,
+            Err(error) => return Err(error.into()),
+        };
+        match error {
+            AttachError::NoNode { .. } | AttachError::NoServices { .. } if args.wait => {}
+            AttachError::NoNode { .. } => {
                 return Err(anyhow!(error).context("use --wait to wait for a node"));
             }
-            Err(error) => return Err(error.into()),
+            _ => return Err(error.into()),
         }
         if !std::mem::replace(&mut is_told, true) {
             output::note(&format!("waiting for a node that runs as {endpoint}"));
@@ -168,6 +177,10 @@ impl Recording {
                 None => {}
             }
             self.live.update(&self.feed);
+            // In the lockstep, the node waits until the queue has room.
+            if (self.queue.size_bytes() as u64) < args.queue_bytes / 2 {
+                self.tap.ready()?;
+            }
             self.tap.wait(WAIT_MAX);
         }
     }

@@ -24,7 +24,7 @@ use super::read::file_source::check_stop;
 use super::read::limits::SizeLimits;
 use super::read::open::open_regular_file;
 use super::read::read_error::{LogEnd, ReadError};
-use super::read::reader::LogReader;
+use super::read::reader::{ChunkStart, LogReader};
 use super::read::records::RecordReader;
 use super::run::RunDescription;
 use super::run::selection::ContentSelection;
@@ -191,6 +191,14 @@ impl IndexedLog {
     /// Returns `true` if the file has an index, and `false` if it was scanned.
     pub fn has_index(&self) -> bool {
         self.has_index
+    }
+
+    /// Returns a chunk for a reader of the same file to continue at.
+    ///
+    /// # Panics
+    /// If there is no such chunk.
+    pub(in crate::log) fn chunk_start(&self, index: usize) -> ChunkStart<'_> {
+        ChunkStart { byte: self.chunks[index].offset, channels: &self.channels }
     }
 
     /// Reads all messages of a chunk except `/tf` and foreign topics, and verifies its checksum.

@@ -12,6 +12,8 @@ use std::sync::Arc;
 use sim_contract::{ParticleState, Stop, Torn};
 
 use super::index::IndexedLog;
+use super::read::file_source::FileSource;
+use super::read::frames::FrameReader;
 use super::read::read_error::{LogEnd, ReadError};
 use super::rows::{CollidersRow, ParametersRow, StatusRow, StepRow, SurfaceRow, TopologyRow};
 use super::run::RunDescription;
@@ -195,6 +197,52 @@ impl Tape {
         Ok(TapeState { row, has_readable_row, particles, torn, colliders, parameters, status })
     }
 
+    /// Returns the newest keyframe up to `step` and its step, as far as it is readable.
+    ///
+    /// # Errors
+    /// If the operating system reports an error.
+    pub fn keyframe_at(&mut self, step: u64) -> Result<Option<(u64, Vec<u8>)>, ReadError> {
+        let Some(position) = self.find(step)? else { return Ok(None) };
+        let chunks = self.reader.chunks.with_topic(Topic::Keyframe);
+        for chunk in chunks.backward_from(position.chunk) {
+            if self.reader.digest(chunk)?.keyframe(step).is_some() {
+                return self.reader.keyframe(chunk, step);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Makes a reader of the same file continue after the snapshot of a recorded step. Its next frame has
+    /// every message of later steps.
+    ///
+    /// # Errors
+    /// If the operating system reports an error or the content of a message is invalid.
+    pub fn wind(
+        &mut self,
+        frames: &mut FrameReader<FileSource>,
+        step: u64,
+    ) -> Result<(), ReadError> {
+        let Some(SnapshotPosition { chunk, step }) = self.find(step)? else { return Ok(()) };
+        // One chunk earlier, because a batch of the recorder may contain later messages early. If that
+        // chunk is damaged, the reader ends there.
+        for chunk in [chunk.saturating_sub(1), chunk] {
+            frames.go_to(&self.log().chunk_start(chunk))?;
+            if frames.skip_to(step)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes a reader of the same file continue at the first message.
+    ///
+    /// # Errors
+    /// If the operating system reports an error.
+    pub fn rewind(&self, frames: &mut FrameReader<FileSource>) -> Result<(), ReadError> {
+        // A tape has a snapshot, so there is a chunk.
+        frames.go_to(&self.log().chunk_start(0))
+    }
+
     fn find(&mut self, step: u64) -> Result<Option<SnapshotPosition>, ReadError> {
         find(&mut self.reader, step, self.range)
     }
@@ -232,7 +280,7 @@ impl Tape {
         for chunk in self.reader.chunks.with_topic(Topic::Keyframe).backward_from(chunk) {
             match self.reader.digest(chunk)?.keyframe(step) {
                 Some((keyframe_step, Some(torn))) => {
-                    return Ok((chunk, TearTracker::from_keyframe(*keyframe_step, torn.clone())));
+                    return Ok((chunk, TearTracker::from_step(*keyframe_step, torn.clone())));
                 }
                 // A keyframe of another version. All keyframes of a file have the same version.
                 Some((_, None)) => return Ok((0, from_start)),

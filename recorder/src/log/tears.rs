@@ -75,8 +75,8 @@ impl TearTracker {
         Self { torn, step: None, pending: Vec::new(), is_known: true }
     }
 
-    /// Starts at a keyframe, which includes all changes up to its step.
-    pub(crate) fn from_keyframe(step: u64, torn: Torn) -> Self {
+    /// Starts at a step with all torn constraints of that step, such as those of a keyframe.
+    pub fn from_step(step: u64, torn: Torn) -> Self {
         Self { step: Some(step), ..Self::new(torn) }
     }
 
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn tears_that_a_keyframe_includes_are_not_added_twice() {
-        let mut tracker = TearTracker::from_keyframe(4, before(&[1]));
+        let mut tracker = TearTracker::from_step(4, before(&[1]));
         tracker.process(&tears(4, &[1]));
         tracker.process(&tears(5, &[2]));
         assert_eq!(torn_at(&mut tracker, 5), [1, 2]);

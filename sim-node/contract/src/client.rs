@@ -27,7 +27,7 @@ use crate::messages::parameters::to_values;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
 use crate::messages::restore::GivenState;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
-use crate::messages::status::{NodeStatus, StatusFlags};
+use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, LoadHeader, Triangle};
 use crate::ports::latch::Latch;
@@ -74,10 +74,7 @@ impl Client {
     /// # Errors
     /// No simulation runs there, it has another version of the contract, or `/dev/shm` is full.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
-        let random = getrandom::u64()
-            .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
-        // Ids below 2^53 are exact in JSON.
-        Self::attach_as(endpoint, (random >> 11).max(CONSOLE_CLIENT_ID + 1))
+        Self::attach_as(endpoint, random_client_id()?)
     }
 
     /// Attaches as the client `client_id`, below 2^53. Only clients with this id can move the particles
@@ -327,7 +324,8 @@ impl Client {
     }
 
     /// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client
-    /// has called [`Client::ready`] for it. Dropping the client leaves the lockstep.
+    /// has called [`Client::ready`] for it. Dropping the client leaves the lockstep. A replay waits for its
+    /// members with the next snapshot, so they read every one, at any rate.
     ///
     /// The node applies the commands that the members send before they are ready, and those of other
     /// clients that have arrived until then. The order is that of their client ids, so members with fixed
@@ -335,7 +333,7 @@ impl Client {
     ///
     /// # Errors
     /// The lockstep already has [`crate::MEMBERS_MAX`] members, `/dev/shm` is full, or the node has not
-    /// answered within `timeout`: a replay has no lockstep.
+    /// answered within `timeout`.
     pub fn join_lockstep(&mut self, timeout: Duration) -> Result<(), LockstepError> {
         self.join_lockstep_every(NonZeroU32::MIN, timeout)
     }
@@ -365,10 +363,6 @@ impl Client {
             if status.members().iter().any(|member| member.client_id == self.id) {
                 return Ok(());
             }
-            if status.flags & StatusFlags::REPLAY != 0 {
-                let endpoint = self.attachment.session.endpoint.clone();
-                return Err(LockstepError::Replay { endpoint });
-            }
             // A node that waits only briefly may have dropped this client before it knew of its
             // membership.
             if let Some(member) = &self.member {
@@ -388,10 +382,10 @@ impl Client {
         let member = self.member.as_mut().ok_or(LockstepError::NotJoined)?;
         let reader = open_particles(&mut self.particles, &self.attachment)?;
         let snapshot = self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(reader.newest()?.map(Snapshot).filter(|snapshot| member.takes_part(snapshot)))
+            Ok(reader.newest()?.map(Snapshot).filter(|one| member.takes_part(one.header())))
         })?;
         if let Some(snapshot) = &snapshot {
-            member.begin_turn(snapshot);
+            member.begin_turn(snapshot.header());
         }
         Ok(snapshot)
     }
@@ -416,6 +410,13 @@ impl Client {
     pub fn was_owner_killed(&self) -> bool {
         self.attachment.session.is_lock_left() && !self.is_owner_alive()
     }
+}
+
+/// Returns the id of a new client. Ids below 2^53 are exact in JSON.
+pub(crate) fn random_client_id() -> Result<u64, AttachError> {
+    let random = getrandom::u64()
+        .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
+    Ok((random >> 11).max(CONSOLE_CLIENT_ID + 1))
 }
 
 impl Drop for Client {

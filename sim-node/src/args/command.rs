@@ -110,6 +110,7 @@ pub(crate) enum CommandVerb {
     ///
     /// The state is the nearest kept one at or before the target. `sim-node run --history` sets the memory
     /// for past states: the node keeps every step while it fits, then old states at growing distances.
+    /// A replay (`recorder play`) continues at the target, as a new run, and --to-step also goes forward.
     #[command(after_help = "Examples:\n  \
         sim-node ctl rewind 2s\n  \
         sim-node ctl rewind --to-step 480")]

@@ -34,15 +34,27 @@ fn remedy(
         Reason::UnknownConstraint => status()?.constraint_count as usize,
         Reason::UnknownAnchor => anchor_count(client, timeout)?,
         Reason::UnknownCollider => client.colliders(timeout).ok()?.colliders.len(),
-        Reason::NoEffectHere
-            if !matches!(action, Action::Step { .. })
-                && status().is_some_and(|status| is_replay(&status)) =>
-        {
-            return Some("a recording accepts only pause, resume and step".to_owned());
+        _ => {
+            let of_replay = remedy_of_replay(action, reason);
+            let mut is_replay = || status().is_some_and(|status| is_replay(&status));
+            return of_replay.filter(|_| is_replay()).or_else(|| fixed_remedy(action, reason));
         }
-        _ => return fixed_remedy(action, reason),
     };
     Some(allowed_indices(count))
+}
+
+/// Remedy of a rejection by a replay, where it is not that of a node.
+fn remedy_of_replay(action: &Action, reason: Reason) -> Option<String> {
+    let remedy = match (reason, action) {
+        (Reason::NoEffectHere, Action::Step { .. }) => return None,
+        (Reason::NoEffectHere, _) => {
+            "a recording accepts only pause, resume, step, rewind and set time_scale"
+        }
+        (Reason::OutOfRange, Action::Rewind { .. }) => "allowed: a step of the recording",
+        (Reason::OutOfRange, Action::Set { .. }) => "allowed: 0.01 to 100",
+        _ => return None,
+    };
+    Some(remedy.to_owned())
 }
 
 fn is_replay(status: &NodeStatus) -> bool {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::process::Finished;
+use crate::finished::Finished;
 
 /// Number of actions that a failure shows.
 const ACTIONS_SHOWN: usize = 30;

@@ -6,7 +6,7 @@ use crate::faults::action::Ending;
 use crate::faults::actor::{Actor, Ends};
 use crate::faults::recording::{Claim, Recording};
 use crate::faults::world::{Recorder, World};
-use crate::process::Finished;
+use crate::finished::Finished;
 use crate::programs::Program;
 
 const RECORDER_ENDS: Ends = Ends {

@@ -5,7 +5,7 @@ use std::path::Path;
 use recorder::{LogReader, Message, StepRow, Topic};
 use serde_json::Value;
 
-use crate::process::Finished;
+use crate::finished::Finished;
 
 /// The statement of a recorder about its file, made by its exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

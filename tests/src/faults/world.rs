@@ -7,7 +7,7 @@ use crate::faults::actor::{Actor, Ends};
 use crate::faults::domain_files::DomainFiles;
 use crate::faults::journal::Journal;
 use crate::faults::kept_files::KeptFiles;
-use crate::process::Finished;
+use crate::finished::Finished;
 use crate::programs::Program;
 use crate::sandbox::Sandbox;
 

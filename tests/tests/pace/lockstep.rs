@@ -272,17 +272,41 @@ fn a_member_continues_with_the_next_node() {
 }
 
 #[test]
-fn a_node_without_a_lockstep_says_so() {
+fn a_replay_waits_for_its_members_at_any_rate_and_after_a_seek() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
-    let simulate = ["simulate", "curtain", "--steps", "50", "-o", &file];
+    let simulate = ["simulate", "curtain", "--steps", "500", "-o", &file];
     assert_eq!(Process::run(Program::Recorder, &sandbox, &simulate).code, Some(0));
-    let play = ["play", &file, "--paused"];
+    let play = ["play", &file, "--paused", "--rate", "max"];
     let replay = Process::start_ready(Program::Recorder, &sandbox, &play);
-    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
-    let error = client.join_lockstep(DEADLINE).unwrap_err().to_string();
-    assert!(error.contains("is a replay, which has no lockstep"), "{error}");
+    let mut client = Client::attach_as(&sandbox.endpoint(), 7).unwrap();
     let error = client.ready().unwrap_err().to_string();
     assert!(error.contains("call join_lockstep first"), "{error}");
-    replay.interrupt();
+    client.join_lockstep(DEADLINE).unwrap();
+    ctl(&sandbox, &["resume"]);
+    let mut observer = Client::attach(&sandbox.endpoint()).unwrap();
+    for step in 0..=200 {
+        assert_eq!(client.next_turn(DEADLINE).unwrap().unwrap().header().step, step);
+        if step.is_multiple_of(50) {
+            // However long the member takes, the replay stays.
+            for _ in 0..3 {
+                wait_for("a status that awaits the member", || {
+                    let status = observer.status(DEADLINE).unwrap()?;
+                    assert!(status.step <= step, "{} > {step}", status.step);
+                    (status.step == step && status.members()[0].is_awaited == 1).then_some(())
+                });
+            }
+        }
+        client.ready().unwrap();
+    }
+    // It waits before step 202, and obeys commands meanwhile.
+    ctl(&sandbox, &["rewind", "--to-step", "400"]);
+    let turns = std::iter::from_fn(|| {
+        let step = client.next_turn(DEADLINE).unwrap()?.header().step;
+        client.ready().unwrap();
+        Some(step)
+    });
+    let steps: Vec<_> = turns.take_while(|step| *step < 500).filter(|step| *step >= 400).collect();
+    assert_eq!(steps, (400..500).collect::<Vec<_>>());
+    replay.wait().success();
 }

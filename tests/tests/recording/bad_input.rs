@@ -296,7 +296,7 @@ fn wrong_option_values_state_what_is_expected() {
     for (args, words) in [
         (["simulate", "rope", "--steps", "-1"].as_slice(), "it must be a whole number from 0"),
         (&["record", "--duration", "-5s"], "it must be a time with its unit"),
-        (&["play", "run.mcap", "--rate", "-1"], "it must be a number above 0"),
+        (&["play", "run.mcap", "--rate", "-1"], "it must be a number from 0.01 to 100"),
         (
             &["info", "run.mcap", "--jsn"],
             "there is no option '--jsn' here (did you mean '--json'?)",

@@ -10,6 +10,12 @@ mod interrupt;
 mod losses;
 mod outputs;
 mod physics;
+mod play {
+    mod files;
+    mod keys;
+    mod lockstep;
+    mod seek;
+}
 mod raw;
 mod repair;
 mod states;

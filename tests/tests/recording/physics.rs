@@ -100,12 +100,13 @@ fn a_late_recording_with_tears_a_reset_and_a_load_verifies_and_plays_back_row_fo
     let player = Process::start_ready(Program::Recorder, &sandbox, &play);
     let recording = record(&sandbox, &second);
     let part = format!("{second}.part");
-    // The replay ends with the last step, and the recording with the replay.
+    // The replay stays at the last step until it is resumed. The recording ends with the replay.
     for frame in &one[..one.len() - 1] {
         let step = frame.row.step;
         wait_for("the step in the file", || recorded_steps(&part).contains(&step).then_some(()));
         ctl(&sandbox, &["step"]);
     }
+    ctl(&sandbox, &["resume"]);
     player.wait().success();
     recording.wait().success();
     let two = frames(&second);

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use integration_tests::{Process, Program, Sandbox, record};
+use integration_tests::{Process, Program, Sandbox, ctl, record};
 use recorder::{Frame, FrameReader, LogReader, Message as Logged, RunDescription};
 use serde_json::{Value, json};
 use sim_contract::ParticleFlags;
@@ -105,6 +105,10 @@ impl View {
             }
             Message::Pins(message) => {
                 *pins = message.particles;
+                None
+            }
+            Message::Scene(_) => {
+                (*torn, *pins) = (Vec::new(), Vec::new());
                 None
             }
             Message::Frame(frame) if matches(frame.head.stamp.step) => {
@@ -312,6 +316,22 @@ fn a_recording_of_a_live_node_is_shown_as_recorded() {
     let count = states.len();
     for place in [count - 1, 1, count / 2, count / 3, count / 3 * 2, 2] {
         assert_eq!(view.seek(states[place].step), states[place]);
+    }
+}
+
+#[test]
+fn a_page_of_a_node_follows_a_playback_to_any_step() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let (states, _) = states(&file);
+    let args = ["play", file.as_str(), "--paused"];
+    let _player = Process::start_ready(Program::Recorder, &sandbox, &args);
+    let bridge = Bridge::start(&sandbox);
+    let mut view = View::new(&bridge);
+    assert_eq!(view.shown(|step| step == 0), states[0]);
+    for step in [400, 60, 700, 20, 199, 960] {
+        ctl(&sandbox, &["rewind", "--to-step", &step.to_string()]);
+        assert_eq!(view.shown(|shown| shown == step), states[usize::try_from(step).unwrap()]);
     }
 }
 

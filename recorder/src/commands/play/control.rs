@@ -1,73 +1,192 @@
-//! The commands that a replay obeys: pause, resume and step.
+//! The controls of a replay: pause, step, seek and rate.
 
-use sim_contract::{Action, Reason};
+use std::ops::RangeInclusive;
+
+use sim_contract::{Action, Parameter, ParameterValue, Reason};
+
+/// Simulated time per wall-clock time.
+pub(super) const RATES: RangeInclusive<f64> = 0.01..=100.0;
+
+/// The rate without deadlines.
+pub(super) const MAX_RATE: f64 = f64::INFINITY;
 
 /// The state of the playback.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Control {
-    pub(crate) is_paused: bool,
+    pub(super) is_paused: bool,
     /// Snapshots to publish while paused.
     steps_due: u64,
+    /// Simulated time per wall-clock time.
+    pub(super) rate: f64,
+}
+
+/// A change of the playback.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Request {
+    Pause,
+    Resume,
+    /// Publishes snapshots while paused.
+    Step(u64),
+    Rate(f64),
+    /// Continues at another place, as a new run.
+    Seek(Target),
+}
+
+/// A place to continue at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Target {
+    /// A step of the recorded run, or the last recorded one before it.
+    Step(u64),
+    /// A number of steps back in the recorded run.
+    BackSteps(u64),
+    /// The recorded snapshot before the last published one.
+    Previous,
+    /// A simulated time from the last published snapshot on, in nanoseconds.
+    By(i64),
+    /// A part of the replay.
+    Percent(u8),
+}
+
+impl Request {
+    /// Returns the change that a command asks for. Rejects commands that would change the recording.
+    pub(super) fn from_action(action: &Action) -> Result<Self, Reason> {
+        Ok(match *action {
+            Action::Pause => Self::Pause,
+            Action::Resume => Self::Resume,
+            Action::Step { count: 0 } => return Err(Reason::OutOfRange),
+            Action::Step { count } => Self::Step(count.into()),
+            Action::Rewind { to_step: Some(step), back_steps: None } => {
+                Self::Seek(Target::Step(step))
+            }
+            Action::Rewind { to_step: None, back_steps: Some(count) } => {
+                Self::Seek(Target::BackSteps(count.into()))
+            }
+            Action::Set { parameter, value, constraint_kind } => {
+                if Parameter::from_name(parameter.as_str()) != Some(Parameter::TimeScale) {
+                    return Err(Reason::NoEffectHere);
+                }
+                let is_of_kind = constraint_kind.is_some();
+                Self::Rate(rate(value).filter(|_| !is_of_kind).ok_or(Reason::OutOfRange)?)
+            }
+            _ => return Err(Reason::NoEffectHere),
+        })
+    }
+}
+
+/// Returns the rate in a command, whose numbers have fewer digits than ours.
+fn rate(value: ParameterValue) -> Option<f64> {
+    let ParameterValue::Number(number) = value else { return None };
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "the limits are compared as the command has them"
+    )]
+    let limits = *RATES.start() as f32..=*RATES.end() as f32;
+    limits.contains(&number).then(|| f64::from(number).clamp(*RATES.start(), *RATES.end()))
 }
 
 impl Control {
-    /// A replay that starts paused still publishes its first snapshot.
-    pub(crate) fn new(starts_paused: bool) -> Self {
-        Self { is_paused: starts_paused, steps_due: u64::from(starts_paused) }
+    pub(super) fn new(starts_paused: bool, rate: f64) -> Self {
+        Self { is_paused: starts_paused, steps_due: 0, rate }
     }
 
-    pub(crate) fn is_moving(self) -> bool {
+    /// Begins a run. A paused replay still publishes its first snapshot.
+    pub(super) fn begin_run(&mut self) {
+        self.steps_due = u64::from(self.is_paused);
+    }
+
+    pub(super) fn is_moving(self) -> bool {
         !self.is_paused || self.steps_due > 0
     }
 
     /// Counts a published snapshot.
-    pub(crate) fn count_step(&mut self) {
+    pub(super) fn count_step(&mut self) {
         self.steps_due = self.steps_due.saturating_sub(1);
     }
 
-    /// Executes a command. Rejects commands that would change the recording.
-    pub(crate) fn obey(&mut self, action: Action) -> Result<(), Reason> {
-        match action {
-            Action::Pause => *self = Self { is_paused: true, steps_due: 0 },
-            Action::Resume => *self = Self { is_paused: false, steps_due: 0 },
-            Action::Step { count: 0 } => return Err(Reason::OutOfRange),
-            Action::Step { count } if self.is_paused => self.steps_due += u64::from(count),
-            _ => return Err(Reason::NoEffectHere),
+    /// Gives up the steps after the last snapshot.
+    pub(super) fn end(&mut self) {
+        self.steps_due = 0;
+    }
+
+    pub(super) fn set_paused(&mut self, is_paused: bool) {
+        (self.is_paused, self.steps_due) = (is_paused, 0);
+    }
+
+    /// Publishes snapshots while paused.
+    pub(super) fn step(&mut self, count: u64) -> Result<(), Reason> {
+        if !self.is_paused {
+            return Err(Reason::NoEffectHere);
         }
+        self.steps_due = self.steps_due.saturating_add(count);
         Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::{KindFilter, Text};
+
     use super::*;
 
+    fn set(parameter: &str, value: f32) -> Action {
+        let value = ParameterValue::Number(value);
+        Action::Set { parameter: Text::cut(parameter), value, constraint_kind: None }
+    }
+
     #[test]
-    fn a_replay_obeys_only_pause_resume_and_step() {
-        let mut control = Control::new(false);
+    fn steps_are_counted_while_paused() {
+        let mut control = Control::new(false, 1.0);
         assert!(control.is_moving());
-        assert_eq!(control.obey(Action::Step { count: 1 }), Err(Reason::NoEffectHere));
-        assert_eq!(control.obey(Action::Pause), Ok(()));
+        assert_eq!(control.step(1), Err(Reason::NoEffectHere));
+        control.set_paused(true);
         assert!(!control.is_moving());
-        assert_eq!(control.obey(Action::Step { count: 0 }), Err(Reason::OutOfRange));
-        assert_eq!(control.obey(Action::Step { count: 2 }), Ok(()));
+        assert_eq!(control.step(2), Ok(()));
         for _ in 0..2 {
             assert!(control.is_moving());
             control.count_step();
         }
         assert!(!control.is_moving());
-        assert_eq!(control.obey(Action::Resume), Ok(()));
+        control.step(3).unwrap();
+        control.end();
+        assert!(!control.is_moving());
+        control.set_paused(false);
         assert!(control.is_moving());
-        for action in [Action::Pin { particle: 0 }, Action::Reset, Action::Unknown { number: 99 }] {
-            assert_eq!(control.obey(action), Err(Reason::NoEffectHere));
-        }
     }
 
     #[test]
-    fn a_replay_that_starts_paused_publishes_one_snapshot() {
-        let mut control = Control::new(true);
+    fn a_paused_replay_publishes_the_first_snapshot_of_each_run() {
+        let mut control = Control::new(true, 1.0);
+        control.begin_run();
         assert!(control.is_moving());
         control.count_step();
         assert!(!control.is_moving());
+    }
+
+    #[test]
+    fn commands_control_the_replay_or_are_rejected_with_the_reason() {
+        let rewind = |to_step, back_steps| Action::Rewind { to_step, back_steps };
+        for (action, request) in [
+            (Action::Pause, Ok(Request::Pause)),
+            (Action::Step { count: 2 }, Ok(Request::Step(2))),
+            (Action::Step { count: 0 }, Err(Reason::OutOfRange)),
+            (rewind(Some(480), None), Ok(Request::Seek(Target::Step(480)))),
+            (rewind(None, Some(9)), Ok(Request::Seek(Target::BackSteps(9)))),
+            (set("time_scale", 0.5), Ok(Request::Rate(0.5))),
+            (set("time_scale", 0.01), Ok(Request::Rate(f64::from(0.01_f32).max(0.01)))),
+            (set("time_scale", 0.0), Err(Reason::OutOfRange)),
+            (set("time_scale", f32::NAN), Err(Reason::OutOfRange)),
+            (set("time_scale", 100.1), Err(Reason::OutOfRange)),
+            (set("damping", 0.1), Err(Reason::NoEffectHere)),
+            (set("colour", 0.1), Err(Reason::NoEffectHere)),
+            (Action::Pin { particle: 0 }, Err(Reason::NoEffectHere)),
+            (Action::Reset, Err(Reason::NoEffectHere)),
+            (Action::Unknown { number: 99 }, Err(Reason::NoEffectHere)),
+        ] {
+            assert_eq!(Request::from_action(&action), request, "{action:?}");
+        }
+        let Action::Set { parameter, value, .. } = set("time_scale", 1.0) else { unreachable!() };
+        let constraint_kind = Some(KindFilter::Unknown);
+        let of_kind = Action::Set { parameter, value, constraint_kind };
+        assert_eq!(Request::from_action(&of_kind), Err(Reason::OutOfRange));
     }
 }

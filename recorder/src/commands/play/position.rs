@@ -1,6 +1,6 @@
 //! The state of a replay: the values for headers and for late subscribers.
 
-use recorder::{CollidersRow, Message, OutcomeRow, TearTracker};
+use recorder::{CollidersRow, Message, OutcomeRow, StatusRow, TapeState, TearTracker};
 use sim_contract::{Action, Method, ParameterValues, Torn};
 use sim_solver::Keyframe;
 
@@ -12,6 +12,8 @@ pub(crate) struct Position {
     pub(super) latched_keyframe: Option<Vec<u8>>,
     /// The newest colliders before the first published snapshot.
     pub(super) latched_colliders: Option<CollidersRow>,
+    /// The newest status of the node before the first published snapshot.
+    pub(super) latched_status: Option<StatusRow>,
     /// The recorded node was paused.
     pub(super) is_paused: bool,
     /// Number of outcomes so far.
@@ -32,6 +34,7 @@ impl Position {
             keyframe_step: 0,
             latched_keyframe: None,
             latched_colliders: None,
+            latched_status: None,
             is_paused: false,
             outcome_count: 0,
             rejected_count: 0,
@@ -42,16 +45,24 @@ impl Position {
         }
     }
 
-    /// Applies the messages of a snapshot that is not published.
-    pub(crate) fn skip(&mut self, updates: &[Message]) {
-        for update in updates {
-            self.apply(update);
-            match update {
-                Message::Keyframe { bytes, .. } => self.latched_keyframe = Some(bytes.clone()),
-                Message::Colliders(row) => self.latched_colliders = Some(row.clone()),
-                _ => {}
-            }
+    /// Starts at a state in the middle of a recording, with the newest keyframe up to its step.
+    pub(crate) fn at(state: &TapeState, keyframe: Option<(u64, Vec<u8>)>, method: Method) -> Self {
+        let mut torn = state.torn.clone();
+        torn.header.since_step = state.row.step.saturating_sub(state.row.scene_step);
+        let mut position = Self::new(Torn::default(), method);
+        position.tears = TearTracker::from_step(state.row.step, torn);
+        position.outcome_count = state.row.outcome_count;
+        position.rejected_count = state.status.as_ref().map_or(0, |row| row.rejected_count);
+        position.latched_colliders.clone_from(&state.colliders);
+        position.latched_status.clone_from(&state.status);
+        if let Some(row) = &state.parameters {
+            position.apply_parameters(&Message::Parameters(row.clone()));
         }
+        if let Some((step, bytes)) = keyframe {
+            position.apply(&Message::Keyframe { step, bytes: bytes.clone() });
+            position.latched_keyframe = Some(bytes);
+        }
+        position
     }
 
     /// Applies a message.

@@ -1,15 +1,18 @@
 //! Publishes a recording like the recorded node.
 
+use std::collections::VecDeque;
+
 use anyhow::{Context, bail};
 use recorder::{CollidersRow, Frame, Message, RunDescription, StatusRow, SurfaceRow, TopologyRow};
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    CONTRACT_VERSION, CollidersHeader, Endpoint, KeyframeHeader, Load, LoadHeader, NodeStatus,
-    Outcome, Owner, ParameterValues, ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags,
-    TearsHeader, Torn, Wake,
+    CONTRACT_VERSION, CollidersHeader, Command, Endpoint, KeyframeHeader, Load, LoadHeader,
+    NodeStatus, OUTCOME_FLAG_CONTROL, Outcome, Owner, OwnerError, ParameterValues, Reason,
+    ReceivedCommand, SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Torn, Wake,
 };
 
 use super::control::Control;
+use super::lockstep::{Lockstep, Published};
 use super::position::Position;
 
 /// The part of a recording that the owner of a name needs.
@@ -24,15 +27,23 @@ pub(crate) struct Recorded<'a> {
     pub(crate) keyframe_size_bytes_max: usize,
 }
 
-/// One pass over a recording, with its own run id.
+/// The playback, for the status.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Playback<'a> {
+    pub(super) control: Control,
+    /// The last published step, or the first one of the run.
+    pub(super) step: u64,
+    /// Simulated time per wall-clock time, as measured.
+    pub(super) real_time_factor: f64,
+    pub(super) lockstep: &'a Lockstep,
+}
+
+/// A run of recorded snapshots, with its own run id.
 #[derive(Debug)]
 pub(crate) struct Replay {
     owner: Owner,
     run: RunDescription,
     run_id: u64,
-    pub(crate) control: Control,
-    /// Simulated time per wall-clock time.
-    rate: f64,
     position: Position,
     /// The last published list of torn constraints.
     published_torn: Torn,
@@ -49,12 +60,13 @@ pub(crate) struct Replay {
 }
 
 impl Replay {
-    /// Becomes the owner of the name and publishes the scene.
+    /// Publishes the scene, as the owner of the name. `owner` is that of the run before, whose readers stay
+    /// connected.
     pub(crate) fn new(
         endpoint: &Endpoint,
+        owner: Option<Owner>,
         recorded: &Recorded<'_>,
-        position: Position,
-        rate: f64,
+        mut position: Position,
     ) -> anyhow::Result<Self> {
         let Recorded { run, scene, topology, surface, .. } = *recorded;
         let run_id = getrandom::u64().context("cannot get a random run id")?;
@@ -73,23 +85,35 @@ impl Replay {
             keyframe_size_bytes_max: recorded.keyframe_size_bytes_max,
             parameters: position.parameters,
         };
-        let owner = Owner::create(endpoint, &load)?;
+        let owner = own(endpoint, owner, &load)?;
         let run = run.clone();
-        let control = Control::new(false);
         Ok(Self {
             owner,
             run,
             run_id,
-            control,
-            rate,
             published_torn: Torn::default(),
             published_parameters: position.parameters,
+            status: position.latched_status.take(),
             position,
             step: None,
             next_index: None,
-            status: None,
             commands: Vec::new(),
         })
+    }
+
+    /// Returns the owner of the name.
+    pub(super) fn owner(&self) -> &Owner {
+        &self.owner
+    }
+
+    /// Returns the last published step, or step 0 of the run before the first.
+    pub(super) fn published(&self) -> Published {
+        Published { run_id: self.run_id, step: self.step.unwrap_or_default() }
+    }
+
+    /// Ends the run. The name stays owned.
+    pub(crate) fn into_owner(self) -> Owner {
+        self.owner
     }
 
     /// Publishes the latched messages before the first snapshot: the colliders, the torn constraints
@@ -131,7 +155,6 @@ impl Replay {
         self.next_index = Some(header.snapshot_index.wrapping_add(1));
         self.owner.wake(Wake::Frame);
         self.step = Some(frame.row.step);
-        self.control.count_step();
         Ok(())
     }
 
@@ -219,26 +242,36 @@ impl Replay {
         u32::try_from(distance).unwrap_or(u32::MAX).max(1)
     }
 
-    /// Answers commands. The answers are not part of the recorded run. `next_step` is the first step
-    /// that can show an effect. Returns `true` if a command arrived.
-    pub(crate) fn answer_commands(&mut self, next_step: u64) -> anyhow::Result<bool> {
+    /// Returns the last published step; `None` before the first.
+    pub(super) fn step(&self) -> Option<u64> {
+        self.step
+    }
+
+    /// Serves late subscribers, and appends the commands that have arrived.
+    pub(crate) fn receive_commands(&mut self, commands: &mut VecDeque<ReceivedCommand>) {
         self.owner.refresh();
         self.owner.receive_commands(&mut self.commands);
         // A replay refuses states, but answers the clients that give them.
         let mut states = Vec::new();
         self.owner.receive_states(&mut states);
-        self.commands.extend(states.into_iter().map(|(command, _)| command));
-        let has_any = !self.commands.is_empty();
-        for ReceivedCommand { command, .. } in self.commands.drain(..) {
-            let result = self.control.obey(command.action());
-            let index = self.position.outcome_count;
-            let mut outcome = Outcome::new(index, next_step, command, result);
-            outcome.run_id = self.run_id;
-            outcome.flags = sim_contract::OUTCOME_FLAG_CONTROL;
-            self.owner.publish_outcome(&outcome)?;
-            self.owner.wake(Wake::Outcome);
-        }
-        Ok(has_any)
+        commands.extend(self.commands.drain(..));
+        commands.extend(states.into_iter().map(|(command, _)| command));
+    }
+
+    /// Answers a command. The answer is not part of the recorded run. `step` is the first one that can
+    /// show an effect.
+    pub(crate) fn answer(
+        &self,
+        command: Command,
+        step: u64,
+        result: Result<(), Reason>,
+    ) -> anyhow::Result<()> {
+        let mut outcome = Outcome::new(self.position.outcome_count, step, command, result);
+        outcome.run_id = self.run_id;
+        outcome.flags = OUTCOME_FLAG_CONTROL;
+        self.owner.publish_outcome(&outcome)?;
+        self.owner.wake(Wake::Outcome);
+        Ok(())
     }
 
     /// Returns the number of readers of snapshots.
@@ -247,14 +280,16 @@ impl Replay {
     }
 
     /// Publishes the status of the replay, with the recorded timing of the node.
-    pub(crate) fn publish_status(&self) -> anyhow::Result<()> {
+    pub(super) fn publish_status(&self, playback: &Playback<'_>) -> anyhow::Result<()> {
+        let Playback { control, step, real_time_factor, lockstep } = *playback;
         let mut status = NodeStatus {
             contract_version: CONTRACT_VERSION,
             solver_version: self.run.solver_version,
             run_id: self.run_id,
-            step: self.step.unwrap_or_default(),
-            real_time_factor: if self.control.is_moving() { self.rate } else { 0.0 },
-            time_scale: self.rate,
+            step,
+            real_time_factor,
+            // As for a node without deadlines.
+            time_scale: if control.rate.is_finite() { control.rate } else { 1.0 },
             outcome_count: self.position.outcome_count,
             rejected_count: self.position.rejected_count,
             rate_hz: self.run.rate_hz,
@@ -263,10 +298,13 @@ impl Replay {
             torn_count: self.published_torn.header.count,
             reader_count: u32::try_from(self.reader_count()).unwrap_or(u32::MAX),
             process_id: std::process::id(),
-            flags: StatusFlags::REPLAY
-                | if self.control.is_paused { StatusFlags::PAUSED } else { 0 },
+            flags: StatusFlags::REPLAY | if control.is_paused { StatusFlags::PAUSED } else { 0 },
             ..NodeStatus::default()
         };
+        for (entry, member) in status.members.iter_mut().zip(lockstep.members(step)) {
+            *entry = member;
+            status.member_count += 1;
+        }
         if let Some(row) = &self.status {
             status.wake_late_ns_p50 = row.wake_late_ns_p50;
             status.wake_late_ns_p99 = row.wake_late_ns_p99;
@@ -281,4 +319,17 @@ impl Replay {
         self.owner.wake(Wake::Status);
         Ok(())
     }
+}
+
+/// Publishes a load as the owner of the name. Where memory lacks room for two loads, the name is free for
+/// a moment between them.
+fn own(endpoint: &Endpoint, owner: Option<Owner>, load: &Load<'_>) -> Result<Owner, OwnerError> {
+    if let Some(mut owner) = owner {
+        match owner.load(load) {
+            Ok(()) => return Ok(owner),
+            Err(OwnerError::NotEnoughSharedMemory { .. }) => drop(owner),
+            Err(error) => return Err(error),
+        }
+    }
+    Owner::create(endpoint, load)
 }

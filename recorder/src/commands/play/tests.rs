@@ -1,16 +1,18 @@
 //! Headers and payloads that a replay publishes equal the recorded ones.
 
+use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Duration;
 
 use recorder::{
-    CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TearsRow,
-    TopologyRow, Up,
+    CollidersRow, Frame, Message, OutcomeRow, RunDescription, StepRow, SurfaceRow, TapeState,
+    TearsRow, TopologyRow, Up,
 };
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     Action, CONTRACT_VERSION, Client, ColliderState, Command, ConstraintState, LoadHeader, Method,
-    Outcome, OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, TearCause,
-    Torn, TornConstraint, Triangle,
+    Outcome, OutcomeStatus, Owner, ParticleState, Reason, SnapshotFlags, SnapshotHeader, Tap,
+    TearCause, Torn, TornConstraint, Triangle,
 };
 
 use super::position::Position;
@@ -62,6 +64,15 @@ fn replay(domain: &TestDomain) -> Replay {
 }
 
 fn replay_from(domain: &TestDomain, position: Position) -> Replay {
+    replay_after(domain, None, position)
+}
+
+/// Serves late subscribers.
+fn serve(replay: &mut Replay) {
+    replay.receive_commands(&mut VecDeque::new());
+}
+
+fn replay_after(domain: &TestDomain, owner: Option<Owner>, position: Position) -> Replay {
     let load = LoadHeader::default();
     let recorded = Recorded {
         run: &run(),
@@ -71,7 +82,7 @@ fn replay_from(domain: &TestDomain, position: Position) -> Replay {
         collider_count: 1,
         keyframe_size_bytes_max: 64,
     };
-    Replay::new(&domain.endpoint(), &recorded, position, 1.0).unwrap()
+    Replay::new(&domain.endpoint(), owner, &recorded, position).unwrap()
 }
 
 /// Returns a client that reads snapshots from now on. Its first read subscribes it.
@@ -118,7 +129,7 @@ fn snapshots_equal_those_of_the_node_except_run_id_time_and_flag() {
     assert_ne!(header.run_id, run().run_id);
     assert_eq!(particles, frame(12, Vec::new()).payload());
     assert!(client.topology(Duration::ZERO).unwrap().is_none());
-    replay.answer_commands(13).unwrap();
+    serve(&mut replay);
     assert_eq!(client.topology(TIMEOUT).unwrap().unwrap().constraints.len(), 4);
 }
 
@@ -147,17 +158,41 @@ fn answers_to_commands_are_not_part_of_the_recorded_run() {
     let domain = TestDomain::new();
     let mut replay = replay(&domain);
     let mut client = Client::attach(&domain.endpoint()).unwrap();
-    let mut ask = |action| {
+    let mut ask = |action, result| {
         client.send(action).unwrap();
-        replay.answer_commands(42).unwrap();
+        let mut commands = VecDeque::new();
+        replay.receive_commands(&mut commands);
+        replay.answer(commands[0].command, 42, result).unwrap();
         client.next_outcome(TIMEOUT).unwrap().unwrap()
     };
-    let paused = ask(Action::Pause);
+    let paused = ask(Action::Pause, Ok(()));
     assert_eq!((paused.step, paused.status), (42, OutcomeStatus::Applied as u32));
     assert_eq!(paused.flags, sim_contract::OUTCOME_FLAG_CONTROL);
-    let refused = ask(Action::Pin { particle: 0 });
+    let refused = ask(Action::Pin { particle: 0 }, Err(Reason::NoEffectHere));
     assert_eq!(refused.reason, Reason::NoEffectHere as u32);
-    assert!(!replay.control.is_moving());
+}
+
+#[test]
+fn readers_stay_connected_when_a_run_follows_another() {
+    let domain = TestDomain::new();
+    let mut first = replay(&domain);
+    let mut tap = Tap::attach(&domain.endpoint()).unwrap();
+    first.publish(&frame(12, vec![])).unwrap();
+    serve(&mut first);
+    let mut next = |replay: &mut Replay| {
+        serve(replay);
+        let state = tap.next_state(|_| {}).unwrap();
+        (state.header.run_id, state.header.step, state.torn.indices().collect::<Vec<_>>())
+    };
+    let (run_id, step, torn) = next(&mut first);
+    assert_eq!((step, torn), (12, vec![]));
+    let position = Position::new(before(None), Method::Xpbd);
+    let mut second = replay_after(&domain, Some(first.into_owner()), position);
+    second.publish_latched(3).unwrap();
+    second.publish(&frame(3, vec![])).unwrap();
+    let (second_run_id, step, _) = next(&mut second);
+    assert_eq!(step, 3);
+    assert_ne!(run_id, second_run_id, "steps never go back in a run");
 }
 
 #[test]
@@ -187,7 +222,7 @@ fn a_snapshot_of_another_size_is_refused() {
     let short = Frame { particles, ..frame(1, vec![floor(1, 2.0)]) };
     let error = replay.publish(&short).unwrap_err();
     assert_eq!(error.to_string(), "the snapshot of step 1 has 1 particles, but the scene has 2");
-    replay.answer_commands(1).unwrap();
+    serve(&mut replay);
     assert!(client.colliders(Duration::ZERO).unwrap().colliders.is_empty(), "nothing of its step");
 }
 
@@ -233,7 +268,7 @@ fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
     replay.publish_latched(5).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
-    replay.answer_commands(5).unwrap();
+    serve(&mut replay);
     let (force, cut) = (Some(TearCause::Force), Some(TearCause::Cut));
     assert_eq!(torn(&mut client), (0, 0, vec![(2, force)]));
     replay.publish(&frame(5, vec![tears(5, &[3, 1], "cut")])).unwrap();
@@ -250,25 +285,37 @@ fn each_list_of_tears_is_complete_and_a_reset_empties_it() {
 #[test]
 fn a_replay_that_starts_late_publishes_the_torn_constraints_and_the_colliders() {
     let domain = TestDomain::new();
-    let mut position = Position::new(before(None), Method::Xpbd);
-    position.skip(&[floor(0, 0.0), tears(1, &[0], "stretch")]);
-    position.skip(&[floor(2, 1.0), tears(2, &[1], "cut"), outcome(0, 2, Action::Reset)]);
-    position.skip(&[floor(3, 2.0), tears(4, &[0], "distance")]);
-    let mut replay = replay_from(&domain, position);
+    let (cut, distance) = (Some(TearCause::Cut), Some(TearCause::Distance));
+    let mut torn: Torn = [TornConstraint::new(1, cut)].into_iter().collect();
+    torn.extend(4, [TornConstraint::new(0, distance)]);
+    let Message::Colliders(colliders) = floor(3, 2.0) else { unreachable!() };
+    let row = StepRow { step: 6, scene_step: 4, outcome_count: 3, ..frame(6, vec![]).row };
+    let state = TapeState {
+        row,
+        has_readable_row: true,
+        particles: Arc::new(frame(6, vec![]).payload().to_vec()),
+        torn,
+        colliders: Some(colliders),
+        parameters: None,
+        status: None,
+    };
+    let mut replay = replay_from(&domain, Position::at(&state, None, Method::Xpbd));
     replay.publish_latched(6).unwrap();
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     let mut offset = |replay: &mut Replay, timeout| {
         let colliders = client.colliders(timeout).unwrap();
-        replay.answer_commands(6).unwrap();
+        serve(replay);
         colliders.colliders.first().map(|one| (colliders.header.step, one.offset))
     };
     assert_eq!(offset(&mut replay, Duration::ZERO), None);
     assert_eq!(offset(&mut replay, TIMEOUT), Some((3, 2.0)));
     replay.publish(&frame(6, vec![floor(6, 3.0)])).unwrap();
     assert_eq!(offset(&mut replay, TIMEOUT), Some((6, 3.0)));
-    let expected = vec![(1, Some(TearCause::Cut)), (0, Some(TearCause::Distance))];
+    let expected = vec![(1, cut), (0, distance)];
     let mut client = Client::attach(&domain.endpoint()).unwrap();
     assert_eq!(client.torn(Duration::ZERO).unwrap().constraints, []);
-    replay.answer_commands(6).unwrap();
-    assert_eq!(torn(&mut client), (4, 1, expected));
+    serve(&mut replay);
+    let torn = client.torn(TIMEOUT).unwrap();
+    let all: Vec<_> = torn.constraints.iter().map(|one| (one.constraint, one.cause())).collect();
+    assert_eq!((torn.header.since_step, all), (2, expected));
 }

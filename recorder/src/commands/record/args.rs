@@ -45,6 +45,7 @@ const FLUSH_INTERVALS: RangeInclusive<Duration> =
     recorder record -o run.mcap --every 10 --exclude status --meta operator=Ada\n  \
     recorder record -o flight.mcap --only-commands && recorder simulate flight.mcap -o run.mcap"
 )]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct RecordArgs {
     #[command(flatten)]
     pub(super) endpoint: EndpointArgs,
@@ -59,6 +60,9 @@ pub(crate) struct RecordArgs {
     /// Wait until a node is running
     #[arg(long)]
     pub(super) wait: bool,
+    /// Join the lockstep: the node or replay waits for this recorder, which then loses nothing
+    #[arg(long)]
+    pub(super) lockstep: bool,
     #[command(flatten)]
     pub(super) split: SplitArgs,
     /// Keep the last TIME in memory, such as 30s or 30, from 1s to 1h. Write it, and a second more, on
@@ -122,6 +126,7 @@ impl From<SingleStateArgs> for RecordArgs {
             endpoint,
             output,
             follow: false,
+            lockstep: false,
             wait: false,
             split: SplitArgs::default(),
             black_box: None,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 use sim_contract::Stop;
 
@@ -32,6 +32,11 @@ impl std::error::Error for Interrupted {}
 impl FileSource {
     pub(super) fn new(file: File, stop: Option<Stop>) -> Self {
         Self { file: BufReader::with_capacity(BUFFER_SIZE_BYTES, file), stop }
+    }
+
+    /// Continues at a byte of the file.
+    pub(super) fn go_to(&mut self, byte: u64) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(byte)).map(|_| ())
     }
 }
 

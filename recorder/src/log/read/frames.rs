@@ -5,8 +5,9 @@ use std::io::Read;
 use sim_contract::ParticleState;
 
 use super::decode::LoggedMessage;
+use super::file_source::FileSource;
 use super::read_error::{LogEnd, ReadError};
-use super::reader::LogReader;
+use super::reader::{ChunkStart, LogReader};
 use crate::log::backlog::Backlog;
 use crate::log::message::Message;
 use crate::log::rows::StepRow;
@@ -54,6 +55,35 @@ pub struct FrameReader<R> {
     /// The message that showed that the snapshot before it has no payload.
     next: Option<LoggedMessage>,
     is_only_commands: bool,
+}
+
+impl FrameReader<FileSource> {
+    /// Continues at a chunk.
+    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) -> Result<(), ReadError> {
+        self.log.go_to(chunk)?;
+        self.backlog = Backlog::new(self.log.run(), self.log.scene().len());
+        self.updates.clear();
+        self.log_times_ns.clear();
+        (self.row, self.next) = (None, None);
+        Ok(())
+    }
+
+    /// Skips to the end of the snapshot of a step. The next frame has the messages of later steps that
+    /// precede the snapshot in the file. Returns `false` if the readable part ends before the snapshot.
+    pub(in crate::log) fn skip_to(&mut self, step: u64) -> Result<bool, ReadError> {
+        while let Some(LoggedMessage { message, log_time_ns, .. }) = self.next_message()? {
+            match message {
+                Message::Particles { step: at, .. } if at == step => return Ok(true),
+                Message::Particles { .. } | Message::Step(_) => {}
+                update if update.step() > step => {
+                    self.add_update(update)?;
+                    self.log_times_ns.push(log_time_ns);
+                }
+                _ => {}
+            }
+        }
+        Ok(false)
+    }
 }
 
 impl<R: Read> FrameReader<R> {

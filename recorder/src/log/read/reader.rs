@@ -66,6 +66,26 @@ impl LogReader<FileSource> {
     }
 }
 
+/// A chunk to continue at.
+#[derive(Debug)]
+pub(in crate::log) struct ChunkStart<'a> {
+    /// First byte of the chunk in the file.
+    pub(in crate::log) byte: u64,
+    /// The channels that chunks before it declare.
+    pub(in crate::log) channels: &'a BTreeMap<u16, Option<TopicChannel>>,
+}
+
+impl LogReader<FileSource> {
+    /// Continues at a chunk. An audit ends, because it compares the whole file.
+    pub(in crate::log) fn go_to(&mut self, chunk: &ChunkStart<'_>) -> Result<(), ReadError> {
+        self.records.go_to(chunk.byte)?;
+        self.channels.extend(chunk.channels);
+        self.closing = None;
+        self.audit = None;
+        Ok(())
+    }
+}
+
 /// Names the unfinished part of a recording that does not exist yet.
 fn open_error(path: &Path, cause: io::Error) -> ReadError {
     let part = part_path(path);

@@ -3,13 +3,14 @@
 //! This reader owns the framing of the file, so that it can compare each length with the limits of
 //! the scene before anything is allocated. The mcap crate decompresses the chunks and parses records.
 
-use std::io::Read;
+use std::io::{self, Read};
 
 use mcap::McapError;
 use mcap::records::{Record, op};
 
 use super::chunk_data::ChunkData;
 use super::fault::Fault;
+use super::file_source::FileSource;
 use super::lengths::check_lengths;
 use super::limits::{
     HEADER_RECORD_SIZE_BYTES_MAX, RECORD_HEADER_SIZE_BYTES, SizeLimits, TEXT_SIZE_BYTES_MAX,
@@ -48,6 +49,17 @@ enum Part {
     /// A record that no reader of ours needs, or the header of a chunk.
     Other,
     End,
+}
+
+impl RecordReader<FileSource> {
+    /// Continues with the record that begins at a byte of the file.
+    pub(in crate::log) fn go_to(&mut self, byte: u64) -> io::Result<()> {
+        self.source.go_to(byte)?;
+        self.chunk = None;
+        self.intact_count = byte;
+        self.end = None;
+        Ok(())
+    }
 }
 
 impl<R: Read> RecordReader<R> {

@@ -5,6 +5,7 @@ use std::io::{self, ErrorKind, Read};
 use crc32fast::Hasher;
 
 use super::fault::Fault;
+use super::file_source::FileSource;
 
 /// Most bytes to request from the file at a time. Memory grows only with bytes that the file has.
 const READ_SIZE_BYTES_MAX: u64 = 1 << 20;
@@ -17,6 +18,16 @@ pub(in crate::log) struct Source<R> {
     position: u64,
     /// The checksum of the current section. `None` if nothing checks it.
     hasher: Option<Hasher>,
+}
+
+impl Source<FileSource> {
+    /// Continues at a byte of the file. The rest of the file has no checksum.
+    pub(in crate::log) fn go_to(&mut self, byte: u64) -> io::Result<()> {
+        self.inner.go_to(byte)?;
+        self.position = byte;
+        self.hasher = None;
+        Ok(())
+    }
 }
 
 impl<R: Read> Source<R> {

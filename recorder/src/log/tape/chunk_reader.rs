@@ -84,6 +84,20 @@ impl ChunkReader {
         Ok(snapshot.map(|(_, particles)| Arc::clone(particles)))
     }
 
+    /// Returns the newest keyframe of a chunk up to a step.
+    pub(super) fn keyframe(
+        &mut self,
+        chunk: usize,
+        step: u64,
+    ) -> Result<Option<(u64, Vec<u8>)>, ReadError> {
+        let messages = self.log.read_chunk(chunk)?.into_iter().rev();
+        let mut keyframes = messages.filter_map(|logged| match logged.message {
+            Message::Keyframe { step, bytes } => Some((step, bytes)),
+            _ => None,
+        });
+        Ok(keyframes.find(|(keyframe_step, _)| *keyframe_step <= step))
+    }
+
     /// Returns the newest value that `pick` selects, up to a chunk.
     pub(super) fn latest<T>(
         &mut self,

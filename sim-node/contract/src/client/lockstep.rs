@@ -6,12 +6,11 @@ use std::time::Duration;
 use thiserror::Error;
 
 use crate::client::request::OwnerState;
-use crate::client::views::Snapshot;
-use crate::endpoint::Endpoint;
 use crate::messages::ready::Ready;
+use crate::messages::snapshot::SnapshotHeader;
 use crate::ports::reader::ReadError;
 use crate::ports::service::{READY, ServiceError};
-use crate::ports::services::Attachment;
+use crate::ports::services::{AttachError, Attachment};
 use crate::ports::writer::{PublishError, ValueWriter};
 
 /// Error of a member of the lockstep.
@@ -21,12 +20,6 @@ pub enum LockstepError {
     /// The client has not joined.
     #[error("this client is no member of the lockstep: call join_lockstep first")]
     NotJoined,
-    /// A replay publishes recorded steps, and waits for nobody.
-    #[error("{endpoint} is a replay, which has no lockstep: join the lockstep of a node")]
-    Replay {
-        /// The replay.
-        endpoint: Endpoint,
-    },
     /// The node did not confirm the membership.
     #[error("the lockstep did not admit this client within {timeout:?}: {owner}")]
     NotAdmitted {
@@ -35,6 +28,9 @@ pub enum LockstepError {
         /// State of the owner after the wait.
         owner: OwnerState,
     },
+    /// There is no node to attach to.
+    #[error(transparent)]
+    Attach(#[from] AttachError),
     /// A message could not be read.
     #[error(transparent)]
     Read(#[from] ReadError),
@@ -85,15 +81,13 @@ impl Member {
     }
 
     /// Returns `true` for a snapshot whose turn is this member's, and not yet ended.
-    pub(crate) fn takes_part(&self, snapshot: &Snapshot) -> bool {
-        let header = snapshot.header();
+    pub(crate) fn takes_part(&self, header: &SnapshotHeader) -> bool {
         let Ready { run_id, step, every, .. } = self.message;
         let is_new = header.run_id != run_id || header.step > step;
         is_new && header.step.is_multiple_of(every.into())
     }
 
-    pub(crate) fn begin_turn(&mut self, snapshot: &Snapshot) {
-        let header = snapshot.header();
+    pub(crate) fn begin_turn(&mut self, header: &SnapshotHeader) {
         (self.message.run_id, self.message.step) = (header.run_id, header.step);
         self.is_in_turn = true;
     }

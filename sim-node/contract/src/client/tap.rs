@@ -1,12 +1,16 @@
 //! The tap: reads everything that an owner publishes.
 
+use std::num::NonZeroU32;
 use std::rc::Rc;
 use std::time::Duration;
 
 use crate::client::change::LostChanges;
+use crate::client::lockstep::{LockstepError, Member};
+use crate::client::random_client_id;
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
+use crate::limits::UPDATES_BUFFERED;
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::to_values;
@@ -50,6 +54,8 @@ pub struct Tap {
     /// The held snapshot has arrived before its load.
     is_early: bool,
     errors: Vec<ReadError>,
+    /// The membership in the lockstep, if it has joined.
+    member: Option<Member>,
     // Dropped last: the ports belong to its services and its node.
     attachment: Rc<Attachment>,
 }
@@ -63,10 +69,28 @@ impl Tap {
     /// another reader, or `/dev/shm` is full.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
         let attachment = Attachment::open(Session::join(endpoint)?)?;
-        Ok(Self::subscribe(attachment)?)
+        Ok(Self::subscribe(attachment, None)?)
     }
 
-    fn subscribe(attachment: Attachment) -> Result<Self, ServiceError> {
+    /// Attaches as a member of the lockstep: the owner waits, at the steps that are multiples of
+    /// [`Tap::LOCKSTEP_EVERY`], until [`Tap::ready`] is called. So the tap misses nothing at any rate. It joins
+    /// before it subscribes, and again with each turn, also at the next owner of the name.
+    ///
+    /// # Errors
+    /// Same as [`Tap::attach`], or the lockstep has no place for another member.
+    pub fn attach_in_lockstep(endpoint: &Endpoint) -> Result<Self, LockstepError> {
+        let attachment = Attachment::open(Session::join(endpoint)?)?;
+        let member = Member::create(&attachment, random_client_id()?, Self::LOCKSTEP_EVERY)?;
+        member.join()?;
+        Ok(Self::subscribe(attachment, Some(member))?)
+    }
+
+    /// Distance of the steps at which a tap in the lockstep takes part: in one step, a service publishes at most
+    /// one of the [`crate::UPDATES_BUFFERED`] messages that it can hold for a reader.
+    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
+    pub const LOCKSTEP_EVERY: NonZeroU32 = NonZeroU32::new(UPDATES_BUFFERED as u32).unwrap();
+
+    fn subscribe(attachment: Attachment, member: Option<Member>) -> Result<Self, ServiceError> {
         let attachment = Rc::new(attachment);
         let (services, source) = (&attachment.services, &Rc::new(Source::new(&attachment)));
         // Fields are evaluated in the order written here.
@@ -87,6 +111,7 @@ impl Tap {
             held: None,
             is_early: false,
             errors: Vec::new(),
+            member,
             attachment,
         })
     }
@@ -143,7 +168,21 @@ impl Tap {
         if self.is_early {
             return None;
         }
+        if let Some(member) = &mut self.member
+            && member.takes_part(sample.user_header())
+        {
+            member.begin_turn(sample.user_header());
+        }
         self.assembler.assemble(sample.user_header(), sample.payload())
+    }
+
+    /// Lets the owner go on, if it waits for this tap. Call it when all states were read. A tap that is no
+    /// member has nothing to do.
+    ///
+    /// # Errors
+    /// There is no memory.
+    pub fn ready(&mut self) -> Result<(), LockstepError> {
+        self.member.as_mut().map_or(Ok(()), Member::ready)
     }
 
     /// Removes and returns the errors of messages that could not be read.

@@ -1,0 +1,274 @@
+//! The files of a replay, played one after another on one timeline.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use recorder::{ContentSelection, Frame, LogEnd, RunDescription, StepRow};
+use sim_contract::Stop;
+use sim_contract::clock::SECOND_NS;
+
+use super::recording::{Recording, Start};
+use super::replay::Recorded;
+use crate::cli::output;
+
+/// A recorded step of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place {
+    /// Number of the file, from 0.
+    pub(super) file: usize,
+    pub(super) step: u64,
+}
+
+/// The files of a replay. Files that continue a run, as those of a split recording, play as one run.
+#[derive(Debug)]
+pub(super) struct Playlist {
+    files: Vec<Listed>,
+    /// The file that is being read.
+    current: usize,
+    recording: Recording,
+    /// Every file that has ended was complete.
+    is_whole: bool,
+    stop: Stop,
+}
+
+/// A file on the timeline.
+#[derive(Debug)]
+struct Listed {
+    path: PathBuf,
+    rate_hz: u32,
+    first_step: u64,
+    last_step: u64,
+    /// Time of its first snapshot, from the start of the replay.
+    begin_ns: u64,
+    /// It continues the run of the file before, without a gap.
+    is_continuation: bool,
+}
+
+/// The end of a file, for the comparison with the start of the next one.
+#[derive(Debug)]
+struct Junction {
+    run_id: u64,
+    scene: Vec<u8>,
+    topology_revision: u32,
+    selection: ContentSelection,
+    last: StepRow,
+}
+
+impl Playlist {
+    /// Opens the first file, and reads the range of every other one.
+    pub(super) fn open(paths: &[PathBuf], stop: &Stop) -> anyhow::Result<Self> {
+        let mut files: Vec<Listed> = Vec::new();
+        let mut junction: Option<Junction> = None;
+        let mut first = None;
+        for path in paths {
+            let name = || output::path_text(path);
+            let mut recording = Recording::open(path, stop).with_context(name)?;
+            let listed =
+                Listed::new(&mut recording, files.last(), junction.as_ref()).with_context(name)?;
+            files.push(listed);
+            junction = Some(Junction::of(&mut recording).with_context(name)?);
+            first.get_or_insert(recording);
+        }
+        let recording = first.context("there is no file to play")?;
+        Ok(Self { files, current: 0, recording, is_whole: true, stop: stop.clone() })
+    }
+
+    /// Returns the time from the first to the last snapshot.
+    pub(super) fn duration_ns(&self) -> u64 {
+        self.files.last().map_or(0, Listed::end_ns)
+    }
+
+    /// Returns the time of a step of the file that is being read, from the start of the replay.
+    pub(super) fn time_ns(&self, step: u64) -> u64 {
+        self.files[self.current].time_ns(step)
+    }
+
+    /// Returns the time of a place, from the start of the replay.
+    pub(super) fn time_of(&self, place: Place) -> u64 {
+        self.files[place.file].time_ns(place.step)
+    }
+
+    /// Returns the last place up to a time.
+    pub(super) fn place_at(&self, time_ns: u64) -> Place {
+        let file = self.files.partition_point(|file| file.begin_ns <= time_ns).saturating_sub(1);
+        Place { file, step: self.files[file].step_at(time_ns) }
+    }
+
+    /// Returns the place of a step of the run that is being played, or `None` if it is not in the files.
+    pub(super) fn place_of(&self, step: u64) -> Option<Place> {
+        let (mut begin, mut end) = (self.current, self.current + 1);
+        while self.files[begin].is_continuation {
+            begin -= 1;
+        }
+        while self.files.get(end).is_some_and(|file| file.is_continuation) {
+            end += 1;
+        }
+        let run = &self.files[begin..end];
+        let last = run.last()?.last_step;
+        let file = begin + run.iter().rposition(|file| file.first_step <= step)?;
+        (step <= last).then_some(Place { file, step: step.min(self.files[file].last_step) })
+    }
+
+    /// Returns the place of the recorded snapshot before a step of the run that is being played; at the first
+    /// one, that one.
+    pub(super) fn place_before(&mut self, step: u64) -> anyhow::Result<Place> {
+        let file = self.place_of(step).map_or(self.current, |place| place.file);
+        let first = self.files[file].first_step;
+        if step > first {
+            self.read(file)?;
+            let step = self.recording.tape().step_at(step - 1).with_context(|| self.name())?;
+            return Ok(Place { file, step });
+        }
+        Ok(match file.checked_sub(1) {
+            Some(before) => Place { file: before, step: self.files[before].last_step },
+            None => Place { file, step: first },
+        })
+    }
+
+    /// Returns the place after the run that has ended.
+    pub(super) fn place_after_run(&self) -> Option<Place> {
+        let file = self.current + 1;
+        self.files.get(file).map(|listed| Place { file, step: listed.first_step })
+    }
+
+    /// Continues at the last recorded step up to a place.
+    pub(super) fn start_at(&mut self, place: Place) -> anyhow::Result<Start> {
+        self.read(place.file)?;
+        self.recording.start_at(place.step).with_context(|| self.name())
+    }
+
+    /// Returns the data of the load of the file that is being read.
+    pub(super) fn recorded(&mut self) -> anyhow::Result<Recorded<'_>> {
+        let name = self.name();
+        self.recording.recorded().context(name)
+    }
+
+    /// Returns the next snapshot of the run, or `None` at its end.
+    pub(super) fn next_frame(&mut self) -> anyhow::Result<Option<Frame>> {
+        if let Some(frame) = self.recording.next_frame().with_context(|| self.name())? {
+            return Ok(Some(frame));
+        }
+        self.report_end();
+        let next = self.current + 1;
+        if !self.files.get(next).is_some_and(|file| file.is_continuation) {
+            return Ok(None);
+        }
+        self.read(next)?;
+        let Start { mut frame, .. } =
+            self.recording.start_at(self.files[next].first_step).with_context(|| self.name())?;
+        // The file repeats what was latched before its first step.
+        frame.updates.retain(|update| update.step() >= frame.row.step);
+        Ok(Some(frame))
+    }
+
+    /// Returns `true` if every file that has ended was complete.
+    pub(super) fn is_whole(&self) -> bool {
+        self.is_whole
+    }
+
+    fn name(&self) -> String {
+        output::path_text(self.recording.path())
+    }
+
+    fn read(&mut self, file: usize) -> anyhow::Result<()> {
+        if file != self.current {
+            let path = &self.files[file].path;
+            self.recording =
+                Recording::open(path, &self.stop).with_context(|| output::path_text(path))?;
+            self.current = file;
+        }
+        Ok(())
+    }
+
+    fn report_end(&mut self) {
+        if let Some(end) = self.recording.end()
+            && *end != LogEnd::Complete
+        {
+            self.is_whole = false;
+            output::warn_incomplete(self.recording.path(), end, "played as far as it goes");
+        }
+    }
+}
+
+impl Listed {
+    fn new(
+        recording: &mut Recording,
+        before: Option<&Self>,
+        junction: Option<&Junction>,
+    ) -> anyhow::Result<Self> {
+        let is_continuation = match (before, junction) {
+            (Some(before), Some(junction)) => junction.is_continued_by(before, recording)?,
+            _ => false,
+        };
+        let run = recording.run();
+        let rate_hz = run.rate_hz;
+        let first_step = recording.tape().first_step();
+        let begin_ns = match before {
+            None => 0,
+            Some(before) if is_continuation => before.time_ns(first_step),
+            // The last snapshot of a run is shown for one step.
+            Some(before) => before.end_ns() + SECOND_NS / u64::from(before.rate_hz.max(1)),
+        };
+        let last_step = recording.tape().last_step();
+        let path = recording.path().to_owned();
+        Ok(Self { path, rate_hz, first_step, last_step, begin_ns, is_continuation })
+    }
+
+    fn time_ns(&self, step: u64) -> u64 {
+        let steps = step.saturating_sub(self.first_step);
+        self.begin_ns.saturating_add(RunDescription::duration_ns(steps, self.rate_hz))
+    }
+
+    fn end_ns(&self) -> u64 {
+        self.time_ns(self.last_step)
+    }
+
+    /// Returns the last step up to a time.
+    fn step_at(&self, time_ns: u64) -> u64 {
+        let passed_ns = u128::from(time_ns.saturating_sub(self.begin_ns));
+        // A time of a step is rounded down, so the next step may begin within the same nanosecond.
+        let steps = (passed_ns + 1) * u128::from(self.rate_hz) / u128::from(SECOND_NS);
+        let steps = u64::try_from(steps).unwrap_or(u64::MAX);
+        self.first_step.saturating_add(steps).min(self.last_step)
+    }
+}
+
+impl Junction {
+    fn of(recording: &mut Recording) -> anyhow::Result<Self> {
+        let last_step = recording.tape().last_step();
+        let last = recording.tape().state_at(last_step)?.row;
+        Ok(Self {
+            run_id: recording.run().run_id,
+            scene: recording.scene().to_vec(),
+            topology_revision: recording.tape().topology().revision,
+            selection: recording.selection(),
+            last,
+        })
+    }
+
+    /// Returns `true` if no snapshot is missing between this file and the next one. Warns about missing ones
+    /// within a run.
+    fn is_continued_by(&self, before: &Listed, next: &mut Recording) -> anyhow::Result<bool> {
+        let is_same_load = self.run_id == next.run().run_id
+            && self.topology_revision == next.tape().topology().revision
+            && self.scene == next.scene();
+        let first_step = next.tape().first_step();
+        if !is_same_load || first_step <= self.last.step {
+            return Ok(false);
+        }
+        let first = next.tape().state_at(first_step)?.row;
+        let missing = match (self.last.snapshot_index, first.snapshot_index) {
+            (Some(last), Some(first)) => self.selection.missing_between(last, first),
+            // Older formats do not number their snapshots.
+            _ => 0,
+        };
+        if missing > 0 {
+            let (one, two) = (before.path.display(), next.path().display());
+            output::note(&format!(
+                "warning: {missing} snapshots between {one} and {two} are missing, so {two} plays as a run of its \
+                 own. If another file of this recording has them, name it between the two"
+            ));
+        }
+        Ok(missing == 0)
+    }
+}

@@ -1,0 +1,164 @@
+//! One file of a replay, read forward from any step.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use recorder::{
+    CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
+    RunDescription, Tape, torn_before_first,
+};
+use sim_contract::{Method, Stop};
+use sim_solver::Solver;
+
+use super::position::Position;
+use super::replay::Recorded;
+use crate::input::scene_source::scene_in_recording;
+
+/// A recording that is read forward from any step.
+#[derive(Debug)]
+pub(super) struct Recording {
+    path: PathBuf,
+    frames: FrameReader<FileSource>,
+    tape: Tape,
+    /// Number of colliders in the first snapshot. `None` if the file has none before it.
+    collider_count: Option<usize>,
+    /// `None` until they are needed.
+    sizes: Option<Sizes>,
+}
+
+/// Sizes of the messages of a load.
+#[derive(Debug, Clone, Copy)]
+struct Sizes {
+    /// Number of colliders. It never changes in a recording.
+    collider_count: usize,
+    keyframe_size_bytes_max: usize,
+}
+
+/// A place in a recording: its next snapshot, and the state before it.
+#[derive(Debug)]
+pub(super) struct Start {
+    pub(super) frame: Frame,
+    pub(super) position: Position,
+}
+
+impl Recording {
+    /// Opens a file at its first snapshot. Errors do not name the file.
+    pub(super) fn open(path: &Path, stop: &Stop) -> anyhow::Result<Self> {
+        let log = LogReader::open_until(path, stop)?;
+        log.selection().require(&ContentSelection::FOR_STATES, "`recorder play`")?;
+        log.selection().require_all_particles("`recorder play`")?;
+        // Names the problem of a file whose readable part has no snapshot.
+        let mut frames = FrameReader::new(log);
+        let first = next_frame(&mut frames)?;
+        let collider_count = first_colliders(&first).map(|row| row.colliders.len());
+        let tape = Tape::open(path, Some(stop), &mut |_, _| {})?;
+        tape.rewind(&mut frames)?;
+        Ok(Self { path: path.to_owned(), frames, tape, collider_count, sizes: None })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) fn run(&self) -> &RunDescription {
+        self.tape.run()
+    }
+
+    pub(super) fn tape(&mut self) -> &mut Tape {
+        &mut self.tape
+    }
+
+    pub(super) fn scene(&self) -> &[u8] {
+        self.frames.log().scene()
+    }
+
+    pub(super) fn selection(&self) -> ContentSelection {
+        self.frames.log().selection()
+    }
+
+    /// Returns the data of the load.
+    pub(super) fn recorded(&mut self) -> anyhow::Result<Recorded<'_>> {
+        let Sizes { collider_count, keyframe_size_bytes_max } = self.sizes()?;
+        Ok(Recorded {
+            run: self.tape.run(),
+            scene: self.frames.log().scene(),
+            topology: self.tape.topology(),
+            surface: self.tape.surface(),
+            collider_count,
+            keyframe_size_bytes_max,
+        })
+    }
+
+    fn sizes(&mut self) -> anyhow::Result<Sizes> {
+        if let Some(sizes) = self.sizes {
+            return Ok(sizes);
+        }
+        let solver = Solver::new(&scene_in_recording(self.frames.log())?);
+        let sizes = Sizes {
+            collider_count: self.collider_count.unwrap_or_else(|| solver.collider_count()),
+            keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),
+        };
+        self.sizes = Some(sizes);
+        Ok(sizes)
+    }
+
+    /// Continues with the snapshot of the last recorded step up to `step`.
+    pub(super) fn start_at(&mut self, step: u64) -> anyhow::Result<Start> {
+        if step <= self.tape.first_step() { self.start() } else { self.start_in_the_middle(step) }
+    }
+
+    fn start(&mut self) -> anyhow::Result<Start> {
+        self.tape.rewind(&mut self.frames)?;
+        let frame = next_frame(&mut self.frames)?;
+        let torn = torn_before_first(self.tape.topology(), &frame);
+        let mut position = Position::new(torn, self.method());
+        // The load has the parameters of its first snapshot.
+        frame.updates.iter().for_each(|update| position.apply_parameters(update));
+        Ok(Start { frame, position })
+    }
+
+    fn start_in_the_middle(&mut self, step: u64) -> anyhow::Result<Start> {
+        let state = self.tape.state_at(step)?;
+        let keyframe = self.tape.keyframe_at(state.row.step)?;
+        let position = Position::at(&state, keyframe, self.method());
+        self.tape.wind(&mut self.frames, state.row.step)?;
+        let frame = Frame {
+            updates: Vec::new(),
+            row: state.row,
+            particles: Some(state.particles.to_vec()),
+            log_times_ns: Vec::new(),
+        };
+        Ok(Start { frame, position })
+    }
+
+    /// Returns the next snapshot, or `None` at the end of the readable part.
+    pub(super) fn next_frame(&mut self) -> anyhow::Result<Option<Frame>> {
+        Ok(self.frames.next_frame()?)
+    }
+
+    /// Returns the end of the file, once it was reached.
+    pub(super) fn end(&self) -> Option<&LogEnd> {
+        self.frames.end()
+    }
+
+    fn method(&self) -> Method {
+        Method::from_number(self.run().method).unwrap_or_default()
+    }
+}
+
+fn next_frame(frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {
+    match frames.next_frame()? {
+        Some(frame) => Ok(frame),
+        None => match frames.end() {
+            Some(LogEnd::Complete) | None => bail!("has no snapshot to play"),
+            Some(end) => bail!("has no snapshot to play: {end}"),
+        },
+    }
+}
+
+fn first_colliders(first: &Frame) -> Option<&CollidersRow> {
+    first.updates.iter().find_map(|update| match update {
+        Message::Colliders(row) => Some(row),
+        _ => None,
+    })
+}
