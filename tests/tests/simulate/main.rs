@@ -18,9 +18,9 @@ fn recorder(sandbox: &Sandbox, args: &[&str]) -> Finished {
     Process::run(Program::Recorder, sandbox, args)
 }
 
-/// Starts a recorder, and waits until it records.
+/// Starts a recorder for which the node waits, so that it loses nothing, and waits until it records.
 fn record(sandbox: &Sandbox, args: &[&str]) -> Process {
-    let args: Vec<_> = ["record"].into_iter().chain(args.iter().copied()).collect();
+    let args: Vec<_> = ["record", "--lockstep"].into_iter().chain(args.iter().copied()).collect();
     let mut recording = Process::start_ready(Program::Recorder, sandbox, &args);
     recording.wait_for_line("recording from step ");
     recording
