@@ -132,7 +132,11 @@ fn a_loaded_scene_is_built_with_ordinary_scheduling_and_stepped_with_fifo() {
         (state.policy == SCHED_OTHER && is_apart).then_some(())
     });
     assert!(client.next_outcome(DEADLINE).unwrap().is_some());
-    let [solver] = threads(id, "solver-1").try_into().unwrap();
+    // The old solver ends beside the loop, with its threads.
+    let solver = wait_for("the thread of the new solver alone", || {
+        let [solver] = threads(id, "solver-1").try_into().ok()?;
+        Some(solver)
+    });
     let state = thread_state(&solver).unwrap();
     assert_eq!((state.policy, state.priority), (SCHED_FIFO, 20));
     assert!(cpus.len() == 1 || state.cpus != cpus.last().unwrap().to_string(), "{state:?}");
