@@ -21,6 +21,7 @@ use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number_in};
 use crate::cli::progress::{progress_bar, progress_bytes};
+use crate::export::frame_names::FrameNames;
 use crate::export::pictures::camera::View;
 use crate::export::pictures::mesh::Bend;
 use crate::export::pictures::shape::Size;
@@ -113,6 +114,10 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let format = args.format.format().context("one of the formats is required")?;
     refuse_own_input(&open_regular_file(&args.file)?, format.target())?;
     let survey = survey(args, log, &path)?;
+    if let Format::Data(DataFormat::Ros2, folder) = format {
+        let names = FrameNames::new(folder, &survey.run.scene_name, "mcap");
+        refuse_own_input(&open_regular_file(&args.file)?, &names.index_path("mcap"))?;
+    }
     let selection = args.selection(&format);
     let steps =
         selection.select(&survey.steps, survey.run.rate_hz).with_context(|| path.clone())?;

@@ -58,12 +58,13 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let names = args.names(default_path(endpoint.name(), realtime_ns()));
     let extras = Extras::open(&args.extras)?;
     let earlier_count = names.check(args.file.existing())?;
+    // Before the wait for a node, because SIGUSR1 would end the process.
+    let trigger = args.black_box.map(Trigger::install).transpose()?;
     let Some(tap) = attach(args, &endpoint, &stop)? else {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
     let selection = args.selection.selection();
     let queue_bytes = usize::try_from(args.queue_bytes).unwrap_or(usize::MAX / 2);
-    let trigger = args.black_box.map(Trigger::install).transpose()?;
     let options = WriteOptions {
         selection,
         file: args.file.clone(),

@@ -154,6 +154,7 @@ pub(crate) fn verify<R: Read>(
         Finding::Identical => {
             compare_states(&mut verification, &mut report, stop, on_progress)
                 .with_context(|| path.to_owned())?;
+            report.gaps = verification.gaps();
         }
         finding => _ = report.add(finding, 0),
     }
@@ -193,7 +194,6 @@ fn compare_states<R: Read>(
         }
     }
     verification.finish_coverage();
-    report.gaps = verification.gaps();
     if verification.simulation.is_some() && verification.coverage.last_step.is_none() {
         let finding = verification.check_end();
         report.add_end(finding);
@@ -222,7 +222,9 @@ impl Report {
     fn text(&self) -> String {
         let lines = self.not_covered.iter().map(|what| format!("\n  {}", printable_line(what)));
         let lost = self.lost.iter().map(|(topic, count)| format!("\nmissing: {topic} {count}"));
-        format!("{self}{}\nnot compared:{}", lost.collect::<String>(), lines.collect::<String>())
+        let gaps = self.gaps.iter().map(|gap| format!("\ngap: steps {}..={}", gap.from, gap.to));
+        let (gaps, lost) = (gaps.collect::<String>(), lost.collect::<String>());
+        format!("{self}{gaps}{lost}\nnot compared:{}", lines.collect::<String>())
     }
 
     /// Returns `true` before the first snapshot is compared.
@@ -251,7 +253,8 @@ impl Report {
                 (self.step, self.what, self.difference) = (Some(step), Some(what), difference);
             }
             Finding::OtherContent { what } => {
-                (self.verdict, self.what) = (Verdict::Diverged, Some(what));
+                self.verdict = Verdict::Diverged;
+                (self.step, self.what) = (None, Some(what));
             }
             Finding::Interrupted => self.verdict = Verdict::Interrupted,
             // The report names the first one.
@@ -284,16 +287,10 @@ impl fmt::Display for Report {
             Verdict::Diverged => {
                 write!(f, "step {step} differs: {what} ({count} steps before it bit-identical)")
             }
-            Verdict::OutcomeLogIncomplete => {
-                let gaps: Vec<_> =
-                    self.gaps.iter().map(|gap| format!("{}..={}", gap.from, gap.to)).collect();
-                write!(
-                    f,
-                    "outcome log incomplete from step {step}: {what} ({count} other steps \
-                     bit-identical; not compared: steps {})",
-                    gaps.join(", ")
-                )
-            }
+            Verdict::OutcomeLogIncomplete => write!(
+                f,
+                "outcome log incomplete from step {step}: {what} ({count} other steps bit-identical)"
+            ),
             Verdict::Interrupted => write!(f, "interrupted; {count} steps so far bit-identical"),
         }
     }

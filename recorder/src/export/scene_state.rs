@@ -119,11 +119,11 @@ impl SceneState {
         triangles.filter(move |(_, corners)| is_intact(*corners))
     }
 
-    /// Returns for each particle whether an untorn constraint or a triangle uses it.
+    /// Returns for each particle whether an untorn constraint or an intact triangle uses it.
     pub(crate) fn connected(&self) -> Vec<bool> {
         let mut is_connected = vec![false; self.particles.len()];
         let ends = self.untorn_constraints().flat_map(|constraint| [constraint.a, constraint.b]);
-        let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);
+        let corners = self.intact_triangles().flat_map(|(_, corners)| corners);
         for index in ends.chain(corners) {
             is_connected[index as usize] = true;
         }

@@ -141,7 +141,8 @@ impl Owner {
         self.load_after(load, |_| Ok(())).map(drop)
     }
 
-    /// Returns a handle with which another thread prepares loads.
+    /// Returns a handle with which another thread prepares loads. A load, and the end of the owner, wait for
+    /// a preparation in progress.
     pub fn preparer(&self) -> LoadPreparer {
         self.preparation.preparer()
     }

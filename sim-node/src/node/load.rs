@@ -102,6 +102,7 @@ impl Node {
                 Err(error).context("publishing the loaded scene")
             }
             Err(error) => {
+                self.dispose((scene, solver, messages));
                 let (problem, reason) = (error.to_string(), Reason::NoEffectHere);
                 Ok(Err(Refusal { problem, reason }))
             }

@@ -134,7 +134,7 @@ impl Files {
 
     fn on_begin(&mut self, header: Box<RunHeader>, log_time_ns: u64) -> anyhow::Result<()> {
         match &mut self.options.black_box {
-            Some(black_box) => black_box.begin(header, log_time_ns),
+            Some(black_box) => black_box.begin(header, log_time_ns, monotonic_ns()),
             None => self.begin(&header, log_time_ns)?,
         }
         Ok(())
@@ -149,7 +149,7 @@ impl Files {
 
     fn on_end(&mut self, closing: Closing, end: FileEnd) -> anyhow::Result<()> {
         let Some(black_box) = &mut self.options.black_box else { return self.finish(closing) };
-        black_box.end(closing, end).map_or(Ok(()), |file| self.write_kept(file))
+        black_box.end(closing, end, monotonic_ns()).map_or(Ok(()), |file| self.write_kept(file))
     }
 
     /// Writes a file of the black box.
@@ -179,13 +179,13 @@ impl Files {
         self.free_space()
     }
 
-    /// Removes the oldest files while less than the reserve is free. Keeps the one in progress.
+    /// Removes the oldest file if less than the reserve is free, but not the one in progress. Only one at a
+    /// time, because some file systems show its space as free only seconds later.
     fn free_space(&mut self) -> anyhow::Result<()> {
         let Some(free_min_bytes) = self.options.ring.free_min_bytes else { return Ok(()) };
-        while self.oldest_number + 1 < self.next_number
-            && free_bytes(&self.options.names.path(self.oldest_number))
-                .is_some_and(|free_bytes| free_bytes < free_min_bytes)
-        {
+        let free_bytes = free_bytes(&self.options.names.path(self.oldest_number));
+        let is_short = free_bytes.is_some_and(|free_bytes| free_bytes < free_min_bytes);
+        if is_short && self.oldest_number + 1 < self.next_number {
             self.remove_oldest()?;
         }
         Ok(())

@@ -318,7 +318,7 @@ impl<R: Read> Verification<R> {
             one.stop_reason == "steps reached"
                 && !one.missing().contains_key(Topic::Outcomes.name())
         });
-        self.coverage.has_run_hash = has_inputs && is_whole;
+        self.coverage.has_run_hash = has_inputs && is_whole && self.gaps().is_empty();
         if self.coverage.has_run_hash && log.run().run_id != self.run_id.value() {
             return Finding::in_file(
                 "the metadata 'run': its run_id is not the hash of the scene and the commands in \

@@ -15,8 +15,8 @@ use crate::commands::record::queue::{Content, FileEnd};
 /// Shortest time from the last event to the end of the file, so that the file shows what follows it. Events
 /// that follow each other within it are in one file.
 const TAIL: Duration = Duration::from_secs(1);
-/// Longest text of a reason, in characters. A file can have many events.
-const REASON_LENGTH_MAX: usize = 300;
+/// Most marks that a reason names. It counts the others.
+const MARKS_MAX: usize = 8;
 
 /// Decides when the black box is written, and why.
 #[derive(Debug)]
@@ -28,12 +28,71 @@ pub(crate) struct Trigger {
     events: Option<Events>,
 }
 
+/// The events of a file.
 #[derive(Debug)]
 struct Events {
-    reason: String,
     /// CLOCK_MONOTONIC, in nanoseconds.
     first_ns: u64,
     last_ns: u64,
+    marks: Vec<String>,
+    more_marks: u64,
+    tears: Tally,
+    frozen: Tally,
+    is_signalled: bool,
+}
+
+/// Events of one kind.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    first_step: u64,
+    count: usize,
+}
+
+impl Tally {
+    fn add(&mut self, step: u64, count: usize) {
+        if self.count == 0 {
+            self.first_step = step;
+        }
+        self.count += count;
+    }
+
+    /// Describes the events with their name, for one and for several.
+    fn text(self, one: &str, several: &str) -> Option<String> {
+        let Self { first_step, count } = self;
+        match count {
+            0 => None,
+            1 => Some(format!("{one} at step {first_step}")),
+            _ => Some(format!("{count} {several} from step {first_step} on")),
+        }
+    }
+}
+
+impl Events {
+    fn begin(now_ns: u64) -> Self {
+        Self {
+            first_ns: now_ns,
+            last_ns: now_ns,
+            marks: Vec::new(),
+            more_marks: 0,
+            tears: Tally::default(),
+            frozen: Tally::default(),
+            is_signalled: false,
+        }
+    }
+
+    fn add_mark(&mut self, mark: String) {
+        if self.marks.len() < MARKS_MAX { self.marks.push(mark) } else { self.more_marks += 1 }
+    }
+
+    /// Describes the events for the stop reason of the file.
+    fn reason(self) -> String {
+        let more = (self.more_marks > 0).then(|| format!("{} more marks", self.more_marks));
+        let signal = self.is_signalled.then(|| "SIGUSR1".to_owned());
+        let tears = self.tears.text("tear", "tears");
+        let frozen = self.frozen.text("frozen particle", "frozen particles");
+        let parts = [more, tears, frozen, signal].into_iter().flatten();
+        self.marks.into_iter().chain(parts).collect::<Vec<_>>().join(", ")
+    }
 }
 
 impl Trigger {
@@ -50,28 +109,35 @@ impl Trigger {
     /// Notices the signal.
     pub(crate) fn poll_signal(&mut self, now_ns: u64) {
         if self.signalled.swap(false, Ordering::Relaxed) {
-            self.add("SIGUSR1".to_owned(), now_ns);
+            self.events_at(now_ns).is_signalled = true;
         }
     }
 
     /// Notices the event of a content, if it is one.
     pub(crate) fn watch(&mut self, content: &Content, now_ns: u64) {
-        if let Content::Update(message) = content
-            && let Some(reason) = event(message)
-        {
-            self.add(reason, now_ns);
+        let Content::Update(message) = content else { return };
+        match message {
+            Message::Outcome(row) if row.is_applied() => {
+                if let Action::Mark { text } = &row.action {
+                    let mark = format!("mark '{}' at step {}", text.as_str(), row.step);
+                    self.events_at(now_ns).add_mark(mark);
+                }
+            }
+            Message::Tears(row) if !row.constraints.is_empty() => {
+                self.events_at(now_ns).tears.add(row.step, row.constraints.len());
+            }
+            Message::Event(row) if row.kind == "frozen" => {
+                self.events_at(now_ns).frozen.add(row.step, 1);
+            }
+            _ => {}
         }
     }
 
-    fn add(&mut self, reason: String, now_ns: u64) {
-        let Some(events) = &mut self.events else {
-            self.events = Some(Events { reason, first_ns: now_ns, last_ns: now_ns });
-            return;
-        };
+    /// Returns the events of the file to come, with one at `now_ns`.
+    fn events_at(&mut self, now_ns: u64) -> &mut Events {
+        let events = self.events.get_or_insert_with(|| Events::begin(now_ns));
         events.last_ns = now_ns;
-        if events.reason.len() + reason.len() <= REASON_LENGTH_MAX {
-            events.reason = format!("{}, {reason}", events.reason);
-        }
+        events
     }
 
     /// Returns `true` if the file can end.
@@ -92,28 +158,11 @@ impl Trigger {
     ) -> (String, FileEnd) {
         let is_written = !is_continued || self.is_due(now_ns);
         match self.events.take_if(|_| is_written) {
-            Some(events) => (events.reason, FileEnd::Write),
+            Some(events) => (events.reason(), FileEnd::Write),
             None if self.events.is_some() => (stop_reason, FileEnd::KeepAll),
             None if is_continued => (stop_reason, FileEnd::Keep),
             None => (stop_reason, FileEnd::Drop),
         }
-    }
-}
-
-/// Returns the description of an event that is worth a file.
-fn event(message: &Message) -> Option<String> {
-    match message {
-        Message::Outcome(row) if row.is_applied() => match &row.action {
-            Action::Mark { text } => Some(format!("mark '{}' at step {}", text.as_str(), row.step)),
-            _ => None,
-        },
-        Message::Tears(row) if !row.constraints.is_empty() => {
-            Some(format!("tear at step {}", row.step))
-        }
-        Message::Event(row) if row.kind == "frozen" => {
-            Some(format!("frozen particle at step {}", row.step))
-        }
-        _ => None,
     }
 }
 
@@ -154,7 +203,7 @@ mod tests {
         }
         trigger.poll_signal(0);
         assert!(trigger.events.is_none());
-        for content in [mark(Ok(())), tear(8), event("frozen")] {
+        for content in [mark(Ok(())), tear(8), tear(9), event("frozen")] {
             trigger.watch(&content, 0);
         }
         trigger.signalled.store(true, Ordering::Relaxed);
@@ -162,7 +211,16 @@ mod tests {
         trigger.poll_signal(0);
         assert_eq!(
             trigger.end_part("split".to_owned(), false, 0).0,
-            "mark 'slips' at step 7, tear at step 8, frozen particle at step 9, SIGUSR1"
+            "mark 'slips' at step 7, 2 tears from step 8 on, frozen particle at step 9, SIGUSR1"
+        );
+        for _ in 0..MARKS_MAX + 3 {
+            trigger.watch(&mark(Ok(())), 0);
+        }
+        trigger.watch(&tear(8), 0);
+        let reason = trigger.end_part("split".to_owned(), false, 0).0;
+        assert!(
+            reason.ends_with("mark 'slips' at step 7, 3 more marks, tear at step 8"),
+            "{reason}"
         );
     }
 

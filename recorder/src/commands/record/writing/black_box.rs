@@ -24,6 +24,8 @@ pub(crate) struct BlackBox {
 struct Part {
     header: Box<RunHeader>,
     log_time_ns: u64,
+    /// CLOCK_MONOTONIC at its beginning. The wall clock of `log_time_ns` may be set meanwhile.
+    begin_ns: u64,
     items: Vec<Item>,
     size_bytes: usize,
     closing: Closing,
@@ -49,11 +51,13 @@ impl BlackBox {
         self.size_bytes
     }
 
-    pub(crate) fn begin(&mut self, header: Box<RunHeader>, log_time_ns: u64) {
+    /// Begins a part at `now_ns` of CLOCK_MONOTONIC.
+    pub(crate) fn begin(&mut self, header: Box<RunHeader>, log_time_ns: u64, now_ns: u64) {
         let size_bytes = header.scene.len();
         self.size_bytes += size_bytes;
         let (items, closing) = (Vec::new(), Closing::default());
-        self.parts.push_back(Part { header, log_time_ns, items, size_bytes, closing });
+        let begin_ns = now_ns;
+        self.parts.push_back(Part { header, log_time_ns, begin_ns, items, size_bytes, closing });
     }
 
     pub(crate) fn push(&mut self, item: Item) {
@@ -68,11 +72,9 @@ impl BlackBox {
         }
     }
 
-    /// Ends a part. Returns the file to write, if there is one.
-    pub(crate) fn end(&mut self, closing: Closing, end: FileEnd) -> Option<KeptFile> {
-        let part = self.parts.back_mut()?;
-        let now_ns = part.items.last().map_or(part.log_time_ns, |item| item.log_time_ns);
-        part.closing = closing;
+    /// Ends a part at `now_ns` of CLOCK_MONOTONIC. Returns the file to write, if there is one.
+    pub(crate) fn end(&mut self, closing: Closing, end: FileEnd, now_ns: u64) -> Option<KeptFile> {
+        self.parts.back_mut()?.closing = closing;
         match end {
             FileEnd::Write => self.take_all(),
             FileEnd::KeepAll => None,
@@ -91,7 +93,7 @@ impl BlackBox {
     fn remove_before(&mut self, now_ns: u64) {
         let span_ns = u64::try_from(self.span.as_nanos()).unwrap_or(u64::MAX);
         let begin_ns = now_ns.saturating_sub(span_ns);
-        while self.parts.get(1).is_some_and(|second| second.log_time_ns <= begin_ns) {
+        while self.parts.get(1).is_some_and(|second| second.begin_ns <= begin_ns) {
             self.remove_oldest();
         }
     }
@@ -177,7 +179,8 @@ mod tests {
 
     /// Adds a part of one second with one step each, whose parameters are those of step 0.
     fn add_part(black_box: &mut BlackBox, second: u64, end: FileEnd) -> Option<KeptFile> {
-        black_box.begin(header(), second * SECOND_NS);
+        // The wall clock goes back.
+        black_box.begin(header(), 1000 - second, second * SECOND_NS);
         black_box.push(update(parameters(0), second));
         let row = StepRow { step: second, ..StepRow::default() };
         let content = Content::Snapshot(row, Vec::new());
@@ -186,7 +189,8 @@ mod tests {
         counts[Topic::Parameters].received = 1;
         counts[Topic::Steps].received = 1;
         counts[Topic::Steps].gaps = u64::from(second == 4);
-        black_box.end(Closing { stop_reason: format!("end {second}"), counts, unreadable: 1 }, end)
+        let closing = Closing { stop_reason: format!("end {second}"), counts, unreadable: 1 };
+        black_box.end(closing, end, (second + 1) * SECOND_NS)
     }
 
     fn steps(file: &KeptFile) -> Vec<u64> {
@@ -200,12 +204,12 @@ mod tests {
             assert!(add_part(&mut black_box, second, FileEnd::Keep).is_none());
         }
         let file = add_part(&mut black_box, 6, FileEnd::Write).unwrap();
-        assert_eq!(steps(&file), [2, 3, 4, 5, 6]);
+        assert_eq!(steps(&file), [3, 4, 5, 6]);
         let repeated = file.items.iter().filter(|item| item.content.snapshot_step().is_none());
         assert_eq!(repeated.count(), 1, "the parameters at the beginning");
         let counts = &file.closing.counts;
-        assert_eq!((counts[Topic::Steps].received, counts[Topic::Parameters].received), (5, 1));
-        assert_eq!((counts[Topic::Steps].gaps, file.closing.unreadable), (1, 5));
+        assert_eq!((counts[Topic::Steps].received, counts[Topic::Parameters].received), (4, 1));
+        assert_eq!((counts[Topic::Steps].gaps, file.closing.unreadable), (1, 4));
         assert_eq!(file.closing.stop_reason, "end 6");
         assert_eq!((black_box.parts.len(), black_box.size_bytes()), (0, 0));
         let next = add_part(&mut black_box, 7, FileEnd::Write).unwrap();

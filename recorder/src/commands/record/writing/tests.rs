@@ -103,13 +103,16 @@ fn a_ring_goes_on_when_another_program_has_moved_its_oldest_file() {
 }
 
 #[test]
-fn a_disk_without_its_reserve_keeps_only_the_file_in_progress() {
+fn a_disk_without_its_reserve_loses_a_file_at_each_flush_but_the_one_in_progress() {
     let folder = Folder::new("reserve");
     let mut files = full_ring(&folder);
     files.options.ring = Ring { files_max: None, free_min_bytes: Some(0) };
     files.begin(&header(), 0).unwrap();
     assert_eq!(names_in(&folder).len(), 3);
     files.options.ring.free_min_bytes = Some(u64::MAX);
+    files.flush().unwrap();
+    assert_eq!(names_in(&folder), ["run_0001.mcap", "run_0002.mcap.part"]);
+    files.flush().unwrap();
     files.flush().unwrap();
     assert_eq!(names_in(&folder), ["run_0002.mcap.part"]);
     assert_eq!(files.written.removed_count, 2);
