@@ -19,6 +19,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{anyhow, bail};
+use recorder::PartFile;
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns, sleep_until};
 use sim_contract::{
     AttachError, Endpoint, LockstepError, SNAPSHOTS_BUFFERED, Stop, Tap, console, report_bus_errors,
@@ -57,7 +58,11 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let begin_ns = monotonic_ns();
     let names = args.names(default_path(endpoint.name(), realtime_ns()));
     let extras = Extras::open(&args.extras)?;
-    let earlier_count = names.check(args.file.existing())?;
+    let (names, earlier_count) = match args.black_box {
+        // It goes on after a restart, and replaces no file of an earlier event.
+        Some(_) => (names.after_earlier_files(), 0),
+        None => (names.clone(), names.check(args.file.existing())?),
+    };
     // Before the wait for a node, because SIGUSR1 would end the process.
     let trigger = args.black_box.map(Trigger::install).transpose()?;
     let Some(tap) = attach(args, &endpoint, &stop)? else {
@@ -75,7 +80,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         extras,
         black_box: args.black_box.map(|span| BlackBox::new(span, queue_bytes)),
     };
-    let file = options.create(0)?;
+    let mut file = Some(options.create(0)?);
     let path = output::path_text(&options.names.path(0));
     if earlier_count > 0 {
         output::note(&format!(
@@ -85,6 +90,8 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     }
     match args.black_box {
         Some(span) => {
+            // That it can be created is known now. It is created with the first event.
+            file.take().map_or(Ok(()), PartFile::discard)?;
             let span = humantime::format_duration(span);
             output::note(&format!(
                 "ready keeping the last {span} of {endpoint}; the first file is {path}"
@@ -101,7 +108,10 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let feed = Feed::new(intake, Arc::clone(&queue), position, args.split.clone());
     let mut recording = Recording {
         tap,
-        feed: feed.following(args.follows()).selecting(selection).triggered_by(trigger),
+        feed: feed
+            .following(args.follows())
+            .selecting(selection)
+            .triggered_by(trigger, args.queue_bytes),
         live,
         queue,
         writing,

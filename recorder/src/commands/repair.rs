@@ -58,8 +58,10 @@ struct Repaired<'a> {
     lost_head: Option<&'static str>,
     /// Ranges of steps without snapshots.
     lost_steps: Vec<String>,
-    /// `/topology` and `/surface` were lost, and follow from the scene.
-    is_load_restored: bool,
+    /// Topics that were lost, and follow from the scene.
+    restored: &'static [&'static str],
+    /// The input has its end. Without it, nobody knows what the recorder had not written yet.
+    has_end: bool,
     /// The checksum of the data is wrong, and no damaged part explains it.
     is_uncertain: bool,
     finding_count: u64,
@@ -81,14 +83,15 @@ pub(crate) fn run(args: &RepairArgs) -> anyhow::Result<Exit> {
     }
     let (mut file, mut report) = copy(args, open()?, None, &stop)?;
     let load = lost_load(&report);
-    let is_load_restored = load.is_some();
-    if is_load_restored {
+    let mut restored: &[_] = &[];
+    if load.is_some() {
         // It comes before everything that was written.
         file.discard()?;
         (file, report) = copy(args, open()?, load, &stop)?;
+        restored = &["/topology", "/surface"];
     }
     file.finish()?;
-    let repaired = Repaired { is_load_restored, ..Repaired::new(input, output, &report) };
+    let repaired = Repaired { restored, ..Repaired::new(input, output, &report) };
     output::result(args.as_json, &repaired, &repaired.to_string())?;
     Ok(if repaired.is_lossless { Exit::Done } else { Exit::Loss })
 }
@@ -156,7 +159,8 @@ impl<'a> Repaired<'a> {
             lost: losses.messages(),
             lost_head: losses.head(),
             lost_steps,
-            is_load_restored: false,
+            restored: &[],
+            has_end: report.has_end,
             is_uncertain: report.is_uncertain,
             finding_count: report.findings.count(),
             findings: report.findings.list(),
@@ -179,16 +183,20 @@ impl fmt::Display for Repaired<'_> {
         if more > 0 {
             write!(f, "\ndamage      {more} more")?;
         }
-        if self.is_load_restored {
-            write!(f, "\nrestored    /topology and /surface, from the scene")?;
+        if !self.restored.is_empty() {
+            write!(f, "\nrestored    {}, from the scene", self.restored.join(", "))?;
         }
         if self.is_uncertain {
             let what = "the checksum of the data is wrong, and no damaged part explains it: a byte outside \
                         of the messages may be wrong";
             write!(f, "\nuncertain   {what}")?;
         }
-        if self.is_lossless {
+        if self.is_lossless && self.has_end {
             return write!(f, "\nmissing     nothing");
+        }
+        if self.is_lossless {
+            let what = "nothing of this file. It has no end: what was not written then is unknown";
+            return write!(f, "\nmissing     {what}");
         }
         if let Some(what) = self.lost_head {
             write!(f, "\nmissing     {what}")?;

@@ -110,6 +110,7 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
     let (report, end) =
         verify(open()?, &path, options, stop.flag(), |bytes| bar.set_position(bytes))?;
     bar.finish_and_clear();
+    args.check_range(&report).with_context(|| path.clone())?;
     output::result(args.as_json, &report, &report.text())?;
     if let Some(end) = &end {
         output::warn_incomplete(&args.file, end, "verified as far as it goes");
@@ -122,6 +123,16 @@ pub(crate) fn run(args: &VerifyArgs) -> anyhow::Result<Exit> {
 }
 
 impl VerifyArgs {
+    /// Refuses a range that begins after the last step: nothing of it was compared.
+    fn check_range(&self, report: &Report) -> anyhow::Result<()> {
+        match (self.from, report.last_identical_step) {
+            (Some(from), Some(last)) if from > last && report.verdict == Verdict::Identical => {
+                bail!("--from {from} is after its last step, {last}")
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Returns the steps to compare, with the one to start from.
     fn range<R: Read>(
         &self,

@@ -81,7 +81,8 @@ pub(crate) struct RecordArgs {
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = whole_number)]
     pub(super) steps: Option<u64>,
     /// Memory for snapshots that wait to be written, in bytes, at least 1 MiB. Snapshots that do
-    /// not fit are lost and counted. With --black-box, also the memory for what is kept
+    /// not fit are lost and counted. With --black-box, also the memory for what is
+    /// kept, besides the last second or two
     #[arg(long, value_name = "BYTES", default_value_t = QUEUE_BYTES_DEFAULT,
         allow_hyphen_values = true, value_parser = queue_bytes)]
     pub(super) queue_bytes: u64,
@@ -166,7 +167,7 @@ impl RecordArgs {
     pub(super) fn names(&self, default: PathBuf) -> FileNames {
         let path = self.output.clone().unwrap_or(default);
         let is_numbered = self.follows() || self.split.is_given();
-        if is_numbered { FileNames::Numbered(path) } else { FileNames::Single(path) }
+        if is_numbered { FileNames::numbered(path) } else { FileNames::Single(path) }
     }
 
     /// Returns `true` if the recording goes on with another load or run. A black box always does.

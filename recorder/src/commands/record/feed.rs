@@ -36,6 +36,8 @@ pub(crate) struct Feed {
     selector: Selector,
     /// Decides when the black box is written, if this is one.
     trigger: Option<Trigger>,
+    /// Memory of the black box.
+    limit_bytes: u64,
     is_paused: bool,
     /// The newest file.
     file: Option<FileBegin>,
@@ -60,15 +62,16 @@ impl Feed {
             is_following: false,
             selector,
             trigger: None,
+            limit_bytes: u64::MAX,
             is_paused: false,
             file: None,
             accepted,
         }
     }
 
-    /// Feeds a black box.
-    pub(crate) fn triggered_by(self, trigger: Option<Trigger>) -> Self {
-        Self { trigger, ..self }
+    /// Feeds a black box that keeps `limit_bytes`.
+    pub(crate) fn triggered_by(self, trigger: Option<Trigger>, limit_bytes: u64) -> Self {
+        Self { trigger, limit_bytes, ..self }
     }
 
     /// Goes on in the next file with another load or run.
@@ -108,7 +111,9 @@ impl Feed {
         let now_ns = monotonic_ns();
         let is_due = match &self.trigger {
             Some(trigger) => {
-                now_ns.saturating_sub(file.monotonic_ns) >= PART_MIN_NS || trigger.is_due(now_ns)
+                now_ns.saturating_sub(file.monotonic_ns) >= PART_MIN_NS
+                    || trigger.is_due(now_ns)
+                    || trigger.has_event(self.intake.last_step()) && self.is_full(1)
             }
             None => self.split.is_due(file, &self.position, self.queue.size_bytes(), now_ns),
         };
@@ -123,7 +128,7 @@ impl Feed {
         }
         self.intake.accept_messages(messages, Now::read(), &mut self.accepted);
         self.enqueue();
-        self.end_part_in_pause();
+        self.end_part_early();
         self.accepted.end.take()
     }
 
@@ -157,8 +162,12 @@ impl Feed {
         if !self.intake.has_started() {
             return;
         }
+        let (is_full, last_step) = (self.is_full(1), self.intake.last_step());
         let (stop_reason, end) = match &mut self.trigger {
-            Some(trigger) => trigger.end_part(stop_reason, is_continued, monotonic_ns()),
+            Some(trigger) => {
+                let is_full = is_full && trigger.has_event(last_step);
+                trigger.end_part(stop_reason, is_continued, is_full, monotonic_ns())
+            }
             None => (stop_reason, FileEnd::Write),
         };
         let mut closing = self.intake.end_file(stop_reason);
@@ -166,15 +175,25 @@ impl Feed {
         self.queue.end(closing, end);
     }
 
-    /// Ends a part for which the black box is to be written while no state arrives. The state after a pause
-    /// has a keyframe, so the next part begins with it.
-    fn end_part_in_pause(&mut self) {
+    /// Ends a part for which the black box is to be written while no complete state arrives: in a pause, and
+    /// before it takes more than twice its memory. The state after a pause has a keyframe, so the next part
+    /// begins with it.
+    fn end_part_early(&mut self) {
         let now_ns = monotonic_ns();
+        let (is_far_too_full, last_step) = (self.is_full(2), self.intake.last_step());
         let Some(trigger) = &mut self.trigger else { return };
         trigger.poll_signal(now_ns);
-        if self.is_paused && trigger.is_due(now_ns) {
+        let is_over = trigger.has_event(last_step) && is_far_too_full;
+        if is_over || self.is_paused && trigger.is_due(now_ns) {
             self.end_part(StopReason::Split.text().to_owned(), true);
         }
+    }
+
+    /// Returns `true` if a black box, and what waits for it, take a multiple of its memory.
+    fn is_full(&self, multiple: u64) -> bool {
+        let kept_bytes = self.position.get().map_or(0, |(_, size_bytes)| size_bytes);
+        let size_bytes = kept_bytes + self.queue.size_bytes() as u64;
+        size_bytes > self.limit_bytes.saturating_mul(multiple)
     }
 
     /// Passes what is accepted to the queue, in the order of publication.

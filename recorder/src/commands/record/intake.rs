@@ -3,7 +3,9 @@
 mod started;
 
 use recorder::{AllCounts, Closing};
-use sim_contract::{Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotHeader, State};
+use sim_contract::{
+    Change, LostChanges, NodeStatus, Outcome, ReadError, SnapshotFlags, SnapshotHeader, State,
+};
 
 use super::accepted::{Accepted, RunEnd};
 use super::first_state::FirstState;
@@ -31,6 +33,9 @@ pub(crate) struct Intake {
     started: Option<Started>,
     /// The file before this one.
     previous: Option<PreviousFile>,
+    /// Snapshots of replayed runs that came after that file and before the next state with a keyframe. They
+    /// have no numbers of their own run.
+    skipped_count: u64,
     lost: LostChanges,
     /// Messages after the first state or the candidate that arrived but could not be read.
     unreadable: u64,
@@ -73,6 +78,9 @@ impl Intake {
         self.outcomes.retain(|outcome| {
             outcome.run_id != state.header.run_id || outcome.index >= first_outcome
         });
+        if self.candidate.is_some() {
+            self.skipped_count += u64::from(self.is_replay_after_file(state.header));
+        }
         self.candidate = FirstState::new(state);
         if self.previous.is_none() {
             (self.unreadable, self.follows_errors) = (0, true);
@@ -110,6 +118,12 @@ impl Intake {
     fn first_outcome(&self, first: &SnapshotHeader) -> u64 {
         let previous = self.previous.as_ref().filter(|previous| previous.run_id == first.run_id);
         previous.map_or(first.outcome_count, |previous| previous.next_outcome)
+    }
+
+    /// Returns `true` for a snapshot of a replay that follows another run in the file before.
+    fn is_replay_after_file(&self, header: &SnapshotHeader) -> bool {
+        let is_replay = header.flags & SnapshotFlags::REPLAY != 0;
+        is_replay && self.previous.as_ref().is_some_and(|previous| previous.run_id != header.run_id)
     }
 
     /// Returns the reason why the file ends before a state.
@@ -160,6 +174,7 @@ impl Intake {
         let Some(load) = &mut self.load else { return };
         let previous = self.previous.as_ref();
         let mut started = Started::new(&first, previous, self.lost);
+        started.add_gaps(std::mem::take(&mut self.skipped_count));
         if previous.is_none() {
             started.set_steps_max(self.steps_max);
         }
@@ -195,6 +210,11 @@ impl Intake {
     /// Returns the first step of the file, once it has begun.
     pub(crate) fn first_step(&self) -> Option<u64> {
         self.started.as_ref().map(|started| started.first_step)
+    }
+
+    /// Returns the last step of the file so far, once it has begun.
+    pub(crate) fn last_step(&self) -> Option<u64> {
+        self.started.as_ref().map(Started::last_step)
     }
 
     /// Returns the run in the file, once it has begun.

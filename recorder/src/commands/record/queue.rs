@@ -5,7 +5,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use recorder::{AllCounts, Backlog, Closing, Message, StepRow, Topic};
-use sim_contract::ParticleState;
+use sim_contract::{Action, ParticleState};
 
 use super::load::RunHeader;
 
@@ -16,6 +16,14 @@ pub(crate) enum Content {
     Update(Message),
     /// The two messages of a snapshot, which stay together.
     Snapshot(StepRow, Vec<ParticleState>),
+}
+
+/// Something that is worth a file of a black box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Event<'a> {
+    Mark { step: u64, text: &'a str },
+    Tears { step: u64, count: usize },
+    Frozen { step: u64 },
 }
 
 /// A content with the time of its reception: wall clock, in nanoseconds since 1970.
@@ -225,6 +233,22 @@ impl Entry {
 }
 
 impl Content {
+    /// Returns the event, if the content is one.
+    pub(crate) fn event(&self) -> Option<Event<'_>> {
+        let Self::Update(message) = self else { return None };
+        match message {
+            Message::Outcome(row) if row.is_applied() => match &row.action {
+                Action::Mark { text } => Some(Event::Mark { step: row.step, text: text.as_str() }),
+                _ => None,
+            },
+            Message::Tears(row) if !row.constraints.is_empty() => {
+                Some(Event::Tears { step: row.step, count: row.constraints.len() })
+            }
+            Message::Event(row) if row.kind == "frozen" => Some(Event::Frozen { step: row.step }),
+            _ => None,
+        }
+    }
+
     /// Returns the step of a snapshot, with its particles or without.
     pub(crate) fn snapshot_step(&self) -> Option<u64> {
         match self {

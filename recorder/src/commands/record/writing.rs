@@ -67,14 +67,14 @@ pub(crate) fn start(
     queue: Arc<Queue>,
     position: Arc<WritePosition>,
     options: WriteOptions,
-    first: PartFile,
+    first: Option<PartFile>,
 ) -> anyhow::Result<JoinHandle<anyhow::Result<Written>>> {
     let queue = CloseOnDrop(queue);
     let writing = thread::Builder::new().name("writer".to_owned()).spawn(move || {
         let mut files = Files {
             options,
             position,
-            created: Some(first),
+            created: first,
             open: None,
             next_number: 0,
             oldest_number: 0,
@@ -186,6 +186,8 @@ impl Files {
         let free_bytes = free_bytes(&self.options.names.path(self.oldest_number));
         let is_short = free_bytes.is_some_and(|free_bytes| free_bytes < free_min_bytes);
         if is_short && self.oldest_number + 1 < self.next_number {
+            let path = output::path_text(&self.options.names.path(self.oldest_number));
+            output::note(&format!("removing {path}, because less than --min-free is free"));
             self.remove_oldest()?;
         }
         Ok(())
@@ -237,7 +239,7 @@ impl Files {
             let is_complete = error.leaves_complete_file();
             if is_complete { anyhow!(error) } else { anyhow!(error).context(kept()) }
         })?;
-        if matches!(self.options.names, FileNames::Numbered(_)) {
+        if matches!(self.options.names, FileNames::Numbered { .. }) {
             output::note(&Written::file_line(&path, &closing, steps));
         }
         self.written.add(path, &closing, steps);

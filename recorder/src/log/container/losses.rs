@@ -9,6 +9,12 @@ use crate::log::topic::{AllCounts, Topic};
 /// Most ranges that a repair lists. It counts the others.
 const RANGES_MAX: usize = 1000;
 
+/// Content that damage before the metadata `run` has taken from a file without a scene.
+pub(super) const LOST_SCENE: &str =
+    "the scene, so the result cannot be verified, and perhaps the selection";
+/// Content that damage before the metadata `run` may have taken from a file with a scene.
+pub(super) const LOST_SELECTION: &str = "a part before the metadata 'run', perhaps the selection";
+
 /// A range of steps without snapshots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LostSteps {

@@ -17,7 +17,7 @@ use super::attachment::{Checksum, LongAttachment, WRONG_CHECKSUM};
 use super::chunk::{ChunkContent, InnerRecords, compression};
 use super::content::ContentCheck;
 use super::finding::{Findings, record_name};
-use super::losses::Losses;
+use super::losses::{LOST_SCENE, LOST_SELECTION, Losses};
 use super::lost_load::{LoadRows, LostLoad};
 use super::salvage::{Format, Salvage, size_in_memory};
 use super::walk::{Part, Walk};
@@ -34,11 +34,6 @@ const PROGRESS_PERIOD_BYTES: u64 = 16 << 20;
 
 /// Most memory of the records before the metadata `run`: a scene, and as much again.
 const HEAD_SIZE_BYTES_MAX: u64 = 2 * HEADER_RECORD_SIZE_BYTES_MAX;
-/// Content that damage before the metadata `run` has taken from a file without a scene.
-const LOST_SCENE: &str = "the scene, so the result cannot be verified, and perhaps the selection";
-/// Content that damage before the metadata `run` may have taken from a file with a scene.
-const LOST_SELECTION: &str = "a part before the metadata 'run', perhaps the selection";
-
 /// The reason why a file could not be repaired.
 #[derive(Debug, thiserror::Error)]
 pub enum RepairError {
@@ -65,6 +60,8 @@ pub struct RepairReport {
     pub steps: Option<[u64; 2]>,
     /// The load that the output lacks, if it follows from the scene and this.
     pub lost_load: Option<LostLoad>,
+    /// The input has its end, so nothing behind it was lost.
+    pub has_end: bool,
     /// The scene, if the input has it.
     pub scene: Option<Vec<u8>>,
 }
@@ -482,6 +479,7 @@ impl<W: Write> Repair<W> {
             ("source_size_bytes".to_owned(), self.size_bytes.to_string()),
             ("finding_count".to_owned(), self.findings.count().to_string()),
         ]);
+        let has_end = self.closing.is_some();
         let (_, losses) = salvage.finish(self.closing.take(), &mut content, &mut metadata)?;
         let last = content.last_row().map(|row| row.step);
         Ok(RepairReport {
@@ -491,6 +489,7 @@ impl<W: Write> Repair<W> {
             steps: self.first_step.zip(last).map(|(first, last)| [first, last]),
             losses,
             lost_load: content.load.lost(),
+            has_end,
             scene: self.scene,
         })
     }

@@ -169,3 +169,37 @@ fn a_killed_black_box_leaves_a_file_that_can_be_repaired() {
         std::fs::remove_file(&left).unwrap();
     }
 }
+
+#[test]
+fn a_full_black_box_keeps_what_comes_before_an_event_and_ends_the_file_early() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain"]);
+    // About 190 steps.
+    let recording = black_box(&sandbox, &["--queue-bytes", "1048576"]);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    wait_for_steps(&mut client, 600);
+    for number in 0..3 {
+        let mark = ctl(&sandbox, &["mark", "now"])["step"].as_u64().unwrap();
+        let file = numbered(&sandbox, number);
+        wait_for_file(&file);
+        let steps = steps(&file);
+        assert!(steps[0] < mark && steps.contains(&mark), "{mark} in {}..", steps[0]);
+        assert_eq!(outcomes(&file).len(), 1);
+        wait_for_steps(&mut client, 300);
+    }
+    finish(recording);
+}
+
+#[test]
+fn a_black_box_numbers_its_files_after_those_of_an_earlier_one() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    for number in 0..2 {
+        let recording = black_box(&sandbox, &[]);
+        ctl(&sandbox, &["step", "3"]);
+        ctl(&sandbox, &["mark", "now"]);
+        wait_for_file(&numbered(&sandbox, number));
+        recording.signal(Signal::KILL);
+        recording.wait();
+    }
+}

@@ -5,12 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use recorder::Message;
 use signal_hook::consts::SIGUSR1;
 use signal_hook::flag;
-use sim_contract::Action;
 
-use crate::commands::record::queue::{Content, FileEnd};
+use crate::commands::record::queue::{Content, Event, FileEnd};
 
 /// Shortest time from the last event to the end of the file, so that the file shows what follows it. Events
 /// that follow each other within it are in one file.
@@ -34,6 +32,8 @@ struct Events {
     /// CLOCK_MONOTONIC, in nanoseconds.
     first_ns: u64,
     last_ns: u64,
+    /// Step of the last event.
+    last_step: u64,
     marks: Vec<String>,
     more_marks: u64,
     tears: Tally,
@@ -72,6 +72,7 @@ impl Events {
         Self {
             first_ns: now_ns,
             last_ns: now_ns,
+            last_step: 0,
             marks: Vec::new(),
             more_marks: 0,
             tears: Tally::default(),
@@ -115,21 +116,17 @@ impl Trigger {
 
     /// Notices the event of a content, if it is one.
     pub(crate) fn watch(&mut self, content: &Content, now_ns: u64) {
-        let Content::Update(message) = content else { return };
-        match message {
-            Message::Outcome(row) if row.is_applied() => {
-                if let Action::Mark { text } = &row.action {
-                    let mark = format!("mark '{}' at step {}", text.as_str(), row.step);
-                    self.events_at(now_ns).add_mark(mark);
-                }
+        match content.event() {
+            Some(Event::Mark { step, text }) => {
+                let mark = format!("mark '{text}' at step {step}");
+                self.events_at(now_ns).add_mark(mark);
             }
-            Message::Tears(row) if !row.constraints.is_empty() => {
-                self.events_at(now_ns).tears.add(row.step, row.constraints.len());
-            }
-            Message::Event(row) if row.kind == "frozen" => {
-                self.events_at(now_ns).frozen.add(row.step, 1);
-            }
-            _ => {}
+            Some(Event::Tears { step, count }) => self.events_at(now_ns).tears.add(step, count),
+            Some(Event::Frozen { step }) => self.events_at(now_ns).frozen.add(step, 1),
+            None => return,
+        }
+        if let (Some(events), Content::Update(message)) = (&mut self.events, content) {
+            events.last_step = events.last_step.max(message.step());
         }
     }
 
@@ -138,6 +135,12 @@ impl Trigger {
         let events = self.events.get_or_insert_with(|| Events::begin(now_ns));
         events.last_ns = now_ns;
         events
+    }
+
+    /// Returns `true` if there is an event whose file is not written. `last_step` is the last recorded one:
+    /// the file must show the effect.
+    pub(crate) fn has_event(&self, last_step: Option<u64>) -> bool {
+        self.events.as_ref().is_some_and(|events| last_step >= Some(events.last_step))
     }
 
     /// Returns `true` if the file can end.
@@ -154,9 +157,10 @@ impl Trigger {
         &mut self,
         stop_reason: String,
         is_continued: bool,
+        is_full: bool,
         now_ns: u64,
     ) -> (String, FileEnd) {
-        let is_written = !is_continued || self.is_due(now_ns);
+        let is_written = !is_continued || is_full || self.is_due(now_ns);
         match self.events.take_if(|_| is_written) {
             Some(events) => (events.reason(), FileEnd::Write),
             None if self.events.is_some() => (stop_reason, FileEnd::KeepAll),
@@ -168,9 +172,9 @@ impl Trigger {
 
 #[cfg(test)]
 mod tests {
-    use recorder::{EventRow, OutcomeRow, TearsRow};
+    use recorder::{EventRow, Message, OutcomeRow, TearsRow};
     use sim_contract::clock::SECOND_NS;
-    use sim_contract::{Command, Outcome, Reason, TearCause, Text, TornConstraint};
+    use sim_contract::{Action, Command, Outcome, Reason, TearCause, Text, TornConstraint};
 
     use super::*;
 
@@ -210,14 +214,14 @@ mod tests {
         trigger.poll_signal(0);
         trigger.poll_signal(0);
         assert_eq!(
-            trigger.end_part("split".to_owned(), false, 0).0,
+            trigger.end_part("split".to_owned(), false, false, 0).0,
             "mark 'slips' at step 7, 2 tears from step 8 on, frozen particle at step 9, SIGUSR1"
         );
         for _ in 0..MARKS_MAX + 3 {
             trigger.watch(&mark(Ok(())), 0);
         }
         trigger.watch(&tear(8), 0);
-        let reason = trigger.end_part("split".to_owned(), false, 0).0;
+        let reason = trigger.end_part("split".to_owned(), false, false, 0).0;
         assert!(
             reason.ends_with("mark 'slips' at step 7, 3 more marks, tear at step 8"),
             "{reason}"
@@ -227,8 +231,9 @@ mod tests {
     #[test]
     fn a_file_ends_a_second_after_the_last_event_and_within_the_span_of_the_first() {
         let mut trigger = trigger();
-        let end =
-            |trigger: &mut Trigger, now_ns| trigger.end_part("split".to_owned(), true, now_ns).1;
+        let end = |trigger: &mut Trigger, now_ns| {
+            trigger.end_part("split".to_owned(), true, false, now_ns).1
+        };
         assert_eq!(end(&mut trigger, SECOND_NS), FileEnd::Keep);
         trigger.watch(&tear(1), SECOND_NS);
         assert_eq!(end(&mut trigger, 2 * SECOND_NS - 1), FileEnd::KeepAll);
@@ -247,7 +252,7 @@ mod tests {
     #[test]
     fn a_part_that_no_other_continues_is_written_only_after_an_event() {
         let mut trigger = trigger();
-        let end = |trigger: &mut Trigger| trigger.end_part("signal".to_owned(), false, 0);
+        let end = |trigger: &mut Trigger| trigger.end_part("signal".to_owned(), false, false, 0);
         assert_eq!(end(&mut trigger), ("signal".to_owned(), FileEnd::Drop));
         trigger.watch(&tear(4), 0);
         assert_eq!(end(&mut trigger), ("tear at step 4".to_owned(), FileEnd::Write));

@@ -122,6 +122,16 @@ impl Started {
         }
     }
 
+    /// Returns the last recorded step.
+    pub(super) fn last_step(&self) -> u64 {
+        self.last.step
+    }
+
+    /// Adds snapshots that are missing before the first one.
+    pub(super) fn add_gaps(&mut self, count: u64) {
+        self.state_gaps += count;
+    }
+
     /// Ends the recording a number of steps after the first one.
     pub(super) fn set_steps_max(&mut self, steps_max: Option<u64>) {
         let end_step = steps_max.map(|steps| self.first_step.saturating_add(steps));

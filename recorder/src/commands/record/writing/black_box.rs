@@ -4,10 +4,15 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use recorder::{Closing, Message, Topic};
+use sim_contract::clock::SECOND_NS;
 
 use crate::cli::output;
 use crate::commands::record::load::RunHeader;
 use crate::commands::record::queue::{Content, FileEnd, Item};
+
+/// Parts that are kept in any case: the one in progress, and the one before it, so that there is always
+/// something before an event.
+const PARTS_MIN: usize = 2;
 
 /// Keeps parts of a recording that follow each other. Each begins with everything that a file needs, so the
 /// oldest one kept begins the file.
@@ -17,6 +22,8 @@ pub(crate) struct BlackBox {
     limit_bytes: usize,
     parts: VecDeque<Part>,
     size_bytes: usize,
+    /// An event has arrived, so what came before it stays until its file is written.
+    has_event: bool,
     is_warned: bool,
 }
 
@@ -41,9 +48,17 @@ pub(crate) struct KeptFile {
 }
 
 impl BlackBox {
-    /// Keeps what was received within `span`, and at most `limit_bytes` and the part in progress.
+    /// Keeps what was received within `span`, in at most `limit_bytes`. Beyond that, it keeps [`PARTS_MIN`]
+    /// parts, and what comes before an event until its file is written.
     pub(crate) fn new(span: Duration, limit_bytes: usize) -> Self {
-        Self { span, limit_bytes, parts: VecDeque::new(), size_bytes: 0, is_warned: false }
+        Self {
+            span,
+            limit_bytes,
+            parts: VecDeque::new(),
+            size_bytes: 0,
+            has_event: false,
+            is_warned: false,
+        }
     }
 
     /// Returns the size of what is kept, in bytes.
@@ -63,12 +78,14 @@ impl BlackBox {
     pub(crate) fn push(&mut self, item: Item) {
         let Some(part) = self.parts.back_mut() else { return };
         let size_bytes = item.content.size_bytes();
+        self.has_event |= item.content.event().is_some();
         part.size_bytes += size_bytes;
         part.items.push(item);
         self.size_bytes += size_bytes;
-        while self.size_bytes > self.limit_bytes && self.parts.len() > 1 {
-            self.remove_oldest();
+        while self.size_bytes > self.limit_bytes && self.parts.len() > PARTS_MIN && !self.has_event
+        {
             self.warn_once();
+            self.remove_oldest();
         }
     }
 
@@ -83,7 +100,7 @@ impl BlackBox {
                 None
             }
             FileEnd::Drop => {
-                (self.parts, self.size_bytes) = (VecDeque::new(), 0);
+                (self.parts, self.size_bytes, self.has_event) = (VecDeque::new(), 0, false);
                 None
             }
         }
@@ -104,9 +121,12 @@ impl BlackBox {
 
     fn warn_once(&mut self) {
         if !std::mem::replace(&mut self.is_warned, true) {
+            let begin_ns = |part: Option<&Part>| part.map_or(0, |part| part.begin_ns);
+            let kept_ns = begin_ns(self.parts.back()) - begin_ns(self.parts.front());
             output::note(&format!(
-                "warning: the black box keeps less than {}, because {} bytes hold no more; enlarge \
-                 --queue-bytes",
+                "warning: the black box keeps about the last {:.1} s instead of {}, because {} bytes hold no \
+                 more; enlarge --queue-bytes",
+                kept_ns as f64 / SECOND_NS as f64,
                 humantime::format_duration(self.span),
                 self.limit_bytes
             ));
@@ -115,7 +135,7 @@ impl BlackBox {
 
     /// Joins all parts to one file.
     fn take_all(&mut self) -> Option<KeptFile> {
-        self.size_bytes = 0;
+        (self.size_bytes, self.has_event) = (0, false);
         let mut parts = std::mem::take(&mut self.parts).into_iter();
         let Part { header, log_time_ns, items, closing, .. } = parts.next()?;
         let mut file = KeptFile { header, log_time_ns, items, closing };
@@ -145,9 +165,8 @@ fn repeats(content: &Content, first_step: Option<u64>, closing: &mut Closing) ->
 
 #[cfg(test)]
 mod tests {
-    use recorder::{AllCounts, ParametersRow, RunDescription, StepRow, Up};
+    use recorder::{AllCounts, ParametersRow, RunDescription, StepRow, TearsRow, Up};
     use sim_contract::ParameterValues;
-    use sim_contract::clock::SECOND_NS;
 
     use super::*;
 
@@ -229,12 +248,18 @@ mod tests {
     }
 
     #[test]
-    fn the_memory_is_limited_except_for_the_part_in_progress() {
+    fn the_memory_is_limited_except_for_the_newest_parts_and_those_of_an_event() {
         let mut black_box = BlackBox::new(Duration::from_secs(100), 1);
         for second in 0..6 {
             add_part(&mut black_box, second, FileEnd::Keep);
-            assert_eq!(black_box.parts.len(), 1);
+            assert!(black_box.parts.len() <= PARTS_MIN);
         }
-        assert_eq!(steps(&add_part(&mut black_box, 6, FileEnd::Write).unwrap()), [6]);
+        let tears = TearsRow { step: 5, constraints: vec![1], causes: vec!["cut".to_owned()] };
+        black_box.push(update(Message::Tears(tears), 5));
+        for second in 6..9 {
+            add_part(&mut black_box, second, FileEnd::KeepAll);
+        }
+        let file = add_part(&mut black_box, 9, FileEnd::Write).unwrap();
+        assert_eq!(steps(&file), [4, 5, 6, 7, 8, 9]);
     }
 }

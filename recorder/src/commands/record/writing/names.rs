@@ -13,18 +13,37 @@ pub(crate) enum FileNames {
     Single(PathBuf),
     /// `NAME_0000.mcap`, `NAME_0001.mcap` and so on: numbered from 0 after an underscore, as rosbag2 does,
     /// but with zeros before the number, so that the names sort.
-    Numbered(PathBuf),
+    Numbered {
+        /// The path without a number.
+        path: PathBuf,
+        /// Number in the name of the first file.
+        first: u64,
+    },
 }
 
 impl FileNames {
+    /// Returns the names of several files, numbered from 0.
+    pub(crate) fn numbered(path: PathBuf) -> Self {
+        Self::Numbered { path, first: 0 }
+    }
+
+    /// Numbers the files after those that are in the folder.
+    pub(crate) fn after_earlier_files(mut self) -> Self {
+        let next = self.earlier_files().iter().filter_map(|path| self.number_of(path)).max();
+        if let Self::Numbered { first, .. } = &mut self {
+            *first = next.map_or(0, |last| last + 1);
+        }
+        self
+    }
+
     /// Returns the path of a file, counted from 0.
     pub(crate) fn path(&self, number: u64) -> PathBuf {
         match self {
             Self::Single(path) => path.clone(),
-            Self::Numbered(path) => {
+            Self::Numbered { path, first } => {
                 let (stem, extension) = split_name(path);
                 let mut name = stem;
-                name.push(format!("_{number:04}{extension}"));
+                name.push(format!("_{:04}{extension}", first + number));
                 path.with_file_name(name)
             }
         }
@@ -47,7 +66,7 @@ impl FileNames {
     /// Returns the numbered files, finished or not, that are in the folder. A folder that cannot be
     /// read is reported when a file is created.
     fn earlier_files(&self) -> Vec<PathBuf> {
-        let Self::Numbered(path) = self else { return Vec::new() };
+        let Self::Numbered { path, .. } = self else { return Vec::new() };
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let entries = fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten();
         let names = entries.flatten().map(|entry| entry.file_name());
@@ -58,15 +77,18 @@ impl FileNames {
 
     /// Returns `true` for the name of a file, finished or not, with any number.
     fn has_name(&self, name: &OsString) -> bool {
-        let Self::Numbered(path) = self else { return false };
+        self.number_of(Path::new(name)).is_some()
+    }
+
+    /// Returns the number in the name of a file of this recording, finished or not.
+    fn number_of(&self, file: &Path) -> Option<u64> {
+        let Self::Numbered { path, .. } = self else { return None };
         let (stem, extension) = split_name(path);
-        let (Some(name), Some(stem)) = (name.to_str(), stem.to_str()) else { return false };
+        let (name, stem) = (file.file_name()?.to_str()?, stem.to_str()?);
         let name = name.strip_suffix(".part").unwrap_or(name);
-        let number = name.strip_suffix(extension).and_then(|name| name.strip_prefix(stem));
-        let number = number.and_then(|number| number.strip_prefix('_'));
-        number.is_some_and(|number| {
-            number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit())
-        })
+        let number = name.strip_suffix(extension)?.strip_prefix(stem)?.strip_prefix('_')?;
+        let is_number = number.len() >= 4 && number.bytes().all(|byte| byte.is_ascii_digit());
+        number.parse().ok().filter(|_| is_number)
     }
 }
 
@@ -84,7 +106,7 @@ mod tests {
 
     #[test]
     fn files_are_numbered_before_their_extension() {
-        let path = |name: &str, number| FileNames::Numbered(PathBuf::from(name)).path(number);
+        let path = |name: &str, number| FileNames::numbered(PathBuf::from(name)).path(number);
         assert_eq!(path("logs/run.mcap", 0), Path::new("logs/run_0000.mcap"));
         assert_eq!(path("logs/run.mcap", 12_345), Path::new("logs/run_12345.mcap"));
         assert_eq!(path("run.v2", 7), Path::new("run.v2_0007"));
@@ -93,7 +115,7 @@ mod tests {
 
     #[test]
     fn only_numbered_files_of_the_same_name_belong_to_a_recording() {
-        let names = FileNames::Numbered(PathBuf::from("logs/run.mcap"));
+        let names = FileNames::numbered(PathBuf::from("logs/run.mcap"));
         for name in ["run_0000.mcap", "run_12345.mcap", "run_0003.mcap.part"] {
             assert!(names.has_name(&OsString::from(name)), "{name}");
         }

@@ -51,7 +51,7 @@ fn header() -> RunHeader {
 fn full_ring(folder: &Folder) -> Files {
     let options = WriteOptions {
         file: Options::parse_from(["record"]).file,
-        names: FileNames::Numbered(folder.0.join("run.mcap")),
+        names: FileNames::numbered(folder.0.join("run.mcap")),
         extras: Extras::default(),
         selection: ContentSelection::default(),
         ring: Ring { files_max: Some(2), free_min_bytes: None },
