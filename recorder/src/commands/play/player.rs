@@ -200,7 +200,7 @@ impl Player {
         }
         replay.publish(frame)?;
         self.control.count_step();
-        let next = self.playlist.next_frame()?;
+        let next = self.playlist.next_frame(replay.position())?;
         Ok(next.filter(|frame| self.playlist.time_ns(frame.row.step) <= self.plan.end_ns))
     }
 
