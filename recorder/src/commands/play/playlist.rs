@@ -52,7 +52,9 @@ struct Junction {
     scene: Vec<u8>,
     topology_revision: u32,
     selection: ContentSelection,
-    last: StepRow,
+    last_step: u64,
+    /// `None` if it is unreadable.
+    last: Option<StepRow>,
 }
 
 impl Playlist {
@@ -188,9 +190,10 @@ impl Playlist {
     /// place may yet be rejected.
     fn recorded_step(&mut self, file: usize, step: u64) -> anyhow::Result<u64> {
         let mut other = None;
-        let recording = match file == self.current {
-            true => &mut self.recording,
-            false => other.insert(self.open_file(file)?),
+        let recording = if file == self.current {
+            &mut self.recording
+        } else {
+            other.insert(self.open_file(file)?)
         };
         let name = output::path_text(recording.path());
         recording.tape().step_at(step).context(name)
@@ -262,12 +265,13 @@ impl Listed {
 impl Junction {
     fn of(recording: &mut Recording) -> anyhow::Result<Self> {
         let last_step = recording.tape().last_step();
-        let last = recording.tape().state_at(last_step)?.row;
+        let last = readable_row(recording, last_step)?;
         Ok(Self {
             run_id: recording.run().run_id,
             scene: recording.scene().to_vec(),
             topology_revision: recording.tape().topology().revision,
             selection: recording.selection(),
+            last_step,
             last,
         })
     }
@@ -279,11 +283,13 @@ impl Junction {
             && self.topology_revision == next.tape().topology().revision
             && self.scene == next.scene();
         let first_step = next.tape().first_step();
-        if !is_same_load || first_step <= self.last.step {
+        if !is_same_load || first_step <= self.last_step {
             return Ok(false);
         }
-        let first = next.tape().state_at(first_step)?.row;
-        let missing = match (self.last.snapshot_index, first.snapshot_index) {
+        let (Some(last), Some(first)) = (self.last, readable_row(next, first_step)?) else {
+            return Ok(false);
+        };
+        let missing = match (last.snapshot_index, first.snapshot_index) {
             (Some(last), Some(first)) => self.selection.missing_between(last, first),
             // Older formats do not number their snapshots.
             _ => 0,
@@ -297,4 +303,9 @@ impl Junction {
         }
         Ok(missing == 0)
     }
+}
+
+fn readable_row(recording: &mut Recording, step: u64) -> anyhow::Result<Option<StepRow>> {
+    let state = recording.tape().state_at(step)?;
+    Ok(state.has_readable_row.then_some(state.row))
 }

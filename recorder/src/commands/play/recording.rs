@@ -123,7 +123,7 @@ impl Recording {
         Ok(sizes)
     }
 
-    /// Continues with the snapshot of the last recorded step up to `step`.
+    /// Continues with the snapshot of the last recorded step up to `step` whose header is readable.
     pub(super) fn start_at(&mut self, step: u64) -> anyhow::Result<Start> {
         if step <= self.tape.first_step() { self.start() } else { self.start_in_the_middle(step) }
     }
@@ -140,7 +140,14 @@ impl Recording {
     }
 
     fn start_in_the_middle(&mut self, step: u64) -> anyhow::Result<Start> {
-        let state = self.tape.state_at(step)?;
+        let mut state = self.tape.state_at(step)?;
+        // A snapshot without its header would be published with a state hash of 0.
+        while !state.has_readable_row {
+            if state.row.step <= self.tape.first_step() {
+                return self.start();
+            }
+            state = self.tape.state_at(state.row.step - 1)?;
+        }
         let keyframe = self.tape.keyframe_at(state.row.step)?;
         let position = Position::at(&state, keyframe, self.method());
         self.tape.wind(&mut self.frames, state.row.step)?;
