@@ -11,6 +11,7 @@ mod losses;
 mod outputs;
 mod physics;
 mod play {
+    mod border;
     mod files;
     mod keys;
     mod lockstep;

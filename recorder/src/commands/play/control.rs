@@ -73,7 +73,8 @@ impl Request {
     }
 }
 
-/// Returns the rate in a command, whose numbers have fewer digits than ours.
+/// Returns the rate in a command. Its numbers have fewer digits than ours, so a rate is the shortest decimal
+/// that they stand for: 0.1, not 0.10000000149.
 fn rate(value: ParameterValue) -> Option<f64> {
     let ParameterValue::Number(number) = value else { return None };
     #[allow(
@@ -81,7 +82,7 @@ fn rate(value: ParameterValue) -> Option<f64> {
         reason = "the limits are compared as the command has them"
     )]
     let limits = *RATES.start() as f32..=*RATES.end() as f32;
-    limits.contains(&number).then(|| f64::from(number).clamp(*RATES.start(), *RATES.end()))
+    limits.contains(&number).then(|| number.to_string().parse().ok()).flatten()
 }
 
 impl Control {
@@ -172,7 +173,9 @@ mod tests {
             (rewind(Some(480), None), Ok(Request::Seek(Target::Step(480)))),
             (rewind(None, Some(9)), Ok(Request::Seek(Target::BackSteps(9)))),
             (set("time_scale", 0.5), Ok(Request::Rate(0.5))),
-            (set("time_scale", 0.01), Ok(Request::Rate(f64::from(0.01_f32).max(0.01)))),
+            (set("time_scale", 0.01), Ok(Request::Rate(0.01))),
+            (set("time_scale", 0.1), Ok(Request::Rate(0.1))),
+            (set("time_scale", 100.0), Ok(Request::Rate(100.0))),
             (set("time_scale", 0.0), Err(Reason::OutOfRange)),
             (set("time_scale", f32::NAN), Err(Reason::OutOfRange)),
             (set("time_scale", 100.1), Err(Reason::OutOfRange)),

@@ -139,7 +139,7 @@ impl Player {
             }
             let now_ns = monotonic_ns();
             let due_ns = match &next {
-                _ if self.awaits_members(replay, now_ns) => now_ns + MEMBERS_WAIT_NS,
+                _ if self.awaits_members(replay, now_ns) => u64::MAX,
                 Some(frame) => self.due_ns(replay, frame.row.step, now_ns),
                 None => self.end_ns(&mut ended_ns, now_ns),
             };
@@ -149,10 +149,24 @@ impl Player {
                     next = self.publish(replay, &frame)?;
                 }
                 None if due_ns <= now_ns => return Ok(self.next_run()),
-                None => sleep_until(due_ns.min(now_ns + WAIT_MAX_NS)),
+                None => self.wait(replay, due_ns, now_ns),
             }
         }
         Ok(None)
+    }
+
+    /// Waits until a snapshot is due, or the members of the lockstep are ready, for at most the time between two
+    /// checks.
+    fn wait(&mut self, replay: &Replay, due_ns: u64, now_ns: u64) {
+        let end_ns = due_ns.min(now_ns + WAIT_MAX_NS);
+        if !self.awaits_members(replay, now_ns) {
+            return sleep_until(end_ns);
+        }
+        let mut now_ns = now_ns;
+        while now_ns < end_ns && self.awaits_members(replay, now_ns) {
+            sleep_until(now_ns + MEMBERS_WAIT_NS);
+            now_ns = monotonic_ns();
+        }
     }
 
     /// Returns `true` if the next snapshot, or the end, waits for members of the lockstep.
@@ -200,7 +214,7 @@ impl Player {
         }
         replay.publish(frame)?;
         self.control.count_step();
-        let next = self.playlist.next_frame()?;
+        let next = self.playlist.next_frame(replay.position())?;
         Ok(next.filter(|frame| self.playlist.time_ns(frame.row.step) <= self.plan.end_ns))
     }
 

@@ -7,6 +7,7 @@ use recorder::{ContentSelection, Frame, LogEnd, RunDescription, StepRow};
 use sim_contract::Stop;
 use sim_contract::clock::SECOND_NS;
 
+use super::position::Position;
 use super::recording::{Recording, Start};
 use super::replay::Recorded;
 use crate::cli::output;
@@ -51,7 +52,9 @@ struct Junction {
     scene: Vec<u8>,
     topology_revision: u32,
     selection: ContentSelection,
-    last: StepRow,
+    last_step: u64,
+    /// `None` if it is unreadable.
+    last: Option<StepRow>,
 }
 
 impl Playlist {
@@ -115,9 +118,7 @@ impl Playlist {
         let file = self.place_of(step).map_or(self.current, |place| place.file);
         let first = self.files[file].first_step;
         if step > first {
-            self.read(file)?;
-            let step = self.recording.tape().step_at(step - 1).with_context(|| self.name())?;
-            return Ok(Place { file, step });
+            return Ok(Place { file, step: self.recorded_step(file, step - 1)? });
         }
         Ok(match file.checked_sub(1) {
             Some(before) => Place { file: before, step: self.files[before].last_step },
@@ -143,21 +144,23 @@ impl Playlist {
         self.recording.recorded().context(name)
     }
 
-    /// Returns the next snapshot of the run, or `None` at its end.
-    pub(super) fn next_frame(&mut self) -> anyhow::Result<Option<Frame>> {
+    /// Returns the next snapshot of the run, or `None` at its end. `reached` is the state after the last one.
+    pub(super) fn next_frame(&mut self, reached: &Position) -> anyhow::Result<Option<Frame>> {
         if let Some(frame) = self.recording.next_frame().with_context(|| self.name())? {
             return Ok(Some(frame));
         }
-        self.report_end();
+        let is_complete = self.report_end();
         let next = self.current + 1;
-        if !self.files.get(next).is_some_and(|file| file.is_continuation) {
+        if !is_complete || !self.files.get(next).is_some_and(|file| file.is_continuation) {
             return Ok(None);
         }
-        self.read(next)?;
-        let Start { mut frame, .. } =
-            self.recording.start_at(self.files[next].first_step).with_context(|| self.name())?;
-        // The file repeats what was latched before its first step.
-        frame.updates.retain(|update| update.step() >= frame.row.step);
+        let mut recording = self.open_file(next)?;
+        let start = recording.start().with_context(|| output::path_text(recording.path()))?;
+        let Some(frame) = start.continue_from(reached, self.recording.trailing_updates()) else {
+            self.warn_of_loss(next);
+            return Ok(None);
+        };
+        (self.recording, self.current) = (recording, next);
         Ok(Some(frame))
     }
 
@@ -172,21 +175,47 @@ impl Playlist {
 
     fn read(&mut self, file: usize) -> anyhow::Result<()> {
         if file != self.current {
-            let path = &self.files[file].path;
-            self.recording =
-                Recording::open(path, &self.stop).with_context(|| output::path_text(path))?;
+            self.recording = self.open_file(file)?;
             self.current = file;
         }
         Ok(())
     }
 
-    fn report_end(&mut self) {
-        if let Some(end) = self.recording.end()
-            && *end != LogEnd::Complete
-        {
+    fn open_file(&self, file: usize) -> anyhow::Result<Recording> {
+        let path = &self.files[file].path;
+        Recording::open(path, &self.stop).with_context(|| output::path_text(path))
+    }
+
+    /// Returns the last recorded step of a file up to a step. The file that is being read stays the same: the
+    /// place may yet be rejected.
+    fn recorded_step(&mut self, file: usize, step: u64) -> anyhow::Result<u64> {
+        let mut other = None;
+        let recording = if file == self.current {
+            &mut self.recording
+        } else {
+            other.insert(self.open_file(file)?)
+        };
+        let name = output::path_text(recording.path());
+        recording.tape().step_at(step).context(name)
+    }
+
+    /// Returns `true` if the file that has ended was complete.
+    fn report_end(&mut self) -> bool {
+        let Some(end) = self.recording.end() else { return true };
+        let is_complete = *end == LogEnd::Complete;
+        if !is_complete {
             self.is_whole = false;
             output::warn_incomplete(self.recording.path(), end, "played as far as it goes");
         }
+        is_complete
+    }
+
+    fn warn_of_loss(&self, next: usize) {
+        let (one, two) = (self.name(), output::path_text(&self.files[next].path));
+        output::note(&format!(
+            "warning: {one} lacks changes of torn constraints, colliders or parameters before {two}, so {two} \
+             plays as a run of its own"
+        ));
     }
 }
 
@@ -236,12 +265,13 @@ impl Listed {
 impl Junction {
     fn of(recording: &mut Recording) -> anyhow::Result<Self> {
         let last_step = recording.tape().last_step();
-        let last = recording.tape().state_at(last_step)?.row;
+        let last = readable_row(recording, last_step)?;
         Ok(Self {
             run_id: recording.run().run_id,
             scene: recording.scene().to_vec(),
             topology_revision: recording.tape().topology().revision,
             selection: recording.selection(),
+            last_step,
             last,
         })
     }
@@ -253,11 +283,13 @@ impl Junction {
             && self.topology_revision == next.tape().topology().revision
             && self.scene == next.scene();
         let first_step = next.tape().first_step();
-        if !is_same_load || first_step <= self.last.step {
+        if !is_same_load || first_step <= self.last_step {
             return Ok(false);
         }
-        let first = next.tape().state_at(first_step)?.row;
-        let missing = match (self.last.snapshot_index, first.snapshot_index) {
+        let (Some(last), Some(first)) = (self.last, readable_row(next, first_step)?) else {
+            return Ok(false);
+        };
+        let missing = match (last.snapshot_index, first.snapshot_index) {
             (Some(last), Some(first)) => self.selection.missing_between(last, first),
             // Older formats do not number their snapshots.
             _ => 0,
@@ -271,4 +303,9 @@ impl Junction {
         }
         Ok(missing == 0)
     }
+}
+
+fn readable_row(recording: &mut Recording, step: u64) -> anyhow::Result<Option<StepRow>> {
+    let state = recording.tape().state_at(step)?;
+    Ok(state.has_readable_row.then_some(state.row))
 }

@@ -1,5 +1,7 @@
 //! The state of a replay: the values for headers and for late subscribers.
 
+use std::collections::BTreeSet;
+
 use recorder::{CollidersRow, Message, OutcomeRow, StatusRow, TapeState, TearTracker};
 use sim_contract::{Action, Method, ParameterValues, Torn};
 use sim_solver::Keyframe;
@@ -12,6 +14,8 @@ pub(crate) struct Position {
     pub(super) latched_keyframe: Option<Vec<u8>>,
     /// The newest colliders before the first published snapshot.
     pub(super) latched_colliders: Option<CollidersRow>,
+    /// The newest colliders.
+    colliders: Option<CollidersRow>,
     /// The newest status of the node before the first published snapshot.
     pub(super) latched_status: Option<StatusRow>,
     /// The recorded node was paused.
@@ -34,6 +38,7 @@ impl Position {
             keyframe_step: 0,
             latched_keyframe: None,
             latched_colliders: None,
+            colliders: None,
             latched_status: None,
             is_paused: false,
             outcome_count: 0,
@@ -54,6 +59,7 @@ impl Position {
         position.outcome_count = state.row.outcome_count;
         position.rejected_count = state.status.as_ref().map_or(0, |row| row.rejected_count);
         position.latched_colliders.clone_from(&state.colliders);
+        position.colliders.clone_from(&state.colliders);
         position.latched_status.clone_from(&state.status);
         if let Some(row) = &state.parameters {
             position.apply_parameters(&Message::Parameters(row.clone()));
@@ -77,6 +83,7 @@ impl Position {
                     self.is_paused = keyframe.paused;
                 }
             }
+            Message::Colliders(row) => self.colliders = Some(row.clone()),
             Message::Outcome(row) => self.apply_outcome(row),
             _ => {}
         }
@@ -96,6 +103,22 @@ impl Position {
             }
             _ => {}
         }
+    }
+
+    /// Returns `true` if the torn constraints, colliders and parameters after a step are the same in both, as
+    /// far as they are known.
+    pub(super) fn agrees_with(&mut self, other: &mut Self, step: u64) -> bool {
+        let are_same_colliders = match (&self.colliders, &other.colliders) {
+            (Some(one), Some(two)) => one.colliders == two.colliders,
+            _ => true,
+        };
+        are_same_colliders
+            && self.parameters == other.parameters
+            && self.torn_indices(step) == other.torn_indices(step)
+    }
+
+    fn torn_indices(&mut self, step: u64) -> Option<BTreeSet<u32>> {
+        self.tears.at(step).map(|torn| torn.indices().collect())
     }
 
     fn apply_outcome(&mut self, row: &OutcomeRow) {

@@ -41,6 +41,27 @@ pub(super) struct Start {
     pub(super) position: Position,
 }
 
+impl Start {
+    /// Returns the first snapshot of a file as the next one of the run that has reached a state, with the last
+    /// messages of the file before: without every snapshot of the run, they follow the last one. Returns
+    /// `None` if they do not lead to the state with which this file begins.
+    pub(super) fn continue_from(self, reached: &Position, trailing: &[Message]) -> Option<Frame> {
+        let Self { mut frame, position: mut begun } = self;
+        frame.updates.iter().for_each(|update| begun.apply(update));
+        let step = frame.row.step;
+        // The file repeats what was latched before its first step.
+        let own = frame.updates.into_iter().filter(|update| update.step() >= step);
+        // An outcome of this step can arrive before the file before ends. No file repeats one.
+        let is_missing =
+            |update: &&Message| update.step() < step || matches!(update, Message::Outcome(_));
+        let earlier = trailing.iter().filter(is_missing).cloned();
+        frame.updates = earlier.chain(own).collect();
+        let mut reached = reached.clone();
+        frame.updates.iter().for_each(|update| reached.apply(update));
+        reached.agrees_with(&mut begun, step).then_some(frame)
+    }
+}
+
 impl Recording {
     /// Opens a file at its first snapshot. Errors do not name the file.
     pub(super) fn open(path: &Path, stop: &Stop) -> anyhow::Result<Self> {
@@ -102,12 +123,13 @@ impl Recording {
         Ok(sizes)
     }
 
-    /// Continues with the snapshot of the last recorded step up to `step`.
+    /// Continues with the snapshot of the last recorded step up to `step` whose header is readable.
     pub(super) fn start_at(&mut self, step: u64) -> anyhow::Result<Start> {
         if step <= self.tape.first_step() { self.start() } else { self.start_in_the_middle(step) }
     }
 
-    fn start(&mut self) -> anyhow::Result<Start> {
+    /// Continues with the first snapshot.
+    pub(super) fn start(&mut self) -> anyhow::Result<Start> {
         self.tape.rewind(&mut self.frames)?;
         let frame = next_frame(&mut self.frames)?;
         let torn = torn_before_first(self.tape.topology(), &frame);
@@ -118,7 +140,14 @@ impl Recording {
     }
 
     fn start_in_the_middle(&mut self, step: u64) -> anyhow::Result<Start> {
-        let state = self.tape.state_at(step)?;
+        let mut state = self.tape.state_at(step)?;
+        // A snapshot without its header would be published with a state hash of 0.
+        while !state.has_readable_row {
+            if state.row.step <= self.tape.first_step() {
+                return self.start();
+            }
+            state = self.tape.state_at(state.row.step - 1)?;
+        }
         let keyframe = self.tape.keyframe_at(state.row.step)?;
         let position = Position::at(&state, keyframe, self.method());
         self.tape.wind(&mut self.frames, state.row.step)?;
@@ -134,6 +163,11 @@ impl Recording {
     /// Returns the next snapshot, or `None` at the end of the readable part.
     pub(super) fn next_frame(&mut self) -> anyhow::Result<Option<Frame>> {
         Ok(self.frames.next_frame()?)
+    }
+
+    /// Returns the messages after the last snapshot, once [`Self::next_frame`] has returned `None`.
+    pub(super) fn trailing_updates(&self) -> &[Message] {
+        self.frames.trailing_updates()
     }
 
     /// Returns the end of the file, once it was reached.

@@ -106,6 +106,11 @@ impl Replay {
         &self.owner
     }
 
+    /// Returns the state after the last published snapshot.
+    pub(super) fn position(&self) -> &Position {
+        &self.position
+    }
+
     /// Returns the last published step, or step 0 of the run before the first.
     pub(super) fn published(&self) -> Published {
         Published { run_id: self.run_id, step: self.step.unwrap_or_default() }

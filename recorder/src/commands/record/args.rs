@@ -60,7 +60,8 @@ pub(crate) struct RecordArgs {
     /// Wait until a node is running
     #[arg(long)]
     pub(super) wait: bool,
-    /// Join the lockstep: the node or replay waits for this recorder, which then loses nothing
+    /// Join the lockstep: the node or replay waits at each published step until this recorder has read
+    /// it. A node drops a member after its --lockstep-timeout, a replay after 10 s
     #[arg(long)]
     pub(super) lockstep: bool,
     #[command(flatten)]

@@ -10,7 +10,7 @@ use crate::client::random_client_id;
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;
-use crate::limits::UPDATES_BUFFERED;
+use crate::limits::{COMMANDS_PER_STEP_MAX, OUTCOMES_BUFFERED, UPDATES_BUFFERED};
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::to_values;
@@ -32,6 +32,12 @@ use crate::ports::wake::WakeListener;
 
 /// Most reads of every service for one state. Each read receives at most one buffer.
 const READS_MAX: usize = 8;
+
+const _: () = {
+    let every = Tap::LOCKSTEP_EVERY.get() as usize;
+    assert!(2 * every * COMMANDS_PER_STEP_MAX <= OUTCOMES_BUFFERED);
+    assert!(2 * every <= UPDATES_BUFFERED);
+};
 
 /// Reads everything that an owner publishes, as a sequence of coherent states. The particles are not
 /// copied. Messages of processes that do not own the name are ignored.
@@ -73,8 +79,10 @@ impl Tap {
     }
 
     /// Attaches as a member of the lockstep: the owner waits, at the steps that are multiples of
-    /// [`Tap::LOCKSTEP_EVERY`], until [`Tap::ready`] is called. So the tap misses nothing at any rate. It joins
-    /// before it subscribes, and again with each turn, also at the next owner of the name.
+    /// [`Tap::LOCKSTEP_EVERY`], until [`Tap::ready`] is called. So the tap misses nothing at any rate, as long
+    /// as it is ready in time: a node goes on without a member after its `--lockstep-timeout`, 2 s by default,
+    /// and a replay after 10 s. A node with `--every` waits only at published steps. The tap joins before it
+    /// subscribes, and again with each turn, also at the next owner of the name.
     ///
     /// # Errors
     /// Same as [`Tap::attach`], or the lockstep has no place for another member.
@@ -85,10 +93,11 @@ impl Tap {
         Ok(Self::subscribe(attachment, Some(member))?)
     }
 
-    /// Distance of the steps at which a tap in the lockstep takes part: in one step, a service publishes at most
-    /// one of the [`crate::UPDATES_BUFFERED`] messages that it can hold for a reader.
-    #[allow(clippy::cast_possible_truncation, reason = "a small number")]
-    pub const LOCKSTEP_EVERY: NonZeroU32 = NonZeroU32::new(UPDATES_BUFFERED as u32).unwrap();
+    /// Distance of the steps at which a tap in the lockstep takes part. In one step, an owner publishes at most
+    /// [`crate::COMMANDS_PER_STEP_MAX`] outcomes, and one message of each other service; the tap can hold
+    /// [`crate::OUTCOMES_BUFFERED`] and [`crate::UPDATES_BUFFERED`]. Half of each stays free, for messages
+    /// between the steps.
+    pub const LOCKSTEP_EVERY: NonZeroU32 = NonZeroU32::MIN;
 
     fn subscribe(attachment: Attachment, member: Option<Member>) -> Result<Self, ServiceError> {
         let attachment = Rc::new(attachment);

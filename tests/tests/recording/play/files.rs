@@ -5,9 +5,9 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use integration_tests::{Process, Program, Sandbox, ctl, wait_for};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
 use recorder::{FrameReader, LogReader};
-use sim_contract::Tap;
+use sim_contract::{Client, Tap};
 
 /// Steps of each file of a split recording.
 const STEPS: u64 = 60;
@@ -56,11 +56,10 @@ fn rows(file: &str) -> Vec<(u64, u64)> {
 
 /// Plays files, and returns every published state, the exit code and the messages.
 fn played(sandbox: &Sandbox, args: &[&str]) -> (Vec<Shown>, Option<i32>, String) {
-    // Slow, so that a reader on a busy machine misses none.
-    let wait = ["play", "--wait-for-readers", "1", "--rate", "0.5"];
+    let wait = ["play", "--wait-for-readers", "1", "--rate", "max"];
     let args: Vec<_> = wait.iter().chain(args).copied().collect();
     let mut player = Process::start_ready(Program::Recorder, sandbox, &args);
-    let mut tap = Tap::attach(&sandbox.endpoint()).unwrap();
+    let mut tap = Tap::attach_in_lockstep(&sandbox.endpoint()).unwrap();
     let mut shown = Vec::new();
     wait_for("the end of the replay", || {
         tap.wait(Duration::from_millis(20));
@@ -74,6 +73,7 @@ fn played(sandbox: &Sandbox, args: &[&str]) -> (Vec<Shown>, Option<i32>, String)
                 is_load: state.changes.contains(&sim_contract::Change::Load),
             });
         }
+        tap.ready().unwrap();
         (!is_running).then_some(())
     });
     let finished = player.wait();
@@ -117,6 +117,31 @@ fn a_seek_goes_from_file_to_file() {
     ctl(&sandbox, &["rewind", "--to-step", "58"]);
     ctl(&sandbox, &["step", "6"]);
     assert_eq!(ctl(&sandbox, &["hash"])["step"], 64);
+}
+
+#[test]
+fn a_rejected_key_leaves_the_replay_in_its_file() {
+    let sandbox = Sandbox::new();
+    let files = split(&sandbox);
+    // The last step of the first file, at 240 Hz. The next snapshot is read ahead from the second file.
+    let last = rows(&files[0]).last().unwrap().0;
+    let start = format!("{}us", last * 1_000_000 / 240 + 1);
+    let args = ["play", "--paused", "--start", &start, &files[0], &files[1]];
+    let mut player = Process::start_on_terminal(r#""$0" "$@""#, Program::Recorder, &sandbox, &args);
+    wait_for("the replay", || player.has_written_part("ready playing").then_some(()));
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    let mut run_ids = Vec::new();
+    // One step back is before the start.
+    for (keys, step) in [("", last), (",.", last + 1), (".", last + 2), (".", last + 3)] {
+        player.press(keys);
+        run_ids.push(wait_for(&format!("step {step}"), || {
+            let status = client.status(DEADLINE).unwrap()?;
+            (status.step == step).then_some(status.run_id)
+        }));
+    }
+    assert!(run_ids.iter().all(|run_id| *run_id == run_ids[0]), "one run: {run_ids:?}");
+    player.press("q");
+    player.wait();
 }
 
 #[test]
