@@ -273,6 +273,7 @@ fn the_simulation_goes_on_from_the_first_complete_state_after_a_missing_outcome(
     assert_eq!(report.steps_identical, 49 + 700 - gap.to, "{report}");
     let (report, _) = check(&edit(true));
     assert_eq!((report.verdict, report.step), (Verdict::Diverged, Some(600)));
+    assert_eq!(report.gaps, [gap], "also where the comparison ends early");
 }
 
 #[test]

@@ -78,6 +78,7 @@ fn a_sound_file_and_a_file_without_an_end_lose_nothing() {
         let whole = Recording::default().write();
         let (repaired, report) = repair(&bytes).unwrap();
         assert!(report.losses.is_empty() && !report.is_uncertain, "{:?}", report.losses);
+        assert_eq!(report.has_end, is_finished);
         assert_repaired(&whole, &repaired, "whole");
         assert_eq!(messages(&repaired), messages(&whole));
         assert_eq!((report.steps, report.losses.ranges()), (Some([0, 40]), &[][..]));

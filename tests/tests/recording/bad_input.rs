@@ -110,6 +110,13 @@ fn export_never_replaces_its_recording_and_refuses_an_empty_range() {
         assert_refused(&refused, &[&run, "this is the input", "choose another name"]);
     }
     assert_eq!(std::fs::read(&run).unwrap(), before);
+    // A bag is named after the scene.
+    let (folder, bag) = (sandbox.path("bags"), sandbox.path("bags/rope.mcap"));
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::copy(&run, &bag).unwrap();
+    let refused = recorder(&sandbox, &["export", &bag, "--ros2", &folder, "--overwrite"]);
+    assert_refused(&refused, &[&bag, "this is the input", "choose another name"]);
+    assert_eq!(std::fs::read(&bag).unwrap(), before);
     let table = sandbox.path("run.csv");
     let refused = recorder(&sandbox, &["export", &run, "--csv", &table, "--from", "1h"]);
     assert_refused(&refused, &[&run, "select no snapshot", "0 (0 s) to 24 (0.100 s)"]);

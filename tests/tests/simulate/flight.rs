@@ -67,6 +67,9 @@ fn a_recording_of_commands_becomes_the_full_one_bit_for_bit() {
     assert!(verified["first_step"].as_u64().unwrap() <= 380, "{verified}");
     let refused = recorder(&sandbox, &["verify", &flight, "--from", "390", "--to", "380"]);
     assert!(refused.stderr.contains("--from 390 is after --to 380"), "{refused:?}");
+    let refused = recorder(&sandbox, &["verify", &flight, "--from", "99999"]);
+    assert_eq!(refused.code, Some(1), "nothing was compared: {refused:?}");
+    assert!(refused.stderr.contains("--from 99999 is after its last step"), "{refused:?}");
 
     let completed = frames(&completed);
     assert_eq!(completed.len(), direct.len());

@@ -113,7 +113,7 @@ impl Feed {
             Some(trigger) => {
                 now_ns.saturating_sub(file.monotonic_ns) >= PART_MIN_NS
                     || trigger.is_due(now_ns)
-                    || trigger.has_event(self.intake.last_step()) && self.is_full(1)
+                    || trigger.has_shown_event(self.intake.last_step()) && self.is_full(1)
             }
             None => self.split.is_due(file, &self.position, self.queue.size_bytes(), now_ns),
         };
@@ -165,7 +165,7 @@ impl Feed {
         let (is_full, last_step) = (self.is_full(1), self.intake.last_step());
         let (stop_reason, end) = match &mut self.trigger {
             Some(trigger) => {
-                let is_full = is_full && trigger.has_event(last_step);
+                let is_full = is_full && trigger.has_shown_event(last_step);
                 trigger.end_part(stop_reason, is_continued, is_full, monotonic_ns())
             }
             None => (stop_reason, FileEnd::Write),
@@ -183,7 +183,7 @@ impl Feed {
         let (is_far_too_full, last_step) = (self.is_full(2), self.intake.last_step());
         let Some(trigger) = &mut self.trigger else { return };
         trigger.poll_signal(now_ns);
-        let is_over = trigger.has_event(last_step) && is_far_too_full;
+        let is_over = trigger.has_shown_event(last_step) && is_far_too_full;
         if is_over || self.is_paused && trigger.is_due(now_ns) {
             self.end_part(StopReason::Split.text().to_owned(), true);
         }

@@ -26,6 +26,14 @@ pub(crate) enum Event<'a> {
     Frozen { step: u64 },
 }
 
+impl Event<'_> {
+    pub(crate) fn step(self) -> u64 {
+        match self {
+            Self::Mark { step, .. } | Self::Tears { step, .. } | Self::Frozen { step } => step,
+        }
+    }
+}
+
 /// A content with the time of its reception: wall clock, in nanoseconds since 1970.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Item {

@@ -25,8 +25,8 @@ pub(crate) struct SplitArgs {
     /// Keep the newest N files, at least 2, and remove older ones of this recording
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = file_count)]
     max_files: Option<u64>,
-    /// While less than this is free on the disk, remove the oldest file of this recording at each flush,
-    /// such as 10GB
+    /// While less than this is free on the disk, such as 10GB, remove the oldest file of this recording at
+    /// each flush
     #[arg(long, value_name = "SIZE", allow_hyphen_values = true, value_parser = size_bytes)]
     min_free: Option<u64>,
 }

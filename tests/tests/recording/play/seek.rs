@@ -226,3 +226,22 @@ fn a_connected_client_reads_on_after_a_seek() {
     let torn: Vec<_> = client.torn(DEADLINE).unwrap().indices().collect();
     assert_eq!(torn, [7]);
 }
+
+#[test]
+fn a_recorder_that_follows_a_jump_declares_what_precedes_the_next_keyframe() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let _play = Process::start_ready(Program::Recorder, &sandbox, &["play", &file, "--paused"]);
+    let output = sandbox.path("follow.mcap");
+    let args = ["record", "--json", "--follow", "--lockstep", "-o", &output];
+    let mut recording = Process::start_ready(Program::Recorder, &sandbox, &args);
+    recording.wait_for_line("recording from step 0");
+    // The keyframes around it are those of steps 240 and 300.
+    ctl(&sandbox, &["rewind", "--to-step", "250"]);
+    ctl(&sandbox, &["step", "100"]);
+    wait_for("the last step", || (ctl(&sandbox, &["status"])["step"] == 350).then_some(()));
+    let report = recording.interrupt().recorded();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!((&report["files"], &report["last_step"]), (&2.into(), &350.into()), "{report}");
+    assert_eq!(report["lost"]["/steps"], 50, "{report}");
+}

@@ -116,17 +116,13 @@ impl Trigger {
 
     /// Notices the event of a content, if it is one.
     pub(crate) fn watch(&mut self, content: &Content, now_ns: u64) {
-        match content.event() {
-            Some(Event::Mark { step, text }) => {
-                let mark = format!("mark '{text}' at step {step}");
-                self.events_at(now_ns).add_mark(mark);
-            }
-            Some(Event::Tears { step, count }) => self.events_at(now_ns).tears.add(step, count),
-            Some(Event::Frozen { step }) => self.events_at(now_ns).frozen.add(step, 1),
-            None => return,
-        }
-        if let (Some(events), Content::Update(message)) = (&mut self.events, content) {
-            events.last_step = events.last_step.max(message.step());
+        let Some(event) = content.event() else { return };
+        let events = self.events_at(now_ns);
+        events.last_step = events.last_step.max(event.step());
+        match event {
+            Event::Mark { step, text } => events.add_mark(format!("mark '{text}' at step {step}")),
+            Event::Tears { step, count } => events.tears.add(step, count),
+            Event::Frozen { step } => events.frozen.add(step, 1),
         }
     }
 
@@ -137,9 +133,9 @@ impl Trigger {
         events
     }
 
-    /// Returns `true` if there is an event whose file is not written. `last_step` is the last recorded one:
-    /// the file must show the effect.
-    pub(crate) fn has_event(&self, last_step: Option<u64>) -> bool {
+    /// Returns `true` if there is an event whose file is not written, and the file shows its effect.
+    /// `last_step` is the last recorded step.
+    pub(crate) fn has_shown_event(&self, last_step: Option<u64>) -> bool {
         self.events.as_ref().is_some_and(|events| last_step >= Some(events.last_step))
     }
 

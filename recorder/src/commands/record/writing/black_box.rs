@@ -94,7 +94,11 @@ impl BlackBox {
         self.parts.back_mut()?.closing = closing;
         match end {
             FileEnd::Write => self.take_all(),
-            FileEnd::KeepAll => None,
+            FileEnd::KeepAll => {
+                // A signal is no content, so only its part shows that it has come.
+                self.has_event = true;
+                None
+            }
             FileEnd::Keep => {
                 self.remove_before(now_ns);
                 None
@@ -165,28 +169,11 @@ fn repeats(content: &Content, first_step: Option<u64>, closing: &mut Closing) ->
 
 #[cfg(test)]
 mod tests {
-    use recorder::{AllCounts, ParametersRow, RunDescription, StepRow, TearsRow, Up};
+    use recorder::{AllCounts, ParametersRow, StepRow, TearsRow};
     use sim_contract::ParameterValues;
 
     use super::*;
-
-    fn header() -> Box<RunHeader> {
-        let run = RunDescription {
-            run_id: 7,
-            epoch_ns: 0,
-            scene_name: "points".to_owned(),
-            origin: [0.0; 3],
-            up: Up::Y,
-            rate_hz: 240,
-            method: 0,
-            particle_count: 1,
-            constraint_count: 0,
-            solver_version: 1,
-            contract_version: 1,
-            recorder_version: "0".to_owned(),
-        };
-        Box::new(RunHeader { run, scene: b"version = 1".to_vec(), rows: Vec::new() })
-    }
+    use crate::commands::record::writing::tests::header;
 
     fn update(message: Message, second: u64) -> Item {
         Item { content: Content::Update(message), log_time_ns: second * SECOND_NS }
@@ -199,7 +186,7 @@ mod tests {
     /// Adds a part of one second with one step each, whose parameters are those of step 0.
     fn add_part(black_box: &mut BlackBox, second: u64, end: FileEnd) -> Option<KeptFile> {
         // The wall clock goes back.
-        black_box.begin(header(), 1000 - second, second * SECOND_NS);
+        black_box.begin(Box::new(header()), 1000 - second, second * SECOND_NS);
         black_box.push(update(parameters(0), second));
         let row = StepRow { step: second, ..StepRow::default() };
         let content = Content::Snapshot(row, Vec::new());
@@ -261,5 +248,10 @@ mod tests {
         }
         let file = add_part(&mut black_box, 9, FileEnd::Write).unwrap();
         assert_eq!(steps(&file), [4, 5, 6, 7, 8, 9]);
+        // A signal shows only in the end of a part.
+        for second in 10..14 {
+            add_part(&mut black_box, second, FileEnd::KeepAll);
+        }
+        assert_eq!(steps(&add_part(&mut black_box, 14, FileEnd::Write).unwrap()).len(), 5);
     }
 }

@@ -29,7 +29,7 @@ struct Options {
     file: FileArgs,
 }
 
-fn header() -> RunHeader {
+pub(super) fn header() -> RunHeader {
     let run = RunDescription {
         run_id: 7,
         epoch_ns: 0,
