@@ -462,3 +462,17 @@ fn get_or_create<T, E>(
         None => Ok(slot.insert(create()?)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::client::tap::Tap;
+
+    #[test]
+    fn clients_taps_and_snapshots_can_move_to_another_thread() {
+        fn require_send<T: Send>() {}
+        require_send::<Client>();
+        require_send::<Tap>();
+        require_send::<Snapshot>();
+    }
+}
