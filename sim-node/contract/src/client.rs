@@ -260,6 +260,20 @@ impl Client {
         let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
         let missed_before = commander.missed_count();
         let sequence = commander.send(&self.attachment, action)?;
+        let outcome = self.wait_for_outcome(sequence, missed_before, timeout);
+        self.forget(sequence);
+        outcome
+    }
+
+    /// Waits for the outcome of a command that [`Client::send`] has sent. After a timeout, it can be called
+    /// again: a program that must react to something else waits in short parts.
+    ///
+    /// # Errors
+    /// Same as [`Client::request`].
+    pub fn outcome(&mut self, sequence: u64, timeout: Duration) -> Result<Outcome, RequestError> {
+        self.check_turn()?;
+        let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
+        let missed_before = commander.missed_count();
         self.wait_for_outcome(sequence, missed_before, timeout)
     }
 
@@ -279,6 +293,7 @@ impl Client {
         let missed_before = commander.missed_count();
         let (sequence, writer) = commander.send_state(&self.attachment, state)?;
         let outcome = self.wait_for_outcome(sequence, missed_before, timeout);
+        self.forget(sequence);
         // The message vanishes with its writer.
         drop(writer);
         outcome
@@ -303,11 +318,17 @@ impl Client {
         if let Some(outcome) = self.watch.wait_for(&self.attachment, timeout, poll)? {
             return Ok(outcome);
         }
-        commander.forget(sequence);
         Err(match commander.missed_count() - missed_before {
             0 => RequestError::timeout(&self.attachment, sequence, timeout),
             missed_count => RequestError::OutcomesMissed { sequence, timeout, missed_count },
         })
+    }
+
+    /// Ignores a late outcome of a command.
+    fn forget(&mut self, sequence: u64) {
+        if let Some(commander) = &mut self.commander {
+            commander.forget(sequence);
+        }
     }
 
     /// Returns the next outcome of this client's commands, in the order of application. Outcomes that
@@ -399,6 +420,11 @@ impl Client {
         self.member.as_mut().ok_or(LockstepError::NotJoined)?.ready()
     }
 
+    /// Leaves the lockstep: the node no longer waits for this client.
+    pub fn leave_lockstep(&mut self) {
+        self.member = None;
+    }
+
     /// Returns `true` if the process that owns the name is alive. Reads the file system: call it a few
     /// times per second at most.
     pub fn is_owner_alive(&self) -> bool {
@@ -460,19 +486,5 @@ fn get_or_create<T, E>(
     match slot {
         Some(value) => Ok(value),
         None => Ok(slot.insert(create()?)),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::client::tap::Tap;
-
-    #[test]
-    fn clients_taps_and_snapshots_can_move_to_another_thread() {
-        fn require_send<T: Send>() {}
-        require_send::<Client>();
-        require_send::<Tap>();
-        require_send::<Snapshot>();
     }
 }

@@ -8,7 +8,7 @@ use std::thread;
 use sim_contract::testing::TestDomain;
 use sim_contract::{
     Action, COMMANDS_BUFFERED, CONSOLE_CLIENT_ID, Client, Command, Endpoint, OUTCOMES_BUFFERED,
-    Outcome, Owner, OwnerState, RequestError,
+    Outcome, Owner, OwnerState, RequestError, Snapshot, Tap,
 };
 
 use crate::support::{DEADLINE, MOMENT, answer_commands, create_owner, publish_step};
@@ -254,4 +254,26 @@ fn a_client_that_sends_without_a_pause_does_not_keep_others_from_being_received(
         let is_fair = |(flood, other): &(usize, usize)| *flood <= COMMANDS_BUFFERED && *other == 1;
         assert!(counts.iter().all(is_fair), "{counts:?}");
     });
+}
+
+#[test]
+fn a_client_waits_in_parts_for_the_outcome_of_a_sent_command() {
+    let domain = TestDomain::new();
+    let owner = create_owner(&domain.endpoint()).unwrap();
+    publish_step(&owner, 8);
+    let mut client = Client::attach(&domain.endpoint()).unwrap();
+    let sequence = client.send(PIN).unwrap();
+    let early = client.outcome(sequence, MOMENT).unwrap_err();
+    assert!(matches!(early, RequestError::Timeout { timeout: MOMENT, .. }), "{early}");
+    answer_commands(&owner, 9, &mut 0);
+    let outcome = client.outcome(sequence, DEADLINE).unwrap();
+    assert_eq!((outcome.command.sequence, outcome.command.action()), (sequence, PIN));
+}
+
+#[test]
+fn clients_taps_and_snapshots_move_between_threads() {
+    fn require_send<T: Send>() {}
+    require_send::<Client>();
+    require_send::<Tap>();
+    require_send::<Snapshot>();
 }
