@@ -252,12 +252,15 @@ fn a_live_recording_with_rewinds_and_states_verifies() {
         }
         recorded.success();
         assert_eq!(report["verdict"], "identical", "{report}");
-        assert_rewinds_go_to_recorded_states(&file);
+        let compared_count = assert_rewinds_go_to_recorded_states(&file);
+        // Of every 7th step, possibly none is the target of a rewind.
+        assert!(compared_count > 0 || options.contains(&"--every"));
     }
 }
 
-/// Asserts that the state of each rewind is that of the recorded step that its outcome names.
-fn assert_rewinds_go_to_recorded_states(file: &str) {
+/// Asserts that the state of each rewind is that of the step that its outcome names, if that step was
+/// recorded. Returns the number of compared states.
+fn assert_rewinds_go_to_recorded_states(file: &str) -> usize {
     let frames = frames(file);
     let frame = |step| frames.iter().find(|frame| frame.row.step == step);
     let updates = frames.iter().flat_map(|frame| &frame.updates);
@@ -275,7 +278,7 @@ fn assert_rewinds_go_to_recorded_states(file: &str) {
         assert!(now.particles == then.particles);
         count += 1;
     }
-    assert!(count > 0);
+    count
 }
 
 #[test]
