@@ -1,0 +1,91 @@
+"""Catenary: a real-time simulation of particles and constraints, in NumPy arrays.
+
+    import catenary
+
+    node = catenary.attach("sim")            # a running `sim-node run`
+    for snapshot in node.snapshots():
+        print(snapshot.step, snapshot.positions[:, 1].min())
+
+    simulation = catenary.Simulation("curtain")   # the solver in this process
+    recording = catenary.open("run.mcap")         # a recording of `recorder record`
+
+Positions and velocities are read-only arrays without a copy. Lengths are in metres, times in seconds,
+masses in kilograms, unless the scene says otherwise.
+"""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+
+from catenary._catenary import Action, Outcome, Snapshot, State, Topology, scene_names
+from catenary._errors import (
+    Error,
+    NotRunning,
+    RecordingError,
+    Rejected,
+    SceneError,
+    StateError,
+    Timeout,
+    TooManySnapshots,
+)
+from catenary._node import Batch, Lockstep, Node
+from catenary._recording import Arrays, Recording, Steps
+from catenary._simulation import Simulation
+
+__all__ = [
+    "ANCHORED",
+    "CONSTRAINT_KINDS",
+    "FROZEN",
+    "GRABBED",
+    "PINNED",
+    "Action",
+    "Arrays",
+    "Batch",
+    "Error",
+    "Lockstep",
+    "Node",
+    "NotRunning",
+    "Outcome",
+    "Recording",
+    "RecordingError",
+    "Rejected",
+    "SceneError",
+    "Simulation",
+    "Snapshot",
+    "State",
+    "StateError",
+    "Steps",
+    "Timeout",
+    "TooManySnapshots",
+    "Topology",
+    "attach",
+    "open",
+    "scene_names",
+]
+
+PINNED, GRABBED, ANCHORED, FROZEN = 1, 2, 4, 8
+"""Bits of `Snapshot.flags`."""
+CONSTRAINT_KINDS = ("structural", "shear", "bend", "tether")
+"""Names of the numbers in `Topology.kinds`."""
+
+
+def attach(
+    name: str = "sim",
+    *,
+    domain: str | None = None,
+    timeout: float = 0.0,
+    client_id: int | None = None,
+) -> Node:
+    """Attaches to the node that runs under a name, or waits for it for up to `timeout` seconds.
+
+    `domain` is that of `sim-node run --domain`; without it, the environment variable CATENARY_DOMAIN counts.
+    `client_id`, below 2^53, names this client in outcomes and recordings; it is random by default.
+
+    Raises `NotRunning` if there is no such node.
+    """
+    return Node(name, domain=domain, timeout=timeout, client_id=client_id)
+
+
+def open(path: str | PathLike[str]) -> Recording:
+    """Opens a recording, finished or not. Raises `RecordingError` if it cannot be read."""
+    return Recording(fspath(path))

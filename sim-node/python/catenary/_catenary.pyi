@@ -1,0 +1,391 @@
+"""The native part of the module."""
+
+from types import TracebackType
+from typing import Any, Literal, Self, final
+
+import numpy.typing as npt
+
+from catenary._types import Floats, Vector, Wholes
+
+__all__ = [
+    "Action",
+    "Lockstep",
+    "Node",
+    "Outcome",
+    "Recording",
+    "Simulation",
+    "Snapshot",
+    "State",
+    "Topology",
+    "scene_names",
+]
+
+def scene_names() -> list[str]:
+    """Returns the names of the built-in scenes."""
+
+@final
+class Snapshot:
+    """The particles after a step.
+
+    The arrays view the particles without a copy, and are read-only. Each of them keeps the snapshot alive. A
+    node lends a program at most 4 snapshots at a time, so keep copies: `snapshot.positions.copy()`.
+    """
+
+    @property
+    def positions(self) -> Floats:
+        """Positions in metres, relative to the origin of the scene. Shape: (particles, 3)."""
+    @property
+    def velocities(self) -> Floats:
+        """Velocities in metres per second. Shape: (particles, 3)."""
+    @property
+    def inverse_masses(self) -> Floats:
+        """Inverse masses in 1/kg; 0 for particles that the step does not move. Shape: (particles,)."""
+    @property
+    def flags(self) -> Wholes:
+        """Sums of PINNED, GRABBED, ANCHORED and FROZEN. Shape: (particles,)."""
+    @property
+    def step(self) -> int:
+        """Number of the step in its run."""
+    @property
+    def scene_step(self) -> int:
+        """Number of steps since the scene was loaded, reset or restored."""
+    @property
+    def time(self) -> float:
+        """Simulated time since step 0, in seconds."""
+    @property
+    def hash(self) -> int:
+        """Hash of the state: equal states have equal hashes on every machine."""
+    @property
+    def run_id(self) -> int:
+        """Number of the run. Steps begin at 0 in each run."""
+    @property
+    def snapshot_index(self) -> int:
+        """Number of snapshots that the run has published before. A gap shows missed ones."""
+    @property
+    def topology_revision(self) -> int:
+        """Number of the load in this run."""
+    @property
+    def torn_count(self) -> int:
+        """Number of torn constraints."""
+    @property
+    def outcome_count(self) -> int:
+        """Number of outcomes that are part of this state."""
+    @property
+    def is_paused(self) -> bool:
+        """True if the node was paused when it made this step."""
+    @property
+    def is_replay(self) -> bool:
+        """True if `recorder play` publishes it."""
+    @property
+    def published_at(self) -> float:
+        """Time of publication in seconds, on the clock of `time.monotonic`."""
+    @property
+    def solve_time(self) -> float:
+        """Time that the solver took for this step, in seconds."""
+    @property
+    def wake_lateness(self) -> float:
+        """Delay of the start of the step after its deadline, in seconds."""
+    def to_bytes(self) -> bytes:
+        """Returns the particles as they are published and recorded: 32 bytes each, little-endian."""
+    def copy(self) -> Snapshot:
+        """Returns the snapshot in the memory of this process, so that it can be kept."""
+    def __len__(self) -> int: ...
+
+@final
+class Topology:
+    """The constraints of a scene, as loaded."""
+
+    @property
+    def ends(self) -> Wholes:
+        """Indices of the two particles of each constraint. Shape: (constraints, 2)."""
+    @property
+    def rest_lengths(self) -> Floats:
+        """Rest lengths in metres. Shape: (constraints,)."""
+    @property
+    def compliances(self) -> Floats:
+        """Compliances in m/N, or stiffnesses from 0 to 1 with method "pbd". Shape: (constraints,)."""
+    @property
+    def kinds(self) -> Wholes:
+        """Kinds: indices into CONSTRAINT_KINDS. Shape: (constraints,)."""
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """Origin of all positions, in metres."""
+    @property
+    def rate(self) -> int:
+        """Steps per second."""
+    @property
+    def method(self) -> Literal["xpbd", "pbd"]:
+        """Method of the solver."""
+    @property
+    def scene_hash(self) -> int:
+        """Hash of the scene: a state belongs to the scene with the same one."""
+    def __len__(self) -> int: ...
+
+@final
+class Outcome:
+    """The answer to a command."""
+
+    @property
+    def is_applied(self) -> bool:
+        """True if the command took effect; False if it was rejected and changed nothing."""
+    @property
+    def reason(self) -> str | None:
+        """Name of the reason of a rejection, such as "unknown_particle"."""
+    @property
+    def step(self) -> int:
+        """First step that shows the effect."""
+    @property
+    def index(self) -> int:
+        """Number of the outcome in its run, without gaps."""
+    @property
+    def sequence(self) -> int:
+        """Number of the command among those of its client."""
+    @property
+    def client_id(self) -> int:
+        """Id of the client that sent the command."""
+    @property
+    def command(self) -> dict[str, Any]:
+        """The command as recordings store it: "kind" and its fields."""
+    @property
+    def begins_run(self) -> bool:
+        """True for a load that began a new run."""
+
+@final
+class State:
+    """A complete state of a scene: it can be pickled, sent to another process and restored."""
+
+    def __new__(cls, scene_hash: int, particles: bytes, keyframe: bytes) -> Self: ...
+    @property
+    def scene_hash(self) -> int:
+        """Hash of the scene that the state belongs to."""
+    @property
+    def hash(self) -> int:
+        """Hash of the state, as in `Snapshot.hash`."""
+    def __len__(self) -> int: ...
+    def __getnewargs__(self) -> tuple[int, bytes, bytes]: ...
+
+@final
+class Action:
+    """A command without its sender. The methods of `Commands` describe each of them."""
+
+    @staticmethod
+    def pin(particle: int) -> Action: ...
+    @staticmethod
+    def unpin(particle: int) -> Action: ...
+    @staticmethod
+    def grab(particle: int, target: Vector, over: float = ...) -> Action: ...
+    @staticmethod
+    def move(particle: int, target: Vector, over: float = ...) -> Action: ...
+    @staticmethod
+    def release(particle: int, *, force: bool = False) -> Action: ...
+    @staticmethod
+    def push(
+        center: Vector,
+        radius: float,
+        delta: Vector,
+        *,
+        limit: float | None = None,
+    ) -> Action: ...
+    @staticmethod
+    def cut(constraint: int) -> Action: ...
+    @staticmethod
+    def cut_radius(center: Vector, radius: float) -> Action: ...
+    @staticmethod
+    def cut_segment(
+        start: Vector, end: Vector, direction: Vector = ...
+    ) -> Action: ...
+    @staticmethod
+    def move_anchor(
+        anchor: int, translation: Vector, rotation: Vector = ...
+    ) -> Action: ...
+    @staticmethod
+    def move_collider(
+        collider: int, translation: Vector, rotation: Vector = ...
+    ) -> Action: ...
+    @staticmethod
+    def set(
+        parameter: str, value: float | Vector | None, kind: str | None = None
+    ) -> Action: ...
+    @staticmethod
+    def load(scene: str) -> Action: ...
+    @staticmethod
+    def pause() -> Action: ...
+    @staticmethod
+    def resume() -> Action: ...
+    @staticmethod
+    def step(count: int = 1) -> Action: ...
+    @staticmethod
+    def reset() -> Action: ...
+    @staticmethod
+    def rewind(*, to_step: int | None = None, back_steps: int | None = None) -> Action: ...
+    @staticmethod
+    def mark(text: str) -> Action: ...
+    @staticmethod
+    def from_dict(fields: dict[str, Any]) -> Action:
+        """Returns the action of a dict such as `Outcome.command`."""
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the action as recordings store it."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+class Node:
+    def __new__(
+        cls,
+        name: str = "sim",
+        *,
+        domain: str | None = None,
+        timeout: float = 0.0,
+        client_id: int | None = None,
+    ) -> Self: ...
+    @property
+    def client_id(self) -> int:
+        """Id of this client in outcomes and recordings."""
+    @property
+    def is_running(self) -> bool:
+        """True if a process runs under the name. Reads the file system: ask a few times per second at most."""
+    def close(self) -> None:
+        """Detaches. Snapshots that are still held stay valid."""
+    def next_snapshot(self, timeout: float | None = None) -> Snapshot | None:
+        """Returns the oldest unread snapshot, or waits for the next one. None if the node has ended.
+
+        Raises `Timeout` if none comes in time, and `TooManySnapshots` if the program holds too many.
+        """
+    def latest(self, timeout: float | None = 5.0) -> Snapshot:
+        """Returns the newest snapshot. Waits only for the first one."""
+    def state(self) -> State:
+        """Returns the newest complete state, which `restore` puts in place again."""
+    def topology(self) -> Topology:
+        """Returns the constraints."""
+    def surface(self) -> Wholes:
+        """Returns the particles of each triangle of the surface. Shape: (triangles, 3)."""
+    def scene(self) -> str:
+        """Returns the scene as TOML, with every default written out."""
+    def parameters(self) -> dict[str, Any]:
+        """Returns the current parameters by name. None is off."""
+    def status(self) -> dict[str, Any]:
+        """Returns the status of the node, with the keys of `sim-node ctl status --json`."""
+    def torn(self) -> Wholes:
+        """Returns the indices of the torn constraints, in the order of tearing."""
+    def colliders(self) -> list[dict[str, Any]]:
+        """Returns the colliders in their newest poses."""
+    def send(self, action: Action) -> int:
+        """Sends an action without waiting. Returns its sequence number, for `outcome`."""
+    def outcome(self, sequence: int, timeout: float | None = 5.0) -> Outcome:
+        """Waits for the outcome of a sent action, applied or rejected."""
+    def request(self, action: Action, timeout: float | None = 5.0) -> Outcome:
+        """Sends an action and waits for its outcome. Raises `Rejected` if it was rejected."""
+    def restore(self, state: State | Snapshot, timeout: float = 5.0) -> Outcome:
+        """Puts a state in place, and continues from it.
+
+        A `State` replaces everything. A `Snapshot` replaces only positions and velocities.
+        """
+    def set_motion(
+        self, positions: npt.ArrayLike, velocities: npt.ArrayLike, timeout: float = 5.0
+    ) -> Outcome:
+        """Replaces the positions and velocities of all particles. Shape of both: (particles, 3)."""
+
+class Lockstep:
+    def __new__(cls, node: Node, every: int = 1, *, timeout: float = 10.0) -> Self: ...
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """Outcomes that came with the last snapshot."""
+    def send(self, action: Action) -> int:
+        """Sends an action for the next step. Returns its sequence number."""
+    def __enter__(self) -> Self: ...
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+        /,
+    ) -> None: ...
+    def __iter__(self) -> Self: ...
+    def __next__(self) -> Snapshot: ...
+
+class Simulation:
+    def __new__(
+        cls, scene: str | None = None, threads: int = 1, *, toml: str | None = None
+    ) -> Self: ...
+    def step(self, count: int = 1) -> None:
+        """Makes `count` steps. Other threads of the interpreter run meanwhile; Ctrl-C ends it between steps."""
+    def apply(self, action: Action) -> None:
+        """Applies an action before the next step. Raises `Rejected` if it is wrong or has no effect here."""
+    def snapshot(self) -> Snapshot:
+        """Returns a copy of the current state."""
+    @property
+    def positions(self) -> Floats:
+        """Copy of the current positions in metres. Shape: (particles, 3)."""
+    @property
+    def velocities(self) -> Floats:
+        """Copy of the current velocities in metres per second. Shape: (particles, 3)."""
+    @property
+    def hash(self) -> int:
+        """Hash of the current state."""
+    @property
+    def step_count(self) -> int:
+        """Number of steps so far."""
+    @property
+    def time(self) -> float:
+        """Simulated time of these steps, in seconds."""
+    @property
+    def rate(self) -> int:
+        """Steps per second."""
+    def scene(self) -> str:
+        """Returns the scene as TOML, with every default written out."""
+    def topology(self) -> Topology:
+        """Returns the constraints."""
+    def surface(self) -> Wholes:
+        """Returns the particles of each triangle of the surface. Shape: (triangles, 3)."""
+    def parameters(self) -> dict[str, Any]:
+        """Returns the current parameters by name. None is off."""
+    def torn(self) -> Wholes:
+        """Returns the indices of the torn constraints, in the order of tearing."""
+    def state(self) -> State:
+        """Returns the complete state, which `restore` puts in place again."""
+    def restore(self, state: State) -> None:
+        """Puts a state of the same scene in place. Raises `StateError` if it belongs to another scene."""
+    def reset(self) -> None:
+        """Puts the initial state and parameters in place. `step_count` continues."""
+    def __len__(self) -> int: ...
+
+class Recording:
+    def __new__(cls, path: str) -> Self: ...
+    @property
+    def path(self) -> str:
+        """Path of the file."""
+    @property
+    def first_step(self) -> int:
+        """First recorded step."""
+    @property
+    def last_step(self) -> int:
+        """Last recorded step."""
+    @property
+    def rate(self) -> int:
+        """Steps per second."""
+    @property
+    def scene_name(self) -> str:
+        """Name of the scene."""
+    @property
+    def particle_count(self) -> int:
+        """Number of particles."""
+    @property
+    def run_id(self) -> int:
+        """Number of the recorded run."""
+    def scene(self) -> str:
+        """Returns the scene as TOML."""
+    def topology(self) -> Topology:
+        """Returns the constraints."""
+    def surface(self) -> Wholes:
+        """Returns the particles of each triangle of the surface. Shape: (triangles, 3)."""
+    def at_or_before(self, step: int) -> Snapshot:
+        """Returns the snapshot of the last recorded step up to `step`, or else the first one."""
+    def step_at(self, step: int) -> int:
+        """Returns the last recorded step up to `step`, or else the first one."""
+    def step_after(self, step: int) -> int | None:
+        """Returns the first recorded step after `step`."""
+    def torn(self, step: int) -> Wholes:
+        """Returns the indices of the constraints that are torn at a step, in the order of tearing."""
+    def steps(self) -> dict[str, npt.NDArray[Any]]:
+        """Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`."""
+    def outcomes(self) -> list[dict[str, Any]]:
+        """Returns the outcomes of all commands, by row: `pandas.DataFrame(recording.outcomes())`."""

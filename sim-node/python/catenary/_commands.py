@@ -1,0 +1,110 @@
+"""Commands, with the same names and arguments for nodes, lockstep members and simulations."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, Generic, TypeVar
+
+from catenary._catenary import Action
+from catenary._types import Vector
+
+Result = TypeVar("Result")
+
+
+class Commands(ABC, Generic[Result]):
+    """The commands. Each of them takes effect before the next step."""
+
+    @abstractmethod
+    def _perform(self, action: Action) -> Result:
+        """Performs the action of a command."""
+
+    def pin(self, particle: int) -> Result:
+        """Holds a particle in place."""
+        return self._perform(Action.pin(particle))
+
+    def unpin(self, particle: int) -> Result:
+        """Frees a pinned particle. It starts at rest."""
+        return self._perform(Action.unpin(particle))
+
+    def grab(self, particle: int, target: Vector, over: float = 1 / 60) -> Result:
+        """Grabs a particle and moves it along a straight line to `target`.
+
+        `over` is the time to the target, from 0 to 0.25 s. The particle follows only this client until
+        `release`, or until the client ends.
+        """
+        return self._perform(Action.grab(particle, target, over))
+
+    def move(self, particle: int, target: Vector, over: float = 1 / 60) -> Result:
+        """Sets a new target for a particle that this client has grabbed. See `grab`."""
+        return self._perform(Action.move(particle, target, over))
+
+    def release(self, particle: int, *, force: bool = False) -> Result:
+        """Releases a grabbed particle with its velocity. `force` also ends the grab of another client."""
+        return self._perform(Action.release(particle, force=force))
+
+    def push(
+        self, center: Vector, radius: float, delta: Vector, *, limit: float | None = None
+    ) -> Result:
+        """Sets the velocity of each free particle within `radius` of `center`.
+
+        In the next step, these particles move by `delta`, in metres. `limit` bounds the magnitude of each
+        component of `delta`.
+        """
+        return self._perform(Action.push(center, radius, delta, limit=limit))
+
+    def cut(self, constraint: int) -> Result:
+        """Tears a constraint."""
+        return self._perform(Action.cut(constraint))
+
+    def cut_radius(self, center: Vector, radius: float) -> Result:
+        """Tears each constraint with an end within `radius` of `center`."""
+        return self._perform(Action.cut_radius(center, radius))
+
+    def cut_segment(
+        self, start: Vector, end: Vector, direction: Vector = (0.0, 0.0, 1.0)
+    ) -> Result:
+        """Tears each constraint that crosses the segment, extended to both sides along `direction`."""
+        return self._perform(Action.cut_segment(start, end, direction))
+
+    def move_anchor(
+        self, anchor: int, translation: Vector, rotation: Vector = (0.0, 0.0, 0.0, 1.0)
+    ) -> Result:
+        """Moves an anchor of the scene to a pose relative to the loaded one. It stays there.
+
+        `rotation` is a quaternion x, y, z, w.
+        """
+        return self._perform(Action.move_anchor(anchor, translation, rotation))
+
+    def move_collider(
+        self, collider: int, translation: Vector, rotation: Vector = (0.0, 0.0, 0.0, 1.0)
+    ) -> Result:
+        """Moves a collider to a pose relative to the loaded one, during the next step.
+
+        Particles in contact feel the velocity of the motion. `rotation` is a quaternion x, y, z, w.
+        """
+        return self._perform(Action.move_collider(collider, translation, rotation))
+
+    def set(self, **values: float | Vector | Mapping[str, float] | None) -> Result:
+        """Sets parameters by name, such as `set(gravity=(0, 0, 0), damping=0.5)`. None turns one off.
+
+        `compliance` and `stiffness` take a number for all constraints, or a dict with a number for each kind,
+        such as `{"shear": 0.5}`. Each parameter is a command of its own, in the order given; the result is
+        that of the last one.
+        """
+        actions = [action for name, value in values.items() for action in _settings(name, value)]
+        if not actions:
+            raise TypeError("give at least one parameter, such as set(damping=0.5)")
+        return [self._perform(action) for action in actions][-1]
+
+    def mark(self, text: str) -> Result:
+        """Marks the step in recordings. Changes nothing else."""
+        return self._perform(Action.mark(text))
+
+
+def _settings(name: str, value: Any) -> list[Action]:
+    if not isinstance(value, Mapping):
+        return [Action.set(name, value)]
+    if not value:
+        raise TypeError(f"`{name}` is empty: give a number for a kind, such as {{'shear': 0.5}}")
+    return [Action.set(name, number, kind) for kind, number in value.items()]

@@ -1,0 +1,109 @@
+"""Recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary import _catenary
+from catenary._catenary import Snapshot
+
+
+class Recording(_catenary.Recording):
+    """A recording. Its keys are steps: `recording[480]`, `recording[240:480:4]`.
+
+    A recording of every n-th step, or one with losses, lacks some steps: a single step that is missing raises
+    `KeyError`, and a slice leaves it out.
+    """
+
+    @overload
+    def __getitem__(self, key: int) -> Snapshot: ...
+    @overload
+    def __getitem__(self, key: slice) -> Steps: ...
+    def __getitem__(self, key: int | slice) -> Snapshot | Steps:
+        if isinstance(key, slice):
+            return Steps(self, self._range(key))
+        if key < 0 or self.step_at(key) != key:
+            raise KeyError(
+                f"{self.path} has no step {key} (it has {self.first_step} to {self.last_step})"
+            )
+        return self.at_or_before(key)
+
+    def at(self, time: float) -> Snapshot:
+        """Returns the last snapshot up to a simulated time in seconds since step 0."""
+        if not 0 <= time < float("inf"):
+            raise ValueError(f"the time is {time} (allowed: 0 or more seconds)")
+        return self.at_or_before(int(time * self.rate + 1e-6))
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        return iter(self[:])
+
+    def to_numpy(self, start: int | None = None, stop: int | None = None, every: int = 1) -> Arrays:
+        """Reads the snapshots of a range of steps into arrays. `stop` itself is not included."""
+        return self[start:stop:every].to_numpy()
+
+    def _range(self, key: slice) -> range:
+        every = 1 if key.step is None else key.step
+        if every < 1:
+            raise ValueError(f"the step of the slice is {every} (allowed: 1 or more)")
+        start = self.first_step if key.start is None else key.start
+        stop = self.last_step + 1 if key.stop is None else key.stop
+        if start < 0 or stop < 0:
+            raise ValueError("steps count from 0, so a slice has no negative ends")
+        return range(start, min(stop, self.last_step + 1), every)
+
+
+@dataclass
+class Arrays:
+    """The snapshots of a range of steps."""
+
+    steps: npt.NDArray[np.uint64]
+    """Steps. Shape: (snapshots,)."""
+    times: npt.NDArray[np.float64]
+    """Simulated times in seconds. Shape: (snapshots,)."""
+    hashes: npt.NDArray[np.uint64]
+    """State hashes. Shape: (snapshots,)."""
+    positions: npt.NDArray[np.float32]
+    """Positions in metres. Shape: (snapshots, particles, 3)."""
+    velocities: npt.NDArray[np.float32]
+    """Velocities in metres per second. Shape: (snapshots, particles, 3)."""
+
+
+class Steps:
+    """The snapshots of a range of steps, read one by one as a loop reaches them."""
+
+    def __init__(self, recording: Recording, steps: range) -> None:
+        self._recording = recording
+        self._range = steps
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        step: int | None = self._first()
+        while step is not None and step < self._range.stop:
+            if (step - self._range.start) % self._range.step == 0:
+                yield self._recording.at_or_before(step)
+            step = self._recording.step_after(step)
+
+    def _first(self) -> int | None:
+        start = self._range.start
+        found = self._recording.step_at(start)
+        return found if found >= start else self._recording.step_after(found)
+
+    def to_numpy(self) -> Arrays:
+        """Reads all of the snapshots into arrays."""
+        snapshots = list(self)
+        shape = (len(snapshots), self._recording.particle_count, 3)
+        arrays = Arrays(
+            steps=np.array([one.step for one in snapshots], np.uint64),
+            times=np.array([one.time for one in snapshots], np.float64),
+            hashes=np.array([one.hash for one in snapshots], np.uint64),
+            positions=np.empty(shape, np.float32),
+            velocities=np.empty(shape, np.float32),
+        )
+        for index, snapshot in enumerate(snapshots):
+            arrays.positions[index] = snapshot.positions
+            arrays.velocities[index] = snapshot.velocities
+        return arrays

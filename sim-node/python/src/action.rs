@@ -1,0 +1,168 @@
+//! Actions: the commands without their sender.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Text};
+use sim_solver::scene::is_path;
+
+use crate::convert::{Quaternion, Vector, from_json, parameter_value};
+
+#[pyclass(frozen, eq, module = "catenary")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Action(pub(crate) sim_contract::Action);
+
+fn text(text: &str) -> PyResult<Text> {
+    Text::new(text).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// Returns a scene as the node finds it: its own working directory is another one.
+fn scene_text(scene: &str) -> PyResult<Text> {
+    if !is_path(scene) {
+        return text(scene);
+    }
+    text(&std::path::absolute(scene)?.to_string_lossy())
+}
+
+fn constraint_kind(name: &str) -> PyResult<KindFilter> {
+    ConstraintKind::from_name(name).map(KindFilter::Known).ok_or_else(|| {
+        let names = ConstraintKind::ALL.map(ConstraintKind::name).join(", ");
+        PyValueError::new_err(format!("there is no kind of constraint '{name}' (allowed: {names})"))
+    })
+}
+
+#[pymethods]
+impl Action {
+    #[staticmethod]
+    fn pin(particle: u32) -> Self {
+        Self(sim_contract::Action::Pin { particle })
+    }
+
+    #[staticmethod]
+    fn unpin(particle: u32) -> Self {
+        Self(sim_contract::Action::Unpin { particle })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (particle, target, over=GRAB_OVER_S_DEFAULT))]
+    fn grab(particle: u32, target: Vector, over: f32) -> Self {
+        Self(sim_contract::Action::Grab { particle, target: target.0, over_s: over })
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "move", signature = (particle, target, over=GRAB_OVER_S_DEFAULT))]
+    fn move_grabbed(particle: u32, target: Vector, over: f32) -> Self {
+        Self(sim_contract::Action::Move { particle, target: target.0, over_s: over })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (particle, *, force=false))]
+    fn release(particle: u32, force: bool) -> Self {
+        Self(sim_contract::Action::Release { particle, force })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (center, radius, delta, *, limit=None))]
+    fn push(center: Vector, radius: f32, delta: Vector, limit: Option<f32>) -> Self {
+        Self(sim_contract::Action::Push { center: center.0, radius, delta: delta.0, limit })
+    }
+
+    #[staticmethod]
+    fn cut(constraint: u32) -> Self {
+        Self(sim_contract::Action::Cut { constraint })
+    }
+
+    #[staticmethod]
+    fn cut_radius(center: Vector, radius: f32) -> Self {
+        Self(sim_contract::Action::CutRadius { center: center.0, radius })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (start, end, direction=Vector::Z))]
+    fn cut_segment(start: Vector, end: Vector, direction: Vector) -> Self {
+        let (from, to, direction) = (start.0, end.0, direction.0);
+        Self(sim_contract::Action::CutSegment { from, to, direction })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (anchor, translation, rotation=Quaternion::IDENTITY))]
+    fn move_anchor(anchor: u32, translation: Vector, rotation: Quaternion) -> Self {
+        let (translation, rotation) = (translation.0, rotation.0);
+        Self(sim_contract::Action::MoveAnchor { anchor, translation, rotation })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (collider, translation, rotation=Quaternion::IDENTITY))]
+    fn move_collider(collider: u32, translation: Vector, rotation: Quaternion) -> Self {
+        let (translation, rotation) = (translation.0, rotation.0);
+        Self(sim_contract::Action::MoveCollider { collider, translation, rotation })
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (parameter, value, kind=None))]
+    fn set(parameter: &str, value: &Bound<'_, PyAny>, kind: Option<&str>) -> PyResult<Self> {
+        Ok(Self(sim_contract::Action::Set {
+            parameter: text(parameter)?,
+            value: parameter_value(value)?,
+            constraint_kind: kind.map(constraint_kind).transpose()?,
+        }))
+    }
+
+    #[staticmethod]
+    fn load(scene: &str) -> PyResult<Self> {
+        Ok(Self(sim_contract::Action::Load { scene: scene_text(scene)? }))
+    }
+
+    #[staticmethod]
+    fn pause() -> Self {
+        Self(sim_contract::Action::Pause)
+    }
+
+    #[staticmethod]
+    fn resume() -> Self {
+        Self(sim_contract::Action::Resume)
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (count=1))]
+    fn step(count: u32) -> Self {
+        Self(sim_contract::Action::Step { count })
+    }
+
+    #[staticmethod]
+    fn reset() -> Self {
+        Self(sim_contract::Action::Reset)
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (*, to_step=None, back_steps=None))]
+    fn rewind(to_step: Option<u64>, back_steps: Option<u32>) -> PyResult<Self> {
+        if to_step.is_some() == back_steps.is_some() {
+            return Err(PyValueError::new_err("give either `to_step` or `back_steps`"));
+        }
+        Ok(Self(sim_contract::Action::Rewind { to_step, back_steps }))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "mark")]
+    fn mark_step(text: &str) -> PyResult<Self> {
+        Ok(Self(sim_contract::Action::Mark { text: self::text(text)? }))
+    }
+
+    /// The action as recordings store it.
+    #[allow(clippy::wrong_self_convention, reason = "Python passes a reference")]
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        from_json(py, &self.0)
+    }
+
+    /// The action of a dict such as `{"kind": "pin", "particle": 3}`.
+    #[staticmethod]
+    fn from_dict(fields: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let json = fields.py().import("json")?.call_method1("dumps", (fields,))?;
+        let action = serde_json::from_str(json.extract()?);
+        action.map(Self).map_err(|error| PyValueError::new_err(format!("not an action: {error}")))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("catenary.Action.from_dict({})", serde_json::to_string(&self.0).unwrap_or_default())
+    }
+}

@@ -1,0 +1,375 @@
+//! A connection to a running node.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use recorder::{CollidersRow, StatusRow};
+use sim_contract::{
+    AttachError, Client, Endpoint, GivenState, ParticleState, ReadError, RequestError,
+};
+
+use crate::action::Action;
+use crate::convert::{from_json, vectors};
+use crate::error::{NotRunning, Timeout, attach_error, endpoint_error, read_error, request_error};
+use crate::outcome::Outcome;
+use crate::patience::{PART, Patience, wait};
+use crate::process::OfProcess;
+use crate::scene::{Topology, corners};
+use crate::snapshot::Snapshot;
+use crate::state::{State, current_state};
+
+/// Longest wait for messages that a node has published once per load, in seconds.
+const LATCHED_TIMEOUT_S: f64 = 5.0;
+
+#[pyclass(frozen, subclass, module = "catenary")]
+#[derive(Debug)]
+pub(crate) struct Node {
+    pub(crate) endpoint: Endpoint,
+    client: Mutex<OfProcess<Client>>,
+    /// The newest snapshot that was read, which `latest` returns again until there is a newer one.
+    newest: Mutex<Option<Py<Snapshot>>>,
+}
+
+impl Node {
+    /// Calls `read` with parts of the wait until it returns a message. `None` after the timeout, or at the
+    /// end of the node.
+    pub(crate) fn read<T: Send>(
+        &self,
+        py: Python<'_>,
+        patience: Patience,
+        mut read: impl FnMut(&mut Client, Duration) -> PyResult<Option<T>> + Send,
+    ) -> PyResult<Option<T>> {
+        let mut is_ended = false;
+        let mut attempt = |part| {
+            let mut client = self.lock();
+            let client = client.get()?;
+            let value = read(client, part)?.map(Some);
+            // The loop ends with nothing at the end of the node.
+            is_ended = value.is_none() && !client.is_owner_alive();
+            Ok(value.or(is_ended.then_some(None)))
+        };
+        let value = wait(py, patience, &mut attempt)?;
+        Ok(value.flatten())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, OfProcess<Client>> {
+        self.client.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Calls a method of the client that does not wait.
+    pub(crate) fn call<T: Send>(
+        &self,
+        py: Python<'_>,
+        call: impl FnOnce(&mut Client) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| call(self.lock().get()?))
+    }
+
+    pub(crate) fn is_running(&self, py: Python<'_>) -> PyResult<bool> {
+        self.call(py, |client| Ok(client.is_owner_alive()))
+    }
+
+    /// Reads what the node has published once.
+    fn latched<T: Send>(
+        &self,
+        py: Python<'_>,
+        mut read: impl FnMut(&mut Client, Duration) -> Result<Option<T>, ReadError> + Send,
+    ) -> PyResult<T> {
+        let patience = Patience::new(Some(LATCHED_TIMEOUT_S))?;
+        let read = |client: &mut Client, part| read(client, part).map_err(|e| read_error(&e));
+        let message = self.read(py, patience, read)?;
+        message.map_or_else(|| Err(self.silence(py)?), Ok)
+    }
+
+    /// Returns the exception for a node that did not answer.
+    pub(crate) fn silence(&self, py: Python<'_>) -> PyResult<PyErr> {
+        let endpoint = &self.endpoint;
+        Ok(if self.is_running(py)? {
+            Timeout::new_err(format!(
+                "{endpoint} publishes nothing: is it paused, stopped or overloaded?"
+            ))
+        } else {
+            NotRunning::new_err(format!("no node runs as {endpoint} now"))
+        })
+    }
+
+    fn newest(&self) -> MutexGuard<'_, Option<Py<Snapshot>>> {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes an object of a snapshot, and keeps it as the newest one.
+    pub(crate) fn show(
+        &self,
+        py: Python<'_>,
+        snapshot: sim_contract::Snapshot,
+    ) -> PyResult<Py<Snapshot>> {
+        let snapshot = Py::new(py, Snapshot::shared(snapshot))?;
+        let replaced = self.newest().replace(snapshot.clone_ref(py));
+        // Outside of the lock, because it may run code of Python.
+        drop(replaced);
+        Ok(snapshot)
+    }
+}
+
+/// Attaches to a node, or waits for it.
+fn attach(
+    py: Python<'_>,
+    endpoint: &Endpoint,
+    client_id: Option<u64>,
+    timeout_s: f64,
+) -> PyResult<Client> {
+    let patience = Patience::new(Some(timeout_s))?;
+    loop {
+        let attached = py.detach(|| match client_id {
+            Some(client_id) => Client::attach_as(endpoint, client_id),
+            None => Client::attach(endpoint),
+        });
+        let is_absent =
+            matches!(attached, Err(AttachError::NoNode { .. } | AttachError::NoServices { .. }));
+        match attached {
+            Ok(client) => return Ok(client),
+            Err(_) if is_absent && !patience.is_over() => py.detach(|| pause(patience.part())),
+            Err(error) => return Err(attach_error(&error)),
+        }
+        py.check_signals()?;
+    }
+}
+
+fn pause(time: Duration) {
+    let time_ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+    sim_contract::clock::sleep_until(sim_contract::clock::monotonic_ns().saturating_add(time_ns));
+}
+
+#[pymethods]
+impl Node {
+    #[new]
+    #[pyo3(signature = (name="sim", *, domain=None, timeout=0.0, client_id=None))]
+    fn new(
+        py: Python<'_>,
+        name: &str,
+        domain: Option<&str>,
+        timeout: f64,
+        client_id: Option<u64>,
+    ) -> PyResult<Self> {
+        let endpoint = Endpoint::from_options(domain, Some(name));
+        let endpoint = endpoint.map_err(|error| endpoint_error(&error))?;
+        let client = attach(py, &endpoint, client_id, timeout)?;
+        let client = Mutex::new(OfProcess::new(client));
+        Ok(Self { endpoint, client, newest: Mutex::default() })
+    }
+
+    #[getter]
+    fn client_id(&self, py: Python<'_>) -> PyResult<u64> {
+        self.call(py, |client| Ok(client.client_id()))
+    }
+
+    #[getter(is_running)]
+    fn is_running_now(&self, py: Python<'_>) -> PyResult<bool> {
+        self.is_running(py)
+    }
+
+    fn close(&self, py: Python<'_>) {
+        self.newest().take();
+        py.detach(|| self.lock().close());
+    }
+
+    #[pyo3(signature = (timeout=None))]
+    fn next_snapshot(
+        &self,
+        py: Python<'_>,
+        timeout: Option<f64>,
+    ) -> PyResult<Option<Py<Snapshot>>> {
+        let patience = Patience::new(timeout)?;
+        let snapshot = self.read(py, patience, |client, part| {
+            client.next_snapshot(part).map_err(|error| read_error(&error))
+        })?;
+        match snapshot {
+            Some(snapshot) => self.show(py, snapshot).map(Some),
+            None if self.is_running(py)? => Err(self.silence(py)?),
+            None => Ok(None),
+        }
+    }
+
+    #[pyo3(signature = (timeout=5.0))]
+    fn latest(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Py<Snapshot>> {
+        let newer = self.call(py, |client| {
+            client.latest_snapshot(Duration::ZERO).map_err(|error| read_error(&error))
+        })?;
+        if let Some(snapshot) = newer {
+            return self.show(py, snapshot);
+        }
+        if let Some(snapshot) = &*self.newest() {
+            return Ok(snapshot.clone_ref(py));
+        }
+        let snapshot = self.read(py, Patience::new(timeout)?, |client, part| {
+            client.latest_snapshot(part).map_err(|error| read_error(&error))
+        })?;
+        match snapshot {
+            Some(snapshot) => self.show(py, snapshot),
+            None => Err(self.silence(py)?),
+        }
+    }
+
+    fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
+        let topology = self.latched(py, Client::topology)?;
+        Topology::new(py, &topology.header, &topology.constraints)
+    }
+
+    fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        corners(py, &self.latched(py, Client::surface)?.triangles)
+    }
+
+    fn scene(&self, py: Python<'_>) -> PyResult<String> {
+        self.latched(py, Client::scene)
+    }
+
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        from_json(py, &self.latched(py, Client::parameters)?.values)
+    }
+
+    fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        from_json(py, &StatusRow::from(&self.latched(py, Client::status)?))
+    }
+
+    fn torn<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let torn = self.latched(py, |client, part| client.torn(part).map(Some))?;
+        Ok(PyArray1::from_iter(py, torn.indices()))
+    }
+
+    fn colliders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let colliders = self.latched(py, |client, part| client.colliders(part).map(Some))?;
+        let row = CollidersRow::new(colliders.header.step, &colliders.colliders);
+        from_json(py, &row.map_or_else(Vec::new, |row| row.colliders))
+    }
+
+    fn send(&self, py: Python<'_>, action: &Action) -> PyResult<u64> {
+        let action = action.0;
+        self.call(py, |client| client.send(action).map_err(|error| request_error(&error)))
+    }
+
+    #[pyo3(signature = (sequence, timeout=5.0))]
+    fn outcome(&self, py: Python<'_>, sequence: u64, timeout: Option<f64>) -> PyResult<Outcome> {
+        let patience = Patience::new(timeout)?;
+        let mut last = None;
+        let outcome =
+            wait(py, patience, |part| match self.lock().get()?.outcome(sequence, part) {
+                Ok(outcome) => Ok(Some(outcome)),
+                Err(
+                    error @ (RequestError::Timeout { .. } | RequestError::OutcomesMissed { .. }),
+                ) => {
+                    last = Some(error);
+                    Ok(None)
+                }
+                Err(error) => Err(request_error(&error)),
+            })?;
+        match (outcome, last) {
+            (Some(outcome), _) => Ok(Outcome(outcome)),
+            (None, Some(error)) => Err(request_error(&with_timeout(error, timeout))),
+            (None, None) => Err(self.silence(py)?),
+        }
+    }
+
+    #[pyo3(signature = (action, timeout=5.0))]
+    fn request(&self, py: Python<'_>, action: &Action, timeout: Option<f64>) -> PyResult<Outcome> {
+        Patience::new(timeout)?;
+        let sequence = self.send(py, action)?;
+        self.outcome(py, sequence, timeout)?.require_applied(py)
+    }
+
+    #[pyo3(signature = (state, timeout=5.0))]
+    fn restore(&self, py: Python<'_>, state: &Bound<'_, PyAny>, timeout: f64) -> PyResult<Outcome> {
+        Patience::new(Some(timeout))?;
+        let timeout = Duration::try_from_secs_f64(timeout).unwrap_or(Duration::MAX);
+        let outcome = if let Ok(state) = state.cast::<State>() {
+            let state = state.get();
+            self.call(py, |client| restore(client, &state.given(), timeout))?
+        } else if let Ok(snapshot) = state.cast::<Snapshot>() {
+            let particles = snapshot.get().memory().particles().to_vec();
+            self.restore_motion(py, &particles, timeout)?
+        } else {
+            return Err(PyTypeError::new_err("expected a State or a Snapshot"));
+        };
+        Outcome(outcome).require_applied(py)
+    }
+
+    #[pyo3(signature = (positions, velocities, timeout=5.0))]
+    fn set_motion(
+        &self,
+        py: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        velocities: &Bound<'_, PyAny>,
+        timeout: f64,
+    ) -> PyResult<Outcome> {
+        Patience::new(Some(timeout))?;
+        let timeout = Duration::try_from_secs_f64(timeout).unwrap_or(Duration::MAX);
+        let outcome = self.restore_motion(py, &motion(positions, velocities)?, timeout)?;
+        Outcome(outcome).require_applied(py)
+    }
+
+    fn state(&self, py: Python<'_>) -> PyResult<State> {
+        current_state(py, &self.endpoint)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<catenary.Node {}>", self.endpoint)
+    }
+}
+
+impl Node {
+    fn restore_motion(
+        &self,
+        py: Python<'_>,
+        particles: &[ParticleState],
+        timeout: Duration,
+    ) -> PyResult<sim_contract::Outcome> {
+        let scene_hash = self.latched(py, Client::topology)?.header.scene_hash;
+        let given = GivenState { scene_hash, particles, keyframe: None };
+        self.call(py, |client| restore(client, &given, timeout))
+    }
+}
+
+fn restore(
+    client: &mut Client,
+    state: &GivenState<'_>,
+    timeout: Duration,
+) -> PyResult<sim_contract::Outcome> {
+    client.restore(state, timeout).map_err(|error| request_error(&error))
+}
+
+/// Returns particles that have only positions and velocities.
+fn motion(
+    positions: &Bound<'_, PyAny>,
+    velocities: &Bound<'_, PyAny>,
+) -> PyResult<Vec<ParticleState>> {
+    let (positions, velocities) =
+        (vectors("positions", positions)?, vectors("velocities", velocities)?);
+    if positions.len() != velocities.len() {
+        return Err(PyValueError::new_err(format!(
+            "there are {} positions, but {} velocities",
+            positions.len(),
+            velocities.len()
+        )));
+    }
+    let pairs = positions.into_iter().zip(velocities);
+    let particle =
+        |(position, velocity)| ParticleState { position, velocity, ..ParticleState::default() };
+    Ok(pairs.map(particle).collect())
+}
+
+/// Returns the error of the last part of a wait as that of the whole wait.
+fn with_timeout(error: RequestError, timeout_s: Option<f64>) -> RequestError {
+    let total = timeout_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let total = total.unwrap_or(PART);
+    match error {
+        RequestError::Timeout { sequence, owner, .. } => {
+            RequestError::Timeout { sequence, timeout: total, owner }
+        }
+        RequestError::OutcomesMissed { sequence, missed_count, .. } => {
+            RequestError::OutcomesMissed { sequence, timeout: total, missed_count }
+        }
+        other => other,
+    }
+}

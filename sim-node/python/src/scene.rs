@@ -1,0 +1,93 @@
+//! Scenes, and what stays the same until the next load.
+
+use std::path::Path;
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use recorder::LogReader;
+use sim_contract::{ConstraintState, LoadHeader, Method, Triangle, read_scene_file};
+use sim_solver::{Scene, SceneError, builtin};
+
+use crate::convert::rows;
+use crate::error::{SceneError as PythonSceneError, load_error, log_error};
+
+/// Returns the names of the built-in scenes.
+#[pyfunction]
+pub(crate) fn scene_names() -> Vec<&'static str> {
+    builtin::names().collect()
+}
+
+/// Loads a scene: a built-in one, a file, or the scene of a recording.
+pub(crate) fn load_scene(source: &str) -> PyResult<Scene> {
+    if Path::new(source).extension() != Some("mcap".as_ref()) {
+        let read = |path: &Path| read_scene_file(path).map_err(|error| error.to_string());
+        return Scene::load(source, &read).map_err(|error| load_error(&error));
+    }
+    let log = LogReader::open(Path::new(source)).map_err(|error| log_error(source, &error))?;
+    let text = String::from_utf8_lossy(log.scene());
+    Scene::from_toml(&text, source).map_err(|error| scene_error(&error))
+}
+
+pub(crate) fn scene_error(error: &SceneError) -> PyErr {
+    PythonSceneError::new_err(error.to_string())
+}
+
+#[pyclass(frozen, get_all, module = "catenary")]
+#[derive(Debug)]
+pub(crate) struct Topology {
+    ends: Py<PyArray2<u32>>,
+    rest_lengths: Py<PyArray1<f32>>,
+    compliances: Py<PyArray1<f32>>,
+    kinds: Py<PyArray1<u32>>,
+    origin: [f64; 3],
+    rate: u32,
+    method: &'static str,
+    scene_hash: u64,
+}
+
+impl Topology {
+    pub(crate) fn new(
+        py: Python<'_>,
+        header: &LoadHeader,
+        constraints: &[ConstraintState],
+    ) -> PyResult<Self> {
+        let ends: Vec<_> = constraints.iter().map(|one| [one.a, one.b]).collect();
+        Ok(Self {
+            ends: rows(py, &ends)?.unbind(),
+            rest_lengths: column(py, constraints, |one| one.rest_length),
+            compliances: column(py, constraints, |one| one.compliance),
+            kinds: column(py, constraints, |one| one.kind),
+            origin: header.origin,
+            rate: header.rate_hz,
+            method: Method::from_number(header.method).map_or("unknown", Method::name),
+            scene_hash: header.scene_hash,
+        })
+    }
+}
+
+fn column<T: numpy::Element>(
+    py: Python<'_>,
+    constraints: &[ConstraintState],
+    field: impl Fn(&ConstraintState) -> T,
+) -> Py<PyArray1<T>> {
+    PyArray1::from_iter(py, constraints.iter().map(field)).unbind()
+}
+
+#[pymethods]
+impl Topology {
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.kinds.bind(py).len().unwrap_or(0)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<catenary.Topology: {} constraints>", self.__len__(py))
+    }
+}
+
+/// Returns the corners of triangles as an array of the shape (triangles, 3).
+pub(crate) fn corners<'py>(
+    py: Python<'py>,
+    triangles: &[Triangle],
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    rows(py, &triangles.iter().map(|triangle| triangle.corners).collect::<Vec<_>>())
+}

@@ -1,0 +1,280 @@
+//! The solver in this process, without a node or shared memory.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
+use sim_contract::{ConstraintState, LoadHeader, SnapshotHeader, Triangle, scene_hash};
+use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver, THREADS_MAX};
+
+use crate::action::Action;
+use crate::convert::from_json;
+use crate::error::StateError;
+use crate::outcome::rejected;
+use crate::patience::PART;
+use crate::scene::{Topology, corners, load_scene, scene_error};
+use crate::snapshot::Snapshot;
+use crate::state::State;
+
+/// The client id of every action.
+const CLIENT_ID: u64 = 1;
+
+#[pyclass(frozen, subclass, module = "catenary")]
+#[derive(Debug)]
+pub(crate) struct Simulation {
+    scene: Scene,
+    scene_hash: u64,
+    running: Mutex<Running>,
+}
+
+#[derive(Debug)]
+struct Running {
+    solver: Solver,
+    step: u64,
+}
+
+impl Running {
+    /// Makes steps for as long as a look at signals can wait. Returns the number of steps that are left.
+    fn advance(&mut self, count: u64) -> u64 {
+        let start_ns = monotonic_ns();
+        let mut left = count;
+        while left > 0 {
+            self.solver.step();
+            self.step += 1;
+            left -= 1;
+            if left > 0 && u128::from(monotonic_ns() - start_ns) > PART.as_nanos() {
+                break;
+            }
+        }
+        left
+    }
+}
+
+impl Simulation {
+    fn running(&self) -> MutexGuard<'_, Running> {
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn with_threads(scene: Scene, threads: usize) -> PyResult<Self> {
+        if threads == 0 || threads > THREADS_MAX.into() {
+            let message = format!("`threads` is {threads} (allowed: 1 to {THREADS_MAX})");
+            return Err(PyValueError::new_err(message));
+        }
+        let mut solver = Solver::new(&scene);
+        solver.set_threads(threads);
+        let scene_hash = scene_hash(scene.to_toml().as_bytes());
+        Ok(Self { scene, scene_hash, running: Mutex::new(Running { solver, step: 0 }) })
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (scene=None, threads=1, *, toml=None))]
+    fn new(
+        py: Python<'_>,
+        scene: Option<&str>,
+        threads: usize,
+        toml: Option<&str>,
+    ) -> PyResult<Self> {
+        py.detach(|| {
+            let scene = match (scene, toml) {
+                (Some(scene), None) => load_scene(scene)?,
+                (None, Some(toml)) => {
+                    Scene::from_toml(toml, "scene").map_err(|error| scene_error(&error))?
+                }
+                _ => return Err(PyTypeError::new_err("give either a scene or `toml`")),
+            };
+            Self::with_threads(scene, threads)
+        })
+    }
+
+    #[pyo3(signature = (count=1))]
+    fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
+        let mut left = count;
+        loop {
+            left = py.detach(|| self.running().advance(left));
+            if left == 0 {
+                return Ok(());
+            }
+            py.check_signals()?;
+        }
+    }
+
+    fn apply(&self, py: Python<'_>, action: &Action) -> PyResult<()> {
+        let result = py.detach(|| self.running().solver.apply(CLIENT_ID, &action.0));
+        let reason = match result {
+            Ok(Applied::Control(
+                Control::Load { .. }
+                | Control::Rewind { .. }
+                | Control::Restore
+                | Control::Step { .. },
+            )) => Reason::NoEffectHere,
+            Ok(_) => return Ok(()),
+            Err(reason) => reason,
+        };
+        let action = serde_json::to_string(&action.0).unwrap_or_default();
+        Err(rejected(py, format!("rejected: {reason}: {action}"), Some(reason), None))
+    }
+
+    fn snapshot(&self, py: Python<'_>) -> Snapshot {
+        py.detach(|| {
+            let running = self.running();
+            let solver = &running.solver;
+            let particles = bytemuck::cast_slice(solver.particles()).to_vec();
+            Snapshot::own(self.header(&running), particles)
+        })
+    }
+
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        Ok(crate::view::vectors(&Bound::new(py, self.snapshot(py))?, crate::snapshot::POSITION))
+    }
+
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        Ok(crate::view::vectors(&Bound::new(py, self.snapshot(py))?, crate::snapshot::VELOCITY))
+    }
+
+    #[getter]
+    fn hash(&self, py: Python<'_>) -> u64 {
+        py.detach(|| self.running().solver.state_hash())
+    }
+
+    #[getter]
+    fn step_count(&self, py: Python<'_>) -> u64 {
+        py.detach(|| self.running().step)
+    }
+
+    #[getter]
+    fn time(&self, py: Python<'_>) -> f64 {
+        self.step_count(py) as f64 / f64::from(self.rate())
+    }
+
+    #[getter]
+    fn rate(&self) -> u32 {
+        self.scene.solver.rate_hz
+    }
+
+    fn scene(&self) -> String {
+        self.scene.to_toml()
+    }
+
+    fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
+        let (header, constraints) = py.detach(|| {
+            let running = self.running();
+            let constraints: Vec<_> = running.solver.constraints().map(constraint_state).collect();
+            (self.load_header(), constraints)
+        });
+        Topology::new(py, &header, &constraints)
+    }
+
+    fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let triangles: Vec<_> = py.detach(|| {
+            let running = self.running();
+            running
+                .solver
+                .triangles()
+                .iter()
+                .map(|corners| Triangle { corners: *corners })
+                .collect()
+        });
+        corners(py, &triangles)
+    }
+
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let values = py.detach(|| self.running().solver.parameter_values());
+        from_json(py, &values)
+    }
+
+    fn torn<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        let torn = py.detach(|| self.running().solver.torn().to_vec());
+        PyArray1::from_vec(py, torn)
+    }
+
+    fn state(&self, py: Python<'_>) -> PyResult<State> {
+        py.detach(|| {
+            let mut running = self.running();
+            // The keyframe holds what the commands so far have changed.
+            running.solver.finish_boundary();
+            let keyframe = running.solver.keyframe().encode();
+            let particles = bytemuck::cast_slice(running.solver.particles()).to_vec();
+            State::from_parts(self.scene_hash, particles, keyframe)
+        })
+    }
+
+    fn restore(&self, py: Python<'_>, state: &State) -> PyResult<()> {
+        if state.scene_hash != self.scene_hash {
+            return Err(StateError::new_err(format!(
+                "the state belongs to a scene with the hash {:016x}, but this one has {:016x}",
+                state.scene_hash, self.scene_hash
+            )));
+        }
+        let keyframe = state.decoded_keyframe()?;
+        py.detach(|| {
+            let particles = bytemuck::cast_slice(&state.particles);
+            let restored = self.running().solver.restore(particles, &keyframe);
+            restored.map_err(|error| StateError::new_err(error.to_string()))
+        })
+    }
+
+    fn reset(&self, py: Python<'_>) {
+        py.detach(|| {
+            let mut running = self.running();
+            let mut solver = Solver::new(&self.scene);
+            solver.set_threads(running.solver.threads());
+            running.solver = solver;
+        });
+    }
+
+    fn __len__(&self, py: Python<'_>) -> usize {
+        py.detach(|| self.running().solver.particle_count())
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let (name, count, step) = (&self.scene.name, self.__len__(py), self.step_count(py));
+        format!("<catenary.Simulation of '{name}': {count} particles, step {step}>")
+    }
+}
+
+impl Simulation {
+    fn header(&self, running: &Running) -> SnapshotHeader {
+        let Running { solver, step } = running;
+        let rate = u64::from(self.scene.solver.rate_hz);
+        SnapshotHeader {
+            contract_version: sim_contract::CONTRACT_VERSION,
+            solver_version: SOLVER_VERSION,
+            step: *step,
+            scene_step: solver.scene_step(),
+            sim_time_ns: time_ns(*step, rate),
+            state_hash: solver.state_hash(),
+            torn_count: u32::try_from(solver.torn().len()).unwrap_or(u32::MAX),
+            particle_count: u32::try_from(solver.particle_count()).unwrap_or(u32::MAX),
+            stride: 1,
+            ..SnapshotHeader::default()
+        }
+    }
+
+    fn load_header(&self) -> LoadHeader {
+        LoadHeader {
+            scene_hash: self.scene_hash,
+            origin: self.scene.origin,
+            rate_hz: self.scene.solver.rate_hz,
+            method: self.scene.solver.method as u32,
+            ..LoadHeader::default()
+        }
+    }
+}
+
+/// Time at the end of a step, rounded down.
+fn time_ns(step: u64, rate_hz: u64) -> u64 {
+    let time_ns = u128::from(step) * u128::from(SECOND_NS) / u128::from(rate_hz);
+    u64::try_from(time_ns).unwrap_or(u64::MAX)
+}
+
+fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
+    let sim_solver::Constraint { a, b, rest_length, compliance, kind, .. } = constraint;
+    ConstraintState { a, b, rest_length, compliance, kind: kind as u32 }
+}

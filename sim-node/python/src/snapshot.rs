@@ -1,0 +1,174 @@
+//! A state of the particles.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use sim_contract::{ParticleState, SnapshotFlags, SnapshotHeader};
+
+use crate::process::OfProcess;
+use crate::view;
+
+/// The place of the particles. It never changes.
+#[derive(Debug)]
+pub(crate) enum Memory {
+    /// In shared memory, lent by a node.
+    Shared(OfProcess<sim_contract::Snapshot>),
+    /// In the memory of this process.
+    Own(Vec<ParticleState>),
+}
+
+impl Memory {
+    pub(crate) fn particles(&self) -> &[ParticleState] {
+        match self {
+            Self::Shared(snapshot) => {
+                snapshot.peek().map_or(&[], sim_contract::Snapshot::particles)
+            }
+            Self::Own(particles) => particles,
+        }
+    }
+}
+
+/// The first field of each vector and the numbers of [`ParticleState`], in units of 4 bytes.
+pub(crate) const POSITION: usize = 0;
+const INVERSE_MASS: usize = 3;
+pub(crate) const VELOCITY: usize = 4;
+const FLAGS: usize = 7;
+
+#[pyclass(frozen, module = "catenary")]
+#[derive(Debug)]
+pub(crate) struct Snapshot {
+    header: SnapshotHeader,
+    /// Locked because a sample of iceoryx2 is not for several threads at a time.
+    memory: Mutex<Memory>,
+}
+
+impl Snapshot {
+    pub(crate) fn shared(snapshot: sim_contract::Snapshot) -> Self {
+        Self {
+            header: *snapshot.header(),
+            memory: Mutex::new(Memory::Shared(OfProcess::new(snapshot))),
+        }
+    }
+
+    pub(crate) fn own(header: SnapshotHeader, particles: Vec<ParticleState>) -> Self {
+        Self { header, memory: Mutex::new(Memory::Own(particles)) }
+    }
+
+    pub(crate) fn memory(&self) -> MutexGuard<'_, Memory> {
+        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Snapshot {
+    #[getter]
+    fn positions<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+        view::vectors(this, POSITION)
+    }
+
+    #[getter]
+    fn velocities<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+        view::vectors(this, VELOCITY)
+    }
+
+    #[getter]
+    fn inverse_masses<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f32>> {
+        view::numbers(this, INVERSE_MASS)
+    }
+
+    #[getter]
+    fn flags<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<u32>> {
+        view::numbers(this, FLAGS)
+    }
+
+    #[getter]
+    fn step(&self) -> u64 {
+        self.header.step
+    }
+
+    #[getter]
+    fn scene_step(&self) -> u64 {
+        self.header.scene_step
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.header.sim_time_ns as f64 * 1e-9
+    }
+
+    #[getter]
+    fn hash(&self) -> u64 {
+        self.header.state_hash
+    }
+
+    #[getter]
+    fn run_id(&self) -> u64 {
+        self.header.run_id
+    }
+
+    #[getter]
+    fn snapshot_index(&self) -> u32 {
+        self.header.snapshot_index
+    }
+
+    #[getter]
+    fn topology_revision(&self) -> u32 {
+        self.header.topology_revision
+    }
+
+    #[getter]
+    fn torn_count(&self) -> u32 {
+        self.header.torn_count
+    }
+
+    #[getter]
+    fn outcome_count(&self) -> u64 {
+        self.header.outcome_count
+    }
+
+    #[getter]
+    fn is_paused(&self) -> bool {
+        self.header.flags & SnapshotFlags::PAUSED != 0
+    }
+
+    #[getter]
+    fn is_replay(&self) -> bool {
+        self.header.flags & SnapshotFlags::REPLAY != 0
+    }
+
+    #[getter]
+    fn published_at(&self) -> f64 {
+        self.header.publish_monotonic_ns as f64 * 1e-9
+    }
+
+    #[getter]
+    fn solve_time(&self) -> f64 {
+        self.header.solve_ns as f64 * 1e-9
+    }
+
+    #[getter]
+    fn wake_lateness(&self) -> f64 {
+        self.header.wake_late_ns as f64 * 1e-9
+    }
+
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, bytemuck::cast_slice(self.memory().particles()))
+    }
+
+    fn copy(&self) -> Self {
+        Self::own(self.header, self.memory().particles().to_vec())
+    }
+
+    fn __len__(&self) -> usize {
+        self.memory().particles().len()
+    }
+
+    fn __repr__(&self) -> String {
+        let SnapshotHeader { step, particle_count, state_hash, .. } = self.header;
+        format!(
+            "<catenary.Snapshot of step {step}: {particle_count} particles, hash {state_hash:016x}>"
+        )
+    }
+}

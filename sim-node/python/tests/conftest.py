@@ -1,0 +1,77 @@
+"""Nodes and recordings for the tests. Each test has a domain of its own, and ends its own processes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from itertools import count
+from pathlib import Path
+
+import catenary
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+PROGRAMS = Path(os.environ.get("CATENARY_PROGRAMS", REPOSITORY / "target" / "debug"))
+DEADLINE = 60.0
+NUMBERS = count()
+
+StartNode = Callable[..., "catenary.Node"]
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> str:
+    """Name of a domain, which is also that of programs and examples that the test starts."""
+    name = f"py-{os.getpid()}-{next(NUMBERS)}_"
+    monkeypatch.setenv("CATENARY_DOMAIN", name)
+    return name
+
+
+@pytest.fixture
+def processes() -> Iterator[list[subprocess.Popen[str]]]:
+    """Processes that the test starts. They end with it."""
+    running: list[subprocess.Popen[str]] = []
+    yield running
+    for process in reversed(running):
+        if process.poll() is None:
+            process.send_signal(signal.SIGCONT)
+            process.send_signal(signal.SIGINT)
+        process.communicate(timeout=DEADLINE)
+
+
+@pytest.fixture
+def start(processes: list[subprocess.Popen[str]]) -> Callable[..., subprocess.Popen[str]]:
+    """Starts a program, such as `start("sim-node", "run", "curtain")`."""
+
+    def start(program: str, *arguments: str) -> subprocess.Popen[str]:
+        command = [str(PROGRAMS / program), *arguments]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        processes.append(process)
+        return process
+
+    return start
+
+
+@pytest.fixture
+def start_node(domain: str, start: Callable[..., subprocess.Popen[str]]) -> StartNode:
+    """Starts a node and attaches to it, such as `start_node("curtain", "--paused")`."""
+
+    def start_node(*arguments: str, name: str = "sim") -> catenary.Node:
+        start("sim-node", "run", *arguments, "--name", name)
+        return catenary.attach(name, timeout=DEADLINE)
+
+    return start_node
+
+
+@pytest.fixture
+def simulate(tmp_path: Path) -> Callable[..., Path]:
+    """Makes a recording of a scene, such as `simulate("curtain", "--steps", "600")`."""
+
+    def simulate(*arguments: str) -> Path:
+        path = tmp_path / "run.mcap"
+        command = [str(PROGRAMS / "recorder"), "simulate", *arguments, "-o", str(path)]
+        subprocess.run(command, check=True, capture_output=True, timeout=DEADLINE)
+        return path
+
+    return simulate

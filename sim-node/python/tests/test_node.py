@@ -1,0 +1,295 @@
+"""Reading a node and sending commands to it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Callable
+
+import catenary
+import numpy as np
+import pytest
+import xxhash
+from conftest import DEADLINE, StartNode
+
+
+def test_the_snapshots_of_a_node_come_one_by_one_with_their_hash(start_node: StartNode) -> None:
+    node = start_node("curtain")
+    snapshots = node.snapshots()
+    previous = next(snapshots)
+    for _ in range(100):
+        snapshot = next(snapshots)
+        assert snapshot.snapshot_index == previous.snapshot_index + 1
+        assert snapshot.step == previous.step + 1
+        assert snapshot.time == pytest.approx(snapshot.step / 240)
+        assert snapshot.run_id == previous.run_id
+        particles = np.empty((len(snapshot), 8), np.float32)
+        particles[:, 0:3] = snapshot.positions
+        particles[:, 3] = snapshot.inverse_masses
+        particles[:, 4:7] = snapshot.velocities
+        particles.view(np.uint32)[:, 7] = snapshot.flags
+        assert xxhash.xxh3_64_intdigest(particles.tobytes()) == snapshot.hash
+        previous = snapshot
+
+
+def test_arrays_are_views_that_cannot_be_written_and_outlive_their_snapshot(
+    start_node: StartNode,
+) -> None:
+    node = start_node("curtain", "--paused")
+    snapshot = node.latest()
+    positions = snapshot.positions
+    assert positions.shape == (168, 3) and positions.strides == (32, 4)
+    owner: object = positions.base
+    assert not positions.flags.owndata and owner is snapshot
+    assert positions.ctypes.data == snapshot.positions.ctypes.data
+    assert snapshot.velocities.ctypes.data == positions.ctypes.data + 16
+    for array in (positions, snapshot.velocities, snapshot.inverse_masses, snapshot.flags):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+        with pytest.raises(ValueError):
+            array.flags.writeable = True
+    before = positions.copy()
+    del snapshot
+    node.close()
+    assert np.array_equal(positions, before), "the memory stays mapped"
+
+
+def test_a_program_that_holds_too_many_snapshots_is_told_so(start_node: StartNode) -> None:
+    node = start_node("curtain")
+    held = []
+    with pytest.raises(catenary.TooManySnapshots, match="holds 4 snapshots.*copy"):
+        for snapshot in node.snapshots():
+            held.append(snapshot.positions)
+    assert len(held) == 4
+    copy, values = snapshot.copy(), snapshot.positions.copy()
+    held.clear()
+    del snapshot
+    assert node.next_snapshot(DEADLINE) is not None
+    assert np.array_equal(copy.positions, values)
+
+
+def test_everything_that_a_node_publishes_can_be_read(start_node: StartNode) -> None:
+    node = start_node("carried-cloth", "--paused")
+    snapshot, topology, surface = node.latest(), node.topology(), node.surface()
+    assert topology.ends.shape == (len(topology), 2) and topology.ends.max() < len(snapshot)
+    a, b = snapshot.positions[topology.ends[:, 0]], snapshot.positions[topology.ends[:, 1]]
+    assert np.linalg.norm(b - a, axis=1) == pytest.approx(topology.rest_lengths, rel=1e-3)
+    assert surface.shape[1] == 3 and surface.max() < len(snapshot)
+    assert {catenary.CONSTRAINT_KINDS[kind] for kind in topology.kinds} >= {"structural"}
+    simulation = catenary.Simulation(toml=node.scene())
+    assert simulation.topology().scene_hash == topology.scene_hash
+    assert node.parameters() == simulation.parameters()
+    assert node.status()["particle_count"] == len(snapshot)
+    assert all("shape" in collider for collider in node.colliders())
+    assert node.torn().size == 0
+
+
+def test_commands_return_their_outcome_or_raise_with_the_reason(start_node: StartNode) -> None:
+    node = start_node("curtain", "--paused")
+    outcome = node.grab(90, (0.5, 0.2, 0.3), over=0.1)
+    assert outcome.is_applied and outcome.client_id == node.client_id
+    node.step(30)
+    snapshot = node.latest()
+    assert snapshot.positions[90] == pytest.approx([0.5, 0.2, 0.3])
+    assert snapshot.flags[90] == catenary.GRABBED
+    node.move(90, np.array([0.5, 0.3, 0.3]), over=0.0)
+    node.release(90)
+    node.pin(95)
+    node.unpin(95)
+    node.cut(0)
+    node.cut_radius((0, 0, 0), 0.1)
+    node.cut_segment((-1, 0.31, 0), (1, 0.31, 0))
+    node.push((0, 0, 0), 1.0, (0, 0, 0.001), limit=0.01)
+    node.set(gravity=(0, -1, 0), damping=0.5, tear_force=None)
+    node.mark("here")
+    node.step()
+    assert node.parameters()["gravity"] == [0, -1, 0]
+    assert node.torn()[0] == 0 and node.torn().size > 14
+    rejected: list[tuple[Callable[[], object], str]] = [
+        (lambda: node.pin(168), "unknown_particle"),
+        (lambda: node.cut(0), "already_torn"),
+        (lambda: node.move(3, (0, 0, 0)), "not_grabbed"),
+        (lambda: node.set(dampness=1), "unknown_parameter"),
+        (lambda: node.set(damping=float("nan")), "non_finite"),
+        (lambda: node.set(damping=-1), "out_of_range"),
+        (lambda: node.move_anchor(0, (0, 0, 0)), "unknown_anchor"),
+        (lambda: node.move_collider(0, (0, 0, 0)), "unknown_collider"),
+        (lambda: node.rewind(to_step=10**9), "out_of_range"),
+    ]
+    for command, reason in rejected:
+        with pytest.raises(catenary.Rejected) as error:
+            command()
+        assert error.value.reason == reason
+        assert error.value.outcome is not None and error.value.outcome.reason == reason
+
+
+def test_many_commands_are_sent_before_the_first_answer(start_node: StartNode) -> None:
+    node = start_node("curtain", "--paused")
+    with node.batch() as batch:
+        for particle in range(160, 170):
+            batch.pin(particle)
+    assert [outcome.is_applied for outcome in batch.outcomes] == [True] * 8 + [False] * 2
+    assert len({outcome.step for outcome in batch.outcomes}) == 1
+    sequences = [outcome.sequence for outcome in batch.outcomes]
+    assert sequences == sorted(sequences)
+
+
+def test_states_are_taken_restored_and_rewound(start_node: StartNode) -> None:
+    node = start_node("curtain", "--paused")
+    node.grab(90, (0.5, 0.2, 0.3), over=0.25)
+    node.step(40)
+    state, hash_then = node.state(), node.latest().hash
+    assert state.hash == hash_then
+    node.step(100)
+    later = node.latest().hash
+    outcome = node.restore(state)
+    assert outcome.command["contents"] == "state"
+    assert node.latest().hash == hash_then, "also while paused"
+    node.step(100)
+    assert node.latest().hash == later
+    step = node.latest().step
+    assert node.rewind(back_steps=50).command["to_step"] == step - 50
+    still = node.latest()
+    node.set_motion(still.positions + np.float32(0.5), 0 * still.velocities)
+    moved = node.latest()
+    assert moved.positions == pytest.approx(still.positions + 0.5)
+    assert not moved.velocities.any()
+    node.restore(still)
+    assert np.array_equal(node.latest().positions, still.positions)
+    for wrong in (np.zeros((168, 2)), np.zeros((3, 168)), np.zeros(3)):
+        with pytest.raises(ValueError, match="shape"):
+            node.set_motion(wrong, wrong)
+    with pytest.raises(TypeError, match="State"):
+        node.restore(still.positions)  # type: ignore[arg-type]
+    other = catenary.Simulation("rope").state()
+    with pytest.raises(catenary.Rejected) as error:
+        node.restore(other)
+    assert error.value.reason == "invalid_state"
+
+
+def test_a_load_of_another_rate_begins_a_run_and_reading_goes_on(start_node: StartNode) -> None:
+    node = start_node("curtain")
+    run_id = node.latest().run_id
+    rate = node.topology().rate
+    other = next(n for n in catenary.scene_names() if catenary.Simulation(n).rate != rate)
+    assert node.load(other).begins_run
+    for snapshot in node.snapshots():
+        if snapshot.run_id != run_id:
+            break
+    assert node.topology().rate != rate
+    with pytest.raises(catenary.Rejected):
+        node.load("nix")
+
+
+def test_the_loop_ends_with_the_node_and_reads_the_next_one(
+    start_node: StartNode, processes: list[subprocess.Popen[str]]
+) -> None:
+    node = start_node("curtain")
+    first = node.latest().run_id
+    threading.Timer(0.2, processes[0].kill).start()
+    for snapshot in node.snapshots():
+        assert snapshot.run_id == first
+    assert not node.is_running
+    with pytest.raises(catenary.NotRunning):
+        node.pin(3)
+    start_node("curtain")
+    assert node.next_snapshot(DEADLINE).run_id != first  # type: ignore[union-attr]
+    assert node.pin(3).is_applied
+
+
+def test_a_missing_node_is_named(domain: str) -> None:
+    with pytest.raises(catenary.NotRunning, match=f"no node runs as 'sim' in domain '{domain}'"):
+        catenary.attach()
+    with pytest.raises(ValueError, match="valid name"):
+        catenary.attach("a b")
+    with pytest.raises(ValueError, match="timeout"):
+        catenary.attach(timeout=-1.0)
+
+
+def test_a_stopped_node_is_named_after_the_timeout(
+    start_node: StartNode, processes: list[subprocess.Popen[str]]
+) -> None:
+    node = start_node("curtain")
+    node.latest()
+    processes[0].send_signal(signal.SIGSTOP)
+    action = catenary.Action.pin(3)
+    with pytest.raises(catenary.Timeout, match="does not answer"):
+        node.request(action, timeout=0.2)
+    assert isinstance(catenary.Timeout(), TimeoutError)
+
+
+def test_ctrl_c_ends_a_wait(start_node: StartNode, domain: str) -> None:
+    start_node("curtain", "--paused")
+    script = textwrap.dedent("""
+        import catenary
+        node = catenary.attach()
+        node.latest()
+        try:
+            print("waiting", flush=True)
+            CALL
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+    """)
+    for call in ("node.next_snapshot()", "list(node.snapshots())", "run()"):
+        run = "catenary.Simulation('curtain').step(10**12)"
+        code = script.replace("CALL", run if call == "run()" else call)
+        child = subprocess.Popen(
+            [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert child.stdout is not None and child.stdout.readline() == "waiting\n"
+        child.send_signal(signal.SIGINT)
+        out, err = child.communicate(timeout=DEADLINE)
+        assert (out, child.returncode) == ("interrupted\n", 0), (call, err)
+
+
+def test_a_forked_process_cannot_use_the_node_and_does_not_disturb_it(
+    start_node: StartNode,
+) -> None:
+    node = start_node("curtain")
+    positions = node.latest().positions
+    child = os.fork()
+    if child == 0:
+        try:
+            node.latest()
+        except catenary.Error as error:
+            os._exit(0 if "fork" in str(error) else 2)
+        os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    assert positions.shape == (168, 3)
+    assert node.next_snapshot(DEADLINE) is not None
+
+
+def test_several_threads_share_a_node(start_node: StartNode) -> None:
+    node = start_node("curtain", "--rate", "1000")
+    errors = []
+
+    def use(particle: int) -> None:
+        try:
+            for _ in range(30):
+                node.pin(particle)
+                node.latest().positions.sum()
+                node.unpin(particle)
+        except Exception as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=use, args=(particle,)) for particle in range(20, 28)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(DEADLINE)
+    assert not errors
+
+
+def test_published_at_is_on_the_clock_of_time_monotonic(start_node: StartNode) -> None:
+    node = start_node("curtain")
+    before = time.monotonic()
+    for snapshot in node.snapshots():
+        if snapshot.published_at >= before:
+            break
+    assert before <= snapshot.published_at <= time.monotonic()
+

@@ -1,0 +1,122 @@
+"""Reading recordings."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import catenary
+import numpy as np
+import pytest
+from conftest import DEADLINE, StartNode
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+Simulate = Callable[..., Path]
+
+
+@pytest.fixture
+def recording(simulate: Simulate, tmp_path: Path) -> catenary.Recording:
+    commands = tmp_path / "commands.jsonl"
+    commands.write_text(
+        '{"step": 100, "kind": "grab", "particle": 90, "target": [0.5, 0.2, 0.3]}\n'
+        '{"step": 200, "kind": "cut", "constraint": 7}\n'
+        '{"step": 201, "kind": "cut", "constraint": 7}\n'
+    )
+    return catenary.open(simulate("curtain", "--steps", "600", "--commands", str(commands)))
+
+
+def test_snapshots_are_those_that_the_mcap_reader_finds(recording: catenary.Recording) -> None:
+    with open(recording.path, "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        clouds = [cloud.data for *_, cloud in reader.iter_decoded_messages(["/particles"])]
+    snapshots = list(recording)
+    assert [snapshot.step for snapshot in snapshots] == list(range(601)) == list(range(len(clouds)))
+    for snapshot, cloud in zip(snapshots, clouds):
+        fields = np.frombuffer(cloud, np.float32).reshape(-1, 8)
+        assert np.array_equal(snapshot.positions, fields[:, 0:3])
+        assert np.array_equal(snapshot.velocities, fields[:, 4:7])
+
+
+def test_a_step_a_time_and_a_slice_select_snapshots(recording: catenary.Recording) -> None:
+    assert (recording.first_step, recording.last_step, recording.rate) == (0, 600, 240)
+    assert recording[480].step == recording.at(2.0).step == 480
+    assert recording.at(2.0041).step == 480 and recording.at(1e9).step == 600
+    assert [one.step for one in recording[10:50:10]] == [10, 20, 30, 40]
+    assert [one.step for one in recording[598:]] == [598, 599, 600]
+    with pytest.raises(KeyError, match="no step 601"):
+        recording[601]
+    for key in (slice(-3, None), slice(None, None, -1)):
+        with pytest.raises(ValueError):
+            recording[key]
+    with pytest.raises(ValueError):
+        recording.at(-1.0)
+
+
+def test_a_recording_becomes_arrays(recording: catenary.Recording) -> None:
+    arrays = recording.to_numpy(100, 201, every=50)
+    assert arrays.steps.tolist() == [100, 150, 200]
+    assert arrays.times == pytest.approx([100 / 240, 150 / 240, 200 / 240])
+    assert arrays.positions.shape == arrays.velocities.shape == (3, 168, 3)
+    assert np.array_equal(arrays.positions[1], recording[150].positions)
+    assert arrays.hashes[2] == recording[200].hash
+
+
+def test_steps_and_outcomes_are_tables(recording: catenary.Recording) -> None:
+    steps = recording.steps()
+    assert all(len(column) == 601 for column in steps.values())
+    assert steps["step"].tolist() == list(range(601))
+    assert steps["torn_count"].tolist() == [0] * 200 + [1] * 401
+    rows = recording.outcomes()
+    assert [(row["step"], row["kind"], row["status"]) for row in rows] == [
+        (100, "grab", "applied"),
+        (200, "cut", "applied"),
+        (201, "cut", "rejected"),
+    ]
+    assert recording.torn(199).size == 0 and recording.torn(200).tolist() == [7]
+
+
+def test_the_commands_of_a_recording_give_its_states(recording: catenary.Recording) -> None:
+    simulation = catenary.Simulation(toml=recording.scene())
+    rows = [row for row in recording.outcomes() if row["status"] == "applied"]
+    envelope = {"step", "client_id", "sequence", "index", "status", "reason"}
+    for snapshot in recording[1:]:
+        for row in rows:
+            if row["step"] == snapshot.step:
+                fields = {key: value for key, value in row.items() if key not in envelope}
+                simulation.apply(catenary.Action.from_dict(fields))
+        simulation.step()
+        assert simulation.hash == snapshot.hash
+
+
+def test_a_slice_leaves_out_steps_that_were_not_recorded(
+    start_node: StartNode, start: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    path = tmp_path / "sparse.mcap"
+    node = start_node("rope", "--every", "7", "--paused")
+    recorder = start("recorder", "record", "-o", str(path))
+    end = time.monotonic() + DEADLINE
+    while node.status()["reader_count"] < 1:
+        assert time.monotonic() < end
+    node.step(70)
+    while not path.with_name("sparse.mcap.part").exists():
+        assert time.monotonic() < end
+    recorder.send_signal(signal.SIGINT)
+    recorder.communicate(timeout=DEADLINE)
+    recording = catenary.open(path)
+    assert recording.scene_name == "rope"
+    assert [one.step for one in recording[20:60]] == [21, 28, 35, 42, 49, 56]
+    with pytest.raises(KeyError, match="no step 20"):
+        recording[20]
+
+
+def test_unreadable_files_are_named(tmp_path: Path) -> None:
+    with pytest.raises(catenary.RecordingError, match="missing.mcap: .*No such file"):
+        catenary.open(tmp_path / "missing.mcap")
+    text = tmp_path / "text.mcap"
+    text.write_text("this is no recording")
+    with pytest.raises(catenary.RecordingError, match="text.mcap"):
+        catenary.open(text)

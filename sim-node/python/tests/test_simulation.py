@@ -1,0 +1,170 @@
+"""The solver in this process."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import catenary
+import numpy as np
+import pytest
+from conftest import StartNode
+
+ABC: Any = "abc"
+
+
+def test_a_simulation_has_the_bits_of_a_node(start_node: StartNode) -> None:
+    node = start_node("curtain", "--paused")
+    simulation = catenary.Simulation("curtain", threads=2)
+    assert simulation.hash == node.latest().hash
+    for target in (node, simulation):
+        target.grab(90, (0.5, 0.2, 0.3), over=0.1)
+        target.set(gravity=(1, -9, 0))
+        target.cut_radius((0, 0, 0), 0.05)
+    for count in (1, 2, 40):
+        node.step(count)
+        simulation.step(count)
+        snapshot = node.latest()
+        assert (simulation.step_count, simulation.hash) == (snapshot.step, snapshot.hash)
+        assert np.array_equal(simulation.positions, snapshot.positions)
+        assert np.array_equal(simulation.velocities, snapshot.velocities)
+    assert np.array_equal(simulation.torn(), node.torn())
+    simulation.step(10)
+    node.restore(simulation.state())
+    assert node.latest().hash == simulation.hash
+
+
+def test_a_state_continues_in_another_simulation_and_after_pickling() -> None:
+    first = catenary.Simulation("curtain")
+    first.grab(90, (0.5, 0.2, 0.3), over=0.25)
+    first.step(30)
+    state = pickle.loads(pickle.dumps(first.state()))
+    assert state.hash == first.hash
+    second = catenary.Simulation("curtain")
+    second.restore(state)
+    assert second.hash == first.hash and second.step_count == 0
+    first.step(100)
+    second.step(100)
+    assert second.hash == first.hash
+    with pytest.raises(catenary.StateError, match="scene"):
+        catenary.Simulation("rope").restore(state)
+
+
+def test_a_reset_brings_the_initial_state_and_parameters_back() -> None:
+    simulation = catenary.Simulation("curtain")
+    initial = simulation.hash
+    simulation.set(damping=0.9)
+    simulation.pin(90)
+    simulation.step(10)
+    assert simulation.hash != initial
+    simulation.reset()
+    assert simulation.hash == initial and simulation.step_count == 10
+    assert simulation.parameters() == catenary.Simulation("curtain").parameters()
+
+
+def test_sixteen_simulations_run_in_sixteen_threads() -> None:
+    def run(seed: int) -> int:
+        simulation = catenary.Simulation("curtain")
+        simulation.set(damping=seed % 4 / 4)
+        for _ in range(20):
+            simulation.step(50)
+        return simulation.hash
+
+    hashes = [0] * 16
+
+    def put(seed: int) -> None:
+        hashes[seed] = run(seed)
+
+    threads = [threading.Thread(target=put, args=(seed,)) for seed in range(16)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert hashes == [run(seed) for seed in range(4)] * 4
+
+
+def test_the_interpreter_goes_on_while_a_simulation_steps() -> None:
+    simulation = catenary.Simulation("curtain")
+    thread = threading.Thread(target=simulation.step, args=(20_000,))
+    thread.start()
+    counted = 0
+    while thread.is_alive():
+        counted += 1
+    assert counted > 1000 and simulation.step_count == 20_000
+
+
+def sweep(damping: float) -> float:
+    simulation = catenary.Simulation("pendulum")
+    simulation.set(damping=damping)
+    simulation.step(240)
+    return float(np.linalg.norm(simulation.velocities[1]))
+
+
+def test_simulations_run_in_processes() -> None:
+    dampings = [0.0, 0.5, 1.0]
+    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
+        assert list(pool.map(sweep, dampings)) == [sweep(damping) for damping in dampings]
+
+
+def test_a_falling_particle_follows_the_closed_form() -> None:
+    scene = 'version = 1\n[solver]\nrate_hz = 240\n[[particle]]\nposition = [0, 0, 0]\n'
+    simulation = catenary.Simulation(toml=scene)
+    simulation.step(240)
+    # One substep after another: v = -g n h, y = -g h^2 n (n + 1) / 2.
+    substeps = simulation.parameters()["substeps"]
+    n, h = 240 * substeps, 1 / (240 * substeps)
+    assert simulation.velocities[0, 1] == pytest.approx(-9.81 * n * h, rel=1e-4)
+    assert simulation.positions[0, 1] == pytest.approx(-9.81 * h * h * n * (n + 1) / 2, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: catenary.Simulation("nix"), catenary.SceneError, "no built-in scene 'nix'"),
+        (lambda: catenary.Simulation("./nix.toml"), catenary.SceneError, "nix.toml"),
+        (lambda: catenary.Simulation(toml="version = 2"), ValueError, "version"),
+        (lambda: catenary.Simulation("rope", threads=0), ValueError, "threads"),
+        (lambda: catenary.Simulation(), TypeError, "scene"),
+        (lambda: catenary.Simulation("rope").step(-1), OverflowError, "negative"),
+        (lambda: catenary.Simulation("rope").pin(-1), OverflowError, "range"),
+        (lambda: catenary.Simulation("rope").grab(1, (1, 2)), TypeError, "3 numbers"),
+        (lambda: catenary.Simulation("rope").grab(1, (1, 2, 3, 4)), TypeError, "3 numbers"),
+        (lambda: catenary.Simulation("rope").grab(1, ABC), TypeError, "3 numbers"),
+        (lambda: catenary.Simulation("rope").set(), TypeError, "at least one"),
+        (lambda: catenary.Simulation("rope").set(damping=ABC), TypeError, "a number"),
+        (lambda: catenary.Simulation("rope").set(damping=True), TypeError, "a number"),
+        (lambda: catenary.Simulation("rope").set(stiffness={"x": 1}), ValueError, "kind"),
+        (lambda: catenary.Simulation("rope").pin(10**6), catenary.Rejected, "no such particle"),
+        (
+            lambda: catenary.Simulation("rope").apply(catenary.Action.load("curtain")),
+            catenary.Rejected,
+            "no effect here",
+        ),
+        (lambda: catenary.Action.rewind(), ValueError, "to_step"),
+        (lambda: catenary.Action.from_dict({"kind": "pim"}), ValueError, "pim"),
+        (lambda: catenary.State(1, b"123", b""), ValueError, "bytes"),
+        (lambda: catenary.State(1, b"", b"1234567"), catenary.StateError, "version"),
+    ],
+)
+def test_misuse_raises(call: Callable[[], object], error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        call()
+
+
+def test_actions_have_the_form_of_recordings() -> None:
+    action = catenary.Action.grab(3, (1, 2, 3), 0.125)
+    fields = {"kind": "grab", "particle": 3, "target": [1, 2, 3], "over_s": 0.125}
+    assert action.to_dict() == fields
+    assert catenary.Action.from_dict(fields) == action != catenary.Action.pin(3)
+
+
+def test_the_scene_of_a_recording_runs(simulate: Callable[..., Path]) -> None:
+    path = simulate("pendulum", "--steps", "100")
+    simulation = catenary.Simulation(str(path))
+    simulation.step(100)
+    assert simulation.hash == catenary.open(path)[100].hash
