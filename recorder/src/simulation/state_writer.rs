@@ -10,7 +10,7 @@ use recorder::{
 use sim_contract::{ConstraintState, LoadHeader, ParameterValues, ParticleState, Triangle};
 use sim_solver::Solver;
 
-use super::frozen::FrozenTracker;
+use super::frozen::{FrozenParticles, FrozenTracker};
 use super::job::{Job, count};
 use super::solver_rows::{colliders_row, new_tears_row};
 
@@ -126,7 +126,7 @@ impl<'a, W: Write> StateWriter<'a, W> {
         let time_ns = self.run.time_of_step_ns(step);
         let particles: Vec<ParticleState> =
             (0..solver.particle_count()).map(|index| cast(solver.particle(index))).collect();
-        for row in self.frozen.new_events(step, &particles) {
+        for row in self.frozen.new_events(step, FrozenParticles::find(&particles)) {
             self.log.write(&Message::Event(row), time_ns)?;
         }
         self.log.write(&Message::Step(self.row(solver, step)), time_ns)?;
