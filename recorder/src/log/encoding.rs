@@ -3,6 +3,7 @@
 pub(in crate::log) mod channel;
 mod descriptor;
 mod json_schema;
+mod particle_buffer;
 pub(crate) mod protobuf;
 pub(crate) mod scene_messages;
 
@@ -18,6 +19,7 @@ use super::rows::{
 use super::topic::Topic;
 use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, SCENE_UPDATE, file_descriptor_set};
 use json_schema::row_schema;
+pub use particle_buffer::ParticleBuffer;
 pub use protobuf::{MAP_FRAME, WORLD_FRAME, encode_transform, map_from_world};
 pub(super) use protobuf::{decode_keyframe, decode_particles, particle_bytes};
 use protobuf::{encode_cloud_head, encode_keyframe};

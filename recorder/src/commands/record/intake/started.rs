@@ -181,7 +181,7 @@ impl Started {
     pub(super) fn accept(
         &mut self,
         header: &SnapshotHeader,
-        particles: Vec<ParticleState>,
+        particles: &[ParticleState],
         changes: &[Change],
         accepted: &mut Accepted,
     ) {
@@ -191,7 +191,10 @@ impl Started {
         }
         let rows = changes.iter().filter_map(|change| self.row(change));
         let rows: Vec<_> = rows.collect();
-        let events = self.frozen.new_events(header.step, FrozenParticles::find(&particles));
+        let mut buffer = std::mem::take(&mut accepted.spare);
+        buffer.copy_from(particles);
+        let frozen = FrozenParticles::find(buffer.particles());
+        let events = self.frozen.new_events(header.step, frozen);
         for message in rows.into_iter().chain(events.into_iter().map(Message::Event)) {
             self.counts[message.topic()].received += 1;
             accepted.push(message);
@@ -200,7 +203,7 @@ impl Started {
         self.last = *header;
         self.counts[Topic::Steps].received += 1;
         self.counts[Topic::Particles].received += 1;
-        accepted.contents.push(Content::Snapshot(StepRow::from(header), particles));
+        accepted.contents.push(Content::Snapshot(StepRow::from(header), buffer));
         if header.step >= self.end_step {
             accepted.end = Some(RunEnd::EndStep);
         }
