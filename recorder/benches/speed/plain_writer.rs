@@ -25,6 +25,7 @@ pub(crate) fn run(domain: &str, path: &str) {
             None => break,
         }
     }
-    file.flush().unwrap();
+    // The recorder ends so too.
+    file.into_inner().unwrap().sync_all().unwrap();
     assert!(count > 0, "no snapshot has arrived");
 }

@@ -14,7 +14,7 @@ pub(super) struct PastStates {
     digests: Vec<u64>,
     /// The same without their steps, made for the first state that was given.
     all: Option<HashSet<u64>>,
-    /// That of the newest state.
+    /// The rest of the newest state.
     rest: Rest,
     /// Number of states that were taken from the file without a proof.
     pub(super) given_count: u64,

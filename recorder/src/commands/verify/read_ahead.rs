@@ -23,7 +23,7 @@ pub(super) struct ReadFrame {
     pub(super) frozen: Option<FrozenParticles>,
 }
 
-/// What the file has shown up to a snapshot.
+/// The findings in the file up to a snapshot.
 #[derive(Debug)]
 pub(super) struct Seen {
     /// Number of bytes that are read and intact.
