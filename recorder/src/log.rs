@@ -24,8 +24,8 @@ pub use container::losses::{Losses, LostSteps};
 pub use container::lost_load::{LoadRows, LostLoad};
 pub use container::repair::{RepairError, RepairReport, repair_file};
 pub use encoding::{
-    MAP_FRAME, MessageEncoder, TopicFormat, TopicSchema, WORLD_FRAME, encode_transform,
-    map_from_world, scene_format,
+    MAP_FRAME, MessageEncoder, ParticleBuffer, TopicFormat, TopicSchema, WORLD_FRAME,
+    encode_transform, map_from_world, scene_format,
 };
 pub use index::{ChunkEntry, IndexedLog};
 pub use message::Message;

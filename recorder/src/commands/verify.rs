@@ -7,6 +7,7 @@ mod events;
 pub(crate) mod finding;
 mod load;
 mod past_states;
+mod read_ahead;
 pub(crate) mod resimulation;
 mod side_rows;
 mod snapshot_numbers;
@@ -17,6 +18,7 @@ use std::fmt;
 use std::io::Read;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use std::thread;
 
 use anyhow::{Context, bail};
 use recorder::{LogEnd, LogReader};
@@ -33,7 +35,7 @@ use crate::input::state_place::{Wanted, find_state};
 use difference::Difference;
 use finding::{Finding, StepGap};
 pub(crate) use verification::{StepRange, VerifyOptions};
-use verification::{Verification, VerifyError};
+use verification::{Verification, VerifyError, check_header};
 
 /// Snapshots between two updates of the progress bar.
 const SNAPSHOTS_PER_UPDATE: u64 = 64;
@@ -151,7 +153,7 @@ impl VerifyArgs {
 
 /// Re-simulates a recording. Calls `on_progress` periodically, with the number of bytes that are read.
 /// Ends early, even within a step, if `stop` becomes true.
-pub(crate) fn verify<R: Read>(
+pub(crate) fn verify<R: Read + Send>(
     log: LogReader<R>,
     path: &str,
     options: VerifyOptions,
@@ -159,9 +161,26 @@ pub(crate) fn verify<R: Read>(
     on_progress: impl FnMut(u64),
 ) -> anyhow::Result<(Report, Option<LogEnd>)> {
     let scene = scene_to_simulate(&log, "`recorder verify`").with_context(|| path.to_owned())?;
-    let mut verification = Verification::new(log, scene, options);
+    let log = log.with_audit();
+    let header = check_header(&log, &scene);
+    // The reading thread ends when the verification is dropped, at the latest after its batch.
+    thread::scope(|threads| {
+        let verification = Verification::start(threads, log, scene, options);
+        let verification = verification.with_context(|| path.to_owned())?;
+        report(verification, header, path, stop, on_progress)
+    })
+}
+
+/// Compares the states, unless the header differs, and returns the report.
+fn report(
+    mut verification: Verification,
+    header: Finding,
+    path: &str,
+    stop: &AtomicBool,
+    on_progress: impl FnMut(u64),
+) -> anyhow::Result<(Report, Option<LogEnd>)> {
     let mut report = Report::new();
-    match verification.check_header() {
+    match header {
         Finding::Identical => {
             compare_states(&mut verification, &mut report, stop, on_progress)
                 .with_context(|| path.to_owned())?;
@@ -169,7 +188,7 @@ pub(crate) fn verify<R: Read>(
         }
         finding => _ = report.add(finding, 0),
     }
-    let end = verification.frames.end().cloned().filter(|end| *end != LogEnd::Complete);
+    let end = verification.frames.seen.end.clone().filter(|end| *end != LogEnd::Complete);
     if verification.simulation.is_none() && report.verdict == Verdict::Identical {
         let end = end.map_or_else(String::new, |end| format!(" (the file is {end})"));
         if let Some(last) = verification.coverage.last_step {
@@ -177,16 +196,16 @@ pub(crate) fn verify<R: Read>(
         }
         bail!("{path}: has no snapshot with a keyframe to start from{end}");
     }
-    let end_text = verification.frames.end().map(ToString::to_string);
+    let end_text = verification.frames.seen.end.as_ref().map(ToString::to_string);
     report.file_end = end_text.unwrap_or_else(|| "not reached".to_owned());
-    report.lost = verification.numbers.lost(verification.frames.log().closing());
+    report.lost = verification.numbers.lost(verification.frames.seen.closing.as_deref());
     report.not_covered = verification.coverage.not_covered();
     Ok((report, end))
 }
 
 /// Compares every snapshot, up to the first finding, and then the end of the file.
-fn compare_states<R: Read>(
-    verification: &mut Verification<R>,
+fn compare_states(
+    verification: &mut Verification,
     report: &mut Report,
     stop: &AtomicBool,
     mut on_progress: impl FnMut(u64),
@@ -195,7 +214,7 @@ fn compare_states<R: Read>(
     while let Some((step, finding)) = verification.next(stop)? {
         count += 1;
         if count % SNAPSHOTS_PER_UPDATE == 0 {
-            on_progress(verification.frames.log().intact_count());
+            on_progress(verification.frames.seen.intact_count);
         }
         if report.is_empty() {
             report.first_step = step;

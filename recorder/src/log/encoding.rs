@@ -3,6 +3,7 @@
 pub(in crate::log) mod channel;
 mod descriptor;
 mod json_schema;
+mod particle_buffer;
 pub(crate) mod protobuf;
 pub(crate) mod scene_messages;
 
@@ -18,9 +19,10 @@ use super::rows::{
 use super::topic::Topic;
 use descriptor::{FRAME_TRANSFORM, KEYFRAME, POINT_CLOUD, SCENE_UPDATE, file_descriptor_set};
 use json_schema::row_schema;
+pub use particle_buffer::ParticleBuffer;
 pub use protobuf::{MAP_FRAME, WORLD_FRAME, encode_transform, map_from_world};
-use protobuf::{PointCloudEncoder, encode_keyframe};
 pub(super) use protobuf::{decode_keyframe, decode_particles, particle_bytes};
+use protobuf::{encode_cloud_head, encode_keyframe};
 
 /// The encoding of a topic.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,17 +80,10 @@ fn protobuf_format(name: &'static str) -> TopicFormat {
 }
 
 /// Encodes messages one by one and reuses its memory.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct MessageEncoder {
-    point_cloud: PointCloudEncoder,
     /// The message that was encoded last.
     scratch: Vec<u8>,
-}
-
-impl Default for MessageEncoder {
-    fn default() -> Self {
-        Self { point_cloud: PointCloudEncoder::new(), scratch: Vec::new() }
-    }
 }
 
 impl MessageEncoder {
@@ -123,8 +118,24 @@ impl MessageEncoder {
 
     /// Returns the bytes of a message on `/particles` for a borrowed payload.
     pub fn encode_particles(&mut self, particles: &[ParticleState], time_ns: u64) -> &[u8] {
-        self.point_cloud.encode(time_ns, particles, &mut self.scratch);
+        encode_cloud_head(time_ns, particles, &mut self.scratch);
+        self.scratch.extend_from_slice(bytemuck::cast_slice(particles));
         &self.scratch
+    }
+
+    /// Returns `true` if these are the bytes of a message. Does not copy its particles.
+    pub(in crate::log) fn has_bytes(
+        &mut self,
+        message: &Message,
+        time_ns: u64,
+        bytes: &[u8],
+    ) -> bool {
+        if let Message::Particles { particles, .. } = message {
+            encode_cloud_head(time_ns, particles, &mut self.scratch);
+            return bytes.strip_prefix(self.scratch.as_slice())
+                == Some(bytemuck::cast_slice(particles));
+        }
+        self.encode(message, time_ns).is_ok_and(|expected| expected == bytes)
     }
 }
 

@@ -11,7 +11,7 @@ use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
 use sim_contract::explain_write_error;
 
-use super::encoding::{MessageEncoder, TopicFormat, encode_transform};
+use super::encoding::{MessageEncoder, ParticleBuffer, TopicFormat, encode_transform};
 use super::message::Message;
 use super::run::selection::{ContentSelection, SELECTION_METADATA};
 use super::run::{
@@ -176,24 +176,51 @@ impl<W: Write> LogWriter<W> {
     /// # Errors
     /// If this or an earlier call failed.
     pub fn write(&mut self, message: &Message, log_time_ns: u64) -> Result<(), WriteError> {
+        let header = self.message_header(message.topic(), message.step(), log_time_ns);
+        let data = self.encoder.encode(message, header.publish_time)?;
+        let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
+        let result = file.write_to_known_channel(&header, data);
+        self.count_written(message.topic(), result)
+    }
+
+    /// Appends the particles of a snapshot, like [`LogWriter::write`], but copies them once less.
+    ///
+    /// # Errors
+    /// If this or an earlier call failed.
+    pub fn write_particles(
+        &mut self,
+        step: u64,
+        particles: &mut ParticleBuffer,
+        log_time_ns: u64,
+    ) -> Result<(), WriteError> {
+        let header = self.message_header(Topic::Particles, step, log_time_ns);
+        let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
+        let result = file.write_to_known_channel(&header, particles.message(header.publish_time));
+        self.count_written(Topic::Particles, result)
+    }
+
+    fn message_header(&mut self, topic: Topic, step: u64, log_time_ns: u64) -> MessageHeader {
         self.log_time_ns = self.log_time_ns.max(log_time_ns);
-        if message.topic() == Topic::Particles {
+        if topic == Topic::Particles {
             let after = self.snapshot_log_time_ns.map_or(0, |time_ns| time_ns.saturating_add(1));
             self.log_time_ns = self.log_time_ns.max(after);
             self.snapshot_log_time_ns = Some(self.log_time_ns);
         }
-        let publish_time_ns = self.run.time_of_step_ns(message.step());
-        let data = self.encoder.encode(message, publish_time_ns)?;
-        let header = MessageHeader {
-            channel_id: self.channels[message.topic().index()],
-            sequence: low_32_bits(message.step()),
+        MessageHeader {
+            channel_id: self.channels[topic.index()],
+            sequence: low_32_bits(step),
             log_time: self.log_time_ns,
-            publish_time: publish_time_ns,
-        };
-        let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
-        let result = file.write_to_known_channel(&header, data);
+            publish_time: self.run.time_of_step_ns(step),
+        }
+    }
+
+    fn count_written(
+        &mut self,
+        topic: Topic,
+        result: mcap::McapResult<()>,
+    ) -> Result<(), WriteError> {
         self.stop_on_error(result)?;
-        self.counts[message.topic()].written += 1;
+        self.counts[topic].written += 1;
         Ok(())
     }
 

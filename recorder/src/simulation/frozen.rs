@@ -6,11 +6,38 @@ use sim_contract::{ParticleFlags, ParticleState};
 /// Most events of a step, so that a scene that diverges does not flood the file.
 const EVENTS_PER_STEP_MAX: usize = 1024;
 
+/// The frozen particles of a snapshot.
+#[derive(Debug)]
+pub(crate) struct FrozenParticles {
+    pub(crate) particle_count: usize,
+    /// Ascending.
+    indices: Vec<u32>,
+}
+
+impl FrozenParticles {
+    /// Finds the frozen particles.
+    pub(crate) fn find(particles: &[ParticleState]) -> Self {
+        let is_frozen = |state: &ParticleState| state.flags & ParticleFlags::FROZEN != 0;
+        // Usually empty, so this rarely allocates.
+        let indices = (0_u32..)
+            .zip(particles)
+            .filter(|(_, state)| is_frozen(state))
+            .map(|(index, _)| index)
+            .collect();
+        Self { particle_count: particles.len(), indices }
+    }
+
+    /// Returns `true` if this particle is frozen.
+    pub(crate) fn contains(&self, index: u32) -> bool {
+        self.indices.binary_search(&index).is_ok()
+    }
+}
+
 /// Compares the frozen particles of each snapshot with those of the previous one.
 #[derive(Debug, Default)]
 pub(crate) struct FrozenTracker {
-    /// Frozen particles of the last snapshot, ascending. `None` before the first snapshot.
-    known: Option<Vec<u32>>,
+    /// Those of the last snapshot. `None` before the first snapshot.
+    known: Option<FrozenParticles>,
 }
 
 impl FrozenTracker {
@@ -19,19 +46,19 @@ impl FrozenTracker {
         self.known.is_none()
     }
 
+    /// Returns the frozen particles of the last snapshot.
+    pub(crate) fn known(&self) -> Option<&FrozenParticles> {
+        self.known.as_ref()
+    }
+
     /// Returns the events of a snapshot. The first snapshot has none, because its frozen particles
     /// froze earlier. After a reset a particle can freeze again.
-    pub(crate) fn new_events(&mut self, step: u64, particles: &[ParticleState]) -> Vec<EventRow> {
-        let is_frozen = |state: &ParticleState| state.flags & ParticleFlags::FROZEN != 0;
-        // Usually empty, so this rarely allocates.
-        let frozen: Vec<u32> = (0_u32..)
-            .zip(particles)
-            .filter(|(_, state)| is_frozen(state))
-            .map(|(index, _)| index)
-            .collect();
-        let Some(known) = self.known.replace(frozen) else { return Vec::new() };
-        let frozen = self.known.iter().flatten().copied();
-        rows(step, &frozen.filter(|one| known.binary_search(one).is_err()).collect::<Vec<_>>())
+    pub(crate) fn new_events(&mut self, step: u64, frozen: FrozenParticles) -> Vec<EventRow> {
+        let newest = self.known.take();
+        let known = self.known.insert(frozen);
+        let Some(before) = newest else { return Vec::new() };
+        let new = known.indices.iter().copied().filter(|index| !before.contains(*index));
+        rows(step, &new.collect::<Vec<_>>())
     }
 }
 
@@ -73,7 +100,9 @@ mod tests {
     #[test]
     fn only_newly_frozen_particles_are_events() {
         let mut tracker = FrozenTracker::default();
-        let mut events = |frozen: &[usize]| particles(&tracker.new_events(3, &snapshot(frozen, 5)));
+        let mut events = |frozen: &[usize]| {
+            particles(&tracker.new_events(3, FrozenParticles::find(&snapshot(frozen, 5))))
+        };
         assert_eq!(events(&[2]), [], "it froze before the recording");
         assert_eq!(events(&[0, 2, 4]), [Some(0), Some(4)]);
         assert_eq!(events(&[0, 2, 4]), []);
@@ -85,9 +114,9 @@ mod tests {
     fn the_last_event_of_a_step_over_the_limit_counts_the_remaining_particles() {
         for (count, named) in [(EVENTS_PER_STEP_MAX, 1024), (EVENTS_PER_STEP_MAX + 1, 1023)] {
             let mut tracker = FrozenTracker::default();
-            tracker.new_events(0, &snapshot(&[], count));
+            tracker.new_events(0, FrozenParticles::find(&snapshot(&[], count)));
             let all: Vec<_> = (0..count).collect();
-            let rows = tracker.new_events(1, &snapshot(&all, count));
+            let rows = tracker.new_events(1, FrozenParticles::find(&snapshot(&all, count)));
             assert_eq!(rows.len(), EVENTS_PER_STEP_MAX);
             assert_eq!(rows.iter().filter(|row| row.particle.is_some()).count(), named);
             if named == 1023 {

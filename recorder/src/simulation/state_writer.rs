@@ -2,15 +2,14 @@
 
 use std::io::Write;
 
-use bytemuck::cast;
 use recorder::{
-    CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, RunDescription, StepRow,
-    SurfaceRow, TopologyRow, WriteError,
+    CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, ParticleBuffer, RunDescription,
+    StepRow, SurfaceRow, TopologyRow, WriteError,
 };
 use sim_contract::{ConstraintState, LoadHeader, ParameterValues, ParticleState, Triangle};
 use sim_solver::Solver;
 
-use super::frozen::FrozenTracker;
+use super::frozen::{FrozenParticles, FrozenTracker};
 use super::job::{Job, count};
 use super::solver_rows::{colliders_row, new_tears_row};
 
@@ -35,6 +34,7 @@ pub(super) struct StateWriter<'a, W: Write> {
     /// The last written values.
     parameters: Option<ParameterValues>,
     frozen: FrozenTracker,
+    particles: ParticleBuffer,
 }
 
 impl<'a, W: Write> StateWriter<'a, W> {
@@ -64,6 +64,7 @@ impl<'a, W: Write> StateWriter<'a, W> {
             colliders: CollidersRow { step: 0, colliders: Vec::new() },
             parameters: None,
             frozen: FrozenTracker::default(),
+            particles: ParticleBuffer::default(),
         })
     }
 
@@ -124,13 +125,13 @@ impl<'a, W: Write> StateWriter<'a, W> {
 
     fn write_snapshot(&mut self, solver: &Solver, step: u64) -> Result<(), WriteError> {
         let time_ns = self.run.time_of_step_ns(step);
-        let particles: Vec<ParticleState> =
-            (0..solver.particle_count()).map(|index| cast(solver.particle(index))).collect();
-        for row in self.frozen.new_events(step, &particles) {
+        let particles: &[ParticleState] = bytemuck::cast_slice(solver.particles());
+        for row in self.frozen.new_events(step, FrozenParticles::find(particles)) {
             self.log.write(&Message::Event(row), time_ns)?;
         }
         self.log.write(&Message::Step(self.row(solver, step)), time_ns)?;
-        self.log.write(&Message::Particles { step, particles }, time_ns)
+        self.particles.copy_from(particles);
+        self.log.write_particles(step, &mut self.particles, time_ns)
     }
 
     fn row(&self, solver: &Solver, step: u64) -> StepRow {

@@ -1,6 +1,6 @@
 //! The part of the messages of a node that goes into the recording.
 
-use recorder::Message;
+use recorder::{Message, ParticleBuffer};
 
 use super::load::RunHeader;
 use super::queue::Content;
@@ -23,6 +23,8 @@ pub(crate) struct Accepted {
     pub(crate) header: Option<RunHeader>,
     pub(crate) contents: Vec<Content>,
     pub(crate) end: Option<RunEnd>,
+    /// The buffer for the particles of the next snapshot.
+    pub(crate) spare: ParticleBuffer,
 }
 
 impl Accepted {

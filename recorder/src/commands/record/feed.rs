@@ -94,6 +94,7 @@ impl Feed {
             self.intake.accept_before(state, messages, &mut self.accepted);
             self.end_part(reason.text().to_owned(), reason == StopReason::Split);
         }
+        self.accepted.spare = self.queue.take_spare();
         self.intake.accept_state(state, Now::read(), &mut self.accepted)
     }
 

@@ -67,8 +67,7 @@ impl Intake {
         }
         self.start_if_ready(now, accepted);
         if let Some(started) = &mut self.started {
-            let particles = state.particles.to_vec();
-            started.accept(state.header, particles, state.changes, accepted);
+            started.accept(state.header, state.particles, state.changes, accepted);
             return Ok(());
         }
         if matches!(state.changes.first(), Some(Change::Load)) {
@@ -185,7 +184,7 @@ impl Intake {
         started.skip_member_changes(self.status.as_ref());
         accepted.header = Some(header);
         let FirstState { header, particles, changes, .. } = first;
-        started.accept(&header, particles, &changes, accepted);
+        started.accept(&header, &particles, &changes, accepted);
         self.started = Some(started);
     }
 

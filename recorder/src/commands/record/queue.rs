@@ -4,10 +4,13 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use recorder::{AllCounts, Backlog, Closing, Message, StepRow, Topic};
-use sim_contract::{Action, ParticleState};
+use recorder::{AllCounts, Backlog, Closing, Message, ParticleBuffer, StepRow, Topic};
+use sim_contract::Action;
 
 use super::load::RunHeader;
+
+/// Most spare buffers. More are in use only while the disk is slow, and their memory is then given back.
+const SPARE_BUFFERS_MAX: usize = 8;
 
 /// One or two messages to write.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +18,7 @@ pub(crate) enum Content {
     /// Any message except those of a snapshot.
     Update(Message),
     /// The two messages of a snapshot, which stay together.
-    Snapshot(StepRow, Vec<ParticleState>),
+    Snapshot(StepRow, ParticleBuffer),
 }
 
 /// Something that is worth a file of a black box.
@@ -81,6 +84,8 @@ pub(crate) struct Queue {
 struct State {
     entries: VecDeque<Entry>,
     size_bytes: usize,
+    /// The buffers of written snapshots.
+    spare: Vec<ParticleBuffer>,
     /// The accepted messages without a snapshot; `None` before the start.
     backlog: Option<Backlog>,
     /// The newest file has no snapshot yet.
@@ -167,6 +172,19 @@ impl Queue {
     /// Returns the size of what waits, in bytes.
     pub(crate) fn size_bytes(&self) -> usize {
         self.lock().size_bytes
+    }
+
+    /// Gives a buffer back, after its snapshot was written.
+    pub(crate) fn add_spare(&self, buffer: ParticleBuffer) {
+        let mut state = self.lock();
+        if state.spare.len() < SPARE_BUFFERS_MAX {
+            state.spare.push(buffer);
+        }
+    }
+
+    /// Returns a buffer for the next snapshot.
+    pub(crate) fn take_spare(&self) -> ParticleBuffer {
+        self.lock().spare.pop().unwrap_or_default()
     }
 
     /// Closes the queue. Items in the queue can still be popped.
@@ -268,13 +286,15 @@ impl Content {
     pub(crate) fn size_bytes(&self) -> usize {
         match self {
             Self::Update(message) => message.size_bytes(),
-            Self::Snapshot(_, particles) => size_of::<Item>() + size_of_val(particles.as_slice()),
+            Self::Snapshot(_, buffer) => size_of::<Item>() + size_of_val(buffer.particles()),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::ParticleState;
+
     use super::*;
 
     fn row(step: u64) -> StepRow {
@@ -282,7 +302,7 @@ mod tests {
     }
 
     fn snapshot(step: u64) -> Item {
-        let particles = vec![ParticleState::default(); 1000];
+        let particles = vec![ParticleState::default(); 1000].as_slice().into();
         Item { content: Content::Snapshot(row(step), particles), log_time_ns: step }
     }
 

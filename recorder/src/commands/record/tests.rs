@@ -84,7 +84,7 @@ fn description() -> RunDescription {
 
 fn snapshot(index: u32) -> Content {
     let row = StepRow { step: index.into(), snapshot_index: Some(index), ..StepRow::default() };
-    Content::Snapshot(row, vec![ParticleState::default(); 1000])
+    Content::Snapshot(row, vec![ParticleState::default(); 1000].as_slice().into())
 }
 
 fn keyframe(index: u32) -> Content {
@@ -101,7 +101,7 @@ fn begun_queue(limit_bytes: usize) -> Queue {
 fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> (LogWriter<W>, Closing) {
     loop {
         match queue.pop(WAIT_MAX) {
-            Popped::Item(item) => write_item(&mut log, item).unwrap(),
+            Popped::Item(item) => _ = write_item(&mut log, item).unwrap(),
             Popped::End(mut closing, _) => {
                 closing.counts.set_written(log.counts());
                 return (log, *closing);

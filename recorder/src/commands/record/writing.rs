@@ -12,7 +12,9 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
-use recorder::{Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, WriteError};
+use recorder::{
+    Closing, ContentSelection, LogOptions, LogWriter, Message, PartFile, ParticleBuffer, WriteError,
+};
 use rustix::fs::statvfs;
 use sim_contract::clock::monotonic_ns;
 
@@ -119,7 +121,11 @@ impl Files {
         loop {
             match queue.pop(WAIT_MAX) {
                 Popped::Begin { header, log_time_ns } => self.on_begin(header, log_time_ns)?,
-                Popped::Item(item) => self.on_item(item)?,
+                Popped::Item(item) => {
+                    if let Some(buffer) = self.on_item(item)? {
+                        queue.add_spare(buffer);
+                    }
+                }
                 Popped::End(closing, end) => self.on_end(*closing, end)?,
                 Popped::Timeout => {}
                 Popped::Closed => return Ok(()),
@@ -140,11 +146,12 @@ impl Files {
         Ok(())
     }
 
-    fn on_item(&mut self, item: Item) -> anyhow::Result<()> {
+    /// Returns the buffer of a snapshot that is written.
+    fn on_item(&mut self, item: Item) -> anyhow::Result<Option<ParticleBuffer>> {
         let Some(black_box) = &mut self.options.black_box else { return self.write(item) };
         black_box.push(item);
         self.position.set(self.next_number, black_box.size_bytes() as u64);
-        Ok(())
+        Ok(None)
     }
 
     fn on_end(&mut self, closing: Closing, end: FileEnd) -> anyhow::Result<()> {
@@ -155,7 +162,7 @@ impl Files {
     /// Writes a file of the black box.
     fn write_kept(&mut self, file: KeptFile) -> anyhow::Result<()> {
         self.begin(&file.header, file.log_time_ns)?;
-        file.items.into_iter().try_for_each(|item| self.write(item))?;
+        file.items.into_iter().try_for_each(|item| self.write(item).map(drop))?;
         self.finish(file.closing)
     }
 
@@ -208,14 +215,16 @@ impl Files {
         Ok(())
     }
 
-    fn write(&mut self, item: Item) -> anyhow::Result<()> {
-        let Some(open) = &mut self.open else { return Ok(()) };
+    /// Returns the buffer of a snapshot.
+    fn write(&mut self, item: Item) -> anyhow::Result<Option<ParticleBuffer>> {
+        let Some(open) = &mut self.open else { return Ok(None) };
         if let Content::Snapshot(row, _) | Content::Update(Message::Step(row)) = &item.content {
             open.steps = Some((open.steps.map_or(row.step, |(first, _)| first), row.step));
         }
-        write_item(&mut open.log, item).with_context(|| incomplete(&open.part_path))?;
+        let buffer = write_item(&mut open.log, item);
+        let buffer = buffer.with_context(|| incomplete(&open.part_path))?;
         self.position.set(open.number, open.log.size_bytes());
-        Ok(())
+        Ok(buffer)
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {
@@ -266,14 +275,18 @@ fn incomplete(part_path: &Path) -> String {
     format!("the recording is incomplete; its readable part is {}", output::path_text(part_path))
 }
 
-/// Writes the messages of an item.
-pub(super) fn write_item<W: Write>(log: &mut LogWriter<W>, item: Item) -> Result<(), WriteError> {
+/// Writes the messages of an item. Returns the buffer of a snapshot.
+pub(super) fn write_item<W: Write>(
+    log: &mut LogWriter<W>,
+    item: Item,
+) -> Result<Option<ParticleBuffer>, WriteError> {
     let Item { content, log_time_ns } = item;
     match content {
-        Content::Update(message) => log.write(&message, log_time_ns),
-        Content::Snapshot(row, particles) => {
+        Content::Update(message) => log.write(&message, log_time_ns).map(|()| None),
+        Content::Snapshot(row, mut buffer) => {
             log.write(&Message::Step(row), log_time_ns)?;
-            log.write(&Message::Particles { step: row.step, particles }, log_time_ns)
+            log.write_particles(row.step, &mut buffer, log_time_ns)?;
+            Ok(Some(buffer))
         }
     }
 }

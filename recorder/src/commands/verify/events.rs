@@ -1,9 +1,8 @@
 //! The events of a snapshot, compared with its particles.
 
 use recorder::{EventRow, Frame, Message};
-use sim_contract::{ParticleFlags, ParticleState};
 
-use crate::simulation::frozen::{FrozenTracker, frozen_event};
+use crate::simulation::frozen::{FrozenParticles, FrozenTracker, frozen_event};
 
 /// Compares the events of each snapshot with the particles that froze since the last one. Those of members of
 /// the lockstep are not compared.
@@ -20,8 +19,8 @@ impl EventCheck {
     }
 
     /// Passes a snapshot before the first one to check.
-    pub(super) fn skip(&mut self, step: u64, particles: &[ParticleState]) {
-        self.frozen.new_events(step, particles);
+    pub(super) fn skip(&mut self, step: u64, frozen: FrozenParticles) {
+        self.frozen.new_events(step, frozen);
         self.last_step = Some(step);
     }
 
@@ -30,23 +29,23 @@ impl EventCheck {
     pub(super) fn check(
         &mut self,
         frame: &Frame,
-        particles: &[ParticleState],
+        frozen: FrozenParticles,
         is_after_gap: bool,
     ) -> Option<String> {
         let Frame { row, updates, .. } = frame;
-        let expected = self.frozen.new_events(row.step, particles);
+        let expected = self.frozen.new_events(row.step, frozen);
         let last_step = self.last_step.replace(row.step);
         let events: Vec<_> = updates.iter().filter_map(event).collect();
-        let is_same = match last_step {
-            Some(last) if is_after_gap => {
+        let is_same = match (last_step, self.frozen.known()) {
+            (Some(last), Some(frozen)) if is_after_gap => {
                 is_ascending(&events)
                     && events.iter().all(|event| {
-                        (last + 1..=row.step).contains(&event.step) && is_valid(event, particles)
+                        (last + 1..=row.step).contains(&event.step) && is_valid(event, frozen)
                     })
                     && events
                         .iter()
                         .filter(|event| event.step == row.step)
-                        .all(|event| event.particle.is_none_or(|index| is_frozen(particles, index)))
+                        .all(|event| event.particle.is_none_or(|index| frozen.contains(index)))
                     && has_all(&events, &expected)
             }
             _ => events.iter().copied().eq(&expected),
@@ -63,10 +62,6 @@ fn event(update: &Message) -> Option<&EventRow> {
     }
 }
 
-fn is_frozen(particles: &[ParticleState], index: u32) -> bool {
-    particles.get(index as usize).is_some_and(|state| state.flags & ParticleFlags::FROZEN != 0)
-}
-
 /// Returns `true` if no event is repeated, and each is in its place. An event without a particle is the
 /// last one of its step.
 fn is_ascending(events: &[&EventRow]) -> bool {
@@ -75,10 +70,10 @@ fn is_ascending(events: &[&EventRow]) -> bool {
 }
 
 /// Returns `true` if an event has the form that a recorder writes.
-fn is_valid(event: &EventRow, particles: &[ParticleState]) -> bool {
+fn is_valid(event: &EventRow, frozen: &FrozenParticles) -> bool {
     match event.particle {
         Some(index) => {
-            (index as usize) < particles.len() && *event == frozen_event(event.step, index)
+            (index as usize) < frozen.particle_count && *event == frozen_event(event.step, index)
         }
         None => event.kind == "frozen" && event.text.ends_with(" more particles are frozen"),
     }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use sim_contract::Action;
 use sim_solver::Solver;
-use xxhash_rust::xxh3::xxh3_64_with_seed;
+use xxhash_rust::xxh3::xxh3_64;
 
 /// Digests of the computed states.
 #[derive(Debug)]
@@ -14,6 +14,8 @@ pub(super) struct PastStates {
     digests: Vec<u64>,
     /// The same without their steps, made for the first state that was given.
     all: Option<HashSet<u64>>,
+    /// The rest of the newest state.
+    rest: Rest,
     /// Number of states that were taken from the file without a proof.
     pub(super) given_count: u64,
 }
@@ -21,10 +23,12 @@ pub(super) struct PastStates {
 impl PastStates {
     /// Starts with the first state.
     pub(super) fn from_first(first_step: u64, solver: &Solver) -> Self {
+        let rest = Rest::new(solver);
         Self {
             first_step,
-            digests: vec![digest(solver, solver.state_hash())],
+            digests: vec![rest.state_digest(solver, solver.state_hash())],
             all: None,
+            rest,
             given_count: 0,
         }
     }
@@ -35,9 +39,12 @@ impl PastStates {
         *self = Self { given_count, ..Self::from_first(step, solver) };
     }
 
-    /// Adds the state after the next step.
-    pub(super) fn add(&mut self, solver: &Solver) {
-        let digest = digest(solver, solver.state_hash());
+    /// Adds the state after the next step. `is_commanded` is true if commands precede the step.
+    pub(super) fn add(&mut self, solver: &Solver, is_commanded: bool) {
+        if is_commanded || !self.rest.is_same(solver) {
+            self.rest = Rest::new(solver);
+        }
+        let digest = self.rest.state_digest(solver, solver.state_hash());
         self.digests.push(digest);
         if let Some(all) = &mut self.all {
             all.insert(digest);
@@ -48,7 +55,7 @@ impl PastStates {
     /// of them proves. Returns a description of a difference.
     pub(super) fn compare(&mut self, action: &Action, solver: &Solver) -> Option<String> {
         let state_hash = solver.hash_in_place();
-        let digest = digest(solver, state_hash);
+        let digest = Rest::new(solver).state_digest(solver, state_hash);
         match *action {
             Action::Rewind { to_step: Some(to_step), back_steps: None } => {
                 self.compare_rewind(to_step, digest)
@@ -82,7 +89,34 @@ impl PastStates {
     }
 }
 
-/// Digest of a complete state.
-fn digest(solver: &Solver, state_hash: u64) -> u64 {
-    xxh3_64_with_seed(&solver.keyframe().encode(), state_hash)
+/// The state beside the particles and the scene's step. It rarely changes, and encoding it takes as long
+/// as a part of a small scene's step.
+#[derive(Debug)]
+struct Rest {
+    digest: u64,
+    torn_count: usize,
+    frozen_count: u64,
+}
+
+impl Rest {
+    fn new(solver: &Solver) -> Self {
+        Self {
+            digest: xxh3_64(&solver.keyframe().at_scene_step(0).encode()),
+            torn_count: solver.torn().len(),
+            frozen_count: solver.frozen_count(),
+        }
+    }
+
+    /// Returns `true` if a step without commands before it has changed nothing of this.
+    fn is_same(&self, solver: &Solver) -> bool {
+        solver.grabs().len() == 0
+            && self.torn_count == solver.torn().len()
+            && self.frozen_count == solver.frozen_count()
+    }
+
+    /// Returns the digest of the complete state.
+    fn state_digest(&self, solver: &Solver, state_hash: u64) -> u64 {
+        let parts = [state_hash, solver.scene_step(), self.digest];
+        xxh3_64(&parts.map(u64::to_le_bytes).concat())
+    }
 }

@@ -2,17 +2,23 @@
 
 use std::io::Read;
 use std::sync::atomic::AtomicBool;
+use std::thread::Scope;
 
-use recorder::{Frame, FrameReader, LogReader, Message, OutcomeRow, ReadError, TearsRow, Topic};
-use sim_contract::{Action, ParticleState};
+use recorder::{
+    AuditDifference, Frame, LogReader, Message, OutcomeRow, ReadError, RunDescription, TearsRow,
+    Topic,
+};
+use sim_contract::Action;
 use sim_solver::{Scene, Solver};
 
 use super::coverage::Coverage;
 use super::events::EventCheck;
 use super::finding::{Finding, StepGap};
 use super::load::{compare_counts, compare_load, compare_run};
+use super::read_ahead::{ReadAhead, ReadFrame};
 use super::resimulation::{Resimulation, StartError};
 use super::snapshot_numbers::SnapshotNumbers;
+use crate::simulation::frozen::FrozenParticles;
 use crate::simulation::run_id::RunId;
 
 /// The format version from which on snapshots are numbered and tears have their causes.
@@ -23,6 +29,8 @@ const NUMBERED_VERSION: u32 = 4;
 pub(crate) enum VerifyError {
     #[error(transparent)]
     Read(#[from] ReadError),
+    #[error("cannot start the thread that reads the file: {0}")]
+    Thread(std::io::Error),
     #[error(transparent)]
     Start(#[from] StartError),
 }
@@ -46,8 +54,10 @@ pub(crate) struct VerifyOptions {
 
 /// A recording that is being verified.
 #[derive(Debug)]
-pub(super) struct Verification<R> {
-    pub(super) frames: FrameReader<R>,
+pub(super) struct Verification {
+    pub(super) frames: ReadAhead,
+    run: RunDescription,
+    format_version: u32,
     scene: Scene,
     threads: usize,
     range: StepRange,
@@ -66,9 +76,14 @@ pub(super) struct Verification<R> {
     has_all_commands: bool,
 }
 
-impl<R: Read> Verification<R> {
-    pub(super) fn new(log: LogReader<R>, scene: Scene, options: VerifyOptions) -> Self {
-        let VerifyOptions { threads, range } = options;
+impl Verification {
+    /// Starts to read `log`, which compares its form, on another thread.
+    pub(super) fn start<'scope, R: Read + Send + 'scope>(
+        threads: &'scope Scope<'scope, '_>,
+        log: LogReader<R>,
+        scene: Scene,
+        options: VerifyOptions,
+    ) -> Result<Self, VerifyError> {
         let is_simulated = log.run().epoch_ns == 0;
         let is_older_format = !log.is_current_format();
         let has_numbers = log.format_version() >= NUMBERED_VERSION;
@@ -76,12 +91,14 @@ impl<R: Read> Verification<R> {
         let left_out =
             Topic::ALL.into_iter().filter(|topic| !selection.has_topic(*topic)).collect();
         let coverage = Coverage { is_older_format, left_out, ..Coverage::default() };
-        Self {
+        Ok(Self {
             run_id: RunId::new(log.scene()),
-            frames: FrameReader::new(log.with_audit()),
+            run: log.run().clone(),
+            format_version: log.format_version(),
+            frames: ReadAhead::start(threads, log).map_err(VerifyError::Thread)?,
             scene,
-            threads,
-            range,
+            threads: options.threads,
+            range: options.range,
             simulation: None,
             coverage,
             revision: None,
@@ -90,17 +107,7 @@ impl<R: Read> Verification<R> {
             numbers: SnapshotNumbers::new(is_simulated, has_numbers, selection),
             events: EventCheck::default(),
             has_all_commands: false,
-        }
-    }
-
-    /// Compares the header of the file with the scene.
-    pub(super) fn check_header(&self) -> Finding {
-        let log = self.frames.log();
-        let what = match self.audit_finding() {
-            Finding::Identical => compare_run(log, &self.scene),
-            finding => return finding,
-        };
-        what.map_or(Finding::Identical, Finding::in_file)
+        })
     }
 
     /// Checks the next snapshot. Returns its step and the finding, or `None` at the end of the readable
@@ -110,7 +117,7 @@ impl<R: Read> Verification<R> {
         stop: &AtomicBool,
     ) -> Result<Option<(u64, Finding)>, VerifyError> {
         loop {
-            let frame = match self.frames.next_frame() {
+            let ReadFrame { frame, frozen } = match self.frames.next_frame() {
                 Ok(Some(frame)) => frame,
                 Ok(None) => return Ok(None),
                 Err(ReadError::Interrupted) => return Ok(Some((0, Finding::Interrupted))),
@@ -121,7 +128,7 @@ impl<R: Read> Verification<R> {
                 self.coverage.last_step = Some(self.range.last);
                 return Ok(None);
             }
-            let finding = self.check_content(&frame);
+            let finding = self.check_content(&frame, frozen);
             if finding != Finding::Identical {
                 return Ok(Some((step, finding)));
             }
@@ -133,12 +140,12 @@ impl<R: Read> Verification<R> {
     }
 
     /// Compares the form of the messages, the load and the events.
-    fn check_content(&mut self, frame: &Frame) -> Finding {
-        let finding = self.audit_finding();
+    fn check_content(&mut self, frame: &Frame, frozen: Option<FrozenParticles>) -> Finding {
+        let finding = self.form_finding();
         if finding != Finding::Identical {
             return finding;
         }
-        if let Some(topic) = self.frames.log().newer_topic() {
+        if let Some(topic) = self.frames.seen.newer_topic {
             let what = format!("its format_version is older than {}", topic.name());
             return Finding::in_file(format!("the metadata 'run': {what}"));
         }
@@ -155,18 +162,17 @@ impl<R: Read> Verification<R> {
             return finding;
         }
         let what = self.numbers.check(&frame.row);
-        let events =
-            frame.particles.as_ref().and_then(|particles| self.check_events(frame, particles));
+        let events = frozen.and_then(|frozen| self.check_events(frame, frozen));
         what.or(events).map_or(Finding::Identical, diverged)
     }
 
     /// Compares the events with particles.
-    fn check_events(&mut self, frame: &Frame, particles: &[ParticleState]) -> Option<String> {
+    fn check_events(&mut self, frame: &Frame, frozen: FrozenParticles) -> Option<String> {
         if self.range.start > 0 && self.simulation.is_none() && frame.particles.is_some() {
-            self.events.skip(frame.row.step, particles);
+            self.events.skip(frame.row.step, frozen);
             return None;
         }
-        let what = self.events.check(frame, particles, self.numbers.is_after_gap());
+        let what = self.events.check(frame, frozen, self.numbers.is_after_gap());
         what.filter(|_| !self.coverage.left_out.contains(&Topic::Events))
     }
 
@@ -175,9 +181,9 @@ impl<R: Read> Verification<R> {
         if frame.particles.is_some() {
             return Finding::Identical;
         }
-        let Some(simulation) = self.simulation.take() else { return Finding::Identical };
-        let what = self.check_events(frame, simulation.particles());
-        self.simulation = Some(simulation);
+        let Some(simulation) = &self.simulation else { return Finding::Identical };
+        let frozen = FrozenParticles::find(simulation.particles());
+        let what = self.check_events(frame, frozen);
         what.map_or(Finding::Identical, |what| Finding::Diverged {
             step: frame.row.step,
             what,
@@ -189,7 +195,7 @@ impl<R: Read> Verification<R> {
         let is_load = |one: &&Message| matches!(one, Message::Topology(_) | Message::Surface(_));
         let mut rows = frame.updates.iter().filter(is_load).peekable();
         rows.peek()?;
-        let run = self.frames.log().run();
+        let run = &self.run;
         let solver = Solver::new(&self.scene);
         for row in rows {
             let topic = row.topic();
@@ -237,7 +243,7 @@ impl<R: Read> Verification<R> {
         let is_complete = row.causes.len() == row.constraints.len();
         let unknown_count = row.causes.iter().filter(|cause| *cause == "unknown").count();
         self.coverage.unknown_cause_count += unknown_count;
-        let has_causes = self.frames.log().format_version() >= NUMBERED_VERSION;
+        let has_causes = self.format_version >= NUMBERED_VERSION;
         let is_wrong = has_causes && !is_complete || self.is_simulated && unknown_count > 0;
         is_wrong.then(|| "/tears: it has no cause for one of its constraints".to_owned())
     }
@@ -285,15 +291,11 @@ impl<R: Read> Verification<R> {
     /// Completes the description of what was compared, once [`Self::next`] has returned `None`.
     pub(super) fn finish_coverage(&mut self) {
         let waiting_count = self.simulation.as_ref().map_or(0, Resimulation::waiting_count);
-        self.coverage.trailing_count = self.frames.trailing_updates().len()
-            + usize::from(self.frames.trailing_row().is_some())
-            + waiting_count;
+        self.coverage.trailing_count = self.frames.seen.trailing_count + waiting_count;
         self.coverage.earlier_count =
             self.simulation.as_ref().map_or(0, Resimulation::earlier_count);
         self.coverage.given_count = self.simulation.as_ref().map_or(0, Resimulation::given_count);
-        let log = self.frames.log();
-        let foreign = log.audit().into_iter().flat_map(recorder::Audit::foreign);
-        self.coverage.foreign = foreign.map(ToOwned::to_owned).collect();
+        self.coverage.foreign.clone_from(&self.frames.seen.foreign);
     }
 
     /// Returns the steps whose states could not be simulated.
@@ -303,23 +305,23 @@ impl<R: Read> Verification<R> {
 
     /// Checks the end of the file, once [`Self::next`] has returned `None`.
     pub(super) fn check_end(&mut self) -> Finding {
-        let log = self.frames.log();
-        let finding = self.audit_finding();
+        let closing = self.frames.seen.closing.as_deref();
+        let finding = self.form_finding();
         if finding != Finding::Identical {
             return finding;
         }
-        if let Some(what) = log.closing().and_then(|one| self.numbers.check_declared(one)) {
+        if let Some(what) = closing.and_then(|one| self.numbers.check_declared(one)) {
             return Finding::in_file(what);
         }
         // A recording of a node has a random id. An interrupted simulation has fewer commands, and so has a
         // repaired file that lacks some.
         let has_inputs = self.is_simulated && self.has_all_commands;
-        let is_whole = log.closing().is_some_and(|one| {
+        let is_whole = closing.is_some_and(|one| {
             one.stop_reason == "steps reached"
                 && !one.missing().contains_key(Topic::Outcomes.name())
         });
         self.coverage.has_run_hash = has_inputs && is_whole && self.gaps().is_empty();
-        if self.coverage.has_run_hash && log.run().run_id != self.run_id.value() {
+        if self.coverage.has_run_hash && self.run.run_id != self.run_id.value() {
             return Finding::in_file(
                 "the metadata 'run': its run_id is not the hash of the scene and the commands in \
                  /outcomes"
@@ -329,13 +331,24 @@ impl<R: Read> Verification<R> {
         Finding::Identical
     }
 
-    fn audit_finding(&self) -> Finding {
-        let difference = self.frames.log().audit().and_then(|audit| audit.difference());
-        difference.map_or(Finding::Identical, |difference| match difference.step {
-            None => Finding::in_file(difference.what.clone()),
-            Some(step) => {
-                Finding::Diverged { step, what: difference.what.clone(), difference: None }
-            }
-        })
+    fn form_finding(&self) -> Finding {
+        form_finding(self.frames.seen.difference.as_ref())
     }
+}
+
+/// Compares the header of a file with the scene. `log` compares its form.
+pub(super) fn check_header<R: Read>(log: &LogReader<R>, scene: &Scene) -> Finding {
+    let what = match form_finding(log.audit().and_then(|audit| audit.difference())) {
+        Finding::Identical => compare_run(log, scene),
+        finding => return finding,
+    };
+    what.map_or(Finding::Identical, Finding::in_file)
+}
+
+/// Returns the finding for a part of the file that a recorder would write differently.
+fn form_finding(difference: Option<&AuditDifference>) -> Finding {
+    difference.map_or(Finding::Identical, |AuditDifference { step, what }| match step {
+        None => Finding::in_file(what.clone()),
+        Some(step) => Finding::at_step(*step, what.clone()),
+    })
 }

@@ -122,7 +122,8 @@ mod tests {
     use sim_solver::scene::Up;
 
     use super::*;
-    use crate::log::encoding::protobuf::{PointCloudEncoder, encode_keyframe, encode_transform};
+    use crate::log::encoding::MessageEncoder;
+    use crate::log::encoding::protobuf::{encode_keyframe, encode_transform};
 
     fn messages(root: &'static str) -> BTreeMap<String, DescriptorProto> {
         let set = FileDescriptorSet::decode(file_descriptor_set(root).as_slice()).unwrap();
@@ -174,13 +175,9 @@ mod tests {
 
     #[test]
     fn the_schema_of_particles_declares_every_written_field() {
-        let mut message = Vec::new();
-        PointCloudEncoder::new().encode(
-            1_000_000_001,
-            &[ParticleState::default(); 2],
-            &mut message,
-        );
-        let checked = check(&messages(POINT_CLOUD), ".foxglove.PointCloud", &message);
+        let mut encoder = MessageEncoder::default();
+        let message = encoder.encode_particles(&[ParticleState::default(); 2], 1_000_000_001);
+        let checked = check(&messages(POINT_CLOUD), ".foxglove.PointCloud", message);
         assert!(checked > 30, "{checked} fields");
     }
 

@@ -4,6 +4,7 @@
 //! `descriptor.rs` declares the same messages for readers of a file.
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::sync::LazyLock;
 
 use prost::Message;
 use prost::encoding::{
@@ -126,58 +127,75 @@ pub(super) struct Keyframe {
 
 const IDENTITY: Quaternion = Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
 
-/// Encodes snapshots as foxglove.PointCloud. Only the time and the data differ between messages.
-#[derive(Debug)]
-pub(super) struct PointCloudEncoder {
-    /// A cloud without data.
-    prefix: PointCloud,
-}
-
-impl PointCloudEncoder {
-    pub(super) fn new() -> Self {
-        let position = Vector3 { x: 0.0, y: 0.0, z: 0.0 };
-        let fields = FIELDS.map(|(name, offset, numeric_type)| PackedElementField {
-            name: name.to_owned(),
-            offset,
-            r#type: numeric_type,
-        });
-        Self {
-            prefix: PointCloud {
-                timestamp: None,
-                frame_id: WORLD_FRAME.to_owned(),
-                pose: Some(Pose { position: Some(position), orientation: Some(IDENTITY) }),
-                point_stride: 32,
-                fields: fields.into(),
-                data: Vec::new(),
-            },
-        }
-    }
-
-    /// Replaces `out` with the message. `data` is the last field and is copied once.
-    pub(super) fn encode(&mut self, time_ns: u64, particles: &[ParticleState], out: &mut Vec<u8>) {
-        let payload: &[u8] = bytemuck::cast_slice(particles);
-        self.prefix.timestamp = Some(timestamp(time_ns));
-        out.clear();
-        out.reserve(self.prefix.encoded_len() + 11 + payload.len());
-        self.prefix.encode_raw(out);
-        if !payload.is_empty() {
-            out.push(DATA_KEY);
-            encode_varint(payload.len() as u64, out);
-            out.extend_from_slice(payload);
-        }
+/// Returns a cloud without a time and data.
+fn empty_cloud() -> PointCloud {
+    let position = Vector3 { x: 0.0, y: 0.0, z: 0.0 };
+    let fields = FIELDS.map(|(name, offset, numeric_type)| PackedElementField {
+        name: name.to_owned(),
+        offset,
+        r#type: numeric_type,
+    });
+    PointCloud {
+        timestamp: None,
+        frame_id: WORLD_FRAME.to_owned(),
+        pose: Some(Pose { position: Some(position), orientation: Some(IDENTITY) }),
+        point_stride: 32,
+        fields: fields.into(),
+        data: Vec::new(),
     }
 }
 
-/// Decodes the particles of a cloud that [`PointCloudEncoder`] encoded.
+/// The fields between the time and the data, which are the same in all clouds.
+static SHARED_FIELDS: LazyLock<Vec<u8>> = LazyLock::new(|| empty_cloud().encode_to_vec());
+
+/// Replaces `out` with a foxglove.PointCloud up to the bytes of its data, which is the last field.
+pub(super) fn encode_cloud_head(time_ns: u64, particles: &[ParticleState], out: &mut Vec<u8>) {
+    out.clear();
+    prost::encoding::message::encode(1, &timestamp(time_ns), out);
+    out.extend_from_slice(&SHARED_FIELDS);
+    if !particles.is_empty() {
+        out.push(DATA_KEY);
+        encode_varint(size_of_val(particles) as u64, out);
+    }
+}
+
+/// Decodes the particles of a cloud that [`encode_cloud_head`] has begun.
 pub(crate) fn decode_particles(message: &[u8]) -> Result<Vec<ParticleState>, String> {
     let data = particle_bytes(message)?;
-    let mut particles = vec![ParticleState::default(); data.len() / 32];
-    bytemuck::cast_slice_mut(&mut particles).copy_from_slice(data);
-    Ok(particles)
+    Ok(data.chunks_exact(size_of::<ParticleState>()).map(bytemuck::pod_read_unaligned).collect())
 }
 
-/// Returns the bytes of the particles of a cloud that [`PointCloudEncoder`] encoded: 32 for each.
+/// Returns the bytes of the particles of a cloud that [`encode_cloud_head`] has begun: 32 for each.
 pub(crate) fn particle_bytes(message: &[u8]) -> Result<&[u8], String> {
+    match plain_particle_bytes(message) {
+        Some(data) => Ok(data),
+        None => any_particle_bytes(message),
+    }
+}
+
+/// Returns the bytes of the particles if all fields are in the order of [`encode_cloud_head`].
+fn plain_particle_bytes(message: &[u8]) -> Option<&[u8]> {
+    let mut left = message;
+    let time = take_field(1, &mut left)?;
+    Timestamp::decode(time).ok()?;
+    left = left.strip_prefix(SHARED_FIELDS.as_slice())?;
+    let data = take_field(DATA_NUMBER, &mut left)?;
+    (left.is_empty() && data.len().is_multiple_of(size_of::<ParticleState>())).then_some(data)
+}
+
+/// Removes the next field, if it has this number and bytes, and returns them.
+fn take_field<'a>(number: u32, left: &mut &'a [u8]) -> Option<&'a [u8]> {
+    if decode_key(left).ok()? != (number, WireType::LengthDelimited) {
+        return None;
+    }
+    let size = usize::try_from(decode_varint(left).ok()?).ok()?;
+    let (field, rest) = left.split_at_checked(size)?;
+    *left = rest;
+    Some(field)
+}
+
+/// Returns the bytes of the particles of a cloud with fields in any order.
+fn any_particle_bytes(message: &[u8]) -> Result<&[u8], String> {
     let (rest, data) = split_data(message).ok_or("it is not a point cloud")?;
     if rest.len() > REST_SIZE_BYTES_MAX {
         let problem = "bytes beside its data (allowed: up to";
@@ -299,11 +317,32 @@ mod tests {
         vec![odd, ParticleState::default(), odd]
     }
 
+    fn encode_cloud(time_ns: u64, particles: &[ParticleState], out: &mut Vec<u8>) {
+        encode_cloud_head(time_ns, particles, out);
+        out.extend_from_slice(bytemuck::cast_slice(particles));
+    }
+
+    #[test]
+    fn fields_in_another_order_and_unknown_ones_change_no_particle() {
+        let particles = odd_particles();
+        let data = bytemuck::cast_slice::<_, u8>(&particles).to_vec();
+        let cloud = PointCloud { data: data.clone(), ..PointCloud::default() }.encode_to_vec();
+        let time = PointCloud { timestamp: Some(timestamp(7)), ..PointCloud::default() };
+        let time = time.encode_to_vec();
+        let (fields, unknown) = (SHARED_FIELDS.clone(), vec![15 << 3 | 2, 1, 0]);
+        for parts in [
+            [cloud.clone(), fields.clone(), time.clone()],
+            [time, fields, [cloud, unknown].concat()],
+        ] {
+            assert_eq!(particle_bytes(&parts.concat()), Ok(data.as_slice()));
+        }
+    }
+
     #[test]
     fn a_cloud_decodes_to_the_encoded_bits() {
         let particles = odd_particles();
         let mut message = Vec::new();
-        PointCloudEncoder::new().encode(12_000_000_034, &particles, &mut message);
+        encode_cloud(12_000_000_034, &particles, &mut message);
         let cloud = PointCloud::decode(message.as_slice()).unwrap();
         assert_eq!(cloud.data, bytemuck::cast_slice::<_, u8>(&particles));
         assert_eq!(cloud.timestamp, Some(Timestamp { seconds: 12, nanos: 34 }));
@@ -316,11 +355,11 @@ mod tests {
     #[test]
     fn a_cloud_equals_the_output_of_the_generated_encoder() {
         for particles in [odd_particles(), Vec::new()] {
-            let mut encoder = PointCloudEncoder::new();
             let mut message = Vec::new();
-            encoder.encode(5, &particles, &mut message);
-            let mut expected = encoder.prefix.clone();
-            expected.data = bytemuck::cast_slice(&particles).to_vec();
+            encode_cloud(5, &particles, &mut message);
+            let timestamp = Some(Timestamp { seconds: 0, nanos: 5 });
+            let data = bytemuck::cast_slice(&particles).to_vec();
+            let expected = PointCloud { timestamp, data, ..empty_cloud() };
             assert_eq!(message, expected.encode_to_vec());
         }
     }
@@ -374,7 +413,7 @@ mod tests {
     fn a_cloud_with_another_point_layout_is_refused() {
         let foreign = PointCloud { point_stride: 16, ..PointCloud::default() };
         assert!(decode_particles(&foreign.encode_to_vec()).is_err());
-        let partial = PointCloud { data: vec![0; 33], ..PointCloudEncoder::new().prefix };
+        let partial = PointCloud { data: vec![0; 33], ..empty_cloud() };
         assert!(decode_particles(&partial.encode_to_vec()).is_err());
     }
 }

@@ -178,7 +178,7 @@ impl Audit {
             let what = format!("the message on {} has the time of another step", topic.name());
             self.report(Some(step), what);
         }
-        if self.encoder.encode(message, *publish_time_ns).ok() != Some(data) {
+        if !self.encoder.has_bytes(message, *publish_time_ns, data) {
             let what = format!(
                 "the message on {} has bytes that a recorder does not write: an unknown or missing \
                  field, or another form of a value",

@@ -35,6 +35,12 @@ impl Frame {
         self.particles.as_deref().unwrap_or_default()
     }
 
+    /// Returns the approximate memory use, in bytes.
+    pub fn size_bytes(&self) -> usize {
+        let updates_size_bytes: usize = self.updates.iter().map(Message::size_bytes).sum();
+        size_of::<Self>() + size_of_val(self.payload()) + updates_size_bytes
+    }
+
     /// Returns the keyframe that completes this snapshot, if there is one.
     pub fn own_keyframe(&self) -> Option<&[u8]> {
         self.updates.iter().rev().find_map(|update| match update {

@@ -34,6 +34,7 @@ pub struct LogReader<R> {
     limits: SizeLimits,
     channels: BTreeMap<u16, Option<TopicChannel>>,
     run: RunDescription,
+    format_version: u32,
     scene: Vec<u8>,
     selection: ContentSelection,
     closing: Option<Closing>,
@@ -119,6 +120,9 @@ impl<R: Read> LogReader<R> {
                         return Err(ReadError::Foreign { library: header.library });
                     }
                     let (run, scene) = (read_run(&map)?, scene.unwrap_or_default());
+                    // `read_run` refuses any other text.
+                    let format_version =
+                        map.get(FORMAT_VERSION_KEY).and_then(|text| text.parse().ok());
                     let limits = SizeLimits::new(&run, scene.len());
                     records.set_limits(limits);
                     let channels = BTreeMap::new();
@@ -128,6 +132,7 @@ impl<R: Read> LogReader<R> {
                         limits,
                         channels,
                         run,
+                        format_version: format_version.unwrap_or(FORMAT_VERSION_MIN),
                         scene,
                         selection,
                         closing: None,
@@ -200,9 +205,7 @@ impl<R: Read> LogReader<R> {
 
     /// Returns the version of the format of the file.
     pub fn format_version(&self) -> u32 {
-        // Any other text was refused at the start.
-        let version = self.header.run.get(FORMAT_VERSION_KEY);
-        version.and_then(|text| text.parse().ok()).unwrap_or(FORMAT_VERSION_MIN)
+        self.format_version
     }
 
     /// Returns a topic in a form that the format of the file does not have yet. Only an edited file has

@@ -167,7 +167,7 @@ impl Selector {
 
 #[cfg(test)]
 mod tests {
-    use recorder::{OutcomeRow, StepRow};
+    use recorder::{OutcomeRow, ParticleBuffer, StepRow};
     use sim_contract::{Action, Command, Outcome, Reason};
 
     use super::*;
@@ -175,7 +175,7 @@ mod tests {
     fn snapshot(index: u32) -> Content {
         let step = u64::from(index);
         let row = StepRow { step, snapshot_index: Some(index), ..StepRow::default() };
-        Content::Snapshot(row, Vec::new())
+        Content::Snapshot(row, ParticleBuffer::default())
     }
 
     fn keyframe(step: u64) -> Content {

@@ -12,7 +12,7 @@ use sim_contract::{
 use crate::commands::record::accepted::{Accepted, RunEnd};
 use crate::commands::record::first_state::FirstState;
 use crate::commands::record::queue::Content;
-use crate::simulation::frozen::FrozenTracker;
+use crate::simulation::frozen::{FrozenParticles, FrozenTracker};
 
 /// The end of a file that another one may follow.
 #[derive(Debug)]
@@ -160,7 +160,8 @@ impl Started {
         let changes = next.changes.iter().filter(|change| is_before(change, next.header.step));
         let mut rows: Vec<_> = changes.filter_map(|change| self.row(change)).collect();
         if next.header.topology_revision == self.topology_revision {
-            let events = self.frozen.new_events(next.header.step, next.particles);
+            let events =
+                self.frozen.new_events(next.header.step, FrozenParticles::find(next.particles));
             rows.extend(events.into_iter().map(Message::Event));
         }
         for message in rows {
@@ -180,7 +181,7 @@ impl Started {
     pub(super) fn accept(
         &mut self,
         header: &SnapshotHeader,
-        particles: Vec<ParticleState>,
+        particles: &[ParticleState],
         changes: &[Change],
         accepted: &mut Accepted,
     ) {
@@ -190,7 +191,10 @@ impl Started {
         }
         let rows = changes.iter().filter_map(|change| self.row(change));
         let rows: Vec<_> = rows.collect();
-        let events = self.frozen.new_events(header.step, &particles);
+        let mut buffer = std::mem::take(&mut accepted.spare);
+        buffer.copy_from(particles);
+        let frozen = FrozenParticles::find(buffer.particles());
+        let events = self.frozen.new_events(header.step, frozen);
         for message in rows.into_iter().chain(events.into_iter().map(Message::Event)) {
             self.counts[message.topic()].received += 1;
             accepted.push(message);
@@ -199,7 +203,7 @@ impl Started {
         self.last = *header;
         self.counts[Topic::Steps].received += 1;
         self.counts[Topic::Particles].received += 1;
-        accepted.contents.push(Content::Snapshot(StepRow::from(header), particles));
+        accepted.contents.push(Content::Snapshot(StepRow::from(header), buffer));
         if header.step >= self.end_step {
             accepted.end = Some(RunEnd::EndStep);
         }

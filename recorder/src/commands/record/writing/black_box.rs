@@ -169,7 +169,7 @@ fn repeats(content: &Content, first_step: Option<u64>, closing: &mut Closing) ->
 
 #[cfg(test)]
 mod tests {
-    use recorder::{AllCounts, ParametersRow, StepRow, TearsRow};
+    use recorder::{AllCounts, ParametersRow, ParticleBuffer, StepRow, TearsRow};
     use sim_contract::ParameterValues;
 
     use super::*;
@@ -189,7 +189,7 @@ mod tests {
         black_box.begin(Box::new(header()), 1000 - second, second * SECOND_NS);
         black_box.push(update(parameters(0), second));
         let row = StepRow { step: second, ..StepRow::default() };
-        let content = Content::Snapshot(row, Vec::new());
+        let content = Content::Snapshot(row, ParticleBuffer::default());
         black_box.push(Item { content, log_time_ns: second * SECOND_NS + 1 });
         let mut counts = AllCounts::default();
         counts[Topic::Parameters].received = 1;
