@@ -1,5 +1,6 @@
 //! `recorder play`: plays a recording on the services of a node.
 
+mod complete_state;
 mod control;
 mod keyboard;
 mod keys;

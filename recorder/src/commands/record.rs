@@ -265,7 +265,7 @@ impl Recording {
         {
             console::note(&format!("note: {hint}"));
         }
-        let report = Report::new(&written, stop_reason.clone());
+        let report = Report::new(&written, self.feed.skipped_count(), stop_reason.clone());
         if !report.has_files() && args.black_box.is_none() {
             bail!(
                 "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe"

@@ -260,8 +260,22 @@ impl Player {
                 return Ok(Some(Beginning { place, command: None }));
             }
         }
+        if !self.control.is_moving() {
+            self.complete_state(replay)?;
+        }
         self.show(replay, last_step)?;
         Ok(None)
+    }
+
+    /// Publishes the keyframe of the snapshot at which the replay stands, for a reader that has joined since.
+    /// A node does so, too, so that a state can be read from one that is paused.
+    fn complete_state(&mut self, replay: &mut Replay) -> anyhow::Result<()> {
+        if let Some(step) = replay.take_step_to_complete()
+            && let Some(bytes) = self.playlist.keyframe_of(step)?
+        {
+            replay.complete(step, &bytes)?;
+        }
+        Ok(())
     }
 
     /// Obeys a request, or returns the place that it asks for. `step` is the last published one.

@@ -10,6 +10,7 @@ use recorder::{
 use sim_contract::{Method, Stop};
 use sim_solver::Solver;
 
+use super::complete_state::keyframe_of;
 use super::position::Position;
 use super::replay::Recorded;
 use crate::input::scene_source::scene_in_recording;
@@ -24,6 +25,7 @@ pub(super) struct Recording {
     collider_count: Option<usize>,
     /// `None` until they are needed.
     sizes: Option<Sizes>,
+    stop: Stop,
 }
 
 /// Sizes of the messages of a load.
@@ -74,7 +76,14 @@ impl Recording {
         let collider_count = first_colliders(&first).map(|row| row.colliders.len());
         let tape = Tape::open(path, Some(stop), &mut |_, _| {})?;
         tape.rewind(&mut frames)?;
-        Ok(Self { path: path.to_owned(), frames, tape, collider_count, sizes: None })
+        Ok(Self {
+            path: path.to_owned(),
+            frames,
+            tape,
+            collider_count,
+            sizes: None,
+            stop: stop.clone(),
+        })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -123,7 +132,8 @@ impl Recording {
         Ok(sizes)
     }
 
-    /// Continues with the snapshot of the last recorded step up to `step` whose header is readable.
+    /// Continues with the snapshot of the last recorded step up to `step` whose header is readable. Its state
+    /// is complete, if the recording leads to it.
     pub(super) fn start_at(&mut self, step: u64) -> anyhow::Result<Start> {
         if step <= self.tape.first_step() { self.start() } else { self.start_in_the_middle(step) }
     }
@@ -148,9 +158,13 @@ impl Recording {
             }
             state = self.tape.state_at(state.row.step - 1)?;
         }
-        let keyframe = self.tape.keyframe_at(state.row.step)?;
+        let step = state.row.step;
+        let keyframe = match self.keyframe_of(step)? {
+            Some(bytes) => Some((step, bytes)),
+            None => self.tape.keyframe_at(step)?,
+        };
         let position = Position::at(&state, keyframe, self.method());
-        self.tape.wind(&mut self.frames, state.row.step)?;
+        self.tape.wind(&mut self.frames, step)?;
         let frame = Frame {
             updates: Vec::new(),
             row: state.row,
@@ -158,6 +172,12 @@ impl Recording {
             log_times_ns: Vec::new(),
         };
         Ok(Start { frame, position })
+    }
+
+    /// Returns the keyframe of a recorded step, simulated if it has none of its own; `None` if the recording
+    /// does not lead to it.
+    pub(super) fn keyframe_of(&mut self, step: u64) -> anyhow::Result<Option<Vec<u8>>> {
+        keyframe_of(&self.path, &mut self.tape, step, &self.stop)
     }
 
     /// Returns the next snapshot, or `None` at the end of the readable part.

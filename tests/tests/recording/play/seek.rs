@@ -181,8 +181,8 @@ fn recordings_beside_seeks_verify_and_begin_a_file_at_each() {
     let following = start(&["record", "-o", &all, "--follow", "--json"]);
     let single = start(&["record", "-o", &first]);
     ctl(&sandbox, &["step", "30"]);
-    // A keyframe is at each command and each second, so that a file begins exactly at the place.
-    for step in [480, 200, 720] {
+    // At a keyframe, at a command, and between keyframes.
+    for step in [480, 200, 733] {
         ctl(&sandbox, &["rewind", "--to-step", &step.to_string()]);
         ctl(&sandbox, &["step", "30"]);
     }
@@ -195,7 +195,7 @@ fn recordings_beside_seeks_verify_and_begin_a_file_at_each() {
     let report: serde_json::Value = serde_json::from_str(&following.stdout).unwrap();
     assert_eq!(report["lost"], serde_json::json!({}), "{report}");
     assert_eq!(steps(&first), (0..=30).collect::<Vec<_>>());
-    for (number, begin) in [0, 480, 200, 720, 1200].into_iter().enumerate() {
+    for (number, begin) in [0, 480, 200, 733, 1200].into_iter().enumerate() {
         let file = sandbox.path(&format!("all_{number:04}.mcap"));
         let end = if begin == STEPS { begin } else { begin + 30 };
         assert_eq!(steps(&file), (begin..=end).collect::<Vec<_>>(), "{file}");
@@ -228,7 +228,7 @@ fn a_connected_client_reads_on_after_a_seek() {
 }
 
 #[test]
-fn a_recorder_that_follows_a_jump_declares_what_precedes_the_next_keyframe() {
+fn a_recorder_that_follows_a_jump_between_keyframes_misses_nothing() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
     let _play = Process::start_ready(Program::Recorder, &sandbox, &["play", &file, "--paused"]);
@@ -243,5 +243,5 @@ fn a_recorder_that_follows_a_jump_declares_what_precedes_the_next_keyframe() {
     let report = recording.interrupt().recorded();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     assert_eq!((&report["files"], &report["last_step"]), (&2.into(), &350.into()), "{report}");
-    assert_eq!(report["lost"]["/steps"], 50, "{report}");
+    assert_eq!(report["lost"], serde_json::json!({}), "{report}");
 }
