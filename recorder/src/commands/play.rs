@@ -116,6 +116,7 @@ fn play(args: &PlayArgs, stop: &Stop) -> anyhow::Result<Exit> {
         commands: VecDeque::new(),
         next_status_ns: 0,
         is_quit: false,
+        is_at_end: false,
     };
     let ready = format!("ready playing {} as {}", names(&args.files), player.endpoint);
     let played = player.play(stop, || output::note(&ready));

@@ -36,6 +36,8 @@ pub(super) struct Playback<'a> {
     /// Simulated time per wall-clock time, as measured.
     pub(super) real_time_factor: f64,
     pub(super) lockstep: &'a Lockstep,
+    /// The last snapshot of the run is published.
+    pub(super) is_at_end: bool,
 }
 
 /// A run of recorded snapshots, with its own run id.
@@ -311,7 +313,7 @@ impl Replay {
 
     /// Publishes the status of the replay, with the recorded timing of the node.
     pub(super) fn publish_status(&self, playback: &Playback<'_>) -> anyhow::Result<()> {
-        let Playback { control, step, real_time_factor, lockstep } = *playback;
+        let Playback { control, step, real_time_factor, lockstep, is_at_end } = *playback;
         let mut status = NodeStatus {
             contract_version: CONTRACT_VERSION,
             solver_version: self.run.solver_version,
@@ -328,7 +330,9 @@ impl Replay {
             torn_count: self.published_torn.header.count,
             reader_count: u32::try_from(self.reader_count()).unwrap_or(u32::MAX),
             process_id: std::process::id(),
-            flags: StatusFlags::REPLAY | if control.is_paused { StatusFlags::PAUSED } else { 0 },
+            flags: StatusFlags::REPLAY
+                | if control.is_paused { StatusFlags::PAUSED } else { 0 }
+                | if is_at_end { StatusFlags::AT_END } else { 0 },
             ..NodeStatus::default()
         };
         for (entry, member) in status.members.iter_mut().zip(lockstep.members(step)) {

@@ -168,6 +168,37 @@ fn a_paused_replay_stays_at_its_last_snapshot_until_it_is_resumed() {
 }
 
 #[test]
+fn steps_beyond_the_end_say_where_the_replay_has_ended() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let args = ["play", &file, "--paused", "--start", "4990ms"];
+    let _player = Process::start_ready(Program::Recorder, &sandbox, &args);
+    let step = |count| Process::run(Program::SimNode, &sandbox, &["ctl", "step", count]);
+    let beyond = step("9");
+    assert_eq!(beyond.code, Some(1), "{beyond:?}");
+    let expected =
+        "error: the replay has ended at step 1200, its last snapshot, before step 1206\n";
+    assert_eq!(beyond.stderr, expected);
+    assert_eq!(ctl(&sandbox, &["hash"])["step"], STEPS);
+    let at_end = step("1");
+    assert_eq!(at_end.code, Some(4), "{at_end:?}");
+    assert!(at_end.stdout.contains("the replay stands at its last snapshot"), "{at_end:?}");
+    ctl(&sandbox, &["rewind", "--to-step", "1199"]);
+    assert_eq!(step("1").code, Some(0));
+}
+
+#[test]
+fn the_time_scale_of_a_replay_is_its_rate() {
+    let sandbox = Sandbox::new();
+    let file = recording(&sandbox);
+    let args = ["play", &file, "--paused", "--rate", "0.25"];
+    let _player = Process::start_ready(Program::Recorder, &sandbox, &args);
+    assert_eq!(ctl(&sandbox, &["get", "time_scale"])["time_scale"], 0.25);
+    ctl(&sandbox, &["set", "time_scale", "2.5"]);
+    assert_eq!(ctl(&sandbox, &["get"])["time_scale"], 2.5);
+}
+
+#[test]
 fn recordings_beside_seeks_verify_and_begin_a_file_at_each() {
     let sandbox = Sandbox::new();
     let file = recording(&sandbox);
