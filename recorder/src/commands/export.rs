@@ -12,10 +12,11 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use recorder::{ContentSelection, LogEnd, LogReader, ReadError, open_regular_file};
 use sim_contract::Stop;
 
+use crate::cli::damaged_input::lacks;
 use crate::cli::exit::Exit;
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
@@ -54,7 +55,7 @@ const SIDE_MIN: u32 = 16;
     Coordinates are those of the recording, in m, relative to the origin of the scene: no format \
     turns the scene.\n\n\
     Exit codes: 0 exported; 1 failed; 3 the file is truncated or damaged and was exported as far as \
-    it goes.\n\nExamples:\n  \
+    it goes, if at all.\n\nExamples:\n  \
     recorder export run.mcap --png pictures\n  \
     recorder export run.mcap --png pictures --every 100ms --view front --size 1280x720\n  \
     recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite\n  \
@@ -122,7 +123,9 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let steps =
         selection.select(&survey.steps, survey.run.rate_hz).with_context(|| path.clone())?;
     if steps.is_empty() {
-        bail!("{path}: has no snapshot to export (the file is {})", survey.end);
+        // The selection is not empty where the file has snapshots.
+        return Err(lacks(&args.file, "has no snapshot to export", Some(&survey.end)))
+            .context(path);
     }
     if let Err(reason) = &survey.scene {
         output::note(&format!("warning: {reason}; exported with y up"));

@@ -71,7 +71,7 @@ fn after_help() -> String {
          stays at its last snapshot. A reader in the lockstep (`recorder record --lockstep`) misses no snapshot \
          at any rate: the replay waits for it. It does not wait for other readers. Each pass of --loop, and each jump to another place, begins a new \
          run.\n\n{}\n\nExit codes: 0 played; 1 failed; 3 a file is truncated or damaged and was played as \
-         far as it goes.\n\nExamples:\n  \
+         far as it goes, if at all.\n\nExamples:\n  \
          recorder play run.mcap\n  \
          recorder play run.mcap --rate 0.25 --loop\n  \
          recorder play run_*.mcap --paused\n  \

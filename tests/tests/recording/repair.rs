@@ -94,6 +94,42 @@ fn the_file_of_a_killed_recorder_is_repaired_and_that_of_a_running_one_is_being_
 }
 
 #[test]
+fn every_program_names_the_repair_of_a_file_whose_first_chunk_is_lost() {
+    let sandbox = Sandbox::new();
+    let [whole, damaged, output] =
+        ["whole", "damaged", "output"].map(|name| sandbox.path(&format!("{name}.mcap")));
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "800", "-o", &whole]).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    // The chunks begin after the scene.
+    bytes[20_000] ^= 1;
+    fs::write(&damaged, &bytes).unwrap();
+    let cure = format!("`recorder repair {damaged} OUT.mcap` copies what is intact");
+    for args in [
+        &["verify", &damaged][..],
+        &["verify", &damaged, "--from", "3"],
+        &["play", &damaged],
+        &["export", &damaged, "--csv", &sandbox.path("a.csv")],
+        &["diff", &whole, &damaged],
+        &["diff", &damaged, &whole],
+        &["simulate", &damaged, "-o", &output],
+        &["restore", &damaged],
+    ] {
+        let node = (args[0] == "restore").then(|| {
+            Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"])
+        });
+        let refused = recorder(&sandbox, args);
+        drop(node);
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(3), ""), "{args:?} {refused:?}");
+        assert!(refused.stderr.contains(&cure), "{args:?} {}", refused.stderr);
+    }
+    let args = ["--replay", &damaged, "--listen", "127.0.0.1:0"];
+    let refused = Process::run(Program::ViewerBridge, &sandbox, &args);
+    // It has no exit code of its own for damage.
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.stderr.contains(&cure), "{}", refused.stderr);
+}
+
+#[test]
 fn a_damaged_header_is_written_anew() {
     let sandbox = Sandbox::new();
     let [whole, damaged, repaired] =

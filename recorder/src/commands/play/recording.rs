@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
 use recorder::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
     RunDescription, Tape, torn_before_first,
@@ -13,6 +12,7 @@ use sim_solver::Solver;
 use super::complete_state::keyframe_of;
 use super::position::Position;
 use super::replay::Recorded;
+use crate::cli::damaged_input::lacks;
 use crate::input::scene_source::scene_in_recording;
 
 /// A recording that is read forward from any step.
@@ -72,7 +72,7 @@ impl Recording {
         log.selection().require_all_particles("`recorder play`")?;
         // Names the problem of a file whose readable part has no snapshot.
         let mut frames = FrameReader::new(log);
-        let first = next_frame(&mut frames)?;
+        let first = next_frame(path, &mut frames)?;
         let collider_count = first_colliders(&first).map(|row| row.colliders.len());
         let tape = Tape::open(path, Some(stop), &mut |_, _| {})?;
         tape.rewind(&mut frames)?;
@@ -141,7 +141,7 @@ impl Recording {
     /// Continues with the first snapshot.
     pub(super) fn start(&mut self) -> anyhow::Result<Start> {
         self.tape.rewind(&mut self.frames)?;
-        let frame = next_frame(&mut self.frames)?;
+        let frame = next_frame(&self.path, &mut self.frames)?;
         let torn = torn_before_first(self.tape.topology(), &frame);
         let mut position = Position::new(torn, self.method());
         // The load has the parameters of its first snapshot.
@@ -200,14 +200,9 @@ impl Recording {
     }
 }
 
-fn next_frame(frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {
-    match frames.next_frame()? {
-        Some(frame) => Ok(frame),
-        None => match frames.end() {
-            Some(LogEnd::Complete) | None => bail!("has no snapshot to play"),
-            Some(end) => bail!("has no snapshot to play: {end}"),
-        },
-    }
+fn next_frame(path: &Path, frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {
+    let frame = frames.next_frame()?;
+    frame.ok_or_else(|| lacks(path, "has no snapshot to play", frames.end()))
 }
 
 fn first_colliders(first: &Frame) -> Option<&CollidersRow> {
