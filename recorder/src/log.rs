@@ -44,7 +44,7 @@ pub use rows::{
     StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
 pub use run::selection::ContentSelection;
-pub use run::{Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
+pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
 pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
 pub use tears::{TearTracker, torn_before_first};
