@@ -30,7 +30,7 @@ use crate::cli::file_args::default_path;
 use crate::cli::output;
 pub(crate) use args::{RecordArgs, SingleStateArgs};
 use feed::Feed;
-use feed::trigger::Trigger;
+use feed::trigger::{Trigger, UserSignal};
 use intake::Intake;
 use live::LiveLine;
 use load::LoadError;
@@ -64,7 +64,9 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         None => (names.clone(), names.check(args.file.existing())?),
     };
     // Before the wait for a node, because SIGUSR1 would end the process.
-    let trigger = args.black_box.map(Trigger::install).transpose()?;
+    let signal = UserSignal::install()?;
+    let trigger = args.black_box.map(|span| Trigger::new(span, signal.clone()));
+    PartFile::check(&names.path(0), args.file.existing())?;
     let Some(tap) = attach(args, &endpoint, &stop)? else {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
@@ -119,6 +121,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         next_owner_check_ns: 0,
         is_owner_alive: true,
         ended_run: None,
+        signal,
     };
     let result = recording.run(args, &stop);
     let report = recording.finish(result, args, &endpoint)?;
@@ -173,6 +176,7 @@ struct Recording {
     is_owner_alive: bool,
     /// The run in the file when the owner was last found dead.
     ended_run: Option<u64>,
+    signal: UserSignal,
 }
 
 impl Recording {
@@ -186,6 +190,12 @@ impl Recording {
                 Some(StopReason::OwnerGone) if args.follows() => self.end_file_of_owner(),
                 Some(reason) => return Ok(reason),
                 None => {}
+            }
+            if args.black_box.is_none() && self.signal.take() {
+                output::note(
+                    "warning: SIGUSR1 writes the memory of a black box, but --black-box is not given: the \
+                     recording goes on",
+                );
             }
             self.live.update(&self.feed);
             // In the lockstep, the node waits until the queue has room.
