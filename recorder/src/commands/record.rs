@@ -50,6 +50,10 @@ const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
 /// Pause between two attempts to attach to a node that is not there yet.
 const ATTACH_PAUSE_NS: u64 = SECOND_NS / 50;
 
+/// Warning about SIGUSR1.
+const IGNORED_SIGNAL: &str = "warning: SIGUSR1 writes the memory of a black box, but --black-box is not given: the \
+                              recording goes on";
+
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     args.check().unwrap_or_else(|error| exit::with_usage(&error));
     let stop = Stop::install()?;
@@ -84,12 +88,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     };
     let mut file = Some(options.create(0)?);
     let path = output::path_text(&options.names.path(0));
-    if earlier_count > 0 {
-        output::note(&format!(
-            "warning: {earlier_count} files of an earlier recording are beside {path}; each stays until a \
-             file with its number begins"
-        ));
-    }
+    warn_of_earlier_files(earlier_count, &path);
     match args.black_box {
         Some(span) => {
             // That it can be created is known now. It is created with the first event.
@@ -127,6 +126,15 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let report = recording.finish(result, args, &endpoint)?;
     output::result(args.as_json, &report, &report.to_string())?;
     Ok(if report.is_complete() { Exit::Done } else { Exit::Loss })
+}
+
+fn warn_of_earlier_files(count: usize, path: &str) {
+    if count > 0 {
+        output::note(&format!(
+            "warning: {count} files of an earlier recording are beside {path}; each stays until a file with its \
+             number begins"
+        ));
+    }
 }
 
 /// Attaches to the node. With `--wait`, waits for one until a signal or the end of `--duration`, and
@@ -192,10 +200,7 @@ impl Recording {
                 None => {}
             }
             if args.black_box.is_none() && self.signal.take() {
-                output::note(
-                    "warning: SIGUSR1 writes the memory of a black box, but --black-box is not given: the \
-                     recording goes on",
-                );
+                output::note(IGNORED_SIGNAL);
             }
             self.live.update(&self.feed);
             // In the lockstep, the node waits until the queue has room.

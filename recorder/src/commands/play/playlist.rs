@@ -81,9 +81,11 @@ impl Playlist {
         self.files.last().map_or(0, Listed::end_ns)
     }
 
-    /// Returns the time of a step of the file that is being read, from the start of the replay.
+    /// Returns the time of a step of the run that is being played, from the start of the replay. The file that
+    /// is being read may be the one after that of the step.
     pub(super) fn time_ns(&self, step: u64) -> u64 {
-        self.files[self.current].time_ns(step)
+        let file = self.place_of(step).map_or(self.current, |place| place.file);
+        self.files[file].time_ns(step)
     }
 
     /// Returns the time of a place, from the start of the replay.
