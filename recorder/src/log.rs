@@ -19,10 +19,12 @@ mod writer;
 pub use backlog::Backlog;
 pub use command_file::{CommandFileError, TimedCommand, parse_commands, sort_commands};
 pub use container::check::check_file;
-pub use container::finding::{CheckExtent, CheckReport, Cure, Finding, Findings};
+pub use container::finding::{
+    AfterEnd, CheckExtent, CheckReport, Cure, Finding, Findings, RepairReport,
+};
 pub use container::losses::{Losses, LostSteps};
 pub use container::lost_load::{LoadRows, LostLoad};
-pub use container::repair::{RepairError, RepairReport, repair_file};
+pub use container::repair::{RepairError, repair_file};
 pub use encoding::{
     MAP_FRAME, MessageEncoder, ParticleBuffer, TopicFormat, TopicSchema, WORLD_FRAME,
     encode_transform, map_from_world, scene_format,
@@ -42,7 +44,7 @@ pub use rows::{
     StepRow, SurfaceRow, TearsRow, TopologyRow,
 };
 pub use run::selection::ContentSelection;
-pub use run::{Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
+pub use run::{CLOSING_METADATA, Closing, FORMAT_VERSION, RunDescription, SCENE_ATTACHMENT};
 pub use state_hash::state_hash;
 pub use tape::{Tape, TapeError, TapeState};
 pub use tears::{TearTracker, torn_before_first};

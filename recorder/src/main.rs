@@ -25,7 +25,7 @@ use commands::{
     name = "recorder",
     version,
     after_help = "Exit codes: 0 success, 1 failure, 2 usage error, 3 finished with loss or \
-        divergence.\n\nExamples:\n  \
+        divergence, or a recording too damaged to use.\n\nExamples:\n  \
         recorder record -o run.mcap\n  \
         recorder play run.mcap\n  \
         recorder simulate curtain --steps 2400 -o curtain.mcap\n  \

@@ -4,6 +4,8 @@ use std::process::{ExitCode, Termination};
 
 use sim_contract::console;
 
+use super::damaged_input::DamagedInput;
+
 /// The exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Exit {
@@ -11,7 +13,8 @@ pub(crate) enum Exit {
     Done,
     /// 1: failure, with the reason on stderr. (2 is a usage error, with which clap exits.)
     Failed,
-    /// 3: finished, but with loss, truncation or divergence.
+    /// 3: finished, but with loss, truncation or divergence; or the input is so damaged that nothing of it can be
+    /// used.
     Loss,
 }
 
@@ -29,7 +32,7 @@ impl Termination for Exit {
 pub(crate) fn from_result(result: anyhow::Result<Exit>) -> Exit {
     result.unwrap_or_else(|error| {
         console::note(&format!("error: {error:#}"));
-        Exit::Failed
+        if error.is::<DamagedInput>() { Exit::Loss } else { Exit::Failed }
     })
 }
 

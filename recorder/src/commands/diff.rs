@@ -10,6 +10,7 @@ use anyhow::Context;
 use recorder::{ContentSelection, FileSource, FrameReader, LogEnd, LogReader};
 use sim_contract::Stop;
 
+use crate::cli::damaged_input::lacks;
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::progress::progress_spinner;
@@ -46,10 +47,17 @@ pub(crate) fn run(args: &DiffArgs) -> anyhow::Result<Exit> {
         }
     })?;
     bar.finish_and_clear();
-    let report = comparison.report()?;
+    let paths = [&args.a, &args.b];
+    let report = comparison.report().map_err(|error| {
+        let damaged = paths.into_iter().zip(&ends).find(|(_, end)| **end != LogEnd::Complete);
+        match damaged {
+            Some((path, end)) => lacks(path, &format!("{error:#}"), Some(end)),
+            None => error,
+        }
+    })?;
     output::result(args.as_json, &report, &report.to_string())?;
     let mut is_complete = true;
-    for (path, end) in [&args.a, &args.b].into_iter().zip(ends) {
+    for (path, end) in paths.into_iter().zip(ends) {
         if end != LogEnd::Complete {
             output::warn_incomplete(path, &end, "compared as far as it goes");
             is_complete = false;

@@ -12,11 +12,13 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
+use clap::error::ErrorKind;
 use recorder::{ContentSelection, LogEnd, LogReader, ReadError, open_regular_file};
 use sim_contract::Stop;
 
-use crate::cli::exit::Exit;
+use crate::cli::damaged_input::lacks;
+use crate::cli::exit::{self, Exit};
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::{self, whole_number_in};
@@ -30,7 +32,7 @@ use crate::export::scene_state::{SceneState, visit_states};
 use crate::export::selection::{Choice, Moment, Selection, SnapshotRange};
 use data::DataFormat;
 use format_args::{Format, FormatArgs};
-use pictures::Style;
+use pictures::{Pace, Style};
 use survey::Survey;
 
 /// Number of pictures without an option that selects them.
@@ -42,6 +44,8 @@ const SCENE_PERIOD: Duration = Duration::from_nanos(33_333_333);
 /// Longest and shortest side of a picture, in pixels. A picture takes 4 bytes of memory per pixel.
 const SIDE_MAX: u32 = 8192;
 const SIDE_MIN: u32 = 16;
+const SIZE_DEFAULT: Size = Size { width: 960, height: 720 };
+const FRAMES_PER_S_DEFAULT: u16 = 25;
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -54,7 +58,7 @@ const SIDE_MIN: u32 = 16;
     Coordinates are those of the recording, in m, relative to the origin of the scene: no format \
     turns the scene.\n\n\
     Exit codes: 0 exported; 1 failed; 3 the file is truncated or damaged and was exported as far as \
-    it goes.\n\nExamples:\n  \
+    it goes, if at all.\n\nExamples:\n  \
     recorder export run.mcap --png pictures\n  \
     recorder export run.mcap --png pictures --every 100ms --view front --size 1280x720\n  \
     recorder export run.mcap --svg pictures --at 1s --at 1500ms --overwrite\n  \
@@ -82,13 +86,12 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse::duration,
         group = "selection", conflicts_with_all = ["from", "to"])]
     at: Vec<Duration>,
-    /// Frames of an animation per second, 1 to 100
-    #[arg(long, value_name = "FPS", default_value_t = 25, allow_hyphen_values = true,
-        value_parser = frames_per_s)]
-    fps: u16,
-    /// Width and height of pictures in pixels, 16 to 8192 each
-    #[arg(long, value_name = "WxH", default_value = "960x720", allow_hyphen_values = true, value_parser = size)]
-    size: Size,
+    /// Frames of an animation per second, 1 to 100 [default: 25]
+    #[arg(long, value_name = "FPS", allow_hyphen_values = true, value_parser = frames_per_s)]
+    fps: Option<u16>,
+    /// Width and height of pictures in pixels, 16 to 8192 each [default: 960x720]
+    #[arg(long, value_name = "WxH", allow_hyphen_values = true, value_parser = size)]
+    size: Option<Size>,
     /// Direction of view of pictures [default: front for a 2-D scene, along the thin axis of a flat
     /// scene, else iso]
     #[arg(long, value_enum)]
@@ -103,6 +106,7 @@ pub(crate) struct ExportArgs {
 }
 
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
+    args.check().unwrap_or_else(|error| exit::with_usage(&error));
     let stop = Stop::install()?;
     let path = output::path_text(&args.file);
     let open = || LogReader::open_until(&args.file, &stop);
@@ -122,7 +126,9 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
     let steps =
         selection.select(&survey.steps, survey.run.rate_hz).with_context(|| path.clone())?;
     if steps.is_empty() {
-        bail!("{path}: has no snapshot to export (the file is {})", survey.end);
+        // The selection is not empty where the file has snapshots.
+        return Err(lacks(&args.file, "has no snapshot to export", Some(&survey.end)))
+            .context(path);
     }
     if let Err(reason) = &survey.scene {
         output::note(&format!("warning: {reason}; exported with y up"));
@@ -175,8 +181,7 @@ fn export<R: Read>(
             output::result(args.as_json, &written, &files.join("\n"))
         }
         Format::Animation(path) => {
-            let style = args.style();
-            let written = pictures::animate(&snapshots, style, args.fps, path, existing)?;
+            let written = pictures::animate(&snapshots, args.style(), args.pace(), path, existing)?;
             output::result(args.as_json, &written, &written.to_string())
         }
         Format::Data(format, target) => {
@@ -193,9 +198,7 @@ impl ExportArgs {
             (_, Some(count)) => Choice::Spread(count),
             _ if !self.at.is_empty() => Choice::At(self.at.clone()),
             _ if matches!(format, Format::Pictures(..)) => Choice::Spread(FRAMES_DEFAULT),
-            _ if matches!(format, Format::Animation(_)) => {
-                Choice::Every(Duration::from_secs(1) / u32::from(self.fps))
-            }
+            _ if matches!(format, Format::Animation(_)) => Choice::Every(self.frame_time()),
             _ if format.data() == Some(DataFormat::Foxglove) => Choice::Every(SCENE_PERIOD),
             _ => Choice::All,
         };
@@ -204,7 +207,41 @@ impl ExportArgs {
 
     fn style(&self) -> Style {
         let bend = if self.no_bend { Bend::Hide } else { Bend::Draw };
-        Style { size: self.size, view: self.view, bend }
+        Style { size: self.size.unwrap_or(SIZE_DEFAULT), view: self.view, bend }
+    }
+
+    /// Returns the wall-clock time of a frame.
+    fn frame_time(&self) -> Duration {
+        Duration::from_secs(1) / u32::from(self.fps.unwrap_or(FRAMES_PER_S_DEFAULT))
+    }
+
+    /// Returns the pace of an animation.
+    fn pace(&self) -> Pace {
+        let frame_time = self.frame_time();
+        if self.frames.is_some() || !self.at.is_empty() {
+            return Pace { frame_time, period: None };
+        }
+        Pace { frame_time, period: Some(self.every.unwrap_or(frame_time)) }
+    }
+
+    /// Refuses options that the format ignores.
+    fn check(&self) -> Result<(), clap::Error> {
+        let Some(format) = self.format.format() else { return Ok(()) };
+        let is_picture = format.data().is_none();
+        let of_pictures = "pictures (--png, --svg, --apng)";
+        let ignored = [
+            ("--fps", self.fps.is_some() && !matches!(format, Format::Animation(_)), "--apng"),
+            ("--size", self.size.is_some() && !is_picture, of_pictures),
+            ("--view", self.view.is_some() && !is_picture, of_pictures),
+            ("--no-bend", self.no_bend && !is_picture, of_pictures),
+        ];
+        match ignored.into_iter().find(|(_, is_ignored, _)| *is_ignored) {
+            None => Ok(()),
+            Some((option, _, formats)) => Err(clap::Error::raw(
+                ErrorKind::ArgumentConflict,
+                format!("{option} has an effect only on {formats}: remove it\n"),
+            )),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! `recorder play`: plays a recording on the services of a node.
 
+mod complete_state;
 mod control;
 mod keyboard;
 mod keys;
@@ -70,7 +71,7 @@ fn after_help() -> String {
          stays at its last snapshot. A reader in the lockstep (`recorder record --lockstep`) misses no snapshot \
          at any rate: the replay waits for it. It does not wait for other readers. Each pass of --loop, and each jump to another place, begins a new \
          run.\n\n{}\n\nExit codes: 0 played; 1 failed; 3 a file is truncated or damaged and was played as \
-         far as it goes.\n\nExamples:\n  \
+         far as it goes, if at all.\n\nExamples:\n  \
          recorder play run.mcap\n  \
          recorder play run.mcap --rate 0.25 --loop\n  \
          recorder play run_*.mcap --paused\n  \
@@ -115,6 +116,7 @@ fn play(args: &PlayArgs, stop: &Stop) -> anyhow::Result<Exit> {
         commands: VecDeque::new(),
         next_status_ns: 0,
         is_quit: false,
+        is_at_end: false,
     };
     let ready = format!("ready playing {} as {}", names(&args.files), player.endpoint);
     let played = player.play(stop, || output::note(&ready));

@@ -30,7 +30,7 @@ use crate::cli::file_args::default_path;
 use crate::cli::output;
 pub(crate) use args::{RecordArgs, SingleStateArgs};
 use feed::Feed;
-use feed::trigger::Trigger;
+use feed::trigger::{Trigger, UserSignal};
 use intake::Intake;
 use live::LiveLine;
 use load::LoadError;
@@ -50,6 +50,10 @@ const OWNER_CHECK_NS: u64 = SECOND_NS / 5;
 /// Pause between two attempts to attach to a node that is not there yet.
 const ATTACH_PAUSE_NS: u64 = SECOND_NS / 50;
 
+/// Warning about SIGUSR1.
+const IGNORED_SIGNAL: &str = "warning: SIGUSR1 writes the memory of a black box, but --black-box is not given: the \
+                              recording goes on";
+
 pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     args.check().unwrap_or_else(|error| exit::with_usage(&error));
     let stop = Stop::install()?;
@@ -64,7 +68,9 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         None => (names.clone(), names.check(args.file.existing())?),
     };
     // Before the wait for a node, because SIGUSR1 would end the process.
-    let trigger = args.black_box.map(Trigger::install).transpose()?;
+    let signal = UserSignal::install()?;
+    let trigger = args.black_box.map(|span| Trigger::new(span, signal.clone()));
+    PartFile::check(&names.path(0), args.file.existing())?;
     let Some(tap) = attach(args, &endpoint, &stop)? else {
         bail!("nothing was recorded: no node has come up as {endpoint}");
     };
@@ -82,12 +88,7 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     };
     let mut file = Some(options.create(0)?);
     let path = output::path_text(&options.names.path(0));
-    if earlier_count > 0 {
-        output::note(&format!(
-            "warning: {earlier_count} files of an earlier recording are beside {path}; each stays until a \
-             file with its number begins"
-        ));
-    }
+    warn_of_earlier_files(earlier_count, &path);
     match args.black_box {
         Some(span) => {
             // That it can be created is known now. It is created with the first event.
@@ -119,11 +120,21 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         next_owner_check_ns: 0,
         is_owner_alive: true,
         ended_run: None,
+        signal,
     };
     let result = recording.run(args, &stop);
     let report = recording.finish(result, args, &endpoint)?;
     output::result(args.as_json, &report, &report.to_string())?;
     Ok(if report.is_complete() { Exit::Done } else { Exit::Loss })
+}
+
+fn warn_of_earlier_files(count: usize, path: &str) {
+    if count > 0 {
+        output::note(&format!(
+            "warning: {count} files of an earlier recording are beside {path}; each stays until a file with its \
+             number begins"
+        ));
+    }
 }
 
 /// Attaches to the node. With `--wait`, waits for one until a signal or the end of `--duration`, and
@@ -173,6 +184,7 @@ struct Recording {
     is_owner_alive: bool,
     /// The run in the file when the owner was last found dead.
     ended_run: Option<u64>,
+    signal: UserSignal,
 }
 
 impl Recording {
@@ -186,6 +198,9 @@ impl Recording {
                 Some(StopReason::OwnerGone) if args.follows() => self.end_file_of_owner(),
                 Some(reason) => return Ok(reason),
                 None => {}
+            }
+            if args.black_box.is_none() && self.signal.take() {
+                output::note(IGNORED_SIGNAL);
             }
             self.live.update(&self.feed);
             // In the lockstep, the node waits until the queue has room.
@@ -265,7 +280,7 @@ impl Recording {
         {
             console::note(&format!("note: {hint}"));
         }
-        let report = Report::new(&written, stop_reason.clone());
+        let report = Report::new(&written, self.feed.skipped_count(), stop_reason.clone());
         if !report.has_files() && args.black_box.is_none() {
             bail!(
                 "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe"

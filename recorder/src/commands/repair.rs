@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use recorder::{
-    Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow, Topic,
-    TopologyRow, open_regular_file, repair_file,
+    AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow,
+    Topic, TopologyRow, open_regular_file, repair_file,
 };
 use serde::Serialize;
 use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, printable_line};
@@ -62,6 +62,8 @@ struct Repaired<'a> {
     restored: &'static [&'static str],
     /// The input has its end. Without it, nobody knows what the recorder had not written yet.
     has_end: bool,
+    /// Bytes after that end, such as a second file, which the output lacks.
+    after_end: Option<&'a AfterEnd>,
     /// The checksum of the data is wrong, and no damaged part explains it.
     is_uncertain: bool,
     finding_count: u64,
@@ -153,7 +155,9 @@ impl<'a> Repaired<'a> {
         Self {
             input,
             output,
-            is_lossless: losses.is_empty() && !report.is_uncertain,
+            is_lossless: losses.is_empty()
+                && !report.is_uncertain
+                && !report.after_end.as_ref().is_some_and(AfterEnd::has_messages),
             steps: report.steps,
             snapshot_count: report.counts[Topic::Particles].written,
             lost: losses.messages(),
@@ -161,6 +165,7 @@ impl<'a> Repaired<'a> {
             lost_steps,
             restored: &[],
             has_end: report.has_end,
+            after_end: report.after_end.as_ref(),
             is_uncertain: report.is_uncertain,
             finding_count: report.findings.count(),
             findings: report.findings.list(),
@@ -190,6 +195,14 @@ impl fmt::Display for Repaired<'_> {
             let what = "the checksum of the data is wrong, and no damaged part explains it: a byte outside \
                         of the messages may be wrong";
             write!(f, "\nuncertain   {what}")?;
+        }
+        if let Some(AfterEnd { byte, size_bytes, message_count, .. }) = self.after_end {
+            let cure = format!("`tail -c +{}` writes them to a file of their own", byte + 1);
+            write!(
+                f,
+                "\nafter end   {size_bytes} bytes with {message_count} messages follow the end of the recording and \
+                 are not copied: {cure}"
+            )?;
         }
         if self.is_lossless && self.has_end {
             return write!(f, "\nmissing     nothing");

@@ -98,7 +98,7 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
         (None, Some(time)) => Wanted::UpTo(step_at(time, log.run().rate_hz)),
         (None, None) => Wanted::Last,
     };
-    let place = find_state(log, wanted).with_context(|| path.clone())?;
+    let place = find_state(&args.file, log, wanted).with_context(|| path.clone())?;
     let state = read_state(&args.file, place, args.threads.count(), &stop).context(path)?;
     let given = GivenState {
         scene_hash: state.scene_hash,

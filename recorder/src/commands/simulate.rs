@@ -108,7 +108,7 @@ fn run_recording(args: &SimulateArgs, stop: &Stop) -> anyhow::Result<Exit> {
     let bar = progress_spinner();
     let before_ns = monotonic_ns();
     let completion =
-        Completion::new(log, args.threads.count()).with_context(|| args.scene.clone())?;
+        Completion::new(path, log, args.threads.count()).with_context(|| args.scene.clone())?;
     let create = || args.output.as_deref().map(|path| args.file.create(path)).transpose();
     let (completed, file) = completion
         .run(args.file.options(), create, stop.flag(), |step| {

@@ -16,7 +16,7 @@ mod verification;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io::Read;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::thread;
 
@@ -25,6 +25,7 @@ use recorder::{LogEnd, LogReader};
 use serde::Serialize;
 use sim_contract::{Stop, printable_line};
 
+use crate::cli::damaged_input::lacks;
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::whole_number;
@@ -145,7 +146,7 @@ impl VerifyArgs {
         if from > last {
             bail!("--from {from} is after --to {last}");
         }
-        let place = find_state(open()?, Wanted::UpTo(from));
+        let place = find_state(&self.file, open()?, Wanted::UpTo(from));
         let place = place.with_context(|| output::path_text(&self.file))?;
         Ok(StepRange { start: place.keyframe_step, last })
     }
@@ -190,11 +191,11 @@ fn report(
     }
     let end = verification.frames.seen.end.clone().filter(|end| *end != LogEnd::Complete);
     if verification.simulation.is_none() && report.verdict == Verdict::Identical {
-        let end = end.map_or_else(String::new, |end| format!(" (the file is {end})"));
         if let Some(last) = verification.coverage.last_step {
             bail!("{path}: has no complete state up to step {last} to start from");
         }
-        bail!("{path}: has no snapshot with a keyframe to start from{end}");
+        let problem = format!("{path}: has no snapshot with a keyframe to start from");
+        return Err(lacks(Path::new(path), &problem, end.as_ref()));
     }
     let end_text = verification.frames.seen.end.as_ref().map(ToString::to_string);
     report.file_end = end_text.unwrap_or_else(|| "not reached".to_owned());

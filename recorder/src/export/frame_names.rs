@@ -54,6 +54,37 @@ impl<'a> FrameNames<'a> {
         fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the folder {}", folder.display()))
     }
+
+    /// Removes the files of other steps that an earlier export has left in the folder, if files may be
+    /// replaced. Only files with such a name are removed.
+    pub(crate) fn remove_older(&self, existing: Existing) -> anyhow::Result<()> {
+        if existing != Existing::Overwrite {
+            return Ok(());
+        }
+        let folder = self.folder;
+        let reading = || format!("cannot read the folder {}", folder.display());
+        for entry in fs::read_dir(folder).with_context(reading)? {
+            let entry = entry.with_context(reading)?;
+            let is_file = entry.file_type().with_context(reading)?.is_file();
+            if is_file && entry.file_name().to_str().is_some_and(|name| self.is_frame(name)) {
+                let path = entry.path();
+                fs::remove_file(&path).with_context(|| {
+                    format!("cannot remove {} of an earlier export", path.display())
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns `true` for the name of the file of any step.
+    fn is_frame(&self, name: &str) -> bool {
+        let step = name
+            .strip_prefix(&self.stem)
+            .and_then(|rest| rest.strip_prefix('_'))
+            .and_then(|rest| rest.strip_suffix(self.extension))
+            .and_then(|rest| rest.strip_suffix('.'));
+        step.and_then(|step| step.parse().ok()).is_some_and(|step| self.name(step) == name)
+    }
 }
 
 /// Returns the name of a scene with every character that is not safe in a file name replaced.
@@ -74,6 +105,44 @@ mod tests {
         assert_eq!(name("curtain"), Path::new("d/curtain_00000037.png"));
         assert_eq!(name("../a b"), Path::new("d/.._a_b_00000037.png"));
         assert_eq!(name(".."), Path::new("d/scene_00000037.png"));
+    }
+
+    #[test]
+    fn only_files_of_an_earlier_export_of_the_same_scene_and_format_are_removed() {
+        let folder =
+            std::env::temp_dir().join(format!("recorder-older-frames-{}", std::process::id()));
+        fs::create_dir_all(folder.join("rope_00000009.png")).unwrap();
+        let (older, others) = (
+            ["rope_00000000.png", "rope_00000480.png", "rope_123456789.png"],
+            [
+                "rope_480.png",
+                "rope_0000048x.png",
+                "rope_+0000480.png",
+                "rope_00000480.svg",
+                "rope_2_00000480.png",
+                "curtain_00000480.png",
+                "rope.png",
+            ],
+        );
+        let write = || {
+            for name in older.iter().chain(&others) {
+                fs::write(folder.join(name), "").unwrap();
+            }
+        };
+        let names = FrameNames::new(&folder, "rope", "png");
+        write();
+        names.remove_older(Existing::Refuse).unwrap();
+        assert!(older.iter().all(|name| folder.join(name).exists()));
+        names.remove_older(Existing::Overwrite).unwrap();
+        let mut left: Vec<_> = fs::read_dir(&folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        fs::remove_dir_all(&folder).unwrap();
+        let mut expected = [&others[..], &["rope_00000009.png"]].concat();
+        left.sort();
+        expected.sort_unstable();
+        assert_eq!(left, expected);
     }
 
     #[test]

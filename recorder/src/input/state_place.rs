@@ -1,9 +1,11 @@
 //! Finds a state in a recording, and the complete state from which it can be simulated.
 
 use std::io::Read;
+use std::path::Path;
 
-use anyhow::Context;
 use recorder::{FrameReader, LogReader};
+
+use crate::cli::damaged_input::lacks;
 
 /// The state to look for.
 #[derive(Debug, Clone, Copy)]
@@ -21,8 +23,12 @@ pub(crate) struct Place {
     pub(crate) keyframe_step: u64,
 }
 
-/// Finds the wanted state, and the last keyframe up to it.
-pub(crate) fn find_state<R: Read>(log: LogReader<R>, wanted: Wanted) -> anyhow::Result<Place> {
+/// Finds the wanted state in a file, and the last keyframe up to it.
+pub(crate) fn find_state<R: Read>(
+    path: &Path,
+    log: LogReader<R>,
+    wanted: Wanted,
+) -> anyhow::Result<Place> {
     let mut frames = FrameReader::new(log);
     let (mut found, mut keyframe_step, mut first) = (None, None, None);
     while let Some(frame) = frames.next_frame()? {
@@ -44,12 +50,13 @@ pub(crate) fn find_state<R: Read>(log: LogReader<R>, wanted: Wanted) -> anyhow::
         Wanted::Step(wanted) => place.step == wanted,
         Wanted::Last | Wanted::UpTo(_) => true,
     });
-    found.with_context(|| match (wanted, first) {
+    let problem = || match (wanted, first) {
         (_, None) => "has no snapshot".to_owned(),
         (Wanted::Step(step) | Wanted::UpTo(step), Some(first)) => format!(
             "has no complete state of step {step}: it begins with step {first}, and `recorder info` \
              shows its steps"
         ),
         (Wanted::Last, Some(_)) => "has no keyframe".to_owned(),
-    })
+    };
+    found.ok_or_else(|| lacks(path, &problem(), frames.end()))
 }

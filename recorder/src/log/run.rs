@@ -26,7 +26,7 @@ pub(super) const FORMAT_VERSION_MIN: u32 = 1;
 /// Name of the metadata record of [`RunDescription`].
 pub(super) const RUN_METADATA: &str = "run";
 /// Name of the metadata record of [`Closing`].
-pub(super) const CLOSING_METADATA: &str = "recorder";
+pub const CLOSING_METADATA: &str = "recorder";
 /// Name of the metadata record with the losses of a repair.
 pub(super) const REPAIR_METADATA: &str = "repair";
 /// Name of the attachment with the scene.
@@ -173,7 +173,8 @@ pub struct Closing {
 const UNREADABLE: &str = "unreadable";
 
 impl Closing {
-    pub(super) fn to_map(&self) -> BTreeMap<String, String> {
+    /// Returns the entries of the metadata [`CLOSING_METADATA`].
+    pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
             ("stop_reason".to_owned(), self.stop_reason.clone()),
             (UNREADABLE.to_owned(), self.unreadable.to_string()),

@@ -32,9 +32,14 @@ pub enum TapeError {
     /// The file has no readable snapshot.
     #[error("has no snapshot to show (the file is {0})")]
     NoSnapshot(LogEnd),
-    /// The file has no scene.
-    #[error("has no readable {0} before its first snapshot")]
-    NoLoad(&'static str),
+    /// The file has no readable constraints or triangles.
+    #[error("has no readable {topic} before its first snapshot")]
+    NoLoad {
+        /// Name of the topic that it lacks.
+        topic: &'static str,
+        /// A chunk that cannot be read, or the end of the file, explains it.
+        is_damaged: bool,
+    },
 }
 
 /// A recording that winds to any step.
@@ -88,8 +93,10 @@ impl Tape {
     ) -> Result<Self, TapeError> {
         let mut log = IndexedLog::open_with_progress(path, stop, on_progress)?;
         let load = read_load(&mut log)?;
-        let topology = load.topology.ok_or(TapeError::NoLoad("/topology"))?;
-        let surface = load.surface.ok_or(TapeError::NoLoad("/surface"))?;
+        let is_damaged = load.has_damage || *log.end() != LogEnd::Complete;
+        let missing = |topic| TapeError::NoLoad { topic, is_damaged };
+        let topology = load.topology.ok_or_else(|| missing("/topology"))?;
+        let surface = load.surface.ok_or_else(|| missing("/surface"))?;
         let mut reader = ChunkReader::new(log);
         let ends = first_and_last(&mut reader)?;
         let (first_steps, last) =

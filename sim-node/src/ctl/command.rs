@@ -79,6 +79,9 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
     Ok(Exit::Done)
 }
 
+/// Time between two checks whether a replay has ended.
+const END_CHECK_PERIOD: Duration = Duration::from_millis(100);
+
 /// Waits until the steps are made, so that a query after this call shows them. Without `--timeout`,
 /// waits as long as the node makes steps.
 fn wait_for_steps(
@@ -89,23 +92,20 @@ fn wait_for_steps(
 ) -> anyhow::Result<()> {
     let last = outcome.step + u64::from(count) - 1;
     let silence_max = args.timeout() + period(client, args.timeout())?;
-    let start_ns = monotonic_ns();
-    let passed = || Duration::from_nanos(monotonic_ns() - start_ns);
-    let remaining = || match args.timeout {
-        Some(_) => silence_max.saturating_sub(passed()),
-        None => silence_max,
-    };
-    while let Some(snapshot) = client.next_snapshot(remaining())? {
-        if snapshot.header().step >= last {
-            return Ok(());
-        }
-        if remaining().is_zero() {
+    let is_replay = outcome.flags & OUTCOME_FLAG_CONTROL != 0;
+    let mut since_ns = monotonic_ns();
+    loop {
+        let passed = Duration::from_nanos(monotonic_ns() - since_ns);
+        let remaining = silence_max.saturating_sub(passed);
+        if remaining.is_zero() {
             break;
         }
-    }
-    // A replay may end before it has shown all of them.
-    if outcome.flags & OUTCOME_FLAG_CONTROL != 0 {
-        return Ok(());
+        match client.next_snapshot(remaining.min(END_CHECK_PERIOD))? {
+            Some(snapshot) if snapshot.header().step >= last => return Ok(()),
+            Some(_) if args.timeout.is_none() => since_ns = monotonic_ns(),
+            None if is_replay => refuse_end(client, last)?,
+            _ => {}
+        }
     }
     if !client.is_owner_alive() {
         bail!("the node ended before step {last}");
@@ -114,6 +114,20 @@ fn wait_for_steps(
         "step {last} has not come in time: the node is still stepping (`ctl pause` ends that, a \
          longer --timeout waits for it)"
     )
+}
+
+/// Returns an error if the replay stands at its end, before `last`.
+fn refuse_end(client: &mut Client, last: u64) -> anyhow::Result<()> {
+    if let Some(status) = client.status(Duration::ZERO)?
+        && status.is_at_end()
+        && status.step < last
+    {
+        bail!(
+            "the replay has ended at step {}, its last snapshot, before step {last}",
+            status.step
+        );
+    }
+    Ok(())
 }
 
 /// Wall-clock time between two steps, which is long at a small time scale.

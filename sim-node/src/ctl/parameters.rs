@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use serde_json::{Map, Value};
-use sim_contract::{Client, OffMeaning, Parameter, ParameterValue, Setting};
+use sim_contract::{Client, NodeStatus, OffMeaning, Parameter, ParameterValue, Setting};
 
 use crate::args::CtlArgs;
 use crate::output;
@@ -17,11 +17,16 @@ pub(super) fn print(
     let Some(parameters) = client.parameters(args.timeout())? else {
         bail!("the node published no parameters within {:?}; is it stopped?", args.timeout());
     };
+    let mut values = parameters.values;
+    // A replay publishes the parameters of the recorded run, but goes at its own rate.
+    if let Some(status) = client.status(args.timeout())?.filter(NodeStatus::is_replay) {
+        values.time_scale = to_f32(status.time_scale);
+    }
     let is_asked = |name: &str| parameter.is_none_or(|parameter| parameter.name() == name);
     let step = parameters.header.step;
     if args.json {
         let mut object = Map::from_iter([("step".to_owned(), step.into())]);
-        if let Value::Object(values) = serde_json::to_value(parameters.values)? {
+        if let Value::Object(values) = serde_json::to_value(values)? {
             object.extend(values.into_iter().filter(|(name, _)| is_asked(name)));
         }
         return output::json(&Value::Object(object));
@@ -32,11 +37,16 @@ pub(super) fn print(
         ("value", Align::Left),
         ("unit", Align::Left),
     ]);
-    let settings = parameters.values.settings();
+    let settings = values.settings();
     for setting in settings.iter().filter(|setting| is_asked(setting.parameter.name())) {
         table.add(cells(setting));
     }
     output::text(&format!("since step {step}\n{}", table.text()))
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "parameters are f32")]
+fn to_f32(value: f64) -> f32 {
+    value as f32
 }
 
 /// Name, kind of constraints, value and unit.

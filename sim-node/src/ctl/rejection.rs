@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use sim_contract::{
-    Action, Client, NodeStatus, OffMeaning, PARAMETERS, Parameter, ParameterInfo, Reason,
-    STEP_WORK_MAX, StatusFlags, ValueForm,
+    Action, Client, OffMeaning, PARAMETERS, Parameter, ParameterInfo, Reason, STEP_WORK_MAX,
+    ValueForm,
 };
 use sim_solver::Scene;
 
@@ -36,7 +36,7 @@ fn remedy(
         Reason::UnknownCollider => client.colliders(timeout).ok()?.colliders.len(),
         _ => {
             let of_replay = remedy_of_replay(action, reason);
-            let mut is_replay = || status().is_some_and(|status| is_replay(&status));
+            let mut is_replay = || status().is_some_and(|status| status.is_replay());
             return of_replay.filter(|_| is_replay()).or_else(|| fixed_remedy(action, reason));
         }
     };
@@ -51,14 +51,13 @@ fn remedy_of_replay(action: &Action, reason: Reason) -> Option<String> {
             "a recording accepts only pause, resume, step, rewind and set time_scale"
         }
         (Reason::OutOfRange, Action::Rewind { .. }) => "allowed: a step of the recording",
+        (Reason::OutOfRange, Action::Step { count }) if *count > 0 => {
+            "the replay stands at its last snapshot; `ctl rewind` goes back"
+        }
         (Reason::OutOfRange, Action::Set { .. }) => "allowed: 0.01 to 100",
         _ => return None,
     };
     Some(remedy.to_owned())
-}
-
-fn is_replay(status: &NodeStatus) -> bool {
-    status.flags & StatusFlags::REPLAY != 0
 }
 
 /// Number of anchors, which only the scene names.

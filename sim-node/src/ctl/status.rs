@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use serde::Serialize;
-use sim_contract::{Client, MemberStatus, NodeStatus, StatusFlags};
+use sim_contract::{Client, MemberStatus, NodeStatus};
 
 use crate::args::CtlArgs;
 use crate::output;
@@ -59,7 +59,7 @@ impl StatusRow {
             process_id: status.process_id,
             step: status.step,
             paused: status.is_paused(),
-            replay: status.flags & StatusFlags::REPLAY != 0,
+            replay: status.is_replay(),
             rate_hz: status.rate_hz,
             real_time_factor: status.real_time_factor,
             time_scale: status.time_scale,

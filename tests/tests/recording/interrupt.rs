@@ -1,6 +1,6 @@
-//! Ctrl-C ends every program while it reads a large recording.
+//! Ctrl-C ends every program while it reads a large recording, and SIGUSR1 ends no recorder.
 
-use integration_tests::{Process, Program, Sandbox, Signal, wait_for};
+use integration_tests::{Process, Program, Sandbox, Signal, ctl, record, wait_for};
 
 use super::raw::small;
 
@@ -18,6 +18,20 @@ fn large_recording(sandbox: &Sandbox) -> String {
     let args = ["simulate", "curtain", "--steps", "24000", "--compression", "none", "-o", &file];
     Process::run(Program::Recorder, sandbox, &args).success();
     file
+}
+
+#[test]
+fn sigusr1_does_not_end_a_recording_without_a_black_box() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope", "--paused"]);
+    let file = sandbox.path("run.mcap");
+    let mut recording = record(&sandbox, &file);
+    recording.signal(Signal::USR1);
+    recording.wait_for_line("warning: SIGUSR1 writes the memory of a black box");
+    ctl(&sandbox, &["step", "20"]);
+    assert_eq!(recording.interrupt().code, Some(0));
+    let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    assert!(verified.contains("20 steps bit-identical"), "{verified}");
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod play {
     mod files;
     mod keys;
     mod lockstep;
+    mod middle;
     mod seek;
 }
 mod raw;

@@ -54,6 +54,31 @@ fn a_recording_whose_name_is_taken_meanwhile_is_complete_under_its_unfinished_na
     recorder(&sandbox, &["info", &format!("{file}.part")]).success();
 }
 
+#[test]
+fn a_recorder_that_waits_for_a_node_refuses_an_unusable_output_first() {
+    let sandbox = Sandbox::new();
+    let (taken, cut) = (sandbox.write("taken.mcap", "mine"), sandbox.path("cut.mcap"));
+    let part = sandbox.write("cut.mcap.part", "of a killed recorder");
+    let missing = sandbox.path("missing/run.mcap");
+    for (output, problem) in [
+        (&taken, format!("{taken} exists (use --overwrite to replace it)")),
+        (&cut, format!("{part} exists: the program that wrote it was killed")),
+        (&missing, format!("cannot write {missing}.part: ")),
+        (&sandbox.path(""), "name a file".to_owned()),
+    ] {
+        // Without the check, the recorder would wait for as long as that.
+        let args = ["record", "--wait", "--duration", "1s", "-o", output];
+        let refused = recorder(&sandbox, &args);
+        assert_eq!(refused.code, Some(1), "{refused:?}");
+        assert!(refused.stderr.contains(&problem), "no \"{problem}\" in: {}", refused.stderr);
+        assert!(!refused.stderr.contains("waiting for a node"), "{}", refused.stderr);
+    }
+    let waiting =
+        recorder(&sandbox, &["record", "--wait", "--duration", "100ms", "--overwrite", "-o", &cut]);
+    assert!(waiting.stderr.contains("no node has come up"), "{}", waiting.stderr);
+    assert_eq!(std::fs::read_to_string(&part).unwrap(), "of a killed recorder", "it may be needed");
+}
+
 /// Asserts that a program failed at the limit, and left the readable part of its recording.
 fn assert_ended_at_the_limit(finished: &Finished, file: &str) {
     assert_eq!(finished.code, Some(1), "{}", finished.stderr);

@@ -94,6 +94,89 @@ fn the_file_of_a_killed_recorder_is_repaired_and_that_of_a_running_one_is_being_
 }
 
 #[test]
+fn every_program_names_the_repair_of_a_file_whose_first_chunk_is_lost() {
+    let sandbox = Sandbox::new();
+    let [whole, damaged, output] =
+        ["whole", "damaged", "output"].map(|name| sandbox.path(&format!("{name}.mcap")));
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "800", "-o", &whole]).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    // The chunks begin after the scene.
+    bytes[20_000] ^= 1;
+    fs::write(&damaged, &bytes).unwrap();
+    let cure = format!("`recorder repair {damaged} OUT.mcap` copies what is intact");
+    for args in [
+        &["verify", &damaged][..],
+        &["verify", &damaged, "--from", "3"],
+        &["play", &damaged],
+        &["export", &damaged, "--csv", &sandbox.path("a.csv")],
+        &["diff", &whole, &damaged],
+        &["diff", &damaged, &whole],
+        &["simulate", &damaged, "-o", &output],
+        &["restore", &damaged],
+    ] {
+        let node = (args[0] == "restore").then(|| {
+            Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain", "--paused"])
+        });
+        let refused = recorder(&sandbox, args);
+        drop(node);
+        assert_eq!((refused.code, refused.stdout.as_str()), (Some(3), ""), "{args:?} {refused:?}");
+        assert!(refused.stderr.contains(&cure), "{args:?} {}", refused.stderr);
+    }
+    let args = ["--replay", &damaged, "--listen", "127.0.0.1:0"];
+    let refused = Process::run(Program::ViewerBridge, &sandbox, &args);
+    // It has no exit code of its own for damage.
+    assert_eq!(refused.code, Some(1), "{refused:?}");
+    assert!(refused.stderr.contains(&cure), "{}", refused.stderr);
+}
+
+#[test]
+fn a_damaged_header_is_written_anew() {
+    let sandbox = Sandbox::new();
+    let [whole, damaged, repaired] =
+        ["whole", "damaged", "repaired"].map(|name| sandbox.path(&format!("{name}.mcap")));
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "10", "-o", &whole]).success();
+    let mut bytes = fs::read(&whole).unwrap();
+    let library = bytes.windows(9).position(|text| text == b"recorder/").unwrap();
+    bytes[library + 2] ^= 1;
+    fs::write(&damaged, &bytes).unwrap();
+    let report = recorder(&sandbox, &["repair", &damaged, &repaired]);
+    assert!(report.stdout.contains("header: its library is 'rebord"), "{report:?}");
+    recorder(&sandbox, &["check", &repaired]).success();
+    recorder(&sandbox, &["verify", &repaired]).success();
+}
+
+#[test]
+fn bytes_after_the_end_are_reported_and_are_a_loss_if_messages_are_in_them() {
+    let sandbox = Sandbox::new();
+    let [one, two, both, repaired] =
+        ["one", "two", "both", "repaired"].map(|name| sandbox.path(&format!("{name}.mcap")));
+    recorder(&sandbox, &["simulate", "curtain", "--steps", "20", "-o", &one]).success();
+    recorder(&sandbox, &["simulate", "rope", "--steps", "30", "-o", &two]).success();
+    let message_count =
+        recorder(&sandbox, &["check", "--json", &two]).json()["message_count"].as_u64().unwrap();
+    let (first, second) = (fs::read(&one).unwrap(), fs::read(&two).unwrap());
+    let files = |count: u64| [&first[..], &second.repeat(usize::try_from(count).unwrap())].concat();
+    let noise = [&first[..], &[7; 1000]].concat();
+    for (bytes, code, messages) in
+        [(files(1), 3, message_count), (files(2), 3, 2 * message_count), (noise, 0, 0)]
+    {
+        fs::write(&both, &bytes).unwrap();
+        let repair = ["repair", &both, &repaired, "--json", "--overwrite"];
+        let report = recorder(&sandbox, &repair);
+        assert_eq!(report.code, Some(code), "{report:?}");
+        let report: Value = serde_json::from_str(&report.stdout).unwrap();
+        let after_end = &report["after_end"];
+        assert_eq!(after_end["byte"], first.len(), "{report}");
+        assert_eq!(after_end["size_bytes"], bytes.len() - first.len(), "{report}");
+        assert_eq!(after_end["message_count"], messages, "{report}");
+        assert_eq!(report["is_lossless"], messages == 0, "{report}");
+        recorder(&sandbox, &["verify", &repaired]).success();
+    }
+    let text = recorder(&sandbox, &["repair", &both, &repaired, "--overwrite"]).success();
+    assert!(text.contains("after end   1000 bytes with 0 messages"), "{text}");
+}
+
+#[test]
 fn a_check_of_several_files_reports_each_and_ends_with_the_worst() {
     let sandbox = Sandbox::new();
     let (damaged, _) = damaged(&sandbox);

@@ -1,6 +1,7 @@
 //! Exports states as pictures.
 
 use std::path::Path;
+use std::time::Duration;
 
 use recorder::Existing;
 use serde::Serialize;
@@ -23,6 +24,27 @@ pub(super) struct Style {
     pub(super) size: Size,
     pub(super) view: Option<View>,
     pub(super) bend: Bend,
+}
+
+/// The times of the frames of an animation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pace {
+    /// Wall-clock time of a frame.
+    pub(super) frame_time: Duration,
+    /// Simulated time that passes within it. `None` shows each frame for this time, whenever it was recorded.
+    pub(super) period: Option<Duration>,
+}
+
+impl Pace {
+    /// Returns how long each frame is shown, from the simulated times of the frames in s. Frames that are
+    /// missing in the recording leave the one before them standing.
+    pub(super) fn delays(self, times_s: &[f64]) -> Vec<Duration> {
+        let last = times_s.last().map(|_| self.frame_time);
+        let Some(period) = self.period else { return vec![self.frame_time; times_s.len()] };
+        let rate = self.frame_time.as_secs_f64() / period.as_secs_f64();
+        let between = times_s.windows(2).map(|pair| (pair[1] - pair[0]) * rate);
+        between.map(Duration::from_secs_f64).chain(last).collect()
+    }
 }
 
 /// A written picture, as printed.
@@ -57,14 +79,14 @@ pub(super) fn draw(
 pub(super) fn animate(
     snapshots: &Snapshots<'_>,
     style: Style,
-    frames_per_s: u16,
+    pace: Pace,
     path: &Path,
     existing: Existing,
 ) -> anyhow::Result<Written> {
     let mut files = WrittenFiles::new(existing);
     files.add_streamed(path, |out| {
-        let count = snapshots.steps.len();
-        let mut animation = Animation::begin(out, style.size, count, frames_per_s)?;
+        let times_s: Vec<_> = snapshots.steps.iter().map(|step| snapshots.time_s(*step)).collect();
+        let mut animation = Animation::begin(out, style.size, &pace.delays(&times_s))?;
         let renderer = renderer(snapshots, style)?;
         snapshots.for_each(|state| {
             animation.add(&renderer.draw(state, snapshots.time_s(state.row.step)))

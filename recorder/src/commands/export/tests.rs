@@ -155,19 +155,27 @@ fn a_png_has_the_size_that_was_asked_for_and_several_colors() {
 fn the_frames_of_an_animation_are_the_pictures() {
     let file = record(TINY, 40);
     let path = std::env::temp_dir().join(format!("recorder-apng-{}.png", std::process::id()));
-    with_snapshots(&file, Some(&[0, 20, 40]), |snapshots| {
-        pictures::animate(snapshots, STYLE, 50, &path, Existing::Refuse).unwrap();
+    // Half as fast as the run.
+    let frame_time = Duration::from_millis(20);
+    let pace = Pace { frame_time, period: Some(frame_time / 2) };
+    let rate_hz = with_snapshots(&file, Some(&[0, 20, 23]), |snapshots| {
+        pictures::animate(snapshots, STYLE, pace, &path, Existing::Refuse).unwrap();
+        f64::from(snapshots.run.rate_hz)
     });
     let bytes = fs::read(&path).unwrap();
     fs::remove_file(&path).unwrap();
     let mut reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
     let control = *reader.info().animation_control().unwrap();
     assert_eq!((control.num_frames, control.num_plays), (3, 0));
-    for picture in pictures(&file, &[0, 20, 40], STYLE) {
+    let expected_ms =
+        [20.0, 3.0].map(|steps| 2.0 * 1000.0 * steps / rate_hz).into_iter().chain([20.0]);
+    for (picture, expected_ms) in pictures(&file, &[0, 20, 23], STYLE).into_iter().zip(expected_ms)
+    {
         let mut frame = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut frame).unwrap();
         let delay = reader.info().frame_control().unwrap();
-        assert_eq!((delay.delay_num, delay.delay_den), (1, 50));
+        let delay_ms = 1000.0 * f64::from(delay.delay_num) / f64::from(delay.delay_den);
+        assert!((delay_ms - expected_ms).abs() <= 1.0, "{delay_ms} {expected_ms}");
         let single = png::encode(&picture).unwrap();
         let mut single = ::png::Decoder::new(Cursor::new(single)).read_info().unwrap();
         let mut pixels = vec![0; single.output_buffer_size().unwrap()];
@@ -357,6 +365,40 @@ fn the_error_names_a_wrong_option() {
 }
 
 #[test]
+fn an_option_that_the_format_ignores_is_refused() {
+    for (line, refused) in [
+        ("a.mcap --png d --fps 30", Some("--fps has an effect only on --apng")),
+        ("a.mcap --npz f --fps 30", Some("--fps")),
+        ("a.mcap --npz f --size 20x30", Some("--size has an effect only on pictures")),
+        ("a.mcap --obj d --view top", Some("--view")),
+        ("a.mcap --obj d --no-bend", Some("--no-bend")),
+        ("a.mcap --apng f --fps 30 --size 20x30 --view top --no-bend", None),
+        ("a.mcap --svg d --size 20x30", None),
+        ("a.mcap --npz f", None),
+    ] {
+        let error = parse(line).unwrap().check().err().map(|error| error.to_string());
+        match (&error, refused) {
+            (Some(error), Some(word)) => assert!(error.contains(word), "{line}: {error}"),
+            (found, refused) => assert_eq!(found.is_some(), refused.is_some(), "{line}"),
+        }
+    }
+}
+
+#[test]
+fn an_animation_keeps_the_pace_of_a_sparse_recording() {
+    let pace = |line| parse(line).unwrap().pace();
+    let delays_ms = |pace: Pace| {
+        let delays = pace.delays(&[0.0, 0.1, 0.5, 0.54]);
+        delays.iter().map(|delay| (delay.as_secs_f64() * 1000.0).round()).collect::<Vec<_>>()
+    };
+    assert_eq!(delays_ms(pace("a.mcap --apng f")), [100.0, 400.0, 40.0, 40.0]);
+    assert_eq!(delays_ms(pace("a.mcap --apng f --fps 10")), [100.0, 400.0, 40.0, 100.0]);
+    let twice_as_fast = pace("a.mcap --apng f --fps 50 --every 40ms");
+    assert_eq!(delays_ms(twice_as_fast), [50.0, 200.0, 20.0, 20.0]);
+    assert_eq!(delays_ms(pace("a.mcap --apng f --frames 4 --fps 20")), [50.0; 4]);
+}
+
+#[test]
 fn options_select_the_snapshots_and_the_style() {
     let selection = |line| {
         let args = parse(line).unwrap();
@@ -394,7 +436,7 @@ fn files_without_a_snapshot_are_an_error() {
     };
     let empty = LogWriter::create(Vec::new(), LogOptions::default(), &run_at(100), b"", 0);
     let empty = empty.unwrap().finish(&Closing::default()).unwrap();
-    assert_eq!(error_for(&empty), "a.mcap: has no snapshot to export (the file is complete)");
+    assert_eq!(error_for(&empty), "a.mcap: has no snapshot to export");
     assert_eq!(
         error_for(b"a text of some length, and no recording"),
         "a.mcap: is not an MCAP file"

@@ -52,6 +52,8 @@ pub(super) struct Player {
     pub(super) commands: VecDeque<ReceivedCommand>,
     pub(super) next_status_ns: u64,
     pub(super) is_quit: bool,
+    /// The last snapshot of the run is published.
+    pub(super) is_at_end: bool,
 }
 
 /// The measured speed of the playback.
@@ -236,6 +238,7 @@ impl Player {
         next: Option<&Frame>,
         last_step: u64,
     ) -> anyhow::Result<Option<Beginning>> {
+        self.is_at_end = next.is_none();
         let next_step = next.map_or(last_step + 1, |frame| frame.row.step);
         replay.receive_commands(&mut self.commands);
         while let Some(ReceivedCommand { command, .. }) = self.commands.pop_front() {
@@ -260,8 +263,22 @@ impl Player {
                 return Ok(Some(Beginning { place, command: None }));
             }
         }
+        if !self.control.is_moving() {
+            self.complete_state(replay)?;
+        }
         self.show(replay, last_step)?;
         Ok(None)
+    }
+
+    /// Publishes the keyframe of the snapshot at which the replay stands, for a reader that has joined since.
+    /// A node does so, too, so that a state can be read from one that is paused.
+    fn complete_state(&mut self, replay: &mut Replay) -> anyhow::Result<()> {
+        if let Some(step) = replay.take_step_to_complete()
+            && let Some(bytes) = self.playlist.keyframe_of(step)?
+        {
+            replay.complete(step, &bytes)?;
+        }
+        Ok(())
     }
 
     /// Obeys a request, or returns the place that it asks for. `step` is the last published one.
@@ -273,6 +290,9 @@ impl Player {
         match request {
             Request::Pause => self.control.set_paused(true),
             Request::Resume => self.control.set_paused(false),
+            Request::Step(_) if self.is_at_end && self.control.is_paused => {
+                return Ok(Err(Reason::OutOfRange));
+            }
             Request::Step(count) => return Ok(self.control.step(count).map(|()| None)),
             Request::Rate(rate) => {
                 self.control.rate = rate;
@@ -315,9 +335,13 @@ impl Player {
         self.next_status_ns = now_ns + STATUS_PERIOD_NS;
         let Plan { start_ns, end_ns, .. } = self.plan;
         let time_ns = self.playlist.time_ns(step).saturating_sub(start_ns);
-        let (control, lockstep) = (self.control, &self.lockstep);
-        let real_time_factor = self.speed.update(now_ns, time_ns);
-        replay.publish_status(&Playback { control, step, real_time_factor, lockstep })?;
+        replay.publish_status(&Playback {
+            control: self.control,
+            step,
+            real_time_factor: self.speed.update(now_ns, time_ns),
+            lockstep: &self.lockstep,
+            is_at_end: self.is_at_end,
+        })?;
         live::show(&Shown { time_ns, duration_ns: end_ns - start_ns, step, control: self.control });
         Ok(())
     }

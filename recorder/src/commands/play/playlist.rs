@@ -81,9 +81,11 @@ impl Playlist {
         self.files.last().map_or(0, Listed::end_ns)
     }
 
-    /// Returns the time of a step of the file that is being read, from the start of the replay.
+    /// Returns the time of a step of the run that is being played, from the start of the replay. The file that
+    /// is being read may be the one after that of the step.
     pub(super) fn time_ns(&self, step: u64) -> u64 {
-        self.files[self.current].time_ns(step)
+        let file = self.place_of(step).map_or(self.current, |place| place.file);
+        self.files[file].time_ns(step)
     }
 
     /// Returns the time of a place, from the start of the replay.
@@ -186,9 +188,24 @@ impl Playlist {
         Recording::open(path, &self.stop).with_context(|| output::path_text(path))
     }
 
-    /// Returns the last recorded step of a file up to a step. The file that is being read stays the same: the
-    /// place may yet be rejected.
+    /// Returns the keyframe of a published step of the run that is being played, as
+    /// [`Recording::keyframe_of`].
+    pub(super) fn keyframe_of(&mut self, step: u64) -> anyhow::Result<Option<Vec<u8>>> {
+        let Some(Place { file, .. }) = self.place_of(step) else { return Ok(None) };
+        self.read_beside(file, |recording| recording.keyframe_of(step))
+    }
+
+    /// Returns the last recorded step of a file up to a step.
     fn recorded_step(&mut self, file: usize, step: u64) -> anyhow::Result<u64> {
+        self.read_beside(file, |recording| Ok(recording.tape().step_at(step)?))
+    }
+
+    /// Reads from a file. The file that is being played stays the same.
+    fn read_beside<T>(
+        &mut self,
+        file: usize,
+        read: impl FnOnce(&mut Recording) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
         let mut other = None;
         let recording = if file == self.current {
             &mut self.recording
@@ -196,7 +213,7 @@ impl Playlist {
             other.insert(self.open_file(file)?)
         };
         let name = output::path_text(recording.path());
-        recording.tape().step_at(step).context(name)
+        read(recording).context(name)
     }
 
     /// Returns `true` if the file that has ended was complete.

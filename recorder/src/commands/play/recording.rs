@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
 use recorder::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
     RunDescription, Tape, torn_before_first,
@@ -10,8 +9,10 @@ use recorder::{
 use sim_contract::{Method, Stop};
 use sim_solver::Solver;
 
+use super::complete_state::keyframe_of;
 use super::position::Position;
 use super::replay::Recorded;
+use crate::cli::damaged_input::lacks;
 use crate::input::scene_source::scene_in_recording;
 
 /// A recording that is read forward from any step.
@@ -24,6 +25,7 @@ pub(super) struct Recording {
     collider_count: Option<usize>,
     /// `None` until they are needed.
     sizes: Option<Sizes>,
+    stop: Stop,
 }
 
 /// Sizes of the messages of a load.
@@ -70,11 +72,18 @@ impl Recording {
         log.selection().require_all_particles("`recorder play`")?;
         // Names the problem of a file whose readable part has no snapshot.
         let mut frames = FrameReader::new(log);
-        let first = next_frame(&mut frames)?;
+        let first = next_frame(path, &mut frames)?;
         let collider_count = first_colliders(&first).map(|row| row.colliders.len());
         let tape = Tape::open(path, Some(stop), &mut |_, _| {})?;
         tape.rewind(&mut frames)?;
-        Ok(Self { path: path.to_owned(), frames, tape, collider_count, sizes: None })
+        Ok(Self {
+            path: path.to_owned(),
+            frames,
+            tape,
+            collider_count,
+            sizes: None,
+            stop: stop.clone(),
+        })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -123,7 +132,8 @@ impl Recording {
         Ok(sizes)
     }
 
-    /// Continues with the snapshot of the last recorded step up to `step` whose header is readable.
+    /// Continues with the snapshot of the last recorded step up to `step` whose header is readable. Its state
+    /// is complete, if the recording leads to it.
     pub(super) fn start_at(&mut self, step: u64) -> anyhow::Result<Start> {
         if step <= self.tape.first_step() { self.start() } else { self.start_in_the_middle(step) }
     }
@@ -131,7 +141,7 @@ impl Recording {
     /// Continues with the first snapshot.
     pub(super) fn start(&mut self) -> anyhow::Result<Start> {
         self.tape.rewind(&mut self.frames)?;
-        let frame = next_frame(&mut self.frames)?;
+        let frame = next_frame(&self.path, &mut self.frames)?;
         let torn = torn_before_first(self.tape.topology(), &frame);
         let mut position = Position::new(torn, self.method());
         // The load has the parameters of its first snapshot.
@@ -148,9 +158,13 @@ impl Recording {
             }
             state = self.tape.state_at(state.row.step - 1)?;
         }
-        let keyframe = self.tape.keyframe_at(state.row.step)?;
+        let step = state.row.step;
+        let keyframe = match self.keyframe_of(step)? {
+            Some(bytes) => Some((step, bytes)),
+            None => self.tape.keyframe_at(step)?,
+        };
         let position = Position::at(&state, keyframe, self.method());
-        self.tape.wind(&mut self.frames, state.row.step)?;
+        self.tape.wind(&mut self.frames, step)?;
         let frame = Frame {
             updates: Vec::new(),
             row: state.row,
@@ -158,6 +172,12 @@ impl Recording {
             log_times_ns: Vec::new(),
         };
         Ok(Start { frame, position })
+    }
+
+    /// Returns the keyframe of a recorded step, simulated if it has none of its own; `None` if the recording
+    /// does not lead to it.
+    pub(super) fn keyframe_of(&mut self, step: u64) -> anyhow::Result<Option<Vec<u8>>> {
+        keyframe_of(&self.path, &mut self.tape, step, &self.stop)
     }
 
     /// Returns the next snapshot, or `None` at the end of the readable part.
@@ -180,14 +200,9 @@ impl Recording {
     }
 }
 
-fn next_frame(frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {
-    match frames.next_frame()? {
-        Some(frame) => Ok(frame),
-        None => match frames.end() {
-            Some(LogEnd::Complete) | None => bail!("has no snapshot to play"),
-            Some(end) => bail!("has no snapshot to play: {end}"),
-        },
-    }
+fn next_frame(path: &Path, frames: &mut FrameReader<FileSource>) -> anyhow::Result<Frame> {
+    let frame = frames.next_frame()?;
+    frame.ok_or_else(|| lacks(path, "has no snapshot to play", frames.end()))
 }
 
 fn first_colliders(first: &Frame) -> Option<&CollidersRow> {

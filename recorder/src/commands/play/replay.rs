@@ -36,6 +36,8 @@ pub(super) struct Playback<'a> {
     /// Simulated time per wall-clock time, as measured.
     pub(super) real_time_factor: f64,
     pub(super) lockstep: &'a Lockstep,
+    /// The last snapshot of the run is published.
+    pub(super) is_at_end: bool,
 }
 
 /// A run of recorded snapshots, with its own run id.
@@ -51,10 +53,14 @@ pub(crate) struct Replay {
     published_parameters: ParameterValues,
     /// The last published step; `None` before the first.
     step: Option<u64>,
-    /// The index of the next snapshot; `None` before the first, which keeps its recorded index.
-    next_index: Option<u32>,
+    /// The index of the next snapshot. A run counts from 0, so that readers know when they miss its start.
+    next_index: u32,
     /// The latest recorded status of the node.
     status: Option<StatusRow>,
+    /// Readers of keyframes at the last check.
+    keyframe_reader_count: usize,
+    /// A reader has joined the keyframes since the newest one.
+    is_keyframe_wanted: bool,
     /// Reused for each batch of commands.
     commands: Vec<ReceivedCommand>,
 }
@@ -96,7 +102,9 @@ impl Replay {
             status: position.latched_status.take(),
             position,
             step: None,
-            next_index: None,
+            next_index: 0,
+            keyframe_reader_count: 0,
+            is_keyframe_wanted: false,
             commands: Vec::new(),
         })
     }
@@ -157,7 +165,7 @@ impl Replay {
         }
         let header = self.header(frame);
         self.owner.publish_particles(&header, |index| particles[index])?;
-        self.next_index = Some(header.snapshot_index.wrapping_add(1));
+        self.next_index = self.next_index.wrapping_add(1);
         self.owner.wake(Wake::Frame);
         self.step = Some(frame.row.step);
         Ok(())
@@ -180,10 +188,29 @@ impl Replay {
         Ok(())
     }
 
-    fn publish_keyframe(&self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
+    fn publish_keyframe(&mut self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
         let size_bytes = bytes.len() as u64;
         let header = KeyframeHeader { run_id: self.run_id, step, size_bytes };
-        Ok(self.owner.publish_keyframe(header, bytes)?)
+        self.owner.publish_keyframe(header, bytes)?;
+        self.is_keyframe_wanted = false;
+        Ok(())
+    }
+
+    /// Returns the last published step once after a reader has joined the keyframes, if it has none yet.
+    pub(super) fn take_step_to_complete(&mut self) -> Option<u64> {
+        let before =
+            std::mem::replace(&mut self.keyframe_reader_count, self.owner.keyframe_reader_count());
+        self.is_keyframe_wanted |= self.keyframe_reader_count > before;
+        let step = self.step.filter(|step| self.position.keyframe_step != *step)?;
+        std::mem::take(&mut self.is_keyframe_wanted).then_some(step)
+    }
+
+    /// Publishes the keyframe of the last snapshot after it.
+    pub(super) fn complete(&mut self, step: u64, bytes: &[u8]) -> anyhow::Result<()> {
+        self.position.keyframe_step = step;
+        self.publish_keyframe(step, bytes)?;
+        self.owner.wake(Wake::Frame);
+        Ok(())
     }
 
     /// Publishes the torn constraints at a step, if they have changed.
@@ -236,7 +263,7 @@ impl Replay {
             particle_count: self.run.particle_count,
             flags: SnapshotFlags::REPLAY | paused,
             stride: self.stride(row.step),
-            snapshot_index: self.next_index.unwrap_or(row.snapshot_index.unwrap_or(0)),
+            snapshot_index: self.next_index,
         }
     }
 
@@ -286,7 +313,7 @@ impl Replay {
 
     /// Publishes the status of the replay, with the recorded timing of the node.
     pub(super) fn publish_status(&self, playback: &Playback<'_>) -> anyhow::Result<()> {
-        let Playback { control, step, real_time_factor, lockstep } = *playback;
+        let Playback { control, step, real_time_factor, lockstep, is_at_end } = *playback;
         let mut status = NodeStatus {
             contract_version: CONTRACT_VERSION,
             solver_version: self.run.solver_version,
@@ -303,7 +330,9 @@ impl Replay {
             torn_count: self.published_torn.header.count,
             reader_count: u32::try_from(self.reader_count()).unwrap_or(u32::MAX),
             process_id: std::process::id(),
-            flags: StatusFlags::REPLAY | if control.is_paused { StatusFlags::PAUSED } else { 0 },
+            flags: StatusFlags::REPLAY
+                | if control.is_paused { StatusFlags::PAUSED } else { 0 }
+                | if is_at_end { StatusFlags::AT_END } else { 0 },
             ..NodeStatus::default()
         };
         for (entry, member) in status.members.iter_mut().zip(lockstep.members(step)) {

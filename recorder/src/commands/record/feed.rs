@@ -11,7 +11,7 @@ use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 
 use super::accepted::{Accepted, RunEnd};
 use super::first_state::FirstState;
-use super::intake::Intake;
+use super::intake::{Intake, Skipped};
 use super::load::{LoadError, Now};
 use super::messages::Messages;
 use super::queue::{FileEnd, Item, Queue};
@@ -209,6 +209,7 @@ impl Feed {
             {
                 output::note(&format!("recording from step {step}"));
             }
+            self.warn_of_skipped();
             self.queue.begin(header, log_time_ns);
         }
         let now_ns = monotonic_ns();
@@ -219,6 +220,21 @@ impl Feed {
             let Some(content) = self.selector.select(content) else { continue };
             self.queue.push(Item { content, log_time_ns });
         }
+    }
+
+    fn warn_of_skipped(&mut self) {
+        let Skipped { count, last_step } = self.intake.take_skipped();
+        if count > 0 {
+            output::note(&format!(
+                "warning: the replay began in the middle of a recording and could not publish a complete state \
+                 there, so {count} snapshots up to step {last_step}, before the first keyframe, are not recorded"
+            ));
+        }
+    }
+
+    /// Returns the number of snapshots that came before the first keyframe of a file.
+    pub(crate) fn skipped_count(&self) -> u64 {
+        self.intake.skipped_count()
     }
 
     /// Counts messages that could not be read.

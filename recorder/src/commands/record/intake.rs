@@ -33,8 +33,12 @@ pub(crate) struct Intake {
     started: Option<Started>,
     /// The file before this one.
     previous: Option<PreviousFile>,
-    /// Snapshots of replayed runs that came after that file and before the next state with a keyframe. They
-    /// have no numbers of their own run.
+    /// The newest replayed run whose first snapshot has arrived.
+    seen_replay: Option<u64>,
+    /// Snapshots of replayed runs that have arrived from the first on, and before the first state of the next
+    /// file.
+    skipped: Skipped,
+    /// The number of these snapshots before all files.
     skipped_count: u64,
     lost: LostChanges,
     /// Messages after the first state or the candidate that arrived but could not be read.
@@ -43,6 +47,14 @@ pub(crate) struct Intake {
     follows_errors: bool,
     /// An error was reported, and the recording had started then.
     reported: Option<bool>,
+}
+
+/// Snapshots that came before the first one that has its keyframe.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Skipped {
+    pub(crate) count: u64,
+    /// Step of the last one.
+    pub(crate) last_step: u64,
 }
 
 impl Intake {
@@ -77,8 +89,9 @@ impl Intake {
         self.outcomes.retain(|outcome| {
             outcome.run_id != state.header.run_id || outcome.index >= first_outcome
         });
-        if self.candidate.is_some() {
-            self.skipped_count += u64::from(self.is_replay_after_file(state.header));
+        self.skip_candidate();
+        if state.header.snapshot_index == 0 && is_replay(state.header) {
+            self.seen_replay = Some(state.header.run_id);
         }
         self.candidate = FirstState::new(state);
         if self.previous.is_none() {
@@ -119,10 +132,18 @@ impl Intake {
         previous.map_or(first.outcome_count, |previous| previous.next_outcome)
     }
 
-    /// Returns `true` for a snapshot of a replay that follows another run in the file before.
-    fn is_replay_after_file(&self, header: &SnapshotHeader) -> bool {
-        let is_replay = header.flags & SnapshotFlags::REPLAY != 0;
-        is_replay && self.previous.as_ref().is_some_and(|previous| previous.run_id != header.run_id)
+    /// Counts the candidate, whose keyframe has not arrived, if it belongs to a replayed run that was there to
+    /// be recorded from its first snapshot on. Those of a node in the file before are missing by their numbers.
+    fn skip_candidate(&mut self) {
+        let Some(FirstState { header, .. }) = &self.candidate else { return };
+        let is_missing = match &self.previous {
+            Some(previous) => is_replay(header) && previous.run_id != header.run_id,
+            None => self.seen_replay == Some(header.run_id),
+        };
+        if is_missing {
+            self.skipped.count += 1;
+            self.skipped.last_step = header.step;
+        }
     }
 
     /// Returns the reason why the file ends before a state.
@@ -173,7 +194,8 @@ impl Intake {
         let Some(load) = &mut self.load else { return };
         let previous = self.previous.as_ref();
         let mut started = Started::new(&first, previous, self.lost);
-        started.add_gaps(std::mem::take(&mut self.skipped_count));
+        started.add_gaps(self.skipped.count);
+        self.skipped_count += self.skipped.count;
         if previous.is_none() {
             started.set_steps_max(self.steps_max);
         }
@@ -206,6 +228,17 @@ impl Intake {
         is_first.then(|| format!("warning: a message {effect}: {error}"))
     }
 
+    /// Returns the snapshots since the last call that are not in a file that has begun, because they came
+    /// before its first keyframe.
+    pub(crate) fn take_skipped(&mut self) -> Skipped {
+        std::mem::take(&mut self.skipped)
+    }
+
+    /// Returns the number of snapshots that came before the first keyframe of a file.
+    pub(crate) fn skipped_count(&self) -> u64 {
+        self.skipped_count
+    }
+
     /// Returns the first step of the file, once it has begun.
     pub(crate) fn first_step(&self) -> Option<u64> {
         self.started.as_ref().map(|started| started.first_step)
@@ -234,6 +267,10 @@ impl Intake {
     fn counts(&self) -> AllCounts {
         self.started.as_ref().map_or_else(AllCounts::default, |started| started.counts(&self.lost))
     }
+}
+
+fn is_replay(header: &SnapshotHeader) -> bool {
+    header.flags & SnapshotFlags::REPLAY != 0
 }
 
 #[cfg(test)]

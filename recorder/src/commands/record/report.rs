@@ -64,11 +64,14 @@ pub(crate) struct Report {
     outcomes: u64,
     /// Number of missing messages, for topics that have any, and "unreadable" ones.
     lost: BTreeMap<&'static str, u64>,
+    /// The part of the lost snapshots that came before the first keyframe.
+    before_first_keyframe: u64,
     stop_reason: String,
 }
 
 impl Report {
-    pub(crate) fn new(written: &Written, stop_reason: String) -> Self {
+    /// Reports the files, for which `before_first_keyframe` snapshots came too early.
+    pub(crate) fn new(written: &Written, before_first_keyframe: u64, stop_reason: String) -> Self {
         let counts = &written.total.counts;
         Self {
             output: (written.file_count > 0).then(|| output::path_text(&written.last_path)),
@@ -79,6 +82,7 @@ impl Report {
             snapshots: counts[Topic::Steps].written,
             outcomes: counts[Topic::Outcomes].written,
             lost: written.total.missing(),
+            before_first_keyframe,
             stop_reason,
         }
     }
@@ -120,6 +124,10 @@ impl fmt::Display for Report {
         }
         for (topic, count) in &self.lost {
             writeln!(f, "lost        {topic} {count}")?;
+        }
+        if self.before_first_keyframe > 0 {
+            let count = self.before_first_keyframe;
+            writeln!(f, "of these    {count} snapshots before the first keyframe")?;
         }
         write!(f, "stopped     {}", self.stop_reason)
     }

@@ -1,6 +1,7 @@
 //! Simulates a recording again and writes it with the particles of every snapshot.
 
 use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
@@ -10,6 +11,7 @@ use recorder::{
 };
 use sim_solver::Scene;
 
+use crate::cli::damaged_input::lacks;
 use crate::commands::verify::finding::Finding;
 use crate::commands::verify::resimulation::Resimulation;
 use crate::input::scene_source::scene_to_simulate;
@@ -33,6 +35,7 @@ const OUTPUT: &str = "the new file, whose readable part ends with .part";
 
 /// A recording that is simulated again.
 pub(super) struct Completion<R: Read> {
+    path: PathBuf,
     frames: FrameReader<R>,
     scene: Scene,
     simulation: Option<Resimulation>,
@@ -44,9 +47,10 @@ pub(super) struct Completion<R: Read> {
 
 impl<R: Read> Completion<R> {
     /// Starts with a recording that has its commands and keyframes.
-    pub(super) fn new(log: LogReader<R>, threads: usize) -> anyhow::Result<Self> {
+    pub(super) fn new(path: &Path, log: LogReader<R>, threads: usize) -> anyhow::Result<Self> {
         let scene = scene_to_simulate(&log, "`recorder simulate`")?;
         Ok(Self {
+            path: path.to_owned(),
             frames: FrameReader::new(log),
             scene,
             simulation: None,
@@ -199,7 +203,9 @@ impl<R: Read> Completion<R> {
     }
 
     fn completed(self, is_interrupted: bool) -> anyhow::Result<Completed> {
-        let (first_step, last_step, state_hash) = self.result.context("has no snapshot")?;
+        let result =
+            self.result.ok_or_else(|| lacks(&self.path, "has no snapshot", self.frames.end()));
+        let (first_step, last_step, state_hash) = result?;
         Ok(Completed {
             scene: self.scene,
             first_step,

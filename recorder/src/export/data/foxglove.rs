@@ -2,7 +2,9 @@
 
 use std::io::Write;
 
-use recorder::{DrawnMesh, SCENE_TOPIC, SceneDrawing, scene_format};
+use recorder::{
+    AllCounts, DrawnMesh, GapCounter, LogReader, SCENE_TOPIC, SceneDrawing, scene_format,
+};
 use sim_contract::{ConstraintKind, TornConstraint};
 
 use super::recording_copy::RecordingCopy;
@@ -31,7 +33,17 @@ pub(crate) fn write(snapshots: &Snapshots<'_>, out: &mut dyn Write) -> anyhow::R
         let time_ns = snapshots.run.time_of_step_ns(state.row.step);
         copy.insert(*channel, &drawing.encode(time_ns, &state.particles))
     })?;
-    copy.finish()
+    copy.finish(|| count_gaps(snapshots))
+}
+
+/// Counts the messages that are missing in the recording, as their numbers show.
+fn count_gaps(snapshots: &Snapshots<'_>) -> anyhow::Result<AllCounts> {
+    let mut log = LogReader::new((snapshots.open_bytes)()?)?;
+    let mut gaps = GapCounter::for_selection(log.selection());
+    while let Some(logged) = log.next_message()? {
+        gaps.add(&logged.message);
+    }
+    Ok(gaps.counts())
 }
 
 fn mesh(state: &SceneState) -> DrawnMesh {

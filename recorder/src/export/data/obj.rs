@@ -16,6 +16,7 @@ pub(crate) fn write(
 ) -> anyhow::Result<()> {
     let names = FrameNames::new(folder, &snapshots.run.scene_name, "obj");
     names.prepare(snapshots.steps, files.existing())?;
+    names.remove_older(files.existing())?;
     snapshots
         .for_each(|state| files.add_whole(&names.path(state.row.step), mesh(state)?.as_bytes()))
 }

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::io::{Read, Write};
 
 use anyhow::{Context, bail};
-use mcap::records::{MessageHeader, Record};
+use mcap::records::{MessageHeader, Metadata, Record};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
-use recorder::{Topic, TopicFormat};
+use recorder::{AllCounts, CLOSING_METADATA, Closing, Topic, TopicFormat};
 
 /// The copy of a recording, up to the record that was copied last.
 pub(super) struct RecordingCopy<'a> {
@@ -16,6 +16,12 @@ pub(super) struct RecordingCopy<'a> {
     reader: LinearReader,
     file: Writer<NoSeek<&'a mut dyn Write>>,
     particles_channel: Option<u16>,
+    /// The topics of a recording, by channel.
+    topics: BTreeMap<u16, Topic>,
+    /// Messages of these topics that are copied.
+    counts: AllCounts,
+    /// The source states the end of its recording.
+    has_closing: bool,
     /// The header of the snapshot that was copied last.
     snapshot: Option<MessageHeader>,
 }
@@ -37,7 +43,16 @@ impl<'a> RecordingCopy<'a> {
             .compression_level(1)
             .compression_threads(0)
             .create(NoSeek::new(out))?;
-        Ok(Self { source, reader, file, particles_channel: None, snapshot: None })
+        Ok(Self {
+            source,
+            reader,
+            file,
+            particles_channel: None,
+            topics: BTreeMap::new(),
+            counts: AllCounts::default(),
+            has_closing: false,
+            snapshot: None,
+        })
     }
 
     /// Copies everything up to the snapshot of a step, and the snapshot.
@@ -52,10 +67,25 @@ impl<'a> RecordingCopy<'a> {
         bail!("has no snapshot of step {step}")
     }
 
-    /// Copies the rest and writes the index.
-    pub(super) fn finish(mut self) -> anyhow::Result<()> {
+    /// Copies the rest and writes the index. If the source has no end, the copy declares that, with the
+    /// messages that `count_gaps` finds missing.
+    pub(super) fn finish(
+        mut self,
+        count_gaps: impl FnOnce() -> anyhow::Result<AllCounts>,
+    ) -> anyhow::Result<()> {
         while let Some(record) = next_record(&mut self.reader, self.source)? {
             self.copy(record)?;
+        }
+        if !self.has_closing {
+            let gaps = count_gaps()?;
+            for topic in Topic::ALL {
+                self.counts[topic].gaps = gaps[topic].gaps;
+            }
+            self.counts.set_received_to_written();
+            let stop_reason = "unknown: the recording had no end".to_owned();
+            let closing = Closing { stop_reason, counts: self.counts, unreadable: 0 };
+            let (name, metadata) = (CLOSING_METADATA.to_owned(), closing.to_map());
+            self.file.write_metadata(&Metadata { name, metadata })?;
         }
         self.file.finish()?;
         Ok(())
@@ -91,6 +121,7 @@ impl<'a> RecordingCopy<'a> {
                 if topic == Topic::Particles.name() {
                     self.particles_channel = Some(id);
                 }
+                self.topics.extend(Topic::from_name(&topic).map(|topic| (id, topic)));
                 self.file.add_channel_with_id(
                     id,
                     schema_id,
@@ -101,6 +132,9 @@ impl<'a> RecordingCopy<'a> {
             }
             Record::Message { header, data } => {
                 self.file.write_to_known_channel(&header, &data)?;
+                if let Some(topic) = self.topics.get(&header.channel_id) {
+                    self.counts[*topic].written += 1;
+                }
                 if self.particles_channel == Some(header.channel_id) {
                     self.snapshot = Some(header);
                     return Ok(Some(header.sequence));
@@ -113,7 +147,10 @@ impl<'a> RecordingCopy<'a> {
                 media_type: header.media_type,
                 data,
             })?,
-            Record::Metadata(metadata) => self.file.write_metadata(&metadata)?,
+            Record::Metadata(metadata) => {
+                self.has_closing |= metadata.name == CLOSING_METADATA;
+                self.file.write_metadata(&metadata)?;
+            }
             _ => {}
         }
         Ok(None)

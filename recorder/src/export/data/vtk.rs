@@ -20,6 +20,7 @@ pub(crate) fn write(
     let collection = names.index_path("pvd");
     files.existing().check(&collection)?;
     names.prepare(snapshots.steps, files.existing())?;
+    names.remove_older(files.existing())?;
     snapshots.for_each(|state| {
         let step = state.row.step;
         files.add_whole(&names.path(step), &polydata(state, snapshots.time_s(step)))

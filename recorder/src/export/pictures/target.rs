@@ -36,9 +36,10 @@ impl<'a> Target<'a> {
         Self { names: FrameNames::new(folder, scene_name, extension), format, existing }
     }
 
-    /// Creates the folder. Fails if one of the files may not be created.
+    /// Creates the folder, or empties it of older pictures. Fails if one of the files may not be created.
     pub(crate) fn prepare(&self, steps: &[u64]) -> anyhow::Result<()> {
-        self.names.prepare(steps, self.existing)
+        self.names.prepare(steps, self.existing)?;
+        self.names.remove_older(self.existing)
     }
 
     /// Writes the picture of a step. The file gets its name only when it is complete.

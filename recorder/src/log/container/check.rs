@@ -9,7 +9,7 @@ use sim_contract::Stop;
 use super::attachment::no_checksum;
 use super::chunk::{Chunk, ChunkContent, InnerRecords};
 use super::content::ContentCheck;
-use super::finding::{CheckExtent, CheckReport, Findings, record_name};
+use super::finding::{CheckExtent, CheckReport, Findings, after_end_text, record_name};
 use super::places::Places;
 use super::summary::{SummaryCheck, is_of_index};
 use super::walk::{Part, Walk};
@@ -116,6 +116,10 @@ impl Check {
             }
             Part::Truncated { byte } => {
                 self.findings.add(byte, "end of the file", "the file is truncated here");
+                Ok(SectionEnd::None)
+            }
+            Part::AfterEnd { bytes } => {
+                self.findings.add(bytes.start, "end of the file", after_end_text(&bytes));
                 Ok(SectionEnd::None)
             }
         }

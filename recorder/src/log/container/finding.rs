@@ -1,6 +1,13 @@
-//! The findings of a check.
+//! The reports of a check and of a repair, and their findings.
 
 use std::fmt;
+use std::ops::Range;
+
+use serde::Serialize;
+
+use super::losses::Losses;
+use super::lost_load::LostLoad;
+use crate::log::topic::AllCounts;
 
 /// The result of the check of a file.
 #[derive(Debug)]
@@ -32,7 +39,48 @@ pub struct CheckExtent {
     pub not_checked: Vec<String>,
 }
 
-use serde::Serialize;
+/// The result of a repair.
+#[derive(Debug)]
+pub struct RepairReport {
+    /// The damage that was found.
+    pub findings: Findings,
+    /// The content that the output lacks.
+    pub losses: Losses,
+    /// The checksum of the data is wrong, and no damaged record explains it.
+    pub is_uncertain: bool,
+    /// The messages of the output. Only `written` is set.
+    pub counts: AllCounts,
+    /// The first and the last step of the snapshots in the output.
+    pub steps: Option<[u64; 2]>,
+    /// The load that the output lacks, if it follows from the scene and this.
+    pub lost_load: Option<LostLoad>,
+    /// The input has its end, so nothing behind it was lost.
+    pub has_end: bool,
+    /// The bytes after that end, which are not copied.
+    pub after_end: Option<AfterEnd>,
+    /// The scene, if the input has it.
+    pub scene: Option<Vec<u8>>,
+}
+
+/// Bytes after the end of a recording, such as a second file.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct AfterEnd {
+    /// Position of the first one.
+    pub byte: u64,
+    /// Number of bytes.
+    pub size_bytes: u64,
+    /// Number of messages in them, as their indexes count.
+    pub message_count: u64,
+    /// Number of intact chunks in them.
+    pub chunk_count: u64,
+}
+
+impl AfterEnd {
+    /// Returns `true` if messages are in these bytes.
+    pub fn has_messages(&self) -> bool {
+        self.message_count > 0 || self.chunk_count > 0
+    }
+}
 
 /// Most findings that a report lists. It counts the others.
 const FINDINGS_MAX: usize = 100;
@@ -114,6 +162,12 @@ impl Findings {
             self.list.push(Finding { byte, record, what, cure });
         }
     }
+}
+
+/// Describes bytes after the end of a recording.
+pub(super) fn after_end_text(bytes: &Range<u64>) -> String {
+    let count = bytes.end - bytes.start;
+    format!("{count} other bytes follow the end of the recording, such as a second file")
 }
 
 /// Returns the name of a kind of record.

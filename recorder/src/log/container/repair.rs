@@ -9,24 +9,23 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
 
-use mcap::Attachment;
 use mcap::records::{MessageIndex, Metadata, Record, op};
+use mcap::{Attachment, MAGIC};
 use sim_contract::Stop;
 
 use super::attachment::{Checksum, LongAttachment, WRONG_CHECKSUM};
 use super::chunk::{ChunkContent, InnerRecords, compression};
 use super::content::ContentCheck;
-use super::finding::{Findings, record_name};
-use super::losses::{LOST_SCENE, LOST_SELECTION, Losses};
-use super::lost_load::{LoadRows, LostLoad};
+use super::finding::{AfterEnd, Findings, RepairReport, record_name};
+use super::losses::{LOST_SCENE, LOST_SELECTION};
+use super::lost_load::LoadRows;
 use super::salvage::{Format, Salvage, size_in_memory};
 use super::walk::{Part, Walk};
 use super::window::Window;
 use crate::log::read::limits::{HEADER_RECORD_SIZE_BYTES_MAX, SizeLimits};
 use crate::log::read::read_error::{LogEnd, ReadError};
 use crate::log::run::selection::{ContentSelection, SELECTION_METADATA};
-use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT};
-use crate::log::topic::AllCounts;
+use crate::log::run::{CLOSING_METADATA, Closing, RUN_METADATA, SCENE_ATTACHMENT, header_library};
 use crate::log::writer::WriteError;
 
 /// Bytes between two calls of the progress callback.
@@ -43,27 +42,6 @@ pub enum RepairError {
     /// The output cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-}
-
-/// The result of a repair.
-#[derive(Debug)]
-pub struct RepairReport {
-    /// The damage that was found.
-    pub findings: Findings,
-    /// The content that the output lacks.
-    pub losses: Losses,
-    /// The checksum of the data is wrong, and no damaged record explains it.
-    pub is_uncertain: bool,
-    /// The messages of the output. Only `written` is set.
-    pub counts: AllCounts,
-    /// The first and the last step of the snapshots in the output.
-    pub steps: Option<[u64; 2]>,
-    /// The load that the output lacks, if it follows from the scene and this.
-    pub lost_load: Option<LostLoad>,
-    /// The input has its end, so nothing behind it was lost.
-    pub has_end: bool,
-    /// The scene, if the input has it.
-    pub scene: Option<Vec<u8>>,
 }
 
 /// Copies the intact part of a recording. Calls `on_progress` with the position and the size of the input.
@@ -91,6 +69,10 @@ pub fn repair_file<R: Read + Seek, W: Write>(
         let Some(part) = walk.next()? else { break };
         if let Part::LongAttachment { attachment, checksum } = part {
             repair.add_long_attachment(&mut walk, attachment, checksum)?;
+            continue;
+        }
+        if let Part::AfterEnd { bytes } = part {
+            repair.after_end = Some(walk.read_after_end(&bytes)?);
             continue;
         }
         if let Some(saved) = repair.add(part, &mut chunks)? {
@@ -139,6 +121,7 @@ struct Repair<W: Write> {
     section: Section,
     has_wrong_checksum: bool,
     first_step: Option<u64>,
+    after_end: Option<AfterEnd>,
 }
 
 impl<W: Write> Repair<W> {
@@ -162,6 +145,7 @@ impl<W: Write> Repair<W> {
             section: Section::Data,
             has_wrong_checksum: false,
             first_step: None,
+            after_end: None,
         }
     }
 
@@ -174,8 +158,8 @@ impl<W: Write> Repair<W> {
         match part {
             Part::Record { byte, opcode, body } => self.add_record(byte, opcode, body, chunks),
             Part::Skipped { opcode: op::CHUNK, .. } => Err(self.no_run().into()),
-            // It is copied in pieces from the walk.
-            Part::LongAttachment { .. } => Ok(None),
+            // The one is copied in pieces from the walk, the other is only counted.
+            Part::LongAttachment { .. } | Part::AfterEnd { .. } => Ok(None),
             Part::Skipped { byte, opcode } => {
                 self.lose(byte, record_name(opcode), "it is of another program")?;
                 Ok(None)
@@ -284,9 +268,7 @@ impl<W: Write> Repair<W> {
                 return Ok(Some(end.data_section_crc));
             }
             Record::Footer(_) => self.section = Section::Index,
-            Record::Header(header) => {
-                (self.format.profile, self.format.library) = (header.profile, header.library);
-            }
+            Record::Header(header) => self.format.library = header.library,
             Record::MessageIndex(index) => self.add_message_index(&index),
             Record::Metadata(metadata) => self.add_metadata(byte, metadata)?,
             Record::Attachment { header, data, crc } => {
@@ -356,6 +338,7 @@ impl<W: Write> Repair<W> {
     /// Creates the output.
     fn begin(&mut self) -> Result<(), RepairError> {
         let Some(out) = self.out.take() else { return Ok(()) };
+        self.restore_header();
         let salvage = self.salvage.insert(Salvage::create(out, &self.format)?);
         if self.is_head_damaged {
             let is_scene = |one: &Record<'_>| matches!(one, Record::Attachment { header, .. } if header.name == SCENE_ATTACHMENT);
@@ -366,6 +349,18 @@ impl<W: Write> Repair<W> {
             self.copy_head(&record)?;
         }
         Ok(())
+    }
+
+    /// Sets the header of the output: that of the recorder of the run. The one of the input has no checksum.
+    fn restore_header(&mut self) {
+        let Some(content) = &self.content else { return };
+        let own = header_library(&content.run().recorder_version);
+        let found = std::mem::take(&mut self.format.library);
+        if !found.is_empty() && !found.starts_with(&own) {
+            let what = format!("its library is '{found}', not that of '{}'", own.trim_end());
+            self.findings.add_index(MAGIC.len() as u64, "header", what);
+        }
+        self.format.library = own + mcap::LIBRARY_IDENTIFIER;
     }
 
     fn add_chunk(
@@ -490,6 +485,7 @@ impl<W: Write> Repair<W> {
             losses,
             lost_load: content.load.lost(),
             has_end,
+            after_end: self.after_end,
             scene: self.scene,
         })
     }

@@ -51,7 +51,6 @@ struct LostStart {
 /// The options of the output, from the input.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Format {
-    pub(super) profile: String,
     pub(super) library: String,
     /// "", "lz4" or "zstd".
     pub(super) compression: String,
@@ -81,7 +80,7 @@ impl<W: Write> Salvage<W> {
             _ => (Some(mcap::Compression::Zstd), 1),
         };
         let file = WriteOptions::new()
-            .profile(format.profile.as_str())
+            .profile("")
             .library(format.library.as_str())
             .disable_seeking(true)
             .chunk_size(Some(CHUNK_SIZE_BYTES))

@@ -10,10 +10,11 @@ use std::ops::Range;
 
 use crc32fast::Hasher;
 use mcap::MAGIC;
-use mcap::records::op;
+use mcap::records::{Record, op};
 
 use super::attachment::{Checksum, LongAttachment};
 use super::chunk::is_chunk;
+use super::finding::AfterEnd;
 use super::window::Window;
 use crate::log::read::lengths::is_exact;
 use crate::log::read::limits::{
@@ -42,6 +43,8 @@ pub(super) enum Part<'a> {
     Damaged { bytes: Range<u64>, cause: String },
     /// The file ends within a record, or before its end.
     Truncated { byte: u64 },
+    /// Other bytes follow the end of the recording, such as a second file.
+    AfterEnd { bytes: Range<u64> },
 }
 
 /// The form of the bytes at a position.
@@ -216,14 +219,37 @@ impl<R: Read + Seek> Walk<R> {
         if rest == MAGIC {
             return Ok(None);
         }
-        let cause = if rest.starts_with(MAGIC) {
-            "other bytes follow the end of the recording, such as a second file"
-        } else if MAGIC.starts_with(rest) {
+        if rest.starts_with(MAGIC) {
+            return Ok(Some(Part::AfterEnd { bytes: byte + MAGIC.len() as u64..end }));
+        }
+        if MAGIC.starts_with(rest) {
             return Ok(Some(Part::Truncated { byte }));
-        } else {
-            "the last bytes are not those of an MCAP file"
-        };
-        Ok(Some(Part::Damaged { bytes: byte..end, cause: cause.to_owned() }))
+        }
+        let cause = "the last bytes are not those of an MCAP file".to_owned();
+        Ok(Some(Part::Damaged { bytes: byte..end, cause }))
+    }
+
+    /// Reads the bytes after the end to count their messages.
+    pub(super) fn read_after_end(&mut self, bytes: &Range<u64>) -> Result<AfterEnd, ReadError> {
+        let (byte, size_bytes) = (bytes.start, bytes.end - bytes.start);
+        let mut found = AfterEnd { byte, size_bytes, ..AfterEnd::default() };
+        let mut begin = Some(byte);
+        while let Some(at) = begin.take() {
+            (self.at, self.is_done, self.is_after_footer) = (at, false, false);
+            while let Some(part) = self.next()? {
+                match part {
+                    Part::Record { opcode: op::CHUNK, .. } => found.chunk_count += 1,
+                    Part::Record { opcode: op::MESSAGE, .. } => found.message_count += 1,
+                    Part::Record { opcode: op::MESSAGE_INDEX, body, .. } => {
+                        found.message_count += index_entry_count(body);
+                    }
+                    // A third file.
+                    Part::AfterEnd { bytes } => begin = Some(bytes.start),
+                    _ => {}
+                }
+            }
+        }
+        Ok(found)
     }
 
     /// Adds the bytes up to a position to the checksum, and continues there.
@@ -316,6 +342,14 @@ impl<R: Read + Seek> Walk<R> {
             Ok(()) => Ok(Form::Record { opcode, size_bytes }),
             Err(cause) => wrong(cause, false),
         }
+    }
+}
+
+/// Returns the number of messages in a message index, whose length is exact.
+fn index_entry_count(body: &[u8]) -> u64 {
+    match mcap::parse_record(op::MESSAGE_INDEX, body) {
+        Ok(Record::MessageIndex(index)) => index.records.len() as u64,
+        _ => 0,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sim_contract::{NodeStatus, StatusFlags};
+use sim_contract::NodeStatus;
 
 /// The status of the node, with the fields of [`NodeStatus`]. Recordings of contract version 1 lack
 /// the fields with a default.
@@ -41,7 +41,7 @@ impl From<&NodeStatus> for StatusRow {
         Self {
             step: status.step,
             paused: status.is_paused(),
-            replay: status.flags & StatusFlags::REPLAY != 0,
+            replay: status.is_replay(),
             real_time_factor: finite(status.real_time_factor),
             time_scale: finite(status.time_scale),
             wake_late_ns_p50: status.wake_late_ns_p50,

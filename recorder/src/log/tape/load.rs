@@ -11,6 +11,8 @@ use crate::log::topic::Topic;
 pub(super) struct Load {
     pub(super) topology: Option<TopologyRow>,
     pub(super) surface: Option<SurfaceRow>,
+    /// A chunk that may have had them cannot be read.
+    pub(super) has_damage: bool,
 }
 
 /// Reads the load. A file has one load, in its first chunks, before the first snapshot.
@@ -24,7 +26,10 @@ pub(super) fn read_load(log: &mut IndexedLog) -> Result<Load, ReadError> {
             continue;
         }
         let messages = match log.read_chunk(chunk) {
-            Err(ReadError::DamagedChunk { .. } | ReadError::Malformed { .. }) => continue,
+            Err(ReadError::DamagedChunk { .. } | ReadError::Malformed { .. }) => {
+                load.has_damage = true;
+                continue;
+            }
             read => read?,
         };
         for logged in messages {

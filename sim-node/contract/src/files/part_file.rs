@@ -9,7 +9,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{CWD, RenameFlags, renameat_with};
+use rustix::fs::{Access, CWD, RenameFlags, access, renameat_with};
 use rustix::io::Errno;
 
 use crate::files::kind::kind_of_non_file;
@@ -79,6 +79,24 @@ impl PartFile {
         // Only now, because the file may have belonged to another program until it was locked.
         file.set_len(0).map_err(|cause| io_error(&part_path, cause))?;
         Ok(Self::begin(file, path, existing))
+    }
+
+    /// Checks that [`PartFile::create`] would create the file now, and changes nothing.
+    ///
+    /// # Errors
+    /// Same as [`PartFile::create`].
+    pub fn check(path: &Path, existing: Existing) -> Result<(), PartFileError> {
+        check_unused(path)?;
+        existing.check(path)?;
+        let part_path = part_path(path);
+        check_unused(&part_path)?;
+        if existing == Existing::Refuse && part_path.exists() {
+            return Err(PartFileError::PartExists(part_path));
+        }
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        access(folder, Access::WRITE_OK | Access::EXEC_OK)
+            .map_err(|cause| io_error(&part_path, cause.into()))
     }
 
     /// Writes a whole file. An existing file keeps its contents until the new ones are complete.

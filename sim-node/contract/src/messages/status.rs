@@ -100,6 +100,9 @@ impl StatusFlags {
     pub const PAUSED: u32 = 1;
     /// The writer plays a recording; it is not a live node.
     pub const REPLAY: u32 = 1 << 1;
+    /// A replay has published the last snapshot of its run. It goes on only with another run, as after a
+    /// rewind.
+    pub const AT_END: u32 = 1 << 2;
 }
 
 impl NodeStatus {
@@ -124,5 +127,15 @@ impl NodeStatus {
     /// Returns `true` if the node waits for `resume` or `step`.
     pub fn is_paused(&self) -> bool {
         self.flags & StatusFlags::PAUSED != 0
+    }
+
+    /// Returns `true` if the writer plays a recording.
+    pub fn is_replay(&self) -> bool {
+        self.flags & StatusFlags::REPLAY != 0
+    }
+
+    /// Returns `true` if a replay has published the last snapshot of its run.
+    pub fn is_at_end(&self) -> bool {
+        self.flags & StatusFlags::AT_END != 0
     }
 }

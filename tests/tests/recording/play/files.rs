@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, wait_for};
-use recorder::{FrameReader, LogReader};
+use recorder::{Closing, FrameReader, LogOptions, LogReader, LogWriter, Message};
 use sim_contract::{Client, Tap};
 
 /// Steps of each file of a split recording.
@@ -97,6 +97,55 @@ fn the_files_of_a_split_recording_play_as_one_run() {
     assert!(shown.iter().all(|one| one.run_id == shown[0].run_id), "one run");
     assert_eq!(shown.iter().filter(|one| one.is_load).count(), 1, "one load");
     assert_eq!(shown.last().unwrap().torn_count, 3, "those of the earlier files too");
+}
+
+/// Simulates a recording and divides it at a keyframe. Returns the two files.
+fn halves(sandbox: &Sandbox, border: u64) -> [String; 2] {
+    let whole = sandbox.path("whole.mcap");
+    let args = ["simulate", "curtain", "--steps", "960", "-o", &whole];
+    Process::run(Program::Recorder, sandbox, &args).success();
+    let write = |name: &str, has: &dyn Fn(&Message) -> bool| {
+        let file = sandbox.path(name);
+        let mut log = LogReader::open(Path::new(&whole)).unwrap();
+        let out = fs::File::create(&file).unwrap();
+        let mut half =
+            LogWriter::create(out, LogOptions::default(), log.run(), log.scene(), 0).unwrap();
+        while let Some(logged) = log.next_message().unwrap() {
+            if has(&logged.message) {
+                half.write(&logged.message, logged.log_time_ns).unwrap();
+            }
+        }
+        half.finish(&Closing::default()).unwrap();
+        file
+    };
+    let is_of_load = |message: &Message| {
+        matches!(message, Message::Topology(_) | Message::Surface(_) | Message::Parameters(_))
+    };
+    [
+        write("half_0.mcap", &|message| message.step() < border),
+        write("half_1.mcap", &|message| is_of_load(message) || message.step() >= border),
+    ]
+}
+
+#[test]
+fn an_arrow_key_at_the_last_snapshot_of_a_file_counts_from_there() {
+    let sandbox = Sandbox::new();
+    let [one, two] = halves(&sandbox, 480);
+    let args = ["play", "--paused", &one, &two];
+    let mut player = Process::start_on_terminal(r#""$0" "$@""#, Program::Recorder, &sandbox, &args);
+    wait_for("the replay", || player.has_written_part("ready playing").then_some(()));
+    let stands_at = |step: u64| {
+        wait_for("the step", || (ctl(&sandbox, &["status"])["step"] == step).then_some(()));
+    };
+    ctl(&sandbox, &["rewind", "--to-step", "479"]);
+    stands_at(479);
+    // A second of 240 steps.
+    player.press("\x1b[D");
+    stands_at(239);
+    player.press("\x1b[C");
+    stands_at(479);
+    player.press("\x1b[C");
+    stands_at(719);
 }
 
 #[test]

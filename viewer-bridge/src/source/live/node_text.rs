@@ -1,6 +1,6 @@
 //! Messages about the state of a live node.
 
-use sim_contract::{NodeStatus, StatusFlags};
+use sim_contract::NodeStatus;
 
 use crate::message::{Node, NodeState};
 
@@ -21,7 +21,7 @@ pub(super) fn node_text(status: Option<&NodeStatus>, method: Option<&'static str
         method,
         rate_hz: status.rate_hz,
         is_paused: status.is_paused(),
-        is_replay: status.flags & StatusFlags::REPLAY != 0,
+        is_replay: status.is_replay(),
         time_scale: status.time_scale,
         process_id: Some(status.process_id),
     }

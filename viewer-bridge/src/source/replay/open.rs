@@ -57,7 +57,8 @@ pub(super) fn open(
             path.display()
         ));
     };
-    let mut tape = Tape::open(path, Some(stop), &mut on_walk).map_err(with_remedy)?;
+    let mut tape =
+        Tape::open(path, Some(stop), &mut on_walk).map_err(|error| with_remedy(path, error))?;
     if *tape.log().end() != LogEnd::Complete {
         let (end, last) = (tape.log().end(), tape.last_step());
         let path = path.display();
@@ -67,18 +68,23 @@ pub(super) fn open(
         ));
     }
     let load = load_of(&tape)?;
-    let first = tape.state_at(tape.first_step()).map_err(with_remedy)?;
+    let first = tape.state_at(tape.first_step()).map_err(|error| with_remedy(path, error))?;
     let name = path.file_name().unwrap_or(path.as_os_str());
     Ok(Recording { tape, load, first, file: name.to_string_lossy().into_owned() })
 }
 
 /// Adds the remedy to an error.
-fn with_remedy(error: TapeError) -> anyhow::Error {
+fn with_remedy(path: &Path, error: TapeError) -> anyhow::Error {
     let remedy = match &error {
+        TapeError::NoLoad { is_damaged: true, .. }
+        | TapeError::NoSnapshot(LogEnd::Truncated { .. } | LogEnd::Damaged { .. }) => {
+            let path = path.display();
+            return anyhow!("{error}; `recorder repair {path} OUT.mcap` copies what is intact");
+        }
         TapeError::Read(ReadError::NotMcap | ReadError::Foreign { .. }) => GIVE_A_RECORDING,
         TapeError::Read(ReadError::Version { .. }) => "use a viewer-bridge of that version",
         TapeError::Read(ReadError::Io(_)) => "check that the file can be read",
-        TapeError::Read(_) | TapeError::NoSnapshot(_) | TapeError::NoLoad(_) => RECORD_AGAIN,
+        TapeError::Read(_) | TapeError::NoSnapshot(_) | TapeError::NoLoad { .. } => RECORD_AGAIN,
     };
     anyhow!("{:#}; {remedy}", anyhow::Error::new(error))
 }

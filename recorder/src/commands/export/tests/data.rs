@@ -225,6 +225,10 @@ fn a_copy_for_viewers_is_a_recording_with_the_same_content() {
         let intact = &original[..usize::try_from(expected.intact_count).unwrap()];
         let copy = written(intact, foxglove::write);
         assert_eq!(recorded(&copy), recorded(original));
+        if original.len() < file.len() {
+            let checked = recorder::check_file(Cursor::new(&copy), None, &mut |_, _| {}).unwrap();
+            assert_eq!(checked.findings.list(), [], "it declares that it had no end");
+        }
         let read = survey_of(&copy, "a");
         assert_eq!(read.end, LogEnd::Complete);
         assert_eq!((read.steps, read.run), (expected.steps, expected.run));

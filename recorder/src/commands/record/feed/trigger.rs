@@ -16,12 +16,35 @@ const TAIL: Duration = Duration::from_secs(1);
 /// Most marks that a reason names. It counts the others.
 const MARKS_MAX: usize = 8;
 
+/// SIGUSR1, which otherwise ends a process.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct UserSignal {
+    has_arrived: Arc<AtomicBool>,
+}
+
+impl UserSignal {
+    /// Watches for the signal.
+    ///
+    /// # Errors
+    /// The system refuses the handler.
+    pub(crate) fn install() -> io::Result<Self> {
+        let signal = Self::default();
+        flag::register(SIGUSR1, Arc::clone(&signal.has_arrived))?;
+        Ok(signal)
+    }
+
+    /// Returns `true` once after the signal has arrived.
+    pub(crate) fn take(&self) -> bool {
+        self.has_arrived.swap(false, Ordering::Relaxed)
+    }
+}
+
 /// Decides when the black box is written, and why.
 #[derive(Debug)]
 pub(crate) struct Trigger {
     /// Longest time from the first event to the end of the file.
     span: Duration,
-    signalled: Arc<AtomicBool>,
+    signal: UserSignal,
     /// The events since the last file.
     events: Option<Events>,
 }
@@ -97,19 +120,14 @@ impl Events {
 }
 
 impl Trigger {
-    /// Watches for SIGUSR1, too.
-    ///
-    /// # Errors
-    /// The system refuses the handler.
-    pub(crate) fn install(span: Duration) -> io::Result<Self> {
-        let signalled = Arc::new(AtomicBool::new(false));
-        flag::register(SIGUSR1, Arc::clone(&signalled))?;
-        Ok(Self { span, signalled, events: None })
+    /// Watches for the signal, too.
+    pub(crate) fn new(span: Duration, signal: UserSignal) -> Self {
+        Self { span, signal, events: None }
     }
 
     /// Notices the signal.
     pub(crate) fn poll_signal(&mut self, now_ns: u64) {
-        if self.signalled.swap(false, Ordering::Relaxed) {
+        if self.signal.take() {
             self.events_at(now_ns).is_signalled = true;
         }
     }
@@ -175,8 +193,7 @@ mod tests {
     use super::*;
 
     fn trigger() -> Trigger {
-        let signalled = Arc::new(AtomicBool::new(false));
-        Trigger { span: Duration::from_secs(10), signalled, events: None }
+        Trigger::new(Duration::from_secs(10), UserSignal::default())
     }
 
     fn tear(step: u64) -> Content {
@@ -206,7 +223,7 @@ mod tests {
         for content in [mark(Ok(())), tear(8), tear(9), event("frozen")] {
             trigger.watch(&content, 0);
         }
-        trigger.signalled.store(true, Ordering::Relaxed);
+        trigger.signal.has_arrived.store(true, Ordering::Relaxed);
         trigger.poll_signal(0);
         trigger.poll_signal(0);
         assert_eq!(

@@ -39,7 +39,7 @@ impl PreviousFile {
     }
 
     /// Returns the number of snapshots between this file and one that begins with `first`. A node
-    /// numbers the snapshots of a run from 0; a replay starts anywhere.
+    /// numbers the snapshots of a run from 0. Those of a replay are counted as they arrive.
     fn missing_before(&self, first: &SnapshotHeader) -> u64 {
         if self.run_id == first.run_id {
             first.snapshot_index.wrapping_sub(self.next_snapshot).into()

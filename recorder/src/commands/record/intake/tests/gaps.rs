@@ -109,7 +109,7 @@ fn unreadable_messages_are_counted_from_the_start_on_and_make_the_report_incompl
     assert_eq!(closing.missing(), [("unreadable", 3)].into());
     let mut written = Written::default();
     written.add("run.mcap".into(), &closing, Some((5, 6)));
-    assert!(!Report::new(&written, String::new()).is_complete());
+    assert!(!Report::new(&written, 0, String::new()).is_complete());
 }
 
 #[test]
