@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import statistics
 import subprocess
@@ -31,7 +32,7 @@ spacing = 0.01
 
 @contextmanager
 def node(*arguments: str) -> Iterator[catenary.Node]:
-    os.environ["CATENARY_DOMAIN"] = f"bench-{os.getpid()}_"
+    os.environ["CATENARY_DOMAIN"] = f"bench-{os.getpid()}"
     command = [str(PROGRAMS / "sim-node"), "run", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
@@ -40,6 +41,9 @@ def node(*arguments: str) -> Iterator[catenary.Node]:
     finally:
         process.send_signal(signal.SIGINT)
         process.wait()
+        for file in Path("/dev/shm").glob(f"bench-{os.getpid()}_*"):
+            file.unlink()
+        shutil.rmtree(f"/tmp/catenary-{os.getuid()}-bench-{os.getpid()}", ignore_errors=True)
 
 
 def percentiles(times: list[float]) -> str:

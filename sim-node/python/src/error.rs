@@ -36,7 +36,7 @@ pub(crate) fn read_error(error: &ReadError) -> PyErr {
     match error {
         ReadError::TooManyHeld { max, .. } => TooManySnapshots::new_err(format!(
             "this program holds {max} snapshots, the most that a node lends it: keep copies, such as \
-             `snapshot.positions.copy()`, and let go of the snapshots and of the arrays that view them"
+             `snapshot.positions.copy()`, and drop the snapshots and the arrays that view them"
         )),
         _ => Error::new_err(error.to_string()),
     }

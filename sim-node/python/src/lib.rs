@@ -1,44 +1,38 @@
 //! The native part of the Python module `catenary`.
 //!
 //! It wraps the client, the solver and the reader of recordings in Python classes. Particles stay where
-//! they are: arrays are views of shared memory, or of the memory of a [`snapshot::Snapshot`]. Every call
+//! they are: arrays are views of shared memory, or of the memory of a [`data::snapshot::Snapshot`]. Every call
 //! that waits or computes lets other threads of the interpreter run, and ends early on a signal.
 
-mod action;
 mod convert;
+mod data;
 mod error;
 mod lockstep;
 mod node;
-mod outcome;
 mod patience;
 mod process;
 mod recording;
-mod scene;
 mod simulation;
-mod snapshot;
-mod state;
-#[allow(unsafe_code, reason = "arrays that view memory of Rust")]
-mod view;
 
 /// Registers the classes. Their documentation is in `_catenary.pyi`.
 #[pyo3::pymodule]
 mod _catenary {
     #[pymodule_export]
-    use crate::action::Action;
+    use crate::data::action::Action;
+    #[pymodule_export]
+    use crate::data::outcome::Outcome;
+    #[pymodule_export]
+    use crate::data::scene::{Topology, scene_names};
+    #[pymodule_export]
+    use crate::data::snapshot::Snapshot;
+    #[pymodule_export]
+    use crate::data::state::State;
     #[pymodule_export]
     use crate::lockstep::Lockstep;
     #[pymodule_export]
     use crate::node::Node;
     #[pymodule_export]
-    use crate::outcome::Outcome;
-    #[pymodule_export]
     use crate::recording::Recording;
     #[pymodule_export]
-    use crate::scene::{Topology, scene_names};
-    #[pymodule_export]
     use crate::simulation::Simulation;
-    #[pymodule_export]
-    use crate::snapshot::Snapshot;
-    #[pymodule_export]
-    use crate::state::State;
 }

@@ -8,12 +8,12 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sim_contract::{Client, SnapshotHeader};
 
-use crate::action::Action;
+use crate::data::action::Action;
+use crate::data::outcome::Outcome;
+use crate::data::snapshot::Snapshot;
 use crate::error::{Error, lockstep_error, read_error, request_error};
 use crate::node::Node;
-use crate::outcome::Outcome;
 use crate::patience::Patience;
-use crate::snapshot::Snapshot;
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]

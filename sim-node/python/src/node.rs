@@ -11,15 +11,15 @@ use sim_contract::{
     AttachError, Client, Endpoint, GivenState, ParticleState, ReadError, RequestError,
 };
 
-use crate::action::Action;
 use crate::convert::{from_json, vectors};
+use crate::data::action::Action;
+use crate::data::outcome::Outcome;
+use crate::data::scene::{Topology, corners};
+use crate::data::snapshot::Snapshot;
+use crate::data::state::{State, current_state};
 use crate::error::{NotRunning, Timeout, attach_error, endpoint_error, read_error, request_error};
-use crate::outcome::Outcome;
 use crate::patience::{PART, Patience, wait};
 use crate::process::OfProcess;
-use crate::scene::{Topology, corners};
-use crate::snapshot::Snapshot;
-use crate::state::{State, current_state};
 
 /// Longest wait for messages that a node has published once per load, in seconds.
 const LATCHED_TIMEOUT_S: f64 = 5.0;

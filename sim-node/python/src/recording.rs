@@ -10,9 +10,9 @@ use recorder::{LogReader, Message, OutcomeRow, RunDescription, StepRow, Tape, Ta
 use sim_contract::SnapshotHeader;
 
 use crate::convert::from_json;
+use crate::data::scene::{Topology, corners};
+use crate::data::snapshot::Snapshot;
 use crate::error::{RecordingError, log_error, tape_error};
-use crate::scene::{Topology, corners};
-use crate::snapshot::Snapshot;
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]

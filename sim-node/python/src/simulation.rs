@@ -9,14 +9,14 @@ use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{ConstraintState, LoadHeader, SnapshotHeader, Triangle, scene_hash};
 use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver, THREADS_MAX};
 
-use crate::action::Action;
 use crate::convert::from_json;
+use crate::data::action::Action;
+use crate::data::outcome::rejected;
+use crate::data::scene::{Topology, corners, load_scene, scene_error};
+use crate::data::snapshot::Snapshot;
+use crate::data::state::State;
 use crate::error::StateError;
-use crate::outcome::rejected;
 use crate::patience::PART;
-use crate::scene::{Topology, corners, load_scene, scene_error};
-use crate::snapshot::Snapshot;
-use crate::state::State;
 
 /// The client id of every action.
 const CLIENT_ID: u64 = 1;
@@ -130,12 +130,18 @@ impl Simulation {
 
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        Ok(crate::view::vectors(&Bound::new(py, self.snapshot(py))?, crate::snapshot::POSITION))
+        Ok(crate::data::view::vectors(
+            &Bound::new(py, self.snapshot(py))?,
+            crate::data::snapshot::POSITION,
+        ))
     }
 
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        Ok(crate::view::vectors(&Bound::new(py, self.snapshot(py))?, crate::snapshot::VELOCITY))
+        Ok(crate::data::view::vectors(
+            &Bound::new(py, self.snapshot(py))?,
+            crate::data::snapshot::VELOCITY,
+        ))
     }
 
     #[getter]

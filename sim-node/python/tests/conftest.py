@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
@@ -21,15 +22,21 @@ StartNode = Callable[..., "catenary.Node"]
 
 
 @pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> str:
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """Name of a domain, which is also that of programs and examples that the test starts."""
-    name = f"py-{os.getpid()}-{next(NUMBERS)}_"
+    name = f"py-{os.getpid()}-{next(NUMBERS)}"
     monkeypatch.setenv("CATENARY_DOMAIN", name)
-    return name
+    yield name
+    left = [file for file in os.listdir("/dev/shm") if file.startswith(f"{name}_")]
+    for file in left:
+        os.remove(f"/dev/shm/{file}")
+    shutil.rmtree(f"/tmp/catenary-{os.getuid()}-{name}", ignore_errors=True)
+    # iceoryx2 keeps one file for each domain. Everything else belongs to a process that has ended.
+    assert len(left) <= 1, left
 
 
 @pytest.fixture
-def processes() -> Iterator[list[subprocess.Popen[str]]]:
+def processes(domain: str) -> Iterator[list[subprocess.Popen[str]]]:
     """Processes that the test starts. They end with it."""
     running: list[subprocess.Popen[str]] = []
     yield running
@@ -54,14 +61,18 @@ def start(processes: list[subprocess.Popen[str]]) -> Callable[..., subprocess.Po
 
 
 @pytest.fixture
-def start_node(domain: str, start: Callable[..., subprocess.Popen[str]]) -> StartNode:
+def start_node(start: Callable[..., subprocess.Popen[str]]) -> Iterator[StartNode]:
     """Starts a node and attaches to it, such as `start_node("curtain", "--paused")`."""
+    nodes: list[catenary.Node] = []
 
     def start_node(*arguments: str, name: str = "sim") -> catenary.Node:
         start("sim-node", "run", *arguments, "--name", name)
-        return catenary.attach(name, timeout=DEADLINE)
+        nodes.append(catenary.attach(name, timeout=DEADLINE))
+        return nodes[-1]
 
-    return start_node
+    yield start_node
+    for node in nodes:
+        node.close()
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ class Node(Commands[Outcome], _catenary.Node):
             if snapshot is None:
                 return
             yield snapshot
-            # Let go of it while waiting: a node lends a program only a few.
+            # Drop it before the wait: a node lends a program only a few.
             del snapshot
 
     def load(self, scene: str) -> Outcome:

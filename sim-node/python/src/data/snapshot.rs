@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use sim_contract::{ParticleState, SnapshotFlags, SnapshotHeader};
 
+use crate::data::view;
 use crate::process::OfProcess;
-use crate::view;
 
 /// The place of the particles. It never changes.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use sim_contract::ParticleState;
 
-use crate::snapshot::Snapshot;
+use crate::data::snapshot::Snapshot;
 
 /// Number of 4-byte fields of a particle.
 const FIELDS: usize = size_of::<ParticleState>() / 4;

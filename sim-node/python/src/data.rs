@@ -1,0 +1,9 @@
+//! The values that a program exchanges with nodes, simulations and recordings.
+
+pub(crate) mod action;
+pub(crate) mod outcome;
+pub(crate) mod scene;
+pub(crate) mod snapshot;
+pub(crate) mod state;
+#[allow(unsafe_code, reason = "arrays that view memory of Rust")]
+pub(crate) mod view;
