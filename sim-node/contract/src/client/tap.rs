@@ -1,7 +1,7 @@
 //! The tap: reads everything that an owner publishes.
 
 use std::num::NonZeroU32;
-use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use crate::client::change::LostChanges;
@@ -63,7 +63,7 @@ pub struct Tap {
     /// The membership in the lockstep, if it has joined.
     member: Option<Member>,
     // Dropped last: the ports belong to its services and its node.
-    attachment: Rc<Attachment>,
+    attachment: Arc<Attachment>,
 }
 
 impl Tap {
@@ -100,8 +100,8 @@ impl Tap {
     pub const LOCKSTEP_EVERY: NonZeroU32 = NonZeroU32::MIN;
 
     fn subscribe(attachment: Attachment, member: Option<Member>) -> Result<Self, ServiceError> {
-        let attachment = Rc::new(attachment);
-        let (services, source) = (&attachment.services, &Rc::new(Source::new(&attachment)));
+        let attachment = Arc::new(attachment);
+        let (services, source) = (&attachment.services, &Arc::new(Source::new(&attachment)));
         // Fields are evaluated in the order written here.
         Ok(Self {
             listener: listen(&services.wake)?,

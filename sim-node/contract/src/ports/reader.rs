@@ -1,7 +1,7 @@
 //! Readers of the publish-subscribe services. They check each message.
 
 use std::fmt::Debug;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use iceoryx2::port::ReceiveError;
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
@@ -66,7 +66,7 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
     buffered: usize,
     borrowed: usize,
     /// Accepted publishers; `None` accepts all.
-    source: Option<Rc<Source>>,
+    source: Option<Arc<Source>>,
 }
 
 impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
@@ -78,8 +78,8 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     }
 
     /// Drops messages of other publishers without a trace.
-    pub(crate) fn restricted_to(self, source: &Rc<Source>) -> Self {
-        Self { source: Some(Rc::clone(source)), ..self }
+    pub(crate) fn restricted_to(self, source: &Arc<Source>) -> Self {
+        Self { source: Some(Arc::clone(source)), ..self }
     }
 
     /// Returns the next message; `None` if all were read.
@@ -145,7 +145,7 @@ pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
     service: String,
     buffered: usize,
     /// Accepted publishers; `None` accepts all.
-    source: Option<Rc<Source>>,
+    source: Option<Arc<Source>>,
 }
 
 impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
@@ -156,8 +156,8 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
     }
 
     /// Drops messages of other publishers without a trace.
-    pub(crate) fn restricted_to(self, source: &Rc<Source>) -> Self {
-        Self { source: Some(Rc::clone(source)), ..self }
+    pub(crate) fn restricted_to(self, source: &Arc<Source>) -> Self {
+        Self { source: Some(Arc::clone(source)), ..self }
     }
 
     /// Returns the next value; `None` if all were read.

@@ -1,8 +1,7 @@
 //! The processes whose messages a reader accepts.
 
-use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::prelude::{CallbackProgression, PortFactory};
@@ -19,29 +18,33 @@ const OWNERS_MAX: usize = 8;
 /// may still be unread when another one has taken the name, so it is remembered.
 #[derive(Debug)]
 pub(crate) struct Source {
-    attachment: Rc<Attachment>,
+    attachment: Arc<Attachment>,
     /// Newest last.
-    owners: RefCell<VecDeque<UniqueNodeId>>,
+    owners: Mutex<VecDeque<UniqueNodeId>>,
 }
 
 impl Source {
     /// Accepts the present owner, even if it is gone when its messages are read, and later owners.
-    pub(crate) fn new(attachment: &Rc<Attachment>) -> Self {
-        let source = Self { attachment: Rc::clone(attachment), owners: RefCell::default() };
+    pub(crate) fn new(attachment: &Arc<Attachment>) -> Self {
+        let source = Self { attachment: Arc::clone(attachment), owners: Mutex::default() };
         source.remember_owner();
         source
     }
 
     /// Returns `true` if a message of this iceoryx2 node comes from an owner of the name.
     pub(crate) fn accepts(&self, node: UniqueNodeId) -> bool {
-        if !self.owners.borrow().contains(&node) {
+        if !self.owners().contains(&node) {
             self.remember_owner();
         }
-        self.owners.borrow().contains(&node)
+        self.owners().contains(&node)
+    }
+
+    fn owners(&self) -> MutexGuard<'_, VecDeque<UniqueNodeId>> {
+        self.owners.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn remember_owner(&self) {
-        let mut owners = self.owners.borrow_mut();
+        let mut owners = self.owners();
         self.attachment.status.dynamic_config().list_publishers(|publisher| {
             if !owners.contains(&publisher.node_id) {
                 owners.push_back(publisher.node_id);
