@@ -56,6 +56,7 @@ const TYPES: [(&str, &str); 34] = [
 
 /// Constants with their names in the header, their values, and their meanings.
 #[rustfmt::skip]
+#[allow(clippy::cast_possible_truncation, reason = "small limits")]
 const CONSTANTS: [(&str, &str, u32, &str); 25] = [
     ("CONTRACT_VERSION", "CATENARY_CONTRACT_VERSION", CONTRACT_VERSION, "version of the layouts of this header"),
     ("MEMBERS_MAX", "CATENARY_MEMBERS_MAX", MEMBERS_MAX as u32, "most members of the lockstep"),

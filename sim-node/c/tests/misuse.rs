@@ -220,7 +220,8 @@ fn the_end_of_a_node_and_silence_are_two_results() {
     let owner = owner(&domain);
     publish(&owner, 0);
     let client = attach(&domain, &owner);
-    drop(next_snapshot(client));
+    let mut snapshot = next_snapshot(client);
+    assert_eq!(catenary_release_snapshot(Some(&mut snapshot)), CatenaryResult::Ok);
     let next =
         |timeout_s| catenary_next_snapshot(client, timeout_s, Some(&mut MaybeUninit::uninit()));
     assert_eq!(next(0.0), CatenaryResult::Timeout);

@@ -130,7 +130,7 @@ fn fields(source: &str) -> BTreeMap<(String, String), Field> {
     for line in source.lines() {
         if let Some(name) = line.strip_prefix("pub struct ").and_then(|rest| rest.split(' ').next())
         {
-            structure = name.to_owned();
+            name.clone_into(&mut structure);
         }
         let line = line.trim();
         if let Some(text) = line.strip_prefix("///") {
@@ -204,94 +204,74 @@ fn layout_tables() -> String {
     text.trim_start().to_owned()
 }
 
+/// Names by their numbers, of a field that the title describes.
+type Numbers = (&'static str, Vec<(u32, &'static str)>);
+
 /// Lists of names with their numbers.
 fn number_tables() -> String {
     let mut text = "| number in | values |\n|---|---|\n".to_owned();
-    let mut add = |title: &str, values: Vec<(u64, String)>| {
+    for (title, values) in command_numbers().into_iter().chain(state_numbers()) {
         let values: Vec<_> =
             values.iter().map(|(number, name)| format!("{number} {name}")).collect();
         writeln!(text, "| {title} | {} |", values.join(", ")).unwrap();
-    };
-    let kinds = (1..).zip(&ActionFields::ALL[..ActionFields::ALL.len() - 1]);
-    add("`kind` of a command", kinds.map(|(number, one)| (number, one.kind.to_owned())).collect());
-    add("`options` of a command, bits", bits(&OPTIONS));
-    add(
-        "`status` of an outcome",
-        vec![
-            (OutcomeStatus::Applied as u64, "applied".to_owned()),
-            (OutcomeStatus::Rejected as u64, "rejected".to_owned()),
-        ],
-    );
-    let named = |number: u32, name: &str| (u64::from(number), name.to_owned());
-    add(
-        "`reason` of an outcome",
-        [named(0, "none")]
-            .into_iter()
-            .chain(Reason::ALL.map(|one| named(one as u32, one.name())))
-            .collect(),
-    );
-    add(
-        "`flags` of an outcome, bits",
-        bits(&[
-            (OUTCOME_FLAG_CONTROL, "control"),
-            (OUTCOME_FLAG_DISCONNECTED, "disconnected"),
-            (OUTCOME_FLAG_NEW_RUN, "new_run"),
-        ]),
-    );
-    add("`flags` of a particle, bits", bits(&ParticleFlags::NAMES));
-    add(
-        "`flags` of a snapshot, bits",
-        bits(&[(SnapshotFlags::PAUSED, "paused"), (SnapshotFlags::REPLAY, "replay")]),
-    );
-    add(
-        "`flags` of a status, bits",
-        bits(&[(StatusFlags::PAUSED, "paused"), (StatusFlags::REPLAY, "replay")]),
-    );
-    add(
-        "`kind` of a constraint",
-        ConstraintKind::ALL.map(|one| named(one as u32, one.name())).to_vec(),
-    );
-    add(
-        "`cause` of a tear",
-        TearCause::ALL
-            .map(|one| named(one as u32, one.name()))
-            .into_iter()
-            .chain([named(u32::MAX, "unknown")])
-            .collect(),
-    );
-    add(
-        "`shape` of a collider",
-        ColliderShape::ALL.map(|one| named(one as u32, one.name())).to_vec(),
-    );
-    add("`method` of a load", Method::ALL.map(|one| named(one as u32, one.name())).to_vec());
-    add(
-        "`parameter`",
-        (0..).zip(PARAMETERS).map(|(number, info)| named(number, info.name)).collect(),
-    );
-    add(
-        "`contents` of a restore",
-        vec![
-            named(RestoreContents::State as u32, "state"),
-            named(RestoreContents::Motion as u32, "motion"),
-        ],
-    );
-    add(
-        "`kind` of a member's change",
-        MemberChangeKind::ALL.map(|one| named(one as u32, one.name())).to_vec(),
-    );
-    add("`tag` of a member's message", vec![named(Ready::TAG, "ready")]);
-    add(
-        "event of `wake`",
-        vec![
-            named(Wake::Frame as u32, "frame"),
-            named(Wake::Load as u32, "load"),
-            named(Wake::Tears as u32, "tears"),
-            named(Wake::Outcome as u32, "outcome"),
-            named(Wake::Status as u32, "status"),
-            named(Wake::OwnerGone as u32, "owner gone"),
-        ],
-    );
+    }
     text
+}
+
+fn command_numbers() -> [Numbers; 8] {
+    let (unknown, kinds) = ActionFields::ALL.split_last().unwrap();
+    assert_eq!(unknown.kind, "unknown");
+    let kinds = (1..).zip(kinds).map(|(number, one)| (number, one.kind)).collect();
+    let statuses = [(OutcomeStatus::Applied, "applied"), (OutcomeStatus::Rejected, "rejected")];
+    let reasons = Reason::ALL.map(|one| (one as u32, one.name()));
+    let contents = [(RestoreContents::State, "state"), (RestoreContents::Motion, "motion")];
+    let flags = [
+        (OUTCOME_FLAG_CONTROL, "control"),
+        (OUTCOME_FLAG_DISCONNECTED, "disconnected"),
+        (OUTCOME_FLAG_NEW_RUN, "new_run"),
+    ];
+    let parameters = (0..).zip(PARAMETERS).map(|(number, info)| (number, info.name)).collect();
+    [
+        ("`kind` of a command", kinds),
+        ("`options` of a command, bits", OPTIONS.to_vec()),
+        ("`status` of an outcome", statuses.map(|(one, name)| (one as u32, name)).to_vec()),
+        ("`reason` of an outcome", [(0, "none")].into_iter().chain(reasons).collect()),
+        ("`flags` of an outcome, bits", flags.to_vec()),
+        ("`parameter`", parameters),
+        ("`contents` of a restore", contents.map(|(one, name)| (one as u32, name)).to_vec()),
+        ("`tag` of a member's message", vec![(Ready::TAG, "ready")]),
+    ]
+}
+
+fn state_numbers() -> [Numbers; 9] {
+    let snapshot = [(SnapshotFlags::PAUSED, "paused"), (SnapshotFlags::REPLAY, "replay")];
+    let status = [(StatusFlags::PAUSED, "paused"), (StatusFlags::REPLAY, "replay")];
+    let causes = TearCause::ALL.map(|one| (one as u32, one.name()));
+    let events = [
+        (Wake::Frame, "frame"),
+        (Wake::Load, "load"),
+        (Wake::Tears, "tears"),
+        (Wake::Outcome, "outcome"),
+        (Wake::Status, "status"),
+        (Wake::OwnerGone, "owner gone"),
+    ];
+    [
+        ("`flags` of a particle, bits", ParticleFlags::NAMES.to_vec()),
+        ("`flags` of a snapshot, bits", snapshot.to_vec()),
+        ("`flags` of a status, bits", status.to_vec()),
+        (
+            "`kind` of a constraint",
+            ConstraintKind::ALL.map(|one| (one as u32, one.name())).to_vec(),
+        ),
+        ("`cause` of a tear", causes.into_iter().chain([(u32::MAX, "unknown")]).collect()),
+        ("`shape` of a collider", ColliderShape::ALL.map(|one| (one as u32, one.name())).to_vec()),
+        ("`method` of a load", Method::ALL.map(|one| (one as u32, one.name())).to_vec()),
+        (
+            "`kind` of a member's change",
+            MemberChangeKind::ALL.map(|one| (one as u32, one.name())).to_vec(),
+        ),
+        ("event of `wake`", events.map(|(one, name)| (one as u32, name)).to_vec()),
+    ]
 }
 
 const OPTIONS: [(u32, &str); 10] = [
@@ -306,10 +286,6 @@ const OPTIONS: [(u32, &str); 10] = [
     (CommandOptions::STATE, "state"),
     (CommandOptions::MOTION, "motion"),
 ];
-
-fn bits(names: &[(u32, &str)]) -> Vec<(u64, String)> {
-    names.iter().map(|(bit, name)| (u64::from(*bit), (*name).to_owned())).collect()
-}
 
 #[test]
 fn a_process_has_the_names_of_its_program_and_of_the_node() {
