@@ -90,8 +90,8 @@ const INTRODUCTION: &str = "\
 //
 // - Results: every function that can fail returns a catenary_result, and catenary_last_error describes
 //   the failure. No call aborts the program, and a null, released or wrong handle is CATENARY_MISUSE.
-// - Ownership: who attaches a client detaches it, before the process ends; who borrows a snapshot
-//   releases it. Lists and texts are borrowed from the client, until the next call of the same function.
+// - Ownership: release every snapshot, and detach every client before the process ends. Lists and texts
+//   belong to the client, and are valid until its next call of the same function.
 // - Threads: a client is for one thread at a time. Functions without a client are for any thread.
 // - Timeouts are in seconds, finite, 0 or more; 0 polls. Calls wait at most that long, so a program that
 //   handles SIGINT itself looks at its flag between calls. The library installs no signal handler.
