@@ -33,6 +33,12 @@ pub enum Program {
     Grab,
     /// The contract's example that controls a pendulum in lockstep.
     Hold,
+    /// The example in C, compiled by its test and linked with the shared library.
+    PullCorner,
+    /// The same, linked with the static library.
+    PullCornerStatic,
+    /// The example in C++, compiled by its test.
+    HoldInCpp,
     /// The Python interpreter of `.venv`, which `.ci/run` creates.
     Python,
     /// Node.js from the search path, for scripts whose packages `.ci/run` installs in `tests/node`.
@@ -57,6 +63,9 @@ impl Program {
             Self::Watch => built().join("examples/watch"),
             Self::Grab => built().join("examples/grab"),
             Self::Hold => built().join("examples/hold"),
+            Self::PullCorner => built().join("pull_corner"),
+            Self::PullCornerStatic => built().join("pull_corner_static"),
+            Self::HoldInCpp => built().join("hold"),
             // Found through the search path.
             Self::Node => PathBuf::from("node"),
             Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),
@@ -69,7 +78,7 @@ static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 
 /// Returns the folder of the programs, built with the profile of this test.
 fn built() -> &'static Path {
-    FOLDER.get_or_init(|| build(&["--quiet", "--workspace", "--bins", "--examples"]))
+    FOLDER.get_or_init(|| build(&["--quiet", "--workspace", "--lib", "--bins", "--examples"]))
 }
 
 /// Builds the simulation, the recorder and the viewer, and shows the progress of cargo on stderr.

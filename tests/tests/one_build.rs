@@ -7,8 +7,9 @@ use std::path::Path;
 use std::process::Command;
 
 /// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
-const PROGRAMS: [&str; 4] = ["sim-node", "recorder", "viewer-bridge", "integration-tests"];
-const PACKAGES: [&str; 8] = [
+const PROGRAMS: [&str; 5] = ["sim-node", "sim-c", "recorder", "viewer-bridge", "integration-tests"];
+const PACKAGES: [&str; 9] = [
+    "sim-c",
     "sim-types",
     "sim-contract",
     "sim-solver",

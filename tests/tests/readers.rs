@@ -5,7 +5,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record};
+use integration_tests::{DEADLINE, Process, Program, Sandbox, ctl, record, wait_for};
 use serde_json::{Value, json};
 use sim_contract::{CONTRACT_VERSION, Client, TearCause};
 
@@ -131,6 +131,40 @@ fn the_iceoryx2_python_package_reads_particles_tears_and_parameters() {
         let expected = snapshot.particles()[index].position.map(f64::from);
         assert_eq!(position, expected);
     }
+}
+
+#[test]
+#[ignore = "needs Python"]
+fn a_client_that_knows_only_the_services_page_commands_a_node() {
+    let sandbox = Sandbox::new();
+    let file = sandbox.path("run.mcap");
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let recording = record(&sandbox, &file);
+    let prefix = format!("{}_", sandbox.domain());
+    let root = sandbox.root();
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sim-node/contract/SERVICES.md");
+    let args = [&prefix, root.to_str().unwrap(), page.to_str().unwrap()];
+    let outcomes = python(&sandbox, "foreign_client.py", &args);
+    let expected = json!([
+        ["grab", 0, "none"],
+        ["pin", 1, "unknown_particle"],
+        ["cut", 0, "none"],
+        ["cut", 1, "already_torn"],
+        ["pin", 0, "none"],
+        ["pin", 1, "out_of_range"],
+        ["load", 1, "out_of_range"],
+    ]);
+    assert_eq!(outcomes, expected);
+    // The grab has ended with the client.
+    let releases = || {
+        let status = ctl(&sandbox, &["status"]);
+        (status["outcomes"].as_u64() == Some(8)).then_some(())
+    };
+    wait_for("the release of the lost grab", releases);
+    // The rejections are in the log, and the re-simulation rejects the same commands.
+    assert_eq!(recording.interrupt().code, Some(0));
+    let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    assert!(verified.contains("steps bit-identical"), "{verified}");
 }
 
 #[test]

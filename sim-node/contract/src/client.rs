@@ -37,7 +37,7 @@ use crate::ports::service::{
 };
 use crate::ports::services::{AttachError, Attachment};
 use crate::ports::session::Session;
-use sim_types::Action;
+use sim_types::{Action, CLIENT_ID_END};
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
 ///
@@ -77,13 +77,16 @@ impl Client {
         Self::attach_as(endpoint, random_client_id()?)
     }
 
-    /// Attaches as the client `client_id`, below 2^53. Only clients with this id can move the particles
+    /// Attaches as the client `client_id`. Only clients with this id can move the particles
     /// that it grabs. Several processes may use [`CONSOLE_CLIENT_ID`]; any other id belongs to one
     /// process at a time.
     ///
     /// # Errors
-    /// Same as [`Client::attach`].
+    /// Same as [`Client::attach`], or the id is not below [`crate::CLIENT_ID_END`].
     pub fn attach_as(endpoint: &Endpoint, client_id: u64) -> Result<Self, AttachError> {
+        if client_id >= CLIENT_ID_END {
+            return Err(AttachError::ClientId { client_id });
+        }
         let attachment = Attachment::open(Session::join(endpoint)?)?;
         Ok(Self {
             id: client_id,
@@ -420,7 +423,7 @@ impl Client {
         self.member.as_mut().ok_or(LockstepError::NotJoined)?.ready()
     }
 
-    /// Leaves the lockstep: the node no longer waits for this client.
+    /// Leaves the lockstep, if this client is a member. The node goes on without it.
     pub fn leave_lockstep(&mut self) {
         self.member = None;
     }

@@ -117,6 +117,6 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
     with pytest.raises(catenary.RecordingError, match="missing.mcap: .*No such file"):
         catenary.open(tmp_path / "missing.mcap")
     text = tmp_path / "text.mcap"
-    text.write_text("this is no recording")
+    text.write_text("plain text")
     with pytest.raises(catenary.RecordingError, match="text.mcap"):
         catenary.open(text)

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::{Grab, Particle, ParticleFlags, Reason, Scene, Solver, builtin};
+use sim_types::{Action, CLIENT_ID_END};
 
 const CLIENT: u64 = 7;
 
@@ -216,4 +217,14 @@ fn fixed_particles_survive_a_neighbour_that_blows_up_and_the_state_can_be_restor
     let keyframe = solver.keyframe();
     solver.restore(&particles, &keyframe).unwrap();
     solver.release(CLIENT, 2).unwrap();
+}
+
+#[test]
+fn a_client_id_that_json_cannot_hold_is_rejected_and_changes_nothing() {
+    let mut solver = curtain();
+    let before = bits(&solver);
+    let action = Action::Grab { particle: 90, target: [0.5, 0.2, 0.3], over_s: 0.1 };
+    assert_eq!(solver.apply(CLIENT_ID_END, &action), Err(Reason::OutOfRange));
+    assert_eq!(bits(&solver), before);
+    solver.apply(CLIENT_ID_END - 1, &action).unwrap();
 }

@@ -3,7 +3,8 @@
 use bytemuck::cast_slice;
 use sim_contract::clock::monotonic_ns;
 use sim_contract::{
-    Action, COMMANDS_PER_STEP_MAX, Command, Reason, ReceivedState, RestoreContents, Stop,
+    Action, CLIENT_ID_END, COMMANDS_PER_STEP_MAX, Command, Reason, ReceivedState, RestoreContents,
+    Stop,
 };
 use sim_solver::{Applied, Control, Keyframe, Particle};
 
@@ -88,7 +89,10 @@ impl Node {
             self.inbox.put_back(request);
             return Ok(());
         }
-        if let Action::Load { scene } = request.received.command.action() {
+        // The solver rejects the commands of a wrong client id.
+        if let Action::Load { scene } = request.received.command.action()
+            && request.received.command.client_id < CLIENT_ID_END
+        {
             return self.load(request, scene, stop);
         }
         if self.is_long(&request) {

@@ -241,6 +241,8 @@ impl Lockstep {
 #[cfg(test)]
 mod tests {
     //! Checks who is awaited, with messages given to `Lockstep::add`.
+    use sim_contract::CLIENT_ID_END;
+
     use super::*;
 
     const RUN: u64 = 9;
@@ -280,6 +282,7 @@ mod tests {
         let messages = [
             Ready { tag: 0, ..ready(7, 0, 1) },
             ready(7, 0, 0),
+            ready(CLIENT_ID_END, 0, 1),
             // The step is not computed yet.
             ready(7, 3, 1),
         ];
@@ -287,7 +290,7 @@ mod tests {
             let last = Published { run_id: RUN, step: 2 };
             lockstep.add(message, ConnectionId(1), last, &mut |_| panic!("joined"));
         }
-        assert_eq!(lockstep.refused_count, 3);
+        assert_eq!(lockstep.refused_count, 4);
         assert_eq!(lockstep.members(2).count(), 0);
     }
 

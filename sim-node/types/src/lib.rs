@@ -35,7 +35,7 @@ pub use collider_shape::ColliderShape;
 pub use constraint_kind::ConstraintKind;
 pub use json::hash as json_hash;
 pub use json::non_finite::PlainF32;
-pub use limits::{COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, STEP_WORK_MAX};
+pub use limits::{CLIENT_ID_END, COLLIDERS_MAX, ELEMENTS_MAX, SCENE_SIZE_BYTES_MAX, STEP_WORK_MAX};
 pub use method::Method;
 pub use parameter::{OffMeaning, PARAMETERS, Parameter, ParameterInfo, ParameterValue, ValueForm};
 pub use parameter_values::{ParameterValues, PerKind, SETTINGS_COUNT, Setting};

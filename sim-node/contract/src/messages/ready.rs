@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use sim_types::CLIENT_ID_END;
 
 /// Message of a member of the lockstep: 32 bytes, alignment 8. It is not a command: it changes no
 /// state, and has no outcome. The connection that it comes through identifies the member.
@@ -9,7 +10,7 @@ use iceoryx2::prelude::ZeroCopySend;
 #[repr(C)]
 #[type_name("catenary.Ready")]
 pub struct Ready {
-    /// Client id of the member.
+    /// Client id of the member, below [`CLIENT_ID_END`].
     pub client_id: u64,
     /// Run of the step; 0 if the member joins and has read no snapshot.
     pub run_id: u64,
@@ -29,6 +30,6 @@ impl Ready {
 
     /// Returns `true` if the message is one of this service.
     pub fn is_valid(&self) -> bool {
-        self.tag == Self::TAG && self.every > 0
+        self.tag == Self::TAG && self.every > 0 && self.client_id < CLIENT_ID_END
     }
 }

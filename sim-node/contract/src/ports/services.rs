@@ -3,6 +3,7 @@
 use iceoryx2::identifiers::UniqueNodeId;
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, NodeState, PortFactory};
+use sim_types::CLIENT_ID_END;
 use thiserror::Error;
 
 use crate::endpoint::Endpoint;
@@ -114,6 +115,12 @@ pub enum AttachError {
         endpoint: Endpoint,
         /// The process, if its lock names it.
         process_id: Option<u32>,
+    },
+    /// The id of the client is too large.
+    #[error("{client_id} is no client id (allowed: 0 to {})", CLIENT_ID_END - 1)]
+    ClientId {
+        /// The refused id.
+        client_id: u64,
     },
     /// A service could not be opened or connected to.
     #[error(transparent)]

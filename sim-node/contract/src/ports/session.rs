@@ -6,8 +6,8 @@ use std::fs::File;
 use std::time::Duration;
 
 use iceoryx2::prelude::{
-    AttributeVerifier, Config, IceoryxSend, Node, NodeBuilder, Service, ServiceName,
-    SignalHandlingMode, ZeroCopySend, ipc_threadsafe,
+    AttributeVerifier, Config, IceoryxSend, Node, NodeBuilder, NodeName, SemanticStringError,
+    Service, ServiceName, SignalHandlingMode, ZeroCopySend, ipc_threadsafe,
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
@@ -33,6 +33,8 @@ pub(crate) type Events = port_factory::event::PortFactory<ipc_threadsafe::Servic
 
 /// Pause before another attempt, while another process creates or removes the same service.
 const RETRY_PAUSE: Duration = Duration::from_millis(5);
+/// Longest file name of a program in the name of its iceoryx2 node.
+const PROGRAM_CHARACTERS_MAX: usize = 60;
 /// Most attempts. In each of them, iceoryx2 waits for [`domain::CREATION_TIMEOUT`].
 const ATTEMPTS_MAX: usize = 20;
 
@@ -91,6 +93,7 @@ impl Session {
             counter::check(&config).map_err(private)?;
         }
         let node = NodeBuilder::new()
+            .name(&node_name(endpoint).map_err(|error| refused(&error))?)
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc_threadsafe::Service>()
@@ -275,6 +278,18 @@ impl Session {
         let attributes = details.static_details.attributes();
         attributes.key_value(&VERSION_KEY.try_into().ok()?, 0).map(ToString::to_string)
     }
+}
+
+/// Returns the name that `iox2 node list` shows: the file name of the program, and the name of the
+/// simulation.
+fn node_name(endpoint: &Endpoint) -> Result<NodeName, SemanticStringError> {
+    let path = std::env::current_exe().unwrap_or_default();
+    let program = path.file_name().unwrap_or_default().to_string_lossy();
+    // iceoryx2 allows 128 characters of ASCII, of which the simulation's name has 64 at most.
+    let program = program.chars().take(PROGRAM_CHARACTERS_MAX);
+    let program: String =
+        program.map(|one| if one.is_ascii_graphic() { one } else { '?' }).collect();
+    NodeName::new(&format!("{program}:{}", endpoint.name()))
 }
 
 /// Returns the attribute of every service of a contract version.

@@ -37,10 +37,15 @@ macro_rules! constants {
 
 #[test]
 fn the_layout_of_shared_memory_is_frozen() {
+    insta::assert_snapshot!("layout", layouts());
+}
+
+/// Returns the name, size and alignment of each type, each followed by the offsets of its fields.
+pub(crate) fn layouts() -> String {
     let mut text = String::new();
     write_state_layouts(&mut text);
     write_command_and_status_layouts(&mut text);
-    insta::assert_snapshot!("layout", text);
+    text
 }
 
 fn write_state_layouts(text: &mut String) {

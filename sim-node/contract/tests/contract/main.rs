@@ -7,5 +7,6 @@ mod layout;
 mod load;
 mod ownership;
 mod readers;
+mod services_page;
 mod states;
 mod support;

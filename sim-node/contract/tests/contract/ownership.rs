@@ -5,7 +5,9 @@ use std::sync::mpsc;
 use std::thread;
 
 use sim_contract::testing::TestDomain;
-use sim_contract::{AttachError, Client, Endpoint, Load, NodeStatus, Owner, OwnerError, Tap};
+use sim_contract::{
+    AttachError, CLIENT_ID_END, Client, Endpoint, Load, NodeStatus, Owner, OwnerError, Tap,
+};
 
 use crate::support::{
     DEADLINE, MOMENT, constraints, create_owner, load_header, publish_step, triangles,
@@ -48,6 +50,18 @@ fn a_client_without_a_node_gets_an_error_that_names_the_service_and_the_remedy()
         )
     );
     assert!(matches!(Tap::attach(&endpoint).unwrap_err(), AttachError::NoNode { .. }));
+}
+
+#[test]
+fn a_client_id_that_json_cannot_hold_is_refused() {
+    let domain = TestDomain::new();
+    let _owner = create_owner(&domain.endpoint()).unwrap();
+    let error = Client::attach_as(&domain.endpoint(), CLIENT_ID_END).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "9007199254740992 is no client id (allowed: 0 to 9007199254740991)"
+    );
+    Client::attach_as(&domain.endpoint(), CLIENT_ID_END - 1).unwrap();
 }
 
 #[test]

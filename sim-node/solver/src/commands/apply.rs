@@ -1,6 +1,6 @@
 //! Applies actions: the only way from a command to the state.
 
-use sim_types::{Action, KindFilter, Parameter, ParameterValue, Reason, Text};
+use sim_types::{Action, CLIENT_ID_END, KindFilter, Parameter, ParameterValue, Reason, Text};
 
 use super::cut::{Sphere, Sweep};
 use super::{Grab, Push};
@@ -56,11 +56,14 @@ impl Solver {
     /// Applies an action at the boundary before the next step.
     ///
     /// `client_id` names the sender: only the client that grabbed a particle can move or release
-    /// it.
+    /// it. It is below [`CLIENT_ID_END`].
     ///
     /// # Errors
     /// The action is wrong or has no effect here. A rejected action changes no bit of the state.
     pub fn apply(&mut self, client_id: u64, action: &Action) -> Result<Applied, Reason> {
+        if client_id >= CLIENT_ID_END {
+            return Err(Reason::OutOfRange);
+        }
         match *action {
             Action::Pin { particle } => self.pin(particle)?,
             Action::Unpin { particle } => self.unpin(particle)?,

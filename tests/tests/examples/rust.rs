@@ -1,5 +1,4 @@
 //! The examples of the contract work against a running node, and report errors as text.
-#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use integration_tests::{Process, Program, Sandbox};
 
@@ -45,9 +44,9 @@ fn hold_brings_a_pendulum_to_rest() {
 #[test]
 fn the_examples_stay_short() {
     for source in [
-        include_str!("../../sim-node/contract/examples/watch.rs"),
-        include_str!("../../sim-node/contract/examples/grab.rs"),
-        include_str!("../../sim-node/contract/examples/hold.rs"),
+        include_str!("../../../sim-node/contract/examples/watch.rs"),
+        include_str!("../../../sim-node/contract/examples/grab.rs"),
+        include_str!("../../../sim-node/contract/examples/hold.rs"),
     ] {
         assert!(source.lines().count() <= 50);
     }

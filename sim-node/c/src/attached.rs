@@ -1,0 +1,90 @@
+//! The attached clients, and the data that the program has borrowed from each.
+
+use std::ffi::CString;
+use std::ptr;
+use std::sync::{Arc, Mutex, TryLockError};
+use std::time::Duration;
+
+use sim_contract::{
+    Client, ColliderState, ConstraintState, ParameterState, TornConstraint, Triangle,
+};
+
+use crate::handles::Handles;
+use crate::outcome::{CatenaryResult, Failure, guard};
+
+/// A connection to a simulation. It reads snapshots and sends commands.
+///
+/// A client may be used by any thread, but by one at a time: a call while another thread is in a call
+/// of the same client returns `CATENARY_MISUSE`. Threads that work at the same time attach one client
+/// each. A client does not survive `fork`.
+#[derive(Debug)]
+pub struct ClientHandle {
+    _opaque: [u8; 0],
+}
+
+/// A client with the lists that the program has borrowed from it.
+#[derive(Debug)]
+pub(crate) struct Attached {
+    pub(crate) client: Client,
+    pub(crate) lists: Lists,
+}
+
+/// The lists that the program has borrowed from a client.
+#[derive(Debug, Default)]
+pub(crate) struct Lists {
+    pub(crate) topology: Vec<ConstraintState>,
+    pub(crate) surface: Vec<Triangle>,
+    pub(crate) torn: Vec<TornConstraint>,
+    pub(crate) parameters: Vec<ParameterState>,
+    pub(crate) colliders: Vec<ColliderState>,
+    pub(crate) scene: CString,
+}
+
+static CLIENTS: Handles<Arc<Mutex<Attached>>> = Handles::new();
+
+/// Timeout from which on a call without a message looks for the node. That costs about as much as
+/// opening a few files.
+pub(crate) const LOOK_MIN: Duration = Duration::from_millis(100);
+
+/// Runs a call of a client.
+pub(crate) fn with_client(
+    handle: *const ClientHandle,
+    call: impl FnOnce(&mut Attached) -> Result<(), Failure>,
+) -> CatenaryResult {
+    guard(|| {
+        let attached = CLIENTS.get(handle.addr()).ok_or_else(unknown)?;
+        match attached.try_lock() {
+            Ok(mut attached) => call(&mut attached),
+            Err(TryLockError::WouldBlock) => Err(Failure::misuse(
+                "another thread is in a call of this client: attach one per thread",
+            )),
+            Err(TryLockError::Poisoned(_)) => Err(Failure::bug()),
+        }
+    })
+}
+
+fn unknown() -> Failure {
+    Failure::misuse("this is no client: it is null, or it was detached")
+}
+
+impl Attached {
+    /// Returns the reason why nothing arrived.
+    pub(crate) fn nothing(&self, timeout: Duration) -> Failure {
+        if timeout >= LOOK_MIN && !self.client.is_owner_alive() {
+            return Failure::new(CatenaryResult::Gone, "the node has ended");
+        }
+        let text = format!("nothing arrived within {timeout:?}: is the node paused?");
+        Failure::new(CatenaryResult::Timeout, text)
+    }
+}
+
+/// Keeps a client, and returns its handle.
+pub(crate) fn keep(client: Client) -> *mut ClientHandle {
+    let attached = Attached { client, lists: Lists::default() };
+    ptr::without_provenance_mut(CLIENTS.insert(Arc::new(Mutex::new(attached))))
+}
+
+/// Detaches a client.
+pub(crate) fn remove(handle: *const ClientHandle) -> Result<(), Failure> {
+    CLIENTS.remove(handle.addr()).map(drop).ok_or_else(unknown)
+}

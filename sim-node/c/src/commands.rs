@@ -1,0 +1,223 @@
+//! Commands as values, for `catenary_request` and `catenary_send`.
+
+use std::ffi::c_char;
+
+use sim_contract::{Action, Command, KindFilter, ParameterValue, Text};
+
+use crate::pointers::{numbers, text};
+
+/// Encodes an action; `None`, because of a null pointer or a wrong text, becomes the empty command, which
+/// is refused when it is sent.
+fn command(action: Option<Action>) -> Command {
+    action.map_or_else(Command::default, |action| Command::new(0, 0, action))
+}
+
+fn short_text(pointer: *const c_char) -> Option<Text> {
+    Text::new(&text(pointer, "text").ok().flatten()?).ok()
+}
+
+/// Holds a particle in place.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_pin(particle: u32) -> Command {
+    command(Some(Action::Pin { particle }))
+}
+
+/// Frees a pinned particle, from rest.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_unpin(particle: u32) -> Command {
+    command(Some(Action::Unpin { particle }))
+}
+
+/// Grabs a particle, and drives it on a straight line to `target` (3 numbers, in m) within `over_s`
+/// seconds, 0 to 0.25.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_grab(particle: u32, target: *const f32, over_s: f32) -> Command {
+    command(numbers(target).map(|target| Action::Grab { particle, target, over_s }))
+}
+
+/// Drives a particle that this client has grabbed to a new target, as in `catenary_command_grab`.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_move(particle: u32, target: *const f32, over_s: f32) -> Command {
+    command(numbers(target).map(|target| Action::Move { particle, target, over_s }))
+}
+
+/// Releases a particle that this client has grabbed, with the velocity of its last motion.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_release(particle: u32) -> Command {
+    command(Some(Action::Release { particle, force: false }))
+}
+
+/// Releases a grabbed particle, whichever client has grabbed it.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_release_forced(particle: u32) -> Command {
+    command(Some(Action::Release { particle, force: true }))
+}
+
+/// Pauses the node.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_pause() -> Command {
+    command(Some(Action::Pause))
+}
+
+/// Resumes a paused node.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_resume() -> Command {
+    command(Some(Action::Resume))
+}
+
+/// Makes a paused node compute `count` steps.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_step(count: u32) -> Command {
+    command(Some(Action::Step { count }))
+}
+
+/// Restores the initial state. The step number continues.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_reset() -> Command {
+    command(Some(Action::Reset))
+}
+
+/// Sets the velocity of the free particles within a sphere (`center`: 3 numbers; both in m) to `delta`
+/// (3 numbers, in m per step) times the rate.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_push(
+    center: *const f32,
+    radius: f32,
+    delta: *const f32,
+) -> Command {
+    push(center, radius, delta, None)
+}
+
+/// Pushes like `catenary_command_push`, with a limit in m on each component of `delta`.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_push_limited(
+    center: *const f32,
+    radius: f32,
+    delta: *const f32,
+    limit: f32,
+) -> Command {
+    push(center, radius, delta, Some(limit))
+}
+
+fn push(center: *const f32, radius: f32, delta: *const f32, limit: Option<f32>) -> Command {
+    let pair = numbers(center).zip(numbers(delta));
+    command(pair.map(|(center, delta)| Action::Push { center, radius, delta, limit }))
+}
+
+/// Tears a constraint.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_cut(constraint: u32) -> Command {
+    command(Some(Action::Cut { constraint }))
+}
+
+/// Tears all constraints with an end within a sphere (`center`: 3 numbers; both in m).
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_cut_radius(center: *const f32, radius: f32) -> Command {
+    command(numbers(center).map(|center| Action::CutRadius { center, radius }))
+}
+
+/// Tears all constraints that cross the segment between two points (3 numbers each, in m), extended without
+/// end along plus and minus `direction` (3 numbers; 0 0 1 in a planar scene).
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_cut_segment(
+    from: *const f32,
+    to: *const f32,
+    direction: *const f32,
+) -> Command {
+    let all = numbers(from).zip(numbers(to)).zip(numbers(direction));
+    command(all.map(|((from, to), direction)| Action::CutSegment { from, to, direction }))
+}
+
+/// Moves an anchor to a pose by the end of the next step, where it stays. `translation` (3 numbers, in m)
+/// and `rotation` (quaternion x, y, z, w) are relative to the pose at load. A null rotation is none.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_move_anchor(
+    anchor: u32,
+    translation: *const f32,
+    rotation: *const f32,
+) -> Command {
+    let rotation = numbers(rotation).unwrap_or(IDENTITY);
+    let action = |translation| Action::MoveAnchor { anchor, translation, rotation };
+    command(numbers(translation).map(action))
+}
+
+/// Moves a collider to a pose during the next step, with the velocity that this implies; see
+/// `catenary_command_move_anchor`.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_move_collider(
+    collider: u32,
+    translation: *const f32,
+    rotation: *const f32,
+) -> Command {
+    let rotation = numbers(rotation).unwrap_or(IDENTITY);
+    let action = |translation| Action::MoveCollider { collider, translation, rotation };
+    command(numbers(translation).map(action))
+}
+
+/// No rotation.
+const IDENTITY: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// Sets a parameter, such as "damping", to a number.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_set(parameter: *const c_char, value: f32) -> Command {
+    set(parameter, Some(ParameterValue::Number(value)))
+}
+
+/// Sets a parameter, such as "gravity", to three numbers.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_set_vector(
+    parameter: *const c_char,
+    value: *const f32,
+) -> Command {
+    set(parameter, numbers(value).map(ParameterValue::Vector))
+}
+
+/// Switches a parameter off, such as the limit `tear_force`.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_set_off(parameter: *const c_char) -> Command {
+    set(parameter, Some(ParameterValue::Off))
+}
+
+/// Returns a command that sets "compliance" or "stiffness", for the constraints of one kind only (a
+/// `catenary_constraint_kind`). Any other command is returned unchanged.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_for_kind(set: Command, constraint_kind: u32) -> Command {
+    match set.action() {
+        Action::Set { parameter, value, .. } => {
+            let constraint_kind = Some(KindFilter::from_number(constraint_kind));
+            command(Some(Action::Set { parameter, value, constraint_kind }))
+        }
+        _ => set,
+    }
+}
+
+fn set(parameter: *const c_char, value: Option<ParameterValue>) -> Command {
+    let pair = short_text(parameter).zip(value);
+    let action = |(parameter, value)| Action::Set { parameter, value, constraint_kind: None };
+    command(pair.map(action))
+}
+
+/// Loads a built-in scene, or a file that the node can read; at most 160 bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_load(scene: *const c_char) -> Command {
+    command(short_text(scene).map(|scene| Action::Load { scene }))
+}
+
+/// Puts the nearest kept state at or before a step of this run in place. The outcome has its step
+/// (`index` is the low half, `count` the high half of a 64-bit number).
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_rewind_to(step: u64) -> Command {
+    command(Some(Action::Rewind { to_step: Some(step), back_steps: None }))
+}
+
+/// Puts the nearest kept state at least a number of steps ago in place.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_rewind_back(steps: u32) -> Command {
+    command(Some(Action::Rewind { to_step: None, back_steps: Some(steps) }))
+}
+
+/// Marks the step in recordings, with a text of 1 to 160 bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_command_mark(text: *const c_char) -> Command {
+    command(short_text(text).map(|text| Action::Mark { text }))
+}

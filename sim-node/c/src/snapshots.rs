@@ -1,0 +1,84 @@
+//! Snapshots, borrowed from shared memory.
+
+use std::mem::MaybeUninit;
+use std::ptr;
+
+use sim_contract::{ParticleState, SnapshotHeader};
+
+use crate::attached::{ClientHandle, with_client};
+use crate::handles::Handles;
+use crate::outcome::{CatenaryResult, Failure, guard};
+use crate::pointers::{check_place, timeout, write};
+
+/// A snapshot, borrowed from shared memory. The data is read-only memory of another process: writing to
+/// it ends the program.
+///
+/// It is valid until `catenary_release_snapshot`, also after the client was detached or the node has
+/// ended. A client may hold four snapshots at a time.
+#[derive(Debug)]
+#[repr(C)]
+pub struct Snapshot {
+    /// The header.
+    pub header: *const SnapshotHeader,
+    /// The particles, by index.
+    pub particles: *const ParticleState,
+    /// Number of particles.
+    pub particle_count: usize,
+    /// For the library; 0 after the release.
+    pub handle: usize,
+}
+
+static SNAPSHOTS: Handles<sim_contract::Snapshot> = Handles::new();
+
+pub(crate) fn keep(held: sim_contract::Snapshot) -> Snapshot {
+    let (header, particles) = (ptr::from_ref(held.header()), held.particles());
+    let (particles, particle_count) = (particles.as_ptr(), particles.len());
+    // Moving the value does not move the memory that it holds.
+    Snapshot { header, particles, particle_count, handle: SNAPSHOTS.insert(held) }
+}
+
+/// Borrows the oldest unread snapshot, or waits for the next one. The first call of a client returns the
+/// latest published one. A client that is more than 64 snapshots behind misses some; `snapshot_index` of
+/// the header shows it. Release each snapshot.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_next_snapshot(
+    client: *mut ClientHandle,
+    timeout_s: f64,
+    snapshot: Option<&mut MaybeUninit<Snapshot>>,
+) -> CatenaryResult {
+    with_client(client, |attached| {
+        check_place(snapshot.as_deref(), "snapshot")?;
+        let timeout = timeout(timeout_s)?;
+        let held = attached.client.next_snapshot(timeout)?;
+        write(snapshot, keep(held.ok_or_else(|| attached.nothing(timeout))?), "snapshot")
+    })
+}
+
+/// Borrows the newest unread snapshot and skips those before it, or waits for the next one. Release each
+/// snapshot.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_latest_snapshot(
+    client: *mut ClientHandle,
+    timeout_s: f64,
+    snapshot: Option<&mut MaybeUninit<Snapshot>>,
+) -> CatenaryResult {
+    with_client(client, |attached| {
+        check_place(snapshot.as_deref(), "snapshot")?;
+        let timeout = timeout(timeout_s)?;
+        let held = attached.client.latest_snapshot(timeout)?;
+        write(snapshot, keep(held.ok_or_else(|| attached.nothing(timeout))?), "snapshot")
+    })
+}
+
+/// Returns a snapshot to the node, and sets all fields of `*snapshot` to 0. Another release, or the
+/// release of a copy, is `CATENARY_MISUSE`. Any thread may release it.
+#[unsafe(no_mangle)]
+pub extern "C" fn catenary_release_snapshot(snapshot: Option<&mut Snapshot>) -> CatenaryResult {
+    guard(|| {
+        let snapshot = snapshot.ok_or_else(|| Failure::misuse("snapshot is null"))?;
+        let held = SNAPSHOTS.remove(snapshot.handle);
+        *snapshot =
+            Snapshot { header: ptr::null(), particles: ptr::null(), particle_count: 0, handle: 0 };
+        held.map(drop).ok_or_else(|| Failure::misuse("the snapshot was released before"))
+    })
+}

@@ -1,0 +1,231 @@
+//! The header is generated from the Rust types, and compiles as C99 and as C++17 without a warning. To
+//! update it after a change: `UPDATE_GOLDEN=1 cargo test -p sim-c --test header`
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use cbindgen::{
+    Builder, Config, DocumentationStyle, EnumConfig, ItemType, Language, RenameRule, Style,
+};
+use sim_contract::{
+    CONTRACT_VERSION, ColliderState, CollidersHeader, CommandOptions, ConstraintState, LoadHeader,
+    MEMBER_CHANGES_KEPT, MEMBERS_MAX, NodeStatus, OUTCOME_FLAG_CONTROL, OUTCOME_FLAG_DISCONNECTED,
+    OUTCOME_FLAG_NEW_RUN, Outcome, ParameterState, ParametersHeader, ParticleFlags, ParticleState,
+    SnapshotFlags, SnapshotHeader, StatusFlags, TearsHeader, Text, TornConstraint, Triangle,
+};
+
+/// Types with their names in the header. The last ones are in no signature: numbers in messages.
+const TYPES: [(&str, &str); 34] = [
+    ("CatenaryResult", "catenary_result"),
+    ("ClientHandle", "catenary_client"),
+    ("Snapshot", "catenary_snapshot"),
+    ("Topology", "catenary_topology"),
+    ("Surface", "catenary_surface"),
+    ("Torn", "catenary_torn"),
+    ("Parameters", "catenary_parameters"),
+    ("Colliders", "catenary_colliders"),
+    ("StateToRestore", "catenary_state_to_restore"),
+    ("SnapshotHeader", "catenary_snapshot_header"),
+    ("ParticleState", "catenary_particle_state"),
+    ("ConstraintState", "catenary_constraint_state"),
+    ("Triangle", "catenary_triangle"),
+    ("LoadHeader", "catenary_load_header"),
+    ("TearsHeader", "catenary_tears_header"),
+    ("TornConstraint", "catenary_torn_constraint"),
+    ("ParametersHeader", "catenary_parameters_header"),
+    ("ParameterState", "catenary_parameter_state"),
+    ("CollidersHeader", "catenary_colliders_header"),
+    ("ColliderState", "catenary_collider_state"),
+    ("Command", "catenary_command"),
+    ("Outcome", "catenary_outcome"),
+    ("NodeStatus", "catenary_node_status"),
+    ("MemberStatus", "catenary_member_status"),
+    ("MemberChanges", "catenary_member_changes"),
+    ("MemberChange", "catenary_member_change"),
+    ("OutcomeStatus", "catenary_outcome_status"),
+    ("Reason", "catenary_reason"),
+    ("ConstraintKind", "catenary_constraint_kind"),
+    ("ColliderShape", "catenary_collider_shape"),
+    ("TearCause", "catenary_tear_cause"),
+    ("Method", "catenary_method"),
+    ("Parameter", "catenary_parameter"),
+    ("MemberChangeKind", "catenary_member_change_kind"),
+];
+
+/// Constants with their names in the header, their values, and their meanings.
+#[rustfmt::skip]
+#[allow(clippy::cast_possible_truncation, reason = "small limits")]
+const CONSTANTS: [(&str, &str, u32, &str); 25] = [
+    ("CONTRACT_VERSION", "CATENARY_CONTRACT_VERSION", CONTRACT_VERSION, "version of the layouts of this header"),
+    ("MEMBERS_MAX", "CATENARY_MEMBERS_MAX", MEMBERS_MAX as u32, "most members of the lockstep"),
+    ("MEMBER_CHANGES_KEPT", "CATENARY_MEMBER_CHANGES_KEPT", MEMBER_CHANGES_KEPT as u32, "changes that a status names"),
+    ("SIZE_BYTES_MAX", "CATENARY_TEXT_SIZE_BYTES_MAX", Text::SIZE_BYTES_MAX as u32, "longest text of a command"),
+    ("ParticleFlags::PINNED", "CATENARY_PARTICLE_PINNED", ParticleFlags::PINNED, "held in place"),
+    ("ParticleFlags::GRABBED", "CATENARY_PARTICLE_GRABBED", ParticleFlags::GRABBED, "driven by a client"),
+    ("ParticleFlags::ANCHORED", "CATENARY_PARTICLE_ANCHORED", ParticleFlags::ANCHORED, "moved by an anchor"),
+    ("ParticleFlags::FROZEN", "CATENARY_PARTICLE_FROZEN", ParticleFlags::FROZEN, "excluded: its state was not finite"),
+    ("SnapshotFlags::PAUSED", "CATENARY_SNAPSHOT_PAUSED", SnapshotFlags::PAUSED, "the node was paused in this step"),
+    ("SnapshotFlags::REPLAY", "CATENARY_SNAPSHOT_REPLAY", SnapshotFlags::REPLAY, "the writer plays a recording"),
+    ("StatusFlags::PAUSED", "CATENARY_STATUS_PAUSED", StatusFlags::PAUSED, "the node waits for resume or step"),
+    ("StatusFlags::REPLAY", "CATENARY_STATUS_REPLAY", StatusFlags::REPLAY, "the writer plays a recording"),
+    ("OUTCOME_FLAG_CONTROL", "CATENARY_OUTCOME_CONTROL", OUTCOME_FLAG_CONTROL, "answers a command to a replay"),
+    ("OUTCOME_FLAG_DISCONNECTED", "CATENARY_OUTCOME_DISCONNECTED", OUTCOME_FLAG_DISCONNECTED, "release of a lost grab"),
+    ("OUTCOME_FLAG_NEW_RUN", "CATENARY_OUTCOME_NEW_RUN", OUTCOME_FLAG_NEW_RUN, "the scene begins a new run at step 0"),
+    ("CommandOptions::LIMIT", "CATENARY_OPTION_LIMIT", CommandOptions::LIMIT, "a push has a limit"),
+    ("CommandOptions::VALUE_NUMBER", "CATENARY_OPTION_VALUE_NUMBER", CommandOptions::VALUE_NUMBER, "a set has a number"),
+    ("CommandOptions::VALUE_VECTOR", "CATENARY_OPTION_VALUE_VECTOR", CommandOptions::VALUE_VECTOR, "a set has a vector"),
+    ("CommandOptions::VALUE_OFF", "CATENARY_OPTION_VALUE_OFF", CommandOptions::VALUE_OFF, "a set switches off"),
+    ("CommandOptions::CONSTRAINT_KIND", "CATENARY_OPTION_CONSTRAINT_KIND", CommandOptions::CONSTRAINT_KIND, "a set is for one kind"),
+    ("CommandOptions::FORCE", "CATENARY_OPTION_FORCE", CommandOptions::FORCE, "a release is for the grab of any client"),
+    ("CommandOptions::TO", "CATENARY_OPTION_TO", CommandOptions::TO, "a rewind has a step of the run"),
+    ("CommandOptions::BACK", "CATENARY_OPTION_BACK", CommandOptions::BACK, "a rewind has a number of steps"),
+    ("CommandOptions::STATE", "CATENARY_OPTION_STATE", CommandOptions::STATE, "a restore has a complete state"),
+    ("CommandOptions::MOTION", "CATENARY_OPTION_MOTION", CommandOptions::MOTION, "a restore has positions and velocities"),
+];
+
+const INTRODUCTION: &str = "\
+// Catenary's client API: reads the states of a running simulation in shared memory, and commands it.
+//
+// - Results: every function that can fail returns a catenary_result, and catenary_last_error describes
+//   the failure. No call aborts the program, and a null, released or wrong handle is CATENARY_MISUSE.
+// - Ownership: release every snapshot, and detach every client before the process ends. Lists and texts
+//   belong to the client, and are valid until its next call of the same function.
+// - Threads: a client is for one thread at a time. Functions without a client are for any thread.
+// - Timeouts are in seconds, finite, 0 or more; 0 polls. Calls wait at most that long, so a program that
+//   handles SIGINT itself looks at its flag between calls. The library installs no signal handler.
+// - Lengths are in the unit of the scene (m), relative to its origin; times in s; velocities in m/s.
+//
+// Generated from the Rust types of the crate sim-c; do not edit.
+";
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).to_owned()
+}
+
+fn generate() -> String {
+    let mut config = Config {
+        language: Language::C,
+        style: Style::Type,
+        cpp_compat: true,
+        include_guard: Some("CATENARY_H".to_owned()),
+        header: Some(INTRODUCTION.to_owned()),
+        no_includes: true,
+        sys_includes: vec!["stddef.h".to_owned(), "stdint.h".to_owned()],
+        after_includes: Some(definitions()),
+        usize_is_size_t: true,
+        documentation_style: DocumentationStyle::C99,
+        enumeration: EnumConfig {
+            rename_variants: RenameRule::QualifiedScreamingSnakeCase,
+            ..EnumConfig::default()
+        },
+        ..Config::default()
+    };
+    config.parse.parse_deps = true;
+    config.parse.include = Some(vec!["sim-contract".to_owned(), "sim-types".to_owned()]);
+    config.export.include = TYPES.iter().map(|(rust, _)| (*rust).to_owned()).collect();
+    // Their constants make them opaque types.
+    config.export.exclude = ["NumberRange", "ParticleFlags", "PerKind"].map(str::to_owned).to_vec();
+    config.export.item_types =
+        vec![ItemType::Enums, ItemType::Structs, ItemType::OpaqueItems, ItemType::Functions];
+    config.export.rename = names().map(|(rust, c)| (rust.to_owned(), c.to_owned())).collect();
+    let mut header = Vec::new();
+    Builder::new().with_crate(folder()).with_config(config).generate().unwrap().write(&mut header);
+    let header = String::from_utf8(header).unwrap();
+    let (header, end) = header.rsplit_once("#endif").unwrap();
+    let header = format!("{header}{}\n#endif{end}", checks());
+    header.lines().map(|line| adapt(line) + "\n").collect()
+}
+
+fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
+    TYPES.into_iter().chain(CONSTANTS.map(|(rust, c, ..)| (rust, c)))
+}
+
+fn definitions() -> String {
+    let mut text = String::new();
+    for (_, name, value, meaning) in CONSTANTS {
+        writeln!(text, "#define {name} {value}  // {meaning}").unwrap();
+    }
+    text
+}
+
+/// Refuses to compile where the layout of a message differs from the Rust type.
+fn checks() -> String {
+    let mut text = "// The sizes of the messages in shared memory.\n".to_owned();
+    let mut add = |name: &str, size_bytes: usize| {
+        let condition = format!("sizeof(catenary_{name}) == {size_bytes} ? 1 : -1");
+        writeln!(text, "typedef char catenary_check_{name}[{condition}];").unwrap();
+    };
+    add("snapshot_header", size_of::<SnapshotHeader>());
+    add("particle_state", size_of::<ParticleState>());
+    add("load_header", size_of::<LoadHeader>());
+    add("constraint_state", size_of::<ConstraintState>());
+    add("triangle", size_of::<Triangle>());
+    add("tears_header", size_of::<TearsHeader>());
+    add("torn_constraint", size_of::<TornConstraint>());
+    add("parameters_header", size_of::<ParametersHeader>());
+    add("parameter_state", size_of::<ParameterState>());
+    add("colliders_header", size_of::<CollidersHeader>());
+    add("collider_state", size_of::<ColliderState>());
+    add("command", size_of::<sim_contract::Command>());
+    add("outcome", size_of::<Outcome>());
+    add("node_status", size_of::<NodeStatus>());
+    text
+}
+
+/// Gives a comment the names of the header instead of links to Rust items.
+fn adapt(line: &str) -> String {
+    let mut line = line.replace("CATENARY_RESULT_", "CATENARY_");
+    if !line.trim_start().starts_with("//") {
+        return line;
+    }
+    while let Some(start) = line.find("`](") {
+        let end = start + line[start..].find(')').unwrap();
+        line.replace_range(start + 1..=end, "");
+    }
+    line = line.replace("[`", "`").replace("`]", "`").replace("crate::", "");
+    line = line.replace("u32::MAX", "UINT32_MAX");
+    for (rust, c) in names() {
+        line = line.replace(&format!("`{rust}`"), &format!("`{c}`"));
+    }
+    line.trim_end().to_owned()
+}
+
+#[test]
+fn the_committed_header_is_that_of_the_rust_types() {
+    let file = folder().join("include/catenary.h");
+    let header = generate();
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        std::fs::write(&file, &header).unwrap();
+    }
+    let committed = std::fs::read_to_string(&file).unwrap();
+    let differs = committed.lines().zip(header.lines()).find(|(old, new)| old != new);
+    assert!(
+        committed == header,
+        "run UPDATE_GOLDEN=1 cargo test -p sim-c --test header; first difference: {differs:?}"
+    );
+}
+
+/// Compiles a file that includes a header, and nothing else.
+#[allow(clippy::disallowed_methods, reason = "a test starts the compiler")]
+fn compile(compiler: &str, standard: &str, header: &str) {
+    let output = Command::new(compiler)
+        .args([standard, "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"])
+        .arg(folder().join("include").join(header))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_header_compiles_as_c99_without_a_warning() {
+    compile("cc", "-std=c99", "catenary.h");
+}
+
+#[test]
+#[ignore = "needs a C++ compiler"]
+fn the_headers_compile_as_cpp17_without_a_warning() {
+    compile("c++", "-std=c++17", "catenary.h");
+    compile("c++", "-std=c++17", "catenary.hpp");
+}
