@@ -14,14 +14,13 @@ use std::num::NonZeroU32;
 use std::time::Duration;
 
 use crate::client::lockstep::{LockstepError, Member};
-use crate::client::request::{Commander, RequestError};
+use crate::client::request::{Commander, RequestError, random_client_id};
 use crate::client::torn::Torn;
 use crate::client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
 use crate::clock::Deadline;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
-use crate::messages::command::CONSOLE_CLIENT_ID;
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::to_values;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
@@ -78,7 +77,7 @@ impl Client {
     }
 
     /// Attaches as the client `client_id`. Only clients with this id can move the particles
-    /// that it grabs. Several processes may use [`CONSOLE_CLIENT_ID`]; any other id belongs to one
+    /// that it grabs. Several processes may use [`crate::CONSOLE_CLIENT_ID`]; any other id belongs to one
     /// process at a time.
     ///
     /// # Errors
@@ -280,6 +279,19 @@ impl Client {
         self.wait_for_outcome(sequence, missed_before, timeout)
     }
 
+    /// Returns the outcome of a sent command if it has arrived, also in this client's turn of the lockstep.
+    ///
+    /// # Errors
+    /// Same as [`Client::status`].
+    pub fn arrived_outcome(&mut self, sequence: u64) -> Result<Option<Outcome>, ReadError> {
+        self.commander.as_mut().map_or(Ok(None), |commander| commander.outcome_for(sequence))
+    }
+
+    /// Returns `true` in this client's turn of the lockstep, in which the node answers no request.
+    pub fn is_in_turn(&self) -> bool {
+        self.member.as_ref().is_some_and(Member::is_in_turn)
+    }
+
     /// Gives a state to the node, which puts it in place at the next boundary, and waits for the
     /// outcome. The state of the step that the outcome names is the given one, and the run continues
     /// from it.
@@ -304,10 +316,7 @@ impl Client {
 
     /// Refuses a request that the node would answer only after this client's turn.
     fn check_turn(&self) -> Result<(), RequestError> {
-        match &self.member {
-            Some(member) if member.is_in_turn() => Err(RequestError::InTurn),
-            _ => Ok(()),
-        }
+        if self.is_in_turn() { Err(RequestError::InTurn) } else { Ok(()) }
     }
 
     fn wait_for_outcome(
@@ -372,6 +381,8 @@ impl Client {
         every: NonZeroU32,
         timeout: Duration,
     ) -> Result<(), LockstepError> {
+        // The node may wait at a snapshot that this client has read: a new reader receives it again.
+        self.particles = None;
         let member = self.member.insert(Member::create(&self.attachment, self.id, every)?);
         let joined = member.join().and_then(|()| self.wait_for_membership(timeout));
         if joined.is_err() {
@@ -439,13 +450,6 @@ impl Client {
     pub fn was_owner_killed(&self) -> bool {
         self.attachment.session.is_lock_left() && !self.is_owner_alive()
     }
-}
-
-/// Returns the id of a new client. Ids below 2^53 are exact in JSON.
-pub(crate) fn random_client_id() -> Result<u64, AttachError> {
-    let random = getrandom::u64()
-        .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
-    Ok((random >> 11).max(CONSOLE_CLIENT_ID + 1))
 }
 
 impl Drop for Client {

@@ -1,5 +1,6 @@
 //! Membership in the lockstep of a node.
 
+use std::mem;
 use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -30,6 +31,8 @@ struct Progress {
     is_member: bool,
     /// Header of the last turn.
     last: Option<SnapshotHeader>,
+    /// Sequence numbers of sent commands without an outcome.
+    sent: Vec<u64>,
     /// Outcomes that have arrived with the last turn.
     outcomes: Vec<sim_contract::Outcome>,
 }
@@ -66,15 +69,19 @@ impl Lockstep {
     }
 }
 
-/// Reads the outcomes that have arrived.
-fn drain_outcomes(client: &mut Client) -> PyResult<Vec<sim_contract::Outcome>> {
-    let mut outcomes = Vec::new();
-    while let Some(outcome) =
-        client.next_outcome(Duration::ZERO).map_err(|error| read_error(&error))?
-    {
-        outcomes.push(outcome);
+/// Returns the outcomes that have arrived, and the sequence numbers without one.
+fn arrived(
+    client: &mut Client,
+    sent: Vec<u64>,
+) -> PyResult<(Vec<sim_contract::Outcome>, Vec<u64>)> {
+    let (mut outcomes, mut unanswered) = (Vec::new(), Vec::new());
+    for sequence in sent {
+        match client.arrived_outcome(sequence).map_err(|error| read_error(&error))? {
+            Some(outcome) => outcomes.push(outcome),
+            None => unanswered.push(sequence),
+        }
     }
-    Ok(outcomes)
+    Ok((outcomes, unanswered))
 }
 
 #[pymethods]
@@ -102,15 +109,32 @@ impl Lockstep {
     fn __exit__(
         &self,
         py: Python<'_>,
-        _kind: &Bound<'_, PyAny>,
+        kind: &Bound<'_, PyAny>,
         _value: &Bound<'_, PyAny>,
         _traceback: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        self.progress().is_member = false;
-        self.node.get().call(py, |client| {
+        let sent = {
+            let mut progress = self.progress();
+            progress.is_member = false;
+            mem::take(&mut progress.sent)
+        };
+        let node = self.node.get();
+        // A closed node has left already.
+        let left = node.call(py, |client| {
             client.leave_lockstep();
             Ok(())
-        })
+        });
+        if left.is_err() || !kind.is_none() {
+            return Ok(());
+        }
+        // The commands of the last turn. A node that ends does not answer them.
+        for sequence in sent {
+            match node.outcome(py, sequence, Some(self.timeout_s)) {
+                Ok(outcome) => _ = outcome.require_applied(py)?,
+                Err(_) => break,
+            }
+        }
+        Ok(())
     }
 
     fn __iter__(this: Py<Self>) -> Py<Self> {
@@ -127,12 +151,17 @@ impl Lockstep {
         })?;
         let Some(snapshot) = snapshot else { return Ok(None) };
         self.check_turn(snapshot.header())?;
-        let outcomes = node.call(py, drain_outcomes)?;
-        self.progress().outcomes.clone_from(&outcomes);
+        let sent = mem::take(&mut self.progress().sent);
+        let (outcomes, sent) = node.call(py, |client| arrived(client, sent))?;
+        {
+            let mut progress = self.progress();
+            (progress.outcomes, progress.sent) = (outcomes.clone(), sent);
+        }
+        let snapshot = node.show(py, snapshot)?;
         for outcome in outcomes {
             Outcome(outcome).require_applied(py)?;
         }
-        node.show(py, snapshot).map(Some)
+        Ok(Some(snapshot))
     }
 
     #[getter]
@@ -144,6 +173,9 @@ impl Lockstep {
         self.require_member()?;
         let action = action.0;
         let node = self.node.get();
-        node.call(py, |client| client.send(action).map_err(|error| request_error(&error)))
+        let sequence =
+            node.call(py, |client| client.send(action).map_err(|error| request_error(&error)))?;
+        self.progress().sent.push(sequence);
+        Ok(sequence)
     }
 }

@@ -7,8 +7,10 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use recorder::{CollidersRow, StatusRow};
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{
-    AttachError, Client, Endpoint, GivenState, ParticleState, ReadError, RequestError,
+    AttachError, Client, Endpoint, GivenState, OwnerState, ParticleState, ReadError, RequestError,
+    SnapshotHeader,
 };
 
 use crate::convert::{from_json, vectors};
@@ -17,7 +19,9 @@ use crate::data::outcome::Outcome;
 use crate::data::scene::{Topology, corners};
 use crate::data::snapshot::Snapshot;
 use crate::data::state::{State, current_state};
-use crate::error::{NotRunning, Timeout, attach_error, endpoint_error, read_error, request_error};
+use crate::error::{
+    NotRunning, Timeout, TooManySnapshots, attach_error, endpoint_error, read_error, request_error,
+};
 use crate::patience::{PART, Patience, wait};
 use crate::process::OfProcess;
 
@@ -28,7 +32,7 @@ const LATCHED_TIMEOUT_S: f64 = 5.0;
 #[derive(Debug)]
 pub(crate) struct Node {
     pub(crate) endpoint: Endpoint,
-    client: Mutex<OfProcess<Client>>,
+    client: OfProcess<Client>,
     /// The newest snapshot that was read, which `latest` returns again until there is a newer one.
     newest: Mutex<Option<Py<Snapshot>>>,
 }
@@ -42,21 +46,18 @@ impl Node {
         patience: Patience,
         mut read: impl FnMut(&mut Client, Duration) -> PyResult<Option<T>> + Send,
     ) -> PyResult<Option<T>> {
-        let mut is_ended = false;
         let mut attempt = |part| {
-            let mut client = self.lock();
-            let client = client.get()?;
-            let value = read(client, part)?.map(Some);
-            // The loop ends with nothing at the end of the node.
-            is_ended = value.is_none() && !client.is_owner_alive();
-            Ok(value.or(is_ended.then_some(None)))
+            self.client.with(|client| {
+                let value = read(client, part)?;
+                if value.is_some() || client.is_owner_alive() {
+                    return Ok(value.map(Some));
+                }
+                // Its last message may have arrived meanwhile. The wait ends with nothing.
+                Ok(Some(read(client, Duration::ZERO)?))
+            })
         };
         let value = wait(py, patience, &mut attempt)?;
         Ok(value.flatten())
-    }
-
-    fn lock(&self) -> MutexGuard<'_, OfProcess<Client>> {
-        self.client.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Calls a method of the client that does not wait.
@@ -65,7 +66,7 @@ impl Node {
         py: Python<'_>,
         call: impl FnOnce(&mut Client) -> PyResult<T> + Send,
     ) -> PyResult<T> {
-        py.detach(|| call(self.lock().get()?))
+        py.detach(|| self.client.with(call))
     }
 
     pub(crate) fn is_running(&self, py: Python<'_>) -> PyResult<bool> {
@@ -94,6 +95,24 @@ impl Node {
         } else {
             NotRunning::new_err(format!("no node runs as {endpoint} now"))
         })
+    }
+
+    /// Reads a snapshot. If the program holds too many, the one that this node keeps makes room.
+    fn read_snapshot(
+        &self,
+        py: Python<'_>,
+        patience: Patience,
+        read: fn(&mut Client, Duration) -> Result<Option<sim_contract::Snapshot>, ReadError>,
+    ) -> PyResult<Option<sim_contract::Snapshot>> {
+        let read = |client: &mut Client, part| read(client, part).map_err(|e| read_error(&e));
+        match self.read(py, patience, read) {
+            Err(error) if error.is_instance_of::<TooManySnapshots>(py) => {
+                let kept = self.newest().take();
+                drop(kept);
+                self.read(py, patience, read)
+            }
+            result => result,
+        }
     }
 
     fn newest(&self) -> MutexGuard<'_, Option<Py<Snapshot>>> {
@@ -140,7 +159,7 @@ fn attach(
 
 fn pause(time: Duration) {
     let time_ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-    sim_contract::clock::sleep_until(sim_contract::clock::monotonic_ns().saturating_add(time_ns));
+    sim_contract::clock::sleep_until(monotonic_ns().saturating_add(time_ns));
 }
 
 #[pymethods]
@@ -157,8 +176,15 @@ impl Node {
         let endpoint = Endpoint::from_options(domain, Some(name));
         let endpoint = endpoint.map_err(|error| endpoint_error(&error))?;
         let client = attach(py, &endpoint, client_id, timeout)?;
-        let client = Mutex::new(OfProcess::new(client));
+        let client = OfProcess::new("node", client);
         Ok(Self { endpoint, client, newest: Mutex::default() })
+    }
+
+    /// Another connection to the same node, with an id and a queue of snapshots of its own.
+    fn another(&self, py: Python<'_>) -> PyResult<Self> {
+        let client = attach(py, &self.endpoint, None, 0.0)?;
+        let client = OfProcess::new("node", client);
+        Ok(Self { endpoint: self.endpoint.clone(), client, newest: Mutex::default() })
     }
 
     #[getter]
@@ -172,8 +198,9 @@ impl Node {
     }
 
     fn close(&self, py: Python<'_>) {
-        self.newest().take();
-        py.detach(|| self.lock().close());
+        let kept = self.newest().take();
+        drop(kept);
+        py.detach(|| self.client.close());
     }
 
     #[pyo3(signature = (timeout=None))]
@@ -183,10 +210,7 @@ impl Node {
         timeout: Option<f64>,
     ) -> PyResult<Option<Py<Snapshot>>> {
         let patience = Patience::new(timeout)?;
-        let snapshot = self.read(py, patience, |client, part| {
-            client.next_snapshot(part).map_err(|error| read_error(&error))
-        })?;
-        match snapshot {
+        match self.read_snapshot(py, patience, Client::next_snapshot)? {
             Some(snapshot) => self.show(py, snapshot).map(Some),
             None if self.is_running(py)? => Err(self.silence(py)?),
             None => Ok(None),
@@ -195,19 +219,24 @@ impl Node {
 
     #[pyo3(signature = (timeout=5.0))]
     fn latest(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Py<Snapshot>> {
+        let patience = Patience::new(timeout)?;
         let newer = self.call(py, |client| {
             client.latest_snapshot(Duration::ZERO).map_err(|error| read_error(&error))
-        })?;
+        });
+        let newer = match newer {
+            Err(error) if error.is_instance_of::<TooManySnapshots>(py) => None,
+            newer => newer?,
+        };
         if let Some(snapshot) = newer {
             return self.show(py, snapshot);
         }
-        if let Some(snapshot) = &*self.newest() {
-            return Ok(snapshot.clone_ref(py));
+        let kept = self.newest().as_ref().map(|snapshot| snapshot.clone_ref(py));
+        if let Some(snapshot) = kept
+            && (is_recent(snapshot.get().header()) || self.is_running(py)?)
+        {
+            return Ok(snapshot);
         }
-        let snapshot = self.read(py, Patience::new(timeout)?, |client, part| {
-            client.latest_snapshot(part).map_err(|error| read_error(&error))
-        })?;
-        match snapshot {
+        match self.read_snapshot(py, patience, Client::latest_snapshot)? {
             Some(snapshot) => self.show(py, snapshot),
             None => Err(self.silence(py)?),
         }
@@ -235,28 +264,45 @@ impl Node {
     }
 
     fn torn<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
-        let torn = self.latched(py, |client, part| client.torn(part).map(Some))?;
+        let torn = self.latched(py, |client, part| {
+            Ok(Some(client.torn(part)?).filter(|torn| torn.header.run_id != 0))
+        })?;
         Ok(PyArray1::from_iter(py, torn.indices()))
     }
 
     fn colliders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let colliders = self.latched(py, |client, part| client.colliders(part).map(Some))?;
+        let colliders = self.latched(py, |client, part| {
+            Ok(Some(client.colliders(part)?).filter(|list| list.header.run_id != 0))
+        })?;
         let row = CollidersRow::new(colliders.header.step, &colliders.colliders);
         from_json(py, &row.map_or_else(Vec::new, |row| row.colliders))
     }
 
     fn send(&self, py: Python<'_>, action: &Action) -> PyResult<u64> {
         let action = action.0;
-        self.call(py, |client| client.send(action).map_err(|error| request_error(&error)))
+        self.call(py, |client| {
+            if client.is_in_turn() {
+                return Err(request_error(&RequestError::InTurn));
+            }
+            client.send(action).map_err(|error| request_error(&error))
+        })
     }
 
     #[pyo3(signature = (sequence, timeout=5.0))]
-    fn outcome(&self, py: Python<'_>, sequence: u64, timeout: Option<f64>) -> PyResult<Outcome> {
+    pub(crate) fn outcome(
+        &self,
+        py: Python<'_>,
+        sequence: u64,
+        timeout: Option<f64>,
+    ) -> PyResult<Outcome> {
         let patience = Patience::new(timeout)?;
         let mut last = None;
-        let outcome =
-            wait(py, patience, |part| match self.lock().get()?.outcome(sequence, part) {
+        let outcome = wait(py, patience, |part| {
+            self.client.with(|client| match client.outcome(sequence, part) {
                 Ok(outcome) => Ok(Some(outcome)),
+                Err(error @ RequestError::Timeout { owner: OwnerState::Gone { .. }, .. }) => {
+                    Err(request_error(&error))
+                }
                 Err(
                     error @ (RequestError::Timeout { .. } | RequestError::OutcomesMissed { .. }),
                 ) => {
@@ -264,7 +310,8 @@ impl Node {
                     Ok(None)
                 }
                 Err(error) => Err(request_error(&error)),
-            })?;
+            })
+        })?;
         match (outcome, last) {
             (Some(outcome), _) => Ok(Outcome(outcome)),
             (None, Some(error)) => Err(request_error(&with_timeout(error, timeout))),
@@ -287,7 +334,7 @@ impl Node {
             let state = state.get();
             self.call(py, |client| restore(client, &state.given(), timeout))?
         } else if let Ok(snapshot) = state.cast::<Snapshot>() {
-            let particles = snapshot.get().memory().particles().to_vec();
+            let particles = snapshot.get().to_vec()?;
             self.restore_motion(py, &particles, timeout)?
         } else {
             return Err(PyTypeError::new_err("expected a State or a Snapshot"));
@@ -359,6 +406,11 @@ fn motion(
     Ok(pairs.map(particle).collect())
 }
 
+/// Returns `true` for a snapshot that its node has published just now.
+fn is_recent(header: &SnapshotHeader) -> bool {
+    monotonic_ns().saturating_sub(header.publish_monotonic_ns) < SECOND_NS / 2
+}
+
 /// Returns the error of the last part of a wait as that of the whole wait.
 fn with_timeout(error: RequestError, timeout_s: Option<f64>) -> RequestError {
     let total = timeout_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
@@ -371,5 +423,15 @@ fn with_timeout(error: RequestError, timeout_s: Option<f64>) -> RequestError {
             RequestError::OutcomesMissed { sequence, timeout: total, missed_count }
         }
         other => other,
+    }
+}
+
+impl Drop for Node {
+    /// A client waits briefly for the outcomes of its commands: other threads run meanwhile.
+    fn drop(&mut self) {
+        let closed = Python::try_attach(|py| py.detach(|| self.client.close()));
+        if closed.is_none() {
+            self.client.close();
+        }
     }
 }

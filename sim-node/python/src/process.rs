@@ -1,55 +1,63 @@
 //! Values that belong to the process that made them.
 
 use std::process;
+use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
 
 use crate::error::Error;
 
-/// A value with ports in shared memory. A fork copies the value, but not the ports' connections: the copy
-/// must neither be used nor release them.
+/// A locked value with threads, or with ports in shared memory. A fork copies it, but neither its threads nor
+/// its place at other processes: the copy must not be used, locked or released.
 #[derive(Debug)]
 pub(crate) struct OfProcess<T> {
     /// `None` once it is closed.
-    value: Option<T>,
+    value: Mutex<Option<T>>,
+    /// Name in errors.
+    name: &'static str,
     process_id: u32,
 }
 
 impl<T> OfProcess<T> {
-    pub(crate) fn new(value: T) -> Self {
-        Self { value: Some(value), process_id: process::id() }
+    pub(crate) fn new(name: &'static str, value: T) -> Self {
+        Self { value: Mutex::new(Some(value)), name, process_id: process::id() }
     }
 
-    /// Returns the value.
+    fn is_foreign(&self) -> bool {
+        self.process_id != process::id()
+    }
+
+    /// Calls a function with the value.
     ///
     /// # Errors
-    /// It is closed, or belongs to a parent process.
-    pub(crate) fn get(&mut self) -> PyResult<&mut T> {
-        if self.process_id != process::id() {
-            return Err(Error::new_err(
-                "this node was attached before a fork: attach again in each process, or start \
-                 processes with multiprocessing.set_start_method(\"spawn\")",
-            ));
+    /// That of the function; or the value is closed, or belongs to a parent process.
+    pub(crate) fn with<R>(&self, call: impl FnOnce(&mut T) -> PyResult<R>) -> PyResult<R> {
+        let name = self.name;
+        if self.is_foreign() {
+            return Err(Error::new_err(format!(
+                "this {name} was made before a fork: make one in each process, or start processes with \
+                 multiprocessing.set_start_method(\"spawn\")"
+            )));
         }
-        self.value.as_mut().ok_or_else(|| Error::new_err("this node is closed"))
+        let mut value = self.value.lock().unwrap_or_else(PoisonError::into_inner);
+        let value = value.as_mut();
+        call(value.ok_or_else(|| Error::new_err(format!("this {name} is closed")))?)
     }
 
-    /// Returns the value also in a process that a fork has made; `None` once it is closed.
-    pub(crate) fn peek(&self) -> Option<&T> {
-        self.value.as_ref()
-    }
-
-    pub(crate) fn close(&mut self) {
-        let value = self.value.take();
-        if self.process_id != process::id() {
-            // The ports belong to the parent process.
-            Box::leak(Box::new(value));
+    pub(crate) fn close(&self) {
+        if !self.is_foreign() {
+            let value = self.value.lock().unwrap_or_else(PoisonError::into_inner).take();
+            drop(value);
         }
     }
 }
 
 impl<T> Drop for OfProcess<T> {
     fn drop(&mut self) {
-        self.close();
+        if self.is_foreign() {
+            let value = self.value.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+            // It belongs to the parent process.
+            Box::leak(Box::new(value));
+        }
     }
 }

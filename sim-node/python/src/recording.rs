@@ -176,11 +176,11 @@ impl Recording {
         table.set_item("scene_step", column(|row| row.scene_step))?;
         let times = rows.iter().map(|row| row.step as f64 / rate);
         table.set_item("time", PyArray1::from_iter(py, times))?;
-        table.set_item("hash", column(|row| row.state_hash))?;
+        table.set_item("state_hash", column(|row| row.state_hash))?;
         table.set_item("torn_count", column(|row| row.torn_count.into()))?;
         table.set_item("outcome_count", column(|row| row.outcome_count))?;
-        table.set_item("wake_lateness_ns", column(|row| row.wake_late_ns))?;
-        table.set_item("solve_time_ns", column(|row| row.solve_ns))?;
+        table.set_item("wake_late_ns", column(|row| row.wake_late_ns))?;
+        table.set_item("solve_ns", column(|row| row.solve_ns))?;
         Ok(table)
     }
 

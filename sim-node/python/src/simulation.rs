@@ -1,6 +1,7 @@
 //! The solver in this process, without a node or shared memory.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -13,10 +14,12 @@ use crate::convert::from_json;
 use crate::data::action::Action;
 use crate::data::outcome::rejected;
 use crate::data::scene::{Topology, corners, load_scene, scene_error};
-use crate::data::snapshot::Snapshot;
+use crate::data::snapshot::{POSITION, Snapshot, VELOCITY};
 use crate::data::state::State;
+use crate::data::view;
 use crate::error::StateError;
 use crate::patience::PART;
+use crate::process::OfProcess;
 
 /// The client id of every action.
 const CLIENT_ID: u64 = 1;
@@ -26,13 +29,34 @@ const CLIENT_ID: u64 = 1;
 pub(crate) struct Simulation {
     scene: Scene,
     scene_hash: u64,
-    running: Mutex<Running>,
+    running: SharedRunning,
+}
+
+/// The running state. Worker threads do not survive a fork, so a state with several threads belongs to its
+/// process.
+#[derive(Debug)]
+enum SharedRunning {
+    OneThread(Mutex<Running>),
+    Threads(OfProcess<Running>),
+}
+
+impl SharedRunning {
+    fn with<R>(&self, call: impl FnOnce(&mut Running) -> PyResult<R>) -> PyResult<R> {
+        match self {
+            Self::OneThread(running) => {
+                call(&mut running.lock().unwrap_or_else(PoisonError::into_inner))
+            }
+            Self::Threads(running) => running.with(call),
+        }
+    }
 }
 
 #[derive(Debug)]
 struct Running {
     solver: Solver,
     step: u64,
+    /// Commands have changed what the next step will do.
+    is_changed: bool,
 }
 
 impl Running {
@@ -43,6 +67,7 @@ impl Running {
         while left > 0 {
             self.solver.step();
             self.step += 1;
+            self.is_changed = false;
             left -= 1;
             if left > 0 && u128::from(monotonic_ns() - start_ns) > PART.as_nanos() {
                 break;
@@ -53,8 +78,13 @@ impl Running {
 }
 
 impl Simulation {
-    fn running(&self) -> MutexGuard<'_, Running> {
-        self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Calls a function with the running state, while other threads of the interpreter run.
+    fn with<R: Send>(
+        &self,
+        py: Python<'_>,
+        call: impl FnOnce(&mut Running) -> PyResult<R> + Send,
+    ) -> PyResult<R> {
+        py.detach(|| self.running.with(call))
     }
 
     fn with_threads(scene: Scene, threads: usize) -> PyResult<Self> {
@@ -65,7 +95,12 @@ impl Simulation {
         let mut solver = Solver::new(&scene);
         solver.set_threads(threads);
         let scene_hash = scene_hash(scene.to_toml().as_bytes());
-        Ok(Self { scene, scene_hash, running: Mutex::new(Running { solver, step: 0 }) })
+        let running = Running { solver, step: 0, is_changed: false };
+        let running = match running.solver.threads() {
+            1 => SharedRunning::OneThread(Mutex::new(running)),
+            _ => SharedRunning::Threads(OfProcess::new("simulation with several threads", running)),
+        };
+        Ok(Self { scene, scene_hash, running })
     }
 }
 
@@ -75,13 +110,13 @@ impl Simulation {
     #[pyo3(signature = (scene=None, threads=1, *, toml=None))]
     fn new(
         py: Python<'_>,
-        scene: Option<&str>,
+        scene: Option<PathBuf>,
         threads: usize,
         toml: Option<&str>,
     ) -> PyResult<Self> {
         py.detach(|| {
             let scene = match (scene, toml) {
-                (Some(scene), None) => load_scene(scene)?,
+                (Some(scene), None) => load_scene(&scene.to_string_lossy())?,
                 (None, Some(toml)) => {
                     Scene::from_toml(toml, "scene").map_err(|error| scene_error(&error))?
                 }
@@ -95,7 +130,7 @@ impl Simulation {
     fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
         let mut left = count;
         loop {
-            left = py.detach(|| self.running().advance(left));
+            left = self.with(py, |running| Ok(running.advance(left)))?;
             if left == 0 {
                 return Ok(());
             }
@@ -104,59 +139,52 @@ impl Simulation {
     }
 
     fn apply(&self, py: Python<'_>, action: &Action) -> PyResult<()> {
-        let result = py.detach(|| self.running().solver.apply(CLIENT_ID, &action.0));
+        let action = action.0;
+        let result = self.with(py, |running| {
+            running.is_changed = true;
+            Ok(running.solver.apply(CLIENT_ID, &action))
+        })?;
         let reason = match result {
             Ok(Applied::Control(
-                Control::Load { .. }
-                | Control::Rewind { .. }
-                | Control::Restore
-                | Control::Step { .. },
+                Control::Load { .. } | Control::Rewind { .. } | Control::Restore,
             )) => Reason::NoEffectHere,
             Ok(_) => return Ok(()),
             Err(reason) => reason,
         };
-        let action = serde_json::to_string(&action.0).unwrap_or_default();
+        let action = serde_json::to_string(&action).unwrap_or_default();
         Err(rejected(py, format!("rejected: {reason}: {action}"), Some(reason), None))
     }
 
-    fn snapshot(&self, py: Python<'_>) -> Snapshot {
-        py.detach(|| {
-            let running = self.running();
-            let solver = &running.solver;
-            let particles = bytemuck::cast_slice(solver.particles()).to_vec();
-            Snapshot::own(self.header(&running), particles)
+    fn snapshot(&self, py: Python<'_>) -> PyResult<Snapshot> {
+        self.with(py, |running| {
+            let particles = bytemuck::cast_slice(running.solver.particles()).to_vec();
+            Ok(Snapshot::own(self.header(running), particles))
         })
     }
 
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        Ok(crate::data::view::vectors(
-            &Bound::new(py, self.snapshot(py))?,
-            crate::data::snapshot::POSITION,
-        ))
+        view::vectors(&Bound::new(py, self.snapshot(py)?)?, POSITION)
     }
 
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        Ok(crate::data::view::vectors(
-            &Bound::new(py, self.snapshot(py))?,
-            crate::data::snapshot::VELOCITY,
-        ))
+        view::vectors(&Bound::new(py, self.snapshot(py)?)?, VELOCITY)
     }
 
     #[getter]
-    fn hash(&self, py: Python<'_>) -> u64 {
-        py.detach(|| self.running().solver.state_hash())
+    fn hash(&self, py: Python<'_>) -> PyResult<u64> {
+        self.with(py, |running| Ok(running.solver.state_hash()))
     }
 
     #[getter]
-    fn step_count(&self, py: Python<'_>) -> u64 {
-        py.detach(|| self.running().step)
+    fn step_count(&self, py: Python<'_>) -> PyResult<u64> {
+        self.with(py, |running| Ok(running.step))
     }
 
     #[getter]
-    fn time(&self, py: Python<'_>) -> f64 {
-        self.step_count(py) as f64 / f64::from(self.rate())
+    fn time(&self, py: Python<'_>) -> PyResult<f64> {
+        Ok(self.step_count(py)? as f64 / f64::from(self.rate()))
     }
 
     #[getter]
@@ -169,42 +197,37 @@ impl Simulation {
     }
 
     fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
-        let (header, constraints) = py.detach(|| {
-            let running = self.running();
-            let constraints: Vec<_> = running.solver.constraints().map(constraint_state).collect();
-            (self.load_header(), constraints)
-        });
-        Topology::new(py, &header, &constraints)
+        let constraints = self.with(py, |running| {
+            Ok(running.solver.constraints().map(constraint_state).collect::<Vec<_>>())
+        })?;
+        Topology::new(py, &self.load_header(), &constraints)
     }
 
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let triangles: Vec<_> = py.detach(|| {
-            let running = self.running();
-            running
-                .solver
-                .triangles()
-                .iter()
-                .map(|corners| Triangle { corners: *corners })
-                .collect()
-        });
+        let triangles = self.with(py, |running| {
+            let triangles = running.solver.triangles().iter();
+            Ok(triangles.map(|corners| Triangle { corners: *corners }).collect::<Vec<_>>())
+        })?;
         corners(py, &triangles)
     }
 
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let values = py.detach(|| self.running().solver.parameter_values());
+        let values = self.with(py, |running| Ok(running.solver.parameter_values()))?;
         from_json(py, &values)
     }
 
-    fn torn<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
-        let torn = py.detach(|| self.running().solver.torn().to_vec());
-        PyArray1::from_vec(py, torn)
+    fn torn<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let torn = self.with(py, |running| Ok(running.solver.torn().to_vec()))?;
+        Ok(PyArray1::from_vec(py, torn))
     }
 
     fn state(&self, py: Python<'_>) -> PyResult<State> {
-        py.detach(|| {
-            let mut running = self.running();
-            // The keyframe holds what the commands so far have changed.
-            running.solver.finish_boundary();
+        self.with(py, |running| {
+            if running.is_changed {
+                return Err(StateError::new_err(
+                    "commands wait for the next step: call `step()` before `state()`",
+                ));
+            }
             let keyframe = running.solver.keyframe().encode();
             let particles = bytemuck::cast_slice(running.solver.particles()).to_vec();
             State::from_parts(self.scene_hash, particles, keyframe)
@@ -219,35 +242,37 @@ impl Simulation {
             )));
         }
         let keyframe = state.decoded_keyframe()?;
-        py.detach(|| {
+        self.with(py, |running| {
             let particles = bytemuck::cast_slice(&state.particles);
-            let restored = self.running().solver.restore(particles, &keyframe);
-            restored.map_err(|error| StateError::new_err(error.to_string()))
+            let restored = running.solver.restore(particles, &keyframe);
+            restored.map_err(|error| StateError::new_err(error.to_string()))?;
+            running.is_changed = false;
+            Ok(())
         })
     }
 
-    fn reset(&self, py: Python<'_>) {
-        py.detach(|| {
-            let mut running = self.running();
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, |running| {
             let mut solver = Solver::new(&self.scene);
             solver.set_threads(running.solver.threads());
-            running.solver = solver;
-        });
+            (running.solver, running.is_changed) = (solver, false);
+            Ok(())
+        })
     }
 
-    fn __len__(&self, py: Python<'_>) -> usize {
-        py.detach(|| self.running().solver.particle_count())
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        self.with(py, |running| Ok(running.solver.particle_count()))
     }
 
-    fn __repr__(&self, py: Python<'_>) -> String {
-        let (name, count, step) = (&self.scene.name, self.__len__(py), self.step_count(py));
-        format!("<catenary.Simulation of '{name}': {count} particles, step {step}>")
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let (name, count, step) = (&self.scene.name, self.__len__(py)?, self.step_count(py)?);
+        Ok(format!("<catenary.Simulation of '{name}': {count} particles, step {step}>"))
     }
 }
 
 impl Simulation {
     fn header(&self, running: &Running) -> SnapshotHeader {
-        let Running { solver, step } = running;
+        let Running { solver, step, .. } = running;
         let rate = u64::from(self.scene.solver.rate_hz);
         SnapshotHeader {
             contract_version: sim_contract::CONTRACT_VERSION,

@@ -16,7 +16,7 @@ use crate::messages::restore::{GivenState, RestoreHeader};
 use crate::ports::port::reader_count;
 use crate::ports::reader::{Drained, ReadError, ValueReader};
 use crate::ports::service::{COMMANDS, OUTCOMES, ServiceError};
-use crate::ports::services::{Attachment, OwnerProcess};
+use crate::ports::services::{AttachError, Attachment, OwnerProcess};
 use crate::ports::writer::{Capacity, PublishError, SliceWriter, ValueWriter};
 use sim_types::Action;
 
@@ -142,6 +142,13 @@ const UNANSWERED_MAX: usize = 32 * COMMANDS_PER_STEP_MAX;
 
 /// The writer of one state.
 pub(crate) type StateWriter = SliceWriter<u8, RestoreHeader>;
+
+/// Returns the id of a new client. Ids below 2^53 are exact in JSON.
+pub(crate) fn random_client_id() -> Result<u64, AttachError> {
+    let random = getrandom::u64()
+        .map_err(|error| AttachError::NoRandomNumber { detail: error.to_string() })?;
+    Ok((random >> 11).max(CONSOLE_CLIENT_ID + 1))
+}
 
 /// Sends the commands of one client and matches their outcomes.
 #[derive(Debug)]

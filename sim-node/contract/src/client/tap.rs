@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::client::change::LostChanges;
 use crate::client::lockstep::{LockstepError, Member};
-use crate::client::random_client_id;
+use crate::client::request::random_client_id;
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
 use crate::endpoint::Endpoint;

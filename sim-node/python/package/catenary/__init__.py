@@ -15,6 +15,7 @@ masses in kilograms, unless the scene says otherwise.
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from os import PathLike, fspath
 
 from catenary._catenary import Action, Outcome, Snapshot, State, Topology, scene_names
@@ -59,9 +60,10 @@ __all__ = [
     "TooManySnapshots",
     "Topology",
     "attach",
-    "open",
     "scene_names",
 ]
+
+__version__ = version("catenary")
 
 PINNED, GRABBED, ANCHORED, FROZEN = 1, 2, 4, 8
 """Bits of `Snapshot.flags`."""

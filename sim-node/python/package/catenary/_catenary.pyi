@@ -1,5 +1,6 @@
 """The native part of the module."""
 
+from os import PathLike
 from types import TracebackType
 from typing import Any, Literal, Self, final
 
@@ -146,6 +147,8 @@ class Outcome:
     @property
     def command(self) -> dict[str, Any]:
         """The command as recordings store it: "kind" and its fields."""
+    def require_applied(self) -> None:
+        """Raises `Rejected` if the command was rejected."""
     @property
     def begins_run(self) -> bool:
         """True for a load that began a new run."""
@@ -207,7 +210,7 @@ class Action:
         parameter: str, value: float | Vector | None, kind: str | None = None
     ) -> Action: ...
     @staticmethod
-    def load(scene: str) -> Action: ...
+    def load(scene: str | PathLike[str]) -> Action: ...
     @staticmethod
     def pause() -> Action: ...
     @staticmethod
@@ -222,7 +225,7 @@ class Action:
     def mark(text: str) -> Action: ...
     @staticmethod
     def from_dict(fields: dict[str, Any]) -> Action:
-        """Returns the action of a dict such as `Outcome.command`."""
+        """Returns the action of a dict such as `Outcome.command`, or of a row of `Recording.outcomes()`."""
     def to_dict(self) -> dict[str, Any]:
         """Returns the action as recordings store it."""
     def __eq__(self, other: object, /) -> bool: ...
@@ -237,6 +240,8 @@ class Node:
         timeout: float = 0.0,
         client_id: int | None = None,
     ) -> Self: ...
+    def another(self) -> Node:
+        """Returns another connection to the same node, with an id and a queue of snapshots of its own."""
     @property
     def client_id(self) -> int:
         """Id of this client in outcomes and recordings."""
@@ -247,6 +252,8 @@ class Node:
         """Detaches. Snapshots that are still held stay valid."""
     def next_snapshot(self, timeout: float | None = None) -> Snapshot | None:
         """Returns the oldest unread snapshot, or waits for the next one. None if the node has ended.
+
+        `latest` reads from the same queue, and skips what is in it; `snapshots` has a queue of its own.
 
         Raises `Timeout` if none comes in time, and `TooManySnapshots` if the program holds too many.
         """
@@ -263,7 +270,7 @@ class Node:
     def parameters(self) -> dict[str, Any]:
         """Returns the current parameters by name. None is off."""
     def status(self) -> dict[str, Any]:
-        """Returns the status of the node, with the keys of `sim-node ctl status --json`."""
+        """Returns the status of the node, with the keys of `/status` in recordings."""
     def torn(self) -> Wholes:
         """Returns the indices of the torn constraints, in the order of tearing."""
     def colliders(self) -> list[dict[str, Any]]:
@@ -304,12 +311,16 @@ class Lockstep:
 
 class Simulation:
     def __new__(
-        cls, scene: str | None = None, threads: int = 1, *, toml: str | None = None
+        cls, scene: str | PathLike[str] | None = None, threads: int = 1, *, toml: str | None = None
     ) -> Self: ...
     def step(self, count: int = 1) -> None:
         """Makes `count` steps. Other threads of the interpreter run meanwhile; Ctrl-C ends it between steps."""
     def apply(self, action: Action) -> None:
-        """Applies an action before the next step. Raises `Rejected` if it is wrong or has no effect here."""
+        """Applies an action before the next step. Raises `Rejected` if it is wrong.
+
+        Actions that concern a node (`pause`, `resume`, `step`, `mark`, a time scale) change nothing here;
+        `load`, `rewind` and `restore` are rejected.
+        """
     def snapshot(self) -> Snapshot:
         """Returns a copy of the current state."""
     @property
@@ -341,11 +352,17 @@ class Simulation:
     def torn(self) -> Wholes:
         """Returns the indices of the torn constraints, in the order of tearing."""
     def state(self) -> State:
-        """Returns the complete state, which `restore` puts in place again."""
+        """Returns the complete state, which `restore` puts in place again.
+
+        Raises `StateError` between a command and the step that shows it.
+        """
     def restore(self, state: State) -> None:
         """Puts a state of the same scene in place. Raises `StateError` if it belongs to another scene."""
     def reset(self) -> None:
-        """Puts the initial state and parameters in place. `step_count` continues."""
+        """Puts the initial state and parameters in place at once. `step_count` continues.
+
+        A node spends a step on it, which shows the initial state.
+        """
     def __len__(self) -> int: ...
 
 class Recording:

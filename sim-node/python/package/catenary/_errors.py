@@ -32,6 +32,10 @@ class Rejected(Error):
         self.reason = reason
         self.outcome = outcome
 
+    def __reduce__(self) -> tuple[type[Rejected], tuple[str, str]]:
+        # An exception crosses to another process without its outcome.
+        return Rejected, (str(self), self.reason)
+
 
 class TooManySnapshots(Error):
     """The program holds as many snapshots as a node lends it. Keep copies of arrays instead."""

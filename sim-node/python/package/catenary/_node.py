@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
+from os import PathLike
 from types import TracebackType
 
+import numpy.typing as npt
+
 from catenary import _catenary
-from catenary._catenary import Action, Outcome, Snapshot
+from catenary._catenary import Action, Outcome, Snapshot, State
 from catenary._commands import Commands
 from catenary._errors import NotRunning, Timeout
 
@@ -27,28 +31,40 @@ class Node(Commands[Outcome], _catenary.Node):
     def snapshots(self) -> Iterator[Snapshot]:
         """Yields each snapshot in turn, beginning with the newest one. Ends when the node ends.
 
-        The loop waits while the node is paused. A program that takes longer for a snapshot than the node
-        for a step falls behind, up to 64 snapshots, and then misses some: `snapshot_index` shows it. To see
-        only the newest one, call `latest`; to slow the node down to the speed of the program, use
-        `lockstep`.
+        Each loop has a queue of its own, and waits while the node is paused. A program that takes longer for a
+        snapshot than the node for a step falls behind, up to 64 snapshots, and then misses some:
+        `snapshot_index` shows it. To see only the newest one, call `latest`; to slow the node down to the
+        speed of the program, use `lockstep`.
         """
-        while True:
-            try:
-                snapshot = self.next_snapshot(timeout=1.0)
-            except Timeout:
-                continue
-            if snapshot is None:
-                return
-            yield snapshot
-            # Drop it before the wait: a node lends a program only a few.
-            del snapshot
+        reader = self.another()
+        try:
+            while True:
+                try:
+                    snapshot = reader.next_snapshot(timeout=1.0)
+                except Timeout:
+                    continue
+                if snapshot is None:
+                    return
+                yield snapshot
+                # Drop it before the wait: a node lends a program only a few.
+                del snapshot
+        finally:
+            reader.close()
 
-    def load(self, scene: str) -> Outcome:
+    def _shown(self, outcome: Outcome, last: int | None = None, timeout: float = 5.0) -> Outcome:
+        """Waits until the state of a step is published: that of the outcome, or a later one."""
+        step = outcome.step if last is None else last
+        while not outcome.begins_run and self.latest().step < step:
+            if self.next_snapshot(timeout) is None:
+                raise NotRunning(f"the node ended before step {step}")
+        return outcome
+
+    def load(self, scene: str | PathLike[str]) -> Outcome:
         """Replaces the scene: the name of a built-in one, or a path on the host of the node.
 
         A scene with another rate begins a new run at step 0 (`Outcome.begins_run`).
         """
-        return self.request(Action.load(scene))
+        return self._shown(self.request(Action.load(scene)))
 
     def pause(self) -> Outcome:
         """Pauses the node before its next step."""
@@ -64,15 +80,11 @@ class Node(Commands[Outcome], _catenary.Node):
         `latest` then returns its snapshot.
         """
         outcome = self.request(Action.step(count))
-        last = outcome.step + count - 1
-        while self.latest().step < last:
-            if self.next_snapshot(timeout) is None:
-                raise NotRunning(f"the node ended before step {last}")
-        return outcome
+        return self._shown(outcome, outcome.step + count - 1, timeout)
 
     def reset(self) -> Outcome:
         """Puts the initial state in place. The step number continues."""
-        return self.request(Action.reset())
+        return self._shown(self.request(Action.reset()))
 
     def rewind(self, *, to_step: int | None = None, back_steps: int | None = None) -> Outcome:
         """Puts the nearest kept state at or before a step in place, and continues from it.
@@ -80,7 +92,20 @@ class Node(Commands[Outcome], _catenary.Node):
         `to_step` is a step of the run, `back_steps` a number of steps back. The step number continues;
         `Outcome.command["to_step"]` names the step of the state.
         """
-        return self.request(Action.rewind(to_step=to_step, back_steps=back_steps))
+        return self._shown(self.request(Action.rewind(to_step=to_step, back_steps=back_steps)))
+
+    def restore(self, state: State | Snapshot, timeout: float = 5.0) -> Outcome:
+        """Puts a state in place, and continues from it. `latest` then returns its snapshot, or a later one.
+
+        A `State` replaces everything. A `Snapshot` replaces only positions and velocities.
+        """
+        return self._shown(super().restore(state, timeout))
+
+    def set_motion(
+        self, positions: npt.ArrayLike, velocities: npt.ArrayLike, timeout: float = 5.0
+    ) -> Outcome:
+        """Replaces the positions and velocities of all particles. Shape of both: (particles, 3)."""
+        return self._shown(super().set_motion(positions, velocities, timeout))
 
     def batch(self, timeout: float = 5.0) -> Batch:
         """Sends many commands without waiting for each: `with node.batch() as batch: batch.pin(3)`."""
@@ -110,25 +135,36 @@ class Node(Commands[Outcome], _catenary.Node):
 
 
 class Batch(Commands[int]):
-    """Commands that are sent at once and answered later. Each method returns a sequence number."""
+    """Commands that are sent at once and answered later. Each method returns a sequence number.
+
+    The end of the `with` block waits for all outcomes, and raises `Rejected` if there is a rejected one;
+    `outcomes` has all of them, in the order of sending.
+    """
+
+    PENDING_MAX = 128
+    """Most commands without an outcome. A node keeps 256 of a client."""
 
     def __init__(self, node: Node, timeout: float) -> None:
         self._node = node
         self._timeout = timeout
-        self._sequences: list[int] = []
+        self._pending: deque[int] = deque()
         self.outcomes: list[Outcome] = []
-        """Outcomes in the order of sending, after the `with` block."""
 
     def _perform(self, action: Action) -> int:
+        if len(self._pending) == self.PENDING_MAX:
+            self._receive()
         sequence = self._node.send(action)
-        self._sequences.append(sequence)
+        self._pending.append(sequence)
         return sequence
+
+    def _receive(self) -> None:
+        self.outcomes.append(self._node.outcome(self._pending[0], self._timeout))
+        self._pending.popleft()
 
     def wait(self) -> list[Outcome]:
         """Waits for the outcomes of all commands so far, applied or rejected, and returns them."""
-        while self._sequences:
-            self.outcomes.append(self._node.outcome(self._sequences[0], self._timeout))
-            del self._sequences[0]
+        while self._pending:
+            self._receive()
         return self.outcomes
 
     def __enter__(self) -> Batch:
@@ -140,8 +176,10 @@ class Batch(Commands[int]):
         value: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if kind is None:
-            self.wait()
+        if kind is not None:
+            return
+        for outcome in self.wait():
+            outcome.require_applied()
 
 
 class Lockstep(Commands[int], _catenary.Lockstep):

@@ -27,17 +27,24 @@ class Recording(_catenary.Recording):
     def __getitem__(self, key: int | slice) -> Snapshot | Steps:
         if isinstance(key, slice):
             return Steps(self, self._range(key))
-        if key < 0 or self.step_at(key) != key:
+        if key not in self:
             raise KeyError(
                 f"{self.path} has no step {key} (it has {self.first_step} to {self.last_step})"
             )
         return self.at_or_before(key)
 
+    def __contains__(self, step: object) -> bool:
+        if not isinstance(step, int) or not self.first_step <= step <= self.last_step:
+            return False
+        return self.step_at(step) == step
+
     def at(self, time: float) -> Snapshot:
         """Returns the last snapshot up to a simulated time in seconds since step 0."""
         if not 0 <= time < float("inf"):
             raise ValueError(f"the time is {time} (allowed: 0 or more seconds)")
-        return self.at_or_before(int(time * self.rate + 1e-6))
+        # Times of steps are rounded down to nanoseconds.
+        step = int(min(time * self.rate + self.rate * 1e-9 + 1e-6, self.last_step))
+        return self.at_or_before(step)
 
     def __iter__(self) -> Iterator[Snapshot]:
         return iter(self[:])
@@ -81,10 +88,13 @@ class Steps:
         self._range = steps
 
     def __iter__(self) -> Iterator[Snapshot]:
+        return map(self._recording.at_or_before, self._steps())
+
+    def _steps(self) -> Iterator[int]:
         step: int | None = self._first()
         while step is not None and step < self._range.stop:
             if (step - self._range.start) % self._range.step == 0:
-                yield self._recording.at_or_before(step)
+                yield step
             step = self._recording.step_after(step)
 
     def _first(self) -> int | None:
@@ -94,16 +104,18 @@ class Steps:
 
     def to_numpy(self) -> Arrays:
         """Reads all of the snapshots into arrays."""
-        snapshots = list(self)
-        shape = (len(snapshots), self._recording.particle_count, 3)
+        steps = np.array(list(self._steps()), np.uint64)
+        shape = (len(steps), self._recording.particle_count, 3)
         arrays = Arrays(
-            steps=np.array([one.step for one in snapshots], np.uint64),
-            times=np.array([one.time for one in snapshots], np.float64),
-            hashes=np.array([one.hash for one in snapshots], np.uint64),
+            steps=steps,
+            times=np.empty(len(steps), np.float64),
+            hashes=np.empty(len(steps), np.uint64),
             positions=np.empty(shape, np.float32),
             velocities=np.empty(shape, np.float32),
         )
-        for index, snapshot in enumerate(snapshots):
+        for index, snapshot in enumerate(self):
+            arrays.times[index] = snapshot.time
+            arrays.hashes[index] = snapshot.hash
             arrays.positions[index] = snapshot.positions
             arrays.velocities[index] = snapshot.velocities
         return arrays

@@ -1,26 +1,38 @@
 //! Actions: the commands without their sender.
 
+use std::path::{Path, PathBuf};
+
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Text};
-use sim_solver::scene::is_path;
+use sim_solver::builtin;
+use sim_solver::scene::{LoadError, is_path};
 
 use crate::convert::{Quaternion, Vector, from_json, parameter_value};
+use crate::error::load_error;
 
 #[pyclass(frozen, eq, module = "catenary")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Action(pub(crate) sim_contract::Action);
 
+/// The fields of a recorded outcome that its action does not have.
+const ENVELOPE: [&str; 8] =
+    ["step", "client_id", "sequence", "index", "status", "reason", "disconnected", "new_run"];
+
 fn text(text: &str) -> PyResult<Text> {
     Text::new(text).map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-/// Returns a scene as the node finds it: its own working directory is another one.
-fn scene_text(scene: &str) -> PyResult<Text> {
-    if !is_path(scene) {
-        return text(scene);
+/// Returns a scene as the node finds it, whose working directory may differ from this one.
+fn scene_text(scene: &Path) -> PyResult<Text> {
+    let name = scene.to_string_lossy();
+    if is_path(&name) {
+        return text(&std::path::absolute(scene)?.to_string_lossy());
     }
-    text(&std::path::absolute(scene)?.to_string_lossy())
+    if builtin::text(&name).is_none() {
+        return Err(load_error(&LoadError::UnknownName(name.into_owned())));
+    }
+    text(&name)
 }
 
 fn constraint_kind(name: &str) -> PyResult<KindFilter> {
@@ -108,8 +120,8 @@ impl Action {
     }
 
     #[staticmethod]
-    fn load(scene: &str) -> PyResult<Self> {
-        Ok(Self(sim_contract::Action::Load { scene: scene_text(scene)? }))
+    fn load(scene: PathBuf) -> PyResult<Self> {
+        Ok(Self(sim_contract::Action::Load { scene: scene_text(&scene)? }))
     }
 
     #[staticmethod]
@@ -158,7 +170,12 @@ impl Action {
     #[staticmethod]
     fn from_dict(fields: &Bound<'_, PyAny>) -> PyResult<Self> {
         let json = fields.py().import("json")?.call_method1("dumps", (fields,))?;
-        let action = serde_json::from_str(json.extract()?);
+        let mut fields: serde_json::Value = serde_json::from_str(json.extract()?)
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        if let Some(fields) = fields.as_object_mut() {
+            fields.retain(|name, _| !ENVELOPE.contains(&name.as_str()));
+        }
+        let action = serde_json::from_value(fields);
         action.map(Self).map_err(|error| PyValueError::new_err(format!("not an action: {error}")))
     }
 

@@ -81,6 +81,12 @@ impl Outcome {
         from_json(py, &self.0.command.action())
     }
 
+    /// Raises `Rejected` unless the command took effect.
+    #[pyo3(name = "require_applied")]
+    fn require_applied_now(&self, py: Python<'_>) -> PyResult<()> {
+        self.clone().require_applied(py).map(|_| ())
+    }
+
     #[getter]
     fn begins_run(&self) -> bool {
         self.0.begins_run()

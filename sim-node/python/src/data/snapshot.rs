@@ -1,7 +1,5 @@
 //! A state of the particles.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -12,22 +10,11 @@ use crate::process::OfProcess;
 
 /// The place of the particles. It never changes.
 #[derive(Debug)]
-pub(crate) enum Memory {
+enum Memory {
     /// In shared memory, lent by a node.
     Shared(OfProcess<sim_contract::Snapshot>),
     /// In the memory of this process.
     Own(Vec<ParticleState>),
-}
-
-impl Memory {
-    pub(crate) fn particles(&self) -> &[ParticleState] {
-        match self {
-            Self::Shared(snapshot) => {
-                snapshot.peek().map_or(&[], sim_contract::Snapshot::particles)
-            }
-            Self::Own(particles) => particles,
-        }
-    }
 }
 
 /// The first field of each vector and the numbers of [`ParticleState`], in units of 4 bytes.
@@ -40,46 +27,61 @@ const FLAGS: usize = 7;
 #[derive(Debug)]
 pub(crate) struct Snapshot {
     header: SnapshotHeader,
-    /// Locked because a sample of iceoryx2 is not for several threads at a time.
-    memory: Mutex<Memory>,
+    memory: Memory,
 }
 
 impl Snapshot {
     pub(crate) fn shared(snapshot: sim_contract::Snapshot) -> Self {
-        Self {
-            header: *snapshot.header(),
-            memory: Mutex::new(Memory::Shared(OfProcess::new(snapshot))),
-        }
+        let header = *snapshot.header();
+        Self { header, memory: Memory::Shared(OfProcess::new("snapshot", snapshot)) }
     }
 
     pub(crate) fn own(header: SnapshotHeader, particles: Vec<ParticleState>) -> Self {
-        Self { header, memory: Mutex::new(Memory::Own(particles)) }
+        Self { header, memory: Memory::Own(particles) }
     }
 
-    pub(crate) fn memory(&self) -> MutexGuard<'_, Memory> {
-        self.memory.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(crate) fn header(&self) -> &SnapshotHeader {
+        &self.header
+    }
+
+    /// Calls a function with the particles.
+    ///
+    /// # Errors
+    /// They are those of a node, and this process was forked from the one that received them.
+    pub(crate) fn with_particles<R>(
+        &self,
+        call: impl FnOnce(&[ParticleState]) -> R,
+    ) -> PyResult<R> {
+        match &self.memory {
+            Memory::Shared(snapshot) => snapshot.with(|snapshot| Ok(call(snapshot.particles()))),
+            Memory::Own(particles) => Ok(call(particles)),
+        }
+    }
+
+    pub(crate) fn to_vec(&self) -> PyResult<Vec<ParticleState>> {
+        self.with_particles(<[_]>::to_vec)
     }
 }
 
 #[pymethods]
 impl Snapshot {
     #[getter]
-    fn positions<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+    fn positions<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(this, POSITION)
     }
 
     #[getter]
-    fn velocities<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+    fn velocities<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(this, VELOCITY)
     }
 
     #[getter]
-    fn inverse_masses<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f32>> {
+    fn inverse_masses<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         view::numbers(this, INVERSE_MASS)
     }
 
     #[getter]
-    fn flags<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<u32>> {
+    fn flags<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
         view::numbers(this, FLAGS)
     }
 
@@ -153,16 +155,16 @@ impl Snapshot {
         self.header.wake_late_ns as f64 * 1e-9
     }
 
-    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, bytemuck::cast_slice(self.memory().particles()))
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        self.with_particles(|particles| PyBytes::new(py, bytemuck::cast_slice(particles)))
     }
 
-    fn copy(&self) -> Self {
-        Self::own(self.header, self.memory().particles().to_vec())
+    fn copy(&self) -> PyResult<Self> {
+        Ok(Self::own(self.header, self.to_vec()?))
     }
 
     fn __len__(&self) -> usize {
-        self.memory().particles().len()
+        self.header.particle_count as usize
     }
 
     fn __repr__(&self) -> String {

@@ -7,44 +7,53 @@ use pyo3::prelude::*;
 use sim_contract::ParticleState;
 
 use crate::data::snapshot::Snapshot;
+use crate::error::Error;
 
 /// Number of 4-byte fields of a particle.
 const FIELDS: usize = size_of::<ParticleState>() / 4;
+
+/// Returns the particles of a snapshot, which the caller must not use after the owner is dropped.
+fn particles<'py>(owner: &Bound<'py, Snapshot>) -> PyResult<&'py [ParticleState]> {
+    let particles: *const [ParticleState] = owner.get().with_particles(std::ptr::from_ref)?;
+    // SAFETY: the owner holds the particles, in one place and unchanged, until it is dropped. No lock is
+    // held while NumPy runs code of Python.
+    Ok(unsafe { &*particles })
+}
 
 /// Returns the first of three fields of each particle as a read-only array of the shape (particles, 3).
 pub(crate) fn vectors<'py>(
     owner: &Bound<'py, Snapshot>,
     field: usize,
-) -> Bound<'py, PyArray2<f32>> {
-    let snapshot = owner.get();
-    let memory = snapshot.memory();
-    let particles = memory.particles();
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let particles = particles(owner)?;
     let fields = ArrayView2::from_shape((particles.len(), FIELDS), cast_slice(particles))
         .unwrap_or_else(|_| unreachable!("a particle has {FIELDS} fields"));
     let vectors = fields.slice(s![.., field..field + 3]);
-    // SAFETY: the owner holds the particles, in one place and unchanged, until it is dropped, and the
-    // array holds the owner.
+    // SAFETY: the array holds the owner, which holds the particles.
     let array = unsafe { PyArray2::borrow_from_array(&vectors, owner.clone().into_any()) };
-    // NumPy does not let a program undo this, because the array does not own its memory. A write would
-    // end the process: the memory is mapped for reading only.
-    array.readwrite().make_nonwriteable();
-    array
+    read_only(array)
 }
 
 /// Returns a field of each particle as a read-only array of the shape (particles,).
 pub(crate) fn numbers<'py, T: numpy::Element + bytemuck::AnyBitPattern>(
     owner: &Bound<'py, Snapshot>,
     field: usize,
-) -> Bound<'py, PyArray1<T>> {
-    let snapshot = owner.get();
-    let memory = snapshot.memory();
-    let particles = memory.particles();
-    let fields: ArrayView1<'_, T> = ArrayView1::from(cast_slice(particles));
+) -> PyResult<Bound<'py, PyArray1<T>>> {
+    let fields: ArrayView1<'_, T> = ArrayView1::from(cast_slice(particles(owner)?));
+    // A scene may have no particle.
+    let field = field.min(fields.len());
     let numbers = fields.slice(s![field..;FIELDS]);
-    // SAFETY: the owner holds the particles, in one place and unchanged, until it is dropped, and the
-    // array holds the owner.
+    // SAFETY: the array holds the owner, which holds the particles.
     let array = unsafe { PyArray1::borrow_from_array(&numbers, owner.clone().into_any()) };
-    // As above.
-    array.readwrite().make_nonwriteable();
-    array
+    read_only(array)
+}
+
+/// Forbids writing. NumPy does not let a program undo this, because the array does not own its memory. A write
+/// would end the process: the memory is mapped for reading only.
+fn read_only<T: numpy::Element, D: numpy::ndarray::Dimension>(
+    array: Bound<'_, numpy::PyArray<T, D>>,
+) -> PyResult<Bound<'_, numpy::PyArray<T, D>>> {
+    let borrowed = array.try_readwrite().map_err(|error| Error::new_err(error.to_string()))?;
+    borrowed.make_nonwriteable();
+    Ok(array)
 }
