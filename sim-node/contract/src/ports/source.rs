@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use iceoryx2::identifiers::UniqueNodeId;
-use iceoryx2::prelude::{CallbackProgression, PortFactory};
 
 use crate::ports::services::Attachment;
 
@@ -14,8 +13,9 @@ const OWNERS_MAX: usize = 8;
 /// Accepts the messages of the owner of a name, and refuses those of every other process.
 ///
 /// A service has room for more publishers than the owner needs, and iceoryx2 lets any process publish.
-/// Only one process can publish `status`, so that process is the owner. Messages of an earlier owner
-/// may still be unread when another one has taken the name, so it is remembered.
+/// The owner has a publisher of `status` with a name of its own; at the far end of a tunnel, the tunnel
+/// stands for it. Messages of an earlier owner may still be unread when another one has taken the name, so
+/// it is remembered.
 #[derive(Debug)]
 pub(crate) struct Source {
     attachment: Arc<Attachment>,
@@ -46,12 +46,11 @@ impl Source {
 
     fn remember_owner(&self) {
         let mut owners = self.owners();
-        self.attachment.status.dynamic_config().list_publishers(|publisher| {
-            if !owners.contains(&publisher.node_id) {
-                owners.push_back(publisher.node_id);
+        for node in self.attachment.source_nodes() {
+            if !owners.contains(&node) {
+                owners.push_back(node);
             }
-            CallbackProgression::Continue
-        });
+        }
         while owners.len() > OWNERS_MAX {
             owners.pop_front();
         }
