@@ -139,7 +139,7 @@ impl Tap {
 
     fn subscribe(attachment: Attachment, member: Option<Member>) -> Result<Self, ServiceError> {
         let attachment = Arc::new(attachment);
-        let (services, source) = (&attachment.services, &Arc::new(Source::new(&attachment)));
+        let (services, source) = (&attachment.services, &Arc::new(Source::new(&attachment.status)));
         // Fields are evaluated in the order written here.
         let tap = Self {
             listener: listen(&services.wake)?,

@@ -16,7 +16,7 @@ use crate::messages::status::NodeStatus;
 use crate::ports::reader::ValueReader;
 use crate::ports::service::{PARTICLES, READY, STATUS, ServiceError};
 use crate::ports::services::Services;
-use crate::ports::session::{Session, Values, version_of};
+use crate::ports::session::{Session, Values};
 use crate::ports::writer::ValueWriter;
 
 /// Longest wait for the first status, which comes ten times a second.
@@ -34,11 +34,6 @@ pub(crate) struct Mirror {
     heard_ns: AtomicU64,
     /// CLOCK_MONOTONIC from which on another request may be sent.
     next_request_ns: AtomicU64,
-}
-
-/// Returns `true` if a tunnel has created the service.
-pub(crate) fn is_mirror(service: &Values<NodeStatus>) -> bool {
-    version_of(service.attributes()).is_none()
 }
 
 impl Mirror {

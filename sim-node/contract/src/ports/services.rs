@@ -1,6 +1,7 @@
 //! All services of a name, and the process that owns the name.
 
-use iceoryx2::identifiers::UniqueNodeId;
+use std::sync::Arc;
+
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, NodeState, PortFactory};
 use thiserror::Error;
@@ -17,12 +18,13 @@ use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::ports::domain::orphans::{self, Port};
-use crate::ports::mirror::{Mirror, is_mirror};
+use crate::ports::mirror::Mirror;
 use crate::ports::service::{
-    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, OWNER_PORT, PARAMETERS, PARTICLES, READY, RESTORE,
-    SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
+    COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE, SCENE, STATUS,
+    SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
+use crate::ports::source::{is_mirror, owner_nodes};
 
 /// The services of a name, except `status`.
 #[derive(Debug)]
@@ -134,29 +136,6 @@ pub(crate) struct OwnerProcess {
     pub(crate) id: Option<u32>,
 }
 
-/// Returns the iceoryx2 nodes of the owners of the name, living or dead: the publishers of `status` that are
-/// named as an owner's. A tunnel has one without that name.
-fn owner_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
-    let mut nodes = Vec::new();
-    status.dynamic_config().list_publishers(|publisher| {
-        if publisher.publisher_name.as_str() == OWNER_PORT {
-            nodes.push(publisher.node_id);
-        }
-        CallbackProgression::Continue
-    });
-    nodes
-}
-
-/// Returns the iceoryx2 nodes of all publishers of `status`.
-fn publisher_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
-    let mut nodes = Vec::new();
-    status.dynamic_config().list_publishers(|publisher| {
-        nodes.push(publisher.node_id);
-        CallbackProgression::Continue
-    });
-    nodes
-}
-
 /// Returns the living process of this host that owns the name.
 pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
     let owner_nodes = owner_nodes(status);
@@ -180,7 +159,7 @@ pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
 #[derive(Debug)]
 pub(crate) struct Attachment {
     pub(crate) services: Services,
-    pub(crate) status: Values<NodeStatus>,
+    pub(crate) status: Arc<Values<NodeStatus>>,
     /// The connection to an owner on another host; `None` for one on this host.
     mirror: Option<Mirror>,
     // Dropped last: the services belong to its node.
@@ -197,7 +176,7 @@ impl Attachment {
             Err(ServiceError::Missing { service, .. }) => {
                 return Err(no_node(&session, format!("service '{service}' does not exist")));
             }
-            result => result?,
+            result => Arc::new(result?),
         };
         let is_mirror = is_mirror(&status);
         for _ in 0..ATTEMPTS_MAX {
@@ -219,7 +198,7 @@ impl Attachment {
     /// Connects to an owner on another host.
     fn open_mirror(
         session: Session,
-        status: Values<NodeStatus>,
+        status: Arc<Values<NodeStatus>>,
         services: Services,
     ) -> Result<Self, AttachError> {
         match Mirror::connect(&session, &status, &services)? {
@@ -251,11 +230,6 @@ impl Attachment {
         if let Some(mirror) = &self.mirror {
             mirror.request_latched();
         }
-    }
-
-    /// Returns the iceoryx2 nodes whose messages are those of the owner: of a mirror, the tunnel's.
-    pub(crate) fn source_nodes(&self) -> Vec<UniqueNodeId> {
-        if self.is_far() { publisher_nodes(&self.status) } else { owner_nodes(&self.status) }
     }
 
     /// Returns an owner that iceoryx2 takes for dead, because a cleaner of `/tmp` has removed the files of
