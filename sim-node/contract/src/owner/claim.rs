@@ -83,7 +83,6 @@ mod tests {
     use sim_types::ParameterValues;
 
     use super::*;
-    use crate::domain::Domain;
     use crate::messages::topology::LoadHeader;
     use crate::owner::Owner;
     use crate::owner::load::Load;
@@ -113,17 +112,11 @@ mod tests {
     fn the_place_of_a_tunnel_is_not_that_of_a_second_owner() {
         let domain = TestDomain::new();
         let _first = create_owner(&domain.endpoint()).unwrap();
-        // Even without the lock, which a person has removed.
-        let root = Domain::new(&domain.endpoint()).unwrap().root();
-        let locks =
-            [root.as_path(), std::path::Path::new("/dev/shm")].into_iter().flat_map(|folder| {
-                fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>()
-            });
-        let is_lock = |path: &std::path::PathBuf| {
-            let name = path.file_name().unwrap().to_string_lossy().into_owned();
-            name.contains(domain.name()) && name.ends_with(".owner")
-        };
-        locks.filter(is_lock).for_each(|path| fs::remove_file(path).unwrap());
+        // Even without the lock, whose files a person has removed.
+        let config = domain::configuration(Some(domain.name())).unwrap();
+        for path in OwnerLock::paths(&config, "sim") {
+            fs::remove_file(path).unwrap();
+        }
         let error = create_owner(&domain.endpoint()).unwrap_err();
         assert!(matches!(error, OwnerError::NameTaken { .. }), "{error}");
     }

@@ -12,11 +12,12 @@ use iceoryx2::prelude::PortFactory;
 use crate::clock::{Deadline, SECOND_NS, monotonic_ns};
 use crate::limits::{FAR_SILENCE_MAX_MS, MIRROR_BORROWED_MIN, MIRROR_BUFFERED_MIN};
 use crate::messages::ready::Ready;
+use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::ports::reader::ValueReader;
 use crate::ports::service::{PARTICLES, READY, STATUS, ServiceError};
 use crate::ports::services::Services;
-use crate::ports::session::{Session, Values};
+use crate::ports::session::{Session, Slices, Values};
 use crate::ports::writer::ValueWriter;
 
 /// Longest wait for the first status, which comes ten times a second.
@@ -43,7 +44,7 @@ impl Mirror {
         status: &Values<NodeStatus>,
         services: &Services,
     ) -> Result<Option<Self>, ServiceError> {
-        check_quality(services)?;
+        check_quality(&services.particles)?;
         let mirror = Self {
             status: ValueReader::create(status, &STATUS)?,
             requests: ValueWriter::create(&services.config, &services.ready, &READY)?,
@@ -94,8 +95,8 @@ fn check_version(session: &Session, status: &NodeStatus) -> Result<(), ServiceEr
 }
 
 /// Checks the quality of service of one mirror. A tunnel creates all with the defaults of its configuration.
-fn check_quality(services: &Services) -> Result<(), ServiceError> {
-    let quality = services.particles.static_config();
+fn check_quality(particles: &Slices<ParticleState, SnapshotHeader>) -> Result<(), ServiceError> {
+    let quality = particles.static_config();
     let qualities = [
         ("buffered messages", quality.subscriber_max_buffer_size(), MIRROR_BUFFERED_MIN),
         ("held messages", quality.subscriber_max_borrowed_samples(), MIRROR_BORROWED_MIN),
@@ -104,7 +105,7 @@ fn check_quality(services: &Services) -> Result<(), ServiceError> {
     match qualities.into_iter().find(|(_, actual, min)| actual < min) {
         None => Ok(()),
         Some((quality, actual, min)) => {
-            let service = services.particles.name().to_string();
+            let service = particles.name().to_string();
             Err(ServiceError::PoorMirror { service, quality, actual, min })
         }
     }
@@ -118,6 +119,7 @@ mod tests {
     use super::*;
     use crate::client::Client;
     use crate::limits::CONTRACT_VERSION;
+    use crate::ports::service::ServiceSpec;
     use crate::ports::services::AttachError;
     use crate::ports::session::Access;
     use crate::testing::TestDomain;
@@ -190,5 +192,29 @@ mod tests {
         assert!(matches!(error, AttachError::NoNode { .. }));
         let text = error.to_string();
         assert!(text.contains("is the mirror of a tunnel, through which no status"), "{text}");
+    }
+
+    #[test]
+    fn a_mirror_that_holds_too_few_messages_is_refused_with_the_remedy() {
+        let domain = TestDomain::new();
+        let session = Session::join_without_version(&domain.endpoint()).unwrap();
+        let poor = ServiceSpec { buffered: 2, ..PARTICLES };
+        let particles = session.slices(&poor, Access::Create).unwrap();
+        let text = check_quality(&particles).unwrap_err().to_string();
+        assert_eq!(
+            text,
+            "service 'sim/particles' is the mirror of a tunnel that was started with 2 buffered \
+             messages, but at least 64 are needed: start the tunnel in a folder whose \
+             config/iceoryx2.toml `sim-node doctor --iox2-config` has printed"
+        );
+    }
+
+    #[test]
+    fn a_node_does_not_take_a_name_that_a_tunnel_mirrors() {
+        let domain = TestDomain::new();
+        let _tunnel = Tunnel::create(&domain);
+        let session = Session::join(&domain.endpoint()).unwrap();
+        let error = session.values::<NodeStatus>(&STATUS, Access::Create).unwrap_err();
+        assert!(matches!(error, ServiceError::Incompatible { .. }), "{error}");
     }
 }

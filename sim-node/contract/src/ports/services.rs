@@ -201,16 +201,14 @@ impl Attachment {
         status: Arc<Values<NodeStatus>>,
         services: Services,
     ) -> Result<Self, AttachError> {
-        match Mirror::connect(&session, &status, &services)? {
-            Some(mirror) => Ok(Self { services, status, mirror: Some(mirror), session }),
-            None => {
-                let service = session.service_name(&STATUS);
-                let detail = format!(
-                    "service '{service}' is the mirror of a tunnel, through which no status arrives"
-                );
-                Err(no_node(&session, detail))
-            }
+        if let Some(mirror) = Mirror::connect(&session, &status, &services)? {
+            return Ok(Self { services, status, mirror: Some(mirror), session });
         }
+        let service = session.service_name(&STATUS);
+        let detail = format!(
+            "service '{service}' is the mirror of a tunnel, through which no status arrives"
+        );
+        Err(no_node(&session, detail))
     }
 
     pub(crate) fn owner(&self) -> Option<OwnerProcess> {
