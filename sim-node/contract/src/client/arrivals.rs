@@ -1,8 +1,8 @@
 //! Snapshots from behind a network tunnel, put back into order with the other messages.
 //!
 //! A tunnel moves the services one after the other, so a snapshot can arrive before messages that were
-//! published before it. So each one waits: until everything that its header counts is there, and for a
-//! moment in any case, for what it does not count, such as the parameters.
+//! published before it. So each one waits: until its load and everything that its header counts is there, and
+//! for a moment in any case, for what it does not count, such as the parameters.
 
 use std::collections::VecDeque;
 
@@ -85,11 +85,23 @@ impl Arrivals {
         }
     }
 
-    /// Removes and returns the first snapshot if it need not wait any longer.
-    pub(crate) fn next(&mut self, now_ns: u64) -> Option<Copied> {
+    /// Returns the first waiting snapshot.
+    pub(crate) fn first(&self) -> Option<&SnapshotHeader> {
+        self.waiting.front().map(|(_, first)| &first.header)
+    }
+
+    /// Removes and returns the first snapshot if it need not wait any longer. `has_load` says whether the load
+    /// of a snapshot has arrived.
+    pub(crate) fn next(
+        &mut self,
+        now_ns: u64,
+        has_load: impl Fn(&SnapshotHeader) -> bool,
+    ) -> Option<Copied> {
         let (arrival_ns, first) = self.waiting.front()?;
         let waited_ns = now_ns.saturating_sub(*arrival_ns);
-        let is_ready = waited_ns >= WAIT_MIN_NS && self.seen.is_complete(&first.header);
+        let is_ready = waited_ns >= WAIT_MIN_NS
+            && self.seen.is_complete(&first.header)
+            && has_load(&first.header);
         if !is_ready && waited_ns < WAIT_MAX_NS {
             return None;
         }
@@ -139,7 +151,7 @@ mod tests {
     }
 
     fn next_step(arrivals: &mut Arrivals, now_ns: u64) -> Option<u64> {
-        arrivals.next(now_ns).map(|copied| copied.header.step)
+        arrivals.next(now_ns, |_| true).map(|copied| copied.header.step)
     }
 
     /// Arrivals of a run whose first snapshot has passed.
@@ -155,7 +167,7 @@ mod tests {
         let mut arrivals = begun();
         arrivals.add(&snapshot(2), &[ParticleState::default()], 5);
         assert_eq!(next_step(&mut arrivals, WAIT_MIN_NS + 4), None);
-        let copied = arrivals.next(WAIT_MIN_NS + 5).unwrap();
+        let copied = arrivals.next(WAIT_MIN_NS + 5, |_| true).unwrap();
         assert_eq!((copied.header.step, copied.particles.len()), (2, 1));
         assert_eq!(next_step(&mut arrivals, WAIT_MAX_NS * 9), None);
     }
@@ -178,6 +190,14 @@ mod tests {
             arrivals.note(&update);
             assert_eq!(next_step(&mut arrivals, WAIT_MAX_NS - 1), Some(2));
         }
+    }
+
+    #[test]
+    fn a_snapshot_waits_for_its_load() {
+        let mut arrivals = begun();
+        arrivals.add(&snapshot(2), &[], 0);
+        assert!(arrivals.next(WAIT_MAX_NS - 1, |_| false).is_none());
+        assert!(arrivals.next(WAIT_MIN_NS, |header| header.step == 2).is_some());
     }
 
     #[test]

@@ -202,15 +202,17 @@ impl Tap {
     /// Returns the next state from another host.
     fn next_far_state(&mut self, mut on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
         self.receive_far(&mut on_message);
-        let arrived = self.arrivals.next(monotonic_ns());
+        let assembler = &self.assembler;
+        let arrived = self.arrivals.next(monotonic_ns(), |header| assembler.has_load(header));
         self.assemble(Ok(arrived.map(Held::Copied)), on_message)
     }
 
     fn latest_far_state(&mut self, mut on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
         self.receive_far(&mut on_message);
         let now_ns = monotonic_ns();
-        let ready = std::iter::from_fn(|| self.arrivals.next(now_ns));
-        let arrived = ready.last();
+        let (arrivals, assembler) = (&mut self.arrivals, &self.assembler);
+        let has_load = |header: &SnapshotHeader| assembler.has_load(header);
+        let arrived = std::iter::from_fn(|| arrivals.next(now_ns, has_load)).last();
         self.assemble(Ok(arrived.map(Held::Copied)), on_message)
     }
 
@@ -227,7 +229,8 @@ impl Tap {
             }
         }
         self.receive_updates(on_message);
-        if self.is_early || !self.has_keyframe {
+        let lacks_load = |header| !self.assembler.has_load(header);
+        if !self.has_keyframe || self.arrivals.first().is_some_and(lacks_load) {
             self.attachment.request_latched();
         }
     }
