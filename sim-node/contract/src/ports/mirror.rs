@@ -16,7 +16,6 @@ use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::ports::reader::ValueReader;
 use crate::ports::service::{PARTICLES, READY, STATUS, ServiceError};
-use crate::ports::services::Services;
 use crate::ports::session::{Session, Slices, Values};
 use crate::ports::writer::ValueWriter;
 
@@ -42,12 +41,13 @@ impl Mirror {
     pub(crate) fn connect(
         session: &Session,
         status: &Values<NodeStatus>,
-        services: &Services,
+        particles: &Slices<ParticleState, SnapshotHeader>,
+        ready: &Values<Ready>,
     ) -> Result<Option<Self>, ServiceError> {
-        check_quality(&services.particles)?;
+        check_quality(particles)?;
         let mirror = Self {
             status: ValueReader::create(status, &STATUS)?,
-            requests: ValueWriter::create(&services.config, &services.ready, &READY)?,
+            requests: ValueWriter::create(session.config(), ready, &READY)?,
             heard_ns: AtomicU64::new(0),
             next_request_ns: AtomicU64::new(0),
         };
@@ -120,7 +120,7 @@ mod tests {
     use crate::client::Client;
     use crate::limits::CONTRACT_VERSION;
     use crate::ports::service::ServiceSpec;
-    use crate::ports::services::AttachError;
+    use crate::ports::services::{AttachError, Services};
     use crate::ports::session::Access;
     use crate::testing::TestDomain;
 

@@ -201,7 +201,8 @@ impl Attachment {
         status: Arc<Values<NodeStatus>>,
         services: Services,
     ) -> Result<Self, AttachError> {
-        if let Some(mirror) = Mirror::connect(&session, &status, &services)? {
+        let Services { particles, ready, .. } = &services;
+        if let Some(mirror) = Mirror::connect(&session, &status, particles, ready)? {
             return Ok(Self { services, status, mirror: Some(mirror), session });
         }
         let service = session.service_name(&STATUS);
