@@ -29,6 +29,7 @@
 #define CATENARY_SNAPSHOT_REPLAY 2  // the writer plays a recording
 #define CATENARY_STATUS_PAUSED 1  // the node waits for resume or step
 #define CATENARY_STATUS_REPLAY 2  // the writer plays a recording
+#define CATENARY_STATUS_AT_END 4  // the recording has ended
 #define CATENARY_OUTCOME_CONTROL 1  // answers a command to a replay
 #define CATENARY_OUTCOME_DISCONNECTED 2  // release of a lost grab
 #define CATENARY_OUTCOME_NEW_RUN 4  // the scene begins a new run at step 0

@@ -28,6 +28,19 @@ pub struct Snapshot {
     pub handle: usize,
 }
 
+impl Snapshot {
+    const NONE: Self =
+        Self { header: ptr::null(), particles: ptr::null(), particle_count: 0, handle: 0 };
+}
+
+/// Makes the release of a snapshot that was never received an error.
+fn clear(snapshot: Option<&mut MaybeUninit<Snapshot>>) -> Option<&mut MaybeUninit<Snapshot>> {
+    snapshot.map(|place| {
+        place.write(Snapshot::NONE);
+        place
+    })
+}
+
 static SNAPSHOTS: Handles<sim_contract::Snapshot> = Handles::new();
 
 pub(crate) fn keep(held: sim_contract::Snapshot) -> Snapshot {
@@ -47,6 +60,7 @@ pub extern "C" fn catenary_next_snapshot(
     snapshot: Option<&mut MaybeUninit<Snapshot>>,
 ) -> CatenaryResult {
     with_client(client, |attached| {
+        let snapshot = clear(snapshot);
         check_place(snapshot.as_deref(), "snapshot")?;
         let timeout = timeout(timeout_s)?;
         let held = attached.client.next_snapshot(timeout)?;
@@ -63,6 +77,7 @@ pub extern "C" fn catenary_latest_snapshot(
     snapshot: Option<&mut MaybeUninit<Snapshot>>,
 ) -> CatenaryResult {
     with_client(client, |attached| {
+        let snapshot = clear(snapshot);
         check_place(snapshot.as_deref(), "snapshot")?;
         let timeout = timeout(timeout_s)?;
         let held = attached.client.latest_snapshot(timeout)?;
@@ -77,8 +92,7 @@ pub extern "C" fn catenary_release_snapshot(snapshot: Option<&mut Snapshot>) -> 
     guard(|| {
         let snapshot = snapshot.ok_or_else(|| Failure::misuse("snapshot is null"))?;
         let held = SNAPSHOTS.remove(snapshot.handle);
-        *snapshot =
-            Snapshot { header: ptr::null(), particles: ptr::null(), particle_count: 0, handle: 0 };
+        *snapshot = Snapshot::NONE;
         held.map(drop).ok_or_else(|| Failure::misuse("the snapshot was released before"))
     })
 }

@@ -57,7 +57,7 @@ const TYPES: [(&str, &str); 34] = [
 /// Constants with their names in the header, their values, and their meanings.
 #[rustfmt::skip]
 #[allow(clippy::cast_possible_truncation, reason = "small limits")]
-const CONSTANTS: [(&str, &str, u32, &str); 25] = [
+const CONSTANTS: [(&str, &str, u32, &str); 26] = [
     ("CONTRACT_VERSION", "CATENARY_CONTRACT_VERSION", CONTRACT_VERSION, "version of the layouts of this header"),
     ("MEMBERS_MAX", "CATENARY_MEMBERS_MAX", MEMBERS_MAX as u32, "most members of the lockstep"),
     ("MEMBER_CHANGES_KEPT", "CATENARY_MEMBER_CHANGES_KEPT", MEMBER_CHANGES_KEPT as u32, "changes that a status names"),
@@ -70,6 +70,7 @@ const CONSTANTS: [(&str, &str, u32, &str); 25] = [
     ("SnapshotFlags::REPLAY", "CATENARY_SNAPSHOT_REPLAY", SnapshotFlags::REPLAY, "the writer plays a recording"),
     ("StatusFlags::PAUSED", "CATENARY_STATUS_PAUSED", StatusFlags::PAUSED, "the node waits for resume or step"),
     ("StatusFlags::REPLAY", "CATENARY_STATUS_REPLAY", StatusFlags::REPLAY, "the writer plays a recording"),
+    ("StatusFlags::AT_END", "CATENARY_STATUS_AT_END", StatusFlags::AT_END, "the recording has ended"),
     ("OUTCOME_FLAG_CONTROL", "CATENARY_OUTCOME_CONTROL", OUTCOME_FLAG_CONTROL, "answers a command to a replay"),
     ("OUTCOME_FLAG_DISCONNECTED", "CATENARY_OUTCOME_DISCONNECTED", OUTCOME_FLAG_DISCONNECTED, "release of a lost grab"),
     ("OUTCOME_FLAG_NEW_RUN", "CATENARY_OUTCOME_NEW_RUN", OUTCOME_FLAG_NEW_RUN, "the scene begins a new run at step 0"),

@@ -201,11 +201,21 @@ fn a_client_in_a_call_of_another_thread_is_refused() {
     assert_eq!(catenary_release_snapshot(Some(&mut first)), CatenaryResult::Ok);
     let address = client.addr();
     let waiter = thread::spawn(move || {
-        let mut snapshot = next_snapshot(std::ptr::without_provenance_mut(address));
+        let client = std::ptr::without_provenance_mut(address);
+        let mut snapshot = MaybeUninit::uninit();
+        // The main thread may be in a call.
+        while catenary_next_snapshot(client, TIMEOUT_S, Some(&mut snapshot))
+            == CatenaryResult::Misuse
+        {
+            thread::yield_now();
+        }
+        // SAFETY: every call writes it.
+        let mut snapshot = unsafe { snapshot.assume_init() };
         assert_eq!(catenary_release_snapshot(Some(&mut snapshot)), CatenaryResult::Ok);
     });
     // The other thread waits for the next snapshot, sooner or later.
     while catenary_client_id(client, Some(&mut MaybeUninit::uninit())) == CatenaryResult::Ok {
+        assert!(!waiter.is_finished(), "it has received nothing yet");
         thread::yield_now();
     }
     assert!(last_error().contains("another thread is in a call"), "{}", last_error());

@@ -1,8 +1,10 @@
 //! The client API: reads snapshots and sends commands.
 
+pub(crate) mod arrivals;
 pub(crate) mod change;
 pub(crate) mod loaded_scene;
 pub(crate) mod lockstep;
+pub(crate) mod repeats;
 pub(crate) mod request;
 pub(crate) mod state;
 pub(crate) mod tap;
@@ -140,7 +142,7 @@ impl Client {
         let service = &self.attachment.services.topology;
         let latch = get_or_create(&mut self.topology, || Latch::create(service, &TOPOLOGY))?;
         self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(latch.newest()?.map(|sample| Topology {
+            Ok(latch.newest(&self.attachment)?.map(|sample| Topology {
                 header: *sample.user_header(),
                 constraints: sample.payload().to_vec(),
             }))
@@ -156,7 +158,7 @@ impl Client {
         let service = &self.attachment.services.surface;
         let latch = get_or_create(&mut self.surface, || Latch::create(service, &SURFACE))?;
         self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(latch.newest()?.map(|sample| Surface {
+            Ok(latch.newest(&self.attachment)?.map(|sample| Surface {
                 header: *sample.user_header(),
                 triangles: sample.payload().to_vec(),
             }))
@@ -171,7 +173,7 @@ impl Client {
         let service = &self.attachment.services.scene;
         let latch = get_or_create(&mut self.scene, || Latch::create(service, &SCENE))?;
         let bytes = self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(latch.newest()?.map(|sample| sample.payload().to_vec()))
+            Ok(latch.newest(&self.attachment)?.map(|sample| sample.payload().to_vec()))
         })?;
         bytes.map(String::from_utf8).transpose().map_err(|error| ReadError::Malformed {
             service: self.attachment.session.service_name(&SCENE),
@@ -189,7 +191,7 @@ impl Client {
         let service = &self.attachment.services.tears;
         let latch = get_or_create(&mut self.tears, || Latch::create(service, &TEARS))?;
         let torn = self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(latch.newest()?.map(|sample| Torn {
+            Ok(latch.newest(&self.attachment)?.map(|sample| Torn {
                 header: *sample.user_header(),
                 constraints: sample.payload().to_vec(),
             }))
@@ -205,7 +207,7 @@ impl Client {
         let service = &self.attachment.services.parameters;
         let latch = get_or_create(&mut self.parameters, || Latch::create(service, &PARAMETERS))?;
         self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(latch.newest()?.map(|sample| Parameters {
+            Ok(latch.newest(&self.attachment)?.map(|sample| Parameters {
                 header: *sample.user_header(),
                 values: to_values(sample.payload()),
             }))
@@ -221,7 +223,7 @@ impl Client {
         let service = &self.attachment.services.colliders;
         let latch = get_or_create(&mut self.colliders, || Latch::create(service, &COLLIDERS))?;
         let colliders = self.watch.wait_for(&self.attachment, timeout, || {
-            Ok(latch.newest()?.map(|sample| Colliders {
+            Ok(latch.newest(&self.attachment)?.map(|sample| Colliders {
                 header: *sample.user_header(),
                 colliders: sample.payload().to_vec(),
             }))

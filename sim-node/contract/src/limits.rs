@@ -44,8 +44,17 @@ pub const RESTORES_MAX: usize = 8;
 pub const OUTCOME_READERS_MAX: usize = CLIENTS_MAX + READERS_MAX;
 /// Readers of the commands and of the members' messages: the owner, and one spare for a network tunnel.
 pub const COMMAND_READERS_MAX: usize = 2;
-/// Writers of the status: the owner alone.
-pub const STATUS_PUBLISHERS_MAX: usize = 1;
+/// Writers of the status: the owner, and one spare for a network tunnel.
+pub const STATUS_PUBLISHERS_MAX: usize = 2;
+/// Least messages of a mirror that wait for one reader: the tunnel holds as many.
+pub const MIRROR_BUFFERED_MIN: usize = SNAPSHOTS_BUFFERED;
+/// Least messages of a mirror that one reader may hold.
+pub const MIRROR_BORROWED_MIN: usize = BORROWED_SAMPLES_MAX;
+/// Publishers and readers of a mirror.
+pub const MIRROR_PORTS_MAX: usize = 32;
+/// Longest silence of the status at the far end of a network tunnel before the owner counts as gone, in
+/// milliseconds: 30 periods of the status.
+pub const FAR_SILENCE_MAX_MS: u64 = 3000;
 /// Most processes that wait for the wake event at the same time.
 pub const LISTENERS_MAX: usize = 32;
 /// Most processes with a service open at the same time: clients, readers, the owner and spares.

@@ -4,6 +4,7 @@ mod claim;
 pub(crate) mod error;
 pub(crate) mod load;
 pub(crate) mod preparation;
+mod repetition;
 
 use std::cell::Cell;
 use std::io;
@@ -30,12 +31,14 @@ use crate::owner::claim::{claim_name, take_lock};
 use crate::owner::error::OwnerError;
 use crate::owner::load::{Load, LoadWriters, check_limits, check_memory};
 use crate::owner::preparation::{LoadPreparer, Preparation, ReplacedMemory};
+use crate::owner::repetition::Repetition;
 use crate::ports::connection::{self, ConnectionId, ReceivedCommand, receive_held, receive_round};
+use crate::ports::domain::orphans;
 use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::domain::unfinished;
 use crate::ports::port::{PortLimit, create_port, reader_count};
 use crate::ports::reader::subscribe;
-use crate::ports::service::{OUTCOMES, STATUS, ServiceError, WAKE};
+use crate::ports::service::{COMMANDS, OUTCOMES, READY, RESTORE, STATUS, ServiceError, WAKE};
 use crate::ports::services::Services;
 use crate::ports::session::{Access, Events, Session, Values};
 use crate::ports::wake::{Wake, WakeSender};
@@ -60,6 +63,8 @@ pub struct Owner {
     restore: Subscriber<ipc_threadsafe::Service, [u8], RestoreHeader>,
     status: ValueWriter<NodeStatus>,
     wake: WakeSender,
+    /// The request of a far reader.
+    repetition: Repetition,
     /// Number of readers at the last refresh, to notice new readers.
     last_reader_count: Cell<usize>,
     /// Number of the next refreshes that wake the readers.
@@ -103,16 +108,17 @@ impl Owner {
         check_memory(load)?;
         let status = claim_name(&session, &status_service)?;
         let services = Arc::new(Services::access(&session, Access::Create)?);
-        session.restore_orphans(&services.ports());
+        session.restore_orphans(&[services.ports(), orphans::ports(&status_service)].concat());
         let owner = Self {
             preparation: Preparation::new(Arc::clone(&services)),
             wake: wake_sender(&services.wake)?,
-            commands: subscribe(&services.commands)?,
-            ready: subscribe(&services.ready)?,
-            restore: subscribe(&services.restore)?,
+            commands: subscribe(&services.commands, &COMMANDS)?,
+            ready: subscribe(&services.ready, &READY)?,
+            restore: subscribe(&services.restore, &RESTORE)?,
             outcomes: ValueWriter::create(&services.config, &services.outcomes, &OUTCOMES)?,
             writers: LoadWriters::create(&services, load)?,
             status,
+            repetition: Repetition::default(),
             last_reader_count: Cell::new(0),
             wakes_due: Cell::new(0),
             collider_lists: Cell::new((0, 0)),
@@ -178,6 +184,7 @@ impl Owner {
         header: &SnapshotHeader,
         particle: impl Fn(usize) -> ParticleState,
     ) -> Result<(), PublishError> {
+        self.repetition.on_snapshot();
         self.writers.particles.write(*header, particle)
     }
 
@@ -284,8 +291,15 @@ impl Owner {
 
     /// Passes the messages of the members of the lockstep that have arrived to `receive`, as
     /// [`Owner::receive_commands`] does with commands. Whatever a foreign process has written comes too.
-    pub fn receive_ready(&self, receive: impl FnMut(Ready, ConnectionId)) {
-        receive_round(&self.ready, READY_BUFFERED, receive);
+    /// Requests for the latched messages are answered by the next calls of [`Owner::refresh`].
+    pub fn receive_ready(&self, mut receive: impl FnMut(Ready, ConnectionId)) {
+        receive_round(&self.ready, READY_BUFFERED, |message, connection| {
+            if message.tag == Ready::REPEAT_TAG {
+                self.repetition.request();
+            } else {
+                receive(message, connection);
+            }
+        });
     }
 
     /// Appends the states that clients have given, each with the command that its outcome answers: at most
@@ -326,14 +340,19 @@ impl Owner {
         reader_count(&self.services.particles)
     }
 
-    /// Returns the number of readers of `keyframe`, counted like [`Owner::reader_count`].
+    /// Returns the number of readers of `keyframe`, counted like [`Owner::reader_count`], and of all answered
+    /// requests of readers behind a tunnel. A higher number than before means that a reader needs a keyframe.
     pub fn keyframe_reader_count(&self) -> usize {
-        reader_count(&self.services.keyframe)
+        reader_count(&self.services.keyframe) + self.repetition.answered_count()
     }
 
     /// Sends the latched messages to readers that joined since the last call, and wakes them. Cheap:
-    /// call it every step, and while paused.
+    /// call it every step, and while paused. After the request of a reader behind a tunnel, each of the next
+    /// calls also publishes one of the latched messages again.
     pub fn refresh(&self) {
+        if self.repetition.is_due() {
+            self.repetition.publish_next(&self.services, &self.writers);
+        }
         let reader_count = self.total_reader_count();
         if reader_count != self.last_reader_count.replace(reader_count) {
             self.wakes_due.set(WAKES_PER_READER);

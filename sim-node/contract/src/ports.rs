@@ -6,6 +6,7 @@ pub(crate) mod connection;
 pub(crate) mod domain;
 pub(crate) mod latch;
 pub(crate) mod memory;
+pub(crate) mod mirror;
 pub(crate) mod port;
 pub(crate) mod reader;
 pub(crate) mod service;

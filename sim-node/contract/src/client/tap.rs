@@ -4,11 +4,14 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::client::arrivals::{Arrivals, Copied};
 use crate::client::change::LostChanges;
 use crate::client::lockstep::{LockstepError, Member};
+use crate::client::repeats::Repeats;
 use crate::client::request::random_client_id;
 use crate::client::state::{State, StateAssembler};
 use crate::client::watch::listen;
+use crate::clock::monotonic_ns;
 use crate::endpoint::Endpoint;
 use crate::limits::{COMMANDS_PER_STEP_MAX, OUTCOMES_BUFFERED, UPDATES_BUFFERED};
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -39,8 +42,38 @@ const _: () = {
     assert!(2 * every <= UPDATES_BUFFERED);
 };
 
+/// A snapshot.
+#[derive(Debug)]
+enum Held {
+    Shared(SliceSample<ParticleState, SnapshotHeader>),
+    /// From another host.
+    Copied(Copied),
+}
+
+impl Held {
+    fn header(&self) -> &SnapshotHeader {
+        match self {
+            Self::Shared(sample) => sample.user_header(),
+            Self::Copied(copied) => &copied.header,
+        }
+    }
+
+    fn particles(&self) -> &[ParticleState] {
+        match self {
+            Self::Shared(sample) => sample.payload(),
+            Self::Copied(copied) => &copied.particles,
+        }
+    }
+}
+
+/// Longest wait for the next event while a snapshot from another host waits for other messages.
+const ARRIVAL_POLL: Duration = Duration::from_millis(10);
+
 /// Reads everything that an owner publishes, as a sequence of coherent states. The particles are not
-/// copied. Messages of processes that do not own the name are ignored.
+/// copied. Messages of processes that do not own the name are ignored, and so are repeated ones.
+///
+/// Behind a network tunnel, each state comes at least 50 ms late, because it waits for messages that the
+/// tunnel delivers after it, and is copied.
 #[derive(Debug)]
 pub struct Tap {
     listener: WakeListener,
@@ -55,8 +88,13 @@ pub struct Tap {
     keyframe: SliceReader<u8, KeyframeHeader>,
     particles: SliceReader<ParticleState, SnapshotHeader>,
     assembler: StateAssembler,
+    repeats: Repeats,
+    /// The snapshots that have arrived from another host, and wait for other messages.
+    arrivals: Arrivals,
+    /// A keyframe has arrived.
+    has_keyframe: bool,
     /// The snapshot of the newest state.
-    held: Option<SliceSample<ParticleState, SnapshotHeader>>,
+    held: Option<Held>,
     /// The held snapshot has arrived before its load.
     is_early: bool,
     errors: Vec<ReadError>,
@@ -101,9 +139,9 @@ impl Tap {
 
     fn subscribe(attachment: Attachment, member: Option<Member>) -> Result<Self, ServiceError> {
         let attachment = Arc::new(attachment);
-        let (services, source) = (&attachment.services, &Arc::new(Source::new(&attachment)));
+        let (services, source) = (&attachment.services, &Arc::new(Source::new(&attachment.status)));
         // Fields are evaluated in the order written here.
-        Ok(Self {
+        let tap = Self {
             listener: listen(&services.wake)?,
             outcomes: ValueReader::create(&services.outcomes, &OUTCOMES)?.restricted_to(source),
             status: ValueReader::create(&attachment.status, &STATUS)?.restricted_to(source),
@@ -117,12 +155,17 @@ impl Tap {
             keyframe: SliceReader::create(&services.keyframe, &KEYFRAME)?.restricted_to(source),
             particles: SliceReader::create(&services.particles, &PARTICLES)?.restricted_to(source),
             assembler: StateAssembler::default(),
+            repeats: Repeats::default(),
+            arrivals: Arrivals::default(),
+            has_keyframe: false,
             held: None,
             is_early: false,
             errors: Vec::new(),
             member,
-            attachment,
-        })
+            attachment: Arc::clone(&attachment),
+        };
+        attachment.request_latched();
+        Ok(tap)
     }
 
     /// Returns the oldest unread state with everything that belongs to it; `None` if all were read. A
@@ -131,7 +174,10 @@ impl Tap {
     /// `on_message` receives every other message as it arrives. A message can arrive before its state
     /// is published, such as an outcome of a paused node.
     pub fn next_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
-        let arrived = self.particles.next();
+        if self.attachment.is_far() {
+            return self.next_far_state(on_message);
+        }
+        let arrived = self.particles.next().map(|sample| self.unless_repeated(sample));
         self.assemble(arrived, on_message)
     }
 
@@ -139,29 +185,64 @@ impl Tap {
     /// are all changes since the last returned state. `on_message` is the same as in
     /// [`Tap::next_state`].
     pub fn latest_state(&mut self, on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
-        let arrived = self.particles.newest();
+        if self.attachment.is_far() {
+            return self.latest_far_state(on_message);
+        }
+        let arrived = self.particles.newest().map(|sample| self.unless_repeated(sample));
         self.assemble(arrived, on_message)
+    }
+
+    fn unless_repeated(
+        &mut self,
+        sample: Option<SliceSample<ParticleState, SnapshotHeader>>,
+    ) -> Option<Held> {
+        sample.filter(|one| !self.repeats.is_repeated_snapshot(one.user_header())).map(Held::Shared)
+    }
+
+    /// Returns the next state from another host.
+    fn next_far_state(&mut self, mut on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
+        self.receive_far(&mut on_message);
+        let assembler = &self.assembler;
+        let arrived = self.arrivals.next(monotonic_ns(), |header| assembler.has_load(header));
+        self.assemble(Ok(arrived.map(Held::Copied)), on_message)
+    }
+
+    fn latest_far_state(&mut self, mut on_message: impl FnMut(&Update<'_>)) -> Option<State<'_>> {
+        self.receive_far(&mut on_message);
+        let now_ns = monotonic_ns();
+        let (arrivals, assembler) = (&mut self.arrivals, &self.assembler);
+        let has_load = |header: &SnapshotHeader| assembler.has_load(header);
+        let arrived = std::iter::from_fn(|| arrivals.next(now_ns, has_load)).last();
+        self.assemble(Ok(arrived.map(Held::Copied)), on_message)
+    }
+
+    /// Receives the snapshots from another host, then the other messages, and asks for what is missing.
+    fn receive_far(&mut self, on_message: &mut impl FnMut(&Update<'_>)) {
+        while self.arrivals.has_place() {
+            match self.particles.next() {
+                Ok(Some(one)) if self.repeats.is_repeated_snapshot(one.user_header()) => {}
+                Ok(Some(sample)) => {
+                    self.arrivals.add(sample.user_header(), sample.payload(), monotonic_ns());
+                }
+                Ok(None) => break,
+                Err(error) => self.errors.push(error),
+            }
+        }
+        self.receive_updates(on_message);
+        let lacks_load = |header| !self.assembler.has_load(header);
+        if !self.has_keyframe || self.arrivals.first().is_some_and(lacks_load) {
+            self.attachment.request_latched();
+        }
     }
 
     /// Reads the messages up to a snapshot and assembles its state. An owner publishes the particles of
     /// a step last, so the messages that belong to a snapshot have arrived before it.
     fn assemble(
         &mut self,
-        arrived: Result<Option<SliceSample<ParticleState, SnapshotHeader>>, ReadError>,
+        arrived: Result<Option<Held>, ReadError>,
         mut on_message: impl FnMut(&Update<'_>),
     ) -> Option<State<'_>> {
-        let mut assembler = std::mem::take(&mut self.assembler);
-        for _ in 0..READS_MAX {
-            let drained = self.drain_updates(|update| {
-                on_message(&update);
-                assembler.add(&update);
-            });
-            self.errors.extend(drained.errors);
-            if drained.count == 0 {
-                break;
-            }
-        }
-        self.assembler = assembler;
+        self.receive_updates(&mut on_message);
         match arrived {
             // A reader that attaches in the moment of a snapshot can receive it before the load, and a
             // paused node publishes no other.
@@ -172,17 +253,43 @@ impl Tap {
                 self.errors.push(error);
             }
         }
-        let sample = self.held.as_ref()?;
-        self.is_early = !self.assembler.has_load(sample.user_header());
+        let held = self.held.as_ref()?;
+        self.is_early = !self.assembler.has_load(held.header());
         if self.is_early {
             return None;
         }
         if let Some(member) = &mut self.member
-            && member.takes_part(sample.user_header())
+            && member.takes_part(held.header())
         {
-            member.begin_turn(sample.user_header());
+            member.begin_turn(held.header());
         }
-        self.assembler.assemble(sample.user_header(), sample.payload())
+        self.assembler.assemble(held.header(), held.particles())
+    }
+
+    /// Receives all messages except snapshots. A repeated one is for readers behind a tunnel.
+    fn receive_updates(&mut self, on_message: &mut impl FnMut(&Update<'_>)) {
+        let mut assembler = std::mem::take(&mut self.assembler);
+        let mut repeats = std::mem::take(&mut self.repeats);
+        let mut arrivals = std::mem::take(&mut self.arrivals);
+        let mut has_keyframe = self.has_keyframe;
+        for _ in 0..READS_MAX {
+            let drained = self.drain_updates(|update| {
+                if !repeats.is_repeated(&update) {
+                    has_keyframe |= matches!(update, Update::Keyframe(..));
+                    arrivals.note(&update);
+                    on_message(&update);
+                    assembler.add(&update);
+                }
+            });
+            self.errors.extend(drained.errors);
+            if drained.count == 0 {
+                break;
+            }
+        }
+        self.assembler = assembler;
+        self.repeats = repeats;
+        self.arrivals = arrivals;
+        self.has_keyframe = has_keyframe;
     }
 
     /// Lets the owner go on, if it waits for this tap. Call it when all states were read. A tap that is no
@@ -226,7 +333,8 @@ impl Tap {
     /// Waits until the owner wakes its readers, a signal arrives, or `timeout` has passed. An event since
     /// the last wait ends it at once.
     pub fn wait(&self, timeout: Duration) {
-        self.listener.wait(timeout);
+        let is_near = self.arrivals.is_empty();
+        self.listener.wait(if is_near { timeout } else { timeout.min(ARRIVAL_POLL) });
     }
 
     /// Returns `true` if the process that owns the name is alive. Reads the file system: call it a few

@@ -18,7 +18,7 @@ pub struct Ready {
     pub step: u64,
     /// The member takes part at the steps that are multiples of this number, at least 1.
     pub every: u32,
-    /// Always [`Ready::TAG`]. Anything else is refused.
+    /// [`Ready::TAG`] or [`Ready::REPEAT_TAG`]. Anything else is refused.
     pub tag: u32,
 }
 
@@ -27,6 +27,9 @@ const _: () = assert!(size_of::<Ready>() == 32 && align_of::<Ready>() == 8);
 impl Ready {
     /// Marks a message of this service. Random bytes are unlikely to contain it.
     pub const TAG: u32 = u32::from_le_bytes(*b"redy");
+    /// Marks a request: the owner shall publish the latched messages again, because a tunnel gives its
+    /// late readers none. It joins nothing, and the other fields do not matter.
+    pub const REPEAT_TAG: u32 = u32::from_le_bytes(*b"rept");
 
     /// Returns `true` if the message is one of this service.
     pub fn is_valid(&self) -> bool {

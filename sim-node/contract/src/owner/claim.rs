@@ -1,4 +1,4 @@
-//! The claim of a name: its lock, and the one publisher of `status`.
+//! The claim of a name: its lock, and the owner's publisher of `status`.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::owner::error::OwnerError;
 use crate::ports::domain::owner_lock::{LockError, OwnerLock};
 use crate::ports::domain::root::RootError;
 use crate::ports::domain::{self, orphans, root, unfinished};
-use crate::ports::service::{STATUS, ServiceError};
+use crate::ports::service::{OWNER_PORT, STATUS, ServiceError};
 use crate::ports::services::owner;
 use crate::ports::session::{Session, Values};
 use crate::ports::writer::ValueWriter;
@@ -53,27 +53,85 @@ pub(super) fn take_lock(endpoint: &Endpoint) -> Result<OwnerLock, OwnerError> {
     }
 }
 
-/// Creates the one possible publisher of `status`. It exists already where a process owns the name
-/// without its lock, such as one in a container with another root; and for a killed owner, until a
-/// process has cleaned up after it.
+/// Creates the publisher of `status` by which others know the owner. The caller holds the lock of the name,
+/// but a process may own the name without it, such as one in a container with another root. The place can be
+/// taken by a killed owner, until a process has cleaned up after it; the other place is a tunnel's.
 pub(super) fn claim_name(
     session: &Session,
     service: &Values<NodeStatus>,
 ) -> Result<ValueWriter<NodeStatus>, OwnerError> {
     let deadline = Deadline::after(CLEANUP_MAX);
     loop {
-        match ValueWriter::create(session.config(), service, &STATUS) {
-            Err(ServiceError::Full { .. }) => {
-                let owner = owner(service);
-                if owner.is_some() || deadline.remaining().is_zero() {
-                    let process_id = owner.and_then(|process| process.id);
-                    let endpoint = session.endpoint.clone();
-                    return Err(OwnerError::NameTaken { endpoint, process_id });
-                }
+        if let Some(process) = owner(service) {
+            let endpoint = session.endpoint.clone();
+            return Err(OwnerError::NameTaken { endpoint, process_id: process.id });
+        }
+        match ValueWriter::create_named(session.config(), service, &STATUS, OWNER_PORT) {
+            Err(ServiceError::Full { .. }) if !deadline.remaining().is_zero() => {
                 session.restore_orphans(&orphans::ports(service));
                 clock::sleep_until(clock::monotonic_ns() + LOCK_PAUSE_NS);
             }
             status => return Ok(status?),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use sim_types::ParameterValues;
+
+    use super::*;
+    use crate::messages::topology::LoadHeader;
+    use crate::owner::Owner;
+    use crate::owner::load::Load;
+    use crate::ports::session::Access;
+    use crate::testing::TestDomain;
+
+    fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
+        let load = Load {
+            header: LoadHeader::default(),
+            scene: b"",
+            constraints: &[],
+            triangles: &[],
+            collider_count: 0,
+            keyframe_size_bytes_max: 0,
+            parameters: ParameterValues::DEFAULT,
+        };
+        Owner::create(endpoint, &load)
+    }
+
+    /// A tunnel's publisher of `status`.
+    fn tunnel(session: &Session) -> ValueWriter<NodeStatus> {
+        let service = session.values(&STATUS, Access::Open).unwrap();
+        ValueWriter::create(session.config(), &service, &STATUS).unwrap()
+    }
+
+    #[test]
+    fn the_place_of_a_tunnel_is_not_that_of_a_second_owner() {
+        let domain = TestDomain::new();
+        let _first = create_owner(&domain.endpoint()).unwrap();
+        // Even without the lock, whose files a person has removed.
+        let config = domain::configuration(Some(domain.name())).unwrap();
+        for path in OwnerLock::paths(&config, "sim") {
+            fs::remove_file(path).unwrap();
+        }
+        let error = create_owner(&domain.endpoint()).unwrap_err();
+        assert!(matches!(error, OwnerError::NameTaken { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_tunnel_does_not_own_the_name() {
+        let domain = TestDomain::new();
+        let first = create_owner(&domain.endpoint()).unwrap();
+        let session = Session::join(&domain.endpoint()).unwrap();
+        let status = session.values(&STATUS, Access::Open).unwrap();
+        let _tunnel = tunnel(&session);
+        assert!(owner(&status).is_some());
+        drop(first);
+        assert!(owner(&status).is_none());
+        let _second = create_owner(&domain.endpoint()).unwrap();
+        assert!(owner(&status).is_some());
     }
 }

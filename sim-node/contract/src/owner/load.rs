@@ -1,5 +1,6 @@
 //! The data that an owner publishes per load, and the writers whose sizes follow from it.
 
+use std::cell::RefCell;
 use std::fs::File;
 
 use crate::messages::collider::{ColliderState, CollidersHeader};
@@ -51,13 +52,14 @@ impl Load<'_> {
 pub(crate) struct LoadWriters {
     pub(crate) particles: SliceWriter<ParticleState, SnapshotHeader>,
     pub(crate) keyframe: SliceWriter<u8, KeyframeHeader>,
-    // These three publish only the load, so they have memory for one message of exactly its length.
-    scene: SliceWriter<u8, LoadHeader>,
-    topology: SliceWriter<ConstraintState, LoadHeader>,
-    surface: SliceWriter<Triangle, LoadHeader>,
-    tears: SliceWriter<TornConstraint, TearsHeader>,
-    parameters: SliceWriter<ParameterState, ParametersHeader>,
-    colliders: SliceWriter<ColliderState, CollidersHeader>,
+    // These three publish only the load, so they have memory for one message of exactly its length. New
+    // writers replace them when they publish it again.
+    pub(super) scene: RefCell<SliceWriter<u8, LoadHeader>>,
+    pub(super) topology: RefCell<SliceWriter<ConstraintState, LoadHeader>>,
+    pub(super) surface: RefCell<SliceWriter<Triangle, LoadHeader>>,
+    pub(super) tears: SliceWriter<TornConstraint, TearsHeader>,
+    pub(super) parameters: SliceWriter<ParameterState, ParametersHeader>,
+    pub(super) colliders: SliceWriter<ColliderState, CollidersHeader>,
 }
 
 /// Memory of the writers of a load.
@@ -109,9 +111,17 @@ impl LoadWriters {
         Ok(Self {
             particles: SliceWriter::create(config, &services.particles, capacities.particles)?,
             keyframe: SliceWriter::create(config, &services.keyframe, capacities.keyframe)?,
-            scene: SliceWriter::create(config, &services.scene, capacities.scene)?,
-            topology: SliceWriter::create(config, &services.topology, capacities.topology)?,
-            surface: SliceWriter::create(config, &services.surface, capacities.surface)?,
+            scene: RefCell::new(SliceWriter::create(config, &services.scene, capacities.scene)?),
+            topology: RefCell::new(SliceWriter::create(
+                config,
+                &services.topology,
+                capacities.topology,
+            )?),
+            surface: RefCell::new(SliceWriter::create(
+                config,
+                &services.surface,
+                capacities.surface,
+            )?),
             tears: SliceWriter::create(config, &services.tears, capacities.tears)?,
             parameters: SliceWriter::create(config, &services.parameters, capacities.parameters)?,
             colliders: SliceWriter::create(config, &services.colliders, capacities.colliders)?,
@@ -123,9 +133,9 @@ impl LoadWriters {
         vec![
             self.particles.close(),
             self.keyframe.close(),
-            self.scene.close(),
-            self.topology.close(),
-            self.surface.close(),
+            self.scene.into_inner().close(),
+            self.topology.into_inner().close(),
+            self.surface.into_inner().close(),
             self.tears.close(),
             self.parameters.close(),
             self.colliders.close(),
@@ -142,10 +152,14 @@ impl LoadWriters {
     pub(crate) fn publish(&self, load: &Load<'_>) -> Result<(), PublishError> {
         let scene_hash = scene_hash(load.scene);
         let header = |count| LoadHeader { scene_hash, count, ..load.header };
-        self.scene.write(header(payload_count(load.scene)), |index| load.scene[index])?;
+        self.scene.borrow().write(header(payload_count(load.scene)), |index| load.scene[index])?;
         let constraints = load.constraints;
-        self.topology.write(header(payload_count(constraints)), |index| constraints[index])?;
-        self.surface.write(header(payload_count(load.triangles)), |index| load.triangles[index])?;
+        self.topology
+            .borrow()
+            .write(header(payload_count(constraints)), |index| constraints[index])?;
+        self.surface
+            .borrow()
+            .write(header(payload_count(load.triangles)), |index| load.triangles[index])?;
         let LoadHeader { run_id, step, .. } = load.header;
         self.publish_parameters(run_id, step, &load.parameters)?;
         self.publish_tears(
@@ -186,9 +200,9 @@ impl LoadWriters {
     /// Sends the latched messages to readers that joined since the last call. The particles come last,
     /// as in the order of publication.
     pub(crate) fn refresh(&self) {
-        self.scene.refresh();
-        self.topology.refresh();
-        self.surface.refresh();
+        self.scene.borrow().refresh();
+        self.topology.borrow().refresh();
+        self.surface.borrow().refresh();
         self.colliders.refresh();
         self.tears.refresh();
         self.parameters.refresh();

@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use std::sync::Once;
 use std::time::Duration;
 
+use crate::limits::{MIRROR_BORROWED_MIN, MIRROR_BUFFERED_MIN, MIRROR_PORTS_MAX, PARTICIPANTS_MAX};
 use iceoryx2::prelude::{
     Config, FileName, LogLevel, Path, SemanticString, SemanticStringError,
     set_log_level_from_env_or,
@@ -56,6 +57,23 @@ fn adapt(config: &mut Config) {
     global.node.cleanup_dead_nodes_on_creation = false;
     global.node.cleanup_dead_nodes_on_destruction = false;
     global.service.cleanup_dead_nodes_on_open = false;
+    adapt_mirrors(config);
+}
+
+/// Sets the quality of service of the mirrors that a tunnel creates, and of other services without one of
+/// their own. Those of the contract have it.
+fn adapt_mirrors(config: &mut Config) {
+    let services = &mut config.defaults.publish_subscribe;
+    services.max_publishers = MIRROR_PORTS_MAX;
+    services.max_subscribers = MIRROR_PORTS_MAX;
+    services.max_nodes = PARTICIPANTS_MAX;
+    services.subscriber_max_buffer_size = MIRROR_BUFFERED_MIN;
+    services.subscriber_max_borrowed_samples = MIRROR_BORROWED_MIN;
+    services.publisher_history_size = 1;
+    let events = &mut config.defaults.event;
+    events.max_notifiers = MIRROR_PORTS_MAX;
+    events.max_listeners = MIRROR_PORTS_MAX;
+    events.max_nodes = PARTICIPANTS_MAX;
 }
 
 /// Returns the prefix of the domain's files in `/dev/shm`.

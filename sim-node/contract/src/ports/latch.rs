@@ -7,6 +7,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use crate::ports::port::SliceHeader;
 use crate::ports::reader::{ReadError, SliceReader, SliceSample};
 use crate::ports::service::{ServiceError, ServiceSpec};
+use crate::ports::services::Attachment;
 use crate::ports::session::Slices;
 
 /// A reader that keeps its newest message.
@@ -21,9 +22,15 @@ impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> Latch<T, H> {
         Ok(Self { reader: SliceReader::create(service, spec)?, kept: None })
     }
 
-    /// Returns the newest message; `None` if none has arrived yet.
-    pub(crate) fn newest(&mut self) -> Result<Option<&SliceSample<T, H>>, ReadError> {
+    /// Returns the newest message; `None` if none has arrived yet. Then it asks an owner on another host.
+    pub(crate) fn newest(
+        &mut self,
+        attachment: &Attachment,
+    ) -> Result<Option<&SliceSample<T, H>>, ReadError> {
         self.reader.replace_by_newest(&mut self.kept)?;
+        if self.kept.is_none() {
+            attachment.request_latched();
+        }
         Ok(self.kept.as_ref())
     }
 }

@@ -71,7 +71,7 @@ pub(crate) struct SliceReader<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
 
 impl<T: Debug + ZeroCopySend + 'static, H: SliceHeader> SliceReader<T, H> {
     pub(crate) fn create(service: &Slices<T, H>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
-        let subscriber = subscribe(service)?;
+        let subscriber = subscribe(service, spec)?;
         let service = service.name().to_string();
         let ServiceSpec { buffered, borrowed, .. } = *spec;
         Ok(Self { subscriber, service, buffered, borrowed, source: None })
@@ -150,7 +150,7 @@ pub(crate) struct ValueReader<T: Debug + Copy + ZeroCopySend + 'static> {
 
 impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
     pub(crate) fn create(service: &Values<T>, spec: &ServiceSpec) -> Result<Self, ServiceError> {
-        let subscriber = subscribe(service)?;
+        let subscriber = subscribe(service, spec)?;
         let (service, buffered) = (service.name().to_string(), spec.buffered);
         Ok(Self { subscriber, service, buffered, source: None })
     }
@@ -194,8 +194,11 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueReader<T> {
     }
 }
 
+/// Connects a reader. It receives the latched message only where the contract has one: the mirror of a tunnel
+/// latches every service.
 pub(crate) fn subscribe<P, H>(
     service: &publish_subscribe::PortFactory<ipc_threadsafe::Service, P, H>,
+    spec: &ServiceSpec,
 ) -> Result<Subscriber<ipc_threadsafe::Service, P, H>, ServiceError>
 where
     P: Debug + IceoryxSend + ?Sized,
@@ -203,7 +206,9 @@ where
 {
     let full = SubscriberCreateError::ExceedsMaxSupportedSubscribers;
     let limit = PortLimit { ports: "readers", max: service.static_config().max_subscribers() };
-    create_port(service, &full, limit, || service.subscriber_builder().create())
+    create_port(service, &full, limit, || {
+        service.subscriber_builder().history_request(spec.history).create()
+    })
 }
 
 /// Receives the next message of an accepted publisher.

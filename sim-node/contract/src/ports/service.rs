@@ -20,6 +20,9 @@ use crate::ports::memory::MemoryError;
 /// The service attribute that holds the version of the contract.
 pub(crate) const VERSION_KEY: &str = "contract_version";
 
+/// Name of the owner's publisher of `status`, by which other processes know it.
+pub(crate) const OWNER_PORT: &str = "owner";
+
 /// Treatment of a message for a reader with a full buffer. The writer never waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WhenFull {
@@ -217,6 +220,20 @@ pub enum ServiceError {
         actual: String,
         /// Version of this program.
         expected: u32,
+    },
+    /// The mirror of a network tunnel holds too few messages.
+    #[error(
+        "service '{service}' is the mirror of a tunnel that was started with {actual} {quality}, but at least {min} are needed: start the tunnel in a folder whose config/iceoryx2.toml `sim-node doctor --iox2-config` has printed"
+    )]
+    PoorMirror {
+        /// Full name of the service.
+        service: String,
+        /// The quality of service, in the plural.
+        quality: &'static str,
+        /// Its value.
+        actual: usize,
+        /// Its least value.
+        min: usize,
     },
     /// A foreign service has the name.
     #[error(

@@ -1,6 +1,7 @@
 //! All services of a name, and the process that owns the name.
 
-use iceoryx2::identifiers::UniqueNodeId;
+use std::sync::Arc;
+
 use iceoryx2::node::NodeView;
 use iceoryx2::prelude::{CallbackProgression, Config, NodeState, PortFactory};
 use sim_types::CLIENT_ID_END;
@@ -18,11 +19,13 @@ use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::ports::domain::orphans::{self, Port};
+use crate::ports::mirror::Mirror;
 use crate::ports::service::{
     COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE, SCENE, STATUS,
     SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::session::{Access, Events, Session, Slices, Values};
+use crate::ports::source::{is_mirror, owner_nodes};
 
 /// The services of a name, except `status`.
 #[derive(Debug)]
@@ -140,32 +143,22 @@ pub(crate) struct OwnerProcess {
     pub(crate) id: Option<u32>,
 }
 
-/// Returns the iceoryx2 nodes of the publishers of `status`, living or dead.
-fn publisher_nodes(status: &Values<NodeStatus>) -> Vec<UniqueNodeId> {
-    let mut nodes = Vec::new();
-    status.dynamic_config().list_publishers(|publisher| {
-        nodes.push(publisher.node_id);
-        CallbackProgression::Continue
-    });
-    nodes
-}
-
-/// Returns the living process that owns the name: the publisher of `status`.
+/// Returns the living process of this host that owns the name.
 pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
-    let publisher_nodes = publisher_nodes(status);
+    let owner_nodes = owner_nodes(status);
     let mut owner = None;
-    if publisher_nodes.is_empty() {
+    if owner_nodes.is_empty() {
         return owner;
     }
     let listed = status.nodes(|node| match node {
-        NodeState::Alive(node) if publisher_nodes.contains(node.id()) => {
+        NodeState::Alive(node) if owner_nodes.contains(node.id()) => {
             let id = node.details().as_ref().map(|details| details.process_id().value());
             owner = Some(OwnerProcess { id: id.and_then(|id| u32::try_from(id).ok()) });
             CallbackProgression::Stop
         }
         _ => CallbackProgression::Continue,
     });
-    // If iceoryx2 cannot list the nodes, the publisher counts as alive.
+    // If iceoryx2 cannot list the nodes, the owner counts as alive.
     if listed.is_err() { Some(OwnerProcess { id: None }) } else { owner }
 }
 
@@ -173,7 +166,9 @@ pub(crate) fn owner(status: &Values<NodeStatus>) -> Option<OwnerProcess> {
 #[derive(Debug)]
 pub(crate) struct Attachment {
     pub(crate) services: Services,
-    pub(crate) status: Values<NodeStatus>,
+    pub(crate) status: Arc<Values<NodeStatus>>,
+    /// The connection to an owner on another host; `None` for one on this host.
+    mirror: Option<Mirror>,
     // Dropped last: the services belong to its node.
     pub(crate) session: Session,
 }
@@ -188,29 +183,65 @@ impl Attachment {
             Err(ServiceError::Missing { service, .. }) => {
                 return Err(no_node(&session, format!("service '{service}' does not exist")));
             }
-            result => result?,
+            result => Arc::new(result?),
         };
+        let is_mirror = is_mirror(&status);
         for _ in 0..ATTEMPTS_MAX {
-            if owner(&status).is_none() {
+            if !is_mirror && owner(&status).is_none() {
                 break;
             }
             match Services::access(&session, Access::Open) {
                 Err(ServiceError::Missing { .. }) => session.pause(),
-                services => return Ok(Self { services: services?, status, session }),
+                services if is_mirror => return Self::open_mirror(session, status, services?),
+                services => {
+                    return Ok(Self { services: services?, status, mirror: None, session });
+                }
             }
         }
         let service = session.service_name(&STATUS);
         Err(no_node(&session, format!("service '{service}' has no live publisher")))
     }
 
+    /// Connects to an owner on another host.
+    fn open_mirror(
+        session: Session,
+        status: Arc<Values<NodeStatus>>,
+        services: Services,
+    ) -> Result<Self, AttachError> {
+        let Services { particles, ready, .. } = &services;
+        if let Some(mirror) = Mirror::connect(&session, &status, particles, ready)? {
+            return Ok(Self { services, status, mirror: Some(mirror), session });
+        }
+        let service = session.service_name(&STATUS);
+        let detail = format!(
+            "service '{service}' is the mirror of a tunnel, through which no status arrives"
+        );
+        Err(no_node(&session, detail))
+    }
+
     pub(crate) fn owner(&self) -> Option<OwnerProcess> {
+        if let Some(mirror) = &self.mirror {
+            return mirror.is_owner_alive().then_some(OwnerProcess { id: None });
+        }
         owner(&self.status).or_else(|| self.unlisted_owner())
+    }
+
+    /// Returns `true` if the owner is on another host, behind a tunnel.
+    pub(crate) fn is_far(&self) -> bool {
+        self.mirror.is_some()
+    }
+
+    /// Asks an owner on another host for the latched messages. On this host, readers receive them anyway.
+    pub(crate) fn request_latched(&self) {
+        if let Some(mirror) = &self.mirror {
+            mirror.request_latched();
+        }
     }
 
     /// Returns an owner that iceoryx2 takes for dead, because a cleaner of `/tmp` has removed the files of
     /// its node. It still holds the lock of the name.
     fn unlisted_owner(&self) -> Option<OwnerProcess> {
-        let has_publisher = !publisher_nodes(&self.status).is_empty();
+        let has_publisher = !owner_nodes(&self.status).is_empty();
         has_publisher.then(|| self.session.lock_holder()).flatten().map(|id| OwnerProcess { id })
     }
 }

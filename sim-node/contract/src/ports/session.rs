@@ -6,8 +6,8 @@ use std::fs::File;
 use std::time::Duration;
 
 use iceoryx2::prelude::{
-    AttributeVerifier, Config, IceoryxSend, Node, NodeBuilder, NodeName, SemanticStringError,
-    Service, ServiceName, SignalHandlingMode, ZeroCopySend, ipc_threadsafe,
+    AttributeSet, AttributeVerifier, Config, IceoryxSend, Node, NodeBuilder, NodeName, PortFactory,
+    SemanticStringError, Service, ServiceName, SignalHandlingMode, ZeroCopySend, ipc_threadsafe,
 };
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory;
@@ -106,6 +106,14 @@ impl Session {
         Ok(Self { endpoint: endpoint.clone(), node, contract_version, version, _root: root })
     }
 
+    /// Joins as a tunnel does: its services have no version.
+    #[cfg(test)]
+    pub(crate) fn join_without_version(endpoint: &Endpoint) -> Result<Self, ServiceError> {
+        let mut session = Self::join(endpoint)?;
+        session.version = AttributeVerifier::new();
+        Ok(session)
+    }
+
     /// Frees the places of those of these ports whose dead processes iceoryx2 has forgotten. For the holder
     /// of the lock of the name.
     pub(crate) fn restore_orphans(&self, ports: &[Port]) {
@@ -150,7 +158,7 @@ impl Session {
             let builder = self.node.service_builder(name).publish_subscribe::<[T]>();
             let builder = builder.user_header::<H>();
             match access {
-                Access::Open => Ok(builder.open_with_attributes(&self.version)?),
+                Access::Open => self.of_this_version(builder.open()?),
                 Access::Create => {
                     Ok(with_quality(builder, spec).open_or_create_with_attributes(&self.version)?)
                 }
@@ -170,7 +178,7 @@ impl Session {
         self.retry(spec, access, |name| {
             let builder = self.node.service_builder(name).publish_subscribe::<T>();
             match access {
-                Access::Open => Ok(builder.open_with_attributes(&self.version)?),
+                Access::Open => self.of_this_version(builder.open()?),
                 Access::Create => {
                     Ok(with_quality(builder, spec).open_or_create_with_attributes(&self.version)?)
                 }
@@ -183,7 +191,7 @@ impl Session {
         self.retry(&WAKE, access, |name| {
             let builder = self.node.service_builder(name).event();
             match access {
-                Access::Open => Ok(builder.open_with_attributes(&self.version)?),
+                Access::Open => self.of_this_version(builder.open()?),
                 Access::Create => Ok(builder
                     .max_notifiers(WAKE.publishers_max)
                     .max_listeners(WAKE.readers_max)
@@ -194,6 +202,22 @@ impl Session {
                     .open_or_create_with_attributes(&self.version)?),
             }
         })
+    }
+
+    /// Refuses a service of another version. One without a version is the mirror of a tunnel; the version
+    /// is in its messages.
+    fn of_this_version<S: PortFactory>(&self, service: S) -> Result<S, Cause> {
+        match version_of(service.attributes()) {
+            Some(version) if version != self.contract_version.to_string() => {
+                Err(Cause::Incompatible(format!("contract version {version}")))
+            }
+            _ => Ok(service),
+        }
+    }
+
+    /// Returns the version of the contract of this program.
+    pub(crate) fn contract_version(&self) -> u32 {
+        self.contract_version
     }
 
     pub(crate) fn config(&self) -> &Config {
@@ -275,8 +299,7 @@ impl Session {
         let name = ServiceName::new(service).ok()?;
         let details =
             ipc_threadsafe::Service::details(&name, self.node.config(), spec.pattern).ok()??;
-        let attributes = details.static_details.attributes();
-        attributes.key_value(&VERSION_KEY.try_into().ok()?, 0).map(ToString::to_string)
+        version_of(details.static_details.attributes())
     }
 }
 
@@ -290,6 +313,12 @@ fn node_name(endpoint: &Endpoint) -> Result<NodeName, SemanticStringError> {
     let program: String =
         program.map(|one| if one.is_ascii_graphic() { one } else { '?' }).collect();
     NodeName::new(&format!("{program}:{}", endpoint.name()))
+}
+
+/// Returns the contract version in the attributes of a service; `None` for the mirror of a tunnel.
+pub(crate) fn version_of(attributes: &AttributeSet) -> Option<String> {
+    let key = VERSION_KEY.try_into().ok()?;
+    attributes.key_value(&key, 0).map(ToString::to_string)
 }
 
 /// Returns the attribute of every service of a contract version.

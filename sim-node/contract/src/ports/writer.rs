@@ -7,7 +7,7 @@ use iceoryx2::identifiers::UniquePublisherId;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::{
-    BackpressureStrategy, Config, IceoryxSend, PortFactory, ZeroCopySend, ipc_threadsafe,
+    BackpressureStrategy, Config, IceoryxSend, PortFactory, PortName, ZeroCopySend, ipc_threadsafe,
 };
 use iceoryx2::service::port_factory::publish_subscribe;
 use thiserror::Error;
@@ -80,7 +80,7 @@ pub(crate) struct SliceWriter<T: Debug + ZeroCopySend + 'static, H: SliceHeader>
     /// The memory of its messages.
     segment: File,
     service: String,
-    len_max: usize,
+    capacity: Capacity,
 }
 
 impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H> {
@@ -102,7 +102,7 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
         })?;
         let service = service.name().to_string();
         let segment = allocate(config, publisher.id(), &service)?;
-        Ok(Self { publisher, segment, service, len_max })
+        Ok(Self { publisher, segment, service, capacity })
     }
 
     /// Publishes `element(0)`, `element(1)`, ... as one message of `header.element_count()` elements.
@@ -117,7 +117,12 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
 
     /// Returns the most elements of a message.
     pub(crate) fn len_max(&self) -> usize {
-        self.len_max
+        self.capacity.len_max
+    }
+
+    /// Returns the memory of the writer.
+    pub(crate) fn capacity(&self) -> Capacity {
+        self.capacity
     }
 
     /// Same as [`Self::write`]. Returns the number of readers that received the message.
@@ -127,8 +132,9 @@ impl<T: Debug + Copy + ZeroCopySend + 'static, H: SliceHeader> SliceWriter<T, H>
         element: impl Fn(usize) -> T,
     ) -> Result<usize, PublishError> {
         let len = usize::try_from(header.element_count()).unwrap_or(usize::MAX);
-        if len > self.len_max {
-            let (service, len_max) = (self.service.clone(), self.len_max);
+        let len_max = self.capacity.len_max;
+        if len > len_max {
+            let service = self.service.clone();
             return Err(PublishError::TooLong { service, len, len_max });
         }
         let failed = |error: &dyn Debug| PublishError::failed(&self.service, error);
@@ -164,10 +170,23 @@ impl<T: Debug + Copy + ZeroCopySend + 'static> ValueWriter<T> {
         service: &Values<T>,
         spec: &ServiceSpec,
     ) -> Result<Self, ServiceError> {
+        Self::create_named(config, service, spec, "")
+    }
+
+    /// Same as [`Self::create`]. Other processes see the name of the port.
+    pub(crate) fn create_named(
+        config: &Config,
+        service: &Values<T>,
+        spec: &ServiceSpec,
+        port: &str,
+    ) -> Result<Self, ServiceError> {
         let samples = spec.samples_in_use_max();
+        let port = PortName::new(port)
+            .map_err(|error| ServiceError::failed(&service.name().to_string(), &error))?;
         let publisher = create_publisher(service, || {
             service
                 .publisher_builder()
+                .name(&port)
                 .max_loaned_samples(1)
                 .override_sample_preallocation(move |_| samples)
                 .backpressure_strategy(BackpressureStrategy::DiscardData)

@@ -239,13 +239,17 @@ fn command_numbers() -> [Numbers; 8] {
         ("`flags` of an outcome, bits", flags.to_vec()),
         ("`parameter`", parameters),
         ("`contents` of a restore", contents.map(|(one, name)| (one as u32, name)).to_vec()),
-        ("`tag` of a member's message", vec![(Ready::TAG, "ready")]),
+        ("`tag` of a member's message", vec![(Ready::TAG, "ready"), (Ready::REPEAT_TAG, "repeat")]),
     ]
 }
 
 fn state_numbers() -> [Numbers; 9] {
     let snapshot = [(SnapshotFlags::PAUSED, "paused"), (SnapshotFlags::REPLAY, "replay")];
-    let status = [(StatusFlags::PAUSED, "paused"), (StatusFlags::REPLAY, "replay")];
+    let status = [
+        (StatusFlags::PAUSED, "paused"),
+        (StatusFlags::REPLAY, "replay"),
+        (StatusFlags::AT_END, "at end"),
+    ];
     let causes = TearCause::ALL.map(|one| (one as u32, one.name()));
     let events = [
         (Wake::Frame, "frame"),

@@ -65,6 +65,12 @@ impl OwnerLock {
         })
     }
 
+    /// Returns the paths of the files of a lock.
+    #[cfg(test)]
+    pub(crate) fn paths(config: &Config, name: &str) -> [PathBuf; 2] {
+        paths(config, name)
+    }
+
     /// Returns the files of the lock of a name that a killed owner has left, and no other has taken.
     pub(crate) fn left_files(config: &Config, name: &str) -> Vec<PathBuf> {
         let is_left = |path: &PathBuf| File::open(path).is_ok_and(|file| !is_locked(&file));
