@@ -8,8 +8,9 @@ use std::process::Command;
 
 /// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
 const PROGRAMS: [&str; 4] = ["sim-node", "recorder", "viewer-bridge", "integration-tests"];
-const PACKAGES: [&str; 8] = [
+const PACKAGES: [&str; 9] = [
     "sim-types",
+    "sim-cli",
     "sim-contract",
     "sim-solver",
     "sim-lessons",
