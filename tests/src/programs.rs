@@ -37,6 +37,12 @@ pub enum Program {
     Python,
     /// Node.js from the search path, for scripts whose packages `.ci/run` installs in `tests/node`.
     Node,
+    /// The shell, for completion scripts.
+    Bash,
+    /// The formatter of man pages, from the search path.
+    Groff,
+    /// The program that checks units of systemd, from the search path.
+    SystemdAnalyze,
 }
 
 impl Program {
@@ -59,6 +65,9 @@ impl Program {
             Self::Hold => built().join("examples/hold"),
             // Found through the search path.
             Self::Node => PathBuf::from("node"),
+            Self::Bash => PathBuf::from("bash"),
+            Self::Groff => PathBuf::from("groff"),
+            Self::SystemdAnalyze => PathBuf::from("systemd-analyze"),
             Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),
         }
     }
