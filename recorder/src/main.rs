@@ -12,6 +12,7 @@ mod simulation;
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
+use sim_cli::DocumentVerb;
 
 use cli::exit::{self, Exit};
 use commands::{
@@ -70,6 +71,8 @@ enum Command {
     State(state::StateArgs),
     /// Re-simulate a recording and compare every bit
     Verify(verify::VerifyArgs),
+    #[command(flatten)]
+    Document(DocumentVerb),
 }
 
 fn main() -> Exit {
@@ -92,6 +95,7 @@ fn run(command: &Command) -> anyhow::Result<Exit> {
         Command::Simulate(args) => simulate::run(args),
         Command::State(args) => state::run(args),
         Command::Verify(args) => verify::run(args),
+        Command::Document(document) => document.run(Args::command()).map(|()| Exit::Done),
     }
 }
 

@@ -17,6 +17,7 @@ use std::ffi::OsString;
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use sim_cli::DocumentVerb;
 use sim_contract::console;
 
 pub(crate) use bench::{BenchArgs, BenchClientArgs, ClientRole};
@@ -85,6 +86,8 @@ pub(crate) enum Verb {
     BenchClient(BenchClientArgs),
     /// Print tables that teach the physics: Euler, iterations, stiffness, 32-bit numbers
     Lesson(LessonArgs),
+    #[command(flatten)]
+    Document(DocumentVerb),
 }
 
 /// Reads the command line. Exits with code 2 and the usage if it is invalid, and with 0 after a help

@@ -15,7 +15,8 @@ mod scene_source;
 mod scenes;
 mod table;
 
-use args::Verb;
+use args::{Args, Verb};
+use clap::CommandFactory;
 use exit::Exit;
 
 fn main() -> Exit {
@@ -36,6 +37,7 @@ fn main() -> Exit {
         Some(Verb::Bench(options)) => bench::bench(&options),
         Some(Verb::BenchClient(client)) => bench::client::run(&client),
         Some(Verb::Lesson(lesson)) => lesson::lesson(&lesson),
+        Some(Verb::Document(document)) => document.run(Args::command()),
     };
     exit::from_result(result.map(|()| Exit::Done))
 }

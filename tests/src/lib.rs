@@ -20,3 +20,8 @@ pub use rustix::process::Signal;
 pub use sandbox::Sandbox;
 pub use streams::{Stream, Streams};
 pub use wait::{DEADLINE, Deadline, wait_for};
+
+/// Compiles the programs in the README.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct ReadmeDoctests;

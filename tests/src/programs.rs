@@ -43,6 +43,12 @@ pub enum Program {
     Python,
     /// Node.js from the search path, for scripts whose packages `.ci/run` installs in `tests/node`.
     Node,
+    /// The shell, for completion scripts.
+    Bash,
+    /// The formatter of man pages, from the search path.
+    Groff,
+    /// The program that checks units of systemd, from the search path.
+    SystemdAnalyze,
 }
 
 impl Program {
@@ -68,6 +74,9 @@ impl Program {
             Self::HoldInCpp => built().join("hold"),
             // Found through the search path.
             Self::Node => PathBuf::from("node"),
+            Self::Bash => PathBuf::from("bash"),
+            Self::Groff => PathBuf::from("groff"),
+            Self::SystemdAnalyze => PathBuf::from("systemd-analyze"),
             Self::Python => Path::new(env!("CARGO_MANIFEST_DIR")).join("../.venv/bin/python3"),
         }
     }

@@ -8,9 +8,10 @@ use std::process::Command;
 
 /// Programs, as `cargo run` builds them, and every package, as `cargo test` does.
 const PROGRAMS: [&str; 5] = ["sim-node", "sim-c", "recorder", "viewer-bridge", "integration-tests"];
-const PACKAGES: [&str; 9] = [
+const PACKAGES: [&str; 10] = [
     "sim-c",
     "sim-types",
+    "sim-cli",
     "sim-contract",
     "sim-solver",
     "sim-lessons",

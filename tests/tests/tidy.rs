@@ -12,15 +12,16 @@ mod module_graph;
 
 /// The allowed dependencies: each crate with the workspace crates and restricted libraries it may use.
 /// Every crate also uses `build-features`, which has no code.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     ("sim-types", &[]),
     ("sim-solver", &["sim-types"]),
     ("sim-contract", &["iceoryx2", "sim-types"]),
     ("sim-c", &["sim-contract"]),
+    ("sim-cli", &["sim-contract"]),
     ("sim-lessons", &["sim-solver"]),
-    ("sim-node", &["sim-contract", "sim-lessons", "sim-solver"]),
-    ("recorder", &["mcap", "sim-contract", "sim-solver"]),
-    ("viewer-bridge", &["foxglove", "recorder", "sim-contract", "sim-solver"]),
+    ("sim-node", &["sim-cli", "sim-contract", "sim-lessons", "sim-solver"]),
+    ("recorder", &["mcap", "sim-cli", "sim-contract", "sim-solver"]),
+    ("viewer-bridge", &["foxglove", "recorder", "sim-cli", "sim-contract", "sim-solver"]),
     ("integration-tests", &["recorder", "sim-contract", "viewer-bridge"]),
 ];
 

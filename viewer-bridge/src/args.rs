@@ -7,6 +7,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 
 use clap::{CommandFactory, Parser};
+use sim_cli::DocumentVerb;
 use sim_contract::{Endpoint, EndpointError, NAME_DEFAULT};
 use viewer_bridge::source::replay::InitialPlayback;
 use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
@@ -20,6 +21,7 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
 #[command(
     name = "viewer-bridge",
     version,
+    args_conflicts_with_subcommands = true,
     after_help = "Stop it with Ctrl-C, SIGTERM or SIGHUP.\n\n\
         Limits: 16 pages and 16 Foxglove clients at a time. Other connections make \
         room for newcomers.\n\n\
@@ -34,6 +36,8 @@ use viewer_bridge::{FoxgloveOptions, FoxglovePermission, RecordingTimes};
         viewer-bridge --foxglove --replay run.mcap --play   show them a recording, again and again"
 )]
 pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) document: Option<DocumentVerb>,
     /// Address and port to listen on; port 0 is any free port. Beyond loopback, pages need the token
     /// in the printed address. The connection is not encrypted
     #[arg(
@@ -172,6 +176,10 @@ mod tests {
             ("--bogus", "there is no option '--bogus' here\n"),
             ("--lisen", "there is no option '--lisen' here (did you mean '--listen'?)\n"),
             ("curtain", "there is one argument too many: 'curtain'\n"),
+            (
+                "completion",
+                "there is one argument too many: 'completion' (did you mean 'completions'?)\n",
+            ),
             (
                 "run.mcap",
                 "there is one argument too many: 'run.mcap' (to show a recording, use --replay \

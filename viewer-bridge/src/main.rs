@@ -12,6 +12,7 @@ use std::task::Poll;
 use std::thread::{self, JoinHandle};
 
 use anyhow::{Context, anyhow};
+use clap::CommandFactory;
 use sim_contract::{Stop, console, report_bus_errors};
 use tokio::runtime;
 use tokio::signal::unix::{SignalKind, signal};
@@ -49,6 +50,9 @@ fn exit_with_usage(error: &clap::Error) -> ! {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     sim_contract::report_file_size_limit()?;
+    if let Some(document) = &args.document {
+        return document.run(Args::command());
+    }
     let stop = Stop::install()?;
     report_bus_errors()?;
     let source = match open_source(args, &stop) {

@@ -34,11 +34,10 @@ impl Snapshot {
 }
 
 /// Makes the release of a snapshot that was never received an error.
-fn clear(snapshot: Option<&mut MaybeUninit<Snapshot>>) -> Option<&mut MaybeUninit<Snapshot>> {
-    snapshot.map(|place| {
+fn clear(snapshot: Option<&mut MaybeUninit<Snapshot>>) {
+    if let Some(place) = snapshot {
         place.write(Snapshot::NONE);
-        place
-    })
+    }
 }
 
 static SNAPSHOTS: Handles<sim_contract::Snapshot> = Handles::new();
@@ -57,10 +56,10 @@ pub(crate) fn keep(held: sim_contract::Snapshot) -> Snapshot {
 pub extern "C" fn catenary_next_snapshot(
     client: *mut ClientHandle,
     timeout_s: f64,
-    snapshot: Option<&mut MaybeUninit<Snapshot>>,
+    mut snapshot: Option<&mut MaybeUninit<Snapshot>>,
 ) -> CatenaryResult {
     with_client(client, |attached| {
-        let snapshot = clear(snapshot);
+        clear(snapshot.as_deref_mut());
         check_place(snapshot.as_deref(), "snapshot")?;
         let timeout = timeout(timeout_s)?;
         let held = attached.client.next_snapshot(timeout)?;
@@ -74,10 +73,10 @@ pub extern "C" fn catenary_next_snapshot(
 pub extern "C" fn catenary_latest_snapshot(
     client: *mut ClientHandle,
     timeout_s: f64,
-    snapshot: Option<&mut MaybeUninit<Snapshot>>,
+    mut snapshot: Option<&mut MaybeUninit<Snapshot>>,
 ) -> CatenaryResult {
     with_client(client, |attached| {
-        let snapshot = clear(snapshot);
+        clear(snapshot.as_deref_mut());
         check_place(snapshot.as_deref(), "snapshot")?;
         let timeout = timeout(timeout_s)?;
         let held = attached.client.latest_snapshot(timeout)?;

@@ -113,8 +113,3 @@ pub use sim_types::{
     PlainF32, Reason, RestoreContents, SCENE_SIZE_BYTES_MAX, SETTINGS_COUNT, STEP_WORK_MAX,
     Setting, TearCause, Text, TextError, ValueForm, json_hash, printable, printable_line,
 };
-
-/// Compiles the programs in the README.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct ReadmeDoctests;

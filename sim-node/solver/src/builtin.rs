@@ -1,20 +1,20 @@
 //! The built-in scenes.
 
 const SCENES: [(&str, &str); 14] = [
-    ("curtain", include_str!("../../scenes/curtain.toml")),
-    ("rope", include_str!("../../scenes/rope.toml")),
-    ("flag", include_str!("../../scenes/flag.toml")),
-    ("ragdoll", include_str!("../../scenes/ragdoll.toml")),
-    ("spider-web", include_str!("../../scenes/spider-web.toml")),
-    ("rope-bridge", include_str!("../../scenes/rope-bridge.toml")),
-    ("elastic-mesh", include_str!("../../scenes/elastic-mesh.toml")),
-    ("tearable-cloth", include_str!("../../scenes/tearable-cloth.toml")),
-    ("spring-cloth", include_str!("../../scenes/spring-cloth.toml")),
-    ("carried-cloth", include_str!("../../scenes/carried-cloth.toml")),
-    ("drop-box", include_str!("../../scenes/drop-box.toml")),
-    ("drop-box-braced", include_str!("../../scenes/drop-box-braced.toml")),
-    ("pendulum", include_str!("../../scenes/pendulum.toml")),
-    ("free-fall", include_str!("../../scenes/free-fall.toml")),
+    ("curtain", include_str!("../scenes/curtain.toml")),
+    ("rope", include_str!("../scenes/rope.toml")),
+    ("flag", include_str!("../scenes/flag.toml")),
+    ("ragdoll", include_str!("../scenes/ragdoll.toml")),
+    ("spider-web", include_str!("../scenes/spider-web.toml")),
+    ("rope-bridge", include_str!("../scenes/rope-bridge.toml")),
+    ("elastic-mesh", include_str!("../scenes/elastic-mesh.toml")),
+    ("tearable-cloth", include_str!("../scenes/tearable-cloth.toml")),
+    ("spring-cloth", include_str!("../scenes/spring-cloth.toml")),
+    ("carried-cloth", include_str!("../scenes/carried-cloth.toml")),
+    ("drop-box", include_str!("../scenes/drop-box.toml")),
+    ("drop-box-braced", include_str!("../scenes/drop-box-braced.toml")),
+    ("pendulum", include_str!("../scenes/pendulum.toml")),
+    ("free-fall", include_str!("../scenes/free-fall.toml")),
 ];
 
 /// Returns the names of the built-in scenes, in the order of listings.

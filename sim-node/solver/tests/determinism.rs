@@ -182,7 +182,7 @@ fn keyframes_with_impossible_numbers_are_refused() {
 
 /// A built-in scene, and the scenes that use every mechanism.
 const TEXTS: [&str; 3] = [
-    include_str!("../../scenes/curtain.toml"),
+    include_str!("../scenes/curtain.toml"),
     include_str!("scenes/everything.toml"),
     include_str!("scenes/stiffness.toml"),
 ];
