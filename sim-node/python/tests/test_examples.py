@@ -13,14 +13,15 @@ import catenary
 import nbformat
 import numpy as np
 import pytest
-from conftest import DEADLINE, StartNode
+from conftest import DEADLINE, REPOSITORY, StartNode
 from nbclient import NotebookClient
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+PROGRAMS = REPOSITORY / "examples"
 
 
-def run(name: str, *arguments: object) -> str:
-    command = [sys.executable, str(EXAMPLES / name), *map(str, arguments)]
+def run(path: str | Path, *arguments: object) -> str:
+    command = [sys.executable, str(EXAMPLES / path), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -62,6 +63,25 @@ def test_snapshots_reach_rerun(start_node: StartNode, tmp_path: Path) -> None:
     )
     assert stats.returncode == 0, stats.stderr
     assert file.stat().st_size > 50 * 168 * 12
+
+
+def test_a_controller_pulls_a_point_to_its_height(start_node: StartNode) -> None:
+    start_node("curtain", "--as-fast-as-possible")
+    (distance,) = re.findall(r"is ([\d.]+) mm", run(PROGRAMS / "pull" / "pull.py"))
+    assert float(distance) < 5
+
+
+def test_a_tray_carries_its_cloth(start_node: StartNode) -> None:
+    start_node(str(PROGRAMS / "carry" / "tray.toml"), "--as-fast-as-possible")
+    (distance,) = re.findall(r"is ([\d.]+) m ", run(PROGRAMS / "carry" / "carry.py"))
+    assert float(distance) < 0.1, "the tray has moved by a metre"
+
+
+def test_the_stretch_of_a_rope_falls_with_iterations_and_the_square_of_substeps() -> None:
+    rows = re.findall(r"(\d+) +(\d+) +([\d.]+) %", run(PROGRAMS / "lesson" / "rope.py"))
+    stretch = {(int(substeps), int(passes)): float(number) for substeps, passes, number in rows}
+    assert stretch[1, 4] / stretch[1, 16] == pytest.approx(4, rel=0.05)
+    assert stretch[4, 1] / stretch[16, 1] == pytest.approx(16, rel=0.05)
 
 
 def test_the_notebook_runs() -> None:
