@@ -14,7 +14,7 @@ mod process;
 mod recording;
 mod simulation;
 
-/// Registers the classes. Their documentation is in `_catenary.pyi`.
+/// Registers the classes. Their texts are those of `_catenary.pyi`; a test compares them.
 #[pyo3::pymodule]
 mod _catenary {
     #[pymodule_export]

@@ -164,11 +164,13 @@ impl Lockstep {
         Ok(Some(snapshot))
     }
 
+    /// Outcomes that came with the last snapshot.
     #[getter]
     fn outcomes(&self) -> Vec<Outcome> {
         self.progress().outcomes.iter().copied().map(Outcome).collect()
     }
 
+    /// Sends an action for the next step. Returns its sequence number.
     fn send(&self, py: Python<'_>, action: &Action) -> PyResult<u64> {
         self.require_member()?;
         let action = action.0;

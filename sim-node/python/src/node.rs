@@ -180,29 +180,37 @@ impl Node {
         Ok(Self { endpoint, client, newest: Mutex::default() })
     }
 
-    /// Another connection to the same node, with an id and a queue of snapshots of its own.
+    /// Returns another connection to the same node, with an id and a queue of snapshots of its own.
     fn another(&self, py: Python<'_>) -> PyResult<Self> {
         let client = attach(py, &self.endpoint, None, 0.0)?;
         let client = OfProcess::new("node", client);
         Ok(Self { endpoint: self.endpoint.clone(), client, newest: Mutex::default() })
     }
 
+    /// Id of this client in outcomes and recordings.
     #[getter]
     fn client_id(&self, py: Python<'_>) -> PyResult<u64> {
         self.call(py, |client| Ok(client.client_id()))
     }
 
+    /// True if a process runs under the name. Reads the file system: ask a few times per second at most.
     #[getter(is_running)]
     fn is_running_now(&self, py: Python<'_>) -> PyResult<bool> {
         self.is_running(py)
     }
 
+    /// Detaches. Snapshots that are still held stay valid.
     fn close(&self, py: Python<'_>) {
         let kept = self.newest().take();
         drop(kept);
         py.detach(|| self.client.close());
     }
 
+    /// Returns the oldest unread snapshot, or waits for the next one. None if the node has ended.
+    ///
+    /// `latest` reads from the same queue, and skips what is in it; `snapshots` has a queue of its own.
+    ///
+    /// Raises `Timeout` if none comes in time, and `TooManySnapshots` if the program holds too many.
     #[pyo3(signature = (timeout=None))]
     fn next_snapshot(
         &self,
@@ -217,6 +225,7 @@ impl Node {
         }
     }
 
+    /// Returns the newest snapshot. Waits only for the first one.
     #[pyo3(signature = (timeout=5.0))]
     fn latest(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Py<Snapshot>> {
         let patience = Patience::new(timeout)?;
@@ -242,27 +251,33 @@ impl Node {
         }
     }
 
+    /// Returns the constraints.
     fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
         let topology = self.latched(py, Client::topology)?;
         Topology::new(py, &topology.header, &topology.constraints)
     }
 
+    /// Returns the particles of each triangle of the surface. Shape: (triangles, 3).
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         corners(py, &self.latched(py, Client::surface)?.triangles)
     }
 
+    /// Returns the scene as TOML, with every default written out.
     fn scene(&self, py: Python<'_>) -> PyResult<String> {
         self.latched(py, Client::scene)
     }
 
+    /// Returns the current parameters by name. None is off.
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &self.latched(py, Client::parameters)?.values)
     }
 
+    /// Returns the status of the node, with the keys of `/status` in recordings.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &StatusRow::from(&self.latched(py, Client::status)?))
     }
 
+    /// Returns the indices of the torn constraints, in the order of tearing.
     fn torn<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let torn = self.latched(py, |client, part| {
             Ok(Some(client.torn(part)?).filter(|torn| torn.header.run_id != 0))
@@ -270,6 +285,7 @@ impl Node {
         Ok(PyArray1::from_iter(py, torn.indices()))
     }
 
+    /// Returns the colliders in their newest poses.
     fn colliders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let colliders = self.latched(py, |client, part| {
             Ok(Some(client.colliders(part)?).filter(|list| list.header.run_id != 0))
@@ -278,6 +294,7 @@ impl Node {
         from_json(py, &row.map_or_else(Vec::new, |row| row.colliders))
     }
 
+    /// Sends an action without waiting. Returns its sequence number, for `outcome`.
     fn send(&self, py: Python<'_>, action: &Action) -> PyResult<u64> {
         let action = action.0;
         self.call(py, |client| {
@@ -288,6 +305,7 @@ impl Node {
         })
     }
 
+    /// Waits for the outcome of a sent action, applied or rejected.
     #[pyo3(signature = (sequence, timeout=5.0))]
     pub(crate) fn outcome(
         &self,
@@ -319,6 +337,7 @@ impl Node {
         }
     }
 
+    /// Sends an action and waits for its outcome. Raises `Rejected` if it was rejected.
     #[pyo3(signature = (action, timeout=5.0))]
     fn request(&self, py: Python<'_>, action: &Action, timeout: Option<f64>) -> PyResult<Outcome> {
         Patience::new(timeout)?;
@@ -326,6 +345,9 @@ impl Node {
         self.outcome(py, sequence, timeout)?.require_applied(py)
     }
 
+    /// Puts a state in place, and continues from it.
+    ///
+    /// A `State` replaces everything. A `Snapshot` replaces only positions and velocities.
     #[pyo3(signature = (state, timeout=5.0))]
     fn restore(&self, py: Python<'_>, state: &Bound<'_, PyAny>, timeout: f64) -> PyResult<Outcome> {
         Patience::new(Some(timeout))?;
@@ -342,6 +364,7 @@ impl Node {
         Outcome(outcome).require_applied(py)
     }
 
+    /// Replaces the positions and velocities of all particles. Shape of both: (particles, 3).
     #[pyo3(signature = (positions, velocities, timeout=5.0))]
     fn set_motion(
         &self,
@@ -356,6 +379,7 @@ impl Node {
         Outcome(outcome).require_applied(py)
     }
 
+    /// Returns the newest complete state, which `restore` puts in place again.
     fn state(&self, py: Python<'_>) -> PyResult<State> {
         current_state(py, &self.endpoint)
     }

@@ -81,46 +81,55 @@ impl Recording {
         Ok(Self { path: shown, tape: Mutex::new(tape) })
     }
 
+    /// Path of the file.
     #[getter]
     fn path(&self) -> &str {
         &self.path
     }
 
+    /// First recorded step.
     #[getter]
     fn first_step(&self) -> u64 {
         self.tape().first_step()
     }
 
+    /// Last recorded step.
     #[getter]
     fn last_step(&self) -> u64 {
         self.tape().last_step()
     }
 
+    /// Steps per second.
     #[getter]
     fn rate(&self) -> u32 {
         self.run(|run| run.rate_hz)
     }
 
+    /// Name of the scene.
     #[getter]
     fn scene_name(&self) -> String {
         self.run(|run| run.scene_name.clone())
     }
 
+    /// Number of particles.
     #[getter]
     fn particle_count(&self) -> u32 {
         self.run(|run| run.particle_count)
     }
 
+    /// Number of the recorded run.
     #[getter]
     fn run_id(&self) -> u64 {
         self.run(|run| run.run_id)
     }
 
+    /// Returns the scene as TOML.
     fn scene(&self) -> PyResult<String> {
         let text = String::from_utf8(self.tape().log().scene().to_vec());
         text.map_err(|_| RecordingError::new_err(format!("{}: the scene is not text", self.path)))
     }
 
+    /// Returns the constraints.
     fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
         let (header, constraints) = {
             let tape = self.tape();
@@ -130,12 +139,13 @@ impl Recording {
         Topology::new(py, &header, &constraints)
     }
 
+    /// Returns the particles of each triangle of the surface. Shape: (triangles, 3).
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let triangles = self.tape().surface().triangles();
         corners(py, &triangles.ok_or_else(|| self.malformed("/surface"))?)
     }
 
-    /// The snapshot of the last recorded step up to `step`.
+    /// Returns the snapshot of the last recorded step up to `step`, or else the first one.
     fn at_or_before(&self, py: Python<'_>, step: u64) -> PyResult<Snapshot> {
         let (header, particles) = self.read(py, |tape| {
             let state = tape.state_at(step)?;
@@ -144,22 +154,24 @@ impl Recording {
         Ok(Snapshot::own(header, particles))
     }
 
-    /// The first recorded step after `step`; `None` at the end.
+    /// Returns the first recorded step after `step`.
     fn step_after(&self, py: Python<'_>, step: u64) -> PyResult<Option<u64>> {
         let next = self.read(py, |tape| Ok(tape.step_after(step)?))?;
         Ok((next > step).then_some(next))
     }
 
-    /// The last recorded step up to `step`, or the first recorded step.
+    /// Returns the last recorded step up to `step`, or else the first one.
     fn step_at(&self, py: Python<'_>, step: u64) -> PyResult<u64> {
         self.read(py, |tape| Ok(tape.step_at(step)?))
     }
 
+    /// Returns the indices of the constraints that are torn at a step, in the order of tearing.
     fn torn<'py>(&self, py: Python<'py>, step: u64) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let state = self.read(py, |tape| tape.state_at(step))?;
         Ok(PyArray1::from_iter(py, state.torn.indices()))
     }
 
+    /// Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`.
     fn steps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let mut rows = Vec::new();
         py.detach(|| {
@@ -184,6 +196,7 @@ impl Recording {
         Ok(table)
     }
 
+    /// Returns the outcomes of all commands, by row: `pandas.DataFrame(recording.outcomes())`.
     fn outcomes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let mut rows: Vec<OutcomeRow> = Vec::new();
         py.detach(|| {

@@ -126,6 +126,7 @@ impl Simulation {
         })
     }
 
+    /// Makes `count` steps. Other threads of the interpreter run meanwhile; Ctrl-C ends it between steps.
     #[pyo3(signature = (count=1))]
     fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
         let mut left = count;
@@ -138,6 +139,10 @@ impl Simulation {
         }
     }
 
+    /// Applies an action before the next step. Raises `Rejected` if it is wrong.
+    ///
+    /// Actions that concern a node (`pause`, `resume`, `step`, `mark`, a time scale) change nothing here;
+    /// `load`, `rewind` and `restore` are rejected.
     fn apply(&self, py: Python<'_>, action: &Action) -> PyResult<()> {
         let action = action.0;
         let result = self.with(py, |running| {
@@ -155,6 +160,7 @@ impl Simulation {
         Err(rejected(py, format!("rejected: {reason}: {action}"), Some(reason), None))
     }
 
+    /// Returns a copy of the current state.
     fn snapshot(&self, py: Python<'_>) -> PyResult<Snapshot> {
         self.with(py, |running| {
             let particles = bytemuck::cast_slice(running.solver.particles()).to_vec();
@@ -162,40 +168,48 @@ impl Simulation {
         })
     }
 
+    /// Copy of the current positions in metres. Shape: (particles, 3).
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(&Bound::new(py, self.snapshot(py)?)?, POSITION)
     }
 
+    /// Copy of the current velocities in metres per second. Shape: (particles, 3).
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(&Bound::new(py, self.snapshot(py)?)?, VELOCITY)
     }
 
+    /// Hash of the current state.
     #[getter]
     fn hash(&self, py: Python<'_>) -> PyResult<u64> {
         self.with(py, |running| Ok(running.solver.state_hash()))
     }
 
+    /// Number of steps so far.
     #[getter]
     fn step_count(&self, py: Python<'_>) -> PyResult<u64> {
         self.with(py, |running| Ok(running.step))
     }
 
+    /// Simulated time of these steps, in seconds.
     #[getter]
     fn time(&self, py: Python<'_>) -> PyResult<f64> {
         Ok(self.step_count(py)? as f64 / f64::from(self.rate()))
     }
 
+    /// Steps per second.
     #[getter]
     fn rate(&self) -> u32 {
         self.scene.solver.rate_hz
     }
 
+    /// Returns the scene as TOML, with every default written out.
     fn scene(&self) -> String {
         self.scene.to_toml()
     }
 
+    /// Returns the constraints.
     fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
         let constraints = self.with(py, |running| {
             Ok(running.solver.constraints().map(constraint_state).collect::<Vec<_>>())
@@ -203,6 +217,7 @@ impl Simulation {
         Topology::new(py, &self.load_header(), &constraints)
     }
 
+    /// Returns the particles of each triangle of the surface. Shape: (triangles, 3).
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let triangles = self.with(py, |running| {
             let triangles = running.solver.triangles().iter();
@@ -211,16 +226,21 @@ impl Simulation {
         corners(py, &triangles)
     }
 
+    /// Returns the current parameters by name. None is off.
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let values = self.with(py, |running| Ok(running.solver.parameter_values()))?;
         from_json(py, &values)
     }
 
+    /// Returns the indices of the torn constraints, in the order of tearing.
     fn torn<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let torn = self.with(py, |running| Ok(running.solver.torn().to_vec()))?;
         Ok(PyArray1::from_vec(py, torn))
     }
 
+    /// Returns the complete state, which `restore` puts in place again.
+    ///
+    /// Raises `StateError` between a command and the step that shows it.
     fn state(&self, py: Python<'_>) -> PyResult<State> {
         self.with(py, |running| {
             if running.is_changed {
@@ -234,6 +254,7 @@ impl Simulation {
         })
     }
 
+    /// Puts a state of the same scene in place. Raises `StateError` if it belongs to another scene.
     fn restore(&self, py: Python<'_>, state: &State) -> PyResult<()> {
         if state.scene_hash != self.scene_hash {
             return Err(StateError::new_err(format!(
@@ -251,6 +272,9 @@ impl Simulation {
         })
     }
 
+    /// Puts the initial state and parameters in place at once. `step_count` continues.
+    ///
+    /// A node spends a step on it, which shows the initial state.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.with(py, |running| {
             let mut solver = Solver::new(&self.scene);

@@ -11,6 +11,7 @@ use sim_solver::scene::{LoadError, is_path};
 use crate::convert::{Quaternion, Vector, from_json, parameter_value};
 use crate::error::load_error;
 
+/// A command without its sender. The methods of `Commands` describe each of them.
 #[pyclass(frozen, eq, module = "catenary")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Action(pub(crate) sim_contract::Action);
@@ -160,13 +161,13 @@ impl Action {
         Ok(Self(sim_contract::Action::Mark { text: self::text(text)? }))
     }
 
-    /// The action as recordings store it.
+    /// Returns the action as recordings store it.
     #[allow(clippy::wrong_self_convention, reason = "Python passes a reference")]
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &self.0)
     }
 
-    /// The action of a dict such as `{"kind": "pin", "particle": 3}`.
+    /// Returns the action of a dict such as `Outcome.command`, or of a row of `Recording.outcomes()`.
     #[staticmethod]
     fn from_dict(fields: &Bound<'_, PyAny>) -> PyResult<Self> {
         let json = fields.py().import("json")?.call_method1("dumps", (fields,))?;

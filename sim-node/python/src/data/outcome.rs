@@ -7,6 +7,7 @@ use sim_contract::Reason;
 use crate::convert::from_json;
 use crate::error::Rejected;
 
+/// The answer to a command.
 #[pyclass(frozen, module = "catenary")]
 #[derive(Debug, Clone)]
 pub(crate) struct Outcome(pub(crate) sim_contract::Outcome);
@@ -46,47 +47,55 @@ pub(crate) fn rejected(
 
 #[pymethods]
 impl Outcome {
+    /// True if the command took effect; False if it was rejected and changed nothing.
     #[getter]
     fn is_applied(&self) -> bool {
         self.0.is_applied()
     }
 
+    /// Name of the reason of a rejection, such as "unknown_particle".
     #[getter]
     fn reason(&self) -> Option<&'static str> {
         (!self.0.is_applied()).then(|| self.0.reason_name())
     }
 
+    /// First step that shows the effect.
     #[getter]
     fn step(&self) -> u64 {
         self.0.step
     }
 
+    /// Number of the outcome in its run, without gaps.
     #[getter]
     fn index(&self) -> u64 {
         self.0.index
     }
 
+    /// Number of the command among those of its client.
     #[getter]
     fn sequence(&self) -> u64 {
         self.0.command.sequence
     }
 
+    /// Id of the client that sent the command.
     #[getter]
     fn client_id(&self) -> u64 {
         self.0.command.client_id
     }
 
+    /// The command as recordings store it: "kind" and its fields.
     #[getter]
     fn command<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &self.0.command.action())
     }
 
-    /// Raises `Rejected` unless the command took effect.
+    /// Raises `Rejected` if the command was rejected.
     #[pyo3(name = "require_applied")]
     fn require_applied_now(&self, py: Python<'_>) -> PyResult<()> {
         self.clone().require_applied(py).map(|_| ())
     }
 
+    /// True for a load that began a new run.
     #[getter]
     fn begins_run(&self) -> bool {
         self.0.begins_run()

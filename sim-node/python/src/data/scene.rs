@@ -32,16 +32,25 @@ pub(crate) fn scene_error(error: &SceneError) -> PyErr {
     PythonSceneError::new_err(error.to_string())
 }
 
+/// The constraints of a scene, as loaded.
 #[pyclass(frozen, get_all, module = "catenary")]
 #[derive(Debug)]
 pub(crate) struct Topology {
+    /// Indices of the two particles of each constraint. Shape: (constraints, 2).
     ends: Py<PyArray2<u32>>,
+    /// Rest lengths in metres. Shape: (constraints,).
     rest_lengths: Py<PyArray1<f32>>,
+    /// Compliances in m/N, or stiffnesses from 0 to 1 with method "pbd". Shape: (constraints,).
     compliances: Py<PyArray1<f32>>,
+    /// Kinds: indices into CONSTRAINT_KINDS. Shape: (constraints,).
     kinds: Py<PyArray1<u32>>,
+    /// Origin of all positions, in metres.
     origin: [f64; 3],
+    /// Steps per second.
     rate: u32,
+    /// Method of the solver.
     method: &'static str,
+    /// Hash of the scene: a state belongs to the scene with the same one.
     scene_hash: u64,
 }
 

@@ -23,6 +23,10 @@ const INVERSE_MASS: usize = 3;
 pub(crate) const VELOCITY: usize = 4;
 const FLAGS: usize = 7;
 
+/// The particles after a step.
+///
+/// The arrays view the particles without a copy, and are read-only. Each of them keeps the snapshot alive. A
+/// node lends a program at most 4 snapshots at a time, so keep copies: `snapshot.positions.copy()`.
 #[pyclass(frozen, module = "catenary")]
 #[derive(Debug)]
 pub(crate) struct Snapshot {
@@ -65,100 +69,120 @@ impl Snapshot {
 
 #[pymethods]
 impl Snapshot {
+    /// Positions in metres, relative to the origin of the scene. Shape: (particles, 3).
     #[getter]
     fn positions<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(this, POSITION)
     }
 
+    /// Velocities in metres per second. Shape: (particles, 3).
     #[getter]
     fn velocities<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view::vectors(this, VELOCITY)
     }
 
+    /// Inverse masses in 1/kg; 0 for particles that the step does not move. Shape: (particles,).
     #[getter]
     fn inverse_masses<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         view::numbers(this, INVERSE_MASS)
     }
 
+    /// Sums of PINNED, GRABBED, ANCHORED and FROZEN. Shape: (particles,).
     #[getter]
     fn flags<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<u32>>> {
         view::numbers(this, FLAGS)
     }
 
+    /// Number of the step in its run.
     #[getter]
     fn step(&self) -> u64 {
         self.header.step
     }
 
+    /// Number of steps since the scene was loaded, reset or restored.
     #[getter]
     fn scene_step(&self) -> u64 {
         self.header.scene_step
     }
 
+    /// Simulated time since step 0, in seconds.
     #[getter]
     fn time(&self) -> f64 {
         self.header.sim_time_ns as f64 * 1e-9
     }
 
+    /// Hash of the state: equal states have equal hashes on every machine.
     #[getter]
     fn hash(&self) -> u64 {
         self.header.state_hash
     }
 
+    /// Number of the run. Steps begin at 0 in each run.
     #[getter]
     fn run_id(&self) -> u64 {
         self.header.run_id
     }
 
+    /// Number of snapshots that the run has published before. A gap shows missed ones.
     #[getter]
     fn snapshot_index(&self) -> u32 {
         self.header.snapshot_index
     }
 
+    /// Number of the load in this run.
     #[getter]
     fn topology_revision(&self) -> u32 {
         self.header.topology_revision
     }
 
+    /// Number of torn constraints.
     #[getter]
     fn torn_count(&self) -> u32 {
         self.header.torn_count
     }
 
+    /// Number of outcomes that are part of this state.
     #[getter]
     fn outcome_count(&self) -> u64 {
         self.header.outcome_count
     }
 
+    /// True if the node was paused when it made this step.
     #[getter]
     fn is_paused(&self) -> bool {
         self.header.flags & SnapshotFlags::PAUSED != 0
     }
 
+    /// True if `recorder play` publishes it.
     #[getter]
     fn is_replay(&self) -> bool {
         self.header.flags & SnapshotFlags::REPLAY != 0
     }
 
+    /// Time of publication in seconds, on the clock of `time.monotonic`.
     #[getter]
     fn published_at(&self) -> f64 {
         self.header.publish_monotonic_ns as f64 * 1e-9
     }
 
+    /// Time that the solver took for this step, in seconds.
     #[getter]
     fn solve_time(&self) -> f64 {
         self.header.solve_ns as f64 * 1e-9
     }
 
+    /// Delay of the start of the step after its deadline, in seconds.
     #[getter]
     fn wake_lateness(&self) -> f64 {
         self.header.wake_late_ns as f64 * 1e-9
     }
 
+    /// Returns the particles as they are published and recorded: 32 bytes each, little-endian.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         self.with_particles(|particles| PyBytes::new(py, bytemuck::cast_slice(particles)))
     }
 
+    /// Returns the snapshot in the memory of this process, so that it can be kept.
     fn copy(&self) -> PyResult<Self> {
         Ok(Self::own(self.header, self.to_vec()?))
     }

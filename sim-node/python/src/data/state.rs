@@ -9,6 +9,7 @@ use sim_solver::Keyframe;
 use crate::error::{StateError, Timeout, attach_error};
 use crate::patience::{Patience, wait};
 
+/// A complete state of a scene: it can be pickled, sent to another process and restored.
 #[pyclass(frozen, module = "catenary")]
 #[derive(Debug, Clone)]
 pub(crate) struct State {
@@ -55,11 +56,13 @@ impl State {
         Self::from_parts(scene_hash, particles, keyframe)
     }
 
+    /// Hash of the scene that the state belongs to.
     #[getter]
     fn scene_hash(&self) -> u64 {
         self.scene_hash
     }
 
+    /// Hash of the state, as in `Snapshot.hash`.
     #[getter]
     fn hash(&self) -> u64 {
         self.hash
