@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use recorder::{
     AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow,
-    Topic, TopologyRow, open_regular_file, repair_file,
+    Topic, TopologyRow, constraint_state, open_regular_file, repair_file,
 };
 use serde::Serialize;
 use sim_contract::{LoadHeader, Stop, Triangle, is_being_written, printable_line};
@@ -18,7 +18,6 @@ use crate::cli::exit::Exit;
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::progress::progress_bytes;
-use crate::simulation::state_writer::constraint_state;
 
 #[derive(Debug, clap::Args)]
 #[command(

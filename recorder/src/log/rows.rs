@@ -17,4 +17,4 @@ pub use parameters::ParametersRow;
 pub use status::StatusRow;
 pub use step::StepRow;
 pub use tears::TearsRow;
-pub use topology::{Softness, SurfaceRow, TopologyRow};
+pub use topology::{Softness, SurfaceRow, TopologyRow, constraint_state};

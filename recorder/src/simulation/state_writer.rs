@@ -4,9 +4,9 @@ use std::io::Write;
 
 use recorder::{
     CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, ParticleBuffer, RunDescription,
-    StepRow, SurfaceRow, TopologyRow, WriteError,
+    StepRow, SurfaceRow, TopologyRow, WriteError, constraint_state,
 };
-use sim_contract::{ConstraintState, LoadHeader, ParameterValues, ParticleState, Triangle};
+use sim_contract::{LoadHeader, ParameterValues, ParticleState, Triangle};
 use sim_solver::Solver;
 
 use super::frozen::{FrozenParticles, FrozenTracker};
@@ -153,15 +153,4 @@ impl<'a, W: Write> StateWriter<'a, W> {
 #[allow(clippy::cast_possible_truncation, reason = "the low half is wanted")]
 fn low_32_bits(step: u64) -> u32 {
     step as u32
-}
-
-/// Returns a constraint as it is published.
-pub(crate) fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
-    ConstraintState {
-        a: constraint.a,
-        b: constraint.b,
-        rest_length: constraint.rest_length,
-        compliance: constraint.compliance,
-        kind: constraint.kind as u32,
-    }
 }

@@ -2,8 +2,9 @@
 
 use std::mem::MaybeUninit;
 use std::ptr;
+use std::time::Duration;
 
-use sim_contract::{ParticleState, SnapshotHeader};
+use sim_contract::{Client, ParticleState, ReadError, SnapshotHeader};
 
 use crate::attached::{ClientHandle, with_client};
 use crate::handles::Handles;
@@ -33,13 +34,6 @@ impl Snapshot {
         Self { header: ptr::null(), particles: ptr::null(), particle_count: 0, handle: 0 };
 }
 
-/// Makes the release of a snapshot that was never received an error.
-fn clear(snapshot: Option<&mut MaybeUninit<Snapshot>>) {
-    if let Some(place) = snapshot {
-        place.write(Snapshot::NONE);
-    }
-}
-
 static SNAPSHOTS: Handles<sim_contract::Snapshot> = Handles::new();
 
 pub(crate) fn keep(held: sim_contract::Snapshot) -> Snapshot {
@@ -56,15 +50,9 @@ pub(crate) fn keep(held: sim_contract::Snapshot) -> Snapshot {
 pub extern "C" fn catenary_next_snapshot(
     client: *mut ClientHandle,
     timeout_s: f64,
-    mut snapshot: Option<&mut MaybeUninit<Snapshot>>,
+    snapshot: Option<&mut MaybeUninit<Snapshot>>,
 ) -> CatenaryResult {
-    with_client(client, |attached| {
-        clear(snapshot.as_deref_mut());
-        check_place(snapshot.as_deref(), "snapshot")?;
-        let timeout = timeout(timeout_s)?;
-        let held = attached.client.next_snapshot(timeout)?;
-        write(snapshot, keep(held.ok_or_else(|| attached.nothing(timeout))?), "snapshot")
-    })
+    borrow(client, timeout_s, snapshot, Client::next_snapshot)
 }
 
 /// Borrows the newest unread snapshot and skips those before it, or waits for the next one. Release each
@@ -73,13 +61,26 @@ pub extern "C" fn catenary_next_snapshot(
 pub extern "C" fn catenary_latest_snapshot(
     client: *mut ClientHandle,
     timeout_s: f64,
-    mut snapshot: Option<&mut MaybeUninit<Snapshot>>,
+    snapshot: Option<&mut MaybeUninit<Snapshot>>,
 ) -> CatenaryResult {
+    borrow(client, timeout_s, snapshot, Client::latest_snapshot)
+}
+
+/// Writes a snapshot that `read` returns, or one without a handle: the release of a snapshot that was never
+/// received is then an error.
+fn borrow(
+    client: *mut ClientHandle,
+    timeout_s: f64,
+    mut snapshot: Option<&mut MaybeUninit<Snapshot>>,
+    read: fn(&mut Client, Duration) -> Result<Option<sim_contract::Snapshot>, ReadError>,
+) -> CatenaryResult {
+    if let Some(place) = &mut snapshot {
+        place.write(Snapshot::NONE);
+    }
     with_client(client, |attached| {
-        clear(snapshot.as_deref_mut());
         check_place(snapshot.as_deref(), "snapshot")?;
         let timeout = timeout(timeout_s)?;
-        let held = attached.client.latest_snapshot(timeout)?;
+        let held = read(&mut attached.client, timeout)?;
         write(snapshot, keep(held.ok_or_else(|| attached.nothing(timeout))?), "snapshot")
     })
 }

@@ -183,8 +183,12 @@ fn wrong_arguments_are_refused_with_their_names() {
         })
         .collect();
     publish(&owner, 5);
-    let result = catenary_next_snapshot(client, 1.0, Some(&mut MaybeUninit::uninit()));
+    let mut fifth = MaybeUninit::uninit();
+    let result = catenary_next_snapshot(client, 1.0, Some(&mut fifth));
     assert_misuse(result, "4 messages of 'sim/particles' are already held");
+    // SAFETY: a failed call writes a snapshot without a handle.
+    let mut fifth = unsafe { fifth.assume_init() };
+    assert_misuse(catenary_release_snapshot(Some(&mut fifth)), "released before");
     for mut snapshot in held {
         assert_eq!(catenary_release_snapshot(Some(&mut snapshot)), CatenaryResult::Ok);
     }

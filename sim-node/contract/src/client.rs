@@ -373,8 +373,8 @@ impl Client {
         self.join_lockstep_every(NonZeroU32::MIN, timeout)
     }
 
-    /// Joins the lockstep, and takes part only at the steps that are multiples of `every`, as a
-    /// controller of 60 Hz does beside a node of 240 Hz with `every` = 4.
+    /// Joins the lockstep, drops unread snapshots, and takes part only at the steps that are multiples
+    /// of `every`, as a controller of 60 Hz does beside a node of 240 Hz with `every` = 4.
     ///
     /// # Errors
     /// Same as [`Client::join_lockstep`].

@@ -2,7 +2,9 @@
 //!
 //! It wraps the client, the solver and the reader of recordings in Python classes. Particles stay where
 //! they are: arrays are views of shared memory, or of the memory of a [`data::snapshot::Snapshot`]. Every call
-//! that waits or computes lets other threads of the interpreter run, and ends early on a signal.
+//! that waits or computes lets other threads of the interpreter run. A signal ends the waits for snapshots and
+//! outcomes and the steps of a simulation early; joining the lockstep and putting a state in place last for their
+//! timeout at most.
 
 mod convert;
 mod data;

@@ -3,7 +3,6 @@
 use std::mem;
 use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -14,7 +13,7 @@ use crate::data::outcome::Outcome;
 use crate::data::snapshot::Snapshot;
 use crate::error::{Error, lockstep_error, read_error, request_error};
 use crate::node::Node;
-use crate::patience::Patience;
+use crate::patience::{Patience, whole};
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]
@@ -91,13 +90,13 @@ impl Lockstep {
     fn new(node: Py<Node>, every: u32, timeout: f64) -> PyResult<Self> {
         let every = NonZeroU32::new(every)
             .ok_or_else(|| PyValueError::new_err("`every` is 0 (allowed: 1 or more)"))?;
-        Patience::new(Some(timeout))?;
+        whole(timeout)?;
         Ok(Self { node, every, timeout_s: timeout, progress: Mutex::default() })
     }
 
     fn __enter__(this: Py<Self>, py: Python<'_>) -> PyResult<Py<Self>> {
         let own = this.get();
-        let timeout = Duration::try_from_secs_f64(own.timeout_s).unwrap_or(Duration::MAX);
+        let timeout = whole(own.timeout_s)?;
         own.node.get().call(py, |client| {
             let joined = client.join_lockstep_every(own.every, timeout);
             joined.map_err(|error| lockstep_error(&error))

@@ -22,7 +22,7 @@ use crate::data::state::{State, current_state};
 use crate::error::{
     NotRunning, Timeout, TooManySnapshots, attach_error, endpoint_error, read_error, request_error,
 };
-use crate::patience::{PART, Patience, wait};
+use crate::patience::{PART, Patience, wait, whole};
 use crate::process::OfProcess;
 
 /// Longest wait for messages that a node has published once per load, in seconds.
@@ -350,8 +350,7 @@ impl Node {
     /// A `State` replaces everything. A `Snapshot` replaces only positions and velocities.
     #[pyo3(signature = (state, timeout=5.0))]
     fn restore(&self, py: Python<'_>, state: &Bound<'_, PyAny>, timeout: f64) -> PyResult<Outcome> {
-        Patience::new(Some(timeout))?;
-        let timeout = Duration::try_from_secs_f64(timeout).unwrap_or(Duration::MAX);
+        let timeout = whole(timeout)?;
         let outcome = if let Ok(state) = state.cast::<State>() {
             let state = state.get();
             self.call(py, |client| restore(client, &state.given(), timeout))?
@@ -373,8 +372,7 @@ impl Node {
         velocities: &Bound<'_, PyAny>,
         timeout: f64,
     ) -> PyResult<Outcome> {
-        Patience::new(Some(timeout))?;
-        let timeout = Duration::try_from_secs_f64(timeout).unwrap_or(Duration::MAX);
+        let timeout = whole(timeout)?;
         let outcome = self.restore_motion(py, &motion(positions, velocities)?, timeout)?;
         Outcome(outcome).require_applied(py)
     }

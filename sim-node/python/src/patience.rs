@@ -47,6 +47,15 @@ impl Patience {
     }
 }
 
+/// Returns a timeout for a call that waits in one piece.
+///
+/// # Errors
+/// The timeout is negative or NaN.
+pub(crate) fn whole(timeout_s: f64) -> PyResult<Duration> {
+    Patience::new(Some(timeout_s))?;
+    Ok(Duration::try_from_secs_f64(timeout_s).unwrap_or(Duration::MAX))
+}
+
 /// Calls `attempt` with parts of the wait until it returns a value. Between two calls, other threads run
 /// and signals are handled. `None` if the time has passed.
 ///

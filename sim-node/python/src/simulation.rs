@@ -6,8 +6,9 @@ use std::sync::{Mutex, PoisonError};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use sim_contract::clock::{SECOND_NS, monotonic_ns};
-use sim_contract::{ConstraintState, LoadHeader, SnapshotHeader, Triangle, scene_hash};
+use recorder::{RunDescription, constraint_state};
+use sim_contract::clock::monotonic_ns;
+use sim_contract::{LoadHeader, SnapshotHeader, Triangle, scene_hash};
 use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver, THREADS_MAX};
 
 use crate::convert::from_json;
@@ -297,13 +298,12 @@ impl Simulation {
 impl Simulation {
     fn header(&self, running: &Running) -> SnapshotHeader {
         let Running { solver, step, .. } = running;
-        let rate = u64::from(self.scene.solver.rate_hz);
         SnapshotHeader {
             contract_version: sim_contract::CONTRACT_VERSION,
             solver_version: SOLVER_VERSION,
             step: *step,
             scene_step: solver.scene_step(),
-            sim_time_ns: time_ns(*step, rate),
+            sim_time_ns: RunDescription::duration_ns(*step, self.rate()),
             state_hash: solver.state_hash(),
             torn_count: u32::try_from(solver.torn().len()).unwrap_or(u32::MAX),
             particle_count: u32::try_from(solver.particle_count()).unwrap_or(u32::MAX),
@@ -321,15 +321,4 @@ impl Simulation {
             ..LoadHeader::default()
         }
     }
-}
-
-/// Time at the end of a step, rounded down.
-fn time_ns(step: u64, rate_hz: u64) -> u64 {
-    let time_ns = u128::from(step) * u128::from(SECOND_NS) / u128::from(rate_hz);
-    u64::try_from(time_ns).unwrap_or(u64::MAX)
-}
-
-fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
-    let sim_solver::Constraint { a, b, rest_length, compliance, kind, .. } = constraint;
-    ConstraintState { a, b, rest_length, compliance, kind: kind as u32 }
 }

@@ -86,14 +86,6 @@ def test_a_request_within_a_turn_names_the_remedy(start_node: StartNode) -> None
         node.lockstep(every=0)
 
 
-def test_a_member_that_has_read_the_newest_snapshot_begins_with_it(start_node: StartNode) -> None:
-    node = start_node("curtain", "--rate", "10", "--lockstep-timeout", "1000s")
-    for _ in range(5):
-        read = node.next_snapshot(DEADLINE)
-        with node.lockstep() as steps:
-            assert read is not None and next(steps).step >= read.step
-
-
 def test_a_rejected_last_command_is_not_lost(start_node: StartNode) -> None:
     node = start_node("curtain")
     with pytest.raises(catenary.Rejected, match="no such particle"):

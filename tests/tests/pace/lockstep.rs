@@ -72,6 +72,26 @@ fn hash_with_controllers(seed: u64, options: &[&str]) -> String {
 }
 
 #[test]
+fn a_client_that_has_read_the_newest_snapshot_joins_and_takes_its_turn_at_it() {
+    let sandbox = Sandbox::new();
+    // The node never goes on without the client.
+    let options = ["run", "curtain", "--rate", "10", "--lockstep-timeout", "1h"];
+    let node = Process::start_ready(Program::SimNode, &sandbox, &options);
+    let mut client = Client::attach(&sandbox.endpoint()).unwrap();
+    for _ in 0..3 {
+        let read = client.next_snapshot(DEADLINE).unwrap().unwrap().header().step;
+        client.join_lockstep(DEADLINE).unwrap();
+        let turn =
+            client.next_turn(DEADLINE).unwrap().expect("a turn, although the snapshot was read");
+        assert!(turn.header().step >= read);
+        drop(turn);
+        client.leave_lockstep();
+    }
+    drop(client);
+    node.interrupt().success();
+}
+
+#[test]
 fn the_same_controllers_give_the_same_hash_at_any_speed() {
     let expected = hash_with_controllers(0, &[]);
     for seed in 1..=10 {

@@ -79,6 +79,12 @@ struct SoftnessSchema {
     stiffness: Option<Vec<f32>>,
 }
 
+/// Returns a constraint as it is published.
+pub fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
+    let sim_solver::Constraint { a, b, rest_length, compliance, kind, .. } = constraint;
+    ConstraintState { a, b, rest_length, compliance, kind: kind as u32 }
+}
+
 impl TopologyRow {
     /// Returns the row of a load, with no torn constraints.
     pub fn new(header: &LoadHeader, constraints: &[ConstraintState]) -> Self {

@@ -346,8 +346,6 @@ impl Tap {
 
 #[cfg(test)]
 mod tests {
-    use sim_types::ParameterValues;
-
     use super::*;
     use crate::owner::Owner;
     use crate::owner::load::Load;
@@ -355,15 +353,8 @@ mod tests {
     use crate::testing::TestDomain;
 
     fn create_owner(endpoint: &Endpoint, run_id: u64) -> Owner {
-        let load = Load {
-            header: LoadHeader { run_id, ..LoadHeader::default() },
-            scene: b"",
-            constraints: &[],
-            triangles: &[],
-            collider_count: 0,
-            keyframe_size_bytes_max: 0,
-            parameters: ParameterValues::DEFAULT,
-        };
+        let load =
+            Load { header: LoadHeader { run_id, ..LoadHeader::default() }, ..Load::default() };
         Owner::create(endpoint, &load).unwrap()
     }
 

@@ -80,25 +80,14 @@ pub(super) fn claim_name(
 mod tests {
     use std::fs;
 
-    use sim_types::ParameterValues;
-
     use super::*;
-    use crate::messages::topology::LoadHeader;
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::session::Access;
     use crate::testing::TestDomain;
 
     fn create_owner(endpoint: &Endpoint) -> Result<Owner, OwnerError> {
-        let load = Load {
-            header: LoadHeader::default(),
-            scene: b"",
-            constraints: &[],
-            triangles: &[],
-            collider_count: 0,
-            keyframe_size_bytes_max: 0,
-            parameters: ParameterValues::DEFAULT,
-        };
+        let load = Load::default();
         Owner::create(endpoint, &load)
     }
 

@@ -22,7 +22,7 @@ use sim_types::{
 };
 
 /// A load: the data that an owner publishes once, and the sizes of its later messages.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Load<'a> {
     /// Common part of the headers. The owner sets `count` for each service.
     pub header: LoadHeader,
@@ -251,12 +251,7 @@ mod tests {
     fn a_scene_whose_messages_could_fill_shared_memory_is_refused_with_the_numbers() {
         let load = Load {
             header: LoadHeader { particle_count: 100_000, ..LoadHeader::default() },
-            scene: b"",
-            constraints: &[],
-            triangles: &[],
-            collider_count: 0,
-            keyframe_size_bytes_max: 0,
-            parameters: ParameterValues::DEFAULT,
+            ..Load::default()
         };
         // A full buffer, the samples that all readers hold, the latched one and the one being written.
         let samples = 64 + 16 * 4 + 1 + 1;

@@ -78,15 +78,8 @@ fn a_program_that_holds_all_but_one_of_its_snapshots_can_still_read_one() {
 #[test]
 fn an_empty_scene_works() {
     let domain = TestDomain::new();
-    let empty = Load {
-        header: LoadHeader { particle_count: 0, ..load_header() },
-        scene: b"",
-        constraints: &[],
-        triangles: &[],
-        collider_count: 0,
-        keyframe_size_bytes_max: 0,
-        parameters: sim_contract::ParameterValues::default(),
-    };
+    let empty =
+        Load { header: LoadHeader { particle_count: 0, ..load_header() }, ..Load::default() };
     let owner = Owner::create(&domain.endpoint(), &empty).unwrap();
     let publish = || {
         owner.publish_particles(&SnapshotHeader::default(), |_| unreachable!()).unwrap();

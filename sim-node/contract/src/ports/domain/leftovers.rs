@@ -217,22 +217,13 @@ mod tests {
     use super::*;
     use crate::client::Client;
     use crate::domain::Domain;
-    use crate::messages::topology::LoadHeader;
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::domain;
     use crate::testing::TestDomain;
 
     fn create_owner(domain: &TestDomain) -> Owner {
-        let load = Load {
-            header: LoadHeader::default(),
-            scene: b"",
-            constraints: &[],
-            triangles: &[],
-            collider_count: 0,
-            keyframe_size_bytes_max: 0,
-            parameters: sim_types::ParameterValues::DEFAULT,
-        };
+        let load = Load::default();
         Owner::create(&domain.endpoint(), &load).unwrap()
     }
 

@@ -332,7 +332,6 @@ mod tests {
 
     use super::*;
     use crate::client::Client;
-    use crate::messages::topology::LoadHeader;
     use crate::owner::Owner;
     use crate::owner::load::Load;
     use crate::ports::domain;
@@ -346,15 +345,7 @@ mod tests {
     }
 
     fn create_owner(domain: &TestDomain) -> Owner {
-        let load = Load {
-            header: LoadHeader::default(),
-            scene: b"",
-            constraints: &[],
-            triangles: &[],
-            collider_count: 0,
-            keyframe_size_bytes_max: 0,
-            parameters: sim_types::ParameterValues::DEFAULT,
-        };
+        let load = Load::default();
         Owner::create(&domain.endpoint(), &load).unwrap()
     }
 
