@@ -71,6 +71,22 @@ def test_a_controller_pulls_a_point_to_its_height(start_node: StartNode) -> None
     assert float(distance) < 5
 
 
+def test_the_python_of_the_readme_runs_beside_the_curtain(start_node: StartNode) -> None:
+    """The lines `python FILE` and the blocks of Python, in their order."""
+    start_node("curtain")
+    readme = (REPOSITORY / "README.md").read_text()
+    for file in re.findall(r"^python (\S+\.py)", readme, re.MULTILINE):
+        assert "mm from its height" in run(REPOSITORY / file)
+    blocks = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 1
+    for block in blocks:
+        done = subprocess.run(
+            [sys.executable, "-c", block], capture_output=True, text=True, timeout=DEADLINE
+        )
+        assert done.returncode == 0, done.stderr
+        assert float(re.findall(r"([\d.]+)\]$", done.stdout.strip())[0]) > 0.29, "it arrived"
+
+
 def test_a_tray_carries_its_cloth(start_node: StartNode) -> None:
     start_node(str(PROGRAMS / "carry" / "tray.toml"), "--as-fast-as-possible")
     (distance,) = re.findall(r"is ([\d.]+) m ", run(PROGRAMS / "carry" / "carry.py"))

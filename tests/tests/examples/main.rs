@@ -1,5 +1,7 @@
-//! The examples in Rust, C and C++ work against a running node, and report errors as text.
+//! The examples in Rust, C and C++ and the README's commands work against a running node, and report errors
+//! as text.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 mod c_and_cpp;
+mod readme;
 mod rust;

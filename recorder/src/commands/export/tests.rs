@@ -169,11 +169,17 @@ fn the_frames_of_an_animation_are_the_pictures() {
     assert_eq!((control.num_frames, control.num_plays), (3, 0));
     let expected_ms =
         [20.0, 3.0].map(|steps| 2.0 * 1000.0 * steps / rate_hz).into_iter().chain([20.0]);
+    let mut shown = vec![0; reader.output_buffer_size().unwrap()];
     for (picture, expected_ms) in pictures(&file, &[0, 20, 23], STYLE).into_iter().zip(expected_ms)
     {
-        let mut frame = vec![0; reader.output_buffer_size().unwrap()];
-        reader.next_frame(&mut frame).unwrap();
+        let mut part = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut part).unwrap();
         let delay = reader.info().frame_control().unwrap();
+        let (row_bytes, part_bytes) = (3 * STYLE.size.width as usize, 3 * delay.width as usize);
+        let first = delay.y_offset as usize * row_bytes + delay.x_offset as usize * 3;
+        for (row, pixels) in part.chunks_exact(part_bytes).take(delay.height as usize).enumerate() {
+            shown[first + row * row_bytes..][..part_bytes].copy_from_slice(pixels);
+        }
         let delay_ms = 1000.0 * f64::from(delay.delay_num) / f64::from(delay.delay_den);
         assert!((delay_ms - expected_ms).abs() <= 1.0, "{delay_ms} {expected_ms}");
         let single = png::encode(&picture).unwrap();
@@ -182,7 +188,8 @@ fn the_frames_of_an_animation_are_the_pictures() {
         single.next_frame(&mut pixels).unwrap();
         let rgb: Vec<u8> =
             pixels.chunks_exact(4).flat_map(|pixel| pixel[..3].iter().copied()).collect();
-        assert!(frame == rgb);
+        let is_near = |(shown, exact): (&u8, &u8)| shown.abs_diff(*exact) <= 7;
+        assert!(shown.len() == rgb.len() && shown.iter().zip(&rgb).all(is_near));
     }
 }
 

@@ -1,0 +1,118 @@
+//! The commands of the README's ten-minute paths work as printed, one after the other, in one folder.
+
+use integration_tests::{Finished, Process, Program, Sandbox};
+
+const README: &str = include_str!("../../../README.md");
+
+/// Runs the examples of the contract as the test has built them.
+const CARGO: &str = r#"cargo() {
+    [ "$1 $2 $3 $4 $5" = "run --release -p sim-contract --example" ] && [ "$7" = -- ]
+    "$PROGRAMS/examples/$6" "${@:8}"
+}"#;
+
+/// A path of the README, in a folder of its own, beside a node.
+struct TenMinutes {
+    text: &'static str,
+    sandbox: Sandbox,
+    _node: Process,
+}
+
+impl TenMinutes {
+    fn new(heading: &str) -> Self {
+        let (_, text) = README.split_once(&format!("\n## Ten minutes for {heading}\n")).unwrap();
+        let text = text.split("\n## ").next().unwrap();
+        let sandbox = Sandbox::new();
+        let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+        Self { text, sandbox, _node: node }
+    }
+
+    /// Returns the contents of the fenced blocks of a language.
+    fn blocks(&self, language: &str) -> impl Iterator<Item = &'static str> {
+        let parts = self.text.split("\n```").skip(1).step_by(2);
+        parts.filter_map(move |part| part.strip_prefix(language)?.strip_prefix('\n'))
+    }
+
+    /// Runs all commands, except those in Python, which its own tests run. Returns what they printed.
+    fn run(&self) -> Vec<(&'static str, String)> {
+        let lines = self.blocks("sh").flat_map(str::lines);
+        let commands = lines.map(|line| line.split("  #").next().unwrap().trim_end());
+        let commands = commands.filter(|command| !command.starts_with("python"));
+        let done = commands.map(|command| match command.strip_prefix("viewer-bridge ") {
+            Some(args) => (command, self.run_viewer(args)),
+            None => (command, self.run_command(command)),
+        });
+        done.collect()
+    }
+
+    fn run_command(&self, command: &str) -> String {
+        let program = Program::SimNode.path();
+        let programs = program.parent().unwrap().display();
+        let folder = self.sandbox.path("");
+        let script = format!(
+            "PROGRAMS='{programs}'; PATH=\"$PROGRAMS:$PATH\"; cd '{folder}'; {CARGO}\n{command}"
+        );
+        let Finished { code, stdout, stderr, .. } =
+            Process::run(Program::Bash, &self.sandbox, &["-e", "-c", &script]);
+        let expected = if command.starts_with("recorder diff") { 3 } else { 0 };
+        assert_eq!(code, Some(expected), "{command}: {stdout}{stderr}");
+        stdout
+    }
+
+    /// Starts the viewer, and ends it with Ctrl-C when it serves its page.
+    fn run_viewer(&self, args: &str) -> String {
+        let (option, file) = args.split_once(' ').unwrap();
+        let args = [option, &self.sandbox.path(file), "--listen", "127.0.0.1:0"];
+        Process::start_ready(Program::ViewerBridge, &self.sandbox, &args).interrupt().success()
+    }
+}
+
+/// Returns what the only command with this beginning printed.
+fn printed<'a>(done: &'a [(&str, String)], start: &str) -> &'a str {
+    let found: Vec<_> = done.iter().filter(|(command, _)| command.starts_with(start)).collect();
+    assert_eq!(found.len(), 1, "commands {start}");
+    &found[0].1
+}
+
+#[test]
+fn the_path_for_robotics_grabs_records_proves_and_compares() {
+    let path = TenMinutes::new("robotics and simulation");
+    let done = path.run();
+    assert!(printed(&done, "sim-node ctl nearest").starts_with("particle 91 "));
+    assert!(printed(&done, "recorder verify run.mcap").contains("bit-identical"));
+    assert!(printed(&done, "recorder diff").contains("states      differ from step 600 on"));
+}
+
+#[test]
+fn the_path_for_games_brings_a_mesh_in_and_out() {
+    let path = TenMinutes::new("games and effects");
+    // A square of 11 x 11 vertices between y = 0.5 and 1.5.
+    let vertices = (0..121).map(|index| {
+        let (column, row) = (f64::from(index % 11), f64::from(index / 11));
+        format!("v {} {} 0\n", 0.1 * column, 0.5 + 0.1 * row)
+    });
+    let faces = (1..110).filter(|corner| corner % 11 != 0).map(|a| {
+        let [b, c, d] = [a + 1, a + 11, a + 12];
+        format!("f {a} {b} {d}\nf {a} {d} {c}\n")
+    });
+    path.sandbox.write("shirt.obj", &vertices.chain(faces).collect::<String>());
+    path.run();
+}
+
+#[test]
+fn the_path_for_iceoryx2_runs_the_examples_of_the_contract() {
+    let done = TenMinutes::new("iceoryx2 and Rust").run();
+    assert_eq!(
+        printed(&done, "cargo run --release -p sim-contract --example watch").lines().count(),
+        100
+    );
+    assert!(printed(&done, "sim-node bench").contains("lockstep"));
+}
+
+#[test]
+fn the_path_for_teaching_checks_and_loads_the_printed_scene() {
+    let path = TenMinutes::new("teaching");
+    path.sandbox.write("my.toml", path.blocks("toml").next().unwrap());
+    let done = path.run();
+    assert!(printed(&done, "sim-node lesson euler").contains("500"));
+    assert!(printed(&done, "sim-node check my.toml").starts_with("my: 402 particles, "));
+}
