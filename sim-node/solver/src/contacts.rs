@@ -1,9 +1,10 @@
-//! Colliders, and the contacts of particles with them.
+//! Contacts of particles with each other and with colliders.
 
 pub(crate) mod colliders;
 pub(crate) mod contact;
 pub(crate) mod contact_substep;
 pub(crate) mod obstacle;
+pub(crate) mod pairs;
 pub(crate) mod path;
 pub(crate) mod placed_shape;
 pub(crate) mod solid;

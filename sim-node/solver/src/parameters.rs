@@ -22,6 +22,9 @@ pub(crate) struct Parameters {
     pub(crate) iterations: u32,
     pub(crate) wind_velocity: [f32; 3],
     pub(crate) wind_drag: f32,
+    /// Contact distance of particles. None while they do not touch each other.
+    pub(crate) contact_thickness: Option<f32>,
+    pub(crate) contact_friction: f32,
     max_stretch: Option<f32>,
     tear_stretch: Option<f32>,
     tear_distance: Option<f32>,
@@ -58,6 +61,8 @@ impl Parameters {
             iterations: solver.iterations,
             wind_velocity: wind.velocity,
             wind_drag: wind.drag,
+            contact_thickness: scene.contact.thickness(),
+            contact_friction: scene.contact.friction,
             max_stretch: limits.max_stretch,
             tear_stretch: limits.tear_stretch,
             tear_distance: limits.tear_distance,
@@ -108,6 +113,7 @@ impl Parameters {
             | Parameter::Damping
             | Parameter::WindVelocity
             | Parameter::MaxSpeed
+            | Parameter::ContactFriction
             | Parameter::TimeScale => Affected::Nothing,
             Parameter::MaxStretch
             | Parameter::TearStretch
@@ -116,7 +122,8 @@ impl Parameters {
             Parameter::Substeps
             | Parameter::Iterations
             | Parameter::Relaxation
-            | Parameter::WindDrag => Affected::Constraints,
+            | Parameter::WindDrag
+            | Parameter::ContactThickness => Affected::Constraints,
         })
     }
 
@@ -142,9 +149,10 @@ impl Parameters {
         self.softness.map(|softness| softness.map(f32::to_bits))
     }
 
-    fn pass_bits(&self) -> [u32; 4] {
+    fn pass_bits(&self) -> [u32; 5] {
         let has_wind = u32::from(self.wind_drag > 0.0);
-        [self.substeps, self.iterations, self.relaxation.to_bits(), has_wind]
+        let has_contacts = u32::from(self.contact_thickness.is_some());
+        [self.substeps, self.iterations, self.relaxation.to_bits(), has_wind, has_contacts]
     }
 
     fn limit_bits(&self) -> [Option<u32>; 4] {
@@ -170,6 +178,8 @@ impl Parameters {
             Parameter::WindDrag => self.wind_drag = or_zero,
             Parameter::Relaxation => self.relaxation = or_zero,
             Parameter::MaxSpeed => self.max_speed = or_zero,
+            Parameter::ContactThickness => self.contact_thickness = number,
+            Parameter::ContactFriction => self.contact_friction = or_zero,
             Parameter::Substeps => self.substeps = to_count(or_zero),
             Parameter::Iterations => self.iterations = to_count(or_zero),
             Parameter::MaxStretch => self.max_stretch = number,
@@ -207,6 +217,8 @@ impl Parameters {
             tear_distance: self.tear_distance,
             tear_force: self.tear_force,
             max_speed: self.max_speed,
+            contact_thickness: self.contact_thickness,
+            contact_friction: self.contact_friction,
             time_scale: 1.0,
             compliance,
             stiffness,
@@ -253,7 +265,9 @@ fn check_value(
     context: Context,
 ) -> Result<(), Reason> {
     let is_allowed = match (info.form, value) {
-        (_, ParameterValue::Off) => matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit),
+        (_, ParameterValue::Off) => {
+            matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit | OffMeaning::Absent)
+        },
         (ValueForm::Number, ParameterValue::Number(number)) => info.range.contains(number),
         (ValueForm::Whole, ParameterValue::Number(number)) => {
             number.fract() == 0.0 && info.range.contains(number)

@@ -12,6 +12,7 @@ use crate::constraints::order::ProjectionOrder;
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::contacts::colliders::{Collider, PlacedCollider};
 use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
+use crate::contacts::pairs::ParticleContacts;
 use crate::kernels::Kernels;
 use crate::parameters::Parameters;
 use crate::scene::definition::Scene;
@@ -51,6 +52,7 @@ pub struct Solver {
     pub(crate) colliders: Vec<Collider>,
     /// The colliders in the running substep.
     pub(crate) obstacles: Vec<Obstacle>,
+    pub(crate) particle_contacts: ParticleContacts,
     pub(crate) anchors: Anchors,
     scene_anchors: Vec<SceneAnchor>,
     pub(crate) air: Air,
@@ -106,6 +108,7 @@ impl Solver {
             tethers: Tethers::default(),
             colliders: scene.colliders.iter().map(Collider::new).collect(),
             obstacles: Vec::with_capacity(OBSTACLES_PER_COLLIDER * scene.colliders.len()),
+            particle_contacts: ParticleContacts::default(),
             anchors: Anchors::new(&scene.anchors, &model.particles),
             scene_anchors: scene.anchors.clone(),
             air: Air::new(scene.wind, settings.rate_hz, particle_count, &model.triangles),
@@ -177,6 +180,7 @@ impl Solver {
         if constraints {
             self.configure();
         }
+        self.derive_particle_contacts();
         if tethers {
             self.derive_tethers();
             self.has_new_tethers = true;
@@ -199,6 +203,17 @@ impl Solver {
             colliders: !self.colliders.is_empty(),
             wind: self.air.has_surface() && parameters.wind_drag > 0.0,
             tethers: self.settings.tethers,
+            particle_contacts: parameters.contact_thickness.is_some(),
+        }
+    }
+
+    /// Derives the contacts of particles with each other, if their distance has changed.
+    fn derive_particle_contacts(&mut self) {
+        let thickness = self.parameters.contact_thickness;
+        if !self.particle_contacts.are_derived_from(thickness) {
+            let kernels = self.store.kernels();
+            self.particle_contacts = ParticleContacts::new(&self.model, thickness, kernels);
+            self.particle_contacts.locate(&self.store);
         }
     }
 
@@ -207,6 +222,7 @@ impl Solver {
         if self.scene_fields(&self.parameters).wind || self.air.is_located() {
             self.air.locate_corners(&self.store);
         }
+        self.particle_contacts.locate(&self.store);
         self.tethers.attach(&mut self.store, &self.particles);
     }
 

@@ -64,6 +64,7 @@ impl Solver {
                     Stage::Project
                     | Stage::LimitStretch
                     | Stage::Tether
+                    | Stage::ParticleContact
                     | Stage::Contact
                     | Stage::Advance => {}
                     Stage::Tear | Stage::Freeze | Stage::Hash => {
@@ -87,6 +88,7 @@ impl Solver {
                 | Stage::Project
                 | Stage::LimitStretch
                 | Stage::Tether
+                | Stage::ParticleContact
                 | Stage::Contact
                 | Stage::Advance => unreachable!("{stage:?} is a stage of a substep"),
             }
@@ -108,6 +110,7 @@ impl Solver {
     /// Unpacks the state, and computes the targets of anchors and colliders for the end of the step.
     fn begin_step(&mut self) {
         self.store.unpack(&self.particles.states);
+        self.particle_contacts.begin_step();
         self.scene_step += 1;
         let (time_s, dt) = (self.scene_time_s(), self.step_length());
         self.anchors.begin_step(time_s);
@@ -138,14 +141,20 @@ impl Solver {
     }
 
     /// [`Stage::Predict`] to [`Stage::Advance`]. Each sheet and the graph run them on their own
-    /// particles, in one sweep, because their particles share no constraint. Returns true if any
-    /// constraint was marked as torn.
+    /// particles, in one sweep, because their particles share no constraint. Contacts of particles with each
+    /// other, if there are any, divide the sweep in two. Returns true if any constraint was marked as torn.
     fn sweep(&mut self, substep: Substep, stop: &AtomicBool) -> bool {
         let contact_substep = self.contact_substep(substep);
         place_obstacles(&mut self.obstacles, &self.colliders, &contact_substep);
         let prediction = self.prediction(substep);
         let inputs = SubstepInputs { prediction, obstacles: &self.obstacles, stop };
-        self.store.run_swept_stages(&inputs, self.parameters.iterations)
+        let is_marked = self.store.run_swept_stages(&inputs, self.parameters.iterations);
+        if self.particle_contacts.are_on() {
+            let friction = self.parameters.contact_friction;
+            self.particle_contacts.push_apart(&mut self.store, substep, friction);
+            self.store.run_ending(&inputs);
+        }
+        is_marked
     }
 
     fn prediction(&self, substep: Substep) -> Prediction {

@@ -24,6 +24,7 @@ use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
 use crate::kernels::Kernels;
+use crate::kernels::lanes::PackedParticle;
 use crate::parameters::Parameters;
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
@@ -140,6 +141,15 @@ impl ParticleStore {
         is_marked
     }
 
+    /// Runs the stages behind the contacts of particles with each other.
+    pub(crate) fn run_ending(&mut self, inputs: &SubstepInputs<'_>) {
+        let Self { workers, graph, patches, .. } = self;
+        graph.run_ending(workers, inputs);
+        for patch in patches {
+            patch.run_ending(workers, inputs);
+        }
+    }
+
     /// Exchanges everything but the threads with a store of the same scene.
     pub(crate) fn exchange(&mut self, other: &mut Self) {
         std::mem::swap(self, other);
@@ -200,6 +210,29 @@ impl ParticleStore {
             None => self.graph.set_displacement(location.index(), displacement),
             Some(sheet) => self.patches[sheet].set_displacement(location.index(), displacement),
         }
+    }
+
+    /// Position, inverse mass and displacement of a particle.
+    #[inline(always)]
+    pub(crate) fn packed_particle(&self, location: Location) -> PackedParticle {
+        let index = location.index();
+        match location.sheet() {
+            None => self.graph.packed_particle(index),
+            Some(sheet) => {
+                let patch = &self.patches[sheet];
+                let ([x, y, z], [dx, dy, dz]) = (patch.position(index), patch.displacement(index));
+                PackedParticle([x, y, z, patch.inverse_mass(index), dx, dy, dz, 0.0])
+            }
+        }
+    }
+
+    /// Sets the position and the displacement of a particle.
+    pub(crate) fn set_path(&mut self, location: Location, position: [f32; 3], displacement: [f32; 3]) {
+        match location.sheet() {
+            None => self.graph.set_position(location.index(), position),
+            Some(sheet) => self.patches[sheet].set_position(location.index(), position),
+        }
+        self.set_displacement(location, displacement);
     }
 
     /// Sets the velocity that the wind adds to a particle in the running substep.

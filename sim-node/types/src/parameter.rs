@@ -25,6 +25,8 @@ pub enum Parameter {
     TimeScale = 12,
     Compliance = 13,
     Stiffness = 14,
+    ContactThickness = 15,
+    ContactFriction = 16,
 }
 
 /// The value of a parameter. Its JSON form is a number, three numbers or null.
@@ -60,6 +62,8 @@ pub enum OffMeaning {
     Zero,
     /// Off means no limit.
     NoLimit,
+    /// Off means that what the parameter describes does not take place.
+    Absent,
     /// Off means that each constraint has its own value, as after a load. `set` does not accept it.
     OwnOfEach,
 }
@@ -114,7 +118,7 @@ const SOFTNESS: ParameterInfo = ParameterInfo {
 };
 
 /// The table of parameters. The number of a [`Parameter`] is its index here.
-pub const PARAMETERS: [ParameterInfo; 15] = [
+pub const PARAMETERS: [ParameterInfo; 17] = [
     ParameterInfo {
         parameter: Parameter::Gravity,
         name: "gravity",
@@ -209,11 +213,27 @@ pub const PARAMETERS: [ParameterInfo; 15] = [
         range: NumberRange::SHARE,
         ..SOFTNESS
     },
+    ParameterInfo {
+        parameter: Parameter::ContactThickness,
+        name: "contact_thickness",
+        unit: "m",
+        range: NumberRange::POSITIVE,
+        default: ParameterValue::Off,
+        off: OffMeaning::Absent,
+        ..NUMBER
+    },
+    ParameterInfo {
+        parameter: Parameter::ContactFriction,
+        name: "contact_friction",
+        default: ParameterValue::Number(0.3),
+        off: OffMeaning::Zero,
+        ..NUMBER
+    },
 ];
 
 impl Parameter {
     /// All parameters, by number.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::Gravity,
         Self::Damping,
         Self::WindVelocity,
@@ -229,6 +249,8 @@ impl Parameter {
         Self::TimeScale,
         Self::Compliance,
         Self::Stiffness,
+        Self::ContactThickness,
+        Self::ContactFriction,
     ];
 
     /// Returns the parameter with this number.

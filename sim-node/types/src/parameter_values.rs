@@ -17,9 +17,9 @@ pub struct Setting {
     pub value: ParameterValue,
 }
 
-/// Number of [`Setting`]s in [`ParameterValues`]: 13 parameters have one value, and two have a value
+/// Number of [`Setting`]s in [`ParameterValues`]: 15 parameters have one value, and two have a value
 /// for each of the four kinds of constraints.
-pub const SETTINGS_COUNT: usize = 21;
+pub const SETTINGS_COUNT: usize = 23;
 
 /// The values of all parameters, named as in commands. `None` means off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -51,6 +51,15 @@ pub struct ParameterValues {
     pub time_scale: f32,
     pub compliance: PerKind,
     pub stiffness: PerKind,
+    #[serde(with = "optional_number", default)]
+    pub contact_thickness: Option<f32>,
+    #[serde(with = "number", default = "default_friction")]
+    pub contact_friction: f32,
+}
+
+/// In recordings from before there were contacts.
+fn default_friction() -> f32 {
+    ParameterValues::DEFAULT.contact_friction
 }
 
 /// A softness for each kind of constraint. `None` means that each constraint has its own softness.
@@ -118,6 +127,8 @@ impl ParameterValues {
         time_scale: 1.0,
         compliance: PerKind::OWN_OF_EACH,
         stiffness: PerKind::OWN_OF_EACH,
+        contact_thickness: None,
+        contact_friction: 0.3,
     };
 
     /// Returns all values, by parameter and then by kind.
@@ -160,6 +171,8 @@ impl ParameterValues {
             Parameter::TimeScale => Number(self.time_scale),
             Parameter::Compliance => optional(kind.and_then(|kind| self.compliance.get(kind))),
             Parameter::Stiffness => optional(kind.and_then(|kind| self.stiffness.get(kind))),
+            Parameter::ContactThickness => optional(self.contact_thickness),
+            Parameter::ContactFriction => Number(self.contact_friction),
         }
     }
 
@@ -190,6 +203,8 @@ impl ParameterValues {
             Parameter::TimeScale => self.time_scale = or_zero,
             Parameter::Compliance => set_kinds(&mut self.compliance, constraint_kind, number),
             Parameter::Stiffness => set_kinds(&mut self.stiffness, constraint_kind, number),
+            Parameter::ContactThickness => self.contact_thickness = number,
+            Parameter::ContactFriction => self.contact_friction = or_zero,
         }
     }
 }

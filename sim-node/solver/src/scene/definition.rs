@@ -2,6 +2,7 @@
 
 pub(crate) mod anchor;
 pub(crate) mod collider;
+pub(crate) mod contact;
 pub(crate) mod decimal;
 pub(crate) mod element;
 pub(crate) mod limits;
@@ -17,6 +18,7 @@ use super::model::{Model, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
 use collider::SceneCollider;
+use contact::ContactSettings;
 use element::{SceneConstraint, SceneParticle};
 use settings::{PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
 use wind::Wind;
@@ -47,6 +49,8 @@ pub struct Scene {
     /// The air, if the scene has any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wind: Option<Wind>,
+    /// Contacts of particles with each other.
+    pub contact: ContactSettings,
     /// Explicit particles. They have the first indices.
     #[serde(rename = "particle")]
     pub particles: Vec<SceneParticle>,
@@ -158,7 +162,13 @@ impl Scene {
                 reason = "a scene has at most 2^24 particles"
             )]
             generator.build_constraints(first as u32, &mut model);
-            first += generator.shape.particle_count();
+            let end = first + generator.shape.particle_count();
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "a scene has at most 2^24 particles"
+            )]
+            model.is_without_contact[first as usize..end as usize].fill(!generator.contact);
+            first = end;
         }
         model
     }

@@ -44,6 +44,14 @@ pub struct Generator {
     /// Infinity is off.
     #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
     pub tear_stretch: Option<f32>,
+    /// The particles touch others, in a scene in which particles do; default true.
+    #[serde(skip_serializing_if = "is_true")]
+    pub contact: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 /// Shape of a generator.

@@ -20,6 +20,8 @@ pub(crate) struct Model {
     /// By constraint: index into `limits`.
     limit_indices: Vec<u32>,
     pub(crate) triangles: Vec<[u32; 3]>,
+    /// By particle: it never touches others.
+    pub(crate) is_without_contact: Vec<bool>,
     /// Meaning of the constraints' softness.
     pub(crate) method: Method,
 }
@@ -27,7 +29,8 @@ pub(crate) struct Model {
 impl Model {
     /// Creates a model with all particles of a scene.
     pub(crate) fn new(method: Method, particles: Vec<SceneParticle>) -> Self {
-        Self { particles, method, ..Self::default() }
+        let is_without_contact = vec![false; particles.len()];
+        Self { particles, is_without_contact, method, ..Self::default() }
     }
 
     /// Sets the limits of the constraints that are pushed from now on.

@@ -2,6 +2,7 @@
 
 mod anchor;
 mod collider;
+mod contact;
 mod element;
 mod file_scene;
 mod generator;
@@ -78,6 +79,7 @@ impl Scene {
         let dimensions = dimensions.map(|whole| reader.whole("dimensions", whole, 2..=3));
         let dimensions = dimensions.transpose()?.unwrap_or(3);
         reader.is_planar = dimensions == 2;
+        let contact_place = file.contact.as_ref().map(Spanned::span);
         let generator_places: Vec<_> = file.generate.iter().map(Spanned::span).collect();
         let mut scene = reader.without_references(&mut file, &solver, dimensions)?;
         reader.check_size(&scene, file.constraint.len(), &generator_places)?;
@@ -89,6 +91,7 @@ impl Scene {
         if let Err(problem) = scene.check_step_work() {
             return reader.error(solver.place_of_passes(), "solver", problem);
         }
+        reader.complete_contact(&mut scene, contact_place)?;
         reader.check_text_size(&scene)?;
         scene.read_warnings = reader.warnings.take();
         Ok(scene)
@@ -127,6 +130,7 @@ impl Reader<'_> {
             )?,
             solver: self.solver(solver)?,
             wind: file.wind.as_ref().map(|wind| self.wind(wind)).transpose()?,
+            contact: self.contact(file.contact.as_ref().map(|table| &**table.get_ref()))?,
             particles: enumerate(take(&mut file.particle), |index, one| self.particle(index, one))?,
             constraints: Vec::new(),
             colliders: self.colliders(take(&mut file.collider))?,

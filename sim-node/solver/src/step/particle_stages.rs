@@ -27,6 +27,7 @@ pub(crate) fn run_stage<W: Wide>(
         | Stage::Wind
         | Stage::Project
         | Stage::LimitStretch
+        | Stage::ParticleContact
         | Stage::Tear
         | Stage::Freeze
         | Stage::Hash => unreachable!("{stage:?} is not a stage of single particles"),

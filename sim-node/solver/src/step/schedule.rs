@@ -20,6 +20,8 @@ pub(crate) struct ScheduledStage {
 pub(crate) struct OptionalStages {
     pub(crate) limit_stretch: bool,
     pub(crate) tether: bool,
+    /// It needs all particles at once, so it divides the sweep.
+    pub(crate) particle_contact: bool,
     pub(crate) contact: bool,
 }
 
@@ -30,10 +32,21 @@ impl OptionalStages {
             Stage::Project => true,
             Stage::LimitStretch => pass.is_last() && self.limit_stretch,
             Stage::Tether => pass.is_last() && self.tether,
-            Stage::Contact => pass.is_last() && self.contact,
-            Stage::Advance => pass.is_last(),
-            Stage::Drive | Stage::Wind | Stage::Tear | Stage::Freeze | Stage::Hash => false,
+            Stage::Contact | Stage::Advance => {
+                pass.is_last() && !self.particle_contact && self.ends_with(stage)
+            }
+            Stage::Drive
+            | Stage::Wind
+            | Stage::ParticleContact
+            | Stage::Tear
+            | Stage::Freeze
+            | Stage::Hash => false,
         }
+    }
+
+    /// True for the stages behind the contacts of particles with each other.
+    fn ends_with(self, stage: Stage) -> bool {
+        stage == Stage::Advance || (stage == Stage::Contact && self.contact)
     }
 }
 
@@ -42,6 +55,8 @@ impl OptionalStages {
 pub(crate) struct Schedule {
     /// Passes differ only in being the first, the last, both, or neither.
     passes: [Vec<ScheduledStage>; 4],
+    /// The stages behind [`Stage::ParticleContact`]; empty without it.
+    ending: Vec<ScheduledStage>,
 }
 
 impl Schedule {
@@ -68,6 +83,17 @@ impl Schedule {
                 }
             }
         }
+        self.ending.clear();
+        if optional.particle_contact {
+            let stages = Stage::OF_SUBSTEP.into_iter().filter(|stage| optional.ends_with(*stage));
+            let scheduled = |stage| ScheduledStage { stage, group: 0, reach: 0, lag: 0 };
+            self.ending.extend(stages.map(scheduled));
+        }
+    }
+
+    /// The stages behind [`Stage::ParticleContact`]; none without it.
+    pub(crate) fn ending(&self) -> &[ScheduledStage] {
+        &self.ending
     }
 
     /// The stages of a pass.
@@ -93,7 +119,12 @@ mod tests {
     #[test]
     fn passes_run_the_stages_in_order_once_in_a_substep() {
         let mut schedule = Schedule::default();
-        let optional = OptionalStages { limit_stretch: true, tether: true, contact: true };
+        let optional = OptionalStages {
+            limit_stretch: true,
+            tether: true,
+            particle_contact: false,
+            contact: true,
+        };
         schedule.rebuild(optional, &[1, 0].into_iter());
         let project = |lag: usize| [(Stage::Project, 0, lag + 1), (Stage::Project, 1, lag + 1)];
         let end = |lag: usize| {

@@ -19,6 +19,9 @@ pub(crate) enum Stage {
     LimitStretch,
     /// Free particles beyond the length of their tether: d is shortened to it, pulling only.
     Tether,
+    /// Particles nearer to each other than the contact distance: pushed apart along the line between them,
+    /// pair by pair in the order of a hash; friction on the tangential d.
+    ParticleContact,
     /// Free particles inside a collider: pushed out along its normal; friction on the tangential d.
     Contact,
     /// x = x + d; v = d / h; particles in contact take the velocity that their contacts leave them.
@@ -33,13 +36,14 @@ pub(crate) enum Stage {
 
 impl Stage {
     /// The stages of each substep, in order.
-    pub(crate) const OF_SUBSTEP: [Self; 8] = [
+    pub(crate) const OF_SUBSTEP: [Self; 9] = [
         Self::Drive,
         Self::Wind,
         Self::Predict,
         Self::Project,
         Self::LimitStretch,
         Self::Tether,
+        Self::ParticleContact,
         Self::Contact,
         Self::Advance,
     ];

@@ -127,7 +127,7 @@ impl Graph {
     pub(crate) fn allocate(&mut self) {
         let Layout { constraints, scene, .. } = self.layout;
         let count = |is_there: bool| if is_there { self.indices.len() } else { 0 };
-        let SceneFields { colliders, wind, tethers } = scene;
+        let SceneFields { colliders, wind, tethers, .. } = scene;
         self.predicted = vec![[0.0; 3]; count(colliders)];
         self.gains = vec![[0.0; 3]; count(wind)];
         let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
@@ -208,6 +208,13 @@ impl Graph {
         is_marked
     }
 
+    /// Runs the stages behind the contacts of particles with each other.
+    pub(crate) fn run_ending(&mut self, workers: &mut Workers, inputs: &SubstepInputs<'_>) {
+        let schedule = std::mem::take(&mut self.schedule);
+        self.run_particle_stages(workers, schedule.ending(), inputs);
+        self.schedule = schedule;
+    }
+
     fn run_particle_stages(
         &mut self,
         workers: &mut Workers,
@@ -276,6 +283,14 @@ impl Graph {
     pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
         let [_, _, _, _, x, y, z, _] = self.particles[index].0;
         [x, y, z]
+    }
+
+    pub(crate) fn packed_particle(&self, index: usize) -> PackedParticle {
+        self.particles[index]
+    }
+
+    pub(crate) fn set_position(&mut self, index: usize, position: [f32; 3]) {
+        self.particles[index].0[..3].copy_from_slice(&position);
     }
 
     pub(crate) fn set_displacement(&mut self, index: usize, displacement: [f32; 3]) {

@@ -12,6 +12,8 @@ pub(crate) struct SceneFields {
     pub(crate) wind: bool,
     /// For tethers: the position of the root, and the length with its square.
     pub(crate) tethers: bool,
+    /// Particles touch each other. It takes no memory in the store.
+    pub(crate) particle_contacts: bool,
 }
 
 /// Fields in memory, and those in use. Fields that fall out of use stay in memory, so that a change
@@ -23,17 +25,20 @@ pub(crate) struct Layout {
     /// Constraint fields that the current parameters use.
     pub(crate) used: ConstraintFields,
     pub(crate) is_wind_used: bool,
+    pub(crate) has_particle_contacts: bool,
 }
 
 impl Layout {
     /// The layout for these fields that also has all fields in memory now.
     pub(crate) fn extended(self, used: ConstraintFields, scene: SceneFields) -> Self {
-        let scene_fields = SceneFields { wind: self.scene.wind || scene.wind, ..scene };
+        let wind = self.scene.wind || scene.wind;
+        let scene_fields = SceneFields { wind, particle_contacts: false, ..scene };
         Self {
             constraints: self.constraints.union(used),
             scene: scene_fields,
             used,
             is_wind_used: scene.wind,
+            has_particle_contacts: scene.particle_contacts,
         }
     }
 
@@ -57,6 +62,7 @@ impl Layout {
         OptionalStages {
             limit_stretch: self.used.max_lengths,
             tether: self.scene.tethers,
+            particle_contact: self.has_particle_contacts,
             contact: self.scene.colliders,
         }
     }

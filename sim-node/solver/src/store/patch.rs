@@ -28,7 +28,7 @@ use crate::constraints::parameters::ConstraintParameters;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::axes;
 use crate::state::particles::Particle;
-use crate::step::schedule::Schedule;
+use crate::step::schedule::{Schedule, ScheduledStage};
 use crate::step::substep::SubstepInputs;
 
 /// Memory in whole cache lines.
@@ -152,16 +152,37 @@ impl Patch {
     }
 
     /// Runs the stages of a pass on all rows. Returns true if any constraint was marked as torn.
-    ///
-    /// Each worker has a band of rows. A second round finishes the seams between them, whose
-    /// constraints need rows of two bands.
     pub(crate) fn run_pass(
         &mut self,
         workers: &mut Workers,
         pass: Pass,
         inputs: &SubstepInputs<'_>,
     ) -> bool {
-        let (layout, stages) = (&self.layout, self.schedule.of_pass(pass));
+        let schedule = std::mem::take(&mut self.schedule);
+        let is_marked = self.run_stages(workers, (schedule.of_pass(pass), pass), inputs);
+        self.schedule = schedule;
+        is_marked
+    }
+
+    /// Runs the stages behind the contacts of particles with each other.
+    pub(crate) fn run_ending(&mut self, workers: &mut Workers, inputs: &SubstepInputs<'_>) {
+        let schedule = std::mem::take(&mut self.schedule);
+        let last = Pass { index: 0, count: 1 };
+        self.run_stages(workers, (schedule.ending(), last), inputs);
+        self.schedule = schedule;
+    }
+
+    /// Runs stages on all rows. Returns true if any constraint was marked as torn.
+    ///
+    /// Each worker has a band of rows. A second round finishes the seams between them, whose
+    /// constraints need rows of two bands.
+    fn run_stages(
+        &mut self,
+        workers: &mut Workers,
+        (stages, pass): (&[ScheduledStage], Pass),
+        inputs: &SubstepInputs<'_>,
+    ) -> bool {
+        let layout = &self.layout;
         let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
         let kernels = workers.kernels;
         let reach = stages.iter().map(|stage| stage.reach).sum();
@@ -241,6 +262,10 @@ impl Patch {
     #[inline(always)]
     pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
         self.vector(index, 4)
+    }
+
+    pub(crate) fn set_position(&mut self, index: usize, position: [f32; 3]) {
+        self.set_vector(index, 0, position);
     }
 
     pub(crate) fn set_displacement(&mut self, index: usize, displacement: [f32; 3]) {

@@ -4,10 +4,11 @@ use serde::Deserialize;
 
 use super::anchor::FileAnchor;
 use super::collider::FileCollider;
+use super::contact::FileContact;
 use super::element::{FileConstraint, FileParticle};
 use super::generator_file::FileGenerator;
 use super::settings::FileSolver;
-use super::value::{Table, Tables, Vector, Whole, Word, append};
+use super::value::{Spanned, Table, Tables, Vector, Whole, Word, append};
 use super::wind::FileWind;
 
 /// The scene file before any check. Every key is optional, and every value has its place in the
@@ -24,6 +25,7 @@ pub(super) struct FileScene {
     pub(super) gravity: Option<Vector>,
     pub(super) solver: Option<Table<FileSolver>>,
     pub(super) wind: Option<Table<FileWind>>,
+    pub(super) contact: Option<Spanned<Table<FileContact>>>,
     #[serde(default)]
     pub(super) particle: Tables<FileParticle>,
     #[serde(default)]
@@ -48,6 +50,7 @@ impl FileScene {
         self.gravity = self.gravity.take().or(part.gravity);
         self.solver = self.solver.take().or(part.solver);
         self.wind = self.wind.take().or(part.wind);
+        self.contact = self.contact.take().or(part.contact);
         append(&mut self.particle, part.particle);
         append(&mut self.constraint, part.constraint);
         append(&mut self.collider, part.collider);

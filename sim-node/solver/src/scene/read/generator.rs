@@ -62,6 +62,7 @@ impl Reader<'_> {
             mass: fields.mass()?,
             pinned: fields.pinned(known.pins, shape.particle_count())?,
             tear_stretch: fields.tear_stretch()?,
+            contact: fields.file.contact.unwrap_or(true),
             softness: fields.softness()?,
             shape,
         })

@@ -17,6 +17,7 @@ pub(super) struct FileGenerator {
     pub(super) compliance: Option<Spanned<Table<FileSoftness>>>,
     pub(super) stiffness: Option<Spanned<Table<FileSoftness>>>,
     pub(super) tear_stretch: Option<Number>,
+    pub(super) contact: Option<bool>,
     pub(super) pinned: Option<Spanned<FilePinned>>,
     pub(super) columns: Option<Whole>,
     pub(super) rows: Option<Whole>,

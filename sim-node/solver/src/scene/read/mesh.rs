@@ -35,6 +35,7 @@ impl GeneratorFields<'_, '_> {
             pinned: self.pinned_vertices(&mesh)?,
             shape: Shape::Obj(Obj::new(mesh, density)),
             tear_stretch: self.tear_stretch()?,
+            contact: self.file.contact.unwrap_or(true),
             softness: self.softness()?,
         })
     }
