@@ -61,7 +61,7 @@ impl Parameters {
             iterations: solver.iterations,
             wind_velocity: wind.velocity,
             wind_drag: wind.drag,
-            contact_thickness: scene.contact.thickness(),
+            contact_thickness: scene.contact.distance(),
             contact_friction: scene.contact.friction,
             max_stretch: limits.max_stretch,
             tear_stretch: limits.tear_stretch,
@@ -123,7 +123,7 @@ impl Parameters {
             | Parameter::Iterations
             | Parameter::Relaxation
             | Parameter::WindDrag
-            | Parameter::ContactThickness => Affected::Constraints,
+            | Parameter::Contact => Affected::Constraints,
         })
     }
 
@@ -178,7 +178,7 @@ impl Parameters {
             Parameter::WindDrag => self.wind_drag = or_zero,
             Parameter::Relaxation => self.relaxation = or_zero,
             Parameter::MaxSpeed => self.max_speed = or_zero,
-            Parameter::ContactThickness => self.contact_thickness = number,
+            Parameter::Contact => self.contact_thickness = number,
             Parameter::ContactFriction => self.contact_friction = or_zero,
             Parameter::Substeps => self.substeps = to_count(or_zero),
             Parameter::Iterations => self.iterations = to_count(or_zero),
@@ -217,7 +217,7 @@ impl Parameters {
             tear_distance: self.tear_distance,
             tear_force: self.tear_force,
             max_speed: self.max_speed,
-            contact_thickness: self.contact_thickness,
+            contact: self.contact_thickness,
             contact_friction: self.contact_friction,
             time_scale: 1.0,
             compliance,
@@ -267,7 +267,7 @@ fn check_value(
     let is_allowed = match (info.form, value) {
         (_, ParameterValue::Off) => {
             matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit | OffMeaning::Absent)
-        },
+        }
         (ValueForm::Number, ParameterValue::Number(number)) => info.range.contains(number),
         (ValueForm::Whole, ParameterValue::Number(number)) => {
             number.fract() == 0.0 && info.range.contains(number)

@@ -227,7 +227,12 @@ impl ParticleStore {
     }
 
     /// Sets the position and the displacement of a particle.
-    pub(crate) fn set_path(&mut self, location: Location, position: [f32; 3], displacement: [f32; 3]) {
+    pub(crate) fn set_path(
+        &mut self,
+        location: Location,
+        position: [f32; 3],
+        displacement: [f32; 3],
+    ) {
         match location.sheet() {
             None => self.graph.set_position(location.index(), position),
             Some(sheet) => self.patches[sheet].set_position(location.index(), position),

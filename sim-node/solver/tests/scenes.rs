@@ -206,6 +206,8 @@ fn with_parameter(parameter: Parameter, value: f32) -> Result<Scene, SceneError>
     let name = parameter.name();
     let table = match parameter {
         Parameter::WindDrag => format!("[wind]\ndrag = {value:?}"),
+        Parameter::Contact => format!("[contact]\nthickness = {value:?}"),
+        Parameter::ContactFriction => format!("[contact]\nfriction = {value:?}"),
         Parameter::Compliance | Parameter::Stiffness => format!(
             "[solver]\nmethod = \"{}\"\n[[generate]]\nshape = \"rope\"\ncount = 2\n\
              from = [0, 0, 0]\nto = [1, 0, 0]\n{name} = {{ structural = {value:?} }}",

@@ -174,6 +174,7 @@ fn allowed_parameter(info: &ParameterInfo) -> String {
     let off = match info.off {
         OffMeaning::Zero => ", or off for 0",
         OffMeaning::NoLimit => ", or off for no limit",
+        OffMeaning::Absent => ", or off for none",
         OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
     };
     let kind = if info.is_per_kind { ", for one --kind or all" } else { "" };

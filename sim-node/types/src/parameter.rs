@@ -25,7 +25,7 @@ pub enum Parameter {
     TimeScale = 12,
     Compliance = 13,
     Stiffness = 14,
-    ContactThickness = 15,
+    Contact = 15,
     ContactFriction = 16,
 }
 
@@ -214,8 +214,8 @@ pub const PARAMETERS: [ParameterInfo; 17] = [
         ..SOFTNESS
     },
     ParameterInfo {
-        parameter: Parameter::ContactThickness,
-        name: "contact_thickness",
+        parameter: Parameter::Contact,
+        name: "contact",
         unit: "m",
         range: NumberRange::POSITIVE,
         default: ParameterValue::Off,
@@ -249,7 +249,7 @@ impl Parameter {
         Self::TimeScale,
         Self::Compliance,
         Self::Stiffness,
-        Self::ContactThickness,
+        Self::Contact,
         Self::ContactFriction,
     ];
 

@@ -52,7 +52,7 @@ pub struct ParameterValues {
     pub compliance: PerKind,
     pub stiffness: PerKind,
     #[serde(with = "optional_number", default)]
-    pub contact_thickness: Option<f32>,
+    pub contact: Option<f32>,
     #[serde(with = "number", default = "default_friction")]
     pub contact_friction: f32,
 }
@@ -127,7 +127,7 @@ impl ParameterValues {
         time_scale: 1.0,
         compliance: PerKind::OWN_OF_EACH,
         stiffness: PerKind::OWN_OF_EACH,
-        contact_thickness: None,
+        contact: None,
         contact_friction: 0.3,
     };
 
@@ -171,7 +171,7 @@ impl ParameterValues {
             Parameter::TimeScale => Number(self.time_scale),
             Parameter::Compliance => optional(kind.and_then(|kind| self.compliance.get(kind))),
             Parameter::Stiffness => optional(kind.and_then(|kind| self.stiffness.get(kind))),
-            Parameter::ContactThickness => optional(self.contact_thickness),
+            Parameter::Contact => optional(self.contact),
             Parameter::ContactFriction => Number(self.contact_friction),
         }
     }
@@ -203,7 +203,7 @@ impl ParameterValues {
             Parameter::TimeScale => self.time_scale = or_zero,
             Parameter::Compliance => set_kinds(&mut self.compliance, constraint_kind, number),
             Parameter::Stiffness => set_kinds(&mut self.stiffness, constraint_kind, number),
-            Parameter::ContactThickness => self.contact_thickness = number,
+            Parameter::Contact => self.contact = number,
             Parameter::ContactFriction => self.contact_friction = or_zero,
         }
     }

@@ -80,7 +80,8 @@ pub(super) fn command(named: &NamedValue) -> Result<Command, Reason> {
         Some(known @ KindFilter::Known(_)) if info.is_per_kind => Some(known),
         Some(_) => return Err(Reason::UnknownParameter),
     };
-    let can_be_off = matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit);
+    let can_be_off =
+        matches!(info.off, OffMeaning::Zero | OffMeaning::NoLimit | OffMeaning::Absent);
     let value = match (&named.value, info.form) {
         (Some(FoxgloveValue::String(word)), _) if word == OFF && can_be_off => ParameterValue::Off,
         (Some(FoxgloveValue::Array(axes)), ValueForm::Vector) => {

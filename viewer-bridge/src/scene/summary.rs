@@ -68,6 +68,8 @@ fn parameters(scene: &Scene) -> ParameterValues {
         tear_distance: limits.tear_distance,
         tear_force: limits.tear_force,
         max_speed: solver.max_speed,
+        contact: scene.contact.distance(),
+        contact_friction: scene.contact.friction,
         ..defaults
     }
 }

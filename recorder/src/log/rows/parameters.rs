@@ -34,6 +34,8 @@ struct ValuesSchema {
     time_scale: f32,
     compliance: PerKindSchema,
     stiffness: PerKindSchema,
+    contact: Option<f32>,
+    contact_friction: f32,
 }
 
 /// The schema of a value for each kind of constraint. `null` means that each constraint has its own.

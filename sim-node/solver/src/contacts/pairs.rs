@@ -46,6 +46,8 @@ pub(crate) struct ParticleContacts {
     /// Substep for which the candidates were found. None before the first one of a step.
     found_at: Option<Substep>,
     candidates: Vec<Pair>,
+    /// Largest number of candidates.
+    candidate_count_max: usize,
     /// The candidates in the order of contact.
     ordered: Vec<Pair>,
     /// The pairs of the running substep, in the order of contact.
@@ -60,7 +62,7 @@ impl ParticleContacts {
         let Some(thickness) = thickness else { return Self::default() };
         let particles = load::slots(model);
         let count = particles.len();
-        let candidate_count = CANDIDATES_PER_PARTICLE * count;
+        let candidate_count_max = CANDIDATES_PER_PARTICLE * count;
         Self {
             thickness,
             margin: 0.2 * thickness,
@@ -71,9 +73,10 @@ impl ParticleContacts {
             tree: TileTree::new(count),
             particles,
             found_at: None,
-            candidates: Vec::with_capacity(candidate_count),
-            ordered: Vec::with_capacity(candidate_count),
-            near: Vec::with_capacity(candidate_count),
+            candidate_count_max,
+            candidates: Vec::with_capacity(candidate_count_max),
+            ordered: Vec::with_capacity(candidate_count_max),
+            near: Vec::with_capacity(candidate_count_max),
             overflow_count: 0,
         }
     }
@@ -135,9 +138,8 @@ impl ParticleContacts {
         // Less than half of the margin for each particle, so that rounding loses no pair.
         let limit = 0.24 * self.margin * self.margin;
         self.states.iter().zip(&self.paths).all(|(PackedParticle(now), PackedParticle(path))| {
-            let off = axes(|axis| {
-                (now[axis] - path[axis]) + (now[axis + 4] - count * path[axis + 4])
-            });
+            let off =
+                axes(|axis| (now[axis] - path[axis]) + (now[axis + 4] - count * path[axis + 4]));
             let squared = off[0] * off[0] + off[1] * off[1] + off[2] * off[2];
             // NaN is near nothing, and needs no candidates.
             let has_left = squared > limit;
@@ -149,7 +151,8 @@ impl ParticleContacts {
     fn find_candidates(&mut self, substep: Substep, kernels: Kernels) {
         self.found_at = Some(substep);
         self.paths.copy_from_slice(&self.states);
-        let Self { tree, states, particles, load_pairs, candidates, thickness, .. } = self;
+        let Self { tree, states, particles, load_pairs, candidates, .. } = self;
+        let (thickness, count_max) = (self.thickness, self.candidate_count_max);
         for (slot, PackedParticle(state)) in states.iter().enumerate() {
             let tile = &mut tree.tiles[slot / TILE];
             for axis in 0..3 {
@@ -162,19 +165,19 @@ impl ParticleContacts {
         candidates.clear();
         let accept = |NearPair { slots }: NearPair| {
             let [a, b] = slots.map(|slot| slot as usize);
-            let distance = load_pairs.distance(slots, *thickness);
+            let distance = load_pairs.distance(slots, thickness);
             let is_free = states[a].0[3] + states[b].0[3] > 0.0;
             if distance == 0.0 || !is_free {
                 return Search::Continue(());
             }
-            if candidates.len() == candidates.capacity() {
+            if candidates.len() == count_max {
                 return Search::Break(());
             }
             let key = order_key([particles[a], particles[b]]);
             candidates.push(Pair { slots, distance, key });
             Search::Continue(())
         };
-        let query = Query { span, distance: REACH * *thickness + self.margin };
+        let query = Query { span, distance: REACH * thickness + self.margin };
         if kernels.run(SearchWork { tree, query, accept }).is_break() {
             self.overflow_count += 1;
         }

@@ -13,7 +13,7 @@ use crate::solver::Solver;
 use crate::step::drive::ActiveGrab;
 
 /// First four bytes of an encoded keyframe, little-endian. It changes with the fields below.
-const KEYFRAME_VERSION: u32 = 2;
+const KEYFRAME_VERSION: u32 = 3;
 
 /// The state beside the particles of a snapshot. Both together are the complete state after a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

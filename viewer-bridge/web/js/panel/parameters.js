@@ -31,6 +31,8 @@ export const ROWS = [
   { name: "tear_force", label: "Tear force", unit: "N", kind: "log", least: 1e-3, most: 1e5, canBeOff: true, whenOn: 50 },
   { name: "tear_stretch", label: "Tear stretch", unit: "×", kind: "linear", least: 1.01, most: 4, canBeOff: true, whenOn: 1.5 },
   { name: "tear_distance", label: "Tear distance", unit: "m", kind: "log", least: 1e-3, most: 100, canBeOff: true, whenOn: 0.1 },
+  { name: "contact", label: "Contact distance", unit: "m", kind: "log", least: 1e-3, most: 1, canBeOff: true, whenOn: 0.02 },
+  { name: "contact_friction", label: "Contact friction", unit: "", kind: "linear", least: 0, most: 2 },
   { name: "time_scale", label: "Pace", unit: "×", kind: "log", least: 0.01, most: 10 },
 ];
 

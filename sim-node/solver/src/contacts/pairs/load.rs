@@ -30,11 +30,7 @@ pub(super) fn slots(model: &Model) -> Vec<u32> {
     });
     let scale = if size > 0.0 { 1023.0 / size } else { 0.0 };
     slots.sort_by_key(|(index, position)| {
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "0 to 1023"
-        )]
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1023")]
         let cell = |axis: usize| ((position[axis] - min[axis]) * scale) as u32;
         (morton(cell(0)) | morton(cell(1)) << 1 | morton(cell(2)) << 2, *index)
     });

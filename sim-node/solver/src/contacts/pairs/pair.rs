@@ -60,8 +60,7 @@ impl Pair {
         let slide_length = dot(slide, slide).sqrt();
         let grip = friction * push.displacement;
         let stopped = if grip < slide_length { grip / slide_length } else { 1.0 };
-        let correction =
-            axes(|axis| normal[axis] * push.displacement - slide[axis] * stopped);
+        let correction = axes(|axis| normal[axis] * push.displacement - slide[axis] * stopped);
         let shares = [a[3] / weight, -(b[3] / weight)];
         for (slot, share) in self.slots.into_iter().zip(shares) {
             let particle = &mut particles[slot as usize].0;

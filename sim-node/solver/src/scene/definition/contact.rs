@@ -44,8 +44,8 @@ impl Default for ContactSettings {
 }
 
 impl ContactSettings {
-    /// The contact distance; None if particles do not touch each other.
-    pub(crate) fn thickness(&self) -> Option<f32> {
+    /// Returns the contact distance, or `None` if particles do not touch each other.
+    pub fn distance(&self) -> Option<f32> {
         self.thickness.filter(|_| self.mode == ContactMode::Particles)
     }
 }

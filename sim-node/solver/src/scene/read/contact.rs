@@ -23,7 +23,10 @@ impl TableKeys for FileContact {}
 
 impl Reader<'_> {
     /// Checks the table `[contact]`, if there is one.
-    pub(super) fn contact(&self, file: Option<&FileContact>) -> Result<ContactSettings, SceneError> {
+    pub(super) fn contact(
+        &self,
+        file: Option<&FileContact>,
+    ) -> Result<ContactSettings, SceneError> {
         let default = ContactSettings::default();
         let Some(file) = file else { return Ok(default) };
         let mode = file.mode.as_ref();
@@ -32,17 +35,14 @@ impl Reader<'_> {
             number.map(|number| self.ranged(field, number, range)).transpose()
         };
         let range = |parameter: Parameter| parameter.info().range;
-        let friction = number(
-            "contact.friction",
-            file.friction.as_ref(),
-            range(Parameter::ContactFriction),
-        )?;
+        let friction =
+            number("contact.friction", file.friction.as_ref(), range(Parameter::ContactFriction))?;
         Ok(ContactSettings {
             mode: mode.transpose()?.unwrap_or_default(),
             thickness: number(
                 "contact.thickness",
                 file.thickness.as_ref(),
-                range(Parameter::ContactThickness),
+                range(Parameter::Contact),
             )?,
             friction: friction.unwrap_or(default.friction),
         })
