@@ -11,7 +11,7 @@ mod tile_tree;
 
 use load::LoadPairs;
 use pair::Pair;
-use tile_tree::{NearPair, Query, Search, SearchWork, TILE, TileTree};
+use tile_tree::{Query, Search, TILE, TileTree};
 
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{PackedParticle, axes};
@@ -154,20 +154,17 @@ impl ParticleContacts {
         let Self { tree, states, particles, load_pairs, candidates, .. } = self;
         let (thickness, count_max) = (self.thickness, self.candidate_count_max);
         for (slot, PackedParticle(state)) in states.iter().enumerate() {
-            let tile = &mut tree.tiles[slot / TILE];
-            for axis in 0..3 {
-                tile.x[axis][slot % TILE] = state[axis];
-                tile.d[axis][slot % TILE] = state[axis + 4];
-            }
+            let [x, y, z, _, dx, dy, dz, _] = *state;
+            tree.tiles[slot / TILE].set(slot % TILE, [x, y, z], [dx, dy, dz]);
         }
         let span = substep.left() as f32;
-        tree.refit(span);
+        tree.refit(span, kernels);
         candidates.clear();
-        let accept = |NearPair { slots }: NearPair| {
+        let mut accept = |slots: [u32; 2]| {
             let [a, b] = slots.map(|slot| slot as usize);
             let distance = load_pairs.distance(slots, thickness);
             let is_free = states[a].0[3] + states[b].0[3] > 0.0;
-            if distance == 0.0 || !is_free {
+            if !is_free {
                 return Search::Continue(());
             }
             if candidates.len() == count_max {
@@ -178,7 +175,8 @@ impl ParticleContacts {
             Search::Continue(())
         };
         let query = Query { span, distance: REACH * thickness + self.margin };
-        if kernels.run(SearchWork { tree, query, accept }).is_break() {
+        let except = |slot, tile| load_pairs.untouchable(slot, tile);
+        if tree.search_except(query, kernels, &except, &mut accept).is_break() {
             self.overflow_count += 1;
         }
         self.order_candidates();

@@ -226,6 +226,11 @@ impl Avx2 {
 
 impl Wide for Avx2 {
     #[inline(always)]
+    fn bits(mask: Avx2Mask) -> u32 {
+        avx2!(_mm256_movemask_ps(mask.0)).cast_unsigned()
+    }
+
+    #[inline(always)]
     fn unzip(low: Self, high: Self) -> [Self; 2] {
         let even = avx2!(_mm256_shuffle_ps::<0x88>(low.0, high.0));
         [Self(even), Self(avx2!(_mm256_shuffle_ps::<0xDD>(low.0, high.0)))]

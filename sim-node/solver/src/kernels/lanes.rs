@@ -58,6 +58,8 @@ pub(crate) trait Wide: Lanes {
     /// 0 2 8 10 4 6 12 14 and 1 3 9 11 5 7 13 15. [`Self::zip`] is the inverse.
     fn unzip(low: Self, high: Self) -> [Self; 2];
     fn zip(even: Self, odd: Self) -> [Self; 2];
+    /// Bit n is set where the mask is set in lane n.
+    fn bits(mask: Self::Mask) -> u32;
     /// Separates sixteen numbers into even and odd pairs, in the order 0 1 8 9 4 5 12 13 and
     /// 2 3 10 11 6 7 14 15. [`Self::zip_pairs`] is the inverse.
     fn unzip_pairs(low: Self, high: Self) -> [Self; 2];

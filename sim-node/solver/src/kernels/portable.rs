@@ -163,6 +163,12 @@ impl Lanes for Portable {
 
 impl Wide for Portable {
     #[inline(always)]
+    fn bits(mask: [bool; 8]) -> u32 {
+        let lanes = mask.iter().enumerate();
+        lanes.fold(0, |bits, (lane, is_set)| bits | (u32::from(*is_set) << lane))
+    }
+
+    #[inline(always)]
     fn unzip(low: Self, high: Self) -> [Self; 2] {
         let even = Self::pick(low, high, [0, 2, 8, 10, 4, 6, 12, 14]);
         [even, Self::pick(low, high, [1, 3, 9, 11, 5, 7, 13, 15])]

@@ -1,6 +1,6 @@
 //! Pairs of particles that are near each other at load, and so have another contact distance, or none.
 
-use super::tile_tree::{NearPair, Query, Search, SearchWork, TILE, TileTree};
+use super::tile_tree::{Query, Search, TILE, TileTree};
 use crate::kernels::Kernels;
 use crate::scene::model::Model;
 
@@ -10,51 +10,73 @@ const CONNECTED_REACH: f32 = 1.6;
 /// Largest number of near pairs at load for each particle, on average. Further pairs touch as all others.
 const PAIRS_PER_PARTICLE: usize = 32;
 
-/// The slots of the particles that take part in contacts: neighbours at load have neighbouring slots.
+/// Returns the particles that take part in contacts in the order of their slots. Each tile, and each node
+/// of the tree above, holds neighbours at load: it is one half of a cut across the longest side of the
+/// node above.
 pub(super) fn slots(model: &Model) -> Vec<u32> {
-    let particles = (0_u32..).zip(&model.particles).zip(&model.is_without_contact);
-    let mut slots: Vec<_> = particles
-        .filter(|(_, is_without)| !**is_without)
-        .map(|((index, particle), _)| (index, particle.position))
-        .collect();
-    let mut min = [f32::INFINITY; 3];
-    let mut max = [f32::NEG_INFINITY; 3];
-    for (_, position) in &slots {
-        for axis in 0..3 {
-            min[axis] = if position[axis] < min[axis] { position[axis] } else { min[axis] };
-            max[axis] = if position[axis] > max[axis] { position[axis] } else { max[axis] };
+    let particles = (0_u32..).zip(&model.is_without_contact);
+    let mut slots: Vec<_> =
+        particles.filter(|(_, is_without)| !**is_without).map(|(index, _)| index).collect();
+    let mut size = TILE;
+    while size < slots.len() {
+        size *= 2;
+    }
+    divide(&mut slots, size, &|particle, axis| model.particles[particle as usize].position[axis]);
+    slots
+}
+
+/// Orders the particles of a node with room for `size` particles, a tile times a power of 2. Only the last
+/// node of a level is not full.
+fn divide(slots: &mut [u32], size: usize, coordinate: &dyn Fn(u32, usize) -> f32) {
+    if size == TILE {
+        // The cuts leave the order within a tile to the library.
+        slots.sort_unstable();
+        return;
+    }
+    let half = size / 2;
+    if slots.len() <= half {
+        return divide(slots, half, coordinate);
+    }
+    let length = |axis: usize| {
+        let along = slots.iter().map(|slot| coordinate(*slot, axis));
+        let (min, max) = along.fold((f32::INFINITY, f32::NEG_INFINITY), |(min, max), at| {
+            (if at < min { at } else { min }, if at > max { at } else { max })
+        });
+        max - min
+    };
+    let lengths = [0, 1, 2].map(length);
+    let mut longest = 0;
+    for axis in 1..3 {
+        if lengths[axis] > lengths[longest] {
+            longest = axis;
         }
     }
-    let size = (0..3).fold(0.0_f32, |size, axis| {
-        if max[axis] - min[axis] > size { max[axis] - min[axis] } else { size }
+    slots.select_nth_unstable_by(half, |a, b| {
+        let at = |slot: &u32| coordinate(*slot, longest);
+        at(a).total_cmp(&at(b)).then(a.cmp(b))
     });
-    let scale = if size > 0.0 { 1023.0 / size } else { 0.0 };
-    slots.sort_by_key(|(index, position)| {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 1023")]
-        let cell = |axis: usize| ((position[axis] - min[axis]) * scale) as u32;
-        (morton(cell(0)) | morton(cell(1)) << 1 | morton(cell(2)) << 2, *index)
-    });
-    slots.into_iter().map(|(index, _)| index).collect()
+    let (first, second) = slots.split_at_mut(half);
+    divide(first, half, coordinate);
+    divide(second, half, coordinate);
 }
 
-/// Spreads the lower 10 bits to every third bit (Morton 1966).
-fn morton(cell: u32) -> u32 {
-    (0..10).fold(0, |code, bit| code | ((cell >> bit) & 1) << (3 * bit))
-}
-
-/// By slot: the slots behind it that are near it at load.
+/// The pairs of slots that are near each other at load.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadPairs {
-    /// First entry of each slot, and the end of the last one.
+    /// First entry of each slot in `tiles`, and the end of the last one.
     starts: Vec<u32>,
-    entries: Vec<LoadPair>,
+    /// By slot: the particles of its own and later tiles that it never touches.
+    tiles: Vec<Untouchable>,
+    /// Pairs that touch at another distance: ascending slots, and the distance.
+    closer: Vec<([u32; 2], f32)>,
 }
 
+/// Particles of a tile that a particle never touches.
 #[derive(Debug, Clone, Copy)]
-struct LoadPair {
-    other: u32,
-    /// Contact distance; 0 for a pair that never touches.
-    distance: f32,
+struct Untouchable {
+    tile: u32,
+    /// A bit for each particle.
+    lanes: u32,
 }
 
 impl LoadPairs {
@@ -64,46 +86,63 @@ impl LoadPairs {
         let mut tree = TileTree::new(slots.len());
         for (slot, particle) in slots.iter().enumerate() {
             let position = model.particles[*particle as usize].position;
-            let tile = &mut tree.tiles[slot / TILE];
-            for axis in 0..3 {
-                tile.x[axis][slot % TILE] = position[axis];
-                tile.d[axis][slot % TILE] = 0.0;
-            }
+            tree.tiles[slot / TILE].set(slot % TILE, position, [0.0; 3]);
         }
-        tree.refit(0.0);
+        tree.refit(0.0, kernels);
         let query = Query { span: 0.0, distance: CONNECTED_REACH * thickness };
         let count_max = PAIRS_PER_PARTICLE * slots.len();
-        let mut pairs = Vec::new();
-        let accept = |NearPair { slots: [a, b] }: NearPair| {
-            let particles = [a, b].map(|slot| slots[slot as usize]);
-            let is_connected = bodies[particles[0] as usize] == bodies[particles[1] as usize];
-            let apart = model.distance(particles[0], particles[1]);
-            let distance = match is_connected {
-                true => 0.0,
-                false if apart < thickness => apart,
-                false => return Search::Continue(()),
-            };
-            pairs.push((a, LoadPair { other: b, distance }));
-            if pairs.len() < count_max { Search::Continue(()) } else { Search::Break(()) }
-        };
-        let _is_complete = kernels.run(SearchWork { tree: &tree, query, accept });
-        pairs.sort_by_key(|(slot, pair)| (*slot, pair.other));
-        let mut starts = vec![0; slots.len() + 1];
-        for (slot, _) in &pairs {
-            starts[*slot as usize + 1] += 1;
-        }
-        for slot in 0..slots.len() {
-            starts[slot + 1] += starts[slot];
-        }
-        Self { starts, entries: pairs.into_iter().map(|(_, pair)| pair).collect() }
+        let (mut never, mut closer) = (Vec::new(), Vec::new());
+        let _is_complete = tree.search(query, kernels, &mut |pair| {
+            let [a, b] = pair.map(|slot| slots[slot as usize]);
+            let apart = model.distance(a, b);
+            if bodies[a as usize] == bodies[b as usize] || apart == 0.0 {
+                never.push(pair);
+            } else if apart < thickness {
+                closer.push((pair, apart));
+            }
+            let is_full = never.len() + closer.len() >= count_max;
+            if is_full { Search::Break(()) } else { Search::Continue(()) }
+        });
+        never.sort_unstable();
+        closer.sort_unstable_by_key(|(pair, _)| *pair);
+        let mut load_pairs = Self { starts: Vec::new(), tiles: Vec::new(), closer };
+        load_pairs.enter(&never, slots.len());
+        load_pairs
     }
 
-    /// Contact distance of two slots in ascending order; 0 if they never touch.
+    /// Enters the pairs that never touch, which ascend.
+    fn enter(&mut self, never: &[[u32; 2]], slot_count: usize) {
+        let mut rest = never.iter().peekable();
+        for slot in 0..slot_count {
+            self.starts.push(self.tiles.len() as u32);
+            while let Some([_, other]) = rest.next_if(|[first, _]| *first as usize == slot) {
+                let (tile, lane) = (other / TILE as u32, other % TILE as u32);
+                let first = self.starts[slot] as usize;
+                match self.tiles[first..].last_mut() {
+                    Some(last) if last.tile == tile => last.lanes |= 1 << lane,
+                    _ => self.tiles.push(Untouchable { tile, lanes: 1 << lane }),
+                }
+            }
+        }
+        self.starts.push(self.tiles.len() as u32);
+    }
+
+    /// Returns a bit for each particle of a tile, its own or a later one, that a particle never touches.
     #[inline(always)]
-    pub(super) fn distance(&self, [a, b]: [u32; 2], thickness: f32) -> f32 {
-        let range = self.starts[a as usize] as usize..self.starts[a as usize + 1] as usize;
-        let known = self.entries[range].iter().find(|pair| pair.other == b);
-        known.map_or(thickness, |pair| pair.distance)
+    pub(super) fn untouchable(&self, slot: u32, tile: u32) -> u32 {
+        let range = self.starts[slot as usize] as usize..self.starts[slot as usize + 1] as usize;
+        let known = self.tiles[range].iter().find(|one| one.tile == tile);
+        known.map_or(0, |one| one.lanes)
+    }
+
+    /// Contact distance of two slots in ascending order.
+    #[inline(always)]
+    pub(super) fn distance(&self, pair: [u32; 2], thickness: f32) -> f32 {
+        if self.closer.is_empty() {
+            return thickness;
+        }
+        let found = self.closer.binary_search_by_key(&pair, |(pair, _)| *pair);
+        found.map_or(thickness, |index| self.closer[index].1)
     }
 }
 

@@ -3,23 +3,44 @@
 //! Sixteen particles that are neighbours at load form a tile. Four tiles form a node, and so on. The
 //! tree keeps its form from load to load: only the boxes follow the particles.
 
-use crate::kernels::lanes::{LaneWork, Wide, axes};
+use crate::kernels::Kernels;
+use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
 
-/// Number of particles in a tile.
+/// Number of particles in a tile: two groups of eight lanes.
 pub(super) const TILE: usize = 16;
 /// Number of children of a node.
 const ARITY: usize = 4;
+/// Number of pairs of tiles that are examined together.
+const TILE_PAIRS_MAX: usize = 4096;
+
+/// A number for each particle of a tile.
+type TileColumn = [Lanes8; TILE / 8];
 
 /// The particles of a tile: positions, and displacements in a substep. The padding is NaN, which is near
 /// nothing.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tile {
-    pub(super) x: [[f32; TILE]; 3],
-    pub(super) d: [[f32; TILE]; 3],
+    x: [TileColumn; 3],
+    d: [TileColumn; 3],
 }
 
 impl Tile {
-    pub(super) const EMPTY: Self = Self { x: [[f32::NAN; TILE]; 3], d: [[f32::NAN; TILE]; 3] };
+    const EMPTY: Self = Self { x: [[[f32::NAN; 8]; 2]; 3], d: [[[f32::NAN; 8]; 2]; 3] };
+
+    pub(super) fn set(&mut self, lane: usize, position: [f32; 3], displacement: [f32; 3]) {
+        let (group, lane) = (lane / 8, lane % 8);
+        for axis in 0..3 {
+            self.x[axis][group][lane] = position[axis];
+            self.d[axis][group][lane] = displacement[axis];
+        }
+    }
+
+    /// Ends of the paths of one group of lanes, on one axis.
+    #[inline(always)]
+    fn path<W: Wide>(&self, axis: usize, group: usize, span: W) -> [W; 2] {
+        let x = W::load(&self.x[axis][group], 0);
+        [x, x + span * W::load(&self.d[axis][group], 0)]
+    }
 }
 
 /// Smallest and largest coordinate on each axis. An empty box has +infinity and -infinity.
@@ -32,22 +53,11 @@ struct Bounds {
 impl Bounds {
     const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
-    /// NaN changes nothing.
-    #[inline(always)]
-    fn add(&mut self, axis: usize, value: f32) {
-        if value < self.min[axis] {
-            self.min[axis] = value;
-        }
-        if value > self.max[axis] {
-            self.max[axis] = value;
-        }
-    }
-
     fn union(self, other: &Self) -> Self {
         let mut union = self;
         for axis in 0..3 {
-            union.add(axis, other.min[axis]);
-            union.add(axis, other.max[axis]);
+            union.min[axis] = lesser(other.min[axis], union.min[axis]);
+            union.max[axis] = -lesser(-other.max[axis], -union.max[axis]);
         }
         union
     }
@@ -62,19 +72,24 @@ impl Bounds {
     }
 }
 
+/// The lesser number; `b` if `a` is NaN.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
 /// The tiles and the boxes above them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TileTree {
     pub(super) tiles: Vec<Tile>,
     /// Boxes of the tiles, of the nodes above them, and so on up to the root.
     levels: Vec<Vec<Bounds>>,
+    /// Pairs of tiles that are near each other, to be examined.
+    tile_pairs: Vec<[u32; 2]>,
 }
 
-/// A pair of particles that come near each other: a tile and a lane for each. The first is the lower one.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct NearPair {
-    pub(super) slots: [u32; 2],
-}
+/// Leaves nothing out of a search.
+const NONE: fn(u32, u32) -> u32 = |_, _| 0;
 
 /// Order to go on, or to give the search up.
 pub(super) type Search = std::ops::ControlFlow<()>;
@@ -89,22 +104,14 @@ impl TileTree {
             levels.push(vec![Bounds::EMPTY; length]);
             length = if length > 1 { length.div_ceil(ARITY) } else { 0 };
         }
-        Self { tiles, levels }
+        Self { tiles, levels, tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX) }
     }
 
-    /// Recomputes all boxes for paths of `span` times the displacement.
-    pub(super) fn refit(&mut self, span: f32) {
-        let Self { tiles, levels } = self;
+    /// Recomputes all boxes for paths of `span` displacements.
+    pub(super) fn refit(&mut self, span: f32, kernels: Kernels) {
+        let Self { tiles, levels, .. } = self;
         let Some((leaves, nodes)) = levels.split_first_mut() else { return };
-        for (tile, bounds) in tiles.iter().zip(leaves.iter_mut()) {
-            *bounds = Bounds::EMPTY;
-            for axis in 0..3 {
-                for (x, d) in tile.x[axis].iter().zip(&tile.d[axis]) {
-                    bounds.add(axis, *x);
-                    bounds.add(axis, x + span * d);
-                }
-            }
-        }
+        kernels.run(RefitWork { tiles, leaves, span });
         let mut below = &*leaves;
         for level in nodes {
             for (bounds, children) in level.iter_mut().zip(below.chunks(ARITY)) {
@@ -114,71 +121,112 @@ impl TileTree {
         }
     }
 
-    /// Passes every pair of particles whose straight paths of `span` displacements come nearer than
-    /// `distance` to `accept`. The order of two pairs depends only on the tree, not on the other pairs.
-    #[inline(always)]
-    pub(super) fn search<W: Wide>(
-        &self,
+    /// Passes every pair of particles whose straight paths come nearer than the query's distance to
+    /// `accept`, as slots in ascending order. The order of two pairs depends only on the tree, not on the
+    /// other pairs.
+    pub(super) fn search(
+        &mut self,
         query: Query,
-        accept: &mut impl FnMut(NearPair) -> Search,
+        kernels: Kernels,
+        accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
-        match self.levels.len().checked_sub(1) {
-            Some(root) => self.search_nodes::<W>(root, [0, 0], query, accept),
-            None => Search::Continue(()),
-        }
+        self.search_except(query, kernels, &NONE, accept)
     }
 
-    fn search_nodes<W: Wide>(
+    /// Like [`Self::search`], without the pairs that `except` returns: it has a bit for each particle of a
+    /// tile that a slot of this or an earlier tile leaves out.
+    pub(super) fn search_except(
+        &mut self,
+        query: Query,
+        kernels: Kernels,
+        except: &impl Fn(u32, u32) -> u32,
+        accept: &mut impl FnMut([u32; 2]) -> Search,
+    ) -> Search {
+        let Some(root) = self.levels.len().checked_sub(1) else { return Search::Continue(()) };
+        let mut pairs = std::mem::take(&mut self.tile_pairs);
+        let tree = &*self;
+        let mut examine = |pairs: &mut Vec<[u32; 2]>| {
+            let search =
+                kernels.run(SearchWork { tree, pairs, query, except, accept: &mut *accept });
+            pairs.clear();
+            search
+        };
+        let mut found = tree.search_nodes(root, [0, 0], query.distance, &mut |pair| {
+            pairs.push(pair);
+            if pairs.len() < TILE_PAIRS_MAX { Search::Continue(()) } else { examine(&mut pairs) }
+        });
+        if found.is_continue() {
+            found = examine(&mut pairs);
+        }
+        pairs.clear();
+        self.tile_pairs = pairs;
+        found
+    }
+
+    /// Passes pairs of tiles that are near each other to `accept`.
+    fn search_nodes(
         &self,
         level: usize,
         [a, b]: [usize; 2],
-        query: Query,
-        accept: &mut impl FnMut(NearPair) -> Search,
+        distance: f32,
+        accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
         let bounds = &self.levels[level];
-        if !bounds[a].are_near(&bounds[b], query.distance) {
+        if !bounds[a].are_near(&bounds[b], distance) {
             return Search::Continue(());
         }
         if level == 0 {
-            return self.search_tiles::<W>([a, b], query, accept);
+            #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
+            return accept([a as u32, b as u32]);
         }
         let count = self.levels[level - 1].len();
         let children = |node: usize| ARITY * node..count.min(ARITY * (node + 1));
         for left in children(a) {
             let first = if a == b { left } else { ARITY * b };
             for right in first..children(b).end {
-                self.search_nodes::<W>(level - 1, [left, right], query, accept)?;
+                self.search_nodes(level - 1, [left, right], distance, accept)?;
             }
         }
         Search::Continue(())
     }
+}
+
+/// Computes the boxes of the tiles.
+struct RefitWork<'a> {
+    tiles: &'a [Tile],
+    leaves: &'a mut [Bounds],
+    span: f32,
+}
+
+impl LaneWork for RefitWork<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn search_tiles<W: Wide>(
-        &self,
-        [a, b]: [usize; 2],
-        query: Query,
-        accept: &mut impl FnMut(NearPair) -> Search,
-    ) -> Search {
-        let (left, right) = (&self.tiles[a], &self.tiles[b]);
-        for lane in 0..TILE {
-            let x = axes(|axis| left.x[axis][lane]);
-            let d = axes(|axis| left.d[axis][lane]);
-            let mut near = query.near_lanes(right, x, d);
-            if a == b {
-                // Each pair once: the particles behind this one.
-                near &= (!0_u32 << lane) << 1;
-            }
-            while near != 0 {
-                let other = near.trailing_zeros();
-                near &= near - 1;
-                #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
-                let slots = [(TILE * a + lane) as u32, (TILE * b) as u32 + other];
-                accept(NearPair { slots })?;
+    fn run<W: Wide>(self) {
+        let span = W::splat(self.span);
+        for (tile, bounds) in self.tiles.iter().zip(self.leaves) {
+            for axis in 0..3 {
+                let least = W::splat(f32::NEG_INFINITY);
+                let (mut low, mut high) = (least, least);
+                for group in 0..TILE / 8 {
+                    // NaN leaves them as they are.
+                    for end in tile.path(axis, group, span) {
+                        low = (-end).max_or_rhs(low);
+                        high = end.max_or_rhs(high);
+                    }
+                }
+                bounds.min[axis] = -greatest(low);
+                bounds.max[axis] = greatest(high);
             }
         }
-        Search::Continue(())
     }
+}
+
+#[inline(always)]
+fn greatest<W: Wide>(numbers: W) -> f32 {
+    let mut lanes = [0.0; 8];
+    numbers.store(&mut lanes, 0);
+    lanes.into_iter().fold(f32::NEG_INFINITY, |most, lane| if lane > most { lane } else { most })
 }
 
 /// What [`TileTree::search`] looks for.
@@ -189,45 +237,99 @@ pub(super) struct Query {
     pub(super) distance: f32,
 }
 
-impl Query {
-    /// Returns a bit for each particle of a tile that comes near one particle.
-    #[inline(always)]
-    fn near_lanes(&self, tile: &Tile, x: [f32; 3], d: [f32; 3]) -> u32 {
-        let limit = self.distance * self.distance;
-        let mut squared = [0.0; TILE];
-        for (lane, squared) in squared.iter_mut().enumerate() {
-            let r = axes(|axis| tile.x[axis][lane] - x[axis]);
-            let v = axes(|axis| tile.d[axis][lane] - d[axis]);
-            let (rv, vv) = (dot(r, v), dot(v, v));
-            // The time at which straight paths are nearest; NaN where the particles move alike.
-            let time = -rv / vv;
-            let time = if time > 0.0 { time } else { 0.0 };
-            let time = if time < self.span { time } else { self.span };
-            let apart = axes(|axis| r[axis] + time * v[axis]);
-            *squared = dot(apart, apart);
-        }
-        let bits = squared.iter().enumerate();
-        bits.fold(0, |bits, (lane, squared)| bits | (u32::from(*squared < limit) << lane))
-    }
+/// Examines pairs of tiles.
+struct SearchWork<'a, E, F> {
+    tree: &'a TileTree,
+    pairs: &'a [[u32; 2]],
+    query: Query,
+    except: &'a E,
+    accept: &'a mut F,
 }
 
-/// The search of a tree, compiled for each instruction set.
-pub(super) struct SearchWork<'a, F> {
-    pub(super) tree: &'a TileTree,
-    pub(super) query: Query,
-    pub(super) accept: F,
-}
-
-impl<F: FnMut(NearPair) -> Search> LaneWork for SearchWork<'_, F> {
+impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWork<'_, E, F> {
     type Output = Search;
 
     #[inline(always)]
-    fn run<W: Wide>(mut self) -> Search {
-        self.tree.search::<W>(self.query, &mut self.accept)
+    fn run<W: Wide>(self) -> Search {
+        let Self { tree, pairs, query, except, accept } = self;
+        for [a, b] in pairs {
+            let [left, right] = [a, b].map(|tile| &tree.tiles[*tile as usize]);
+            let bounds = &tree.levels[0][*b as usize];
+            let mut lanes = query.lanes_near::<W>(left, bounds);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros();
+                lanes &= lanes - 1;
+                let mut near = query.lanes_near_lane::<W>(right, (left, lane as usize));
+                if a == b {
+                    // Each pair once: the particles behind this one.
+                    near &= (!0_u32 << lane) << 1;
+                }
+                if near != 0 {
+                    near &= !except(TILE as u32 * a + lane, *b);
+                }
+                while near != 0 {
+                    let other = near.trailing_zeros();
+                    near &= near - 1;
+                    let tile = TILE as u32;
+                    accept([tile * a + lane, tile * b + other])?;
+                }
+            }
+        }
+        Search::Continue(())
+    }
+}
+
+impl Query {
+    /// Returns a bit for each particle of a tile whose path comes near a box.
+    #[inline(always)]
+    fn lanes_near<W: Wide>(&self, tile: &Tile, bounds: &Bounds) -> u32 {
+        let span = W::splat(self.span);
+        let mut bits = 0;
+        for group in 0..TILE / 8 {
+            let [x, y, z] = [0, 1, 2];
+            let x = self.is_near_on_axis::<W>(tile.path(x, group, span), x, bounds);
+            let y = self.is_near_on_axis::<W>(tile.path(y, group, span), y, bounds);
+            let z = self.is_near_on_axis::<W>(tile.path(z, group, span), z, bounds);
+            bits |= W::bits(W::both(x, W::both(y, z))) << (8 * group);
+        }
+        bits
+    }
+
+    #[inline(always)]
+    fn is_near_on_axis<W: Wide>(&self, path: [W; 2], axis: usize, bounds: &Bounds) -> W::Mask {
+        let [start, end] = path;
+        let low = -(-start).max_or_rhs(-end);
+        let high = start.max_or_rhs(end);
+        W::both(
+            low.is_at_most(W::splat(bounds.max[axis] + self.distance)),
+            W::splat(bounds.min[axis] - self.distance).is_at_most(high),
+        )
+    }
+
+    /// Returns a bit for each particle of a tile that comes near one particle of another tile.
+    #[inline(always)]
+    fn lanes_near_lane<W: Wide>(&self, tile: &Tile, (other, lane): (&Tile, usize)) -> u32 {
+        let (other_group, other_lane) = (lane / 8, lane % 8);
+        let x = axes(|axis| W::splat(other.x[axis][other_group][other_lane]));
+        let d = axes(|axis| W::splat(other.d[axis][other_group][other_lane]));
+        let (zero, span) = (W::splat(0.0), W::splat(self.span));
+        let limit = W::splat(self.distance * self.distance);
+        let mut bits = 0;
+        for group in 0..TILE / 8 {
+            let r = axes(|axis| W::load(&tile.x[axis][group], 0) - x[axis]);
+            let v = axes(|axis| W::load(&tile.d[axis][group], 0) - d[axis]);
+            // The time at which straight paths are nearest; NaN where the particles move alike.
+            let time = (-dot(r, v) / dot(v, v)).max_or_rhs(zero);
+            let time = W::select(time.is_below(span), time, span);
+            let apart = axes(|axis| r[axis] + time * v[axis]);
+            bits |= W::bits(dot(apart, apart).is_below(limit)) << (8 * group);
+        }
+        bits
     }
 }
 
 #[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn dot<W: Wide>(a: [W; 3], b: [W; 3]) -> W {
+    let [x, y, z] = axes(|axis| a[axis] * b[axis]);
+    x + y + z
 }
