@@ -320,6 +320,7 @@ impl Node {
     fn make_step(&mut self, wake_late_ns: u64, stop: &Stop) -> anyhow::Result<bool> {
         let before_ns = monotonic_ns();
         let frozen_count = self.solver.frozen_count();
+        let overflow_count = self.solver.contact_overflow_count();
         if !self.solver.step_unless(stop.flag()) {
             return Ok(false);
         }
@@ -330,6 +331,13 @@ impl Node {
             self.warnings.print(&format!(
                 "step {}: froze {count} particles whose state was not finite; `ctl reset` restores \
                  them",
+                self.step + 1
+            ));
+        }
+        if self.solver.contact_overflow_count() > overflow_count {
+            self.warnings.print(&format!(
+                "step {}: the particles are piled up so densely that some contacts were left out; more \
+                 substeps or a smaller contact thickness avoid it",
                 self.step + 1
             ));
         }

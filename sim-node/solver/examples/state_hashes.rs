@@ -14,8 +14,9 @@ use sim_solver::{
 };
 
 /// The test scenes.
-const SCENES: [(&str, &str); 2] = [
+const SCENES: [(&str, &str); 3] = [
     ("everything", include_str!("../tests/scenes/everything.toml")),
+    ("touching", include_str!("../tests/scenes/touching.toml")),
     ("stiffness", include_str!("../tests/scenes/stiffness.toml")),
 ];
 

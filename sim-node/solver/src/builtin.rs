@@ -1,6 +1,6 @@
 //! The built-in scenes.
 
-const SCENES: [(&str, &str); 14] = [
+const SCENES: [(&str, &str); 15] = [
     ("curtain", include_str!("../scenes/curtain.toml")),
     ("rope", include_str!("../scenes/rope.toml")),
     ("flag", include_str!("../scenes/flag.toml")),
@@ -11,6 +11,7 @@ const SCENES: [(&str, &str); 14] = [
     ("tearable-cloth", include_str!("../scenes/tearable-cloth.toml")),
     ("spring-cloth", include_str!("../scenes/spring-cloth.toml")),
     ("carried-cloth", include_str!("../scenes/carried-cloth.toml")),
+    ("folding-cloth", include_str!("../scenes/folding-cloth.toml")),
     ("drop-box", include_str!("../scenes/drop-box.toml")),
     ("drop-box-braced", include_str!("../scenes/drop-box-braced.toml")),
     ("pendulum", include_str!("../scenes/pendulum.toml")),

@@ -322,6 +322,12 @@ impl Solver {
         self.frozen_count
     }
 
+    /// Returns the number of times that a search for contacts of particles was given up because there were
+    /// too many of them: 8 for each particle, on average. Further contacts are ignored then.
+    pub fn contact_overflow_count(&self) -> u64 {
+        self.particle_contacts.overflow_count
+    }
+
     /// Returns the number of particles.
     pub fn particle_count(&self) -> usize {
         self.particles.states.len()

@@ -62,6 +62,7 @@ fn every_scene_has_the_counts_of_the_tutorials() {
         ("tearable-cloth", [3993, 7832, 61]),
         ("spring-cloth", [168, 880, 2]),
         ("carried-cloth", [121, 320, 0]),
+        ("folding-cloth", [1600, 9202, 0]),
         ("pendulum", [2, 1, 1]),
         ("free-fall", [1, 0, 0]),
         ("flag", [651, 3648, 21]),
@@ -71,7 +72,7 @@ fn every_scene_has_the_counts_of_the_tutorials() {
         assert_eq!([found.particles, found.constraints, found.pins], counts, "{name}");
     }
     assert_eq!(scene("carried-cloth").anchors[0].particles.len(), 11);
-    assert_eq!(builtin::names().count(), 14);
+    assert_eq!(builtin::names().count(), 15);
 }
 
 /// Runs a scene for a number of steps and asserts that it stays finite.

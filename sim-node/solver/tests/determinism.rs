@@ -181,10 +181,11 @@ fn keyframes_with_impossible_numbers_are_refused() {
 }
 
 /// A built-in scene, and the scenes that use every mechanism.
-const TEXTS: [&str; 3] = [
+const TEXTS: [&str; 4] = [
     include_str!("../scenes/curtain.toml"),
     include_str!("scenes/everything.toml"),
     include_str!("scenes/stiffness.toml"),
+    include_str!("scenes/touching.toml"),
 ];
 
 proptest! {

@@ -71,7 +71,11 @@ fn kernels_agree_on_every_built_in_scene() {
 
 #[test]
 fn kernels_agree_on_scenes_with_every_mechanism() {
-    for text in [include_str!("scenes/everything.toml"), include_str!("scenes/stiffness.toml")] {
+    for text in [
+        include_str!("scenes/everything.toml"),
+        include_str!("scenes/stiffness.toml"),
+        include_str!("scenes/touching.toml"),
+    ] {
         assert_same_bits(text, "test", 300);
     }
 }

@@ -52,7 +52,11 @@ fn neither_steps_nor_commands_allocate() {
     }
     assert_eq!(allocations() - before, 0);
     // Contacts, wind, anchors and many tears in one step do not allocate either.
-    for text in [include_str!("scenes/everything.toml"), include_str!("scenes/stiffness.toml")] {
+    for text in [
+        include_str!("scenes/everything.toml"),
+        include_str!("scenes/stiffness.toml"),
+        include_str!("scenes/touching.toml"),
+    ] {
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
         solver.step();
         // A parameter takes effect at its boundary, which may allocate.

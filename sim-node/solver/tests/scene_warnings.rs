@@ -56,6 +56,16 @@ fn settings_without_effect_cause_a_warning() {
         &format!("[solver]\norder = \"listed\"\n{PAIR}"),
         "order = \"listed\" with one iteration gains energy",
     );
+    // 2 m at 9.81 m/s^2: 6.3 m/s, and 6.5 mm in 1/960 s.
+    let tall = "[contact]\nmode = \"particles\"\nthickness = 0.02\n[[particle]]\nposition = [0, 0, 0]\n\
+        [[particle]]\nposition = [0, 2, 0]\n";
+    assert_warns(
+        tall,
+        "particles that fall through the height of the scene, at 6.3 m/s, move 0.33 of the contact",
+    );
+    assert!(warnings(tall)[0].ends_with("; 6 substeps suffice"));
+    assert!(warnings(&format!("[solver]\nsubsteps = 6\n{tall}")).is_empty());
+    assert!(warnings(&format!("gravity = [0, 0, 0]\n{tall}")).is_empty());
     let pinned = PAIR.replace("[1, 0, 0]", "[1, 0, 0]\npinned = true");
     assert_warns(
         &format!("[[anchor]]\nparticles = [1]\n{pinned}"),

@@ -1,6 +1,7 @@
 //! The cases of the benchmark, by kind.
 
 pub(crate) mod budget;
+pub(crate) mod contacts;
 pub(crate) mod cost;
 pub(crate) mod speed;
 pub(crate) mod stability;

@@ -18,6 +18,7 @@
 //! | quality-N-START | quality of a sheet with tethers at 2 ms (N = 100) or 8 ms (316) per frame |
 //! | cost-316 | packing, hashing and publishing, compared with a step of the sheet |
 //! | threads-N | a step of the sheet with one and two threads, in wall-clock time |
+//! | contacts-SHEET-RATE | a sheet that falls flat, on a ball, or on its edge, with contacts of particles and without |
 //! | stability-START-N-SUBSTEPS | a minute without a gain of 1 % in energy, else the exit code is 1; long |
 //!
 //! START is "swing" (level, pinned at one side), "hang" (upright) or "corners" (level, pinned at two
@@ -34,7 +35,7 @@ mod scenes;
 
 use std::process::ExitCode;
 
-use cases::{budget, cost, speed, stability, threads};
+use cases::{budget, contacts, cost, speed, stability, threads};
 use options::Options;
 use report::Report;
 
@@ -55,6 +56,7 @@ fn main() -> ExitCode {
     budget::run(&options, &mut report);
     cost::run(&options, &mut report);
     threads::run(&options, &mut report);
+    contacts::run(&options, &mut report);
     let are_stable = stability::run(&options, &mut report);
     if report.is_empty() {
         eprintln!("no case has that name");

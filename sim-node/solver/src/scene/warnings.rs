@@ -21,6 +21,7 @@ impl Scene {
             settings::no_tether_root(self, &model),
             settings::upside_down(self),
             settings::wind_without_surface(self, &model),
+            settings::fast_contacts(self, &model),
             constraints::tear_of_rigid(self, &model),
             constraints::tear_beyond_limit(self, &model),
             constraints::tear_by_rounding(self, &model),

@@ -17,6 +17,7 @@ pub(crate) struct ScheduledStage {
 
 /// Stages that run only in scenes that need them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools, reason = "each tells if one stage runs")]
 pub(crate) struct OptionalStages {
     pub(crate) limit_stretch: bool,
     pub(crate) tether: bool,

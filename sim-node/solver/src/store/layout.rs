@@ -5,6 +5,7 @@ use crate::step::schedule::OptionalStages;
 
 /// Fields of particles that only some scenes have.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools, reason = "each tells if a scene has one thing")]
 pub(crate) struct SceneFields {
     /// For colliders: the predicted displacement.
     pub(crate) colliders: bool,

@@ -1,6 +1,6 @@
 //! Pairs of particles that are near each other at load, and so have another contact distance, or none.
 
-use super::tile_tree::{Query, Search, TILE, TileTree};
+use super::tile_tree::{Query, Search, TILE, TILE_LENGTH, TileTree};
 use crate::kernels::Kernels;
 use crate::scene::model::Model;
 
@@ -111,13 +111,14 @@ impl LoadPairs {
     }
 
     /// Enters the pairs that never touch, which ascend.
+    #[allow(clippy::cast_possible_truncation, reason = "at most 32 for each of 2^24 particles")]
     fn enter(&mut self, never: &[[u32; 2]], slot_count: usize) {
         let mut rest = never.iter().peekable();
         for slot in 0..slot_count {
-            self.starts.push(self.tiles.len() as u32);
-            while let Some([_, other]) = rest.next_if(|[first, _]| *first as usize == slot) {
-                let (tile, lane) = (other / TILE as u32, other % TILE as u32);
-                let first = self.starts[slot] as usize;
+            let first = self.tiles.len();
+            self.starts.push(first as u32);
+            while let Some([_, other]) = rest.next_if(|[one, _]| *one as usize == slot) {
+                let (tile, lane) = (other / TILE_LENGTH, other % TILE_LENGTH);
                 match self.tiles[first..].last_mut() {
                     Some(last) if last.tile == tile => last.lanes |= 1 << lane,
                     _ => self.tiles.push(Untouchable { tile, lanes: 1 << lane }),

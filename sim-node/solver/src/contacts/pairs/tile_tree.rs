@@ -7,7 +7,9 @@ use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
 
 /// Number of particles in a tile: two groups of eight lanes.
-pub(super) const TILE: usize = 16;
+pub(super) const TILE: usize = TILE_LENGTH as usize;
+/// The same number for slots.
+pub(super) const TILE_LENGTH: u32 = 16;
 /// Number of children of a node.
 const ARITY: usize = 4;
 /// Number of pairs of tiles that are examined together.
@@ -115,7 +117,7 @@ impl TileTree {
         let mut below = &*leaves;
         for level in nodes {
             for (bounds, children) in level.iter_mut().zip(below.chunks(ARITY)) {
-                *bounds = children.iter().fold(Bounds::EMPTY, |union, child| union.union(child));
+                *bounds = children.iter().fold(Bounds::EMPTY, Bounds::union);
             }
             below = level;
         }
@@ -203,23 +205,27 @@ impl LaneWork for RefitWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        let span = W::splat(self.span);
         for (tile, bounds) in self.tiles.iter().zip(self.leaves) {
             for axis in 0..3 {
-                let least = W::splat(f32::NEG_INFINITY);
-                let (mut low, mut high) = (least, least);
-                for group in 0..TILE / 8 {
-                    // NaN leaves them as they are.
-                    for end in tile.path(axis, group, span) {
-                        low = (-end).max_or_rhs(low);
-                        high = end.max_or_rhs(high);
-                    }
-                }
-                bounds.min[axis] = -greatest(low);
-                bounds.max[axis] = greatest(high);
+                [bounds.min[axis], bounds.max[axis]] = extent::<W>(tile, axis, self.span);
             }
         }
     }
+}
+
+/// The smallest and the largest coordinate of the paths of a tile on an axis.
+#[inline(always)]
+fn extent<W: Wide>(tile: &Tile, axis: usize, span: f32) -> [f32; 2] {
+    let least = W::splat(f32::NEG_INFINITY);
+    let (mut low, mut high) = (least, least);
+    for group in 0..TILE / 8 {
+        // NaN leaves them as they are.
+        for end in tile.path(axis, group, W::splat(span)) {
+            low = (-end).max_or_rhs(low);
+            high = end.max_or_rhs(high);
+        }
+    }
+    [-greatest(low), greatest(high)]
 }
 
 #[inline(always)]
@@ -229,7 +235,7 @@ fn greatest<W: Wide>(numbers: W) -> f32 {
     lanes.into_iter().fold(f32::NEG_INFINITY, |most, lane| if lane > most { lane } else { most })
 }
 
-/// What [`TileTree::search`] looks for.
+/// Condition of [`TileTree::search`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Query {
     /// Number of displacements that a path has.
@@ -252,26 +258,21 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
     #[inline(always)]
     fn run<W: Wide>(self) -> Search {
         let Self { tree, pairs, query, except, accept } = self;
-        for [a, b] in pairs {
-            let [left, right] = [a, b].map(|tile| &tree.tiles[*tile as usize]);
-            let bounds = &tree.levels[0][*b as usize];
+        for &[a, b] in pairs {
+            let [left, right] = [a, b].map(|tile| &tree.tiles[tile as usize]);
+            let bounds = &tree.levels[0][b as usize];
             let mut lanes = query.lanes_near::<W>(left, bounds);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros();
-                lanes &= lanes - 1;
+            while let Some(lane) = take_lowest(&mut lanes) {
                 let mut near = query.lanes_near_lane::<W>(right, (left, lane as usize));
                 if a == b {
                     // Each pair once: the particles behind this one.
                     near &= (!0_u32 << lane) << 1;
                 }
                 if near != 0 {
-                    near &= !except(TILE as u32 * a + lane, *b);
+                    near &= !except(TILE_LENGTH * a + lane, b);
                 }
-                while near != 0 {
-                    let other = near.trailing_zeros();
-                    near &= near - 1;
-                    let tile = TILE as u32;
-                    accept([tile * a + lane, tile * b + other])?;
+                while let Some(other) = take_lowest(&mut near) {
+                    accept([TILE_LENGTH * a + lane, TILE_LENGTH * b + other])?;
                 }
             }
         }
@@ -279,10 +280,18 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
     }
 }
 
+/// Removes the lowest bit that is set, and returns its place.
+#[inline(always)]
+fn take_lowest(bits: &mut u32) -> Option<u32> {
+    let lowest = (*bits != 0).then_some(bits.trailing_zeros());
+    *bits &= bits.wrapping_sub(1);
+    lowest
+}
+
 impl Query {
     /// Returns a bit for each particle of a tile whose path comes near a box.
     #[inline(always)]
-    fn lanes_near<W: Wide>(&self, tile: &Tile, bounds: &Bounds) -> u32 {
+    fn lanes_near<W: Wide>(self, tile: &Tile, bounds: &Bounds) -> u32 {
         let span = W::splat(self.span);
         let mut bits = 0;
         for group in 0..TILE / 8 {
@@ -296,7 +305,7 @@ impl Query {
     }
 
     #[inline(always)]
-    fn is_near_on_axis<W: Wide>(&self, path: [W; 2], axis: usize, bounds: &Bounds) -> W::Mask {
+    fn is_near_on_axis<W: Wide>(self, path: [W; 2], axis: usize, bounds: &Bounds) -> W::Mask {
         let [start, end] = path;
         let low = -(-start).max_or_rhs(-end);
         let high = start.max_or_rhs(end);
@@ -308,7 +317,7 @@ impl Query {
 
     /// Returns a bit for each particle of a tile that comes near one particle of another tile.
     #[inline(always)]
-    fn lanes_near_lane<W: Wide>(&self, tile: &Tile, (other, lane): (&Tile, usize)) -> u32 {
+    fn lanes_near_lane<W: Wide>(self, tile: &Tile, (other, lane): (&Tile, usize)) -> u32 {
         let (other_group, other_lane) = (lane / 8, lane % 8);
         let x = axes(|axis| W::splat(other.x[axis][other_group][other_lane]));
         let d = axes(|axis| W::splat(other.d[axis][other_group][other_lane]));

@@ -31,3 +31,36 @@ pub(super) fn wind_without_surface(scene: &Scene, model: &Model) -> Option<Strin
     (scene.wind.is_some() && model.triangles.is_empty())
         .then(|| "the wind has no effect: it acts on triangles, and the scene has none".to_owned())
 }
+
+/// Largest fall in a substep, in contact distances, at which cloth does not pass through itself.
+const CONTACT_FALL_MAX: f32 = 0.25;
+
+/// Particles that fall through the height of the scene move too far in a substep to touch each other
+/// reliably.
+pub(super) fn fast_contacts(scene: &Scene, model: &Model) -> Option<String> {
+    let thickness = scene.contact.distance()?;
+    let [x, y, z] = scene.gravity;
+    let gravity = (x * x + y * y + z * z).sqrt();
+    let heights = model.particles.iter().map(|particle| {
+        let [px, py, pz] = particle.position;
+        (px * x + py * y + pz * z) / gravity
+    });
+    let (min, max) = heights.fold((f32::INFINITY, f32::NEG_INFINITY), |(min, max), height| {
+        (min.min(height), max.max(height))
+    });
+    let speed = (2.0 * gravity * (max - min)).sqrt();
+    let distance = speed * scene.solver.h();
+    // NaN without gravity.
+    if distance > CONTACT_FALL_MAX * thickness {
+        let substeps = distance / (CONTACT_FALL_MAX * thickness) * scene.solver.substeps as f32;
+        return Some(format!(
+            "particles that fall through the height of the scene, at {speed:.1} {unit}/s, move {share:.2} \
+             of the contact thickness in a substep, and can pass through each other beyond \
+             {CONTACT_FALL_MAX}; {} substeps suffice",
+            substeps.ceil(),
+            unit = scene.unit,
+            share = distance / thickness,
+        ));
+    }
+    None
+}

@@ -1,0 +1,123 @@
+//! Cost of the contacts of particles: the same sheet with them and without.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+use sim_solver::{Scene, Solver};
+
+use crate::measures::clock::wall_ns;
+use crate::options::Options;
+use crate::report::{Report, Row};
+
+/// Distance of neighbours in m, which is also the contact distance.
+const SPACING: f64 = 0.02;
+/// Rates and numbers of substeps: 960 substeps per second each.
+const RATES: [(u32, u32); 2] = [(240, 4), (60, 16)];
+
+/// A sheet with contacts and without.
+#[derive(Debug, Serialize)]
+struct Contacts {
+    case: String,
+    /// Median over the steps, for each particle and substep.
+    off_ns: f64,
+    on_ns: f64,
+    /// Time with contacts relative to the time without.
+    ratio: f64,
+}
+
+impl Row for Contacts {
+    const HEADINGS: &'static [&'static str] =
+        &["off: ns a particle and substep", "contacts on", "ratio"];
+
+    fn case(&self) -> &str {
+        &self.case
+    }
+
+    fn cells(&self) -> Vec<String> {
+        vec![
+            format!("{:.1}", self.off_ns),
+            format!("{:.1}", self.on_ns),
+            format!("{:.2}", self.ratio),
+        ]
+    }
+}
+
+/// A falling sheet of `side` x `side` particles.
+struct Fall {
+    name: &'static str,
+    side: u32,
+    /// Where the time is measured, in s.
+    from_s: f64,
+    to_s: f64,
+}
+
+const FALLS: [Fall; 3] = [
+    // Level, in free fall.
+    Fall { name: "flat", side: 100, from_s: 0.0, to_s: 0.25 },
+    // Onto a ball on the ground.
+    Fall { name: "ball", side: 100, from_s: 0.3, to_s: 1.0 },
+    // On its edge.
+    Fall { name: "heap", side: 48, from_s: 0.3, to_s: 2.0 },
+];
+
+impl Fall {
+    fn scene(&self, (rate_hz, substeps): (u32, u32), mode: &str) -> Scene {
+        let length = f64::from(self.side - 1) * SPACING;
+        let ground =
+            "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0.01\nfriction = 0.3\n";
+        let (origin, right, down, colliders) = match self.name {
+            "heap" => {
+                ([0.0, length + 0.01, 0.0], "[1, 0, 0.01]", "[0.02, -1, 0.01]", ground.to_owned())
+            }
+            name => {
+                let ball = "[[collider]]\nshape = \"sphere\"\ncenter = [0, 0.15, 0]\nradius = 0.16\nfriction = 0.3\n";
+                let colliders =
+                    if name == "ball" { format!("{ball}{ground}") } else { String::new() };
+                ([-length / 2.0, 0.5, -length / 2.0], "[1, 0, 0]", "[0, 0, 1]", colliders)
+            }
+        };
+        let mut text = format!(
+            "version = 1\n[solver]\nrate_hz = {rate_hz}\nsubsteps = {substeps}\n[contact]\nmode = \"{mode}\"\n"
+        );
+        write!(
+            text,
+            "[[generate]]\nshape = \"mesh\"\ncolumns = {side}\nrows = {side}\nspacing = {SPACING}\nmass = 0.001\n\
+             compliance = {{ bend = 1e-3 }}\norigin = {origin:?}\nright = {right}\ndown = {down}\n{colliders}",
+            side = self.side
+        )
+        .unwrap();
+        Scene::from_toml(&text, "bench").unwrap()
+    }
+}
+
+pub(crate) fn run(options: &Options, report: &mut Report) {
+    for fall in &FALLS {
+        for rates in RATES {
+            let case = format!("contacts-{}-{}x{}", fall.name, rates.0, rates.1);
+            if options.wants(&case) {
+                report.push(&measure(case, fall, rates));
+            }
+        }
+    }
+}
+
+/// Steps both in turns, so that disturbances affect both alike.
+fn measure(case: String, fall: &Fall, rates: (u32, u32)) -> Contacts {
+    let mut solvers = ["off", "particles"].map(|mode| Solver::new(&fall.scene(rates, mode)));
+    let mut times_ns = [Vec::new(), Vec::new()];
+    let step_at = |seconds: f64| (seconds * f64::from(rates.0)) as u32;
+    for step in 0..step_at(fall.to_s) {
+        for (solver, times_ns) in solvers.iter_mut().zip(&mut times_ns) {
+            let time_ns = wall_ns(|| solver.step());
+            if step >= step_at(fall.from_s) {
+                times_ns.push(time_ns);
+            }
+        }
+    }
+    let work = f64::from(rates.1) * f64::from(fall.side * fall.side);
+    let [off_ns, on_ns] = times_ns.map(|mut times_ns| {
+        times_ns.sort_by(f64::total_cmp);
+        times_ns[times_ns.len() / 2] / work
+    });
+    Contacts { case, off_ns, on_ns, ratio: on_ns / off_ns }
+}
