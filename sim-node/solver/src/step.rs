@@ -62,6 +62,7 @@ impl Solver {
                     Stage::Predict => is_marked |= self.sweep(substep, stop),
                     // The sweep that begins with `Predict` contains them.
                     Stage::Project
+                    | Stage::Bend
                     | Stage::LimitStretch
                     | Stage::Tether
                     | Stage::Contact
@@ -85,6 +86,7 @@ impl Solver {
                 | Stage::Wind
                 | Stage::Predict
                 | Stage::Project
+                | Stage::Bend
                 | Stage::LimitStretch
                 | Stage::Tether
                 | Stage::Contact
@@ -144,7 +146,8 @@ impl Solver {
         let contact_substep = self.contact_substep(substep);
         place_obstacles(&mut self.obstacles, &self.colliders, &contact_substep);
         let prediction = self.prediction(substep);
-        let inputs = SubstepInputs { prediction, obstacles: &self.obstacles, stop };
+        let relaxation = self.parameters.relaxation;
+        let inputs = SubstepInputs { prediction, relaxation, obstacles: &self.obstacles, stop };
         self.store.run_swept_stages(&inputs, self.parameters.iterations)
     }
 

@@ -25,6 +25,7 @@ pub enum Parameter {
     TimeScale = 12,
     Compliance = 13,
     Stiffness = 14,
+    Bending = 15,
 }
 
 /// The value of a parameter. Its JSON form is a number, three numbers or null.
@@ -60,7 +61,7 @@ pub enum OffMeaning {
     Zero,
     /// Off means no limit.
     NoLimit,
-    /// Off means that each constraint has its own value, as after a load. `set` does not accept it.
+    /// Off means that each constraint or bend has its own value, as after a load. `set` does not accept it.
     OwnOfEach,
 }
 
@@ -114,7 +115,7 @@ const SOFTNESS: ParameterInfo = ParameterInfo {
 };
 
 /// The table of parameters. The number of a [`Parameter`] is its index here.
-pub const PARAMETERS: [ParameterInfo; 15] = [
+pub const PARAMETERS: [ParameterInfo; 16] = [
     ParameterInfo {
         parameter: Parameter::Gravity,
         name: "gravity",
@@ -209,11 +210,19 @@ pub const PARAMETERS: [ParameterInfo; 15] = [
         range: NumberRange::SHARE,
         ..SOFTNESS
     },
+    // On a line the unit is N m².
+    ParameterInfo {
+        parameter: Parameter::Bending,
+        name: "bending",
+        unit: "N m",
+        is_per_kind: false,
+        ..SOFTNESS
+    },
 ];
 
 impl Parameter {
     /// All parameters, by number.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Gravity,
         Self::Damping,
         Self::WindVelocity,
@@ -229,6 +238,7 @@ impl Parameter {
         Self::TimeScale,
         Self::Compliance,
         Self::Stiffness,
+        Self::Bending,
     ];
 
     /// Returns the parameter with this number.

@@ -17,9 +17,9 @@ pub struct Setting {
     pub value: ParameterValue,
 }
 
-/// Number of [`Setting`]s in [`ParameterValues`]: 13 parameters have one value, and two have a value
+/// Number of [`Setting`]s in [`ParameterValues`]: 14 parameters have one value, and two have a value
 /// for each of the four kinds of constraints.
-pub const SETTINGS_COUNT: usize = 21;
+pub const SETTINGS_COUNT: usize = 22;
 
 /// The values of all parameters, named as in commands. `None` means off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -51,6 +51,9 @@ pub struct ParameterValues {
     pub time_scale: f32,
     pub compliance: PerKind,
     pub stiffness: PerKind,
+    /// Older recordings lack it.
+    #[serde(default, with = "optional_number")]
+    pub bending: Option<f32>,
 }
 
 /// A softness for each kind of constraint. `None` means that each constraint has its own softness.
@@ -118,6 +121,7 @@ impl ParameterValues {
         time_scale: 1.0,
         compliance: PerKind::OWN_OF_EACH,
         stiffness: PerKind::OWN_OF_EACH,
+        bending: None,
     };
 
     /// Returns all values, by parameter and then by kind.
@@ -160,6 +164,7 @@ impl ParameterValues {
             Parameter::TimeScale => Number(self.time_scale),
             Parameter::Compliance => optional(kind.and_then(|kind| self.compliance.get(kind))),
             Parameter::Stiffness => optional(kind.and_then(|kind| self.stiffness.get(kind))),
+            Parameter::Bending => optional(self.bending),
         }
     }
 
@@ -190,6 +195,7 @@ impl ParameterValues {
             Parameter::TimeScale => self.time_scale = or_zero,
             Parameter::Compliance => set_kinds(&mut self.compliance, constraint_kind, number),
             Parameter::Stiffness => set_kinds(&mut self.stiffness, constraint_kind, number),
+            Parameter::Bending => self.bending = number,
         }
     }
 }

@@ -34,6 +34,7 @@ struct ValuesSchema {
     time_scale: f32,
     compliance: PerKindSchema,
     stiffness: PerKindSchema,
+    bending: Option<f32>,
 }
 
 /// The schema of a value for each kind of constraint. `null` means that each constraint has its own.

@@ -24,12 +24,22 @@ struct ShapeKeys {
     pins: &'static [&'static str],
 }
 
-const SHEET: &[&str] =
-    &["columns", "rows", "spacing", "origin", "right", "down", "links", "diagonals"];
+const SHEET: &[&str] = &[
+    "columns",
+    "rows",
+    "spacing",
+    "origin",
+    "right",
+    "down",
+    "links",
+    "diagonals",
+    "bending",
+    "twist",
+];
 static SHAPES: [ShapeKeys; 7] = [
     ShapeKeys { name: "cloth", keys: SHEET, pins: &cloth::PIN_WORDS },
     ShapeKeys { name: "mesh", keys: SHEET, pins: &["none", "top", "top-even", "corners"] },
-    ShapeKeys { name: "rope", keys: &["count", "from", "to"], pins: &END_WORDS },
+    ShapeKeys { name: "rope", keys: &["count", "from", "to", "bending"], pins: &END_WORDS },
     ShapeKeys {
         name: "web",
         keys: &["center", "radius", "spokes", "rings", "normal"],
@@ -97,6 +107,7 @@ impl GeneratorFields<'_, '_> {
                 count: self.count("count", file.count.as_ref(), 2)?,
                 from: self.vector("from", file.from.as_ref())?,
                 to: self.vector("to", file.to.as_ref())?,
+                bending: self.single_bending()?,
             }),
             "web" => Shape::Web(self.web()?),
             "bridge" => Shape::Bridge(self.bridge()?),
@@ -145,6 +156,7 @@ impl GeneratorFields<'_, '_> {
             down: self.vector_or("down", file.down.as_ref(), [0.0, -1.0, 0.0])?,
             links: self.links(default_links)?,
             diagonals: self.diagonals()?,
+            bending: self.sheet_bending()?,
         })
     }
 

@@ -5,7 +5,8 @@ use std::ops::Range;
 use serde::Deserialize;
 
 use super::value::{
-    Number, Spanned, Table, TableKeys, Vector, Whole, Word, append, append_elements, element_count,
+    Number, NumberOrPair, Spanned, Table, TableKeys, Vector, Whole, Word, append, append_elements,
+    element_count,
 };
 
 /// The keys of all shapes. The keys of each shape are checked later.
@@ -26,6 +27,8 @@ pub(super) struct FileGenerator {
     pub(super) down: Option<Vector>,
     pub(super) links: Option<Spanned<Vec<Word>>>,
     pub(super) diagonals: Option<Whole>,
+    pub(super) bending: Option<Spanned<NumberOrPair>>,
+    pub(super) twist: Option<Spanned<bool>>,
     pub(super) count: Option<Whole>,
     pub(super) from: Option<Vector>,
     pub(super) to: Option<Vector>,
@@ -105,7 +108,7 @@ impl FileGenerator {
     }
 
     /// Returns the places of the keys that belong to single shapes.
-    pub(super) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 23] {
+    pub(super) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 25] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -118,6 +121,8 @@ impl FileGenerator {
             ("down", span(self.down.as_ref())),
             ("links", span(self.links.as_ref())),
             ("diagonals", span(self.diagonals.as_ref())),
+            ("bending", span(self.bending.as_ref())),
+            ("twist", span(self.twist.as_ref())),
             ("count", span(self.count.as_ref())),
             ("from", span(self.from.as_ref())),
             ("to", span(self.to.as_ref())),

@@ -37,7 +37,7 @@ impl<'a> SheetRow<'a> {
             rest = others;
             lane_groups_mut(field, 0, count)
         };
-        let SceneFields { colliders, wind, tethers } = layout.fields.scene;
+        let SceneFields { colliders, wind, tethers, .. } = layout.fields.scene;
         let x = [next(), next(), next()];
         let (w, d) = (&*next(), [next(), next(), next()]);
         let predicted = colliders.then(|| [next(), next(), next()]);
