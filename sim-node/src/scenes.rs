@@ -89,8 +89,9 @@ pub(crate) fn check(args: &CheckArgs) -> anyhow::Result<()> {
         return output::json(&checked);
     }
     let CheckedScene { name, counts, rate_hz, substeps, iterations, warnings } = checked;
+    let bends = if counts.bends > 0 { format!(" {} bends,", counts.bends) } else { String::new() };
     output::line(&format!(
-        "{name}: {} particles, {} constraints, {} pins, {} triangles; {rate_hz} Hz x {substeps} \
+        "{name}: {} particles, {} constraints,{bends} {} pins, {} triangles; {rate_hz} Hz x {substeps} \
          substeps x {iterations} iterations",
         counts.particles, counts.constraints, counts.pins, counts.triangles
     ))?;

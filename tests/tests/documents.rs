@@ -73,6 +73,7 @@ fn the_scene_reference_names_every_key() {
         "[wind]",
         "[[particle]]\nposition = [0, 0, 0]",
         "[[constraint]]\nparticles = [0, 1]",
+        "[[bend]]\nparticles = [0, 1, 2]",
         "[[collider]]\nshape = \"plane\"",
         "[[anchor]]\nparticles = []",
         "[[anchor]]\nparticles = []\n[[anchor.path]]\ntime = 0",

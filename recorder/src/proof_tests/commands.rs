@@ -40,6 +40,10 @@ mass = 0.01
 pinned = "none"
 tear_stretch = 1.4
 compliance = { structural = 1e-5, shear = 1e-4 }
+bending = 0.02
+[[bend]]
+particles = [0, 2, 3]
+rigidity = 0.01
 [[constraint]]
 particles = [0, 2]
 [[constraint]]
@@ -100,6 +104,7 @@ pub(super) const COMMANDS: &str = r#"
     {"step":51,"kind":"set","parameter":"compliance","value":1e-4,"constraint_kind":"structural"}
     {"step":52,"kind":"set","parameter":"compliance","value":1e-5}
     {"step":53,"kind":"set","parameter":"stiffness","value":0.5}
+    {"step":54,"kind":"set","parameter":"bending","value":0.001}
     {"step":60,"kind":"release","particle":60}
     {"step":61,"kind":"mark","text":"the sleeve slips"}
     {"step":61,"kind":"mark","text":""}

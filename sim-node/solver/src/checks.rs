@@ -7,6 +7,7 @@ use sim_types::{COORDINATE_MAX, Method, Reason, STEP_WORK_MAX};
 pub(crate) struct Context {
     pub(crate) method: Method,
     pub(crate) is_planar: bool,
+    pub(crate) has_bends: bool,
     pub(crate) size: StepSize,
 }
 
@@ -14,6 +15,7 @@ pub(crate) struct Context {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StepSize {
     pub(crate) particles: u64,
+    /// Constraints and bends.
     pub(crate) constraints: u64,
     pub(crate) colliders: u64,
 }

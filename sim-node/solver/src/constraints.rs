@@ -1,5 +1,6 @@
-//! Distance constraints: their definition in a scene, their order, and their projection.
+//! Distance constraints and bends: their definition in a scene, their order, and their projection.
 
+pub(crate) mod bends;
 pub(crate) mod builder;
 pub(crate) mod column_writer;
 pub(crate) mod columns;

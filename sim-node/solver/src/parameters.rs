@@ -31,6 +31,8 @@ pub(crate) struct Parameters {
     tear_force: Option<f32>,
     /// By kind: softness that replaces that of every constraint of the kind.
     softness: [Option<f32>; 4],
+    /// Rigidity that replaces that of every bend.
+    bending: Option<f32>,
 }
 
 /// Derived state that a parameter affects, from nothing to everything.
@@ -40,9 +42,9 @@ pub(crate) enum Affected {
     Nothing,
     /// The limits of constraints.
     Limits,
-    /// All parameters of constraints.
+    /// All parameters of constraints and bends.
     Constraints,
-    /// All parameters of constraints, and the tethers, whose paths consist of rigid constraints.
+    /// All parameters of constraints and bends, and the tethers, whose paths consist of rigid constraints.
     RigidPaths,
 }
 
@@ -68,6 +70,7 @@ impl Parameters {
             tear_distance: limits.tear_distance,
             tear_force: limits.tear_force,
             softness: [None; 4],
+            bending: None,
         }
     }
 
@@ -80,6 +83,11 @@ impl Parameters {
     /// Softness of a constraint of a kind, where `own` is its softness in the scene.
     pub(crate) fn softness(&self, kind: ConstraintKind, own: f32) -> f32 {
         self.softness[kind as usize].unwrap_or(own)
+    }
+
+    /// Rigidity of a bend, where `own` is its rigidity in the scene.
+    pub(crate) fn rigidity(&self, own: f32) -> f32 {
+        self.bending.unwrap_or(own)
     }
 
     /// Sets one parameter. A wrong value changes nothing.
@@ -97,6 +105,9 @@ impl Parameters {
             return Err(Reason::OutOfRange);
         }
         if info.is_per_kind && parameter != softness_parameter(context.method) {
+            return Err(Reason::NoEffectHere);
+        }
+        if parameter == Parameter::Bending && !context.has_bends {
             return Err(Reason::NoEffectHere);
         }
         check_value(info, value, context)?;
@@ -122,6 +133,7 @@ impl Parameters {
             Parameter::Substeps
             | Parameter::Iterations
             | Parameter::Relaxation
+            | Parameter::Bending
             | Parameter::WindDrag
             | Parameter::Contact => Affected::Constraints,
         })
@@ -131,7 +143,9 @@ impl Parameters {
     pub(crate) fn affected_since(&self, before: &Self) -> Affected {
         if self.softness_bits() != before.softness_bits() {
             Affected::RigidPaths
-        } else if self.pass_bits() != before.pass_bits() {
+        } else if self.pass_bits() != before.pass_bits()
+            || self.bending.map(f32::to_bits) != before.bending.map(f32::to_bits)
+        {
             Affected::Constraints
         } else if self.limit_bits() != before.limit_bits() {
             Affected::Limits
@@ -190,6 +204,7 @@ impl Parameters {
                 Some(kind) => self.softness[kind as usize] = number,
                 None => self.softness = [number; 4],
             },
+            Parameter::Bending => self.bending = number,
             // The pace belongs to the node. It is checked here, so that every program refuses the
             // same values.
             Parameter::TimeScale => {}
@@ -222,6 +237,7 @@ impl Parameters {
             time_scale: 1.0,
             compliance,
             stiffness,
+            bending: self.bending,
         }
     }
 
@@ -229,13 +245,13 @@ impl Parameters {
     pub(crate) fn is_valid(&self, context: Context) -> bool {
         let softness = softness_parameter(context.method);
         let are_valid = self.values(context.method).settings().iter().all(|setting| {
-            let is_own_softness = setting.parameter == softness;
-            let is_other_softness = setting.parameter.info().is_per_kind && !is_own_softness;
+            let info = setting.parameter.info();
+            let is_other_softness = info.is_per_kind && setting.parameter != softness;
             let is_unset = setting.value == ParameterValue::Off;
             is_other_softness
-                || (is_own_softness && is_unset)
+                || (info.off == OffMeaning::OwnOfEach && is_unset)
                 || (check_finite(setting.value).is_ok()
-                    && check_value(setting.parameter.info(), setting.value, context).is_ok())
+                    && check_value(info, setting.value, context).is_ok())
         });
         are_valid && context.size.allows(self.substeps, self.iterations)
     }

@@ -7,8 +7,9 @@ use sim_types::{ParameterValues, TearCause};
 use crate::checks::{Context, StepSize};
 use crate::commands::preparation::Prepared;
 use crate::constraints::Constraint;
+use crate::constraints::bends::Bend;
 use crate::constraints::builder::{ConstraintBuilder, Setup};
-use crate::constraints::order::ProjectionOrder;
+use crate::constraints::order::ProjectionOrders;
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::contacts::colliders::{Collider, PlacedCollider};
 use crate::contacts::obstacle::{OBSTACLES_PER_COLLIDER, Obstacle};
@@ -97,13 +98,13 @@ impl Solver {
     pub fn with_kernels(scene: &Scene, kernels: Kernels) -> Self {
         let model = scene.model();
         let settings = scene.solver;
-        let order = ProjectionOrder::new(&model, settings.order);
+        let orders = ProjectionOrders::new(&model, settings.order);
         let particles = new_particles(&model, &scene.anchors);
         let (particle_count, constraint_count) = (model.particles.len(), model.constraints.len());
         let parameters = Parameters::new(scene);
         let mut solver = Self {
             state_hash: state_hash(&particles.states, 0),
-            store: ParticleStore::new(&model, &order, kernels),
+            store: ParticleStore::new(&model, &orders, kernels),
             torn: Torn::new(constraint_count),
             tethers: Tethers::default(),
             colliders: scene.colliders.iter().map(Collider::new).collect(),
@@ -202,6 +203,7 @@ impl Solver {
         SceneFields {
             colliders: !self.colliders.is_empty(),
             wind: self.air.has_surface() && parameters.wind_drag > 0.0,
+            bend_multipliers: !self.model.bends.is_empty() && parameters.iterations > 1,
             tethers: self.settings.tethers,
             particle_contacts: parameters.contact_thickness.is_some(),
         }
@@ -275,10 +277,11 @@ impl Solver {
     pub(crate) fn context(&self) -> Context {
         let size = StepSize {
             particles: self.particle_count() as u64,
-            constraints: self.constraint_count() as u64,
+            constraints: (self.constraint_count() + self.bend_count()) as u64,
             colliders: self.collider_count() as u64,
         };
-        Context { method: self.settings.method, is_planar: self.is_planar, size }
+        let has_bends = self.bend_count() > 0;
+        Context { method: self.settings.method, is_planar: self.is_planar, has_bends, size }
     }
 
     /// Number of steps that a grab of `over_s` seconds takes, rounded up, at least one. A time that
@@ -354,6 +357,16 @@ impl Solver {
     /// Returns the constraints by index, as loaded.
     pub fn constraints(&self) -> impl Iterator<Item = Constraint> + '_ {
         self.model.constraints.iter().copied()
+    }
+
+    /// Returns the number of bends.
+    pub fn bend_count(&self) -> usize {
+        self.model.bends.len()
+    }
+
+    /// Returns the bends by index, as loaded. Bends have indices of their own, and never tear.
+    pub fn bends(&self) -> impl Iterator<Item = Bend> + '_ {
+        self.model.bends.iter().copied()
     }
 
     /// Returns the triangles of the surface, three particle indices each.

@@ -62,6 +62,7 @@ impl Solver {
                     Stage::Predict => is_marked |= self.sweep(substep, stop),
                     // The sweep that begins with `Predict` contains them.
                     Stage::Project
+                    | Stage::Bend
                     | Stage::LimitStretch
                     | Stage::Tether
                     | Stage::ParticleContact
@@ -86,6 +87,7 @@ impl Solver {
                 | Stage::Wind
                 | Stage::Predict
                 | Stage::Project
+                | Stage::Bend
                 | Stage::LimitStretch
                 | Stage::Tether
                 | Stage::ParticleContact
@@ -147,7 +149,8 @@ impl Solver {
         let contact_substep = self.contact_substep(substep);
         place_obstacles(&mut self.obstacles, &self.colliders, &contact_substep);
         let prediction = self.prediction(substep);
-        let inputs = SubstepInputs { prediction, obstacles: &self.obstacles, stop };
+        let relaxation = self.parameters.relaxation;
+        let inputs = SubstepInputs { prediction, relaxation, obstacles: &self.obstacles, stop };
         let is_marked = self.store.run_swept_stages(&inputs, self.parameters.iterations);
         if self.particle_contacts.are_on() {
             let friction = self.parameters.contact_friction;

@@ -2,6 +2,7 @@
 //! rest as a graph. The state is unpacked from the published particles at the start of a step, and
 //! packed again at the end.
 
+mod bends;
 mod configure;
 mod graph;
 mod layout;
@@ -10,17 +11,19 @@ mod publish;
 mod survey;
 mod workers;
 
+use bends::StoredBends;
 use graph::Graph;
 use layout::Layout;
 pub(crate) use layout::{Configured, Location, SceneFields};
-use patch::Patch;
+use patch::{Patch, SheetFamilies};
 use survey::Survey;
 use workers::Workers;
 
+use crate::constraints::bends::families::BendFamily;
 use crate::constraints::column_writer::ColumnWriter;
 use crate::constraints::families::{Family, Sheet};
 use crate::constraints::fields::Pass;
-use crate::constraints::order::ProjectionOrder;
+use crate::constraints::order::ProjectionOrders;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
 use crate::kernels::Kernels;
@@ -48,16 +51,20 @@ pub(crate) struct ParticleStore {
     is_torn: Vec<bool>,
     /// By constraint: where its parameters are.
     locations: Vec<Location>,
+    bends: StoredBends,
     /// Largest number of particles in a block; 0 in scenes without colliders.
     contact_count: usize,
 }
 
 impl ParticleStore {
-    pub(crate) fn new(model: &Model, order: &ProjectionOrder, kernels: Kernels) -> Self {
-        let is_structured = kernels != Kernels::Reference && order.independent_count > 0;
+    pub(crate) fn new(model: &Model, orders: &ProjectionOrders, kernels: Kernels) -> Self {
+        let is_structured = kernels != Kernels::Reference && orders.has_groups();
         let sheets = if is_structured { pure_sheets(model) } else { Vec::new() };
         let mut locations = vec![Location::default(); model.constraints.len()];
-        let graph = Graph::new(model, order, loose_particles(model, &sheets), &mut locations);
+        let mut bends = StoredBends::new(model);
+        let loose = loose_particles(model, &sheets);
+        let mut graph = Graph::new(model, &orders.constraints, loose, &mut locations);
+        graph.set_bends(model, &orders.bends, &mut bends.locations);
         let families = families_of(model, &sheets);
         let patches =
             sheets.iter().zip(&families).map(|(sheet, families)| Patch::new(*sheet, families));
@@ -72,6 +79,7 @@ impl ParticleStore {
             derived_from: None,
             is_torn: vec![false; model.constraints.len()],
             locations,
+            bends,
             contact_count: 0,
         };
         store.locate_constraints(model);
@@ -90,10 +98,25 @@ impl ParticleStore {
         self.writer(location).set(location.index(), parameters);
     }
 
-    /// Takes a constraint out of every pass.
+    fn set_bend(&mut self, bend: u32, scaled_compliance: f32) {
+        let location = self.bends.locations[bend as usize];
+        match location.sheet() {
+            None => self.graph.set_bend(location.index(), scaled_compliance),
+            Some(sheet) => self.patches[sheet].set_bend(location.index(), scaled_compliance),
+        }
+    }
+
+    /// Takes a constraint, and the bends with it in their path, out of every pass.
     pub(crate) fn tear(&mut self, constraint: u32) {
-        self.is_torn[constraint as usize] = true;
+        let was_torn = std::mem::replace(&mut self.is_torn[constraint as usize], true);
         self.set_parameters(constraint, &ConstraintParameters::INACTIVE);
+        if !was_torn {
+            for place in 0..self.bends.paths.of(constraint).len() {
+                let bend = self.bends.paths.of(constraint)[place];
+                self.bends.count_torn(bend, true);
+                self.set_bend(bend, f32::INFINITY);
+            }
+        }
     }
 
     /// Passes each constraint that the projections have marked to `accept`, in ascending order, and
@@ -292,17 +315,18 @@ const COLUMNS_MIN: u32 = 16;
 /// occupy 19 GB; the graph holds it in 2.
 const ROWS_OF_NARROW_MAX: u32 = 1 << 16;
 
-/// Returns the sheets that are stored in rows: their particles have only constraints of families, and
-/// they are not long and narrow.
+/// Returns the sheets that are stored in rows: their particles have only constraints and bends of families,
+/// and they are not long and narrow.
 fn pure_sheets(model: &Model) -> Vec<Sheet> {
     let mut is_pure = vec![true; model.sheets.len()];
-    for (index, family) in (0_u32..).zip(&model.families) {
-        if family.is_none() {
-            for particle in model.pair(index) {
-                if let Some(found) = find_sheet(&model.sheets, particle) {
-                    is_pure[found.sheet] = false;
-                }
-            }
+    let constraints = (0_u32..).zip(&model.families).filter(|(_, family)| family.is_none());
+    let bends = model.bends.iter().zip(&model.bend_families).filter(|(_, family)| family.is_none());
+    let particles = constraints
+        .flat_map(|(index, _)| model.pair(index))
+        .chain(bends.flat_map(|(bend, _)| bend.particles));
+    for particle in particles {
+        if let Some(found) = find_sheet(&model.sheets, particle) {
+            is_pure[found.sheet] = false;
         }
     }
     let sheets = model.sheets.iter().zip(is_pure);
@@ -319,8 +343,8 @@ fn loose_particles(model: &Model, sheets: &[Sheet]) -> Vec<u32> {
     all.filter(|particle| find_sheet(sheets, *particle).is_none()).collect()
 }
 
-/// Returns the families of each sheet, in the order of projection.
-fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<Vec<Family>> {
+/// Returns the families of each sheet.
+fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<SheetFamilies> {
     let mut has_family = vec![[false; Family::ALL.len()]; sheets.len()];
     for (index, group) in (0_u32..).zip(&model.families) {
         let found = find_sheet(sheets, model.pair(index)[0]);
@@ -328,11 +352,23 @@ fn families_of(model: &Model, sheets: &[Sheet]) -> Vec<Vec<Family>> {
             has_family[found.sheet][Family::from_group(*group) as usize] = true;
         }
     }
-    let present = |has: [bool; Family::ALL.len()]| {
-        let all = Family::ALL.into_iter().zip(has);
-        all.filter(|(_, has)| *has).map(|(family, _)| family).collect()
-    };
-    has_family.into_iter().map(present).collect()
+    let mut has_bends = vec![[false; BendFamily::ALL.len()]; sheets.len()];
+    for (bend, group) in model.bends.iter().zip(&model.bend_families) {
+        let found = find_sheet(sheets, bend.particles[0]);
+        if let (Some(found), Some(group)) = (found, group) {
+            has_bends[found.sheet][BendFamily::from_group(*group) as usize] = true;
+        }
+    }
+    let families =
+        has_family.into_iter().zip(has_bends).map(|(constraints, bends)| SheetFamilies {
+            constraints: present(Family::ALL, &constraints),
+            bends: present(BendFamily::ALL, &bends),
+        });
+    families.collect()
+}
+
+fn present<T, const N: usize>(all: [T; N], has: &[bool; N]) -> Vec<T> {
+    all.into_iter().zip(has).filter(|(_, has)| **has).map(|(one, _)| one).collect()
 }
 
 #[cfg(test)]
@@ -374,8 +410,9 @@ mod tests {
             let free_count = before.iter().filter(|one| one.inverse_mass > 0.0).count();
             let (gain, h) = ([0.0, -0.01, 0.0], 0.001);
             let prediction = Prediction { h, kept: 1.0, gain, reach: 1.0, is_first: true };
+            let relaxation = 1.0;
             let stop = AtomicBool::new(is_given_up);
-            let inputs = SubstepInputs { prediction, obstacles: &[], stop: &stop };
+            let inputs = SubstepInputs { prediction, relaxation, obstacles: &[], stop: &stop };
             store.unpack(&particles.states);
             let ParticleStore { workers, graph, patches, .. } = &mut store;
             for pass in Pass::all(2) {

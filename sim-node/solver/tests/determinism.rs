@@ -26,7 +26,7 @@ enum RandomCommand {
 }
 
 /// Parameters with a number. Each has the range to which 0 to 1 is mapped.
-const SETTINGS: [(&str, f32, f32); 9] = [
+const SETTINGS: [(&str, f32, f32); 10] = [
     ("damping", 0.0, 5.0),
     ("wind_drag", 0.0, 2.0),
     ("relaxation", 0.5, 1.5),
@@ -36,6 +36,7 @@ const SETTINGS: [(&str, f32, f32); 9] = [
     ("tear_force", 1.0, 1000.0),
     ("compliance", 0.0, 1e-3),
     ("stiffness", 0.1, 1.0),
+    ("bending", 0.0, 0.1),
 ];
 
 fn random_command() -> impl Strategy<Value = RandomCommand> {
@@ -181,11 +182,12 @@ fn keyframes_with_impossible_numbers_are_refused() {
 }
 
 /// A built-in scene, and the scenes that use every mechanism.
-const TEXTS: [&str; 4] = [
+const TEXTS: [&str; 5] = [
     include_str!("../scenes/curtain.toml"),
     include_str!("scenes/everything.toml"),
     include_str!("scenes/stiffness.toml"),
     include_str!("scenes/touching.toml"),
+    include_str!("scenes/bends.toml"),
 ];
 
 proptest! {

@@ -75,6 +75,7 @@ fn kernels_agree_on_scenes_with_every_mechanism() {
         include_str!("scenes/everything.toml"),
         include_str!("scenes/stiffness.toml"),
         include_str!("scenes/touching.toml"),
+        include_str!("scenes/bends.toml"),
     ] {
         assert_same_bits(text, "test", 300);
     }
@@ -94,7 +95,7 @@ fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
 const LINKS: &str = "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"corners\"";
 
 /// Settings and generator keys that affect constraints.
-const VARIANTS: [(&str, &str, &str); 8] = [
+const VARIANTS: [(&str, &str, &str); 11] = [
     ("rigid", "substeps = 3", LINKS),
     ("passes", "substeps = 2\niterations = 3\nrelaxation = 1.2", LINKS),
     ("tethers", "substeps = 2\ntethers = true", LINKS),
@@ -111,6 +112,13 @@ const VARIANTS: [(&str, &str, &str); 8] = [
     ("limited", "substeps = 1\nmax_stretch = 1.02", LINKS),
     ("torn", "substeps = 2\ntear_stretch = 1.05\ntear_force = 40", LINKS),
     ("one diagonal", "substeps = 2\ntear_distance = 0.01", "diagonals = 1\npinned = \"top-even\""),
+    ("bending", "substeps = 2\ntethers = true", "pinned = \"corners\"\nbending = 40"),
+    (
+        "woven",
+        "substeps = 2\niterations = 3\nrelaxation = 1.2\nmax_stretch = 1.1",
+        "pinned = \"top-even\"\nbending = [40, 1e3]\ntwist = true",
+    ),
+    ("torn bends", "substeps = 2\ntear_stretch = 1.05\ntear_force = 40", "bending = [40, 5]"),
 ];
 
 #[test]
@@ -128,7 +136,7 @@ fn kernels_agree_on_sheets_of_every_size_around_a_vector() {
         let tears = |cause| causes.contains(&cause);
         let by_itself = [TearCause::Force, TearCause::Stretch, TearCause::Distance].map(tears);
         match name {
-            "torn" => assert_eq!(by_itself, [true, true, false]),
+            "torn" | "torn bends" => assert_eq!(by_itself, [true, true, false]),
             "one diagonal" => assert_eq!(by_itself, [false, false, true]),
             _ => assert_eq!(by_itself, [false; 3], "{name}"),
         }
@@ -159,6 +167,32 @@ fn kernels_agree_on_ropes_of_every_length_around_a_vector() {
         );
         assert_same_bits(&text, &format!("rope of {count}"), 60);
     }
+}
+
+/// The ropes lie in rows, and explicit bends turn the sheet into a graph, with more bends at one particle
+/// than there are groups.
+#[test]
+fn kernels_agree_on_bends_of_ropes_and_graphs() {
+    let mut text = "version = 1\n[solver]\nsubsteps = 3\niterations = 2\n".to_owned();
+    for count in [2, 3, 4, 24, 25, 26, 27, 60] {
+        text += &format!(
+            "[[generate]]\nshape = \"rope\"\ncount = {count}\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n\
+             bending = 0.01\nmass = 0.01\n"
+        );
+    }
+    text += "[[generate]]\nshape = \"cloth\"\ncolumns = 12\nrows = 9\nspacing = 0.1\nbending = 5\n";
+    for end in 0..40 {
+        let first = 171 + end;
+        text += &format!("[[bend]]\nparticles = [{first}, 215, {}]\nrigidity = 0.1\n", first + 49);
+        text += &format!(
+            "[[bend]]\nparticles = [{first}, {}, {}, {}]\nrigidity = 0.5\n",
+            first + 1,
+            first + 24,
+            first + 25
+        );
+    }
+    assert_same_bits(&text, "bends", 120);
+    assert_same_bits_of_threads(&text, "bends", 20);
 }
 
 #[test]

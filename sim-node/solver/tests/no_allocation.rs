@@ -52,9 +52,11 @@ fn neither_steps_nor_commands_allocate() {
     }
     assert_eq!(allocations() - before, 0);
     // Contacts, wind, anchors and many tears in one step do not allocate either.
+    // Nor do bends, and their end at a tear.
     for text in [
         include_str!("scenes/everything.toml"),
         include_str!("scenes/stiffness.toml"),
+        include_str!("scenes/bends.toml"),
         include_str!("scenes/touching.toml"),
     ] {
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
@@ -76,7 +78,11 @@ fn neither_steps_nor_commands_allocate() {
 
 #[test]
 fn a_change_of_a_parameter_in_use_allocates_nothing() {
-    for text in [builtin::text("tearable-cloth").unwrap(), include_str!("scenes/everything.toml")] {
+    for text in [
+        builtin::text("tearable-cloth").unwrap(),
+        include_str!("scenes/everything.toml"),
+        include_str!("scenes/bends.toml"),
+    ] {
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());
         let changes = [
             ("max_stretch", [ParameterValue::Number(1.2), ParameterValue::Number(1.3)]),
@@ -86,9 +92,13 @@ fn a_change_of_a_parameter_in_use_allocates_nothing() {
             ("substeps", [ParameterValue::Number(3.0), ParameterValue::Number(2.0)]),
             ("iterations", [ParameterValue::Number(2.0), ParameterValue::Number(3.0)]),
             ("damping", [ParameterValue::Number(0.5), ParameterValue::Off]),
+            ("bending", [ParameterValue::Number(0.01), ParameterValue::Number(0.0)]),
         ];
+        // A scene without bends refuses it.
+        let is_used = |(name, _): &(&str, _)| *name != "bending" || solver.bend_count() > 0;
+        let changes: Vec<_> = changes.into_iter().filter(is_used).collect();
         // The first use of a parameter makes room for its fields.
-        for (name, [first, _]) in changes {
+        for (name, [first, _]) in changes.iter().copied() {
             solver.set(name, first, None).unwrap();
             solver.step();
         }

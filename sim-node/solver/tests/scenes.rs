@@ -16,12 +16,35 @@ fn the_curtain_has_168_particles_596_sticks_and_14_pins() {
     let expected = SceneCounts {
         particles: 168,
         constraints: 596,
+        bends: 0,
         pins: 14,
         triangles: 286,
         colliders: 0,
         anchors: 0,
     };
     assert_eq!(counts, expected);
+}
+
+#[test]
+fn the_number_of_bends_has_a_closed_form() {
+    let count = |keys: &str| {
+        let text = format!("version = 1\n[[generate]]\n{keys}\n");
+        Scene::from_toml(&text, "test").unwrap().counts().bends
+    };
+    for (columns, rows) in [(1, 1), (1, 5), (2, 2), (3, 2), (9, 7)] {
+        let cloth = format!("shape = \"cloth\"\ncolumns = {columns}\nrows = {rows}\nspacing = 1\n");
+        let lines = columns * rows.max(2) - 2 * columns + rows * columns.max(2) - 2 * rows;
+        let cells = (columns - 1) * (rows - 1);
+        assert_eq!(count(&format!("{cloth}bending = 1")), lines + cells);
+        assert_eq!(count(&format!("{cloth}bending = [1, 2]")), lines);
+        assert_eq!(count(&format!("{cloth}bending = [1, 2]\ntwist = true")), lines + cells);
+        assert_eq!(count(&format!("{cloth}bending = 1\ntwist = false")), lines);
+    }
+    for (particles, bends) in [(2, 0), (3, 1), (40, 38)] {
+        let rope =
+            format!("shape = \"rope\"\ncount = {particles}\nfrom = [0, 0, 0]\nto = [1, 0, 0]");
+        assert_eq!([count(&rope), count(&format!("{rope}\nbending = 1"))], [0, bends]);
+    }
 }
 
 #[test]
@@ -140,6 +163,19 @@ const EVERY_KEY: &str = r#"
         links = ["bend"]
         diagonals = 1
         pinned = "corners"
+        bending = [0.1, 0.25]
+        twist = true
+
+        [[generate]]
+        shape = "rope"
+        count = 3
+        from = [2, 0, 0]
+        to = [3, 0, 0]
+        bending = 0.3
+
+        [[bend]]
+        particles = [0, 1, 2]
+        rigidity = 0.7
     "#;
 
 #[test]
@@ -212,6 +248,10 @@ fn with_parameter(parameter: Parameter, value: f32) -> Result<Scene, SceneError>
             "[solver]\nmethod = \"{}\"\n[[generate]]\nshape = \"rope\"\ncount = 2\n\
              from = [0, 0, 0]\nto = [1, 0, 0]\n{name} = {{ structural = {value:?} }}",
             if parameter == Parameter::Compliance { "xpbd" } else { "pbd" }
+        ),
+        Parameter::Bending => format!(
+            "[[generate]]\nshape = \"rope\"\ncount = 3\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n\
+             {name} = {value:?}"
         ),
         _ if parameter.info().form == ValueForm::Whole => format!("[solver]\n{name} = {value}"),
         _ => format!("[solver]\n{name} = {value:?}"),

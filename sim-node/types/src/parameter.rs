@@ -27,6 +27,7 @@ pub enum Parameter {
     Stiffness = 14,
     Contact = 15,
     ContactFriction = 16,
+    Bending = 17,
 }
 
 /// The value of a parameter. Its JSON form is a number, three numbers or null.
@@ -64,7 +65,7 @@ pub enum OffMeaning {
     NoLimit,
     /// Off means that what the parameter describes does not take place.
     Absent,
-    /// Off means that each constraint has its own value, as after a load. `set` does not accept it.
+    /// Off means that each constraint or bend has its own value, as after a load. `set` does not accept it.
     OwnOfEach,
 }
 
@@ -118,7 +119,7 @@ const SOFTNESS: ParameterInfo = ParameterInfo {
 };
 
 /// The table of parameters. The number of a [`Parameter`] is its index here.
-pub const PARAMETERS: [ParameterInfo; 17] = [
+pub const PARAMETERS: [ParameterInfo; 18] = [
     ParameterInfo {
         parameter: Parameter::Gravity,
         name: "gravity",
@@ -229,11 +230,19 @@ pub const PARAMETERS: [ParameterInfo; 17] = [
         off: OffMeaning::Zero,
         ..NUMBER
     },
+    // On a line the unit is N m².
+    ParameterInfo {
+        parameter: Parameter::Bending,
+        name: "bending",
+        unit: "N m",
+        is_per_kind: false,
+        ..SOFTNESS
+    },
 ];
 
 impl Parameter {
     /// All parameters, by number.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Gravity,
         Self::Damping,
         Self::WindVelocity,
@@ -251,6 +260,7 @@ impl Parameter {
         Self::Stiffness,
         Self::Contact,
         Self::ContactFriction,
+        Self::Bending,
     ];
 
     /// Returns the parameter with this number.

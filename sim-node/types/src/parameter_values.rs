@@ -17,9 +17,9 @@ pub struct Setting {
     pub value: ParameterValue,
 }
 
-/// Number of [`Setting`]s in [`ParameterValues`]: 15 parameters have one value, and two have a value
+/// Number of [`Setting`]s in [`ParameterValues`]: 16 parameters have one value, and two have a value
 /// for each of the four kinds of constraints.
-pub const SETTINGS_COUNT: usize = 23;
+pub const SETTINGS_COUNT: usize = 24;
 
 /// The values of all parameters, named as in commands. `None` means off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -55,6 +55,9 @@ pub struct ParameterValues {
     pub contact: Option<f32>,
     #[serde(with = "number", default = "default_friction")]
     pub contact_friction: f32,
+    /// Older recordings lack it.
+    #[serde(default, with = "optional_number")]
+    pub bending: Option<f32>,
 }
 
 /// In recordings from before there were contacts.
@@ -129,6 +132,7 @@ impl ParameterValues {
         stiffness: PerKind::OWN_OF_EACH,
         contact: None,
         contact_friction: 0.3,
+        bending: None,
     };
 
     /// Returns all values, by parameter and then by kind.
@@ -173,6 +177,7 @@ impl ParameterValues {
             Parameter::Stiffness => optional(kind.and_then(|kind| self.stiffness.get(kind))),
             Parameter::Contact => optional(self.contact),
             Parameter::ContactFriction => Number(self.contact_friction),
+            Parameter::Bending => optional(self.bending),
         }
     }
 
@@ -205,6 +210,7 @@ impl ParameterValues {
             Parameter::Stiffness => set_kinds(&mut self.stiffness, constraint_kind, number),
             Parameter::Contact => self.contact = number,
             Parameter::ContactFriction => self.contact_friction = or_zero,
+            Parameter::Bending => self.bending = number,
         }
     }
 }

@@ -36,6 +36,7 @@ struct ValuesSchema {
     stiffness: PerKindSchema,
     contact: Option<f32>,
     contact_friction: f32,
+    bending: Option<f32>,
 }
 
 /// The schema of a value for each kind of constraint. `null` means that each constraint has its own.

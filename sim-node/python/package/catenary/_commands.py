@@ -89,8 +89,8 @@ class Commands(ABC, Generic[Result]):
         """Sets parameters by name, such as `set(gravity=(0, 0, 0), damping=0.5)`. None turns one off.
 
         `compliance` and `stiffness` take a number for all constraints, or a dict with a number for each kind,
-        such as `{"shear": 0.5}`. Each parameter is a command of its own, in the order given; the result is
-        that of the last one.
+        such as `{"shear": 0.5}`. `bending` replaces the rigidity of all bends. Each parameter is a command of
+        its own, in the order given; the result is that of the last one.
         """
         actions = [action for name, value in values.items() for action in _settings(name, value)]
         if not actions:

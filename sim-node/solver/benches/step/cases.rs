@@ -1,5 +1,6 @@
 //! The cases of the benchmark, by kind.
 
+pub(crate) mod bends;
 pub(crate) mod budget;
 pub(crate) mod contacts;
 pub(crate) mod cost;

@@ -16,6 +16,7 @@
 //! | rope-20, rope-50 | ropes of 20 and 50 particles |
 //! | curtain, ragdoll, pendulum ... | every built-in scene that has links |
 //! | quality-N-START | quality of a sheet with tethers at 2 ms (N = 100) or 8 ms (316) per frame |
+//! | bends-N | the cost of a bend in a sheet, and of a distance, N = 100, 316 |
 //! | cost-316 | packing, hashing and publishing, compared with a step of the sheet |
 //! | threads-N | a step of the sheet with one and two threads, in wall-clock time |
 //! | contacts-SHEET-RATE | a sheet that falls flat, on a ball, or on its edge, with contacts of particles and without |
@@ -35,7 +36,7 @@ mod scenes;
 
 use std::process::ExitCode;
 
-use cases::{budget, contacts, cost, speed, stability, threads};
+use cases::{bends, budget, contacts, cost, speed, stability, threads};
 use options::Options;
 use report::Report;
 
@@ -54,6 +55,7 @@ fn main() -> ExitCode {
     speed::run_sheets(&options, &mut report);
     speed::run_graphs(&options, &mut report);
     budget::run(&options, &mut report);
+    bends::run(&options, &mut report);
     cost::run(&options, &mut report);
     threads::run(&options, &mut report);
     contacts::run(&options, &mut report);

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use crate::constraints::builder::{ConstraintBuilder, Setup};
-use crate::constraints::order::ProjectionOrder;
+use crate::constraints::order::ProjectionOrders;
 use crate::constraints::tethers::{TetherBasis, Tethers};
 use crate::kernels::Kernels;
 use crate::parameters::Parameters;
@@ -48,8 +48,8 @@ impl Plan {
     pub fn prepare(self, spare: Option<Spare>) -> Prepared {
         let spare = spare.filter(|Spare(spare)| Arc::ptr_eq(&spare.model, &self.model));
         let new_store = || {
-            let order = ProjectionOrder::new(&self.model, self.order);
-            ParticleStore::new(&self.model, &order, self.kernels)
+            let orders = ProjectionOrders::new(&self.model, self.order);
+            ParticleStore::new(&self.model, &orders, self.kernels)
         };
         let mut store = spare.map_or_else(new_store, |Spare(spare)| spare.store);
         let mut is_torn = vec![false; self.model.constraints.len()];

@@ -24,12 +24,51 @@ pub(crate) struct ProjectionOrder {
     pub(crate) independent_count: usize,
 }
 
-impl ProjectionOrder {
+/// The orders of a scene.
+#[derive(Debug, Clone)]
+pub(crate) struct ProjectionOrders {
+    pub(crate) constraints: ProjectionOrder,
+    pub(crate) bends: ProjectionOrder,
+}
+
+impl ProjectionOrders {
     pub(crate) fn new(model: &Model, order: ConstraintOrder) -> Self {
+        Self {
+            constraints: ProjectionOrder::new(model, order),
+            bends: ProjectionOrder::of_bends(model, order),
+        }
+    }
+
+    /// True unless constraints and bends are projected in the order of the file.
+    pub(crate) fn has_groups(&self) -> bool {
+        self.constraints.independent_count > 0 || self.bends.independent_count > 0
+    }
+}
+
+impl ProjectionOrder {
+    /// The order of the distance constraints.
+    fn new(model: &Model, order: ConstraintOrder) -> Self {
+        let particles = |index| model.pair(index);
+        Self::of(&model.families, model.particles.len(), order, particles)
+    }
+
+    /// The order of the bends, which follow the constraints.
+    fn of_bends(model: &Model, order: ConstraintOrder) -> Self {
+        let particles = |index| model.bends[index as usize].particles;
+        Self::of(&model.bend_families, model.particles.len(), order, particles)
+    }
+
+    /// `families` and `particles` are by constraint.
+    fn of<const N: usize>(
+        families: &[Option<u32>],
+        particle_count: usize,
+        order: ConstraintOrder,
+        particles: impl Fn(u32) -> [u32; N],
+    ) -> Self {
         match order {
-            ConstraintOrder::Listed => Self::from_groups(Vec::new(), (0..count(model)).collect()),
+            ConstraintOrder::Listed => Self::from_groups(Vec::new(), indices(families).collect()),
             ConstraintOrder::Grouped => {
-                let Grouped { independent, overflow } = group(model);
+                let Grouped { independent, overflow } = group(families, particle_count, particles);
                 Self::from_groups(independent, overflow)
             }
         }
@@ -55,34 +94,39 @@ impl ProjectionOrder {
     }
 }
 
-#[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 constraints")]
-fn count(model: &Model) -> u32 {
-    model.constraints.len() as u32
+fn indices(families: &[Option<u32>]) -> impl Iterator<Item = u32> {
+    (0_u32..).take(families.len())
 }
 
 /// Groups declared families first, one half of a family per group. Every other constraint, in
-/// index order, goes into the first later group in which neither of its particles occurs.
-fn group(model: &Model) -> Grouped {
-    let family_count = model.families.iter().flatten().max().map_or(0, |last| *last as usize + 1);
+/// index order, goes into the first later group in which none of its particles occurs.
+fn group<const N: usize>(
+    families: &[Option<u32>],
+    particle_count: usize,
+    particles: impl Fn(u32) -> [u32; N],
+) -> Grouped {
+    let family_count = families.iter().flatten().max().map_or(0, |last| *last as usize + 1);
     let mut groups = vec![Vec::new(); family_count];
     let mut overflow = Vec::new();
     // Bit g of a particle: it occurs in first-fit group g, counted after the families.
-    let mut occupied = vec![0_u32; model.particles.len()];
+    let mut occupied = vec![0_u32; particle_count];
     let first_fit_mask = lowest_bits(GROUPS_MAX - family_count);
-    for index in 0..count(model) {
-        if let Some(family) = model.families[index as usize] {
+    for index in indices(families) {
+        if let Some(family) = families[index as usize] {
             groups[family as usize].push(index);
             continue;
         }
-        let [a, b] = model.pair(index).map(|particle| particle as usize);
-        let free = !(occupied[a] | occupied[b]) & first_fit_mask;
+        let particles = particles(index).map(|particle| particle as usize);
+        let taken = particles.iter().fold(0, |taken, particle| taken | occupied[*particle]);
+        let free = !taken & first_fit_mask;
         if free == 0 {
             overflow.push(index);
             continue;
         }
         let bit = free.trailing_zeros();
-        occupied[a] |= 1 << bit;
-        occupied[b] |= 1 << bit;
+        for particle in particles {
+            occupied[particle] |= 1 << bit;
+        }
         let group = family_count + bit as usize;
         groups.resize(groups.len().max(group + 1), Vec::new());
         groups[group].push(index);
@@ -138,7 +182,7 @@ mod tests {
         assert_eq!(order.groups.len(), 12);
         let mut all: Vec<_> = order.indices.clone();
         all.sort_unstable();
-        assert_eq!(all, (0..count(&model)).collect::<Vec<_>>());
+        assert_eq!(all, indices(&model.families).collect::<Vec<_>>());
         for group in &order.groups {
             assert_independent(&model, &order.indices[group.clone()]);
         }

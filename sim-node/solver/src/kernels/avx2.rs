@@ -254,6 +254,27 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
+    fn unzip_thirds([a, b, c]: [Self; 3]) -> [Self; 3] {
+        // Numbers of one class lie in different lanes of the three registers.
+        let [zero, one, two] = [
+            Self::pick_thirds([a, b, c]),
+            Self::pick_thirds([c, a, b]),
+            Self::pick_thirds([b, c, a]),
+        ];
+        [zero, one.rotated::<1>(), two.rotated::<2>()]
+    }
+
+    #[inline(always)]
+    fn zip_thirds([zero, one, two]: [Self; 3]) -> [Self; 3] {
+        let (one, two) = (one.rotated::<7>(), two.rotated::<6>());
+        [
+            Self::pick_thirds([zero, one, two]),
+            Self::pick_thirds([two, zero, one]),
+            Self::pick_thirds([one, two, zero]),
+        ]
+    }
+
+    #[inline(always)]
     fn columns(particles: &[PackedParticle; 8]) -> [[Self; 4]; 2] {
         let [a, b, c, d, e, f, g, h] = particles;
         let low = Self::transpose([a, b, c, d]);
@@ -307,6 +328,29 @@ impl Wide for Avx2 {
 }
 
 impl Avx2 {
+    /// Lanes 0, 3, 6 of the first, 1, 4, 7 of the second, and 2, 5 of the third.
+    #[inline(always)]
+    fn pick_thirds([a, b, c]: [Self; 3]) -> Self {
+        let ab = avx2!(_mm256_blend_ps::<0b1001_0010>(a.0, b.0));
+        Self(avx2!(_mm256_blend_ps::<0b0010_0100>(ab, c.0)))
+    }
+
+    /// Lane `i` becomes lane `i` + `BY` modulo 8 of the argument.
+    #[inline(always)]
+    fn rotated<const BY: i32>(self) -> Self {
+        let lanes = avx2!(_mm256_setr_epi32(
+            BY % 8,
+            (BY + 1) % 8,
+            (BY + 2) % 8,
+            (BY + 3) % 8,
+            (BY + 4) % 8,
+            (BY + 5) % 8,
+            (BY + 6) % 8,
+            (BY + 7) % 8
+        ));
+        Self(avx2!(_mm256_permutevar8x32_ps(self.0, lanes)))
+    }
+
     /// Transposes columns to rows of x, y, z, 0: particles 0 and 4, 1 and 5, 2 and 6, 3 and 7.
     #[inline(always)]
     fn rows([x, y, z]: [Self; 3]) -> [Self; 4] {

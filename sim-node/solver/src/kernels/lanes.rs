@@ -64,6 +64,10 @@ pub(crate) trait Wide: Lanes {
     /// 2 3 10 11 6 7 14 15. [`Self::zip_pairs`] is the inverse.
     fn unzip_pairs(low: Self, high: Self) -> [Self; 2];
     fn zip_pairs(even: Self, odd: Self) -> [Self; 2];
+    /// Separates twenty-four numbers by their index modulo 3, in the order 0 9 18 3 12 21 6 15 and its
+    /// successors. [`Self::zip_thirds`] is the inverse.
+    fn unzip_thirds(numbers: [Self; 3]) -> [Self; 3];
+    fn zip_thirds(thirds: [Self; 3]) -> [Self; 3];
     /// Transposes eight particles to columns: x, y, z and inverse mass, then the second half.
     fn columns(particles: &[PackedParticle; 8]) -> [[Self; 4]; 2];
     fn set_displacements(particles: &mut [PackedParticle; 8], displacements: [Self; 3]);

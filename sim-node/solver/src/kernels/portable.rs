@@ -14,6 +14,9 @@ use super::lanes::{Lanes, Lanes8, PackedParticle, Wide};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Portable(Lanes8);
 
+/// Indices of the first of three classes of numbers, by lane.
+const THIRDS: [usize; 8] = [0, 9, 18, 3, 12, 21, 6, 15];
+
 impl Portable {
     #[inline(always)]
     fn zip_with(self, other: Self, with: impl Fn(f32, f32) -> f32) -> Self {
@@ -190,6 +193,23 @@ impl Wide for Portable {
     fn zip_pairs(even: Self, odd: Self) -> [Self; 2] {
         // The exchange is its own inverse.
         Self::unzip_pairs(even, odd)
+    }
+
+    #[inline(always)]
+    fn unzip_thirds(numbers: [Self; 3]) -> [Self; 3] {
+        let number = |index: usize| numbers[index / 8].0[index % 8];
+        [0, 1, 2].map(|third| Self(THIRDS.map(|index| number(index + third))))
+    }
+
+    #[inline(always)]
+    fn zip_thirds(thirds: [Self; 3]) -> [Self; 3] {
+        let mut numbers = [Self([0.0; 8]); 3];
+        for (third, from) in thirds.into_iter().enumerate() {
+            for (lane, index) in THIRDS.into_iter().enumerate() {
+                numbers[(index + third) / 8].0[(index + third) % 8] = from.0[lane];
+            }
+        }
+        numbers
     }
 
     #[inline(always)]

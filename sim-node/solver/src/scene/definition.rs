@@ -1,6 +1,7 @@
 //! The checked scene, with every default filled in.
 
 pub(crate) mod anchor;
+pub(crate) mod bending;
 pub(crate) mod collider;
 pub(crate) mod contact;
 pub(crate) mod decimal;
@@ -17,6 +18,7 @@ use super::generate::Generator;
 use super::model::{Model, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
+use bending::SceneBend;
 use collider::SceneCollider;
 use contact::ContactSettings;
 use element::{SceneConstraint, SceneParticle};
@@ -57,6 +59,9 @@ pub struct Scene {
     /// Explicit constraints. They have the first indices and may join generated particles.
     #[serde(rename = "constraint")]
     pub constraints: Vec<SceneConstraint>,
+    /// Explicit bends. They have the first indices of bends.
+    #[serde(rename = "bend", skip_serializing_if = "Vec::is_empty")]
+    pub bends: Vec<SceneBend>,
     /// Colliders, in the order in which they act.
     #[serde(rename = "collider")]
     pub colliders: Vec<SceneCollider>,
@@ -125,10 +130,12 @@ impl Scene {
     }
 
     fn step_size(&self) -> StepSize {
-        let generated = self.generators.iter().map(|generator| generator.shape.constraint_count());
+        let generated = self.generators.iter().map(|generator| &generator.shape);
+        let generated = generated.map(|shape| shape.constraint_count() + shape.bend_count());
+        let explicit = (self.constraints.len() + self.bends.len()) as u64;
         StepSize {
             particles: self.particle_count(),
-            constraints: self.constraints.len() as u64 + generated.sum::<u64>(),
+            constraints: explicit + generated.sum::<u64>(),
             colliders: self.colliders.len() as u64,
         }
     }
@@ -139,6 +146,7 @@ impl Scene {
         SceneCounts {
             particles: model.particles.len(),
             constraints: model.constraints.len(),
+            bends: model.bends.len(),
             pins: model.particles.iter().filter(|particle| particle.pinned).count(),
             triangles: model.triangles.len(),
             colliders: self.colliders.len(),
@@ -146,14 +154,17 @@ impl Scene {
         }
     }
 
-    /// Expands the scene: explicit particles first, then those of each generator, and constraints
-    /// likewise.
+    /// Expands the scene: explicit particles first, then those of each generator, and constraints and
+    /// bends likewise.
     pub(crate) fn model(&self) -> Model {
         let mut particles = self.room_for_particles();
         self.for_each_particle(&mut |particle| particles.push(particle));
         let mut model = Model::new(self.solver.method, particles);
         for constraint in &self.constraints {
             model.push_explicit(constraint);
+        }
+        for bend in &self.bends {
+            model.push_explicit_bend(bend);
         }
         let mut first = self.particles.len() as u64;
         for generator in &self.generators {
@@ -207,6 +218,8 @@ pub struct SceneCounts {
     pub particles: usize,
     /// Constraints.
     pub constraints: usize,
+    /// Bends.
+    pub bends: usize,
     /// Pinned particles.
     pub pins: usize,
     /// Triangles of the surface.

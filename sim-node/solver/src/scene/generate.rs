@@ -1,5 +1,6 @@
 //! Generators: shapes that expand to many particles and constraints.
 
+mod bending;
 pub(super) mod bridge;
 mod builder;
 pub(super) mod cloth;
@@ -100,6 +101,17 @@ impl Shape {
     }
 }
 
+impl Shape {
+    /// Returns the number of bends that the shape expands to.
+    pub(crate) fn bend_count(&self) -> u64 {
+        match self {
+            Self::Cloth(cloth) | Self::Mesh(cloth) => cloth.bend_count(),
+            Self::Rope(rope) => rope.bend_count(),
+            Self::Web(_) | Self::Bridge(_) | Self::Ragdoll(_) | Self::Obj(_) => 0,
+        }
+    }
+}
+
 impl Generator {
     /// Visits the shape's particles.
     pub(crate) fn for_each_particle(&self, up: Up, visit: &mut dyn FnMut(SceneParticle)) {
@@ -115,7 +127,7 @@ impl Generator {
         }
     }
 
-    /// Appends the shape's constraints and triangles to a model that has its particles. `first` is the
+    /// Appends the shape's constraints, triangles and bends to a model that has its particles. `first` is the
     /// index of the first one.
     pub(crate) fn build_constraints(&self, first: u32, model: &mut Model) {
         let Self { shape, softness, tear_stretch, .. } = self;
@@ -128,6 +140,11 @@ impl Generator {
             Shape::Bridge(bridge) => bridge.build_constraints(&mut builder),
             Shape::Ragdoll(_) => Ragdoll::build_constraints(&mut builder),
             Shape::Obj(obj) => obj.build_constraints(&mut builder),
+        }
+        match shape {
+            Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.build_bends(&mut builder),
+            Shape::Rope(rope) => rope.build_bends(&mut builder),
+            Shape::Web(_) | Shape::Bridge(_) | Shape::Ragdoll(_) | Shape::Obj(_) => {}
         }
     }
 }

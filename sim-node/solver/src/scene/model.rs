@@ -1,8 +1,10 @@
 //! Expansion of a scene: every particle, constraint and triangle.
 
+use super::definition::bending::{BendParticles, SceneBend};
 use super::definition::element::{SceneConstraint, SceneParticle};
 use super::definition::limits::Limits;
 use crate::constraints::Constraint;
+use crate::constraints::bends::Bend;
 use crate::constraints::families::Sheet;
 use sim_types::Method;
 
@@ -19,6 +21,9 @@ pub(crate) struct Model {
     limits: Vec<Limits>,
     /// By constraint: index into `limits`.
     limit_indices: Vec<u32>,
+    pub(crate) bends: Vec<Bend>,
+    /// By bend: the group of independent bends that its shape declares.
+    pub(crate) bend_families: Vec<Option<u32>>,
     pub(crate) triangles: Vec<[u32; 3]>,
     /// By particle: it never touches others.
     pub(crate) is_without_contact: Vec<bool>,
@@ -69,6 +74,23 @@ impl Model {
         self.families.push(family);
         #[allow(clippy::cast_possible_truncation, reason = "at most one per constraint")]
         self.limit_indices.push(self.limits.len() as u32 - 1);
+    }
+
+    /// Adds an explicit bend.
+    pub(crate) fn push_explicit_bend(&mut self, bend: &SceneBend) {
+        let SceneBend { particles, rigidity } = *bend;
+        let position = |index: u32| self.particles[index as usize].position;
+        let bend = match particles {
+            BendParticles::Line(line) => Bend::on_line(line, line.map(position), rigidity),
+            BendParticles::Cell(cell) => Bend::of_cell(cell, cell.map(position), rigidity),
+        };
+        self.push_bend(bend, None);
+    }
+
+    /// Adds a bend, with the family that its shape declares.
+    pub(crate) fn push_bend(&mut self, bend: Bend, family: Option<u32>) {
+        self.bends.push(bend);
+        self.bend_families.push(family);
     }
 
     #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 particles")]

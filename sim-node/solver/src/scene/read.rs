@@ -6,10 +6,7 @@ mod contact;
 mod element;
 mod file_scene;
 mod generator;
-mod generator_fields;
-mod generator_file;
 mod limits;
-mod mesh;
 mod reader;
 mod settings;
 mod syntax;
@@ -29,6 +26,7 @@ use super::definition::collider::SceneCollider;
 use super::definition::settings::Up;
 use super::definition::{SCENE_VERSION, Scene};
 use super::error::{Place, SceneError};
+use super::generate::Shape;
 use super::model::Positions;
 use collider::FileCollider;
 use file_scene::FileScene;
@@ -82,7 +80,12 @@ impl Scene {
         let contact_place = file.contact.as_ref().map(Spanned::span);
         let generator_places: Vec<_> = file.generate.iter().map(Spanned::span).collect();
         let mut scene = reader.without_references(&mut file, &solver, dimensions)?;
-        reader.check_size(&scene, file.constraint.len(), &generator_places)?;
+        let explicit = ElementCounts {
+            particles: scene.particles.len() as u64,
+            constraints: file.constraint.len() as u64,
+            bends: file.bend.len() as u64,
+        };
+        reader.check_size(&scene, explicit, &generator_places)?;
         reader.check_memory(&scene, &file)?;
         let positions = scene.positions();
         reader.check_generated(&scene, &positions, &generator_places)?;
@@ -107,7 +110,7 @@ fn enumerate<F, T>(
 }
 
 impl Reader<'_> {
-    /// Reads the scene except for its constraints and anchors, which refer to particles by index. Takes
+    /// Reads the scene except for its constraints, bends and anchors, which refer to particles by index. Takes
     /// the tables that it reads.
     fn without_references(
         &self,
@@ -133,6 +136,7 @@ impl Reader<'_> {
             contact: self.contact(file.contact.as_ref().map(|table| &**table.get_ref()))?,
             particles: enumerate(take(&mut file.particle), |index, one| self.particle(index, one))?,
             constraints: Vec::new(),
+            bends: Vec::new(),
             colliders: self.colliders(take(&mut file.collider))?,
             anchors: Vec::new(),
             generators: enumerate(take(&mut file.generate), |index, one| {
@@ -142,7 +146,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Reads the explicit constraints and the anchors.
+    /// Reads the explicit constraints and bends, and the anchors.
     fn read_references(
         &self,
         scene: &mut Scene,
@@ -151,6 +155,7 @@ impl Reader<'_> {
     ) -> Result<(), SceneError> {
         scene.constraints =
             enumerate(file.constraint, |index, one| self.constraint(index, one, positions))?;
+        scene.bends = enumerate(file.bend, |index, one| self.bend(index, one, positions))?;
         let mut is_anchored = vec![false; positions.0.len()];
         scene.anchors = enumerate(file.anchor, |index, one| {
             self.anchor(index, one, positions, &mut is_anchored)
@@ -224,29 +229,20 @@ impl Reader<'_> {
     fn check_size(
         &self,
         scene: &Scene,
-        explicit_constraints: usize,
+        explicit: ElementCounts,
         generator_places: &[Range<usize>],
     ) -> Result<(), SceneError> {
-        let mut particles = scene.particles.len() as u64;
-        let mut constraints = explicit_constraints as u64;
+        let mut counts = explicit;
         for (index, generator) in scene.generators.iter().enumerate() {
-            particles = particles.saturating_add(generator.shape.particle_count());
-            constraints = constraints.saturating_add(generator.shape.constraint_count());
-            if particles.max(constraints) > u64::from(ELEMENTS_MAX) {
-                let problem = format!(
-                    "increases the scene to {particles} particles and {constraints} constraints \
-                     (allowed: {ELEMENTS_MAX} of each)"
-                );
+            counts.add(&generator.shape);
+            if counts.exceed_limit() {
+                let problem = format!("increases the scene to {}", counts.problem());
                 let span = generator_places[index].clone();
                 return self.error(span, &format!("generate[{index}]"), problem);
             }
         }
-        if particles.max(constraints) > u64::from(ELEMENTS_MAX) {
-            let problem = format!(
-                "has {particles} particles and {constraints} constraints (allowed: {ELEMENTS_MAX} \
-                 of each)"
-            );
-            return self.error(0..0, "scene", problem);
+        if counts.exceed_limit() {
+            return self.error(0..0, "scene", format!("has {}", counts.problem()));
         }
         Ok(())
     }
@@ -276,5 +272,34 @@ impl Reader<'_> {
              {SCENE_SIZE_BYTES_MAX})"
         );
         self.error(0..0, "scene", problem)
+    }
+}
+
+/// Numbers of elements, each of which is limited.
+#[derive(Clone, Copy)]
+struct ElementCounts {
+    particles: u64,
+    constraints: u64,
+    bends: u64,
+}
+
+impl ElementCounts {
+    fn add(&mut self, shape: &Shape) {
+        self.particles = self.particles.saturating_add(shape.particle_count());
+        self.constraints = self.constraints.saturating_add(shape.constraint_count());
+        self.bends = self.bends.saturating_add(shape.bend_count());
+    }
+
+    fn exceed_limit(self) -> bool {
+        self.particles.max(self.constraints).max(self.bends) > u64::from(ELEMENTS_MAX)
+    }
+
+    fn problem(self) -> String {
+        let Self { particles, constraints, bends } = self;
+        let bends = if bends > 0 { format!(" and {bends} bends") } else { String::new() };
+        format!(
+            "{particles} particles and {constraints} constraints{bends} (allowed: {ELEMENTS_MAX} of \
+             each)"
+        )
     }
 }

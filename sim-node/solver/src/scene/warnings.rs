@@ -1,5 +1,6 @@
 //! Warnings about scenes that work, but probably not as intended.
 
+mod bending;
 mod constraints;
 mod particles;
 mod settings;
@@ -29,6 +30,7 @@ impl Scene {
             constraints::duplicates(&model),
         ];
         let mut warnings: Vec<_> = all.into_iter().flatten().collect();
+        warnings.extend(bending::unreached(self, &model));
         warnings.extend(shapes::without_length(self));
         warnings.extend(shapes::without_pins(self));
         warnings.extend(self.read_warnings.iter().cloned());

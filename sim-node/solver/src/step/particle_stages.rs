@@ -26,6 +26,7 @@ pub(crate) fn run_stage<W: Wide>(
         Stage::Drive
         | Stage::Wind
         | Stage::Project
+        | Stage::Bend
         | Stage::LimitStretch
         | Stage::ParticleContact
         | Stage::Tear

@@ -9,7 +9,7 @@ pub(crate) struct ScheduledStage {
     pub(crate) stage: Stage,
     /// Group of a grouped stage, 0 for others: half of a family in a sheet, a group of the graph.
     pub(crate) group: usize,
-    /// In a sheet, the number of rows from the first particle of a constraint to the second.
+    /// In a sheet, the number of rows from the first particle of a constraint to the last.
     pub(crate) reach: usize,
     /// In a sheet, the number of rows by which the stage follows the first stage.
     pub(crate) lag: usize,
@@ -30,7 +30,7 @@ impl OptionalStages {
     fn includes(self, stage: Stage, pass: Pass) -> bool {
         match stage {
             Stage::Predict => pass.is_first(),
-            Stage::Project => true,
+            Stage::Project | Stage::Bend => true,
             Stage::LimitStretch => pass.is_last() && self.limit_stretch,
             Stage::Tether => pass.is_last() && self.tether,
             Stage::Contact | Stage::Advance => {
@@ -61,11 +61,12 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
-    /// Replaces the schedule. `reaches` has one entry for each constraint group.
+    /// Replaces the schedule. `constraints` and `bends` have the reach of each of their groups.
     pub(crate) fn rebuild(
         &mut self,
         optional: OptionalStages,
-        reaches: &(impl Iterator<Item = usize> + Clone),
+        constraints: &(impl Iterator<Item = usize> + Clone),
+        bends: &(impl Iterator<Item = usize> + Clone),
     ) {
         for pass in Pass::all(3).chain(Pass::all(1)) {
             let mut lag = 0;
@@ -74,13 +75,18 @@ impl Schedule {
             for stage in
                 Stage::OF_SUBSTEP.into_iter().filter(|stage| optional.includes(*stage, pass))
             {
-                if !stage.is_grouped() {
-                    stages.push(ScheduledStage { stage, group: 0, reach: 0, lag });
-                    continue;
-                }
-                for (group, reach) in reaches.clone().enumerate() {
+                let mut push = |group, reach| {
                     lag += reach;
                     stages.push(ScheduledStage { stage, group, reach, lag });
+                };
+                match stage {
+                    Stage::Project | Stage::LimitStretch => {
+                        constraints.clone().enumerate().for_each(|(group, one)| push(group, one));
+                    }
+                    Stage::Bend => {
+                        bends.clone().enumerate().for_each(|(group, one)| push(group, one));
+                    }
+                    _ => push(0, 0),
                 }
             }
         }
@@ -126,8 +132,11 @@ mod tests {
             particle_contact: false,
             contact: true,
         };
-        schedule.rebuild(optional, &[1, 0].into_iter());
-        let project = |lag: usize| [(Stage::Project, 0, lag + 1), (Stage::Project, 1, lag + 1)];
+        schedule.rebuild(optional, &[1, 0].into_iter(), &[2].into_iter());
+        let project = |lag: usize| {
+            let constraints = [0, 1].map(|group| (Stage::Project, group, lag + 1));
+            [&constraints[..], &[(Stage::Bend, 0, lag + 3)]].concat()
+        };
         let end = |lag: usize| {
             let limit = |group| (Stage::LimitStretch, group, lag + 1);
             let particle = |stage| (stage, 0, lag + 1);
@@ -140,15 +149,15 @@ mod tests {
         let [first, middle, last] = [0, 1, 2].map(|index| Pass { index, count: 3 });
         assert_eq!(stages(&schedule, first), expected(&[&begin, &project(0)]));
         assert_eq!(stages(&schedule, middle), expected(&[&project(0)]));
-        assert_eq!(stages(&schedule, last), expected(&[&project(0), &end(1)]));
+        assert_eq!(stages(&schedule, last), expected(&[&project(0), &end(3)]));
         let only = Pass { index: 0, count: 1 };
-        assert_eq!(stages(&schedule, only), expected(&[&begin, &project(0), &end(1)]));
+        assert_eq!(stages(&schedule, only), expected(&[&begin, &project(0), &end(3)]));
     }
 
     #[test]
-    fn a_scene_without_limits_tethers_and_colliders_skips_their_stages() {
+    fn a_scene_without_bends_limits_tethers_and_colliders_skips_their_stages() {
         let mut schedule = Schedule::default();
-        schedule.rebuild(OptionalStages::default(), &std::iter::once(0));
+        schedule.rebuild(OptionalStages::default(), &std::iter::once(0), &std::iter::empty());
         let only = Pass { index: 0, count: 1 };
         let expected = [Stage::Predict, Stage::Project, Stage::Advance].map(|stage| (stage, 0, 0));
         assert_eq!(stages(&schedule, only), expected);

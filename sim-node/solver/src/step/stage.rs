@@ -15,6 +15,9 @@ pub(crate) enum Stage {
     /// Constraints, group by group, `iterations` times: `delta_lambda` = -(C + a lambda) /
     /// (`w_a` + `w_b` + a) with a = compliance / h^2 (xpbd), or the share k' of C (pbd).
     Project,
+    /// Bends, group by group, in the same passes: `delta_Lambda` = -(C + a Lambda) / (sum of w c^2 + a)
+    /// with C = sum of c x.
+    Bend,
     /// Constraints longer than `max_stretch` times their rest length: back to it, pulling only.
     LimitStretch,
     /// Free particles beyond the length of their tether: d is shortened to it, pulling only.
@@ -36,11 +39,12 @@ pub(crate) enum Stage {
 
 impl Stage {
     /// The stages of each substep, in order.
-    pub(crate) const OF_SUBSTEP: [Self; 9] = [
+    pub(crate) const OF_SUBSTEP: [Self; 10] = [
         Self::Drive,
         Self::Wind,
         Self::Predict,
         Self::Project,
+        Self::Bend,
         Self::LimitStretch,
         Self::Tether,
         Self::ParticleContact,
@@ -53,6 +57,6 @@ impl Stage {
 
     /// True for stages that run constraint group by constraint group.
     pub(crate) fn is_grouped(self) -> bool {
-        matches!(self, Self::Project | Self::LimitStretch)
+        matches!(self, Self::Project | Self::Bend | Self::LimitStretch)
     }
 }

@@ -34,6 +34,8 @@ impl Substep {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SubstepInputs<'a> {
     pub(crate) prediction: Prediction,
+    /// Fraction of each correction that is applied.
+    pub(crate) relaxation: f32,
     /// In the order of contact.
     pub(crate) obstacles: &'a [Obstacle],
     /// Gives the step up when it becomes true.

@@ -3,6 +3,7 @@
 use super::graph::block::BLOCK_PARTICLES;
 use super::layout::{Configured, Location, SceneFields};
 use super::{ParticleStore, find_sheet};
+use crate::constraints::bends::families::BendFamily;
 use crate::constraints::builder::ConstraintBuilder;
 use crate::constraints::families::Family;
 use crate::constraints::fields::ConstraintFields;
@@ -47,7 +48,15 @@ impl ParticleStore {
         for constraint in (0_u32..).take(self.locations.len()) {
             self.set_parameters(constraint, &self.parameters_of(constraint, builder));
         }
+        for bend in (0_u32..).take(self.bends.locations.len()) {
+            self.derive_bend(bend, builder);
+        }
         configured
+    }
+
+    fn derive_bend(&mut self, bend: u32, builder: &ConstraintBuilder<'_>) {
+        let is_active = self.bends.is_active(bend);
+        self.set_bend(bend, if is_active { builder.bend_compliance(bend) } else { f32::INFINITY });
     }
 
     fn parameters_of(
@@ -85,13 +94,18 @@ impl ParticleStore {
         self.use_fields(builder.model, self.survey.fields(builder.pass_count()), scene)
     }
 
-    /// Deactivates the constraints that have torn since the last call, and activates those that are no
-    /// longer torn.
+    /// Deactivates the constraints that have torn since the last call, with their bends, and activates
+    /// those that are no longer torn.
     fn follow_tears(&mut self, builder: &ConstraintBuilder<'_>, is_torn: &[bool]) {
         for (constraint, is_torn) in (0_u32..).zip(is_torn) {
             if self.is_torn[constraint as usize] != *is_torn {
                 self.is_torn[constraint as usize] = *is_torn;
                 self.set_parameters(constraint, &self.parameters_of(constraint, builder));
+                for place in 0..self.bends.paths.of(constraint).len() {
+                    let bend = self.bends.paths.of(constraint)[place];
+                    self.bends.count_torn(bend, *is_torn);
+                    self.derive_bend(bend, builder);
+                }
             }
         }
     }
@@ -125,7 +139,7 @@ impl ParticleStore {
         Configured::Moved
     }
 
-    /// Updates the locations of the constraints of sheets, whose indices depend on the layout.
+    /// Updates the locations of the constraints and bends of sheets, whose indices depend on the layout.
     pub(super) fn locate_constraints(&mut self, model: &Model) {
         if self.patches.is_empty() {
             return;
@@ -138,6 +152,14 @@ impl ParticleStore {
                 let place = [row, column - family.shifts()[0]];
                 let index = self.patches[found.sheet].constraint_index(family, place);
                 self.locations[constraint as usize] = Location::in_sheet(found.sheet, index);
+            }
+        }
+        for (bend, group) in (0_u32..).zip(&model.bend_families) {
+            let found = find_sheet(&self.sheets, model.bends[bend as usize].particles[0]);
+            if let (Some(found), Some(group)) = (found, group) {
+                let family = BendFamily::from_group(*group);
+                let index = self.patches[found.sheet].bend_index(family, found.place);
+                self.bends.locations[bend as usize] = Location::in_sheet(found.sheet, index);
             }
         }
     }

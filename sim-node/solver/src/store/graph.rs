@@ -1,16 +1,21 @@
 //! Particles and constraints outside of sheets: batches of eight constraints that share no particle.
 
 mod batch;
+mod bends;
 pub(crate) mod block;
 mod group;
+mod indices;
 
 use batch::Batch;
+use bends::GraphBends;
 use block::{BLOCK_PARTICLES, BlockWork, GraphBlock, PackedTether};
 use group::{ConstraintGroup, part_count};
+use indices::find_particle;
 
 use super::layout::{Layout, Location, SceneFields};
 use super::publish::{PublishedMotion, publish};
 use super::workers::{WorkerScratch, Workers};
+use crate::constraints::bends::projection::BendPass;
 use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
 use crate::constraints::columns::{ConstraintColumns, FullPass};
 use crate::constraints::fields::Pass;
@@ -45,6 +50,7 @@ pub(crate) struct Graph {
     /// Columns of the constraints, each as long as 8 `ends`.
     columns: Vec<f32>,
     column_order: ColumnOrder,
+    bends: GraphBends,
     layout: Layout,
     /// Softness of all constraints, unless they differ.
     softness: PassSoftness,
@@ -90,9 +96,22 @@ impl Graph {
 
     /// Index of a particle of the scene in the graph, unless it lies in a sheet.
     pub(crate) fn find(&self, particle: u32) -> Option<u32> {
-        let place = self.indices.binary_search(&particle).ok()?;
-        #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
-        Some(place as u32)
+        find_particle(&self.indices, particle)
+    }
+
+    /// Collects the bends of the graph. Enters their locations into `locations`, which is indexed by bend.
+    pub(crate) fn set_bends(
+        &mut self,
+        model: &Model,
+        order: &ProjectionOrder,
+        locations: &mut [Location],
+    ) {
+        self.bends = GraphBends::new(model, order, &self.indices, locations);
+    }
+
+    /// Sets the scaled compliance of a bend; infinite for one without effect.
+    pub(crate) fn set_bend(&mut self, index: usize, scaled_compliance: f32) {
+        self.bends.set(index, scaled_compliance);
     }
 
     fn push(&mut self, links: &[GraphLink], is_independent: bool, locations: &mut [Location]) {
@@ -120,18 +139,21 @@ impl Graph {
     /// Sets the fields in use, and the softness of constraints that have none of their own.
     pub(crate) fn use_fields(&mut self, layout: Layout, softness: PassSoftness) {
         (self.layout, self.softness) = (layout, softness);
-        self.schedule.rebuild(layout.optional_stages(), &self.groups.iter().map(|_| 0));
+        let (constraints, bends) = (self.groups.iter(), self.bends.groups.iter());
+        let optional = layout.optional_stages();
+        self.schedule.rebuild(optional, &constraints.map(|_| 0), &bends.map(|_| 0));
     }
 
-    /// Allocates the fields of the layout. Every constraint is inactive afterwards.
+    /// Allocates the fields of the layout. Every constraint and bend is inactive afterwards.
     pub(crate) fn allocate(&mut self) {
         let Layout { constraints, scene, .. } = self.layout;
         let count = |is_there: bool| if is_there { self.indices.len() } else { 0 };
-        let SceneFields { colliders, wind, tethers, .. } = scene;
+        let SceneFields { colliders, wind, tethers, bend_multipliers, .. } = scene;
         self.predicted = vec![[0.0; 3]; count(colliders)];
         self.gains = vec![[0.0; 3]; count(wind)];
         let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
         self.tethers = vec![none; count(tethers)];
+        self.bends.allocate(bend_multipliers);
         let length = 8 * self.ends.len();
         refill(&mut self.columns, constraints.column_count() * length, 0.0);
         self.column_order = ColumnOrder::new(constraints);
@@ -168,6 +190,7 @@ impl Graph {
                 }
             }
         }
+        self.bends.update_inverse_masses(&self.particles);
     }
 
     /// Writes the state back. Returns the number of particles that froze.
@@ -200,6 +223,10 @@ impl Graph {
             let ScheduledStage { stage, group, .. } = run[0];
             match stage {
                 Stage::Project => is_marked |= self.project(workers, group, pass),
+                Stage::Bend => {
+                    let pass = BendPass::new(pass, inputs.relaxation);
+                    self.bends.project(group, &mut self.particles, workers, pass);
+                }
                 Stage::LimitStretch => self.limit_stretch(workers, group),
                 _ => self.run_particle_stages(workers, run, inputs),
             }

@@ -3,14 +3,16 @@
 use crate::constraints::fields::ConstraintFields;
 use crate::step::schedule::OptionalStages;
 
-/// Fields of particles that only some scenes have.
+/// Fields of particles and bends that only some scenes have.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[allow(clippy::struct_excessive_bools, reason = "each tells if a scene has one thing")]
+#[allow(clippy::struct_excessive_bools, reason = "each tells if one kind of field exists")]
 pub(crate) struct SceneFields {
     /// For colliders: the predicted displacement.
     pub(crate) colliders: bool,
     /// For wind: the velocity that it adds in a substep.
     pub(crate) wind: bool,
+    /// For bends in several passes: their multipliers.
+    pub(crate) bend_multipliers: bool,
     /// For tethers: the position of the root, and the length with its square.
     pub(crate) tethers: bool,
     /// Particles touch each other. It takes no memory in the store.
@@ -32,8 +34,12 @@ pub(crate) struct Layout {
 impl Layout {
     /// The layout for these fields that also has all fields in memory now.
     pub(crate) fn extended(self, used: ConstraintFields, scene: SceneFields) -> Self {
-        let wind = self.scene.wind || scene.wind;
-        let scene_fields = SceneFields { wind, particle_contacts: false, ..scene };
+        let scene_fields = SceneFields {
+            wind: self.scene.wind || scene.wind,
+            bend_multipliers: self.scene.bend_multipliers || scene.bend_multipliers,
+            particle_contacts: false,
+            ..scene
+        };
         Self {
             constraints: self.constraints.union(used),
             scene: scene_fields,
@@ -96,7 +102,7 @@ impl Location {
         Self::new(sheet + 1, index)
     }
 
-    /// A sheet has at most 2^24 particles. With at most 66 fields in columns of up to 48 numbers for 17
+    /// A sheet has at most 2^24 particles. With at most 78 fields in columns of up to 48 numbers for 16
     /// particles, its indices stay below 2^32.
     fn new(part: usize, index: usize) -> Self {
         let (Ok(part), Ok(index)) = (u32::try_from(part), u32::try_from(index)) else {

@@ -6,6 +6,8 @@
 //! row with eight of the other; columns of constraints within a row are separated in registers.
 
 mod band;
+mod bend_layout;
+mod bends;
 mod ends;
 mod row;
 mod row_layout;
@@ -14,6 +16,7 @@ mod span;
 use std::ops::Range;
 
 use band::{Band, PassSweep, SweepWork};
+use bend_layout::BendLayout;
 use row_layout::{LINE_LENGTH, RowLayout};
 use span::Span;
 
@@ -21,6 +24,7 @@ use super::layout::Layout;
 use super::publish::{PublishedMotion, publish};
 use super::survey::FamilySoftness;
 use super::workers::{WorkerScratch, Workers};
+use crate::constraints::bends::families::BendFamily;
 use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
 use crate::constraints::families::{Family, Sheet};
 use crate::constraints::fields::Pass;
@@ -35,6 +39,13 @@ use crate::step::substep::SubstepInputs;
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 struct CacheLine([f32; LINE_LENGTH]);
+
+/// The families of a sheet, in the order of projection.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SheetFamilies {
+    pub(crate) constraints: Vec<Family>,
+    pub(crate) bends: Vec<BendFamily>,
+}
 
 /// One sheet of particles with its constraints.
 #[derive(Debug, Clone)]
@@ -68,10 +79,10 @@ impl<'a> RowState<'a> {
 
 impl Patch {
     /// Makes an empty patch with these families, in the order of projection.
-    pub(crate) fn new(sheet: Sheet, families: &[Family]) -> Self {
+    pub(crate) fn new(sheet: Sheet, families: &SheetFamilies) -> Self {
         Self {
             sheet,
-            layout: RowLayout::new(sheet.columns as usize, sheet.rows as usize, families),
+            layout: RowLayout::new(&sheet, &families.constraints, &families.bends),
             lines: Vec::new(),
             column_order: ColumnOrder::default(),
             schedule: Schedule::default(),
@@ -87,11 +98,12 @@ impl Patch {
         let families = &self.layout.families;
         let groups = 0..2 * families.len();
         let reaches = groups.map(|group| families[group / 2].family.reach());
-        self.schedule.rebuild(layout.optional_stages(), &reaches);
+        let bends = self.layout.bends.groups.iter().map(|group| group.family.reach());
+        self.schedule.rebuild(layout.optional_stages(), &reaches, &bends);
     }
 
-    /// Allocates the fields of the layout. Every constraint is inactive afterwards, and no particle
-    /// has a tether.
+    /// Allocates the fields of the layout. Every constraint and bend is inactive afterwards, and no
+    /// particle has a tether.
     pub(crate) fn allocate(&mut self) {
         let RowLayout { rows, row_length, stride, constraints_at, family_length, .. } = self.layout;
         refill(&mut self.lines, rows * row_length / LINE_LENGTH, CacheLine([0.0; LINE_LENGTH]));
@@ -101,6 +113,15 @@ impl Patch {
                 let first = row * row_length + constraints_at * stride + family * family_length;
                 for index in first..first + stride {
                     self.writer().set(index, &ConstraintParameters::INACTIVE);
+                }
+            }
+        }
+        for row in 0..rows {
+            for family in 0..self.layout.bends.families.len() {
+                let BendLayout { at, family_length, .. } = self.layout.bends;
+                let first = row * row_length + at + family * family_length;
+                for index in first..first + stride {
+                    self.set_bend(index, f32::INFINITY);
                 }
             }
         }
@@ -122,6 +143,17 @@ impl Patch {
     pub(crate) fn writer(&mut self) -> ColumnWriter<'_> {
         let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
         ColumnWriter::new(numbers, self.layout.stride, self.column_order)
+    }
+
+    /// Index of a bend for [`Self::set_bend`].
+    pub(crate) fn bend_index(&self, family: BendFamily, place: [usize; 2]) -> usize {
+        self.layout.bend_index(family, place)
+    }
+
+    /// Sets the scaled compliance of a bend; infinite for one without effect.
+    pub(crate) fn set_bend(&mut self, index: usize, scaled_compliance: f32) {
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        numbers[index] = scaled_compliance;
     }
 
     fn row(&mut self, row: usize) -> RowState<'_> {

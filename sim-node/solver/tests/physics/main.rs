@@ -7,6 +7,7 @@
 )]
 
 mod anchors;
+mod bending;
 mod colliders;
 mod constraints;
 mod contacts;

@@ -29,6 +29,18 @@ pub(crate) mod vector {
     }
 }
 
+/// `#[serde(with = "decimal::pair")]` for two f32.
+pub(crate) mod pair {
+    use super::{Serialize, Serializer, shortest};
+
+    pub(crate) fn serialize<S: Serializer>(
+        value: &[f32; 2],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.map(shortest).serialize(serializer)
+    }
+}
+
 /// `#[serde(serialize_with = "decimal::vectors::serialize")]` for a list of three f32 each.
 pub(crate) mod vectors {
     use super::{Serializer, shortest};

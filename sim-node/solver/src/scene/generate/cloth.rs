@@ -5,6 +5,7 @@ use sim_types::ConstraintKind;
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, round};
 use crate::constraints::families::Family;
+use crate::scene::definition::bending::SheetBending;
 use crate::scene::definition::decimal;
 
 /// A sheet of columns x rows particles. Particle (c, r) has index r columns + c.
@@ -30,6 +31,9 @@ pub struct Cloth {
     pub links: Vec<ConstraintKind>,
     /// Diagonals of each cell that have a shear constraint.
     pub diagonals: Diagonals,
+    /// Bending rigidity, if it has any.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub bending: Option<SheetBending>,
 }
 
 /// Diagonals of a cell that have a shear constraint.

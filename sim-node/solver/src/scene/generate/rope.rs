@@ -1,10 +1,13 @@
 //! A line of particles.
 
+use glam::Vec3;
 use serde::Serialize;
 use sim_types::ConstraintKind;
 
-use super::builder::{ConstraintBuilder, ParticleBuilder, interpolate};
+use super::builder::{ConstraintBuilder, ParticleBuilder, interpolate, round};
 use super::pinned::is_pinned_end;
+use crate::constraints::bends::families::BendFamily;
+use crate::constraints::bends::{Bend, SECOND_DIFFERENCE};
 use crate::constraints::families::Family;
 use crate::scene::definition::decimal;
 
@@ -19,6 +22,9 @@ pub struct Rope {
     /// Position of the last particle.
     #[serde(with = "decimal::vector")]
     pub to: [f32; 3],
+    /// Bending rigidity EI in N m^2, >= 0, if it has any.
+    #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
+    pub bending: Option<f32>,
 }
 
 impl Rope {
@@ -43,6 +49,31 @@ impl Rope {
         for index in 0..self.count - 1 {
             let family = Family::Horizontal.group(0, index as usize);
             builder.family_link([index, index + 1], ConstraintKind::Structural, family);
+        }
+    }
+    /// Returns the distance of neighbours.
+    pub(crate) fn spacing(&self) -> f64 {
+        let [from, to] = [self.from, self.to].map(|end| Vec3::from_array(end).as_dvec3());
+        from.distance(to) / f64::from(self.count - 1)
+    }
+
+    pub(super) fn bend_count(&self) -> u64 {
+        if self.bending.is_some() { u64::from(self.count).saturating_sub(2) } else { 0 }
+    }
+
+    /// Appends a bend at each particle between two others.
+    pub(super) fn build_bends(&self, builder: &mut ConstraintBuilder<'_>) {
+        let Some(rigidity) = self.bending else { return };
+        let geometry = round(self.spacing().powi(3));
+        for index in builder.first..builder.first + self.count.saturating_sub(2) {
+            let bend = Bend {
+                particles: [index, index + 1, index + 2, index + 1],
+                coefficients: SECOND_DIFFERENCE,
+                geometry,
+                rigidity,
+            };
+            let family = BendFamily::Across.group(0, (index - builder.first) as usize);
+            builder.model.push_bend(bend, Some(family));
         }
     }
 }

@@ -1,14 +1,16 @@
-//! The tables `[[particle]]` and `[[constraint]]`.
+//! The tables `[[particle]]`, `[[constraint]]` and `[[bend]]`.
 
 use serde::Deserialize;
 use sim_types::{ConstraintKind, NumberRange};
 
 use super::limits::FileLimits;
-use super::reader::Reader;
-use super::value::{Number, Spanned, Table, TableKeys, Tuple, Vector, Whole, Word};
+use super::reader::{RIGIDITY, Reader};
+use super::value::{Number, Spanned, Table, TableKeys, ThreeOrFour, Tuple, Vector, Whole, Word};
+use crate::scene::definition::bending::{BendParticles, SceneBend};
 use crate::scene::definition::element::{SceneConstraint, SceneParticle};
 use crate::scene::definition::softness::Softness;
 use crate::scene::error::SceneError;
+use crate::scene::mesh::area;
 use crate::scene::model::Positions;
 
 #[derive(Debug, Deserialize)]
@@ -38,6 +40,15 @@ pub(super) struct FileConstraint {
 }
 
 impl TableKeys for FileConstraint {}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FileBend {
+    particles: Option<Spanned<ThreeOrFour<Whole>>>,
+    rigidity: Option<Number>,
+}
+
+impl TableKeys for FileBend {}
 
 impl Reader<'_> {
     /// Checks a table `[[particle]]`.
@@ -118,4 +129,58 @@ impl Reader<'_> {
             None => Softness::rigid(self.method),
         })
     }
+
+    /// Checks a table `[[bend]]`.
+    pub(super) fn bend(
+        &self,
+        index: usize,
+        table: &Spanned<Table<FileBend>>,
+        positions: &Positions,
+    ) -> Result<SceneBend, SceneError> {
+        let field = |key: &str| format!("bend[{index}].{key}");
+        let file = table.get_ref();
+        let list = file.particles.as_ref();
+        let list = self.required(list, table.span(), &field("particles"), "3 or 4 indices")?;
+        let rigidity = file.rigidity.as_ref();
+        let rigidity = self.required(rigidity, table.span(), &field("rigidity"), RIGIDITY.text)?;
+        let particle = |one| self.particle_index(&field("particles"), one, positions);
+        let ThreeOrFour { three: [a, b, c], fourth } = list.get_ref();
+        let line = [particle(a)?, particle(b)?, particle(c)?];
+        let particles = match fourth {
+            None => BendParticles::Line(line),
+            Some(fourth) => BendParticles::Cell([line[0], line[1], line[2], particle(fourth)?]),
+        };
+        if let Some(problem) = bend_problem(particles, positions) {
+            return self.error(list.span(), &field("particles"), problem);
+        }
+        let rigidity = self.ranged(&field("rigidity"), rigidity, RIGIDITY)?;
+        Ok(SceneBend { particles, rigidity })
+    }
+}
+
+/// Returns what is wrong with the particles of a bend.
+fn bend_problem(particles: BendParticles, positions: &Positions) -> Option<String> {
+    let mut sorted = match particles {
+        BendParticles::Line(line) => line.to_vec(),
+        BendParticles::Cell(cell) => cell.to_vec(),
+    };
+    sorted.sort_unstable();
+    if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Some(format!("names particle {} twice (allowed: different particles)", pair[0]));
+    }
+    let has_size = match particles {
+        BendParticles::Line([a, b, c]) => {
+            positions.distance(a, b) > 0.0 && positions.distance(b, c) > 0.0
+        }
+        BendParticles::Cell([a, b, c, _]) => {
+            area([a, b, c].map(|index| positions.0[index as usize].map(f64::from))) > 0.0
+        }
+    };
+    let problem = match particles {
+        BendParticles::Line(_) => {
+            "has neighbours that coincide (allowed: neighbours at a distance)"
+        }
+        BendParticles::Cell(_) => "is a cell without area (allowed: two corners above two corners)",
+    };
+    (!has_size).then(|| problem.to_owned())
 }

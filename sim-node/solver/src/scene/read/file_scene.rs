@@ -5,8 +5,8 @@ use serde::Deserialize;
 use super::anchor::FileAnchor;
 use super::collider::FileCollider;
 use super::contact::FileContact;
-use super::element::{FileConstraint, FileParticle};
-use super::generator_file::FileGenerator;
+use super::element::{FileBend, FileConstraint, FileParticle};
+use super::generator::file::FileGenerator;
 use super::settings::FileSolver;
 use super::value::{Spanned, Table, Tables, Vector, Whole, Word, append};
 use super::wind::FileWind;
@@ -31,6 +31,8 @@ pub(super) struct FileScene {
     #[serde(default)]
     pub(super) constraint: Tables<FileConstraint>,
     #[serde(default)]
+    pub(super) bend: Tables<FileBend>,
+    #[serde(default)]
     pub(super) collider: Tables<FileCollider>,
     #[serde(default)]
     pub(super) anchor: Tables<FileAnchor>,
@@ -53,6 +55,7 @@ impl FileScene {
         self.contact = self.contact.take().or(part.contact);
         append(&mut self.particle, part.particle);
         append(&mut self.constraint, part.constraint);
+        append(&mut self.bend, part.bend);
         append(&mut self.collider, part.collider);
         append(&mut self.anchor, part.anchor);
         append(&mut self.generate, part.generate);
@@ -77,6 +80,7 @@ impl FileScene {
         match list {
             "particle" => self.particle.len(),
             "constraint" => self.constraint.len(),
+            "bend" => self.bend.len(),
             "collider" => self.collider.len(),
             "anchor" => self.anchor.len(),
             "generate" => self.generate.len(),
@@ -95,6 +99,7 @@ impl FileScene {
         let generators = self.generate.iter().map(|shape| shape.get_ref().lists_size_bytes());
         size_of_val(self.particle.as_slice())
             + size_of_val(self.constraint.as_slice())
+            + size_of_val(self.bend.as_slice())
             + size_of_val(self.collider.as_slice())
             + size_of_val(self.anchor.as_slice())
             + size_of_val(self.generate.as_slice())

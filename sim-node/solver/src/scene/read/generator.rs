@@ -1,9 +1,11 @@
 //! The table `[[generate]]`.
 
+mod fields;
+pub(super) mod file;
+mod mesh;
+
 use sim_types::{ConstraintKind, NumberRange};
 
-use super::generator_fields::GeneratorFields;
-use super::generator_file::FileGenerator;
 use super::reader::Reader;
 use super::value::{Spanned, Table};
 use crate::scene::error::SceneError;
@@ -14,6 +16,8 @@ use crate::scene::generate::ragdoll::{self, Ragdoll};
 use crate::scene::generate::rope::Rope;
 use crate::scene::generate::web::{self, Web};
 use crate::scene::generate::{Generator, Shape};
+use fields::GeneratorFields;
+use file::FileGenerator;
 
 /// Keys and words of a shape.
 struct ShapeKeys {
@@ -24,12 +28,22 @@ struct ShapeKeys {
     pins: &'static [&'static str],
 }
 
-const SHEET: &[&str] =
-    &["columns", "rows", "spacing", "origin", "right", "down", "links", "diagonals"];
+const SHEET: &[&str] = &[
+    "columns",
+    "rows",
+    "spacing",
+    "origin",
+    "right",
+    "down",
+    "links",
+    "diagonals",
+    "bending",
+    "twist",
+];
 static SHAPES: [ShapeKeys; 7] = [
     ShapeKeys { name: "cloth", keys: SHEET, pins: &cloth::PIN_WORDS },
     ShapeKeys { name: "mesh", keys: SHEET, pins: &["none", "top", "top-even", "corners"] },
-    ShapeKeys { name: "rope", keys: &["count", "from", "to"], pins: &END_WORDS },
+    ShapeKeys { name: "rope", keys: &["count", "from", "to", "bending"], pins: &END_WORDS },
     ShapeKeys {
         name: "web",
         keys: &["center", "radius", "spokes", "rings", "normal"],
@@ -98,6 +112,7 @@ impl GeneratorFields<'_, '_> {
                 count: self.count("count", file.count.as_ref(), 2)?,
                 from: self.vector("from", file.from.as_ref())?,
                 to: self.vector("to", file.to.as_ref())?,
+                bending: self.single_bending()?,
             }),
             "web" => Shape::Web(self.web()?),
             "bridge" => Shape::Bridge(self.bridge()?),
@@ -146,6 +161,7 @@ impl GeneratorFields<'_, '_> {
             down: self.vector_or("down", file.down.as_ref(), [0.0, -1.0, 0.0])?,
             links: self.links(default_links)?,
             diagonals: self.diagonals()?,
+            bending: self.sheet_bending()?,
         })
     }
 

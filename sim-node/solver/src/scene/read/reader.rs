@@ -34,6 +34,8 @@ pub(super) const MASS: NumberRange = NumberRange {
     text: "1e-38 to 1e38 kg",
     ..NumberRange::POSITIVE
 };
+/// A bending rigidity; 0 bends freely.
+pub(super) const RIGIDITY: NumberRange = NumberRange::AT_LEAST_ZERO;
 /// A period: a step counts it in whole numbers.
 pub(super) const PERIOD: NumberRange =
     NumberRange { max: 1e6, text: "more than 0, at most 1e6 s", ..NumberRange::POSITIVE };

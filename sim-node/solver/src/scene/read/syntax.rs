@@ -137,13 +137,14 @@ fn syntax_problem(message: &str) -> String {
 
 /// Returns `true` for the keys that are lists of tables.
 fn is_list_of_tables(path: &str) -> bool {
-    ["particle", "constraint", "collider", "anchor", "generate"].contains(&path)
+    ["particle", "constraint", "bend", "collider", "anchor", "generate"].contains(&path)
 }
 
 /// From ``unknown field `x`, expected one of `a`, `b` ``. The path ends with the key.
 fn unknown_key(message: &str) -> String {
     let allowed = message.split_once(", expected ").map_or("", |(_, allowed)| allowed);
-    format!("unknown key (allowed: {})", plain_words(allowed))
+    // Two keys are joined by "or".
+    format!("unknown key (allowed: {})", plain_words(&allowed.replace("` or `", "`, `")))
 }
 
 /// The error's span is the key.

@@ -35,6 +35,11 @@ impl<T> Spanned<T> {
     pub(super) fn into_inner(self) -> T {
         self.value
     }
+
+    /// Returns another value at the same place.
+    pub(super) fn with<U>(&self, value: U) -> Spanned<U> {
+        Spanned { value, start: self.start, end: self.end }
+    }
 }
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Spanned<T> {
@@ -159,6 +164,84 @@ impl<'de, T: Deserialize<'de>, const N: usize> Visitor<'de> for TupleVisitor<T, 
         }
         match <[T; N]>::try_from(values) {
             Ok(values) if length == N => Ok(Tuple(values)),
+            _ => Err(Error::invalid_length(length, &self)),
+        }
+    }
+}
+
+/// One number, or two.
+#[derive(Debug)]
+pub(super) enum NumberOrPair {
+    Number(f64),
+    Pair(Tuple<Number, 2>),
+}
+
+impl<'de> Deserialize<'de> for NumberOrPair {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(NumberOrPairVisitor)
+    }
+}
+
+struct NumberOrPairVisitor;
+
+impl<'de> Visitor<'de> for NumberOrPairVisitor {
+    type Value = NumberOrPair;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("a number or 2 numbers")
+    }
+
+    fn visit_f64<E: Error>(self, number: f64) -> Result<NumberOrPair, E> {
+        Ok(NumberOrPair::Number(number))
+    }
+
+    #[allow(clippy::cast_precision_loss, reason = "a whole number is read from its text")]
+    fn visit_i64<E: Error>(self, number: i64) -> Result<NumberOrPair, E> {
+        Ok(NumberOrPair::Number(number as f64))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<NumberOrPair, A::Error> {
+        TupleVisitor(PhantomData).visit_seq(list).map(NumberOrPair::Pair)
+    }
+}
+
+/// A list of three or four values.
+#[derive(Debug)]
+pub(super) struct ThreeOrFour<T> {
+    pub(super) three: [T; 3],
+    pub(super) fourth: Option<T>,
+}
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for ThreeOrFour<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(ThreeOrFourVisitor(PhantomData))
+    }
+}
+
+struct ThreeOrFourVisitor<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for ThreeOrFourVisitor<T> {
+    type Value = ThreeOrFour<T>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("3 or 4 numbers")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<ThreeOrFour<T>, A::Error> {
+        let mut length = 0;
+        let mut next = || -> Result<Option<T>, A::Error> {
+            let value = list.next_element()?;
+            length += usize::from(value.is_some());
+            Ok(value)
+        };
+        let (values, fourth) = ([next()?, next()?, next()?], next()?);
+        while list.next_element::<IgnoredAny>()?.is_some() {
+            length += 1;
+        }
+        match values {
+            [Some(a), Some(b), Some(c)] if length <= 4 => {
+                Ok(ThreeOrFour { three: [a, b, c], fourth })
+            }
             _ => Err(Error::invalid_length(length, &self)),
         }
     }

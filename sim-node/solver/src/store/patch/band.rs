@@ -6,10 +6,12 @@
 //! stay in a near cache. Every constraint finds its ends as it would stage by stage, so the bits are
 //! the same.
 
+use super::bends::project_bends;
 use super::ends::{ColumnUnit, Ends, project_across, project_down};
 use super::row::SheetRow;
 use super::row_layout::{FamilyBlock, LINE_LENGTH, RowLayout, STATE_FIELDS};
 use super::span::Span;
+use crate::constraints::bends::projection::BendPass;
 use crate::constraints::columns::{ConstraintColumns, FullPass};
 use crate::constraints::families::Family;
 use crate::constraints::fields::Pass;
@@ -22,9 +24,9 @@ use crate::step::stage::Stage;
 use crate::step::substep::SubstepInputs;
 use crate::store::workers::WorkerScratch;
 
-/// Largest number of stages in a pass: two halves of six families, projected and limited, and four
-/// stages of single particles.
-const STAGES_MAX: usize = 2 * 2 * Family::ALL.len() + 4;
+/// Largest number of stages in a pass: two halves of six families, projected and limited, ten groups of
+/// bends, and four stages of single particles.
+const STAGES_MAX: usize = 2 * 2 * Family::ALL.len() + 10 + 4;
 
 /// Consecutive rows in memory.
 pub(crate) struct Band<'a> {
@@ -94,14 +96,37 @@ impl Band<'_> {
         row: usize,
         sweep: &mut PassSweep<'_, '_>,
     ) -> bool {
-        if scheduled.stage.is_grouped() {
-            return self.project::<W>(scheduled, row, sweep);
+        match scheduled.stage {
+            Stage::Project | Stage::LimitStretch => {
+                return self.project::<W>(scheduled, row, sweep);
+            }
+            Stage::Bend => {
+                self.bend::<W>(scheduled, row, sweep);
+                return false;
+            }
+            _ => {}
         }
         let (layout, length) = (self.layout, self.layout.row_length);
         let numbers = &mut self.numbers[(row - self.first) * length..][..length];
         let mut row = SheetRow::new(numbers, layout);
         run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, &mut sweep.scratch.contacts);
         false
+    }
+
+    /// Projects the bends of a group that begin in a row.
+    #[inline(always)]
+    fn bend<W: Wide>(
+        &mut self,
+        scheduled: &ScheduledStage,
+        row: usize,
+        sweep: &mut PassSweep<'_, '_>,
+    ) {
+        let group = self.layout.bends.groups[scheduled.group];
+        if group.begins_in(row) {
+            let rows = &mut self.numbers[(row - self.first) * self.layout.row_length..];
+            let pass = BendPass::new(sweep.pass, sweep.inputs.relaxation);
+            project_bends::<W>(rows, self.layout, group, pass);
+        }
     }
 
     /// Projects the constraints of half a family that begin in a row.

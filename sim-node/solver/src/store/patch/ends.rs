@@ -8,9 +8,9 @@ use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups, lane_groups_mut, ma
 
 /// Positions, inverse masses and displacements of the ends of constraints, in columns of a row.
 pub(crate) struct Ends<'a> {
-    x: [&'a [Lanes8]; 3],
-    w: &'a [Lanes8],
-    d: [&'a mut [Lanes8]; 3],
+    pub(crate) x: [&'a [Lanes8]; 3],
+    pub(crate) w: &'a [Lanes8],
+    pub(crate) d: [&'a mut [Lanes8]; 3],
 }
 
 impl<'a> Ends<'a> {
@@ -26,6 +26,16 @@ impl<'a> Ends<'a> {
             x: [field(0), field(1), field(2)],
             w: field(3),
             d: map_axes([dx, dy, dz], |d| lane_groups_mut(d, from, count)),
+        }
+    }
+
+    /// The first `count` lane groups, in a form that shows the compiler their number.
+    #[inline(always)]
+    pub(crate) fn shortened(self, count: usize) -> Self {
+        Self {
+            x: map_axes(self.x, |x| &x[..count]),
+            w: &self.w[..count],
+            d: map_axes(self.d, |d| &mut d[..count]),
         }
     }
 }
@@ -120,7 +130,7 @@ pub(crate) fn project_across<W: Wide>(
 }
 
 #[inline(always)]
-fn unzip<W: Wide>([low, high]: &[Lanes8; 2], unit: ColumnUnit) -> [W; 2] {
+pub(crate) fn unzip<W: Wide>([low, high]: &[Lanes8; 2], unit: ColumnUnit) -> [W; 2] {
     let (low, high) = (W::load(low, 0), W::load(high, 0));
     match unit {
         ColumnUnit::Single => W::unzip(low, high),
@@ -129,7 +139,7 @@ fn unzip<W: Wide>([low, high]: &[Lanes8; 2], unit: ColumnUnit) -> [W; 2] {
 }
 
 #[inline(always)]
-fn zip<W: Wide>([a, b]: [W; 2], unit: ColumnUnit) -> [W; 2] {
+pub(crate) fn zip<W: Wide>([a, b]: [W; 2], unit: ColumnUnit) -> [W; 2] {
     match unit {
         ColumnUnit::Single => W::zip(a, b),
         ColumnUnit::Pair => W::zip_pairs(a, b),
@@ -142,13 +152,13 @@ fn difference<W: Wide>([a, b]: [W; 2]) -> W {
 }
 
 #[inline(always)]
-fn pairs(groups: &[Lanes8], count: usize) -> &[[Lanes8; 2]] {
+pub(crate) fn pairs(groups: &[Lanes8], count: usize) -> &[[Lanes8; 2]] {
     let (pairs, _) = groups.as_chunks();
     &pairs[..count]
 }
 
 #[inline(always)]
-fn pairs_mut(groups: &mut [Lanes8], count: usize) -> &mut [[Lanes8; 2]] {
+pub(crate) fn pairs_mut(groups: &mut [Lanes8], count: usize) -> &mut [[Lanes8; 2]] {
     let (pairs, _) = groups.as_chunks_mut();
     &mut pairs[..count]
 }

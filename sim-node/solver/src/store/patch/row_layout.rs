@@ -1,6 +1,8 @@
 //! The layout of a row in memory.
 
-use crate::constraints::families::Family;
+use super::bend_layout::{BendGroup, BendLayout};
+use crate::constraints::bends::families::BendFamily;
+use crate::constraints::families::{Family, Sheet};
 use crate::constraints::parameters::PassSoftness;
 use crate::store::layout::{Layout, SceneFields};
 
@@ -27,6 +29,7 @@ pub(crate) struct RowLayout {
     pub(crate) constraints_at: usize,
     /// Length of the fields of one family, in numbers.
     pub(crate) family_length: usize,
+    pub(crate) bends: BendLayout,
     /// Length of a row, in numbers.
     pub(crate) row_length: usize,
 }
@@ -42,19 +45,24 @@ pub(crate) struct FamilyBlock {
 }
 
 impl RowLayout {
-    pub(crate) fn new(columns: usize, rows: usize, families: &[Family]) -> Self {
+    pub(crate) fn new(sheet: &Sheet, families: &[Family], bends: &[BendFamily]) -> Self {
+        let (columns, rows) = (sheet.columns as usize, sheet.rows as usize);
+        let bends = BendLayout::new(bends);
+        // Room for the last lane group, or the last two of constraints within a row, and for the columns
+        // by which their other ends are further on.
+        let length = columns.next_multiple_of(LINE_LENGTH) + LINE_LENGTH;
+        let length = length.max(bends.field_length_min(columns));
         let softness = PassSoftness::RIGID;
         let block = |family: &Family| FamilyBlock { family: *family, softness, is_rigid: false };
         Self {
             columns,
             rows,
-            // Room for the last lane group, or the last two of constraints within a row, and for
-            // the columns by which their other ends are further on.
-            stride: columns.next_multiple_of(LINE_LENGTH) + LINE_LENGTH,
+            stride: length.next_multiple_of(LINE_LENGTH),
             fields: Layout::default(),
             families: families.iter().map(block).collect(),
             constraints_at: 0,
             family_length: 0,
+            bends,
             row_length: 0,
         }
     }
@@ -62,11 +70,12 @@ impl RowLayout {
     /// Sets the fields. The results are stored, because every row needs them.
     pub(crate) fn set_fields(&mut self, fields: Layout) {
         self.fields = fields;
-        let SceneFields { wind, tethers, .. } = fields.scene;
+        let SceneFields { wind, tethers, bend_multipliers, .. } = fields.scene;
         self.constraints_at = self.wind_at() + 3 * usize::from(wind) + 5 * usize::from(tethers);
         self.family_length = fields.constraints.column_count() * self.stride;
-        self.row_length =
+        let constraints_end =
             self.constraints_at * self.stride + self.families.len() * self.family_length;
+        self.row_length = self.bends.set_fields(constraints_end, self.stride, bend_multipliers);
         for block in &mut self.families {
             block.is_rigid = fields.used.are_rigid(block.softness.scaled_compliance);
         }
@@ -107,6 +116,16 @@ impl RowLayout {
             + self.constraints_at * self.stride
             + self.family_index(family) * self.family_length
             + place
+    }
+
+    /// Index, among all numbers of the sheet, of the scaled compliance of a bend.
+    pub(crate) fn bend_index(&self, family: BendFamily, [row, column]: [usize; 2]) -> usize {
+        let family_index = self.bends.family_index(family);
+        let group = BendGroup { family, part: family.part(row, column), family_index };
+        row * self.row_length
+            + self.bends.at
+            + family_index * self.bends.family_length
+            + group.place(column, self.columns, self.stride)
     }
 
     /// Position in its field of a constraint within a row. Its half begins at 0 or in the middle.

@@ -10,7 +10,7 @@ use toml_parser::Source;
 use toml_parser::lexer::{Token, TokenKind};
 
 use crate::scene::read::anchor::FileAnchor;
-use crate::scene::read::generator_file::FileGenerator;
+use crate::scene::read::generator::file::FileGenerator;
 
 /// Size from which on a piece ends at the next opportunity, in bytes. A shorter text is one piece.
 const PIECE_SIZE_BYTES: usize = 256 << 10;

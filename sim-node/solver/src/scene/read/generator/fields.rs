@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use sim_types::{ELEMENTS_MAX, NumberRange, Parameter};
 
-use super::generator_file::{FileGenerator, FilePinned, FileSoftness};
-use super::reader::{Reader, SIZE};
-use super::value::{Number, Vector, Whole};
+use super::super::reader::{RIGIDITY, Reader, SIZE};
+use super::super::value::{Number, NumberOrPair, Vector, Whole};
+use super::file::{FileGenerator, FilePinned, FileSoftness};
+use crate::scene::definition::bending::{Rigidity, SheetBending};
 use crate::scene::definition::softness::{KindSoftness, Softness, SoftnessValues};
 use crate::scene::error::SceneError;
 use crate::scene::generate::pinned::Pinned;
@@ -102,6 +103,42 @@ impl GeneratorFields<'_, '_> {
             bend: value("bend", bend)?,
         };
         Ok(KindSoftness::new(reader.method, values))
+    }
+
+    /// Returns the bending rigidity of a sheet, if it has any.
+    pub(super) fn sheet_bending(&self) -> Result<Option<SheetBending>, SceneError> {
+        let Some(bending) = &self.file.bending else {
+            let Some(twist) = &self.file.twist else { return Ok(None) };
+            let problem = "has no effect without bending (allowed: together with bending)";
+            return self.reader.error(twist.span(), &self.name("twist"), problem);
+        };
+        let rigidity = |number: &Number| self.rigidity(number);
+        let rigidity = match bending.get_ref() {
+            NumberOrPair::Number(number) => Rigidity::Equal(rigidity(&bending.with(*number))?),
+            NumberOrPair::Pair(pair) => {
+                let [warp, weft] = &**pair;
+                Rigidity::Threads([rigidity(warp)?, rigidity(weft)?])
+            }
+        };
+        let is_equal = matches!(rigidity, Rigidity::Equal(_));
+        let twist = self.file.twist.as_ref().map_or(is_equal, |twist| *twist.get_ref());
+        Ok(Some(SheetBending { bending: rigidity, twist }))
+    }
+
+    /// Returns the bending rigidity of a shape without directions, if it has any.
+    pub(super) fn single_bending(&self) -> Result<Option<f32>, SceneError> {
+        let Some(bending) = &self.file.bending else { return Ok(None) };
+        match bending.get_ref() {
+            NumberOrPair::Number(number) => self.rigidity(&bending.with(*number)).map(Some),
+            NumberOrPair::Pair(_) => {
+                let problem = format!("has 2 entries (allowed: {})", RIGIDITY.text);
+                self.reader.error(bending.span(), &self.name("bending"), problem)
+            }
+        }
+    }
+
+    fn rigidity(&self, number: &Number) -> Result<f32, SceneError> {
+        self.reader.ranged(&self.name("bending"), number, RIGIDITY)
     }
 
     /// Returns the pinned particles of a shape of `count` particles. The first word is the default.

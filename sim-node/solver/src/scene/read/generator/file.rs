@@ -4,44 +4,47 @@ use std::ops::Range;
 
 use serde::Deserialize;
 
-use super::value::{
-    Number, Spanned, Table, TableKeys, Vector, Whole, Word, append, append_elements, element_count,
+use super::super::value::{
+    Number, NumberOrPair, Spanned, Table, TableKeys, Vector, Whole, Word, append, append_elements,
+    element_count,
 };
 
 /// The keys of all shapes. The keys of each shape are checked later.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct FileGenerator {
-    pub(super) shape: Option<Word>,
-    pub(super) mass: Option<Number>,
-    pub(super) compliance: Option<Spanned<Table<FileSoftness>>>,
-    pub(super) stiffness: Option<Spanned<Table<FileSoftness>>>,
-    pub(super) tear_stretch: Option<Number>,
-    pub(super) contact: Option<bool>,
-    pub(super) pinned: Option<Spanned<FilePinned>>,
-    pub(super) columns: Option<Whole>,
-    pub(super) rows: Option<Whole>,
-    pub(super) spacing: Option<Number>,
-    pub(super) origin: Option<Vector>,
-    pub(super) right: Option<Vector>,
-    pub(super) down: Option<Vector>,
-    pub(super) links: Option<Spanned<Vec<Word>>>,
-    pub(super) diagonals: Option<Whole>,
-    pub(super) count: Option<Whole>,
-    pub(super) from: Option<Vector>,
-    pub(super) to: Option<Vector>,
-    pub(super) center: Option<Vector>,
-    pub(super) radius: Option<Number>,
-    pub(super) spokes: Option<Whole>,
-    pub(super) rings: Option<Whole>,
-    pub(super) normal: Option<Vector>,
-    pub(super) planks: Option<Whole>,
-    pub(super) width: Option<Number>,
-    pub(super) height: Option<Number>,
-    pub(super) path: Option<Word>,
-    pub(super) density: Option<Number>,
-    pub(super) vertices: Option<Spanned<Vec<Vector>>>,
-    pub(super) faces: Option<Spanned<Vec<Vec<i64>>>>,
+pub(in crate::scene::read) struct FileGenerator {
+    pub(in crate::scene::read) shape: Option<Word>,
+    pub(in crate::scene::read) mass: Option<Number>,
+    pub(in crate::scene::read) compliance: Option<Spanned<Table<FileSoftness>>>,
+    pub(in crate::scene::read) stiffness: Option<Spanned<Table<FileSoftness>>>,
+    pub(in crate::scene::read) tear_stretch: Option<Number>,
+    pub(in crate::scene::read) contact: Option<bool>,
+    pub(in crate::scene::read) pinned: Option<Spanned<FilePinned>>,
+    pub(in crate::scene::read) columns: Option<Whole>,
+    pub(in crate::scene::read) rows: Option<Whole>,
+    pub(in crate::scene::read) spacing: Option<Number>,
+    pub(in crate::scene::read) origin: Option<Vector>,
+    pub(in crate::scene::read) right: Option<Vector>,
+    pub(in crate::scene::read) down: Option<Vector>,
+    pub(in crate::scene::read) links: Option<Spanned<Vec<Word>>>,
+    pub(in crate::scene::read) diagonals: Option<Whole>,
+    pub(in crate::scene::read) bending: Option<Spanned<NumberOrPair>>,
+    pub(in crate::scene::read) twist: Option<Spanned<bool>>,
+    pub(in crate::scene::read) count: Option<Whole>,
+    pub(in crate::scene::read) from: Option<Vector>,
+    pub(in crate::scene::read) to: Option<Vector>,
+    pub(in crate::scene::read) center: Option<Vector>,
+    pub(in crate::scene::read) radius: Option<Number>,
+    pub(in crate::scene::read) spokes: Option<Whole>,
+    pub(in crate::scene::read) rings: Option<Whole>,
+    pub(in crate::scene::read) normal: Option<Vector>,
+    pub(in crate::scene::read) planks: Option<Whole>,
+    pub(in crate::scene::read) width: Option<Number>,
+    pub(in crate::scene::read) height: Option<Number>,
+    pub(in crate::scene::read) path: Option<Word>,
+    pub(in crate::scene::read) density: Option<Number>,
+    pub(in crate::scene::read) vertices: Option<Spanned<Vec<Vector>>>,
+    pub(in crate::scene::read) faces: Option<Spanned<Vec<Vec<i64>>>>,
 }
 
 impl TableKeys for FileGenerator {}
@@ -49,10 +52,10 @@ impl TableKeys for FileGenerator {}
 /// A softness for each kind of constraint.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct FileSoftness {
-    pub(super) structural: Option<Number>,
-    pub(super) shear: Option<Number>,
-    pub(super) bend: Option<Number>,
+pub(in crate::scene::read) struct FileSoftness {
+    pub(in crate::scene::read) structural: Option<Number>,
+    pub(in crate::scene::read) shear: Option<Number>,
+    pub(in crate::scene::read) bend: Option<Number>,
 }
 
 impl TableKeys for FileSoftness {
@@ -66,7 +69,7 @@ impl TableKeys for FileSoftness {
     expecting = "is neither a word nor a list of whole numbers (allowed: a word in quotes or a \
                  list of indices)"
 )]
-pub(super) enum FilePinned {
+pub(in crate::scene::read) enum FilePinned {
     Word(String),
     List(Vec<i64>),
 }
@@ -82,10 +85,10 @@ impl FilePinned {
 
 impl FileGenerator {
     /// The lists that a text can give in parts.
-    pub(super) const LISTS: [&str; 3] = ["vertices", "faces", "pinned"];
+    pub(in crate::scene::read) const LISTS: [&str; 3] = ["vertices", "faces", "pinned"];
 
     /// Appends the lists of a part of the table.
-    pub(super) fn append(&mut self, part: Self) {
+    pub(in crate::scene::read) fn append(&mut self, part: Self) {
         append_elements(self.vertices.as_mut(), part.vertices);
         append_elements(self.faces.as_mut(), part.faces);
         let pinned = self.pinned.as_mut().map(Spanned::get_mut);
@@ -97,7 +100,7 @@ impl FileGenerator {
     }
 
     /// Returns the size of the lists in memory.
-    pub(super) fn lists_size_bytes(&self) -> usize {
+    pub(in crate::scene::read) fn lists_size_bytes(&self) -> usize {
         let faces = self.faces.iter().flat_map(Spanned::get_ref);
         let pinned = self.pinned.as_ref().map_or(&[][..], |pinned| pinned.get_ref().list());
         element_count(self.vertices.as_ref()) * size_of::<Vector>()
@@ -106,7 +109,7 @@ impl FileGenerator {
     }
 
     /// Returns the places of the keys that belong to single shapes.
-    pub(super) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 23] {
+    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 25] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -119,6 +122,8 @@ impl FileGenerator {
             ("down", span(self.down.as_ref())),
             ("links", span(self.links.as_ref())),
             ("diagonals", span(self.diagonals.as_ref())),
+            ("bending", span(self.bending.as_ref())),
+            ("twist", span(self.twist.as_ref())),
             ("count", span(self.count.as_ref())),
             ("from", span(self.from.as_ref())),
             ("to", span(self.to.as_ref())),

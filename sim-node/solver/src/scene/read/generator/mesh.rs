@@ -2,10 +2,10 @@
 
 use sim_types::NumberRange;
 
-use super::generator_fields::GeneratorFields;
-use super::generator_file::FilePinned;
+use super::fields::GeneratorFields;
+use super::file::FilePinned;
 
-use super::value::{Spanned, Vector, Word};
+use super::super::value::{Spanned, Vector, Word};
 use crate::scene::error::SceneError;
 use crate::scene::generate::obj::Obj;
 use crate::scene::generate::pinned::Pinned;

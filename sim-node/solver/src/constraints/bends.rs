@@ -1,0 +1,89 @@
+//! Bends: resistance of ropes, sheets and meshes to curvature.
+
+pub(crate) mod families;
+pub(crate) mod paths;
+pub(crate) mod projection;
+
+use glam::Vec3;
+
+/// A bend of three or four particles.
+///
+/// C is the sum of c x over its particles: a vector, 0 where they lie straight, because the sum of the
+/// coefficients c is 0. The energy is |C|^2 / (2 alpha), where alpha = `geometry` / `rigidity`.
+///
+/// - Second difference: C = `x_a` - 2 `x_b` + `x_c`. On a sheet with the distances `s_x` along the bend
+///   and `s_y` across it, the curvature is |C| / `s_x`^2 and the area of a node `s_x` `s_y`, so
+///   alpha = `s_x`^3 / (`s_y` B). On a rope alpha = s^3 / EI.
+/// - Twist of a cell: C = `x_a` - `x_b` - `x_c` + `x_d`, alpha = `s_x` `s_y` / (2 B). With it, the energy
+///   of a cylinder is the same in every direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bend {
+    /// Indices of the particles. The fourth of a bend of three is its second one again.
+    pub particles: [u32; 4],
+    /// Coefficients c. The fourth of a bend of three is 0.
+    pub coefficients: [f32; 4],
+    /// Compliance alpha times rigidity: m^2 on a surface, m^3 on a line.
+    pub geometry: f32,
+    /// Bending rigidity >= 0: B in N m on a surface, EI in N m^2 on a line.
+    pub rigidity: f32,
+}
+
+/// Coefficients of a second difference.
+pub(crate) const SECOND_DIFFERENCE: [f32; 4] = [1.0, -2.0, 1.0, 0.0];
+/// Coefficients of the twist of a cell. Its first and last corner are opposite.
+pub(crate) const TWIST: [f32; 4] = [1.0, -1.0, -1.0, 1.0];
+
+impl Bend {
+    /// Bend of three particles on a line, with the rigidity EI. With the lengths `l_1` and `l_2` of its
+    /// parts and their mean s, C = s (`x_a` - `x_b`) / `l_1` + s (`x_c` - `x_b`) / `l_2`, whose size is
+    /// s^2 times the curvature. With equal parts it is the second difference.
+    pub(crate) fn on_line(particles: [u32; 3], positions: [[f32; 3]; 3], rigidity: f32) -> Self {
+        let [a, b, c] = positions.map(|one| Vec3::from_array(one).as_dvec3());
+        let (first, second) = (a.distance(b), b.distance(c));
+        let mean = (first + second) / 2.0;
+        let sum = round(mean / first + mean / second);
+        // The greater one is at least half of the sum, so the difference has no rounding: the sum of all
+        // coefficients is exactly 0, and so is that of the forces.
+        let greater = round(mean / first.min(second));
+        let (c_a, c_c) =
+            if first < second { (greater, sum - greater) } else { (sum - greater, greater) };
+        let [a, b, c] = particles;
+        Self {
+            particles: [a, b, c, b],
+            coefficients: [c_a, -sum, c_c, 0.0],
+            geometry: round(mean * mean * mean),
+            rigidity,
+        }
+    }
+
+    /// Twist of a cell with the rigidity B. The second and third corner are next to the first.
+    pub(crate) fn of_cell(particles: [u32; 4], positions: [[f32; 3]; 4], rigidity: f32) -> Self {
+        let [a, b, c, _] = positions.map(|one| Vec3::from_array(one).as_dvec3());
+        let area = (b - a).cross(c - a).length();
+        Self { particles, coefficients: TWIST, geometry: round(area / 2.0), rigidity }
+    }
+
+    /// Pairs of particles, as positions in [`Self::particles`], whose constraints form the path of a
+    /// bend: neighbours on a line, or the sides of a cell.
+    pub(crate) fn path(&self) -> &'static [[usize; 2]] {
+        if self.particles[3] == self.particles[1] {
+            &[[0, 1], [1, 2]]
+        } else {
+            &[[0, 1], [0, 2], [1, 3], [2, 3]]
+        }
+    }
+
+    /// Compliance over h^2 in 1/kg. Infinite for a bend without effect.
+    pub(crate) fn scaled_compliance(&self, rigidity: f32, h: f32) -> f32 {
+        let (geometry, h) = (f64::from(self.geometry), f64::from(h));
+        let scaled = round(geometry / f64::from(rigidity) / (h * h));
+        // 0 / 0: a bend without length and without rigidity.
+        if scaled.is_nan() { f32::INFINITY } else { scaled }
+    }
+}
+
+/// Rounds to the solver's f32.
+#[allow(clippy::cast_possible_truncation, reason = "the one rounding to the solver's f32")]
+fn round(value: f64) -> f32 {
+    value as f32
+}
