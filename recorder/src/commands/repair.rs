@@ -6,6 +6,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 use anyhow::Context;
+use recorder::simulation::constraint_state;
 use recorder::{
     AfterEnd, Finding, LoadRows, PartFile, ReadError, RepairReport, SCENE_ATTACHMENT, SurfaceRow,
     Topic, TopologyRow, open_regular_file, repair_file,
@@ -18,7 +19,6 @@ use crate::cli::exit::Exit;
 use crate::cli::file_args::{OverwriteArgs, refuse_own_input};
 use crate::cli::output::{self, AsJson};
 use crate::cli::progress::progress_bytes;
-use crate::simulation::state_writer::constraint_state;
 
 #[derive(Debug, clap::Args)]
 #[command(

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::{ContentSelection, Frame, FrameReader, LogReader};
+use recorder::verification::Resimulation;
+use recorder::{ContentSelection, Frame, FrameReader, LogReader, recorded_scene};
 use serde::Serialize;
 use sim_contract::{
     Action, Client, GivenState, Outcome, ParticleState, Stop, report_bus_errors, scene_hash,
@@ -17,8 +18,6 @@ use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson, path_text};
 use crate::cli::parse::{self, whole_number};
 use crate::cli::thread_args::ThreadArgs;
-use crate::commands::verify::resimulation::Resimulation;
-use crate::input::scene_source::scene_in_recording;
 use crate::input::state_place::{Place, Wanted, find_state};
 
 #[derive(Debug, clap::Args)]
@@ -158,7 +157,7 @@ fn read_state(
             place.keyframe_step
         );
     }
-    let scene = scene_in_recording(&log)?;
+    let scene = recorded_scene(&log)?;
     let mut frames = FrameReader::new(log);
     let mut simulation: Option<Resimulation> = None;
     while let Some(frame) = frames.next_frame()? {

@@ -1,8 +1,19 @@
-//! Rows of `/colliders` and `/tears` from the state of a solver.
+//! Constraints, and rows of `/colliders` and `/tears`, from the state of a solver.
 
-use recorder::{CollidersRow, TearsRow};
-use sim_contract::{ColliderShape, ColliderState};
+use crate::log::{CollidersRow, TearsRow};
+use sim_contract::{ColliderShape, ColliderState, ConstraintState};
 use sim_solver::{PlacedCollider, Solver};
+
+/// Returns a constraint as it is published.
+pub fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
+    ConstraintState {
+        a: constraint.a,
+        b: constraint.b,
+        rest_length: constraint.rest_length,
+        compliance: constraint.compliance,
+        kind: constraint.kind as u32,
+    }
+}
 
 /// Returns the colliders after `step`.
 pub(crate) fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {

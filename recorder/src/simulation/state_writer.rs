@@ -2,16 +2,16 @@
 
 use std::io::Write;
 
-use recorder::{
+use crate::log::{
     CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, ParticleBuffer, RunDescription,
     StepRow, SurfaceRow, TopologyRow, WriteError,
 };
-use sim_contract::{ConstraintState, LoadHeader, ParameterValues, ParticleState, Triangle};
+use sim_contract::{LoadHeader, ParameterValues, ParticleState, Triangle};
 use sim_solver::Solver;
 
 use super::frozen::{FrozenParticles, FrozenTracker};
 use super::job::{Job, count};
-use super::solver_rows::{colliders_row, new_tears_row};
+use super::solver_rows::{colliders_row, constraint_state, new_tears_row};
 
 /// The time of the next keyframe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,15 +153,4 @@ impl<'a, W: Write> StateWriter<'a, W> {
 #[allow(clippy::cast_possible_truncation, reason = "the low half is wanted")]
 fn low_32_bits(step: u64) -> u32 {
     step as u32
-}
-
-/// Returns a constraint as it is published.
-pub(crate) fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
-    ConstraintState {
-        a: constraint.a,
-        b: constraint.b,
-        rest_length: constraint.rest_length,
-        compliance: constraint.compliance,
-        kind: constraint.kind as u32,
-    }
 }

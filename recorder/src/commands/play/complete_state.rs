@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use recorder::{Frame, FrameReader, LogReader, Message, Tape};
+use recorder::verification::{Resimulation, SnapshotFinding};
+use recorder::{Frame, FrameReader, LogReader, Message, Tape, recorded_scene};
 use sim_contract::{Method, Stop, Torn};
 use sim_solver::SOLVER_VERSION;
 
 use super::position::Position;
-use crate::commands::verify::finding::Finding;
-use crate::commands::verify::resimulation::Resimulation;
-use crate::input::scene_source::scene_in_recording;
 
 /// Most work of a simulation, in steps of one particle: about two seconds on one thread. A jump in a scene
 /// of a million particles, or after a second without keyframes, does not stop the replay for longer.
@@ -52,12 +50,12 @@ pub(super) fn keyframe_of(
         log_times_ns: Vec::new(),
     };
     let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
-    let scene = scene_in_recording(frames.log())?;
+    let scene = recorded_scene(frames.log())?;
     // A keyframe that this solver refuses leads to no state.
     let Ok(Some(mut simulation)) = Resimulation::start(&scene, &first) else { return Ok(None) };
     tape.wind(&mut frames, begin)?;
     while let Some(frame) = frames.next_frame()? {
-        let is_same = simulation.advance(&frame, stop.flag()) == Finding::Identical;
+        let is_same = simulation.advance(&frame, stop.flag()) == SnapshotFinding::Identical;
         if !is_same || frame.row.step > step {
             return Ok(None);
         }

@@ -2,11 +2,11 @@
 
 use std::io::Read;
 
-use recorder::{LogReader, Message, RunDescription, SurfaceRow, TopologyRow};
+use crate::log::{LogReader, Message, RunDescription, SurfaceRow, TopologyRow};
 use sim_contract::{LoadHeader, Triangle};
 use sim_solver::{Scene, Solver};
 
-use crate::simulation::state_writer::constraint_state;
+use crate::simulation::solver_rows::constraint_state;
 
 /// Compares the metadata of the run with the scene. Returns a description of the first difference.
 pub(super) fn compare_run<R: Read>(log: &LogReader<R>, scene: &Scene) -> Option<String> {
