@@ -20,7 +20,7 @@ pub use frozen::{FrozenParticles, FrozenTracker};
 pub use job::{Job, Start};
 use kept_states::KeptStates;
 pub use kept_states::State;
-pub use solver_rows::constraint_state;
+pub use solver_rows::{colliders_row, constraint_state};
 use state_writer::{KeyframeDue, StateWriter};
 
 /// The result of a simulation.

@@ -12,6 +12,7 @@ mod report;
 mod resimulation;
 mod side_rows;
 mod snapshot_numbers;
+mod state;
 
 use std::io::Read;
 use std::sync::atomic::AtomicBool;

@@ -5,19 +5,18 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use recorder::LogReader;
 use recorder::verification::{
     StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify,
 };
+use recorder::{LogReader, Wanted, find_state};
 use sim_contract::{Stop, printable_line};
 
-use crate::cli::damaged_input::lacks;
+use crate::cli::damaged_input::{lacks, lacks_state};
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson};
 use crate::cli::parse::whole_number;
 use crate::cli::progress::progress_bytes;
 use crate::cli::thread_args::ThreadArgs;
-use crate::input::state_place::{Wanted, find_state};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -99,7 +98,8 @@ impl VerifyArgs {
         if from > last {
             bail!("--from {from} is after --to {last}");
         }
-        let place = find_state(&self.file, open()?, Wanted::UpTo(from));
+        let place = find_state(open()?, Wanted::UpTo(from));
+        let place = place.map_err(|error| lacks_state(&self.file, error));
         let place = place.with_context(|| output::path_text(&self.file))?;
         Ok(StepRange { start: place.keyframe_step, last })
     }

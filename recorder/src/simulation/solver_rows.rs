@@ -16,7 +16,7 @@ pub fn constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
 }
 
 /// Returns the colliders after `step`.
-pub(crate) fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
+pub fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
     let states: Vec<_> = solver.colliders().map(|collider| state(&collider)).collect();
     // Every shape of this solver has a row.
     CollidersRow::new(step, &states).unwrap_or(CollidersRow { step, colliders: Vec::new() })

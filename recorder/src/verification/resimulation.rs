@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use crate::log::{Frame, Message, OutcomeRow, StepRow, TearTracker};
+use crate::log::{Frame, Message, OutcomeRow, StepRow};
 use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
-use super::difference::{Difference, first_difference};
 use super::finding::{SnapshotFinding, StepGap};
 use super::past_states::PastStates;
 use super::side_rows::SideRows;
+use super::state::{compare, has_other_tears};
 use crate::simulation::apply::apply;
 
 /// The reason why a recording cannot be re-simulated.
@@ -41,6 +41,10 @@ pub struct Resimulation {
     solver: Solver,
     /// The step of the solver's state.
     step: u64,
+    /// The step of the snapshot whose messages were added last.
+    added_step: u64,
+    /// The node was paused. The solver does not know it.
+    is_paused: bool,
     /// Index of the next outcome to apply.
     next_index: u64,
     /// Outcomes that were read but not applied yet, by index.
@@ -76,6 +80,8 @@ impl Resimulation {
             scene: scene.clone(),
             solver,
             step,
+            added_step: step,
+            is_paused: keyframe.paused,
             next_index,
             pending: BTreeMap::new(),
             side_rows: SideRows::after_start(step),
@@ -86,14 +92,21 @@ impl Resimulation {
         }))
     }
 
-    /// Returns the particles of the last compared snapshot.
+    /// Returns the last simulated step.
+    pub fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// Returns the particles after that step.
     pub fn particles(&self) -> &[ParticleState] {
         bytemuck::cast_slice(self.solver.particles())
     }
 
-    /// Returns the keyframe of the last compared snapshot.
+    /// Returns the rest of the state after that step.
     pub fn keyframe(&self) -> Keyframe {
-        self.solver.keyframe()
+        let mut keyframe = self.solver.keyframe();
+        keyframe.paused = self.is_paused;
+        keyframe
     }
 
     /// Sets the number of threads.
@@ -154,7 +167,7 @@ impl Resimulation {
             let what = format!("its row in /steps follows step {} in the file", self.step);
             return SnapshotFinding::at_step(row.step, what);
         }
-        if let Some(finding) = self.add_updates(&frame.updates) {
+        if let Some(finding) = self.add_frame(frame) {
             return finding;
         }
         if self.is_in_gap {
@@ -172,21 +185,41 @@ impl Resimulation {
         finding
     }
 
+    /// Simulates up to a step before the next snapshot, and compares everything but particles.
+    /// [`Self::advance`] with the same snapshot goes on from there.
+    pub fn advance_to(&mut self, step: u64, frame: &Frame, stop: &AtomicBool) -> SnapshotFinding {
+        let finding = self.add_frame(frame).or_else(|| self.find_gap(&frame.row));
+        let finding = finding.or_else(|| self.simulate_steps(step, frame, stop));
+        finding.unwrap_or(SnapshotFinding::Identical)
+    }
+
+    /// Simulates up to a step. In that of the snapshot, the particles are compared before the other rows.
+    fn simulate_steps(
+        &mut self,
+        step: u64,
+        frame: &Frame,
+        stop: &AtomicBool,
+    ) -> Option<SnapshotFinding> {
+        while self.step < step {
+            if let Some(finding) = self.simulate_step(frame, stop) {
+                return Some(finding);
+            }
+            if self.step < frame.row.step
+                && let Some(finding) = self.compare_side_rows()
+            {
+                return Some(finding);
+            }
+        }
+        None
+    }
+
     fn simulate_to(&mut self, frame: &Frame, stop: &AtomicBool) -> SnapshotFinding {
         let row = &frame.row;
         if let Some(finding) = self.find_gap(row) {
             return finding;
         }
-        while self.step < row.step {
-            if let Some(finding) = self.simulate_step(frame, stop) {
-                return finding;
-            }
-            // In the step of the snapshot, the particles are compared first.
-            if self.step < row.step
-                && let Some(finding) = self.compare_side_rows()
-            {
-                return finding;
-            }
+        if let Some(finding) = self.simulate_steps(row.step, frame, stop) {
+            return finding;
         }
         // All outcomes that the header counts are applied now, unless one has another step.
         if self.next_index > row.outcome_count {
@@ -248,6 +281,15 @@ impl Resimulation {
         let step = self.step;
         let what = self.side_rows.compare(&self.solver, step)?;
         Some(SnapshotFinding::at_step(step, what))
+    }
+
+    /// Adds the messages before a snapshot, once.
+    fn add_frame(&mut self, frame: &Frame) -> Option<SnapshotFinding> {
+        if self.added_step >= frame.row.step {
+            return None;
+        }
+        self.added_step = frame.row.step;
+        self.add_updates(&frame.updates)
     }
 
     /// Adds messages that are compared with later steps. Returns a finding for one that the file has twice,
@@ -385,9 +427,13 @@ impl Resimulation {
         let is_of_node = matches!(row.action, Action::Load { .. }) || row.puts_state_in_place();
         let is_rejected_by_node = is_of_node && !row.is_applied();
         let result = match apply(&mut self.solver, row.client_id, &row.action) {
-            Ok(Applied::Control(Control::Pause | Control::Resume | Control::Step { .. })) => {
+            Ok(Applied::Control(control @ (Control::Pause | Control::Resume))) => {
+                if row.is_applied() {
+                    self.is_paused = matches!(control, Control::Pause);
+                }
                 return None;
             }
+            Ok(Applied::Control(Control::Step { .. })) => return None,
             Err(_) if is_rejected_by_node => return None,
             result => result.map(|_| ()),
         };
@@ -407,76 +453,4 @@ impl Resimulation {
         let what = format!("/outcomes: outcome {} is misplaced: {why}", self.next_index);
         SnapshotFinding::Diverged { step, what, difference: None }
     }
-}
-
-/// Returns `true` if the torn constraints of the first snapshot differ from its rows. Later snapshots
-/// have no `/topology`. An unknown cause equals any cause.
-fn has_other_tears(frame: &Frame, solver: &Solver) -> bool {
-    let torn = frame.updates.iter().find_map(|update| match update {
-        Message::Topology(row) => Some(row.torn_before()),
-        _ => None,
-    });
-    let Some(torn) = torn else { return false };
-    let mut tracker = TearTracker::new(torn);
-    frame.updates.iter().for_each(|update| tracker.process(update));
-    let Some(torn) = tracker.at(frame.row.step) else { return false };
-    let expected = solver.torn().iter().zip(solver.tear_causes());
-    torn.constraints.len() != solver.torn().len()
-        || torn.constraints.iter().zip(expected).any(|(found, (index, cause))| {
-            found.constraint != *index || found.cause().is_some_and(|found| found != *cause)
-        })
-}
-
-/// Compares the recorded header, the recorded payload and the simulated state.
-fn compare(solver: &Solver, frame: &Frame) -> SnapshotFinding {
-    let row = &frame.row;
-    let diverged =
-        |what: String, difference| SnapshotFinding::Diverged { step: row.step, what, difference };
-    let simulated_hash = solver.state_hash();
-    if let Some(particles) = &frame.particles
-        && let Some((what, difference)) = compare_particles(solver, particles)
-    {
-        return diverged(what, difference);
-    }
-    let counts = [
-        ("scene_step", row.scene_step, solver.scene_step()),
-        ("torn_count", u64::from(row.torn_count), solver.torn().len() as u64),
-    ];
-    let differs = |(_, recorded, simulated): &(_, u64, u64)| recorded != simulated;
-    if let Some((name, recorded, simulated)) = counts.into_iter().find(differs) {
-        return diverged(
-            format!("/steps: {name}: recorded {recorded}, simulated {simulated}"),
-            None,
-        );
-    }
-    if row.state_hash != simulated_hash {
-        let of =
-            if frame.particles.is_some() { "its particles have" } else { "the simulation has" };
-        let what = format!(
-            "its row in /steps has the hash {:016x}, but {of} {simulated_hash:016x}",
-            row.state_hash
-        );
-        return diverged(what, None);
-    }
-    SnapshotFinding::Identical
-}
-
-/// Describes the first difference of recorded particles from the simulated state.
-fn compare_particles(
-    solver: &Solver,
-    recorded: &[ParticleState],
-) -> Option<(String, Option<Difference>)> {
-    let expected_count = solver.particle_count();
-    if recorded.len() != expected_count {
-        let count = recorded.len();
-        let what = format!("/particles: recorded {count} particles, simulated {expected_count}");
-        return Some((what, None));
-    }
-    let simulated = bytemuck::cast_slice(solver.particles());
-    // One comparison of memory, because it runs for every step.
-    if bytemuck::cast_slice::<_, u8>(recorded) == bytemuck::cast_slice::<_, u8>(simulated) {
-        return None;
-    }
-    let difference = first_difference(recorded, simulated)?;
-    Some((format!("/particles: {difference}"), Some(difference)))
 }
