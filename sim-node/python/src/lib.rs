@@ -4,6 +4,7 @@
 //! they are: arrays are views of shared memory, or of the memory of a [`data::snapshot::Snapshot`]. Every call
 //! that waits or computes lets other threads of the interpreter run, and ends early on a signal.
 
+mod arguments;
 mod convert;
 mod data;
 mod error;
@@ -13,6 +14,7 @@ mod patience;
 mod process;
 mod recording;
 mod simulation;
+mod verification;
 
 /// Registers the classes. Their texts are those of `_catenary.pyi`; a test compares them.
 #[pyo3::pymodule]
@@ -35,4 +37,6 @@ mod _catenary {
     use crate::recording::Recording;
     #[pymodule_export]
     use crate::simulation::Simulation;
+    #[pymodule_export]
+    use crate::verification::{Verification, verify};
 }
