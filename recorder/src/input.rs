@@ -2,5 +2,4 @@
 
 pub(crate) mod command_source;
 pub(crate) mod scene_source;
-pub(crate) mod state_place;
 mod text_file;

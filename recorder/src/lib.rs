@@ -45,14 +45,25 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`LogReader`] and [`FrameReader`] read a file from its start. [`Tape`] reads it at any step. No
-//! type of the mcap crate is part of this interface.
+//! [`LogReader`] and [`FrameReader`] read a file from its start. [`Tape`] reads it at any step.
+//! [`simulation`] writes the recording of a scene, and [`verification`] simulates a recording again and
+//! compares every bit. No type of the mcap crate is part of this interface.
 #![forbid(unsafe_code)]
 
+mod complete_state;
 mod log;
+#[cfg(test)]
+mod proof_tests;
+mod recorded_scene;
 mod scene_drawing;
+pub mod simulation;
+mod state_place;
+pub mod verification;
 
+pub use complete_state::{CompleteState, CompleteStateError, complete_state};
 pub use log::*;
+pub use recorded_scene::{RecordedSceneError, recorded_scene, scene_to_simulate};
 pub use scene_drawing::{DrawnMesh, SCENE_TOPIC, SceneDrawing};
 pub use sim_contract::{Existing, PartFile, PartFileError};
 pub use sim_solver::scene::Up;
+pub use state_place::{FindStateError, StatePlace, Wanted, find_state};

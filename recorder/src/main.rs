@@ -6,9 +6,6 @@ mod cli;
 mod commands;
 mod export;
 mod input;
-#[cfg(test)]
-mod proof_tests;
-mod simulation;
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};

@@ -11,14 +11,14 @@ mod rows;
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use recorder::{
+use crate::log::{
     Closing, LogEnd, LogOptions, LogReader, LogWriter, Message, TimedCommand, Topic, parse_commands,
 };
 use sim_contract::Action;
 use sim_solver::{SOLVER_VERSION, Scene, Solver, builtin};
 
-use crate::commands::verify::{Report, StepRange, Verdict, VerifyOptions, verify};
 use crate::simulation::{Job, SimulationResult, States, simulate};
+use crate::verification::{StepRange, Verdict, VerifyError, VerifyOptions, VerifyReport, verify};
 
 const COMMANDS: &str = r#"
     {"step":10,"kind":"grab","particle":90,"target":[0.5,0.2,0.3],"over_s":0.1}
@@ -53,9 +53,14 @@ fn record(job: &Job) -> (Vec<u8>, SimulationResult) {
     (finish(log, 0), outcomes)
 }
 
-fn check(file: &[u8]) -> (Report, Option<LogEnd>) {
-    verify(LogReader::new(file).unwrap(), "test.mcap", ALL, &AtomicBool::new(false), |_| {})
-        .unwrap()
+fn check(file: &[u8]) -> (VerifyReport, Option<LogEnd>) {
+    let report = try_check(file).unwrap();
+    let end = report.incomplete_end().cloned();
+    (report, end)
+}
+
+fn try_check(file: &[u8]) -> Result<VerifyReport, VerifyError> {
+    verify(LogReader::new(file).unwrap(), ALL, &AtomicBool::new(false), |_| {})
 }
 
 /// Rebuilds a recording. `change` returns the new message, or `None` to leave it out.
@@ -339,7 +344,7 @@ fn a_range_of_steps_is_compared_and_no_others() {
     let verified = |start, last| {
         let options = VerifyOptions { threads: 1, range: StepRange { start, last } };
         let log = LogReader::new(damaged.as_slice()).unwrap();
-        verify(log, "test.mcap", options, &AtomicBool::new(false), |_| {}).unwrap().0
+        verify(log, options, &AtomicBool::new(false), |_| {}).unwrap()
     };
     for (start, last, expected) in [
         (0, 599, Ok((0, 599))),
@@ -366,15 +371,8 @@ fn a_recording_without_a_keyframe_is_an_error() {
     let (file, _) = record(&job("curtain", "", 10));
     let without =
         rebuild(&file, |message| (!matches!(message, Message::Keyframe { .. })).then_some(message));
-    let error = verify(
-        LogReader::new(without.as_slice()).unwrap(),
-        "x.mcap",
-        ALL,
-        &AtomicBool::new(false),
-        |_| {},
-    );
-    let error = error.unwrap_err().to_string();
-    assert_eq!(error, "x.mcap: has no snapshot with a keyframe to start from");
+    let error = try_check(&without).unwrap_err().to_string();
+    assert_eq!(error, "has no snapshot with a keyframe to start from");
 }
 
 #[test]
@@ -386,16 +384,8 @@ fn a_recording_of_another_solver_version_is_refused() {
     let scene = job.scene.to_toml();
     let log = LogWriter::create(Vec::new(), LogOptions::default(), &run, scene.as_bytes(), 0);
     let file = log.unwrap().finish(&Closing::default()).unwrap();
-    let error = verify(
-        LogReader::new(file.as_slice()).unwrap(),
-        "x.mcap",
-        ALL,
-        &AtomicBool::new(false),
-        |_| {},
-    );
-    let error = format!("{:#}", error.unwrap_err());
-    let found =
-        format!("x.mcap: recorded with solver version {}, but this program", SOLVER_VERSION + 1);
+    let error = try_check(&file).unwrap_err().to_string();
+    let found = format!("recorded with solver version {}, but this program", SOLVER_VERSION + 1);
     assert!(error.contains(&found), "{error}");
 }
 

@@ -6,66 +6,74 @@ mod job;
 mod kept_states;
 pub(crate) mod run_id;
 pub(crate) mod solver_rows;
-pub(crate) mod state_writer;
+mod state_writer;
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use recorder::{LogWriter, OutcomeRow, TimedCommand};
+use crate::log::{LogWriter, OutcomeRow, TimedCommand, WriteError};
 use sim_contract::{Action, Command, Outcome, Reason};
 use sim_solver::{Applied, Solver};
 
 use apply::apply;
-pub(crate) use job::{Job, Start};
+pub use frozen::{FrozenParticles, FrozenTracker};
+pub use job::{Job, Start};
 use kept_states::KeptStates;
-pub(crate) use kept_states::State;
+pub use kept_states::State;
+pub use solver_rows::colliders_row;
 use state_writer::{KeyframeDue, StateWriter};
 
 /// The result of a simulation.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SimulationResult {
+pub struct SimulationResult {
     /// Index of the first outcome.
     first_index: u64,
     /// The last computed step.
-    pub(crate) steps: u64,
+    pub steps: u64,
     /// Hash of the last state.
-    pub(crate) state_hash: u64,
-    pub(crate) applied_count: u64,
-    pub(crate) rejected_count: u64,
+    pub state_hash: u64,
+    /// Number of applied commands.
+    pub applied_count: u64,
+    /// Number of rejected commands.
+    pub rejected_count: u64,
     /// The first rejected commands, at most [`REJECTIONS_SHOWN_MAX`].
-    pub(crate) rejections: Vec<Outcome>,
+    pub rejections: Vec<Outcome>,
 }
 
 /// Most rejected commands to report one by one.
 const REJECTIONS_SHOWN_MAX: usize = 5;
 
 /// The states of a simulation that it does not compute.
-pub(crate) struct States<G> {
+#[derive(Debug)]
+pub struct States<G> {
     /// The first one.
-    pub(crate) solver: Solver,
+    pub solver: Solver,
     /// Returns the one that a command puts in place, for a state that the simulation has not computed.
-    pub(crate) given: G,
+    pub given: G,
 }
 
 /// Returns the state of a command.
-pub(crate) type GiveState = fn(&TimedCommand) -> anyhow::Result<Option<State>>;
+pub type GiveState = fn(&TimedCommand) -> Result<Option<State>, WriteError>;
 
 impl States<GiveState> {
     /// Only the first state.
-    pub(crate) fn first(solver: Solver) -> Self {
+    pub fn first(solver: Solver) -> Self {
         Self { solver, given: |_| Ok(None) }
     }
 }
 
 /// Computes the steps of `job` and writes them to `log`. Calls `on_step` after each step. Ends early, even
 /// within a step, if `stop` becomes true.
-pub(crate) fn simulate<W: Write>(
+///
+/// # Errors
+/// If the file cannot be written, and those of `states.given`.
+pub fn simulate<W: Write, E: From<WriteError>>(
     job: &Job,
-    states: States<impl FnMut(&TimedCommand) -> anyhow::Result<Option<State>>>,
+    states: States<impl FnMut(&TimedCommand) -> Result<Option<State>, E>>,
     log: Option<&mut LogWriter<W>>,
     stop: &AtomicBool,
     mut on_step: impl FnMut(u64),
-) -> anyhow::Result<SimulationResult> {
+) -> Result<SimulationResult, E> {
     let States { mut solver, mut given } = states;
     let run = job.description(&solver);
     let Start { step: first_step, .. } = job.start;

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use recorder::LogEnd;
+use recorder::{FindStateError, LogEnd};
 use sim_contract::is_being_written;
 
 /// A truncated or damaged recording that lacks what a subcommand needs. The program ends with exit code 3.
@@ -40,5 +40,13 @@ pub(crate) fn lacks(path: &Path, problem: &str, end: Option<&LogEnd>) -> anyhow:
             let (path, problem, end) = (path.to_owned(), problem.to_owned(), end.clone());
             anyhow::Error::new(DamagedInput { path, problem, end })
         }
+    }
+}
+
+/// Returns the error of a recording without the state that a subcommand looks for.
+pub(crate) fn lacks_state(path: &Path, error: FindStateError) -> anyhow::Error {
+    match error {
+        FindStateError::Missing { problem, end } => lacks(path, &problem, end.as_ref()),
+        FindStateError::Read(error) => error.into(),
     }
 }

@@ -5,21 +5,22 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use recorder::{ContentSelection, Frame, FrameReader, LogReader};
+use recorder::verification::Resimulation;
+use recorder::{
+    ContentSelection, Frame, FrameReader, LogReader, StatePlace, Wanted, find_state, recorded_scene,
+};
 use serde::Serialize;
 use sim_contract::{
     Action, Client, GivenState, Outcome, ParticleState, Stop, report_bus_errors, scene_hash,
 };
 use sim_solver::SOLVER_VERSION;
 
+use crate::cli::damaged_input::lacks_state;
 use crate::cli::endpoint_args::EndpointArgs;
 use crate::cli::exit::Exit;
 use crate::cli::output::{self, AsJson, path_text};
 use crate::cli::parse::{self, whole_number};
 use crate::cli::thread_args::ThreadArgs;
-use crate::commands::verify::resimulation::Resimulation;
-use crate::input::scene_source::scene_in_recording;
-use crate::input::state_place::{Place, Wanted, find_state};
 
 #[derive(Debug, clap::Args)]
 #[command(
@@ -98,7 +99,8 @@ pub(crate) fn run(args: &RestoreArgs) -> anyhow::Result<Exit> {
         (None, Some(time)) => Wanted::UpTo(step_at(time, log.run().rate_hz)),
         (None, None) => Wanted::Last,
     };
-    let place = find_state(&args.file, log, wanted).with_context(|| path.clone())?;
+    let place = find_state(log, wanted).map_err(|error| lacks_state(&args.file, error));
+    let place = place.with_context(|| path.clone())?;
     let state = read_state(&args.file, place, args.threads.count(), &stop).context(path)?;
     let given = GivenState {
         scene_hash: state.scene_hash,
@@ -142,7 +144,7 @@ fn step_at(time: Duration, rate_hz: u32) -> u64 {
 /// Reads the state, and simulates it from the keyframe if it has none of its own.
 fn read_state(
     path: &Path,
-    place: Place,
+    place: StatePlace,
     threads: usize,
     stop: &Stop,
 ) -> anyhow::Result<RecordedState> {
@@ -158,7 +160,7 @@ fn read_state(
             place.keyframe_step
         );
     }
-    let scene = scene_in_recording(&log)?;
+    let scene = recorded_scene(&log)?;
     let mut frames = FrameReader::new(log);
     let mut simulation: Option<Resimulation> = None;
     while let Some(frame) = frames.next_frame()? {

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use recorder::{Closing, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand};
+use recorder::simulation::{Job, SimulationResult, State, States, simulate};
+use recorder::{Closing, LogEnd, LogReader, OutcomeRow, PartFile, TimedCommand, WriteError};
 use serde::Serialize;
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::{Stop, printable_line};
@@ -22,7 +23,6 @@ use crate::cli::progress::{progress_bar, progress_spinner};
 use crate::cli::thread_args::ThreadArgs;
 use crate::input::command_source::load_commands;
 use crate::input::scene_source::{is_recording, load_scene};
-use crate::simulation::{Job, SimulationResult, State, States, simulate};
 use changes::{Changed, Changes, parse_setting};
 use completion::Completion;
 
@@ -167,10 +167,10 @@ fn run_scene(args: &SimulateArgs, steps: u64, stop: &Stop) -> anyhow::Result<Exi
 }
 
 /// Simulates, and prints the summary.
-fn run_job(
+fn run_job<E: From<WriteError> + Into<anyhow::Error>>(
     args: &SimulateArgs,
     job: &Job,
-    mut states: States<impl FnMut(&TimedCommand) -> anyhow::Result<Option<State>>>,
+    mut states: States<impl FnMut(&TimedCommand) -> Result<Option<State>, E>>,
     stop: &Stop,
 ) -> anyhow::Result<Exit> {
     states.solver.set_threads(args.threads.count());
@@ -184,7 +184,7 @@ fn run_job(
             bar.set_position(step - first_step);
         }
     })
-    .map_err(|error| in_output(args, error))?;
+    .map_err(|error| in_output(args, error.into()))?;
     bar.finish_and_clear();
     let path = log.map(|log| finish(log, &result, job.steps)).transpose();
     let path = path.with_context(|| truncation(args))?;

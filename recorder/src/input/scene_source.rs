@@ -1,13 +1,12 @@
 //! Loads scenes from built-in scenes, files and recordings.
 
-use std::io::Read;
 use std::path::Path;
 
-use anyhow::{Context, anyhow, bail};
-use recorder::{ContentSelection, LogReader};
+use anyhow::{Context, anyhow};
+use recorder::{LogReader, recorded_scene};
 use sim_contract::{Stop, read_scene_file};
+use sim_solver::Scene;
 use sim_solver::scene::LoadError;
-use sim_solver::{SOLVER_VERSION, Scene};
 
 /// Reads and validates a scene. `source` is a recording if it ends in `.mcap`, else a scene file if
 /// it contains `/` or ends in `.toml`, else the name of a built-in scene.
@@ -15,39 +14,13 @@ pub(crate) fn load_scene(source: &str, stop: &Stop) -> anyhow::Result<Scene> {
     if is_recording(source) {
         let log =
             LogReader::open_until(Path::new(source), stop).with_context(|| source.to_owned())?;
-        return scene_in_recording(&log).with_context(|| source.to_owned());
+        return recorded_scene(&log).with_context(|| source.to_owned());
     }
     let read = |path: &Path| read_scene_file(path).map_err(|error| error.to_string());
     Scene::load(source, &read).map_err(|error| match error {
         LoadError::UnknownName(_) => anyhow!("{error}; or give a recording ending in .mcap"),
         other => other.into(),
     })
-}
-
-/// Parses the scene in a recording. Errors do not name the recording.
-pub(crate) fn scene_in_recording<R: Read>(log: &LogReader<R>) -> anyhow::Result<Scene> {
-    if log.scene().is_empty() {
-        bail!("has no scene (attachment scene.toml)");
-    }
-    let text = std::str::from_utf8(log.scene()).context("its attachment scene.toml is not text")?;
-    Ok(Scene::from_toml(text, "scene.toml")?)
-}
-
-/// Parses the scene of a recording that can be simulated again: one of this solver's version with its
-/// commands and states, which `purpose` needs. Errors do not name the recording.
-pub(crate) fn scene_to_simulate<R: Read>(
-    log: &LogReader<R>,
-    purpose: &'static str,
-) -> anyhow::Result<Scene> {
-    log.selection().require(&ContentSelection::FOR_STATES, purpose)?;
-    let version = log.run().solver_version;
-    if version != SOLVER_VERSION {
-        bail!(
-            "recorded with solver version {version}, but this program has version {SOLVER_VERSION}, whose \
-             bits differ. Use the program that recorded it"
-        );
-    }
-    scene_in_recording(log)
 }
 
 /// Extension of recordings.

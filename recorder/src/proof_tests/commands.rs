@@ -3,13 +3,13 @@
 
 use std::sync::atomic::AtomicBool;
 
-use recorder::{LogReader, Message, OutcomeRow, parse_commands};
+use crate::log::{LogReader, Message, OutcomeRow, parse_commands};
 use sim_contract::ActionFields;
 use sim_solver::{PARAMETERS, Scene};
 
 use super::{ALL, check, rebuild, record};
-use crate::commands::verify::{Verdict, verify};
 use crate::simulation::Job;
+use crate::verification::{Verdict, verify};
 
 /// A cloth between two anchors, in the wind, above a floor and beside a rotating box.
 pub(super) const SCENE: &str = r#"
@@ -191,7 +191,7 @@ fn every_kind_of_command_is_recorded_verified_and_repeated_from_its_log() {
 fn a_request_to_stop_interrupts_the_verification_within_a_step() {
     let (file, _) = record(&job(COMMANDS));
     let log = LogReader::new(file.as_slice()).unwrap();
-    let (report, _) = verify(log, "test.mcap", ALL, &AtomicBool::new(true), |_| {}).unwrap();
+    let report = verify(log, ALL, &AtomicBool::new(true), |_| {}).unwrap();
     assert_eq!((report.verdict, report.steps_identical), (Verdict::Interrupted, 0));
 }
 

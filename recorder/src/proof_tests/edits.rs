@@ -13,11 +13,11 @@ mod older_format;
 
 use std::sync::atomic::AtomicBool;
 
-use mcap::records::op;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
-use recorder::{
+use crate::log::{
     Closing, LogOptions, LogReader, LogWriter, Message, StatusRow, Topic, parse_commands,
 };
+use mcap::records::op;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
 use sim_contract::NodeStatus;
 use sim_solver::{Scene, Solver};
 
@@ -26,9 +26,9 @@ use edit::{Change, Edit, MESSAGE_HEADER_SIZE_BYTES};
 use json::json_edits;
 use not_compared::not_compared;
 
-use crate::commands::verify::{Verdict, verify};
 use crate::proof_tests::{ALL, finish};
 use crate::simulation::{Job, States, simulate};
+use crate::verification::{Verdict, verify};
 
 /// A scene whose recording has every topic: a particle that freezes, a cut, and a moving collider.
 const SCENE: &str = "
@@ -140,11 +140,14 @@ fn verified(file: &[u8]) -> (Option<String>, Vec<String>) {
         Ok(log) => log,
         Err(error) => return (Some(error.to_string()), Vec::new()),
     };
-    match verify(log, "x.mcap", ALL, &AtomicBool::new(false), |_| {}) {
-        Err(error) => (Some(format!("{error:#}")), Vec::new()),
-        Ok((_, Some(end))) => (Some(end.to_string()), Vec::new()),
-        Ok((report, None)) if report.verdict == Verdict::Identical => (None, report.not_covered),
-        Ok((report, None)) => (Some(report.to_string()), report.not_covered),
+    let report = match verify(log, ALL, &AtomicBool::new(false), |_| {}) {
+        Err(error) => return (Some(error.to_string()), Vec::new()),
+        Ok(report) => report,
+    };
+    match report.incomplete_end() {
+        Some(end) => (Some(end.to_string()), Vec::new()),
+        None if report.verdict == Verdict::Identical => (None, report.not_covered),
+        None => (Some(report.to_string()), report.not_covered),
     }
 }
 

@@ -1,18 +1,18 @@
 //! Rows that only a recording of a node has: it verifies with them, and not with wrong ones.
 
-use recorder::{LogOptions, LogReader, LogWriter, Message, OutcomeRow, StepRow};
+use crate::log::{LogOptions, LogReader, LogWriter, Message, OutcomeRow, StepRow};
 use sim_contract::Action;
 
 use super::commands::{COMMANDS, STEPS, job};
 use super::{check, finish, record};
-use crate::commands::verify::{Report, Verdict};
+use crate::verification::{Verdict, VerifyReport};
 
 /// Verifies a recording of a node, in which `change` replaces messages.
-fn verified(change: impl FnMut(Message) -> Vec<Message>) -> Report {
+fn verified(change: impl FnMut(Message) -> Vec<Message>) -> VerifyReport {
     verified_job(COMMANDS, change)
 }
 
-fn verified_job(commands: &str, mut change: impl FnMut(Message) -> Vec<Message>) -> Report {
+fn verified_job(commands: &str, mut change: impl FnMut(Message) -> Vec<Message>) -> VerifyReport {
     let (file, _) = record(&job(commands));
     let mut old = LogReader::new(file.as_slice()).unwrap();
     let (mut run, scene) = (old.run().clone(), old.scene().to_vec());
@@ -27,19 +27,19 @@ fn verified_job(commands: &str, mut change: impl FnMut(Message) -> Vec<Message>)
 }
 
 #[track_caller]
-fn assert_identical(report: &Report) {
+fn assert_identical(report: &VerifyReport) {
     assert_eq!(report.verdict, Verdict::Identical, "{report}");
     assert_eq!(report.steps_identical, STEPS);
 }
 
 #[track_caller]
-fn assert_found(report: &Report, expected: &str) {
+fn assert_found(report: &VerifyReport, expected: &str) {
     assert_eq!(report.verdict, Verdict::Diverged, "{report}");
     assert!(report.to_string().contains(expected), "no \"{expected}\" in: {report}");
 }
 
 /// Changes each row of `/steps`.
-fn with_numbers(number: impl Fn(u64) -> u64) -> Report {
+fn with_numbers(number: impl Fn(u64) -> u64) -> VerifyReport {
     verified(|message| match message {
         Message::Step(row) => {
             let snapshot_index = Some(u32::try_from(number(row.step) & 0xffff_ffff).unwrap());
@@ -61,7 +61,7 @@ fn the_numbers_of_snapshots_increase_as_the_end_of_the_file_declares() {
 }
 
 /// Marks one outcome as that of a connection that has ended.
-fn with_disconnected(is_it: impl Fn(&OutcomeRow) -> bool) -> Report {
+fn with_disconnected(is_it: impl Fn(&OutcomeRow) -> bool) -> VerifyReport {
     verified(|message| match message {
         Message::Outcome(row) if is_it(&row) => {
             vec![Message::Outcome(OutcomeRow { disconnected: true, ..row })]

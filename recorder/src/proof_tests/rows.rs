@@ -1,12 +1,12 @@
 //! The rows besides the snapshots: tears with their causes, colliders and events match the
 //! simulation, and a changed row is reported.
 
-use recorder::{Message, TearsRow, TopologyRow};
+use crate::log::{Message, TearsRow, TopologyRow};
 use sim_contract::ParticleFlags;
 
 use super::commands::{COMMANDS, SCENE, STEPS, collect, job, job_of};
 use super::{check, rebuild, record};
-use crate::commands::verify::Verdict;
+use crate::verification::Verdict;
 
 fn tears(file: &[u8]) -> Vec<TearsRow> {
     collect(file, |message| match message {

@@ -1,6 +1,6 @@
 //! The events of a recording: the particles that froze between two snapshots.
 
-use recorder::EventRow;
+use crate::log::EventRow;
 use sim_contract::{ParticleFlags, ParticleState};
 
 /// Most events of a step, so that a scene that diverges does not flood the file.
@@ -8,7 +8,8 @@ const EVENTS_PER_STEP_MAX: usize = 1024;
 
 /// The frozen particles of a snapshot.
 #[derive(Debug)]
-pub(crate) struct FrozenParticles {
+pub struct FrozenParticles {
+    /// Number of all particles.
     pub(crate) particle_count: usize,
     /// Ascending.
     indices: Vec<u32>,
@@ -16,7 +17,7 @@ pub(crate) struct FrozenParticles {
 
 impl FrozenParticles {
     /// Finds the frozen particles.
-    pub(crate) fn find(particles: &[ParticleState]) -> Self {
+    pub fn find(particles: &[ParticleState]) -> Self {
         let is_frozen = |state: &ParticleState| state.flags & ParticleFlags::FROZEN != 0;
         // Usually empty, so this rarely allocates.
         let indices = (0_u32..)
@@ -35,7 +36,7 @@ impl FrozenParticles {
 
 /// Compares the frozen particles of each snapshot with those of the previous one.
 #[derive(Debug, Default)]
-pub(crate) struct FrozenTracker {
+pub struct FrozenTracker {
     /// Those of the last snapshot. `None` before the first snapshot.
     known: Option<FrozenParticles>,
 }
@@ -53,7 +54,7 @@ impl FrozenTracker {
 
     /// Returns the events of a snapshot. The first snapshot has none, because its frozen particles
     /// froze earlier. After a reset a particle can freeze again.
-    pub(crate) fn new_events(&mut self, step: u64, frozen: FrozenParticles) -> Vec<EventRow> {
+    pub fn new_events(&mut self, step: u64, frozen: FrozenParticles) -> Vec<EventRow> {
         let newest = self.known.take();
         let known = self.known.insert(frozen);
         let Some(before) = newest else { return Vec::new() };

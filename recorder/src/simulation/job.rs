@@ -1,6 +1,6 @@
 //! The inputs of a simulation.
 
-use recorder::{RunDescription, TimedCommand};
+use crate::log::{RunDescription, TimedCommand};
 use sim_contract::CONTRACT_VERSION;
 use sim_solver::{SOLVER_VERSION, Scene, Solver};
 
@@ -8,36 +8,39 @@ use super::run_id::RunId;
 
 /// The inputs of a simulation.
 #[derive(Debug)]
-pub(crate) struct Job {
-    pub(crate) scene: Scene,
+pub struct Job {
+    /// The scene.
+    pub scene: Scene,
     /// In the order of application.
-    pub(crate) commands: Vec<TimedCommand>,
+    pub commands: Vec<TimedCommand>,
     /// The last step to compute.
-    pub(crate) steps: u64,
-    pub(crate) start: Start,
+    pub steps: u64,
+    /// The state before the first step to compute.
+    pub start: Start,
 }
 
 /// The state before the first step to compute. The default is that of step 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Start {
-    pub(crate) step: u64,
+pub struct Start {
+    /// The step of the state.
+    pub step: u64,
     /// Number of the commands of the run up to this state.
-    pub(crate) outcome_count: u64,
+    pub outcome_count: u64,
 }
 
 impl Job {
     /// A simulation from step 0.
-    pub(crate) fn new(scene: Scene, commands: Vec<TimedCommand>, steps: u64) -> Self {
+    pub fn new(scene: Scene, commands: Vec<TimedCommand>, steps: u64) -> Self {
         Self { scene, commands, steps, start: Start::default() }
     }
 
     /// Returns the number of commands whose step is after the last one.
-    pub(crate) fn commands_beyond_the_end(&self) -> usize {
+    pub fn commands_beyond_the_end(&self) -> usize {
         self.commands.iter().filter(|command| command.step > self.steps).count()
     }
 
     /// Returns the metadata of a recording of this simulation.
-    pub(crate) fn description(&self, solver: &Solver) -> RunDescription {
+    pub fn description(&self, solver: &Solver) -> RunDescription {
         RunDescription {
             run_id: self.run_id(),
             epoch_ns: 0,

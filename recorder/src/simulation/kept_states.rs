@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use recorder::TimedCommand;
+use crate::log::TimedCommand;
 use sim_contract::{Action, Reason, RestoreContents};
 use sim_solver::{Applied, Keyframe, Particle, Solver};
 
@@ -16,9 +16,11 @@ pub(super) struct KeptStates {
 
 /// A complete state.
 #[derive(Debug, Clone)]
-pub(crate) struct State {
-    pub(crate) particles: Vec<Particle>,
-    pub(crate) keyframe: Keyframe,
+pub struct State {
+    /// The particles.
+    pub particles: Vec<Particle>,
+    /// The rest of the state.
+    pub keyframe: Keyframe,
 }
 
 impl State {

@@ -1,11 +1,11 @@
-//! Rows of `/colliders` and `/tears` from the state of a solver.
+//! Rows of `/colliders` and `/tears`, from the state of a solver.
 
-use recorder::{CollidersRow, TearsRow};
+use crate::log::{CollidersRow, TearsRow};
 use sim_contract::{ColliderShape, ColliderState};
 use sim_solver::{PlacedCollider, Solver};
 
 /// Returns the colliders after `step`.
-pub(crate) fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
+pub fn colliders_row(solver: &Solver, step: u64) -> CollidersRow {
     let states: Vec<_> = solver.colliders().map(|collider| state(&collider)).collect();
     // Every shape of this solver has a row.
     CollidersRow::new(step, &states).unwrap_or(CollidersRow { step, colliders: Vec::new() })

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use recorder::{
+use crate::log::{
     CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, ParticleBuffer, RunDescription,
     StepRow, SurfaceRow, TopologyRow, WriteError, constraint_state,
 };

@@ -4,15 +4,16 @@ pub(crate) mod arrivals;
 pub(crate) mod change;
 pub(crate) mod loaded_scene;
 pub(crate) mod lockstep;
+pub(crate) mod membership;
 pub(crate) mod repeats;
 pub(crate) mod request;
+pub(crate) mod restoring;
 pub(crate) mod state;
 pub(crate) mod tap;
 pub(crate) mod torn;
 pub(crate) mod views;
 pub(crate) mod watch;
 
-use std::num::NonZeroU32;
 use std::time::Duration;
 
 use crate::client::lockstep::{LockstepError, Member};
@@ -20,13 +21,11 @@ use crate::client::request::{Commander, RequestError, random_client_id};
 use crate::client::torn::Torn;
 use crate::client::views::{Colliders, Parameters, Snapshot, Surface, Topology};
 use crate::client::watch::Watch;
-use crate::clock::Deadline;
 use crate::endpoint::Endpoint;
 use crate::messages::collider::{ColliderState, CollidersHeader};
 use crate::messages::outcome::Outcome;
 use crate::messages::parameters::to_values;
 use crate::messages::parameters::{ParameterState, ParametersHeader};
-use crate::messages::restore::GivenState;
 use crate::messages::snapshot::{ParticleState, SnapshotHeader};
 use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
@@ -294,28 +293,6 @@ impl Client {
         self.member.as_ref().is_some_and(Member::is_in_turn)
     }
 
-    /// Gives a state to the node, which puts it in place at the next boundary, and waits for the
-    /// outcome. The state of the step that the outcome names is the given one, and the run continues
-    /// from it.
-    ///
-    /// # Errors
-    /// Same as [`Client::request`]. The node rejects a state that is damaged or belongs to another scene.
-    pub fn restore(
-        &mut self,
-        state: &GivenState<'_>,
-        timeout: Duration,
-    ) -> Result<Outcome, RequestError> {
-        self.check_turn()?;
-        let commander = open_commander(&mut self.commander, &self.attachment, self.id)?;
-        let missed_before = commander.missed_count();
-        let (sequence, writer) = commander.send_state(&self.attachment, state)?;
-        let outcome = self.wait_for_outcome(sequence, missed_before, timeout);
-        self.forget(sequence);
-        // The message vanishes with its writer.
-        drop(writer);
-        outcome
-    }
-
     /// Refuses a request that the node would answer only after this client's turn.
     fn check_turn(&self) -> Result<(), RequestError> {
         if self.is_in_turn() { Err(RequestError::InTurn) } else { Ok(()) }
@@ -356,57 +333,6 @@ impl Client {
             Some(commander) => commander.next_outcome(),
             None => Ok(None),
         })
-    }
-
-    /// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client
-    /// has called [`Client::ready`] for it. Dropping the client leaves the lockstep. A replay waits for its
-    /// members with the next snapshot, so they read every one, at any rate.
-    ///
-    /// The node applies the commands that the members send before they are ready, and those of other
-    /// clients that have arrived until then. The order is that of their client ids, so members with fixed
-    /// ids ([`Client::attach_as`]) and without other clients produce the same states in every run.
-    ///
-    /// # Errors
-    /// The lockstep already has [`crate::MEMBERS_MAX`] members, `/dev/shm` is full, or the node has not
-    /// answered within `timeout`.
-    pub fn join_lockstep(&mut self, timeout: Duration) -> Result<(), LockstepError> {
-        self.join_lockstep_every(NonZeroU32::MIN, timeout)
-    }
-
-    /// Joins the lockstep, drops unread snapshots, and takes part only at the steps that are multiples
-    /// of `every`, as a controller of 60 Hz does beside a node of 240 Hz with `every` = 4.
-    ///
-    /// # Errors
-    /// Same as [`Client::join_lockstep`].
-    pub fn join_lockstep_every(
-        &mut self,
-        every: NonZeroU32,
-        timeout: Duration,
-    ) -> Result<(), LockstepError> {
-        // The node may wait at a snapshot that this client has read: a new reader receives it again.
-        self.particles = None;
-        let member = self.member.insert(Member::create(&self.attachment, self.id, every)?);
-        let joined = member.join().and_then(|()| self.wait_for_membership(timeout));
-        if joined.is_err() {
-            // The node must not wait for a client that does not know of its membership.
-            self.member = None;
-        }
-        joined
-    }
-
-    fn wait_for_membership(&mut self, timeout: Duration) -> Result<(), LockstepError> {
-        let deadline = Deadline::after(timeout);
-        while let Some(status) = self.status(deadline.remaining())? {
-            if status.members().iter().any(|member| member.client_id == self.id) {
-                return Ok(());
-            }
-            // A node that waits only briefly may have dropped this client before it knew of its
-            // membership.
-            if let Some(member) = &self.member {
-                member.join()?;
-            }
-        }
-        Err(LockstepError::not_admitted(&self.attachment, timeout))
     }
 
     /// Returns the newest snapshot that the node waits for this member at, or waits for it. Call

@@ -60,6 +60,7 @@ pub use client::change::{Change, LostChanges};
 pub use client::loaded_scene::LoadedScene;
 pub use client::lockstep::LockstepError;
 pub use client::request::{OwnerState, RequestError};
+pub use client::restoring::SentState;
 pub use client::state::State;
 pub use client::tap::Tap;
 pub use client::torn::Torn;

@@ -5,7 +5,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 use serde::Serialize;
-use sim_contract::ParameterValue;
+use sim_contract::{ParameterValue, ParticleState};
 
 use crate::error::Error;
 
@@ -44,7 +44,7 @@ impl<'py, const N: usize> FromPyObject<'_, 'py> for Numbers<N> {
     }
 }
 
-fn shown(value: &Bound<'_, PyAny>) -> String {
+pub(crate) fn shown(value: &Bound<'_, PyAny>) -> String {
     value.repr().map_or_else(|_| "something else".to_owned(), |text| text.to_string())
 }
 
@@ -84,11 +84,31 @@ pub(crate) fn rows<'py, T: numpy::Element + bytemuck::Pod, const N: usize>(
 }
 
 /// Returns an array of the shape (particles, 3) as rows.
-pub(crate) fn vectors(name: &str, array: &Bound<'_, PyAny>) -> PyResult<Vec<[f32; 3]>> {
+fn vectors(name: &str, array: &Bound<'_, PyAny>) -> PyResult<Vec<[f32; 3]>> {
     let numpy = array.py().import("numpy")?;
     let array = numpy.call_method1("ascontiguousarray", (array, numpy.getattr("float32")?))?;
     let array = array.cast_into::<PyArray2<f32>>().ok().filter(|array| array.dims()[1] == 3);
     let wrong = || PyValueError::new_err(format!("`{name}` must have the shape (particles, 3)"));
     let numbers = array.ok_or_else(wrong)?.to_vec().map_err(|_| wrong())?;
     Ok(bytemuck::cast_slice(&numbers).to_vec())
+}
+
+/// Returns particles that have only positions and velocities.
+pub(crate) fn motion(
+    positions: &Bound<'_, PyAny>,
+    velocities: &Bound<'_, PyAny>,
+) -> PyResult<Vec<ParticleState>> {
+    let (positions, velocities) =
+        (vectors("positions", positions)?, vectors("velocities", velocities)?);
+    if positions.len() != velocities.len() {
+        return Err(PyValueError::new_err(format!(
+            "there are {} positions, but {} velocities",
+            positions.len(),
+            velocities.len()
+        )));
+    }
+    let pairs = positions.into_iter().zip(velocities);
+    let particle =
+        |(position, velocity)| ParticleState { position, velocity, ..ParticleState::default() };
+    Ok(pairs.map(particle).collect())
 }

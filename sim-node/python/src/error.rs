@@ -1,10 +1,10 @@
 //! Errors as Python exceptions, which the module `catenary._errors` defines.
 
 use std::error::Error as StdError;
+use std::path::Path;
 
 use pyo3::import_exception;
 use pyo3::prelude::*;
-use recorder::{ReadError as LogReadError, TapeError};
 use sim_contract::{
     AttachError, EndpointError, LockstepError, OwnerState, ReadError, RequestError,
 };
@@ -77,12 +77,8 @@ pub(crate) fn load_error(error: &LoadError) -> PyErr {
     SceneError::new_err(error.to_string())
 }
 
-pub(crate) fn tape_error(path: &str, error: &TapeError) -> PyErr {
-    RecordingError::new_err(format!("{path}: {}", with_causes(error)))
-}
-
-pub(crate) fn log_error(path: &str, error: &LogReadError) -> PyErr {
-    RecordingError::new_err(format!("{path}: {}", with_causes(error)))
+pub(crate) fn recording_error(path: &Path, error: &dyn StdError) -> PyErr {
+    RecordingError::new_err(format!("{}: {}", path.display(), with_causes(error)))
 }
 
 /// Returns the message of an error, followed by those of its causes.

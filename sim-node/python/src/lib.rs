@@ -6,6 +6,7 @@
 //! outcomes and the steps of a simulation early; joining the lockstep and putting a state in place last for their
 //! timeout at most.
 
+mod arguments;
 mod convert;
 mod data;
 mod error;
@@ -15,6 +16,7 @@ mod patience;
 mod process;
 mod recording;
 mod simulation;
+mod verification;
 
 /// Registers the classes. Their texts are those of `_catenary.pyi`; a test compares them.
 #[pyo3::pymodule]
@@ -37,4 +39,6 @@ mod _catenary {
     use crate::recording::Recording;
     #[pymodule_export]
     use crate::simulation::Simulation;
+    #[pymodule_export]
+    use crate::verification::{Verification, verify};
 }

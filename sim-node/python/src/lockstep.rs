@@ -3,17 +3,18 @@
 use std::mem;
 use std::num::NonZeroU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use sim_contract::{Client, SnapshotHeader};
+use sim_contract::{Client, LockstepError, OwnerState, SnapshotFlags, SnapshotHeader};
 
+use crate::arguments;
 use crate::data::action::Action;
 use crate::data::outcome::Outcome;
 use crate::data::snapshot::Snapshot;
 use crate::error::{Error, lockstep_error, read_error, request_error};
 use crate::node::Node;
-use crate::patience::{Patience, whole};
+use crate::patience::Patience;
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]
@@ -48,16 +49,40 @@ impl Lockstep {
         Err(Error::new_err("not in the lockstep: use `with node.lockstep() as steps:`"))
     }
 
+    /// Joins the lockstep, and waits for the admission.
+    fn join(&self, py: Python<'_>) -> PyResult<()> {
+        let node = self.node.get();
+        let mut last = None;
+        node.call(py, |client| {
+            client.request_membership(self.every).map_err(|error| lockstep_error(&error))
+        })?;
+        let patience = Patience::new(Some(self.timeout_s))?;
+        let joined =
+            node.wait(py, patience, |client, part| match client.await_membership(part) {
+                Ok(()) => Ok(Some(())),
+                Err(error @ LockstepError::NotAdmitted { owner: OwnerState::Alive { .. }, .. }) => {
+                    last = Some(error);
+                    Ok(None)
+                }
+                Err(error) => Err(lockstep_error(&error)),
+            })?;
+        match (joined, last) {
+            (None, Some(error)) => Err(lockstep_error(&with_timeout(error, self.timeout_s))),
+            _ => Ok(()),
+        }
+    }
+
     /// Checks that the node has waited for this member.
     fn check_turn(&self, header: &SnapshotHeader) -> PyResult<()> {
-        let every = u64::from(self.every.get());
         let last = self.progress().last.replace(*header);
-        let Some(last) = last.filter(|last| last.run_id == header.run_id && header.stride == 1)
-        else {
-            return Ok(());
-        };
-        let expected = (last.step / every + 1) * every;
-        if header.step == expected {
+        let is_replay = header.flags & SnapshotFlags::REPLAY != 0;
+        let last = last.filter(|last| last.run_id == header.run_id);
+        // A recording may lack snapshots.
+        let Some(last) = last.filter(|_| !is_replay) else { return Ok(()) };
+        // A node publishes the multiples of its stride, and a few others after commands.
+        let period = lcm(u64::from(self.every.get()), u64::from(header.stride.max(1)));
+        let expected = (last.step / period + 1) * period;
+        if header.step <= expected {
             return Ok(());
         }
         Err(Error::new_err(format!(
@@ -66,6 +91,24 @@ impl Lockstep {
             header.step
         )))
     }
+}
+
+/// Returns the error of the last part of a wait as that of the whole wait.
+fn with_timeout(error: LockstepError, timeout_s: f64) -> LockstepError {
+    let timeout = Duration::try_from_secs_f64(timeout_s).unwrap_or(Duration::MAX);
+    match error {
+        LockstepError::NotAdmitted { owner, .. } => LockstepError::NotAdmitted { timeout, owner },
+        other => other,
+    }
+}
+
+/// Returns the least common multiple.
+fn lcm(a: u64, b: u64) -> u64 {
+    let (mut divisor, mut rest) = (a, b);
+    while rest > 0 {
+        (divisor, rest) = (rest, divisor % rest);
+    }
+    a / divisor * b
 }
 
 /// Returns the outcomes that have arrived, and the sequence numbers without one.
@@ -87,20 +130,29 @@ fn arrived(
 impl Lockstep {
     #[new]
     #[pyo3(signature = (node, every=1, *, timeout=10.0))]
-    fn new(node: Py<Node>, every: u32, timeout: f64) -> PyResult<Self> {
-        let every = NonZeroU32::new(every)
-            .ok_or_else(|| PyValueError::new_err("`every` is 0 (allowed: 1 or more)"))?;
-        whole(timeout)?;
+    fn new(
+        node: Py<Node>,
+        #[pyo3(from_py_with = arguments::every)] every: u32,
+        timeout: f64,
+    ) -> PyResult<Self> {
+        // The argument is at least 1.
+        let every = NonZeroU32::new(every).unwrap_or(NonZeroU32::MIN);
+        Patience::new(Some(timeout))?;
         Ok(Self { node, every, timeout_s: timeout, progress: Mutex::default() })
     }
 
     fn __enter__(this: Py<Self>, py: Python<'_>) -> PyResult<Py<Self>> {
         let own = this.get();
-        let timeout = whole(own.timeout_s)?;
-        own.node.get().call(py, |client| {
-            let joined = client.join_lockstep_every(own.every, timeout);
-            joined.map_err(|error| lockstep_error(&error))
-        })?;
+        let node = own.node.get();
+        let joined = own.join(py);
+        if joined.is_err() {
+            // The node must not wait for a program that does not know of its membership.
+            node.call(py, |client| {
+                client.leave_lockstep();
+                Ok(())
+            })?;
+        }
+        joined?;
         *own.progress() = Progress { is_member: true, ..Progress::default() };
         Ok(this)
     }

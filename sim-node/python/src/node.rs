@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use recorder::{CollidersRow, StatusRow};
 use sim_contract::clock::{SECOND_NS, monotonic_ns};
@@ -13,7 +13,8 @@ use sim_contract::{
     SnapshotHeader,
 };
 
-use crate::convert::{from_json, vectors};
+use crate::arguments;
+use crate::convert::{from_json, motion};
 use crate::data::action::Action;
 use crate::data::outcome::Outcome;
 use crate::data::scene::{Topology, corners};
@@ -22,7 +23,7 @@ use crate::data::state::{State, current_state};
 use crate::error::{
     NotRunning, Timeout, TooManySnapshots, attach_error, endpoint_error, read_error, request_error,
 };
-use crate::patience::{PART, Patience, wait, whole};
+use crate::patience::{PART, Patience, wait};
 use crate::process::OfProcess;
 
 /// Longest wait for messages that a node has published once per load, in seconds.
@@ -67,6 +68,16 @@ impl Node {
         call: impl FnOnce(&mut Client) -> PyResult<T> + Send,
     ) -> PyResult<T> {
         py.detach(|| self.client.with(call))
+    }
+
+    /// Waits in parts until `attempt` returns a value. `None` after the timeout.
+    pub(crate) fn wait<T: Send>(
+        &self,
+        py: Python<'_>,
+        patience: Patience,
+        mut attempt: impl FnMut(&mut Client, Duration) -> PyResult<Option<T>> + Send,
+    ) -> PyResult<Option<T>> {
+        wait(py, patience, |part| self.client.with(|client| attempt(client, part)))
     }
 
     pub(crate) fn is_running(&self, py: Python<'_>) -> PyResult<bool> {
@@ -171,7 +182,7 @@ impl Node {
         name: &str,
         domain: Option<&str>,
         timeout: f64,
-        client_id: Option<u64>,
+        #[pyo3(from_py_with = arguments::client_id)] client_id: Option<u64>,
     ) -> PyResult<Self> {
         let endpoint = Endpoint::from_options(domain, Some(name));
         let endpoint = endpoint.map_err(|error| endpoint_error(&error))?;
@@ -310,13 +321,13 @@ impl Node {
     pub(crate) fn outcome(
         &self,
         py: Python<'_>,
-        sequence: u64,
+        #[pyo3(from_py_with = arguments::sequence)] sequence: u64,
         timeout: Option<f64>,
     ) -> PyResult<Outcome> {
         let patience = Patience::new(timeout)?;
         let mut last = None;
-        let outcome = wait(py, patience, |part| {
-            self.client.with(|client| match client.outcome(sequence, part) {
+        let outcome =
+            self.wait(py, patience, |client, part| match client.outcome(sequence, part) {
                 Ok(outcome) => Ok(Some(outcome)),
                 Err(error @ RequestError::Timeout { owner: OwnerState::Gone { .. }, .. }) => {
                     Err(request_error(&error))
@@ -328,8 +339,7 @@ impl Node {
                     Ok(None)
                 }
                 Err(error) => Err(request_error(&error)),
-            })
-        })?;
+            })?;
         match (outcome, last) {
             (Some(outcome), _) => Ok(Outcome(outcome)),
             (None, Some(error)) => Err(request_error(&with_timeout(error, timeout))),
@@ -350,17 +360,14 @@ impl Node {
     /// A `State` replaces everything. A `Snapshot` replaces only positions and velocities.
     #[pyo3(signature = (state, timeout=5.0))]
     fn restore(&self, py: Python<'_>, state: &Bound<'_, PyAny>, timeout: f64) -> PyResult<Outcome> {
-        let timeout = whole(timeout)?;
-        let outcome = if let Ok(state) = state.cast::<State>() {
-            let state = state.get();
-            self.call(py, |client| restore(client, &state.given(), timeout))?
+        Patience::new(Some(timeout))?;
+        if let Ok(state) = state.cast::<State>() {
+            self.give(py, &state.get().given(), timeout)
         } else if let Ok(snapshot) = state.cast::<Snapshot>() {
-            let particles = snapshot.get().to_vec()?;
-            self.restore_motion(py, &particles, timeout)?
+            self.give_motion(py, &snapshot.get().to_vec()?, timeout)
         } else {
-            return Err(PyTypeError::new_err("expected a State or a Snapshot"));
-        };
-        Outcome(outcome).require_applied(py)
+            Err(PyTypeError::new_err("expected a State or a Snapshot"))
+        }
     }
 
     /// Replaces the positions and velocities of all particles. Shape of both: (particles, 3).
@@ -372,9 +379,8 @@ impl Node {
         velocities: &Bound<'_, PyAny>,
         timeout: f64,
     ) -> PyResult<Outcome> {
-        let timeout = whole(timeout)?;
-        let outcome = self.restore_motion(py, &motion(positions, velocities)?, timeout)?;
-        Outcome(outcome).require_applied(py)
+        Patience::new(Some(timeout))?;
+        self.give_motion(py, &motion(positions, velocities)?, timeout)
     }
 
     /// Returns the newest complete state, which `restore` puts in place again.
@@ -388,44 +394,28 @@ impl Node {
 }
 
 impl Node {
-    fn restore_motion(
+    /// Gives a state to the node, and waits for the outcome.
+    fn give(&self, py: Python<'_>, state: &GivenState<'_>, timeout: f64) -> PyResult<Outcome> {
+        let sent = self
+            .call(py, |client| client.send_state(state).map_err(|error| request_error(&error)))?;
+        let outcome = self.outcome(py, sent.sequence(), Some(timeout));
+        self.call(py, |client| {
+            client.take_back(sent);
+            Ok(())
+        })?;
+        outcome?.require_applied(py)
+    }
+
+    /// Gives positions and velocities to the node.
+    fn give_motion(
         &self,
         py: Python<'_>,
         particles: &[ParticleState],
-        timeout: Duration,
-    ) -> PyResult<sim_contract::Outcome> {
+        timeout: f64,
+    ) -> PyResult<Outcome> {
         let scene_hash = self.latched(py, Client::topology)?.header.scene_hash;
-        let given = GivenState { scene_hash, particles, keyframe: None };
-        self.call(py, |client| restore(client, &given, timeout))
+        self.give(py, &GivenState { scene_hash, particles, keyframe: None }, timeout)
     }
-}
-
-fn restore(
-    client: &mut Client,
-    state: &GivenState<'_>,
-    timeout: Duration,
-) -> PyResult<sim_contract::Outcome> {
-    client.restore(state, timeout).map_err(|error| request_error(&error))
-}
-
-/// Returns particles that have only positions and velocities.
-fn motion(
-    positions: &Bound<'_, PyAny>,
-    velocities: &Bound<'_, PyAny>,
-) -> PyResult<Vec<ParticleState>> {
-    let (positions, velocities) =
-        (vectors("positions", positions)?, vectors("velocities", velocities)?);
-    if positions.len() != velocities.len() {
-        return Err(PyValueError::new_err(format!(
-            "there are {} positions, but {} velocities",
-            positions.len(),
-            velocities.len()
-        )));
-    }
-    let pairs = positions.into_iter().zip(velocities);
-    let particle =
-        |(position, velocity)| ParticleState { position, velocity, ..ParticleState::default() };
-    Ok(pairs.map(particle).collect())
 }
 
 /// Returns `true` for a snapshot that its node has published just now.

@@ -1,10 +1,16 @@
-//! Waiting in parts, so that Ctrl-C ends every wait.
+//! Waiting in parts, so that Ctrl-C ends every wait and all work.
 
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
 use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use sim_contract::Stop;
 use sim_contract::clock::monotonic_ns;
+
+use crate::error::Error;
 
 /// Longest time without a look at signals.
 pub(crate) const PART: Duration = Duration::from_millis(50);
@@ -47,15 +53,6 @@ impl Patience {
     }
 }
 
-/// Returns a timeout for a call that waits in one piece.
-///
-/// # Errors
-/// The timeout is negative or NaN.
-pub(crate) fn whole(timeout_s: f64) -> PyResult<Duration> {
-    Patience::new(Some(timeout_s))?;
-    Ok(Duration::try_from_secs_f64(timeout_s).unwrap_or(Duration::MAX))
-}
-
 /// Calls `attempt` with parts of the wait until it returns a value. Between two calls, other threads run
 /// and signals are handled. `None` if the time has passed.
 ///
@@ -76,4 +73,34 @@ pub(crate) fn wait<T: Send>(
             return Ok(None);
         }
     }
+}
+
+/// Runs long work on a thread of its own, while this one handles signals and other threads of the interpreter
+/// run. After a signal whose handler raises, `work` finds its `Stop` requested and must end soon.
+///
+/// # Errors
+/// The exception of a signal handler such as `KeyboardInterrupt`.
+pub(crate) fn run_until_signal<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&Stop) -> T + Send,
+) -> PyResult<T> {
+    let stop = &Stop::default();
+    let (sender, mut receiver) = channel();
+    thread::scope(|scope| {
+        scope.spawn(move || sender.send(work(stop)).is_ok());
+        let mut raised = None;
+        loop {
+            let receiver = &mut receiver;
+            match py.detach(move || receiver.recv_timeout(PART)) {
+                Ok(result) => return raised.map_or(Ok(result), Err),
+                // The work has panicked, and so will this thread at the end of the scope.
+                Err(RecvTimeoutError::Disconnected) => return Err(Error::new_err("panicked")),
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            if let Err(error) = py.check_signals() {
+                stop.flag().store(true, Ordering::Relaxed);
+                raised = Some(error);
+            }
+        }
+    })
 }

@@ -1,51 +1,83 @@
 //! Recordings, from which snapshots are read at any step.
 
-use std::path::{Path, PathBuf};
+use std::error::Error as StdError;
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use recorder::{LogReader, Message, OutcomeRow, RunDescription, StepRow, Tape, TapeState};
+use recorder::{
+    LogReader, Message, ReadError, RunDescription, StepRow, Tape, TapeError, TapeState,
+    complete_state,
+};
 use sim_contract::SnapshotHeader;
 
+use crate::arguments;
 use crate::convert::from_json;
 use crate::data::scene::{Topology, corners};
 use crate::data::snapshot::Snapshot;
-use crate::error::{RecordingError, log_error, tape_error};
+use crate::data::state::State;
+use crate::error::{Error, RecordingError, recording_error};
+use crate::patience::run_until_signal;
 
 #[pyclass(frozen, subclass, module = "catenary")]
 #[derive(Debug)]
 pub(crate) struct Recording {
-    path: String,
-    tape: Mutex<Tape>,
+    path: PathBuf,
+    /// `None` once it is closed.
+    tape: Mutex<Option<Tape>>,
 }
 
 impl Recording {
-    fn tape(&self) -> MutexGuard<'_, Tape> {
+    fn tape(&self) -> MutexGuard<'_, Option<Tape>> {
         self.tape.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn run<T>(&self, read: impl FnOnce(&RunDescription) -> T) -> T {
-        read(self.tape().run())
+    /// Calls a function with the open recording.
+    fn with<T>(&self, call: impl FnOnce(&mut Tape) -> PyResult<T>) -> PyResult<T> {
+        let mut tape = self.tape();
+        let closed = || Error::new_err(format!("{}: this recording is closed", self.path()));
+        call(tape.as_mut().ok_or_else(closed)?)
     }
 
-    fn read<T: Send>(
+    fn run<T>(&self, read: impl FnOnce(&RunDescription) -> T) -> PyResult<T> {
+        self.with(|tape| Ok(read(tape.run())))
+    }
+
+    fn read<T: Send, E: StdError>(
         &self,
         py: Python<'_>,
-        read: impl FnOnce(&mut Tape) -> Result<T, recorder::TapeError> + Send,
+        read: impl FnOnce(&mut Tape) -> Result<T, E> + Send,
     ) -> PyResult<T> {
-        py.detach(|| read(&mut self.tape()).map_err(|error| tape_error(&self.path, &error)))
+        py.detach(|| self.with(|tape| read(tape).map_err(|error| self.error(&error))))
     }
 
-    /// Calls `on_message` with every message of the file.
-    fn scan(&self, mut on_message: impl FnMut(Message)) -> PyResult<()> {
-        let failed = |error| log_error(&self.path, &error);
-        let mut log = LogReader::open(Path::new(&self.path)).map_err(failed)?;
-        while let Some(logged) = log.next_message().map_err(failed)? {
-            on_message(logged.message);
-        }
-        Ok(())
+    /// Returns what `pick` selects from the messages of the file.
+    fn scan<T: Send>(
+        &self,
+        py: Python<'_>,
+        pick: impl Fn(Message) -> Option<T> + Sync,
+    ) -> PyResult<Vec<T>> {
+        self.with(|_| Ok(()))?;
+        let scanned = run_until_signal(py, |signal| {
+            let mut log = LogReader::open_until(&self.path, signal)?;
+            let mut picked = Vec::new();
+            while let Some(logged) = log.next_message()? {
+                picked.extend(pick(logged.message));
+            }
+            Ok(picked)
+        })?;
+        scanned.map_err(|error: ReadError| self.error(&error))
+    }
+
+    fn error(&self, error: &dyn StdError) -> PyErr {
+        recording_error(&self.path, error)
+    }
+
+    fn malformed(&self, topic: &str) -> PyErr {
+        RecordingError::new_err(format!("{}: {topic} is malformed", self.path()))
     }
 }
 
@@ -75,113 +107,125 @@ fn header(run: &RunDescription, state: &TapeState) -> SnapshotHeader {
 impl Recording {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let shown = path.display().to_string();
-        let tape = py.detach(|| Tape::open(&path, None, &mut |_, _| ()));
-        let tape = tape.map_err(|error| tape_error(&shown, &error))?;
-        Ok(Self { path: shown, tape: Mutex::new(tape) })
+        // Without an index, the whole file is scanned.
+        let tape = run_until_signal(py, |_| Tape::open(&path, None, &mut |_, _| ()))?;
+        let tape = tape.map_err(|error| recording_error(&path, &error))?;
+        Ok(Self { path, tape: Mutex::new(Some(tape)) })
     }
 
     /// Path of the file.
     #[getter]
-    fn path(&self) -> &str {
-        &self.path
+    fn path(&self) -> String {
+        self.path.display().to_string()
     }
 
     /// First recorded step.
     #[getter]
-    fn first_step(&self) -> u64 {
-        self.tape().first_step()
+    fn first_step(&self) -> PyResult<u64> {
+        self.with(|tape| Ok(tape.first_step()))
     }
 
     /// Last recorded step.
     #[getter]
-    fn last_step(&self) -> u64 {
-        self.tape().last_step()
+    fn last_step(&self) -> PyResult<u64> {
+        self.with(|tape| Ok(tape.last_step()))
     }
 
     /// Steps per second.
     #[getter]
-    fn rate(&self) -> u32 {
+    fn rate(&self) -> PyResult<u32> {
         self.run(|run| run.rate_hz)
     }
 
     /// Name of the scene.
     #[getter]
-    fn scene_name(&self) -> String {
+    fn scene_name(&self) -> PyResult<String> {
         self.run(|run| run.scene_name.clone())
     }
 
     /// Number of particles.
     #[getter]
-    fn particle_count(&self) -> u32 {
+    fn particle_count(&self) -> PyResult<u32> {
         self.run(|run| run.particle_count)
     }
 
     /// Number of the recorded run.
     #[getter]
-    fn run_id(&self) -> u64 {
+    fn run_id(&self) -> PyResult<u64> {
         self.run(|run| run.run_id)
     }
 
     /// Returns the scene as TOML.
     fn scene(&self) -> PyResult<String> {
-        let text = String::from_utf8(self.tape().log().scene().to_vec());
-        text.map_err(|_| RecordingError::new_err(format!("{}: the scene is not text", self.path)))
+        let text = self.with(|tape| Ok(String::from_utf8(tape.log().scene().to_vec())))?;
+        text.map_err(|_| RecordingError::new_err(format!("{}: the scene is not text", self.path())))
     }
 
     /// Returns the constraints.
     fn topology(&self, py: Python<'_>) -> PyResult<Topology> {
-        let (header, constraints) = {
-            let tape = self.tape();
-            (tape.run().load_header(tape.topology()), tape.topology().constraints())
-        };
+        let (header, constraints) = self.with(|tape| {
+            let topology = tape.topology();
+            Ok((tape.run().load_header(topology), topology.constraints()))
+        })?;
         let constraints = constraints.ok_or_else(|| self.malformed("/topology"))?;
         Topology::new(py, &header, &constraints)
     }
 
     /// Returns the particles of each triangle of the surface. Shape: (triangles, 3).
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let triangles = self.tape().surface().triangles();
+        let triangles = self.with(|tape| Ok(tape.surface().triangles()))?;
         corners(py, &triangles.ok_or_else(|| self.malformed("/surface"))?)
     }
 
     /// Returns the snapshot of the last recorded step up to `step`, or else the first one.
-    fn at_or_before(&self, py: Python<'_>, step: u64) -> PyResult<Snapshot> {
+    fn at_or_before(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+    ) -> PyResult<Snapshot> {
         let (header, particles) = self.read(py, |tape| {
             let state = tape.state_at(step)?;
-            Ok((header(tape.run(), &state), state.particles.to_vec()))
+            Ok::<_, TapeError>((header(tape.run(), &state), state.particles.to_vec()))
         })?;
         Ok(Snapshot::own(header, particles))
     }
 
     /// Returns the first recorded step after `step`.
-    fn step_after(&self, py: Python<'_>, step: u64) -> PyResult<Option<u64>> {
-        let next = self.read(py, |tape| Ok(tape.step_after(step)?))?;
+    fn step_after(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+    ) -> PyResult<Option<u64>> {
+        let next = self.read(py, |tape| tape.step_after(step))?;
         Ok((next > step).then_some(next))
     }
 
     /// Returns the last recorded step up to `step`, or else the first one.
-    fn step_at(&self, py: Python<'_>, step: u64) -> PyResult<u64> {
-        self.read(py, |tape| Ok(tape.step_at(step)?))
+    fn step_at(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+    ) -> PyResult<u64> {
+        self.read(py, |tape| tape.step_at(step))
     }
 
     /// Returns the indices of the constraints that are torn at a step, in the order of tearing.
-    fn torn<'py>(&self, py: Python<'py>, step: u64) -> PyResult<Bound<'py, PyArray1<u32>>> {
+    fn torn<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+    ) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let state = self.read(py, |tape| tape.state_at(step))?;
         Ok(PyArray1::from_iter(py, state.torn.indices()))
     }
 
     /// Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`.
     fn steps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let mut rows = Vec::new();
-        py.detach(|| {
-            self.scan(|message| {
-                if let Message::Step(row) = message {
-                    rows.push(row);
-                }
-            })
+        let rows = self.scan(py, |message| match message {
+            Message::Step(row) => Some(row),
+            _ => None,
         })?;
-        let rate = f64::from(self.rate());
+        let rate = f64::from(self.rate()?);
         let table = PyDict::new(py);
         let column = |field: fn(&StepRow) -> u64| PyArray1::from_iter(py, rows.iter().map(field));
         table.set_item("step", column(|row| row.step))?;
@@ -198,26 +242,51 @@ impl Recording {
 
     /// Returns the outcomes of all commands, by row: `pandas.DataFrame(recording.outcomes())`.
     fn outcomes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let mut rows: Vec<OutcomeRow> = Vec::new();
-        py.detach(|| {
-            self.scan(|message| {
-                if let Message::Outcome(row) = message {
-                    rows.push(row);
-                }
-            })
+        let rows = self.scan(py, |message| match message {
+            Message::Outcome(row) => Some(row),
+            _ => None,
         })?;
         from_json(py, &rows)
     }
 
-    fn __repr__(&self) -> String {
-        let tape = self.tape();
-        let (first, last) = (tape.first_step(), tape.last_step());
-        format!("<catenary.Recording '{}': steps {first} to {last}>", self.path)
+    /// Returns the complete state after a step, from which a simulation continues with the same bits.
+    ///
+    /// It is simulated from the last complete state in the file, and compared with every snapshot on the way; a
+    /// step without a snapshot is proved by the next one. Raises `KeyError` for a step before the first or after
+    /// the last one, and `RecordingError` if the file does not lead to the step, as after missing outcomes.
+    fn state(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::step)] step: u64,
+    ) -> PyResult<State> {
+        let (first, last) = self.with(|tape| Ok((tape.first_step(), tape.last_step())))?;
+        if !(first..=last).contains(&step) {
+            let path = self.path();
+            let message = format!("{path} has no step {step} (it has {first} to {last})");
+            return Err(PyKeyError::new_err(message));
+        }
+        let state = run_until_signal(py, |signal| {
+            self.with(|tape| {
+                let state = complete_state(&self.path, tape, step, u64::MAX, signal);
+                state.map_err(|error| self.error(&error))
+            })
+        })??;
+        State::from_parts(state.scene_hash, state.particles, state.keyframe)
     }
-}
 
-impl Recording {
-    fn malformed(&self, topic: &str) -> PyErr {
-        RecordingError::new_err(format!("{}: {topic} is malformed", self.path))
+    /// Closes the file. Snapshots and arrays stay valid.
+    fn close(&self) {
+        self.tape().take();
+    }
+
+    fn __repr__(&self) -> String {
+        let path = self.path();
+        match &*self.tape() {
+            Some(tape) => {
+                let (first, last) = (tape.first_step(), tape.last_step());
+                format!("<catenary.Recording '{path}': steps {first} to {last}>")
+            }
+            None => format!("<catenary.Recording '{path}': closed>"),
+        }
     }
 }

@@ -4,14 +4,16 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use recorder::simulation::colliders_row;
 use recorder::{RunDescription, constraint_state};
 use sim_contract::clock::monotonic_ns;
-use sim_contract::{LoadHeader, SnapshotHeader, Triangle, scene_hash};
-use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver, THREADS_MAX};
+use sim_contract::{LoadHeader, ParticleState, SnapshotHeader, Triangle, scene_hash};
+use sim_solver::{Applied, Control, Reason, SOLVER_VERSION, Scene, Solver};
 
-use crate::convert::from_json;
+use crate::arguments;
+use crate::convert::{from_json, motion};
 use crate::data::action::Action;
 use crate::data::outcome::rejected;
 use crate::data::scene::{Topology, corners, load_scene, scene_error};
@@ -89,10 +91,6 @@ impl Simulation {
     }
 
     fn with_threads(scene: Scene, threads: usize) -> PyResult<Self> {
-        if threads == 0 || threads > THREADS_MAX.into() {
-            let message = format!("`threads` is {threads} (allowed: 1 to {THREADS_MAX})");
-            return Err(PyValueError::new_err(message));
-        }
         let mut solver = Solver::new(&scene);
         solver.set_threads(threads);
         let scene_hash = scene_hash(scene.to_toml().as_bytes());
@@ -112,7 +110,7 @@ impl Simulation {
     fn new(
         py: Python<'_>,
         scene: Option<PathBuf>,
-        threads: usize,
+        #[pyo3(from_py_with = arguments::threads)] threads: usize,
         toml: Option<&str>,
     ) -> PyResult<Self> {
         py.detach(|| {
@@ -129,7 +127,11 @@ impl Simulation {
 
     /// Makes `count` steps. Other threads of the interpreter run meanwhile; Ctrl-C ends it between steps.
     #[pyo3(signature = (count=1))]
-    fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
+    fn step(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = arguments::count)] count: u64,
+    ) -> PyResult<()> {
         let mut left = count;
         loop {
             left = self.with(py, |running| Ok(running.advance(left)))?;
@@ -239,6 +241,12 @@ impl Simulation {
         Ok(PyArray1::from_vec(py, torn))
     }
 
+    /// Returns the colliders in their current poses.
+    fn colliders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let row = self.with(py, |running| Ok(colliders_row(&running.solver, running.step)))?;
+        from_json(py, &row.colliders)
+    }
+
     /// Returns the complete state, which `restore` puts in place again.
     ///
     /// Raises `StateError` between a command and the step that shows it.
@@ -255,22 +263,28 @@ impl Simulation {
         })
     }
 
-    /// Puts a state of the same scene in place. Raises `StateError` if it belongs to another scene.
-    fn restore(&self, py: Python<'_>, state: &State) -> PyResult<()> {
-        if state.scene_hash != self.scene_hash {
-            return Err(StateError::new_err(format!(
-                "the state belongs to a scene with the hash {:016x}, but this one has {:016x}",
-                state.scene_hash, self.scene_hash
-            )));
+    /// Puts a state of the same scene in place at once. `step_count` continues.
+    ///
+    /// A `State` replaces everything, a `Snapshot` only positions and velocities. Raises `StateError` if it
+    /// belongs to another scene.
+    fn restore(&self, py: Python<'_>, state: &Bound<'_, PyAny>) -> PyResult<()> {
+        if let Ok(state) = state.cast::<State>() {
+            self.restore_state(py, state.get())
+        } else if let Ok(snapshot) = state.cast::<Snapshot>() {
+            self.restore_motion(py, &snapshot.get().to_vec()?)
+        } else {
+            Err(PyTypeError::new_err("expected a State or a Snapshot"))
         }
-        let keyframe = state.decoded_keyframe()?;
-        self.with(py, |running| {
-            let particles = bytemuck::cast_slice(&state.particles);
-            let restored = running.solver.restore(particles, &keyframe);
-            restored.map_err(|error| StateError::new_err(error.to_string()))?;
-            running.is_changed = false;
-            Ok(())
-        })
+    }
+
+    /// Replaces the positions and velocities of all particles at once. Shape of both: (particles, 3).
+    fn set_motion(
+        &self,
+        py: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        velocities: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        self.restore_motion(py, &motion(positions, velocities)?)
     }
 
     /// Puts the initial state and parameters in place at once. `step_count` continues.
@@ -296,6 +310,34 @@ impl Simulation {
 }
 
 impl Simulation {
+    fn restore_state(&self, py: Python<'_>, state: &State) -> PyResult<()> {
+        if state.scene_hash != self.scene_hash {
+            return Err(StateError::new_err(format!(
+                "the state belongs to a scene with the hash {:016x}, but this one has {:016x}",
+                state.scene_hash, self.scene_hash
+            )));
+        }
+        let keyframe = state.decoded_keyframe()?;
+        self.with(py, |running| {
+            let particles = bytemuck::cast_slice(&state.particles);
+            let restored = running.solver.restore(particles, &keyframe);
+            restored.map_err(|error| StateError::new_err(error.to_string()))?;
+            running.is_changed = false;
+            Ok(())
+        })
+    }
+
+    fn restore_motion(&self, py: Python<'_>, particles: &[ParticleState]) -> PyResult<()> {
+        self.with(py, |running| {
+            let restored = running.solver.put_motion_in_place(bytemuck::cast_slice(particles));
+            restored.map_err(|error| StateError::new_err(error.to_string()))?;
+            // It integrates nothing, and completes the state.
+            running.solver.step();
+            running.is_changed = false;
+            Ok(())
+        })
+    }
+
     fn header(&self, running: &Running) -> SnapshotHeader {
         let Running { solver, step, .. } = running;
         SnapshotHeader {

@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
@@ -19,6 +20,18 @@ DEADLINE = 60.0
 NUMBERS = count()
 
 StartNode = Callable[..., "catenary.Node"]
+Interrupt = Callable[..., str]
+SCRIPT = """
+import catenary
+{setup}
+print("ready", flush=True)
+input()
+try:
+    print("waiting", flush=True)
+    {call}
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
 
 
 @pytest.fixture
@@ -83,3 +96,30 @@ def simulate(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return simulate
+
+
+@pytest.fixture
+def interrupt(domain: str) -> Interrupt:
+    """Sends Ctrl-C to a program in the middle of a call. Returns what it prints then.
+
+    `prepare` is called between the lines of `setup` and the call.
+    """
+
+    def interrupt(call: str, setup: str = "", prepare: Callable[[], object] = lambda: None) -> str:
+        code = SCRIPT.format(setup=setup, call=call)
+        with subprocess.Popen(
+            [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as child:
+            assert child.stdin is not None and child.stdout is not None
+            assert child.stdout.readline() == "ready\n"
+            prepare()
+            child.stdin.write("\n")
+            child.stdin.flush()
+            assert child.stdout.readline() == "waiting\n"
+            child.send_signal(signal.SIGINT)
+            try:
+                return child.communicate(timeout=DEADLINE)[0]
+            finally:
+                child.kill()
+
+    return interrupt

@@ -11,7 +11,9 @@ import pytest
 from catenary import _catenary
 
 STUB = Path(_catenary.__file__).parent / "_catenary.pyi"
-CLASSES = [node for node in ast.parse(STUB.read_text()).body if isinstance(node, ast.ClassDef)]
+NODES = ast.parse(STUB.read_text()).body
+CLASSES = [node for node in NODES if isinstance(node, ast.ClassDef)]
+FUNCTIONS = [node for node in NODES if isinstance(node, ast.FunctionDef)]
 
 
 @pytest.mark.parametrize("stub", CLASSES, ids=[stub.name for stub in CLASSES])
@@ -24,6 +26,12 @@ def test_the_native_classes_have_the_texts_of_the_stub(stub: ast.ClassDef) -> No
         if text is not None:
             found = native if name is None else getattr(native, name)
             assert inspect.cleandoc(found.__doc__ or "") == text, name
+
+
+@pytest.mark.parametrize("stub", FUNCTIONS, ids=[stub.name for stub in FUNCTIONS])
+def test_the_native_functions_have_the_texts_of_the_stub(stub: ast.FunctionDef) -> None:
+    native = getattr(_catenary, stub.name)
+    assert inspect.cleandoc(native.__doc__ or "") == ast.get_docstring(stub)
 
 
 @pytest.mark.parametrize("name", catenary.__all__)

@@ -62,6 +62,15 @@ def test_a_member_takes_part_at_every_fourth_step(start_node: StartNode) -> None
     assert seen == list(range(seen[0], seen[0] + 80, 4)) and seen[0] % 4 == 0
 
 
+def test_a_member_takes_part_at_the_published_multiples_of_its_period(
+    start_node: StartNode,
+) -> None:
+    node = start_node("curtain", "--every", "3")
+    with node.lockstep(every=2) as steps:
+        seen = [snapshot.step for snapshot, _ in zip(steps, range(20))]
+    assert seen == list(range(seen[0], seen[0] + 120, 6)) and seen[0] % 6 == 0
+
+
 def test_a_rejected_command_raises_at_the_next_snapshot(start_node: StartNode) -> None:
     node = start_node("curtain")
     with node.lockstep() as steps:
@@ -94,13 +103,19 @@ def test_a_rejected_last_command_is_not_lost(start_node: StartNode) -> None:
             steps.pin(1000)
 
 
-def test_a_member_that_answers_too_late_is_told_so(start_node: StartNode) -> None:
-    node = start_node("curtain", "--lockstep-timeout", "100ms")
+@pytest.mark.parametrize(("published", "every", "period"), [(1, 1, 1), (1, 4, 4), (3, 1, 3), (4, 6, 12)])
+def test_a_member_that_answers_too_late_is_told_so(
+    start_node: StartNode, published: int, every: int, period: int
+) -> None:
+    node = start_node("curtain", "--lockstep-timeout", "100ms", "--every", str(published))
     other = catenary.attach()
-    with node.lockstep() as steps:
+    with node.lockstep(every=every) as steps:
+        next(steps)
+        # Not the first one, at which the node may have published a step for a command.
         step = next(steps).step
         end = time.monotonic() + DEADLINE
-        while other.latest().step < step + 10:
+        while other.latest().step < step + 10 * period:
             assert time.monotonic() < end
-        with pytest.raises(catenary.Error, match=f"did not wait for this member at step {step + 1}"):
+        missed = f"did not wait for this member at step {step + period} "
+        with pytest.raises(catenary.Error, match=missed):
             next(steps)

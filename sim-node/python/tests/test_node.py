@@ -6,8 +6,6 @@ import os
 import pickle
 import signal
 import subprocess
-import sys
-import textwrap
 import threading
 import time
 from collections.abc import Callable
@@ -16,7 +14,7 @@ import catenary
 import numpy as np
 import pytest
 import xxhash
-from conftest import DEADLINE, StartNode
+from conftest import DEADLINE, Interrupt, StartNode
 
 
 def test_the_snapshots_of_a_node_come_one_by_one_with_their_hash(start_node: StartNode) -> None:
@@ -258,28 +256,29 @@ def test_a_stopped_node_is_named_after_the_timeout(
     assert isinstance(catenary.Timeout(), TimeoutError)
 
 
-def test_ctrl_c_ends_a_wait(start_node: StartNode, domain: str) -> None:
+def test_ctrl_c_ends_a_wait(start_node: StartNode, interrupt: Interrupt) -> None:
     start_node("curtain", "--paused")
-    script = textwrap.dedent("""
-        import catenary
-        node = catenary.attach()
-        node.latest()
-        try:
-            print("waiting", flush=True)
-            CALL
-        except KeyboardInterrupt:
-            print("interrupted", flush=True)
-    """)
-    for call in ("node.next_snapshot()", "list(node.snapshots())", "run()"):
-        run = "catenary.Simulation('curtain').step(10**12)"
-        code = script.replace("CALL", run if call == "run()" else call)
-        child = subprocess.Popen(
-            [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        assert child.stdout is not None and child.stdout.readline() == "waiting\n"
-        child.send_signal(signal.SIGINT)
-        out, err = child.communicate(timeout=DEADLINE)
-        assert (out, child.returncode) == ("interrupted\n", 0), (call, err)
+    setup = "node = catenary.attach(); node.latest()"
+    endless = "catenary.Simulation('curtain').step(10**12)"
+    for call in ("node.next_snapshot()", "list(node.snapshots())", endless):
+        assert interrupt(call, setup) == "interrupted\n", call
+
+
+def test_ctrl_c_ends_a_wait_for_a_stopped_node(
+    start_node: StartNode, processes: list[subprocess.Popen[str]], interrupt: Interrupt
+) -> None:
+    start_node("curtain", "--paused")
+    setup = (
+        "node = catenary.attach(); state = node.state(); node.topology(); still = node.latest().copy()"
+    )
+    for call in (
+        "node.restore(state, timeout=1e6)",
+        "node.set_motion(still.positions, still.velocities, timeout=1e6)",
+        "node.lockstep(timeout=1e6).__enter__()",
+    ):
+        stop = lambda: processes[0].send_signal(signal.SIGSTOP)
+        assert interrupt(call, setup, stop) == "interrupted\n", call
+        processes[0].send_signal(signal.SIGCONT)
 
 
 def test_a_forked_process_cannot_use_the_node_and_does_not_disturb_it(

@@ -92,6 +92,41 @@ def test_the_commands_of_a_recording_give_its_states(recording: catenary.Recordi
         assert simulation.hash == snapshot.hash
 
 
+def test_a_recording_knows_its_length_and_ends_with_its_block(recording: catenary.Recording) -> None:
+    with recording as opened:
+        assert opened is recording and len(recording) == 601 == sum(1 for _ in recording)
+        positions = recording[480].positions
+    assert "closed" in repr(recording) and positions.shape == (168, 3)
+    calls: list[Callable[[], object]] = [
+        lambda: recording.first_step,
+        lambda: recording[480],
+        lambda: recording.steps(),
+        lambda: recording.state(480),
+    ]
+    for call in calls:
+        with pytest.raises(catenary.Error, match="run.mcap: this recording is closed"):
+            call()
+
+
+def test_a_simulation_continues_from_the_state_of_any_step(recording: catenary.Recording) -> None:
+    rows = [row for row in recording.outcomes() if row["status"] == "applied"]
+    # 100 and 200 have commands, 240 a keyframe, and the others neither.
+    for step in (0, 99, 100, 150, 199, 200, 240, 399, 600):
+        state = recording.state(step)
+        assert state.hash == recording[step].hash
+        simulation = catenary.Simulation(recording.path)
+        simulation.restore(state)
+        for snapshot in recording[step + 1 : step + 121]:
+            for row in rows:
+                if row["step"] == snapshot.step:
+                    simulation.apply(catenary.Action.from_dict(row))
+            simulation.step()
+            assert simulation.hash == snapshot.hash, (step, snapshot.step)
+    for missing in (601, 2**63):
+        with pytest.raises(KeyError, match="no step"):
+            recording.state(missing)
+
+
 def recorded(path: Path) -> catenary.Recording | None:
     try:
         return catenary.open(path)
@@ -118,6 +153,10 @@ def test_a_slice_leaves_out_steps_that_were_not_recorded(
     assert [one.step for one in recording[20:60]] == [21, 28, 35, 42, 49, 56]
     with pytest.raises(KeyError, match="no step 20"):
         recording[20]
+    assert len(recording) == len(list(recording)) < recording.last_step - recording.first_step
+    simulation = catenary.Simulation("rope")
+    simulation.step(20)
+    assert recording.state(20).hash == simulation.hash, "between two snapshots"
 
 
 def test_unreadable_files_are_named(tmp_path: Path) -> None:

@@ -4,13 +4,13 @@ use std::cmp::Ordering;
 use std::collections::VecDeque;
 
 use anyhow::{Context, bail};
+use recorder::verification::first_difference;
 use recorder::{FileSource, Frame, FrameReader, LogEnd, Message, OutcomeRow};
 use serde_json::Value;
 use sim_contract::{Action, ParticleState};
 
 use super::growth::{Distance, Growth};
 use super::report::{CommandDifference, Report, SceneDifference, StateDifference};
-use crate::commands::verify::difference::first_difference;
 
 /// One of the two recordings.
 struct Side {

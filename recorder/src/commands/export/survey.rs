@@ -3,12 +3,11 @@
 use std::io::Read;
 
 use anyhow::{Context, bail};
-use recorder::{FrameReader, LogEnd, LogReader, RunDescription};
+use recorder::{FrameReader, LogEnd, LogReader, RunDescription, recorded_scene};
 use sim_solver::Scene;
 use sim_solver::scene::Up;
 
 use crate::export::snapshots::{OpenBytes, Snapshots, VisitStates};
-use crate::input::scene_source::scene_in_recording;
 
 /// Most snapshots of a recording to export: 19 hours at 240 Hz. Their steps take 128 MiB of memory.
 const SNAPSHOTS_MAX: usize = 1 << 24;
@@ -38,7 +37,7 @@ impl Survey {
         path: &str,
         mut on_progress: impl FnMut(u64),
     ) -> anyhow::Result<Self> {
-        let scene = scene_in_recording(&log).map_err(|error| format!("{path}: {error:#}"));
+        let scene = recorded_scene(&log).map_err(|error| format!("{path}: {error:#}"));
         let run = log.run().clone();
         let mut frames = FrameReader::new(log);
         let (mut steps, mut particle_count) = (Vec::new(), 0);

@@ -9,6 +9,7 @@ use std::io::Cursor;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
+use recorder::simulation::{Job, States, simulate};
 use recorder::{Closing, Existing, LogOptions, LogWriter, Message, RunDescription, StepRow, Up};
 use sim_contract::{ConstraintState, ParticleFlags, ParticleState, Triangle};
 use sim_solver::{Scene, Solver};
@@ -21,7 +22,6 @@ use crate::export::pictures::shape::{Picture, Shape};
 use crate::export::pictures::{png, svg};
 use crate::export::scene_state::SceneState;
 use crate::export::snapshots::Snapshots;
-use crate::simulation::{Job, States, simulate};
 
 /// A square of cloth in front of a sphere and above a floor, with a pinned particle at its side.
 const TINY: &str = r#"

@@ -2,14 +2,8 @@
 
 use std::path::Path;
 
-use recorder::{Frame, FrameReader, LogReader, Message, Tape};
-use sim_contract::{Method, Stop, Torn};
-use sim_solver::SOLVER_VERSION;
-
-use super::position::Position;
-use crate::commands::verify::finding::Finding;
-use crate::commands::verify::resimulation::Resimulation;
-use crate::input::scene_source::scene_in_recording;
+use recorder::{CompleteStateError, RecordedSceneError, Tape, complete_state};
+use sim_contract::Stop;
 
 /// Most work of a simulation, in steps of one particle: about two seconds on one thread. A jump in a scene
 /// of a million particles, or after a second without keyframes, does not stop the replay for longer.
@@ -32,42 +26,16 @@ pub(super) fn keyframe_of(
     if begin == step {
         return Ok(Some(bytes));
     }
-    let run = tape.run();
-    let work = (step - begin).saturating_mul(run.particle_count.into());
-    if run.solver_version != SOLVER_VERSION || work > PARTICLE_STEPS_MAX {
-        return Ok(None);
+    let steps_max = PARTICLE_STEPS_MAX / u64::from(tape.run().particle_count).max(1);
+    match complete_state(path, tape, step, steps_max, stop) {
+        Ok(state) => Ok(Some(state.keyframe)),
+        Err(CompleteStateError::Read(error)) => Err(error.into()),
+        Err(CompleteStateError::Tape(error)) => Err(error.into()),
+        Err(CompleteStateError::Scene(
+            error @ (RecordedSceneError::Missing
+            | RecordedSceneError::NotText(_)
+            | RecordedSceneError::Invalid(_)),
+        )) => Err(error.into()),
+        Err(_) => Ok(None),
     }
-    let method = Method::from_number(run.method).unwrap_or_default();
-    let state = tape.state_at(begin)?;
-    if !state.has_readable_row || state.row.step != begin {
-        return Ok(None);
-    }
-    let mut passed = Position::new(Torn::default(), method);
-    let keyframe = Message::Keyframe { step: begin, bytes };
-    passed.apply(&keyframe);
-    let first = Frame {
-        updates: vec![keyframe],
-        row: state.row,
-        particles: Some(state.particles.to_vec()),
-        log_times_ns: Vec::new(),
-    };
-    let mut frames = FrameReader::new(LogReader::open_until(path, stop)?);
-    let scene = scene_in_recording(frames.log())?;
-    // A keyframe that this solver refuses leads to no state.
-    let Ok(Some(mut simulation)) = Resimulation::start(&scene, &first) else { return Ok(None) };
-    tape.wind(&mut frames, begin)?;
-    while let Some(frame) = frames.next_frame()? {
-        let is_same = simulation.advance(&frame, stop.flag()) == Finding::Identical;
-        if !is_same || frame.row.step > step {
-            return Ok(None);
-        }
-        frame.updates.iter().for_each(|update| passed.apply(update));
-        if frame.row.step == step {
-            let mut keyframe = simulation.keyframe();
-            // The solver does not know whether the node was paused.
-            keyframe.paused = passed.is_paused;
-            return Ok(Some(keyframe.encode()));
-        }
-    }
-    Ok(None)
 }

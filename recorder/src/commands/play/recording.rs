@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use recorder::{
     CollidersRow, ContentSelection, FileSource, Frame, FrameReader, LogEnd, LogReader, Message,
-    RunDescription, Tape, torn_before_first,
+    RunDescription, Tape, recorded_scene, torn_before_first,
 };
 use sim_contract::{Method, Stop};
 use sim_solver::Solver;
@@ -13,7 +13,6 @@ use super::complete_state::keyframe_of;
 use super::position::Position;
 use super::replay::Recorded;
 use crate::cli::damaged_input::lacks;
-use crate::input::scene_source::scene_in_recording;
 
 /// A recording that is read forward from any step.
 #[derive(Debug)]
@@ -123,7 +122,7 @@ impl Recording {
         if let Some(sizes) = self.sizes {
             return Ok(sizes);
         }
-        let solver = Solver::new(&scene_in_recording(self.frames.log())?);
+        let solver = Solver::new(&recorded_scene(self.frames.log())?);
         let sizes = Sizes {
             collider_count: self.collider_count.unwrap_or_else(|| solver.collider_count()),
             keyframe_size_bytes_max: solver.keyframe_size_bytes_max(),

@@ -5,16 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
+use recorder::simulation::{Job, Start, State};
 use recorder::{
     FrameReader, LogEnd, LogReader, Message, OutcomeRow, TimedCommand, parse_commands,
-    sort_commands,
+    scene_to_simulate, sort_commands,
 };
 use sim_contract::{Action, Stop};
 use sim_solver::{Keyframe, Scene, Solver};
 
 use crate::input::command_source::{COMMANDS_MAX, timed_command};
-use crate::input::scene_source::scene_to_simulate;
-use crate::simulation::{Job, Start, State};
 
 /// Changes of the commands of a recording.
 #[derive(Debug, Default)]

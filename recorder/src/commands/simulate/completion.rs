@@ -5,16 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, bail};
+use recorder::verification::{Resimulation, SnapshotFinding};
 use recorder::{
     Closing, Frame, FrameReader, LogEnd, LogOptions, LogReader, LogWriter, Message, ReadError,
-    Topic, WriteError,
+    Topic, WriteError, scene_to_simulate,
 };
 use sim_solver::Scene;
 
 use crate::cli::damaged_input::lacks;
-use crate::commands::verify::finding::Finding;
-use crate::commands::verify::resimulation::Resimulation;
-use crate::input::scene_source::scene_to_simulate;
 
 /// The result of a completion.
 #[derive(Debug)]
@@ -133,14 +131,14 @@ impl<R: Read> Completion<R> {
                     start.set_threads(self.threads);
                     self.simulation.insert(start).compare_start(frame)
                 }
-                None if frame.particles.is_some() => Finding::Identical,
+                None if frame.particles.is_some() => SnapshotFinding::Identical,
                 None => bail!(
                     "step {} has no particles, and no keyframe before it to start from",
                     frame.row.step
                 ),
             },
         };
-        if finding == Finding::Interrupted {
+        if finding == SnapshotFinding::Interrupted {
             return Ok(false);
         }
         finding.require_identical()?;

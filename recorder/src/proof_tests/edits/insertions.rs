@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use crate::log::{CollidersRow, EventRow, Message, StepRow, Topic};
 use mcap::records::op;
-use recorder::{CollidersRow, EventRow, Message, StepRow, Topic};
 
 use super::bytes::{metadata_bytes, metadata_of};
 use super::{Record, file_of, records, topics, verified, written};
-use crate::commands::verify::{Report, Verdict};
 use crate::proof_tests::{check, rebuild, rebuild_with_gaps};
+use crate::verification::{Verdict, VerifyReport};
 
 /// Returns the topic of a message.
 fn topic_of(record: &Record, topics: &[Option<Topic>]) -> Option<Topic> {
@@ -60,7 +60,7 @@ fn every_message_that_is_repeated_anywhere_is_found_or_named_as_not_compared() {
 }
 
 /// Inserts messages before the row of a step.
-fn with_inserted(step: u64, inserted: &[Message]) -> Report {
+fn with_inserted(step: u64, inserted: &[Message]) -> VerifyReport {
     let file = written();
     let mut log = Vec::new();
     rebuild(&file, |message| {

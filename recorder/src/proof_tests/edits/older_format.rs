@@ -2,11 +2,12 @@
 //! nor as one of a scene that is turned.
 
 use mcap::records::op;
+use sim_solver::scene::Up;
 
 use super::bytes::{metadata_bytes, metadata_of};
 use super::{Record, file_of, records, topics, verified, written};
+use crate::log::{LogOptions, LogReader, LogWriter, RunDescription, Topic};
 use crate::proof_tests::edits::edit::MESSAGE_HEADER_SIZE_BYTES;
-use recorder::{LogOptions, LogReader, LogWriter, RunDescription, Topic, Up};
 
 /// Changes the metadata of a record, if it has this name.
 fn change_entry((opcode, body): &mut Record, name: &str, key: &str, value: Option<&str>) {

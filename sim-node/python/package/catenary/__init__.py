@@ -8,6 +8,7 @@
 
     simulation = catenary.Simulation("curtain")   # the solver in this process
     recording = catenary.open("run.mcap")         # a recording of `recorder record`
+    assert catenary.verify("run.mcap").is_identical   # it re-simulates bit for bit
 
 Positions and velocities are read-only arrays without a copy. Lengths are in metres, times in seconds,
 masses in kilograms, unless the scene says otherwise.
@@ -18,7 +19,16 @@ from __future__ import annotations
 from importlib.metadata import version
 from os import PathLike, fspath
 
-from catenary._catenary import Action, Outcome, Snapshot, State, Topology, scene_names
+from catenary._catenary import (
+    Action,
+    Outcome,
+    Snapshot,
+    State,
+    Topology,
+    Verification,
+    scene_names,
+    verify,
+)
 from catenary._errors import (
     Error,
     NotRunning,
@@ -59,8 +69,10 @@ __all__ = [
     "Timeout",
     "TooManySnapshots",
     "Topology",
+    "Verification",
     "attach",
     "scene_names",
+    "verify",
 ]
 
 __version__ = version("catenary")

@@ -18,11 +18,28 @@ __all__ = [
     "Snapshot",
     "State",
     "Topology",
+    "Verification",
     "scene_names",
+    "verify",
 ]
 
 def scene_names() -> list[str]:
     """Returns the names of the built-in scenes."""
+
+def verify(
+    path: str | PathLike[str],
+    *,
+    start: int | None = None,
+    stop: int | None = None,
+    threads: int = 1,
+) -> Verification:
+    """Simulates a recording again and compares every bit, up to the first difference.
+
+    `start` is the first step to compare, and `stop` the step after the last one. The simulation starts at the
+    last complete state up to `start`. Other threads of the interpreter run meanwhile; Ctrl-C ends it.
+
+    Raises `RecordingError` if the file cannot be read, or has no complete state to start from.
+    """
 
 @final
 class Snapshot:
@@ -351,13 +368,21 @@ class Simulation:
         """Returns the current parameters by name. None is off."""
     def torn(self) -> Wholes:
         """Returns the indices of the torn constraints, in the order of tearing."""
+    def colliders(self) -> list[dict[str, Any]]:
+        """Returns the colliders in their current poses."""
     def state(self) -> State:
         """Returns the complete state, which `restore` puts in place again.
 
         Raises `StateError` between a command and the step that shows it.
         """
-    def restore(self, state: State) -> None:
-        """Puts a state of the same scene in place. Raises `StateError` if it belongs to another scene."""
+    def restore(self, state: State | Snapshot) -> None:
+        """Puts a state of the same scene in place at once. `step_count` continues.
+
+        A `State` replaces everything, a `Snapshot` only positions and velocities. Raises `StateError` if it
+        belongs to another scene.
+        """
+    def set_motion(self, positions: npt.ArrayLike, velocities: npt.ArrayLike) -> None:
+        """Replaces the positions and velocities of all particles at once. Shape of both: (particles, 3)."""
     def reset(self) -> None:
         """Puts the initial state and parameters in place at once. `step_count` continues.
 
@@ -406,3 +431,58 @@ class Recording:
         """Returns a table of all recorded steps, by column: `pandas.DataFrame(recording.steps())`."""
     def outcomes(self) -> list[dict[str, Any]]:
         """Returns the outcomes of all commands, by row: `pandas.DataFrame(recording.outcomes())`."""
+    def state(self, step: int) -> State:
+        """Returns the complete state after a step, from which a simulation continues with the same bits.
+
+        It is simulated from the last complete state in the file, and compared with every snapshot on the way; a
+        step without a snapshot is proved by the next one. Raises `KeyError` for a step before the first or after
+        the last one, and `RecordingError` if the file does not lead to the step, as after missing outcomes.
+        """
+    def close(self) -> None:
+        """Closes the file. Snapshots and arrays stay valid."""
+
+@final
+class Verification:
+    """The result of `verify`."""
+
+    @property
+    def is_identical(self) -> bool:
+        """True if every compared bit is equal, and the file does not end too early."""
+    @property
+    def verdict(self) -> Literal["identical", "diverged", "outcome_log_incomplete"]:
+        """Result: "identical", "diverged", or "outcome_log_incomplete" if steps that depend on missing outcomes
+        could not be compared, and all others are identical.
+        """
+    @property
+    def first_step(self) -> int:
+        """Step that the simulation started from."""
+    @property
+    def last_identical_step(self) -> int | None:
+        """Last bit-identical step, if there is one."""
+    @property
+    def steps_identical(self) -> int:
+        """Number of simulated and bit-identical steps."""
+    @property
+    def gaps(self) -> list[tuple[int, int]]:
+        """First and last step of each gap, where outcomes are missing."""
+    @property
+    def step(self) -> int | None:
+        """First step that differs, or that may lack an outcome."""
+    @property
+    def particle(self) -> int | None:
+        """First particle of that step that differs, if its particles do."""
+    @property
+    def field(self) -> str | None:
+        """First field of that particle that differs, such as "position x"."""
+    @property
+    def what(self) -> str | None:
+        """Description of the difference or of the missing outcome."""
+    @property
+    def end(self) -> str:
+        """End of the file, such as "complete"."""
+    @property
+    def lost(self) -> dict[str, int]:
+        """Number of messages that the recording lacks, by topic."""
+    @property
+    def not_covered(self) -> list[str]:
+        """Content that was not compared, because the file has it only once."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from types import TracebackType
 from typing import overload
 
 import numpy as np
@@ -17,7 +19,7 @@ class Recording(_catenary.Recording):
     """A recording. Its keys are steps: `recording[480]`, `recording[240:480:4]`.
 
     A recording of every n-th step, or one with losses, lacks some steps: a single step that is missing raises
-    `KeyError`, and a slice leaves it out.
+    `KeyError`, and a slice leaves it out. `len(recording)` counts the snapshots; it reads the file once.
     """
 
     @overload
@@ -38,6 +40,17 @@ class Recording(_catenary.Recording):
             return False
         return self.step_at(step) == step
 
+    def __len__(self) -> int:
+        return self._count
+
+    @cached_property
+    def _count(self) -> int:
+        return sum(1 for _ in self[:]._steps())
+
+    def __bool__(self) -> bool:
+        # Without a look at the length, which reads the file.
+        return True
+
     def at(self, time: float) -> Snapshot:
         """Returns the last snapshot up to a simulated time in seconds since step 0."""
         if not 0 <= time < float("inf"):
@@ -52,6 +65,17 @@ class Recording(_catenary.Recording):
     def to_numpy(self, start: int | None = None, stop: int | None = None, every: int = 1) -> Arrays:
         """Reads the snapshots of a range of steps into arrays. `stop` itself is not included."""
         return self[start:stop:every].to_numpy()
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
 
     def _range(self, key: slice) -> range:
         every = 1 if key.step is None else key.step

@@ -8,6 +8,7 @@ use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, KindFilter, Text};
 use sim_solver::builtin;
 use sim_solver::scene::{LoadError, is_path};
 
+use crate::arguments;
 use crate::convert::{Quaternion, Vector, from_json, parameter_value};
 use crate::error::load_error;
 
@@ -46,30 +47,38 @@ fn constraint_kind(name: &str) -> PyResult<KindFilter> {
 #[pymethods]
 impl Action {
     #[staticmethod]
-    fn pin(particle: u32) -> Self {
+    fn pin(#[pyo3(from_py_with = arguments::particle)] particle: u32) -> Self {
         Self(sim_contract::Action::Pin { particle })
     }
 
     #[staticmethod]
-    fn unpin(particle: u32) -> Self {
+    fn unpin(#[pyo3(from_py_with = arguments::particle)] particle: u32) -> Self {
         Self(sim_contract::Action::Unpin { particle })
     }
 
     #[staticmethod]
     #[pyo3(signature = (particle, target, over=GRAB_OVER_S_DEFAULT))]
-    fn grab(particle: u32, target: Vector, over: f32) -> Self {
+    fn grab(
+        #[pyo3(from_py_with = arguments::particle)] particle: u32,
+        target: Vector,
+        over: f32,
+    ) -> Self {
         Self(sim_contract::Action::Grab { particle, target: target.0, over_s: over })
     }
 
     #[staticmethod]
     #[pyo3(name = "move", signature = (particle, target, over=GRAB_OVER_S_DEFAULT))]
-    fn move_grabbed(particle: u32, target: Vector, over: f32) -> Self {
+    fn move_grabbed(
+        #[pyo3(from_py_with = arguments::particle)] particle: u32,
+        target: Vector,
+        over: f32,
+    ) -> Self {
         Self(sim_contract::Action::Move { particle, target: target.0, over_s: over })
     }
 
     #[staticmethod]
     #[pyo3(signature = (particle, *, force=false))]
-    fn release(particle: u32, force: bool) -> Self {
+    fn release(#[pyo3(from_py_with = arguments::particle)] particle: u32, force: bool) -> Self {
         Self(sim_contract::Action::Release { particle, force })
     }
 
@@ -80,7 +89,7 @@ impl Action {
     }
 
     #[staticmethod]
-    fn cut(constraint: u32) -> Self {
+    fn cut(#[pyo3(from_py_with = arguments::constraint)] constraint: u32) -> Self {
         Self(sim_contract::Action::Cut { constraint })
     }
 
@@ -98,14 +107,22 @@ impl Action {
 
     #[staticmethod]
     #[pyo3(signature = (anchor, translation, rotation=Quaternion::IDENTITY))]
-    fn move_anchor(anchor: u32, translation: Vector, rotation: Quaternion) -> Self {
+    fn move_anchor(
+        #[pyo3(from_py_with = arguments::anchor)] anchor: u32,
+        translation: Vector,
+        rotation: Quaternion,
+    ) -> Self {
         let (translation, rotation) = (translation.0, rotation.0);
         Self(sim_contract::Action::MoveAnchor { anchor, translation, rotation })
     }
 
     #[staticmethod]
     #[pyo3(signature = (collider, translation, rotation=Quaternion::IDENTITY))]
-    fn move_collider(collider: u32, translation: Vector, rotation: Quaternion) -> Self {
+    fn move_collider(
+        #[pyo3(from_py_with = arguments::collider)] collider: u32,
+        translation: Vector,
+        rotation: Quaternion,
+    ) -> Self {
         let (translation, rotation) = (translation.0, rotation.0);
         Self(sim_contract::Action::MoveCollider { collider, translation, rotation })
     }
@@ -137,7 +154,7 @@ impl Action {
 
     #[staticmethod]
     #[pyo3(signature = (count=1))]
-    fn step(count: u32) -> Self {
+    fn step(#[pyo3(from_py_with = arguments::node_steps)] count: u32) -> Self {
         Self(sim_contract::Action::Step { count })
     }
 
@@ -148,7 +165,10 @@ impl Action {
 
     #[staticmethod]
     #[pyo3(signature = (*, to_step=None, back_steps=None))]
-    fn rewind(to_step: Option<u64>, back_steps: Option<u32>) -> PyResult<Self> {
+    fn rewind(
+        #[pyo3(from_py_with = arguments::to_step)] to_step: Option<u64>,
+        #[pyo3(from_py_with = arguments::back_steps)] back_steps: Option<u32>,
+    ) -> PyResult<Self> {
         if to_step.is_some() == back_steps.is_some() {
             return Err(PyValueError::new_err("give either `to_step` or `back_steps`"));
         }

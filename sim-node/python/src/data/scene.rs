@@ -9,7 +9,7 @@ use sim_contract::{ConstraintState, LoadHeader, Method, Triangle, read_scene_fil
 use sim_solver::{Scene, SceneError, builtin};
 
 use crate::convert::rows;
-use crate::error::{SceneError as PythonSceneError, load_error, log_error};
+use crate::error::{SceneError as PythonSceneError, load_error, recording_error};
 
 /// Returns the names of the built-in scenes.
 #[pyfunction]
@@ -23,7 +23,8 @@ pub(crate) fn load_scene(source: &str) -> PyResult<Scene> {
         let read = |path: &Path| read_scene_file(path).map_err(|error| error.to_string());
         return Scene::load(source, &read).map_err(|error| load_error(&error));
     }
-    let log = LogReader::open(Path::new(source)).map_err(|error| log_error(source, &error))?;
+    let path = Path::new(source);
+    let log = LogReader::open(path).map_err(|error| recording_error(path, &error))?;
     let text = String::from_utf8_lossy(log.scene());
     Scene::from_toml(&text, source).map_err(|error| scene_error(&error))
 }

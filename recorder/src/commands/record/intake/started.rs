@@ -1,5 +1,6 @@
 //! The run in progress: the accepted states and messages, the end, and the missing messages.
 
+use recorder::simulation::{FrozenParticles, FrozenTracker};
 use recorder::{
     AllCounts, CollidersRow, EventRow, Message, OutcomeRow, ParametersRow, StatusRow, StepRow,
     TearsRow, Topic,
@@ -12,7 +13,6 @@ use sim_contract::{
 use crate::commands::record::accepted::{Accepted, RunEnd};
 use crate::commands::record::first_state::FirstState;
 use crate::commands::record::queue::Content;
-use crate::simulation::frozen::{FrozenParticles, FrozenTracker};
 
 /// The end of a file that another one may follow.
 #[derive(Debug)]

@@ -4,20 +4,21 @@ use std::io::Read;
 use std::sync::atomic::AtomicBool;
 use std::thread::Scope;
 
-use recorder::{
-    AuditDifference, Frame, LogReader, Message, OutcomeRow, ReadError, RunDescription, TearsRow,
-    Topic,
+use crate::log::{
+    AuditDifference, Frame, LogEnd, LogReader, Message, OutcomeRow, ReadError, RunDescription,
+    TearsRow, Topic,
 };
 use sim_contract::Action;
 use sim_solver::{Scene, Solver};
 
 use super::coverage::Coverage;
 use super::events::EventCheck;
-use super::finding::{Finding, StepGap};
+use super::finding::{SnapshotFinding, StepGap};
 use super::load::{compare_counts, compare_load, compare_run};
 use super::read_ahead::{ReadAhead, ReadFrame};
-use super::resimulation::{Resimulation, StartError};
+use super::resimulation::{Resimulation, ResimulationError};
 use super::snapshot_numbers::SnapshotNumbers;
+use crate::recorded_scene::RecordedSceneError;
 use crate::simulation::frozen::FrozenParticles;
 use crate::simulation::run_id::RunId;
 
@@ -26,30 +27,49 @@ const NUMBERED_VERSION: u32 = 4;
 
 /// The reason why a recording cannot be verified.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum VerifyError {
+pub enum VerifyError {
+    /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// The recording has no scene that can be simulated again.
+    #[error(transparent)]
+    Scene(#[from] RecordedSceneError),
+    /// The operating system refused a thread.
     #[error("cannot start the thread that reads the file: {0}")]
     Thread(std::io::Error),
+    /// The state to start from is invalid.
     #[error(transparent)]
-    Start(#[from] StartError),
+    Start(#[from] ResimulationError),
+    /// The recording has no complete state among the steps to compare.
+    #[error("has no complete state up to step {step} to start from")]
+    NoStateUpTo {
+        /// The last step to compare.
+        step: u64,
+    },
+    /// The recording has no complete state.
+    #[error("has no snapshot with a keyframe to start from")]
+    NoKeyframe {
+        /// The end of a file that is not complete.
+        end: Option<LogEnd>,
+    },
 }
 
 /// The steps of a verification.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct StepRange {
+pub struct StepRange {
     /// The step to start from, if it has a complete state, or the next one that has.
-    pub(crate) start: u64,
+    pub start: u64,
     /// The last step to compare.
-    pub(crate) last: u64,
+    pub last: u64,
 }
 
 /// Options of a verification.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct VerifyOptions {
+pub struct VerifyOptions {
     /// Threads of the solver.
-    pub(crate) threads: usize,
-    pub(crate) range: StepRange,
+    pub threads: usize,
+    /// The steps to compare.
+    pub range: StepRange,
 }
 
 /// A recording that is being verified.
@@ -115,12 +135,12 @@ impl Verification {
     pub(super) fn next(
         &mut self,
         stop: &AtomicBool,
-    ) -> Result<Option<(u64, Finding)>, VerifyError> {
+    ) -> Result<Option<(u64, SnapshotFinding)>, VerifyError> {
         loop {
             let ReadFrame { frame, frozen } = match self.frames.next_frame() {
                 Ok(Some(frame)) => frame,
                 Ok(None) => return Ok(None),
-                Err(ReadError::Interrupted) => return Ok(Some((0, Finding::Interrupted))),
+                Err(ReadError::Interrupted) => return Ok(Some((0, SnapshotFinding::Interrupted))),
                 Err(error) => return Err(error.into()),
             };
             let step = frame.row.step;
@@ -129,7 +149,7 @@ impl Verification {
                 return Ok(None);
             }
             let finding = self.check_content(&frame, frozen);
-            if finding != Finding::Identical {
+            if finding != SnapshotFinding::Identical {
                 return Ok(Some((step, finding)));
             }
             if let Some(finding) = self.check_state(&frame, stop)? {
@@ -140,16 +160,17 @@ impl Verification {
     }
 
     /// Compares the form of the messages, the load and the events.
-    fn check_content(&mut self, frame: &Frame, frozen: Option<FrozenParticles>) -> Finding {
+    fn check_content(&mut self, frame: &Frame, frozen: Option<FrozenParticles>) -> SnapshotFinding {
         let finding = self.form_finding();
-        if finding != Finding::Identical {
+        if finding != SnapshotFinding::Identical {
             return finding;
         }
         if let Some(topic) = self.frames.seen.newer_topic {
             let what = format!("its format_version is older than {}", topic.name());
-            return Finding::in_file(format!("the metadata 'run': {what}"));
+            return SnapshotFinding::in_file(format!("the metadata 'run': {what}"));
         }
-        let diverged = |what| Finding::Diverged { step: frame.row.step, what, difference: None };
+        let diverged =
+            |what| SnapshotFinding::Diverged { step: frame.row.step, what, difference: None };
         self.add_commands(frame);
         if let Some(what) = self.check_load(frame) {
             return diverged(what);
@@ -163,7 +184,7 @@ impl Verification {
         }
         let what = self.numbers.check(&frame.row);
         let events = frozen.and_then(|frozen| self.check_events(frame, frozen));
-        what.or(events).map_or(Finding::Identical, diverged)
+        what.or(events).map_or(SnapshotFinding::Identical, diverged)
     }
 
     /// Compares the events with particles.
@@ -177,14 +198,14 @@ impl Verification {
     }
 
     /// Compares the events of a snapshot that has no particles with those of the simulation.
-    fn check_events_of_simulation(&mut self, frame: &Frame) -> Finding {
+    fn check_events_of_simulation(&mut self, frame: &Frame) -> SnapshotFinding {
         if frame.particles.is_some() {
-            return Finding::Identical;
+            return SnapshotFinding::Identical;
         }
-        let Some(simulation) = &self.simulation else { return Finding::Identical };
+        let Some(simulation) = &self.simulation else { return SnapshotFinding::Identical };
         let frozen = FrozenParticles::find(simulation.particles());
         let what = self.check_events(frame, frozen);
-        what.map_or(Finding::Identical, |what| Finding::Diverged {
+        what.map_or(SnapshotFinding::Identical, |what| SnapshotFinding::Diverged {
             step: frame.row.step,
             what,
             difference: None,
@@ -214,7 +235,7 @@ impl Verification {
     }
 
     /// Checks the fields of tears and outcomes on which no state depends.
-    fn check_rows(&mut self, frame: &Frame) -> Option<Finding> {
+    fn check_rows(&mut self, frame: &Frame) -> Option<SnapshotFinding> {
         frame.updates.iter().find_map(|update| {
             let what = match update {
                 Message::Outcome(row) => self.check_disconnected(row),
@@ -224,7 +245,7 @@ impl Verification {
                 }
                 _ => None,
             }?;
-            Some(Finding::Diverged { step: update.step(), what, difference: None })
+            Some(SnapshotFinding::Diverged { step: update.step(), what, difference: None })
         })
     }
 
@@ -272,10 +293,10 @@ impl Verification {
         &mut self,
         frame: &Frame,
         stop: &AtomicBool,
-    ) -> Result<Option<Finding>, StartError> {
+    ) -> Result<Option<SnapshotFinding>, ResimulationError> {
         if let Some(simulation) = &mut self.simulation {
             return Ok(Some(match simulation.advance(frame, stop) {
-                Finding::Identical => self.check_events_of_simulation(frame),
+                SnapshotFinding::Identical => self.check_events_of_simulation(frame),
                 finding => finding,
             }));
         }
@@ -304,14 +325,14 @@ impl Verification {
     }
 
     /// Checks the end of the file, once [`Self::next`] has returned `None`.
-    pub(super) fn check_end(&mut self) -> Finding {
+    pub(super) fn check_end(&mut self) -> SnapshotFinding {
         let closing = self.frames.seen.closing.as_deref();
         let finding = self.form_finding();
-        if finding != Finding::Identical {
+        if finding != SnapshotFinding::Identical {
             return finding;
         }
         if let Some(what) = closing.and_then(|one| self.numbers.check_declared(one)) {
-            return Finding::in_file(what);
+            return SnapshotFinding::in_file(what);
         }
         // A recording of a node has a random id. An interrupted simulation has fewer commands, and so has a
         // repaired file that lacks some.
@@ -322,33 +343,33 @@ impl Verification {
         });
         self.coverage.has_run_hash = has_inputs && is_whole && self.gaps().is_empty();
         if self.coverage.has_run_hash && self.run.run_id != self.run_id.value() {
-            return Finding::in_file(
+            return SnapshotFinding::in_file(
                 "the metadata 'run': its run_id is not the hash of the scene and the commands in \
                  /outcomes"
                     .to_owned(),
             );
         }
-        Finding::Identical
+        SnapshotFinding::Identical
     }
 
-    fn form_finding(&self) -> Finding {
+    fn form_finding(&self) -> SnapshotFinding {
         form_finding(self.frames.seen.difference.as_ref())
     }
 }
 
 /// Compares the header of a file with the scene. `log` compares its form.
-pub(super) fn check_header<R: Read>(log: &LogReader<R>, scene: &Scene) -> Finding {
+pub(super) fn check_header<R: Read>(log: &LogReader<R>, scene: &Scene) -> SnapshotFinding {
     let what = match form_finding(log.audit().and_then(|audit| audit.difference())) {
-        Finding::Identical => compare_run(log, scene),
+        SnapshotFinding::Identical => compare_run(log, scene),
         finding => return finding,
     };
-    what.map_or(Finding::Identical, Finding::in_file)
+    what.map_or(SnapshotFinding::Identical, SnapshotFinding::in_file)
 }
 
 /// Returns the finding for a part of the file that a recorder would write differently.
-fn form_finding(difference: Option<&AuditDifference>) -> Finding {
-    difference.map_or(Finding::Identical, |AuditDifference { step, what }| match step {
-        None => Finding::in_file(what.clone()),
-        Some(step) => Finding::at_step(*step, what.clone()),
+fn form_finding(difference: Option<&AuditDifference>) -> SnapshotFinding {
+    difference.map_or(SnapshotFinding::Identical, |AuditDifference { step, what }| match step {
+        None => SnapshotFinding::in_file(what.clone()),
+        Some(step) => SnapshotFinding::at_step(*step, what.clone()),
     })
 }

@@ -5,7 +5,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Builder, Scope};
 use std::vec;
 
-use recorder::{AuditDifference, Closing, Frame, FrameReader, LogEnd, LogReader, ReadError, Topic};
+use crate::log::{
+    AuditDifference, Closing, Frame, FrameReader, LogEnd, LogReader, ReadError, Topic,
+};
 
 use crate::simulation::frozen::FrozenParticles;
 
@@ -45,7 +47,7 @@ pub(super) struct Seen {
 impl Seen {
     fn new<R: Read>(frames: &FrameReader<R>) -> Self {
         let log = frames.log();
-        let foreign = log.audit().into_iter().flat_map(recorder::Audit::foreign);
+        let foreign = log.audit().into_iter().flat_map(crate::log::Audit::foreign);
         let trailing_row = usize::from(frames.trailing_row().is_some());
         Self {
             intact_count: log.intact_count(),

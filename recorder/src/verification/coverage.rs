@@ -1,6 +1,6 @@
 //! The content of a recording that a verification does not compare.
 
-use recorder::Topic;
+use crate::log::Topic;
 
 /// Content that a file has only once, so that nothing in it can contradict an edit.
 const ALWAYS: [&str; 9] = [

@@ -3,32 +3,48 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use recorder::{Frame, Message, OutcomeRow, StepRow, TearTracker};
+use crate::log::{Frame, Message, OutcomeRow, StepRow};
 use sim_contract::{Action, Outcome, ParticleState, RestoreContents};
 use sim_solver::{Applied, Control, Keyframe, Scene, Solver};
 
-use super::difference::{Difference, first_difference};
-use super::finding::{Finding, StepGap};
+use super::finding::{SnapshotFinding, StepGap};
 use super::past_states::PastStates;
 use super::side_rows::SideRows;
+use super::state::{compare, has_other_tears};
 use crate::simulation::apply::apply;
 
 /// The reason why a recording cannot be re-simulated.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum StartError {
+pub enum ResimulationError {
+    /// The keyframe cannot be decoded.
     #[error("step {step}: the message on /keyframe: {cause}")]
-    Keyframe { step: u64, cause: sim_solver::KeyframeError },
+    Keyframe {
+        /// The step of the keyframe.
+        step: u64,
+        /// The error in the keyframe.
+        cause: sim_solver::KeyframeError,
+    },
+    /// The solver refuses the state.
     #[error("step {step}: the state in /particles and /keyframe: {cause}")]
-    State { step: u64, cause: sim_solver::RestoreError },
+    State {
+        /// The step of the state.
+        step: u64,
+        /// The reason of the solver.
+        cause: sim_solver::RestoreError,
+    },
 }
 
 /// The re-simulation of a recording.
 #[derive(Debug)]
-pub(crate) struct Resimulation {
+pub struct Resimulation {
     scene: Scene,
     solver: Solver,
     /// The step of the solver's state.
     step: u64,
+    /// The step of the snapshot whose messages were added last.
+    added_step: u64,
+    /// The node was paused. The solver does not know it.
+    is_paused: bool,
     /// Index of the next outcome to apply.
     next_index: u64,
     /// Outcomes that were read but not applied yet, by index.
@@ -44,23 +60,28 @@ pub(crate) struct Resimulation {
 
 impl Resimulation {
     /// Starts at a snapshot. Returns `None` if it has no keyframe.
-    pub(crate) fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, StartError> {
+    ///
+    /// # Errors
+    /// If the state is invalid.
+    pub fn start(scene: &Scene, frame: &Frame) -> Result<Option<Self>, ResimulationError> {
         let step = frame.row.step;
         let Some(bytes) = frame.own_keyframe().filter(|_| frame.particles.is_some()) else {
             return Ok(None);
         };
         let keyframe =
-            Keyframe::decode(bytes).map_err(|cause| StartError::Keyframe { step, cause })?;
+            Keyframe::decode(bytes).map_err(|cause| ResimulationError::Keyframe { step, cause })?;
         let mut solver = Solver::new(scene);
         solver
             .restore(bytemuck::cast_slice(frame.payload()), &keyframe)
-            .map_err(|cause| StartError::State { step, cause })?;
+            .map_err(|cause| ResimulationError::State { step, cause })?;
         let next_index = frame.row.outcome_count;
         let past = PastStates::from_first(step, &solver);
         Ok(Some(Self {
             scene: scene.clone(),
             solver,
             step,
+            added_step: step,
+            is_paused: keyframe.paused,
             next_index,
             pending: BTreeMap::new(),
             side_rows: SideRows::after_start(step),
@@ -71,27 +92,34 @@ impl Resimulation {
         }))
     }
 
-    /// Returns the particles of the last compared snapshot.
-    pub(crate) fn particles(&self) -> &[ParticleState] {
+    /// Returns the last simulated step.
+    pub fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// Returns the particles after that step.
+    pub fn particles(&self) -> &[ParticleState] {
         bytemuck::cast_slice(self.solver.particles())
     }
 
-    /// Returns the keyframe of the last compared snapshot.
-    pub(crate) fn keyframe(&self) -> Keyframe {
-        self.solver.keyframe()
+    /// Returns the rest of the state after that step.
+    pub fn keyframe(&self) -> Keyframe {
+        let mut keyframe = self.solver.keyframe();
+        keyframe.paused = self.is_paused;
+        keyframe
     }
 
     /// Sets the number of threads.
-    pub(crate) fn set_threads(&mut self, threads: usize) {
+    pub fn set_threads(&mut self, threads: usize) {
         self.solver.set_threads(threads);
     }
 
     /// Compares the first snapshot with its own header and with the rows before it. Compares step 0 with
     /// the scene.
-    pub(crate) fn compare_start(&mut self, frame: &Frame) -> Finding {
+    pub fn compare_start(&mut self, frame: &Frame) -> SnapshotFinding {
         let mut rows = match SideRows::up_to_start(&frame.updates, self.step) {
             Ok(rows) => rows,
-            Err(what) => return Finding::at_step(self.step, what),
+            Err(what) => return SnapshotFinding::at_step(self.step, what),
         };
         self.earlier_count += rows.keep_newest(self.step);
         let is_earlier = |update: &&Message| match update {
@@ -108,11 +136,11 @@ impl Resimulation {
         self.compare_first(frame, rows)
     }
 
-    fn compare_first(&self, frame: &Frame, mut rows: SideRows) -> Finding {
+    fn compare_first(&self, frame: &Frame, mut rows: SideRows) -> SnapshotFinding {
         let scene_state = (self.step == 0).then(|| Solver::new(&self.scene));
         let expected = scene_state.as_ref().unwrap_or(&self.solver);
         let finding = compare(expected, frame);
-        if finding != Finding::Identical {
+        if finding != SnapshotFinding::Identical {
             return finding;
         }
         if scene_state.is_none() {
@@ -128,64 +156,86 @@ impl Resimulation {
             }
             what => what,
         };
-        what.map_or(Finding::Identical, |what| Finding::at_step(self.step, what))
+        what.map_or(SnapshotFinding::Identical, |what| SnapshotFinding::at_step(self.step, what))
     }
 
     /// Simulates up to the next snapshot and compares it, unless `stop` becomes true. After missing outcomes,
     /// goes on from the next complete state.
-    pub(crate) fn advance(&mut self, frame: &Frame, stop: &AtomicBool) -> Finding {
+    pub fn advance(&mut self, frame: &Frame, stop: &AtomicBool) -> SnapshotFinding {
         let row = &frame.row;
         if row.step <= self.step {
             let what = format!("its row in /steps follows step {} in the file", self.step);
-            return Finding::at_step(row.step, what);
+            return SnapshotFinding::at_step(row.step, what);
         }
-        if let Some(finding) = self.add_updates(&frame.updates) {
+        if let Some(finding) = self.add_frame(frame) {
             return finding;
         }
         if self.is_in_gap {
             return self.go_on_from(frame);
         }
         let finding = self.simulate_to(frame, stop);
-        if let Finding::Incomplete { step, .. } = &finding {
+        if let SnapshotFinding::Incomplete { step, .. } = &finding {
             self.gaps.push(StepGap { from: *step, to: row.step });
             self.is_in_gap = true;
             let state = self.go_on_from(frame);
-            if state != Finding::NotCompared {
+            if state != SnapshotFinding::NotCompared {
                 return state;
             }
         }
         finding
     }
 
-    fn simulate_to(&mut self, frame: &Frame, stop: &AtomicBool) -> Finding {
+    /// Simulates up to a step before the next snapshot, and compares everything but particles.
+    /// [`Self::advance`] with the same snapshot goes on from there.
+    pub fn advance_to(&mut self, step: u64, frame: &Frame, stop: &AtomicBool) -> SnapshotFinding {
+        let finding = self.add_frame(frame).or_else(|| self.find_gap(&frame.row));
+        let finding = finding.or_else(|| self.simulate_steps(step, frame, stop));
+        finding.unwrap_or(SnapshotFinding::Identical)
+    }
+
+    /// Simulates up to a step. In that of the snapshot, the particles are compared before the other rows.
+    fn simulate_steps(
+        &mut self,
+        step: u64,
+        frame: &Frame,
+        stop: &AtomicBool,
+    ) -> Option<SnapshotFinding> {
+        while self.step < step {
+            if let Some(finding) = self.simulate_step(frame, stop) {
+                return Some(finding);
+            }
+            if self.step < frame.row.step
+                && let Some(finding) = self.compare_side_rows()
+            {
+                return Some(finding);
+            }
+        }
+        None
+    }
+
+    fn simulate_to(&mut self, frame: &Frame, stop: &AtomicBool) -> SnapshotFinding {
         let row = &frame.row;
         if let Some(finding) = self.find_gap(row) {
             return finding;
         }
-        while self.step < row.step {
-            if let Some(finding) = self.simulate_step(frame, stop) {
-                return finding;
-            }
-            // In the step of the snapshot, the particles are compared first.
-            if self.step < row.step
-                && let Some(finding) = self.compare_side_rows()
-            {
-                return finding;
-            }
+        if let Some(finding) = self.simulate_steps(row.step, frame, stop) {
+            return finding;
         }
         // All outcomes that the header counts are applied now, unless one has another step.
         if self.next_index > row.outcome_count {
             let (recorded, simulated) = (row.outcome_count, self.next_index);
             let what = format!("/steps: outcome_count: recorded {recorded}, simulated {simulated}");
-            return Finding::at_step(row.step, what);
+            return SnapshotFinding::at_step(row.step, what);
         }
         if self.next_index != row.outcome_count {
             return self.misplaced(row.step, "its step is after the snapshot that counts it");
         }
         match compare(&self.solver, frame) {
-            Finding::Identical => self.compare_side_rows().unwrap_or(Finding::Identical),
+            SnapshotFinding::Identical => {
+                self.compare_side_rows().unwrap_or(SnapshotFinding::Identical)
+            }
             // The torn constraints may differ. The rows name the first one.
-            different @ Finding::Diverged { difference: None, .. } => {
+            different @ SnapshotFinding::Diverged { difference: None, .. } => {
                 self.compare_side_rows().unwrap_or(different)
             }
             different => different,
@@ -193,23 +243,23 @@ impl Resimulation {
     }
 
     /// Ends a gap if the snapshot is a complete state, which then replaces that of the simulation.
-    fn go_on_from(&mut self, frame: &Frame) -> Finding {
+    fn go_on_from(&mut self, frame: &Frame) -> SnapshotFinding {
         let row = &frame.row;
         if let Some(gap) = self.gaps.last_mut() {
             gap.to = row.step;
         }
         let Some(bytes) = frame.own_keyframe().filter(|_| frame.particles.is_some()) else {
-            return Finding::NotCompared;
+            return SnapshotFinding::NotCompared;
         };
         let particles = bytemuck::cast_slice(frame.payload());
         let restored = Keyframe::decode(bytes)
-            .map_err(|cause| StartError::Keyframe { step: row.step, cause })
+            .map_err(|cause| ResimulationError::Keyframe { step: row.step, cause })
             .and_then(|keyframe| {
                 let restored = self.solver.restore(particles, &keyframe);
-                restored.map_err(|cause| StartError::State { step: row.step, cause })
+                restored.map_err(|cause| ResimulationError::State { step: row.step, cause })
             });
         if let Err(error) = restored {
-            return Finding::at_step(row.step, error.to_string());
+            return SnapshotFinding::at_step(row.step, error.to_string());
         }
         (self.step, self.next_index) = (row.step, row.outcome_count);
         self.pending = self.pending.split_off(&row.outcome_count);
@@ -217,20 +267,29 @@ impl Resimulation {
         self.past.restart(row.step, &self.solver);
         self.is_in_gap = false;
         match compare(&self.solver, frame) {
-            Finding::Identical => Finding::NotCompared,
+            SnapshotFinding::Identical => SnapshotFinding::NotCompared,
             different => different,
         }
     }
 
     /// Returns the steps whose states could not be simulated.
-    pub(crate) fn gaps(&self) -> &[StepGap] {
+    pub(super) fn gaps(&self) -> &[StepGap] {
         &self.gaps
     }
 
-    fn compare_side_rows(&mut self) -> Option<Finding> {
+    fn compare_side_rows(&mut self) -> Option<SnapshotFinding> {
         let step = self.step;
         let what = self.side_rows.compare(&self.solver, step)?;
-        Some(Finding::at_step(step, what))
+        Some(SnapshotFinding::at_step(step, what))
+    }
+
+    /// Adds the messages before a snapshot, once.
+    fn add_frame(&mut self, frame: &Frame) -> Option<SnapshotFinding> {
+        if self.added_step >= frame.row.step {
+            return None;
+        }
+        self.added_step = frame.row.step;
+        self.add_updates(&frame.updates)
     }
 
     /// Adds messages that are compared with later steps. Returns a finding for one that the file has twice,
@@ -238,17 +297,17 @@ impl Resimulation {
     fn add_updates<'a>(
         &mut self,
         updates: impl IntoIterator<Item = &'a Message>,
-    ) -> Option<Finding> {
+    ) -> Option<SnapshotFinding> {
         updates.into_iter().find_map(|update| {
             let what = match update {
                 Message::Outcome(row) => return self.add_outcome(row),
                 _ => self.side_rows.add(update, &self.solver, self.step),
             }?;
-            Some(Finding::at_step(update.step(), what))
+            Some(SnapshotFinding::at_step(update.step(), what))
         })
     }
 
-    fn add_outcome(&mut self, row: &OutcomeRow) -> Option<Finding> {
+    fn add_outcome(&mut self, row: &OutcomeRow) -> Option<SnapshotFinding> {
         let (index, step) = (row.index, row.step);
         if index >= self.next_index && !self.pending.contains_key(&index) {
             self.pending.insert(index, row.clone());
@@ -257,28 +316,29 @@ impl Resimulation {
         // The number of outcomes of the state after a gap is only that of its row.
         let state = self.gaps.last().filter(|gap| step > gap.to);
         Some(match state {
-            Some(gap) => Finding::at_step(
+            Some(gap) => SnapshotFinding::at_step(
                 gap.to,
                 format!("its row in /steps counts outcome {index}, which belongs to step {step}"),
             ),
-            None => {
-                Finding::at_step(step, format!("/outcomes: outcome {index} is in the file twice"))
-            }
+            None => SnapshotFinding::at_step(
+                step,
+                format!("/outcomes: outcome {index} is in the file twice"),
+            ),
         })
     }
 
     /// Returns the number of messages that belong to steps after the last snapshot.
-    pub(crate) fn waiting_count(&self) -> usize {
+    pub(super) fn waiting_count(&self) -> usize {
         self.pending.len() + self.side_rows.count()
     }
 
     /// Returns the number of messages before the first state that do not describe it.
-    pub(crate) fn earlier_count(&self) -> usize {
+    pub(super) fn earlier_count(&self) -> usize {
         self.earlier_count
     }
 
     /// Finds the first outcome that the snapshot counts and the log lacks.
-    fn find_gap(&self, row: &StepRow) -> Option<Finding> {
+    fn find_gap(&self, row: &StepRow) -> Option<SnapshotFinding> {
         let present = self.pending.range(self.next_index..).map(|(index, _)| *index);
         let expected = self.next_index..row.outcome_count;
         let missing = expected.zip(present.map(Some).chain(std::iter::repeat(None)));
@@ -289,12 +349,12 @@ impl Resimulation {
             "/outcomes: outcome {index} is missing; /steps counts {} outcomes up to step {}",
             row.outcome_count, row.step
         );
-        Some(Finding::Incomplete { step, what })
+        Some(SnapshotFinding::Incomplete { step, what })
     }
 
     /// Applies the outcomes of the next step in the order of their index, and computes the step. `frame` is
     /// that of the next snapshot.
-    fn simulate_step(&mut self, frame: &Frame, stop: &AtomicBool) -> Option<Finding> {
+    fn simulate_step(&mut self, frame: &Frame, stop: &AtomicBool) -> Option<SnapshotFinding> {
         let step = self.step + 1;
         let first_index = self.next_index;
         while let Some(entry) = self.pending.first_entry().filter(|entry| entry.get().step <= step)
@@ -313,7 +373,7 @@ impl Resimulation {
             self.side_rows.pass_parameters(&self.solver, step);
         }
         if !self.solver.step_unless(stop) {
-            return Some(Finding::Interrupted);
+            return Some(SnapshotFinding::Interrupted);
         }
         self.step = step;
         self.past.add(&self.solver, self.next_index > first_index);
@@ -322,13 +382,13 @@ impl Resimulation {
 
     /// Returns the number of states that were taken from the file, and are no state that the simulation
     /// had computed.
-    pub(crate) fn given_count(&self) -> u64 {
+    pub(super) fn given_count(&self) -> u64 {
         self.past.given_count
     }
 
     /// Puts the state of a snapshot in place, as the outcome of a rewind or restore says, and compares it
     /// with the states that the simulation has computed.
-    fn put_in_place(&mut self, row: &OutcomeRow, frame: &Frame) -> Option<Finding> {
+    fn put_in_place(&mut self, row: &OutcomeRow, frame: &Frame) -> Option<SnapshotFinding> {
         let (step, index) = (row.step, row.index);
         let is_state = frame.row.step == step && frame.particles.is_some();
         let keyframe = frame.own_keyframe().filter(|_| is_state);
@@ -336,12 +396,12 @@ impl Resimulation {
             let what = format!(
                 "/outcomes: outcome {index} puts a state in place whose snapshot or keyframe is missing"
             );
-            return Some(Finding::Incomplete { step, what });
+            return Some(SnapshotFinding::Incomplete { step, what });
         };
         let result = self.put_state_in_place(row, frame.payload(), bytes);
         let problem = result.err().or_else(|| self.past.compare(&row.action, &self.solver));
         let what = format!("/outcomes: outcome {index}: {}", problem?);
-        Some(Finding::at_step(step, what))
+        Some(SnapshotFinding::at_step(step, what))
     }
 
     fn put_state_in_place(
@@ -363,13 +423,17 @@ impl Resimulation {
 
     /// Applies an outcome and compares its status. Skips pause, resume and step, which control only the
     /// pace of the node, and rejected loads, rewinds and restores, which change nothing.
-    fn apply(&mut self, row: &OutcomeRow) -> Option<Finding> {
+    fn apply(&mut self, row: &OutcomeRow) -> Option<SnapshotFinding> {
         let is_of_node = matches!(row.action, Action::Load { .. }) || row.puts_state_in_place();
         let is_rejected_by_node = is_of_node && !row.is_applied();
         let result = match apply(&mut self.solver, row.client_id, &row.action) {
-            Ok(Applied::Control(Control::Pause | Control::Resume | Control::Step { .. })) => {
+            Ok(Applied::Control(control @ (Control::Pause | Control::Resume))) => {
+                if row.is_applied() {
+                    self.is_paused = matches!(control, Control::Pause);
+                }
                 return None;
             }
+            Ok(Applied::Control(Control::Step { .. })) => return None,
             Err(_) if is_rejected_by_node => return None,
             result => result.map(|_| ()),
         };
@@ -382,83 +446,11 @@ impl Resimulation {
             "/outcomes: outcome {}: recorded {} {}, simulated {} {}",
             row.index, row.status, row.reason, again.status, again.reason
         );
-        Some(Finding::Diverged { step: row.step, what, difference: None })
+        Some(SnapshotFinding::Diverged { step: row.step, what, difference: None })
     }
 
-    fn misplaced(&self, step: u64, why: &str) -> Finding {
+    fn misplaced(&self, step: u64, why: &str) -> SnapshotFinding {
         let what = format!("/outcomes: outcome {} is misplaced: {why}", self.next_index);
-        Finding::Diverged { step, what, difference: None }
+        SnapshotFinding::Diverged { step, what, difference: None }
     }
-}
-
-/// Returns `true` if the torn constraints of the first snapshot differ from its rows. Later snapshots
-/// have no `/topology`. An unknown cause equals any cause.
-fn has_other_tears(frame: &Frame, solver: &Solver) -> bool {
-    let torn = frame.updates.iter().find_map(|update| match update {
-        Message::Topology(row) => Some(row.torn_before()),
-        _ => None,
-    });
-    let Some(torn) = torn else { return false };
-    let mut tracker = TearTracker::new(torn);
-    frame.updates.iter().for_each(|update| tracker.process(update));
-    let Some(torn) = tracker.at(frame.row.step) else { return false };
-    let expected = solver.torn().iter().zip(solver.tear_causes());
-    torn.constraints.len() != solver.torn().len()
-        || torn.constraints.iter().zip(expected).any(|(found, (index, cause))| {
-            found.constraint != *index || found.cause().is_some_and(|found| found != *cause)
-        })
-}
-
-/// Compares the recorded header, the recorded payload and the simulated state.
-fn compare(solver: &Solver, frame: &Frame) -> Finding {
-    let row = &frame.row;
-    let diverged =
-        |what: String, difference| Finding::Diverged { step: row.step, what, difference };
-    let simulated_hash = solver.state_hash();
-    if let Some(particles) = &frame.particles
-        && let Some((what, difference)) = compare_particles(solver, particles)
-    {
-        return diverged(what, difference);
-    }
-    let counts = [
-        ("scene_step", row.scene_step, solver.scene_step()),
-        ("torn_count", u64::from(row.torn_count), solver.torn().len() as u64),
-    ];
-    let differs = |(_, recorded, simulated): &(_, u64, u64)| recorded != simulated;
-    if let Some((name, recorded, simulated)) = counts.into_iter().find(differs) {
-        return diverged(
-            format!("/steps: {name}: recorded {recorded}, simulated {simulated}"),
-            None,
-        );
-    }
-    if row.state_hash != simulated_hash {
-        let of =
-            if frame.particles.is_some() { "its particles have" } else { "the simulation has" };
-        let what = format!(
-            "its row in /steps has the hash {:016x}, but {of} {simulated_hash:016x}",
-            row.state_hash
-        );
-        return diverged(what, None);
-    }
-    Finding::Identical
-}
-
-/// Describes the first difference of recorded particles from the simulated state.
-fn compare_particles(
-    solver: &Solver,
-    recorded: &[ParticleState],
-) -> Option<(String, Option<Difference>)> {
-    let expected_count = solver.particle_count();
-    if recorded.len() != expected_count {
-        let count = recorded.len();
-        let what = format!("/particles: recorded {count} particles, simulated {expected_count}");
-        return Some((what, None));
-    }
-    let simulated = bytemuck::cast_slice(solver.particles());
-    // One comparison of memory, because it runs for every step.
-    if bytemuck::cast_slice::<_, u8>(recorded) == bytemuck::cast_slice::<_, u8>(simulated) {
-        return None;
-    }
-    let difference = first_difference(recorded, simulated)?;
-    Some((format!("/particles: {difference}"), Some(difference)))
 }

@@ -7,13 +7,15 @@ use sim_contract::ParticleState;
 
 /// One field of one particle in two states.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Difference {
-    pub(crate) particle: usize,
-    pub(crate) field: &'static str,
+pub struct Difference {
+    /// Index of the particle.
+    pub particle: usize,
+    /// Name of the field, such as "position x".
+    pub field: &'static str,
     /// The value in the recording, with its bits.
-    pub(crate) recorded: String,
+    pub recorded: String,
     /// The re-simulated value, with its bits.
-    pub(crate) simulated: String,
+    pub simulated: String,
 }
 
 impl fmt::Display for Difference {
@@ -40,7 +42,7 @@ const FIELDS: [&str; 8] = [
 
 /// Returns the first field that differs, or `None` if all bits are equal. Both slices have the same
 /// length.
-pub(crate) fn first_difference(
+pub fn first_difference(
     recorded: &[ParticleState],
     simulated: &[ParticleState],
 ) -> Option<Difference> {

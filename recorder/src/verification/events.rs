@@ -1,6 +1,6 @@
 //! The events of a snapshot, compared with its particles.
 
-use recorder::{EventRow, Frame, Message};
+use crate::log::{EventRow, Frame, Message};
 
 use crate::simulation::frozen::{FrozenParticles, FrozenTracker, frozen_event};
 

@@ -2,9 +2,10 @@
 
 use std::io::Read;
 
-use recorder::{LogReader, Message, RunDescription, SurfaceRow, TopologyRow, constraint_state};
 use sim_contract::{LoadHeader, Triangle};
 use sim_solver::{Scene, Solver};
+
+use crate::log::{LogReader, Message, RunDescription, SurfaceRow, TopologyRow, constraint_state};
 
 /// Compares the metadata of the run with the scene. Returns a description of the first difference.
 pub(super) fn compare_run<R: Read>(log: &LogReader<R>, scene: &Scene) -> Option<String> {

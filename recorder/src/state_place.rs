@@ -1,16 +1,15 @@
 //! Finds a state in a recording, and the complete state from which it can be simulated.
 
 use std::io::Read;
-use std::path::Path;
 
-use recorder::{FrameReader, LogReader};
-
-use crate::cli::damaged_input::lacks;
+use crate::log::{FrameReader, LogEnd, LogReader, ReadError};
 
 /// The state to look for.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Wanted {
+pub enum Wanted {
+    /// The last one.
     Last,
+    /// The state of this step.
     Step(u64),
     /// The last one up to this step.
     UpTo(u64),
@@ -18,17 +17,37 @@ pub(crate) enum Wanted {
 
 /// The steps of a state and of the keyframe to start from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
-    pub(crate) step: u64,
-    pub(crate) keyframe_step: u64,
+pub struct StatePlace {
+    /// The step of the state.
+    pub step: u64,
+    /// The last step up to it with a keyframe.
+    pub keyframe_step: u64,
+}
+
+/// The reason why a state is not found.
+#[derive(Debug, thiserror::Error)]
+pub enum FindStateError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The readable part of the file lacks the state.
+    #[error("{problem}")]
+    Missing {
+        /// The content that it lacks.
+        problem: String,
+        /// The end of the file, if it was reached.
+        end: Option<LogEnd>,
+    },
 }
 
 /// Finds the wanted state in a file, and the last keyframe up to it.
-pub(crate) fn find_state<R: Read>(
-    path: &Path,
+///
+/// # Errors
+/// If the file cannot be read, or has no such state.
+pub fn find_state<R: Read>(
     log: LogReader<R>,
     wanted: Wanted,
-) -> anyhow::Result<Place> {
+) -> Result<StatePlace, FindStateError> {
     let mut frames = FrameReader::new(log);
     let (mut found, mut keyframe_step, mut first) = (None, None, None);
     while let Some(frame) = frames.next_frame()? {
@@ -44,7 +63,7 @@ pub(crate) fn find_state<R: Read>(
         if frame.own_keyframe().is_some() && frame.particles.is_some() {
             keyframe_step = Some(step);
         }
-        found = keyframe_step.map(|keyframe_step| Place { step, keyframe_step });
+        found = keyframe_step.map(|keyframe_step| StatePlace { step, keyframe_step });
     }
     let found = found.filter(|place| match wanted {
         Wanted::Step(wanted) => place.step == wanted,
@@ -58,5 +77,5 @@ pub(crate) fn find_state<R: Read>(
         ),
         (Wanted::Last, Some(_)) => "has no keyframe".to_owned(),
     };
-    found.ok_or_else(|| lacks(path, &problem(), frames.end()))
+    found.ok_or_else(|| FindStateError::Missing { problem: problem(), end: frames.end().cloned() })
 }

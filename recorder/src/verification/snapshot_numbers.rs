@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use recorder::{Closing, ContentSelection, StepRow, Topic};
+use crate::log::{Closing, ContentSelection, StepRow, Topic};
 
 /// Checks `snapshot_index` from row to row, and counts the numbers that are left out.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use recorder::{CollidersRow, EventRow, Message, ParametersRow, TearsRow};
+use crate::log::{CollidersRow, EventRow, Message, ParametersRow, TearsRow};
 use sim_contract::{ParameterValues, ParticleFlags, ParticleState};
 use sim_solver::{Keyframe, Solver};
 

@@ -1,24 +1,28 @@
 //! The results of a comparison.
 
-use anyhow::bail;
 use serde::Serialize;
 
 use super::difference::Difference;
 
 /// The result of the comparison of one snapshot. The texts are for people.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Finding {
+pub enum SnapshotFinding {
     /// Every bit is equal.
     Identical,
     /// Content that belongs to no step differs.
-    OtherContent { what: String },
+    OtherContent {
+        /// Description of the difference.
+        what: String,
+    },
     /// A signal ended the simulation before the snapshot.
     Interrupted,
     /// The simulation differs from the recording.
     Diverged {
         /// The first step that differs.
         step: u64,
+        /// Description of the difference.
         what: String,
+        /// The first field that differs, if particles do.
         difference: Option<Difference>,
     },
     /// Outcomes are missing, so this state and the next ones cannot be simulated. The simulation goes on from
@@ -26,6 +30,7 @@ pub(crate) enum Finding {
     Incomplete {
         /// The first step that may lack an outcome.
         step: u64,
+        /// Description of the missing outcome.
         what: String,
     },
     /// The state follows missing outcomes, or is the complete one from which the simulation goes on.
@@ -34,31 +39,57 @@ pub(crate) enum Finding {
 
 /// Steps whose states could not be simulated, because outcomes are missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) struct StepGap {
+pub struct StepGap {
     /// The first step that may lack an outcome.
-    pub(crate) from: u64,
+    pub from: u64,
     /// The step of the complete state from which the simulation went on, or of the last state.
-    pub(crate) to: u64,
+    pub to: u64,
 }
 
-impl Finding {
+/// The reason why a snapshot is not the simulated one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotIdentical {
+    /// A signal ended the simulation.
+    #[error("interrupted")]
+    Interrupted,
+    /// The state of a step differs, or outcomes are missing.
+    #[error("step {step} cannot be simulated: {what} (`recorder verify` shows the details)")]
+    Step {
+        /// The first step that differs.
+        step: u64,
+        /// Description of the difference.
+        what: String,
+    },
+    /// Content that belongs to no step differs.
+    #[error("{what}")]
+    File {
+        /// Description of the difference.
+        what: String,
+    },
+    /// The state follows missing outcomes.
+    #[error("outcomes are missing")]
+    NotCompared,
+}
+
+impl SnapshotFinding {
     /// Returns the finding for content that belongs to no step.
-    pub(crate) fn in_file(what: String) -> Self {
+    pub(super) fn in_file(what: String) -> Self {
         Self::OtherContent { what }
     }
 
     /// Returns an error for a difference, and after a signal.
-    pub(crate) fn require_identical(self) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    /// Every finding but [`Self::Identical`].
+    pub fn require_identical(self) -> Result<(), NotIdentical> {
         match self {
             Self::Identical => Ok(()),
-            Self::Interrupted => bail!("interrupted"),
+            Self::Interrupted => Err(NotIdentical::Interrupted),
             Self::Diverged { step, what, .. } | Self::Incomplete { step, what } => {
-                bail!(
-                    "step {step} cannot be simulated: {what} (`recorder verify` shows the details)"
-                )
+                Err(NotIdentical::Step { step, what })
             }
-            Self::OtherContent { what } => bail!("{what}"),
-            Self::NotCompared => bail!("outcomes are missing"),
+            Self::OtherContent { what } => Err(NotIdentical::File { what }),
+            Self::NotCompared => Err(NotIdentical::NotCompared),
         }
     }
 

@@ -1,0 +1,155 @@
+//! The result of a verification.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+use sim_contract::printable_line;
+
+use super::difference::Difference;
+use super::finding::{SnapshotFinding, StepGap};
+use crate::log::LogEnd;
+
+/// The result of a verification. It serializes to the JSON that `recorder verify --json` prints.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerifyReport {
+    /// The result in one word.
+    pub verdict: Verdict,
+    /// The step from which the simulation started.
+    pub first_step: u64,
+    /// The last bit-identical step, if there is one.
+    pub last_identical_step: Option<u64>,
+    /// Number of simulated and compared steps.
+    pub steps_identical: u64,
+    /// The step that the verdict concerns.
+    pub step: Option<u64>,
+    /// Description of the finding, for people.
+    pub what: Option<String>,
+    /// Steps whose states could not be simulated, because outcomes are missing.
+    pub gaps: Vec<StepGap>,
+    #[serde(flatten)]
+    /// The first field that differs, if particles do.
+    pub difference: Option<Difference>,
+    /// The end of the file. `None` if the verification has not reached it.
+    #[serde(rename = "file_end", serialize_with = "serialize_end")]
+    pub end: Option<LogEnd>,
+    /// Number of messages that the recording lacks, for topics with such messages, and "unreadable"
+    /// ones.
+    pub lost: BTreeMap<&'static str, u64>,
+    /// The content that is not compared.
+    pub not_covered: Vec<String>,
+}
+
+/// The result of a verification in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Every compared bit is equal.
+    Identical,
+    /// The simulation or the form of the file differs.
+    Diverged,
+    /// Outcomes are missing. The states that do not depend on them are equal.
+    OutcomeLogIncomplete,
+    /// The verification was stopped. Everything up to there is equal.
+    Interrupted,
+}
+
+#[allow(clippy::ref_option, reason = "the signature is that of serde")]
+fn serialize_end<S: Serializer>(end: &Option<LogEnd>, serializer: S) -> Result<S::Ok, S::Error> {
+    match end {
+        Some(end) => serializer.collect_str(end),
+        None => serializer.serialize_str("not reached"),
+    }
+}
+
+impl VerifyReport {
+    /// The report before the first snapshot.
+    pub(super) fn new() -> Self {
+        Self {
+            verdict: Verdict::Identical,
+            first_step: 0,
+            last_identical_step: None,
+            steps_identical: 0,
+            step: None,
+            what: None,
+            gaps: Vec::new(),
+            difference: None,
+            end: None,
+            lost: BTreeMap::new(),
+            not_covered: Vec::new(),
+        }
+    }
+
+    /// Returns `true` before the first snapshot is compared.
+    pub(super) fn is_empty(&self) -> bool {
+        self.last_identical_step.is_none()
+    }
+
+    /// Returns the end of a file that is not complete.
+    pub fn incomplete_end(&self) -> Option<&LogEnd> {
+        self.end.as_ref().filter(|end| **end != LogEnd::Complete)
+    }
+
+    /// Adds the finding at the end of the file.
+    pub(super) fn add_end(&mut self, finding: SnapshotFinding) {
+        if finding != SnapshotFinding::Identical {
+            self.add(finding, 0);
+        }
+    }
+
+    /// Adds the finding at `step`. Returns `true` to continue.
+    pub(super) fn add(&mut self, finding: SnapshotFinding, step: u64) -> bool {
+        match finding {
+            SnapshotFinding::NotCompared => return true,
+            SnapshotFinding::Identical => {
+                self.last_identical_step = Some(step);
+                self.steps_identical += u64::from(step != self.first_step);
+                return true;
+            }
+            SnapshotFinding::Diverged { step, what, difference } => {
+                self.verdict = Verdict::Diverged;
+                (self.step, self.what, self.difference) = (Some(step), Some(what), difference);
+            }
+            SnapshotFinding::OtherContent { what } => {
+                self.verdict = Verdict::Diverged;
+                (self.step, self.what) = (None, Some(what));
+            }
+            SnapshotFinding::Interrupted => self.verdict = Verdict::Interrupted,
+            // The report names the first one.
+            SnapshotFinding::Incomplete { .. } if self.verdict == Verdict::OutcomeLogIncomplete => {
+                return true;
+            }
+            SnapshotFinding::Incomplete { step, what } => {
+                self.verdict = Verdict::OutcomeLogIncomplete;
+                (self.step, self.what) = (Some(step), Some(what));
+                return true;
+            }
+        }
+        false
+    }
+}
+
+impl fmt::Display for VerifyReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.steps_identical;
+        let what = printable_line(self.what.as_deref().unwrap_or(""));
+        let step = self.step.unwrap_or(0);
+        match self.verdict {
+            Verdict::Identical => {
+                let last = self.last_identical_step.unwrap_or(self.first_step);
+                write!(f, "{count} steps bit-identical ({}..={last})", self.first_step)
+            }
+            Verdict::Diverged if self.step.is_none() => {
+                write!(f, "the file differs: {what} ({count} steps bit-identical)")
+            }
+            Verdict::Diverged => {
+                write!(f, "step {step} differs: {what} ({count} steps before it bit-identical)")
+            }
+            Verdict::OutcomeLogIncomplete => write!(
+                f,
+                "outcome log incomplete from step {step}: {what} ({count} other steps bit-identical)"
+            ),
+            Verdict::Interrupted => write!(f, "interrupted; {count} steps so far bit-identical"),
+        }
+    }
+}

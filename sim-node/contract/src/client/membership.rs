@@ -1,0 +1,75 @@
+//! Joining the lockstep.
+
+use std::num::NonZeroU32;
+use std::time::Duration;
+
+use crate::client::Client;
+use crate::client::lockstep::{LockstepError, Member};
+use crate::clock::Deadline;
+
+impl Client {
+    /// Joins the lockstep: from now on, the node computes the step after a snapshot only when this client
+    /// has called [`Client::ready`] for it. Dropping the client leaves the lockstep. A replay waits for its
+    /// members with the next snapshot, so they read every one, at any rate.
+    ///
+    /// The node applies the commands that the members send before they are ready, and those of other
+    /// clients that have arrived until then. The order is that of their client ids, so members with fixed
+    /// ids ([`Client::attach_as`]) and without other clients produce the same states in every run.
+    ///
+    /// # Errors
+    /// The lockstep already has [`crate::MEMBERS_MAX`] members, `/dev/shm` is full, or the node has not
+    /// answered within `timeout`.
+    pub fn join_lockstep(&mut self, timeout: Duration) -> Result<(), LockstepError> {
+        self.join_lockstep_every(NonZeroU32::MIN, timeout)
+    }
+
+    /// Joins the lockstep, drops unread snapshots, and takes part only at the steps that are multiples
+    /// of `every`, as a controller of 60 Hz does beside a node of 240 Hz with `every` = 4.
+    ///
+    /// # Errors
+    /// Same as [`Client::join_lockstep`].
+    pub fn join_lockstep_every(
+        &mut self,
+        every: NonZeroU32,
+        timeout: Duration,
+    ) -> Result<(), LockstepError> {
+        self.request_membership(every)?;
+        let joined = self.await_membership(timeout);
+        if joined.is_err() {
+            self.leave_lockstep();
+        }
+        joined
+    }
+
+    /// Asks to join the lockstep like [`Client::join_lockstep_every`], without waiting for the answer.
+    ///
+    /// # Errors
+    /// The lockstep already has [`crate::MEMBERS_MAX`] members, or `/dev/shm` is full.
+    pub fn request_membership(&mut self, every: NonZeroU32) -> Result<(), LockstepError> {
+        // The node may wait at a snapshot that this client has read: a new reader receives it again.
+        self.particles = None;
+        let member = Member::create(&self.attachment, self.id, every)?;
+        member.join()?;
+        self.member = Some(member);
+        Ok(())
+    }
+
+    /// Waits until the node has admitted this client. After a timeout, it can be called again: a program
+    /// that must react to something else waits in short parts. A client that gives up calls
+    /// [`Client::leave_lockstep`], or the node waits for a client that does not know of its membership.
+    ///
+    /// # Errors
+    /// [`LockstepError::NotAdmitted`] after `timeout`, or the client has not asked to join.
+    pub fn await_membership(&mut self, timeout: Duration) -> Result<(), LockstepError> {
+        let deadline = Deadline::after(timeout);
+        while let Some(status) = self.status(deadline.remaining())? {
+            if status.members().iter().any(|member| member.client_id == self.id) {
+                return Ok(());
+            }
+            // A node that waits only briefly may have dropped this client before it knew of its
+            // membership.
+            self.member.as_ref().ok_or(LockstepError::NotJoined)?.join()?;
+        }
+        Err(LockstepError::not_admitted(&self.attachment, timeout))
+    }
+}
