@@ -9,7 +9,7 @@
 //! assert_eq!(action, Action::Pin { particle: 3 });
 //! let damping = Parameter::from_name("damping").map(Parameter::info);
 //! assert_eq!(damping.map(|info| info.unit), Some("1/s"));
-//! assert_eq!(PARAMETERS.len(), 15);
+//! assert_eq!(PARAMETERS.len(), 16);
 //! # Ok::<(), serde_json::Error>(())
 //! ```
 //!
