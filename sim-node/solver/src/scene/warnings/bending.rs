@@ -72,7 +72,7 @@ fn sentence(place: &Place, scene: &Scene) -> Option<String> {
     let (rate, substeps) = (f64::from(scene.solver.rate_hz), f64::from(scene.solver.substeps));
     let softening = |substeps: f64| FACTOR / ((rate * substeps * passes).powi(2) * square_time);
     let reached = rigidity / (1.0 + softening(substeps));
-    // A bend without length and without rigidity reaches no number.
+    // NaN: a bend without length and without rigidity.
     if reached.is_nan() || reached >= (1.0 - TOLERANCE) * rigidity {
         return None;
     }
