@@ -40,7 +40,7 @@ impl Bend {
     pub(crate) fn on_line(particles: [u32; 3], positions: [[f32; 3]; 3], rigidity: f32) -> Self {
         let [a, b, c] = positions.map(|one| Vec3::from_array(one).as_dvec3());
         let (first, second) = (a.distance(b), b.distance(c));
-        let mean = (first + second) / 2.0;
+        let mean = f64::midpoint(first, second);
         let sum = round(mean / first + mean / second);
         // The greater one is at least half of the sum, so the difference has no rounding: the sum of all
         // coefficients is exactly 0, and so is that of the forces.

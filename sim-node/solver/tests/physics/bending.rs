@@ -57,7 +57,7 @@ impl Cantilever {
         let moment = |i: i64| ((cells - i) * (cells - i + 1)) as f64;
         let common = |i: i64, j: i64| {
             let free = (i.max(j).max(2)..=i.min(j) + 2)
-                .map(|p| [i, j].map(|one| [1, -2, 1][(p - one) as usize]));
+                .map(|p| [i, j].map(|one| [1, -2, 1][usize::try_from(p - one).unwrap()]));
             free.map(|[c, other]| c * other).sum::<i64>() as f64
         };
         let (mut sum, mut weights) = (0.0, 0.0);
@@ -132,7 +132,7 @@ fn few_substeps_reach_less_rigidity_by_the_order_of_the_groups() {
             let rigidity =
                 share * 960.0_f64.powi(2) * cantilever.mass * cantilever.spacing().powi(3) / k;
             let gravity = cantilever.gravity * rigidity / cantilever.rigidity / (1.0 + share);
-            let cantilever = Cantilever { rigidity, gravity, ..cantilever };
+            let cantilever = Cantilever { gravity, rigidity, ..cantilever };
             let expected = cantilever.law_of_tip(cantilever.softening(k));
             let name = format!("tip of {cells} cells, k = {k:.2}, softer by {share}");
             assert_close(&name, expected, cantilever.tip(20.0), 0.03);
@@ -195,7 +195,7 @@ fn energies_on_cylinder(degrees: f64, right: f64) -> [f64; 3] {
     let mut sums = [0.0; 3];
     for bend in solver.bends() {
         let [a, b, _, d] = bend.particles;
-        let family = if d != b { 2 } else { usize::from(b - a == columns) };
+        let family = if d == b { usize::from(b - a == columns) } else { 2 };
         sums[family] += energy(&bend, at);
     }
     let cell = s * s * right;

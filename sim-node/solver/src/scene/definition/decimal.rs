@@ -33,6 +33,7 @@ pub(crate) mod vector {
 pub(crate) mod pair {
     use super::{Serialize, Serializer, shortest};
 
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
     pub(crate) fn serialize<S: Serializer>(
         value: &[f32; 2],
         serializer: S,

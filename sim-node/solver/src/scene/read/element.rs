@@ -165,8 +165,8 @@ fn bend_problem(particles: BendParticles, positions: &Positions) -> Option<Strin
         BendParticles::Cell(cell) => cell.to_vec(),
     };
     sorted.sort_unstable();
-    if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Some(format!("names particle {} twice (allowed: different particles)", pair[0]));
+    if let Some([twice, ..]) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Some(format!("names particle {twice} twice (allowed: different particles)"));
     }
     let has_size = match particles {
         BendParticles::Line([a, b, c]) => {

@@ -72,8 +72,8 @@ fn sentence(place: &Place, scene: &Scene) -> Option<String> {
     let (rate, substeps) = (f64::from(scene.solver.rate_hz), f64::from(scene.solver.substeps));
     let softening = |substeps: f64| FACTOR / ((rate * substeps * passes).powi(2) * square_time);
     let reached = rigidity / (1.0 + softening(substeps));
-    // 0 * infinity: the rigidity is 0.
-    if !(reached < (1.0 - TOLERANCE) * rigidity) {
+    // NaN: a bend without length and without rigidity.
+    if reached.is_nan() || reached >= (1.0 - TOLERANCE) * rigidity {
         return None;
     }
     let sufficient = (softening(1.0) * (1.0 - TOLERANCE) / TOLERANCE).sqrt().ceil();

@@ -179,8 +179,8 @@ impl BendRun<'_> {
             let change = self.projection.change(index, value, weight);
             for end in 0..4 {
                 let share = coefficients[end] * inverse_masses[end];
-                for axis in 0..3 {
-                    particles[indices[end]].0[4 + axis] += share * change[axis];
+                for (axis, along) in change.into_iter().enumerate() {
+                    particles[indices[end]].0[4 + axis] += share * along;
                 }
             }
         }

@@ -82,10 +82,10 @@ fn bend_down<W: Wide>([a, b, c]: [Ends<'_>; 3], projection: &mut BendProjection<
         let weight = bend_weight(&[c_a, c_b, c_c], &w);
         let change = projection.change(LaneIndex { group, lane: 0 }, value, weight);
         let shares = [c_a * w[0], c_b * w[1], c_c * w[2]];
-        for axis in 0..3 {
+        for (axis, along) in change.into_iter().enumerate() {
             let ends = [&mut a.d[axis][group], &mut b.d[axis][group], &mut c.d[axis][group]];
             for (d, share) in ends.into_iter().zip(shares) {
-                (W::load(d, 0) + share * change[axis]).store(d, 0);
+                (W::load(d, 0) + share * along).store(d, 0);
             }
         }
     }
@@ -115,8 +115,7 @@ fn bend_across<W: Wide>(row: Ends<'_>, projection: &mut BendProjection<'_>) {
         let weight = bend_weight(&[c_a, c_b, c_c], &w);
         let change = projection.change(LaneIndex { group, lane: 0 }, value, weight);
         let shares = [c_a * w[0], c_b * w[1], c_c * w[2]];
-        for axis in 0..3 {
-            let along = change[axis];
+        for (axis, along) in change.into_iter().enumerate() {
             let amounts = W::zip_thirds([shares[0] * along, shares[1] * along, shares[2] * along]);
             for (d, amount) in d[axis][group].iter_mut().zip(amounts) {
                 (W::load(d, 0) + amount).store(d, 0);
@@ -157,8 +156,7 @@ fn bend_cells<W: Wide>(upper: Ends<'_>, lower: Ends<'_>, projection: &mut BendPr
         let change = projection.change(LaneIndex { group, lane: 0 }, value, weight);
         let [c_a, c_b, c_c, c_d] = coefficients;
         let (upper, lower) = ([c_a * w_a, c_b * w_b], [c_c * w_c, c_d * w_d]);
-        for axis in 0..3 {
-            let along = change[axis];
+        for (axis, along) in change.into_iter().enumerate() {
             for (d, shares) in
                 [(&mut d_upper[axis][group], upper), (&mut d_lower[axis][group], lower)]
             {
