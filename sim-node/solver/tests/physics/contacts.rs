@@ -1,5 +1,7 @@
 //! Velocities after contacts: bounces, friction, moving surfaces, corners.
 
+mod particles;
+
 use proptest::prelude::*;
 use sim_solver::{Pose, Solver};
 

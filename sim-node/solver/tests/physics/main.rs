@@ -16,7 +16,6 @@ mod hardening;
 mod motion;
 mod order;
 mod parameters;
-mod particle_contacts;
 mod tearing;
 mod tethers;
 mod wind;

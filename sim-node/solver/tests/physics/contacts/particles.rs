@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use sim_solver::{ParameterValue, Scene, Solver};
 
-use super::{assert_at_most, assert_near, rates, solver, step, stepped};
+use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 
 const CONTACT: &str = "[contact]\nmode = \"particles\"\n";
 const SPACING: f64 = 0.02;
