@@ -19,7 +19,7 @@ use rustix::fs::statvfs;
 use sim_contract::clock::monotonic_ns;
 
 use super::load::RunHeader;
-use super::queue::{Content, FileEnd, Item, Popped, Queue};
+use super::queue::{Content, Entry, FileEnd, Item, Queue};
 use super::report::Written;
 use super::split::{Ring, WritePosition};
 use crate::cli::file_args::{FileArgs, LogFile};
@@ -28,7 +28,7 @@ use black_box::{BlackBox, KeptFile};
 use extras::Extras;
 use names::FileNames;
 
-/// Longest wait for an item before the next check whether a flush is due.
+/// Longest time that an item waits for others, which are written together.
 const WAIT_MAX: Duration = Duration::from_millis(50);
 
 /// The writing of files.
@@ -119,22 +119,32 @@ impl Files {
         let interval_ns = u64::try_from(interval_ns).unwrap_or(u64::MAX);
         let mut next_flush_ns = monotonic_ns().saturating_add(interval_ns);
         loop {
-            match queue.pop(WAIT_MAX) {
-                Popped::Begin { header, log_time_ns } => self.on_begin(header, log_time_ns)?,
-                Popped::Item(item) => {
-                    if let Some(buffer) = self.on_item(item)? {
-                        queue.add_spare(buffer);
-                    }
-                }
-                Popped::End(closing, end) => self.on_end(*closing, end)?,
-                Popped::Timeout => {}
-                Popped::Closed => return Ok(()),
+            let until_flush = next_flush_ns.saturating_sub(monotonic_ns());
+            let Some(count) = queue.wait(WAIT_MAX.min(Duration::from_nanos(until_flush))) else {
+                return Ok(());
+            };
+            for entry in std::iter::from_fn(|| queue.pop()).take(count) {
+                self.on_entry(entry, queue)?;
             }
+            // After everything that waited, so that all of it is flushed.
             let now_ns = monotonic_ns();
             if now_ns >= next_flush_ns {
                 next_flush_ns = now_ns.saturating_add(interval_ns);
                 self.flush()?;
             }
+        }
+    }
+
+    fn on_entry(&mut self, entry: Entry, queue: &Queue) -> anyhow::Result<()> {
+        match entry {
+            Entry::Begin { header, log_time_ns } => self.on_begin(header, log_time_ns),
+            Entry::Item(item) => {
+                if let Some(buffer) = self.on_item(item)? {
+                    queue.add_spare(buffer);
+                }
+                Ok(())
+            }
+            Entry::End(closing, end) => self.on_end(*closing, end),
         }
     }
 
