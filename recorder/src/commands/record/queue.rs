@@ -362,12 +362,12 @@ mod tests {
     fn the_queue_wakes_for_a_chunk_and_for_a_part_of_a_small_limit() {
         for (limit_bytes, wakes_at) in [(100 << 20, 33), (1 << 20, 9)] {
             let queue = Queue::new(limit_bytes);
-            let is_awake = |step| {
+            for step in 0..wakes_at {
                 queue.push(snapshot(step));
-                queue.state.lock().unwrap().size_bytes >= queue.wake_size_bytes()
-            };
-            assert_eq!((1..).find(|step| is_awake(*step)), Some(wakes_at));
-            assert_eq!(queue.wait(Duration::MAX), Some(wakes_at as usize));
+                let is_due = queue.lock().size_bytes >= queue.wake_size_bytes();
+                assert_eq!(is_due, step + 1 == wakes_at);
+            }
+            assert_eq!(queue.wait(Duration::MAX), usize::try_from(wakes_at).ok());
         }
     }
 

@@ -103,7 +103,7 @@ fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> (LogWriter<W>, Closi
         queue.wait(WAIT_MAX).expect("it is closed without an end");
         while let Some(entry) = queue.pop() {
             match entry {
-                Entry::Item(item) => _ = write_item(&mut log, item).unwrap(),
+                Entry::Item(item) => write_item(&mut log, item).unwrap(),
                 Entry::End(mut closing, _) => {
                     closing.counts.set_written(log.counts());
                     return (log, *closing);

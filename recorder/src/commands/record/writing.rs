@@ -139,7 +139,8 @@ impl Files {
         match entry {
             Entry::Begin { header, log_time_ns } => self.on_begin(header, log_time_ns),
             Entry::Item(item) => {
-                if let Some(buffer) = self.on_item(item)? {
+                self.on_item(item)?;
+                while let Some(buffer) = self.take_spare() {
                     queue.add_spare(buffer);
                 }
                 Ok(())
@@ -157,11 +158,15 @@ impl Files {
     }
 
     /// Returns the buffer of a snapshot that is written.
-    fn on_item(&mut self, item: Item) -> anyhow::Result<Option<ParticleBuffer>> {
+    fn take_spare(&mut self) -> Option<ParticleBuffer> {
+        self.open.as_mut().and_then(|open| open.log.take_spare())
+    }
+
+    fn on_item(&mut self, item: Item) -> anyhow::Result<()> {
         let Some(black_box) = &mut self.options.black_box else { return self.write(item) };
         black_box.push(item);
         self.position.set(self.next_number, black_box.size_bytes() as u64);
-        Ok(None)
+        Ok(())
     }
 
     fn on_end(&mut self, closing: Closing, end: FileEnd) -> anyhow::Result<()> {
@@ -172,7 +177,7 @@ impl Files {
     /// Writes a file of the black box.
     fn write_kept(&mut self, file: KeptFile) -> anyhow::Result<()> {
         self.begin(&file.header, file.log_time_ns)?;
-        file.items.into_iter().try_for_each(|item| self.write(item).map(drop))?;
+        file.items.into_iter().try_for_each(|item| self.write(item))?;
         self.finish(file.closing)
     }
 
@@ -225,16 +230,14 @@ impl Files {
         Ok(())
     }
 
-    /// Returns the buffer of a snapshot.
-    fn write(&mut self, item: Item) -> anyhow::Result<Option<ParticleBuffer>> {
-        let Some(open) = &mut self.open else { return Ok(None) };
+    fn write(&mut self, item: Item) -> anyhow::Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
         if let Content::Snapshot(row, _) | Content::Update(Message::Step(row)) = &item.content {
             open.steps = Some((open.steps.map_or(row.step, |(first, _)| first), row.step));
         }
-        let buffer = write_item(&mut open.log, item);
-        let buffer = buffer.with_context(|| incomplete(&open.part_path))?;
+        write_item(&mut open.log, item).with_context(|| incomplete(&open.part_path))?;
         self.position.set(open.number, open.log.size_bytes());
-        Ok(buffer)
+        Ok(())
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {
@@ -285,18 +288,14 @@ fn incomplete(part_path: &Path) -> String {
     format!("the recording is incomplete; its readable part is {}", output::path_text(part_path))
 }
 
-/// Writes the messages of an item. Returns the buffer of a snapshot.
-pub(super) fn write_item<W: Write>(
-    log: &mut LogWriter<W>,
-    item: Item,
-) -> Result<Option<ParticleBuffer>, WriteError> {
+/// Writes the messages of an item.
+pub(super) fn write_item<W: Write>(log: &mut LogWriter<W>, item: Item) -> Result<(), WriteError> {
     let Item { content, log_time_ns } = item;
     match content {
-        Content::Update(message) => log.write(&message, log_time_ns).map(|()| None),
-        Content::Snapshot(row, mut buffer) => {
+        Content::Update(message) => log.write(&message, log_time_ns),
+        Content::Snapshot(row, buffer) => {
             log.write(&Message::Step(row), log_time_ns)?;
-            log.write_particles(row.step, &mut buffer, log_time_ns)?;
-            Ok(Some(buffer))
+            log.write_particles(row.step, buffer, log_time_ns)
         }
     }
 }
