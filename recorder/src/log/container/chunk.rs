@@ -2,7 +2,7 @@
 
 use mcap::records::{ChunkHeader, Record, op};
 
-use crate::log::read::chunk_data::ChunkData;
+use crate::log::read::chunk_data::{ChunkData, ChunkStartFields};
 use crate::log::read::fault::Fault;
 use crate::log::read::lengths::is_exact;
 use crate::log::read::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits};
@@ -14,8 +14,9 @@ pub(super) fn is_chunk(body: &[u8], limits: &SizeLimits) -> Result<(), String> {
     if !is_exact(op::CHUNK, body) {
         return Err("a chunk whose length differs from that of its data".to_owned());
     }
-    let result = open(body, limits);
-    result.map(drop).map_err(fault_text)
+    let fields =
+        ChunkStartFields::read(&mut Source::without_checksum(body), body.len() as u64, limits);
+    fields.map(drop).map_err(fault_text)
 }
 
 /// Returns the compression that the header of a chunk names.
@@ -26,23 +27,9 @@ pub(super) fn compression(body: &[u8]) -> Option<String> {
     }
 }
 
-fn open<'a>(body: &'a [u8], limits: &SizeLimits) -> Result<(ChunkData, Source<&'a [u8]>), Fault> {
-    let mut source = Source::without_checksum(body);
-    let length = body.len() as u64;
-    let mut header = [0; RECORD_HEADER_SIZE_BYTES];
-    header[0] = op::CHUNK;
-    header[1..].copy_from_slice(&length.to_le_bytes());
-    let data = ChunkData::open(&mut source, header, length, limits)?;
-    Ok((data, source))
-}
-
 /// The content of chunks, one at a time.
-#[derive(Debug, Default)]
-pub(super) struct ChunkContent {
-    /// Decompressed records.
-    bytes: Vec<u8>,
-    record: Vec<u8>,
-}
+#[derive(Default)]
+pub(super) struct ChunkContent(ChunkData);
 
 /// A chunk with its content.
 #[derive(Debug)]
@@ -77,7 +64,7 @@ impl ChunkContent {
                 Err(Fault::Io(error)) => return Err(error.into()),
                 Err(fault) => return Ok(Err(fault_text(fault))),
             }
-            self.bytes.as_slice()
+            self.0.content()
         };
         let has_checksum = header.uncompressed_crc != 0;
         if has_checksum {
@@ -96,14 +83,9 @@ impl ChunkContent {
     }
 
     fn decompress(&mut self, body: &[u8], limits: &SizeLimits) -> Result<(), Fault> {
-        let (mut data, mut source) = open(body, limits)?;
-        self.bytes.clear();
-        while let Some(opcode) = data.next_record(&mut source, &mut self.record)? {
-            self.bytes.push(opcode);
-            self.bytes.extend_from_slice(&(self.record.len() as u64).to_le_bytes());
-            self.bytes.extend_from_slice(&self.record);
-        }
-        Ok(())
+        let mut source = Source::without_checksum(body);
+        let fields = ChunkStartFields::read(&mut source, body.len() as u64, limits)?;
+        self.0.read(&mut source, &fields)
     }
 }
 

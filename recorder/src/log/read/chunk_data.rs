@@ -1,9 +1,9 @@
 //! The records of one chunk.
 
 use std::io::Read;
+use std::ops::Range;
 
 use mcap::McapError;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::fault::Fault;
 use super::limits::{RECORD_HEADER_SIZE_BYTES, SizeLimits, compression_growth};
@@ -14,24 +14,28 @@ use super::source::Source;
 const FIXED_SIZE_BYTES: usize = 8 + 8 + 8 + 4 + 4;
 /// Longest name of a compression. Ours are "", "lz4" and "zstd".
 const COMPRESSION_SIZE_BYTES_MAX: usize = 32;
-/// Most bytes to request from the file at a time.
-const READ_SIZE_BYTES_MAX: u64 = 1 << 20;
 
-/// A chunk whose sizes are within the limits. Decompresses it while it is read.
+/// The content of one chunk at a time. Its memory is reused.
+#[derive(Default)]
 pub(in crate::log) struct ChunkData {
-    linear: LinearReader,
-    /// The start of the record, until the linear reader requests it.
-    head: Vec<u8>,
-    /// Bytes of the record after its start that the linear reader has not requested yet.
-    remaining: u64,
+    compressed: Vec<u8>,
+    content: Vec<u8>,
+    /// Place of the next record in the content.
+    place: usize,
+    zstd: Option<zstd::bulk::Decompressor<'static>>,
 }
 
-impl ChunkData {
-    /// Reads the header of a chunk and compares its sizes with the limits. `record_header` is the
-    /// opcode and `length`, which precede it.
-    pub(in crate::log) fn open<R: Read>(
+/// The start of a chunk whose sizes are within the limits.
+pub(in crate::log) struct ChunkStartFields {
+    compression: Vec<u8>,
+    checksum: u32,
+    sizes: Sizes,
+}
+
+impl ChunkStartFields {
+    /// Reads the fields of a chunk record of `length` bytes, and compares its sizes with the limits.
+    pub(in crate::log) fn read<R: Read>(
         source: &mut Source<R>,
-        record_header: [u8; RECORD_HEADER_SIZE_BYTES],
         length: u64,
         limits: &SizeLimits,
     ) -> Result<Self, Fault> {
@@ -49,73 +53,103 @@ impl ChunkData {
             uncompressed: u64_at(&fixed, 16),
             compressed: u64_at(&name_and_size, name_size),
         };
-        sizes.check(&name_and_size[..name_size], limits)?;
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(
-                usize::try_from(sizes.uncompressed.max(sizes.compressed)).unwrap_or(usize::MAX),
-            );
-        Ok(Self {
-            linear: LinearReader::new_with_options(options),
-            head: [&record_header[..], &fixed, &name_and_size].concat(),
-            remaining: sizes.compressed,
-        })
+        name_and_size.truncate(name_size);
+        sizes.check(&name_and_size, limits)?;
+        Ok(Self { compression: name_and_size, checksum: u32_at(&fixed, 24), sizes })
     }
+}
 
-    /// Reads the next record into `body` and returns its opcode, or `None` at the end of the chunk.
-    pub(in crate::log) fn next_record<R: Read>(
+impl ChunkData {
+    /// Replaces the content with that of the chunk that `source` continues with, and verifies its checksum.
+    pub(in crate::log) fn read<R: Read>(
         &mut self,
         source: &mut Source<R>,
-        body: &mut Vec<u8>,
-    ) -> Result<Option<u8>, Fault> {
-        loop {
-            match self.linear.next_event() {
-                Some(Ok(LinearReadEvent::ReadRequest(count))) => self.load(source, count)?,
-                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
-                    body.clear();
-                    body.extend_from_slice(data);
-                    return Ok(Some(opcode));
-                }
-                Some(Err(error)) => return Err(self.fault(error)),
-                None => return Ok(None),
-            }
+        start: &ChunkStartFields,
+    ) -> Result<(), Fault> {
+        self.clear();
+        let read = self.read_content(source, start);
+        if read.is_err() {
+            self.clear();
         }
+        read
     }
 
-    /// Loads up to `count` bytes of the chunk, and none at its end.
-    fn load<R: Read>(&mut self, source: &mut Source<R>, count: usize) -> Result<(), Fault> {
-        if !self.head.is_empty() {
-            self.linear.insert(self.head.len()).copy_from_slice(&self.head);
-            self.linear.notify_read(self.head.len());
-            self.head.clear();
-            return Ok(());
+    fn read_content<R: Read>(
+        &mut self,
+        source: &mut Source<R>,
+        start: &ChunkStartFields,
+    ) -> Result<(), Fault> {
+        let Sizes { compressed, uncompressed, .. } = start.sizes;
+        if start.compression.is_empty() {
+            source.read_exactly(compressed, &mut self.content)?;
+        } else {
+            source.read_exactly(compressed, &mut self.compressed)?;
+            self.decompress(&start.compression, uncompressed)?;
         }
-        let count = (count as u64).min(READ_SIZE_BYTES_MAX).min(self.remaining);
-        if count == 0 {
-            self.linear.notify_read(0);
-            return Ok(());
+        if self.content.len() as u64 != uncompressed {
+            return Err(damaged("a chunk whose data has another length than its content"));
         }
-        let buffer = self.linear.insert(usize::try_from(count).unwrap_or(0));
-        let read_count = source.read_some(buffer)?;
-        if read_count == 0 {
-            return Err(Fault::Truncated);
+        let saved = start.checksum;
+        if saved != 0 {
+            let calculated = crc32fast::hash(&self.content);
+            if calculated != saved {
+                return Err(McapError::BadChunkCrc { saved, calculated }.into());
+            }
         }
-        self.linear.notify_read(read_count);
-        self.remaining -= read_count as u64;
         Ok(())
     }
 
-    /// Returns the fault for an error of the linear reader. At the end of the chunk, the end of the
-    /// data is not the end of the file.
-    fn fault(&self, error: McapError) -> Fault {
-        match error {
-            McapError::UnexpectedEof if self.head.is_empty() && self.remaining == 0 => {
-                damaged("a record that is longer than its chunk")
+    fn decompress(&mut self, compression: &[u8], size_bytes: u64) -> Result<(), Fault> {
+        let failed = |error: std::io::Error| Fault::Damaged(error.to_string());
+        match compression {
+            b"zstd" => {
+                let zstd = match &mut self.zstd {
+                    Some(zstd) => zstd,
+                    none => none.insert(zstd::bulk::Decompressor::new().map_err(failed)?),
+                };
+                // Within the limits of the scene.
+                self.content.clear();
+                self.content.reserve_exact(usize::try_from(size_bytes).unwrap_or(usize::MAX));
+                zstd.decompress_to_buffer(&self.compressed, &mut self.content).map_err(failed)?;
+                Ok(())
             }
-            other => other.into(),
+            b"lz4" => {
+                let decoder = lz4::Decoder::new(self.compressed.as_slice()).map_err(failed)?;
+                decoder.take(size_bytes + 1).read_to_end(&mut self.content).map_err(failed)?;
+                Ok(())
+            }
+            other => {
+                let name = String::from_utf8_lossy(other).into_owned();
+                Err(McapError::UnsupportedCompression(name).into())
+            }
         }
+    }
+
+    /// Drops the content.
+    pub(in crate::log) fn clear(&mut self) {
+        self.content.clear();
+        self.place = 0;
+    }
+
+    /// Returns the opcode of the next record and the place of its body, or `None` at the end of the chunk.
+    pub(in crate::log) fn next_record(&mut self) -> Result<Option<(u8, Range<usize>)>, Fault> {
+        let rest = &self.content[self.place..];
+        if rest.is_empty() {
+            return Ok(None);
+        }
+        let too_long = || damaged("a record that is longer than its chunk");
+        let header = rest.first_chunk::<RECORD_HEADER_SIZE_BYTES>().ok_or_else(too_long)?;
+        let [opcode, length @ ..] = *header;
+        let length = usize::try_from(u64::from_le_bytes(length)).unwrap_or(usize::MAX);
+        let begin = self.place + RECORD_HEADER_SIZE_BYTES;
+        let end = begin.checked_add(length).filter(|end| *end <= self.content.len());
+        self.place = end.ok_or_else(too_long)?;
+        Ok(Some((opcode, begin..self.place)))
+    }
+
+    /// Returns the content of the chunk.
+    pub(in crate::log) fn content(&self) -> &[u8] {
+        &self.content
     }
 }
 

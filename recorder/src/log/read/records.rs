@@ -1,14 +1,15 @@
 //! The records of an MCAP file, one by one, with every checksum verified.
 //!
 //! This reader owns the framing of the file, so that it can compare each length with the limits of
-//! the scene before anything is allocated. The mcap crate decompresses the chunks and parses records.
+//! the scene before anything is allocated, and decompresses each chunk at once. The mcap crate parses records.
 
 use std::io::{self, Read};
+use std::ops::Range;
 
 use mcap::McapError;
 use mcap::records::{Record, op};
 
-use super::chunk_data::ChunkData;
+use super::chunk_data::{ChunkData, ChunkStartFields};
 use super::fault::Fault;
 use super::file_source::FileSource;
 use super::lengths::check_lengths;
@@ -28,10 +29,10 @@ pub(in crate::log) struct RecordReader<R> {
     limits: Option<SizeLimits>,
     /// The source is a part of a file, without magic.
     is_part: bool,
-    /// The record that was read last, in the file or in a chunk.
+    /// The record outside a chunk that was read last.
     body: Vec<u8>,
     /// The chunk that is being read.
-    chunk: Option<ChunkData>,
+    chunk: ChunkData,
     /// End of the last intact record, or of the chunk that contains it.
     intact_count: u64,
     /// The file starts as an MCAP file does.
@@ -44,9 +45,11 @@ pub(in crate::log) struct RecordReader<R> {
 enum Part {
     /// A record, in [`RecordReader::body`].
     Record(u8),
+    /// A record of the chunk, at a place of its content.
+    Inner(u8, Range<usize>),
     /// A record that is longer than any of a recorder. It is not read.
     TooLong(u8),
-    /// A record that no reader of ours needs, or the header of a chunk.
+    /// A record that no reader of ours needs, or a chunk, whose records come next.
     Other,
     End,
 }
@@ -55,7 +58,7 @@ impl RecordReader<FileSource> {
     /// Continues with the record that begins at a byte of the file.
     pub(in crate::log) fn go_to(&mut self, byte: u64) -> io::Result<()> {
         self.source.go_to(byte)?;
-        self.chunk = None;
+        self.chunk.clear();
         self.intact_count = byte;
         self.end = None;
         Ok(())
@@ -79,7 +82,7 @@ impl<R: Read> RecordReader<R> {
             limits,
             is_part: false,
             body: Vec::new(),
-            chunk: None,
+            chunk: ChunkData::default(),
             intact_count: 0,
             is_mcap: false,
             end: None,
@@ -108,21 +111,27 @@ impl<R: Read> RecordReader<R> {
         read: impl FnOnce(Record<'_>, u64) -> Result<T, ReadError>,
     ) -> Result<Option<T>, ReadError> {
         while self.end.is_none() {
-            match self.next_part() {
-                Ok(Part::Record(opcode)) => {
-                    self.intact_count = self.source.position();
-                    match parse(opcode, &self.body) {
-                        Ok(record) => return read(record, self.intact_count).map(Some),
-                        Err(fault) => self.stop(fault)?,
-                    }
-                }
+            let (opcode, body) = match self.next_part() {
+                Ok(Part::Record(opcode)) => (opcode, self.body.as_slice()),
+                Ok(Part::Inner(opcode, place)) => (opcode, &self.chunk.content()[place]),
                 Ok(Part::TooLong(opcode)) => {
                     self.intact_count = self.source.position();
                     let record = Record::Unknown { opcode, data: (&[]).into() };
                     return read(record, self.intact_count).map(Some);
                 }
-                Ok(Part::Other) => {}
-                Ok(Part::End) => self.end = Some(LogEnd::Complete),
+                Ok(Part::Other) => continue,
+                Ok(Part::End) => {
+                    self.end = Some(LogEnd::Complete);
+                    continue;
+                }
+                Err(fault) => {
+                    self.stop(fault)?;
+                    continue;
+                }
+            };
+            self.intact_count = self.source.position();
+            match parse(opcode, body) {
+                Ok(record) => return read(record, self.intact_count).map(Some),
                 Err(fault) => self.stop(fault)?,
             }
         }
@@ -131,14 +140,10 @@ impl<R: Read> RecordReader<R> {
 
     /// Reads the next record of the chunk that is being read, or else of the file.
     fn next_part(&mut self) -> Result<Part, Fault> {
-        let Some(chunk) = &mut self.chunk else { return self.read_part() };
-        if let Some(opcode) = chunk.next_record(&mut self.source, &mut self.body)? {
-            let is_text = matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA);
-            let is_too_long = is_text && self.body.len() as u64 > TEXT_SIZE_BYTES_MAX;
-            return Ok(if is_too_long { Part::TooLong(opcode) } else { Part::Record(opcode) });
-        }
-        self.chunk = None;
-        Ok(Part::Other)
+        let Some((opcode, place)) = self.chunk.next_record()? else { return self.read_part() };
+        let is_text = matches!(opcode, op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA);
+        let is_too_long = is_text && place.len() as u64 > TEXT_SIZE_BYTES_MAX;
+        Ok(if is_too_long { Part::TooLong(opcode) } else { Part::Inner(opcode, place) })
     }
 
     fn stop(&mut self, fault: Fault) -> Result<(), ReadError> {
@@ -166,7 +171,7 @@ impl<R: Read> RecordReader<R> {
         let [opcode, length @ ..] = header;
         let length = u64::from_le_bytes(length);
         match opcode {
-            op::CHUNK => self.open_chunk(header, length),
+            op::CHUNK => self.read_chunk(length),
             op::DATA_END => self.read_data_end(length, checksum_before),
             op::FOOTER => self.read_footer(length),
             op::HEADER | op::SCHEMA | op::CHANNEL | op::METADATA => {
@@ -213,18 +218,14 @@ impl<R: Read> RecordReader<R> {
         Ok(Part::Other)
     }
 
-    /// Reads the header of a chunk. A chunk before the metadata of the run is not one of ours. It is
-    /// reported, but not read.
-    fn open_chunk(
-        &mut self,
-        header: [u8; RECORD_HEADER_SIZE_BYTES],
-        length: u64,
-    ) -> Result<Part, Fault> {
+    /// Reads a chunk. One before the metadata of the run is not one of ours. It is reported, but not read.
+    fn read_chunk(&mut self, length: u64) -> Result<Part, Fault> {
         let Some(limits) = &self.limits else {
             self.body.clear();
             return Ok(Part::Record(op::CHUNK));
         };
-        self.chunk = Some(ChunkData::open(&mut self.source, header, length, limits)?);
+        let start = ChunkStartFields::read(&mut self.source, length, limits)?;
+        self.chunk.read(&mut self.source, &start)?;
         Ok(Part::Other)
     }
 
