@@ -19,7 +19,7 @@ use super::split::{FileBegin, SplitArgs, WritePosition};
 use super::stop_reason::StopReason;
 use crate::cli::output;
 use selector::Selector;
-use trigger::Trigger;
+use trigger::{PartEnd, Trigger};
 
 /// Shortest part of a black box. A part repeats the scene and the constraints.
 const PART_MIN_NS: u64 = SECOND_NS;
@@ -92,7 +92,9 @@ impl Feed {
     ) -> Result<(), LoadError> {
         if let Some(reason) = self.end_before(state) {
             self.intake.accept_before(state, messages, &mut self.accepted);
-            self.end_part(reason.text().to_owned(), reason == StopReason::Split);
+            let is_split = reason == StopReason::Split;
+            let end = if is_split { PartEnd::Continued } else { PartEnd::Last };
+            self.end_part(reason.text().to_owned(), end);
         }
         self.accepted.spare = self.queue.take_spare();
         self.intake.accept_state(state, Now::read(), &mut self.accepted)
@@ -154,11 +156,11 @@ impl Feed {
 
     /// Ends the file, if one has begun.
     pub(crate) fn end_file(&mut self, stop_reason: String) {
-        self.end_part(stop_reason, false);
+        self.end_part(stop_reason, PartEnd::Last);
     }
 
     /// Ends the file, or a part of a black box that the next one may continue.
-    fn end_part(&mut self, stop_reason: String, is_continued: bool) {
+    fn end_part(&mut self, stop_reason: String, end: PartEnd) {
         self.enqueue();
         if !self.intake.has_started() {
             return;
@@ -167,7 +169,9 @@ impl Feed {
         let (stop_reason, end) = match &mut self.trigger {
             Some(trigger) => {
                 let is_full = is_full && trigger.has_shown_event(last_step);
-                trigger.end_part(stop_reason, is_continued, is_full, monotonic_ns())
+                let is_continued = end == PartEnd::Continued;
+                let end = if is_continued && is_full { PartEnd::Full } else { end };
+                trigger.end_part(stop_reason, end, monotonic_ns())
             }
             None => (stop_reason, FileEnd::Write),
         };
@@ -186,7 +190,7 @@ impl Feed {
         trigger.poll_signal(now_ns);
         let is_over = trigger.has_shown_event(last_step) && is_far_too_full;
         if is_over || self.is_paused && trigger.is_due(now_ns) {
-            self.end_part(StopReason::Split.text().to_owned(), true);
+            self.end_part(StopReason::Split.text().to_owned(), PartEnd::Continued);
         }
     }
 

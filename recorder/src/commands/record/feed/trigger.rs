@@ -39,6 +39,17 @@ impl UserSignal {
     }
 }
 
+/// The end of a part of the recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PartEnd {
+    /// No other part continues it.
+    Last,
+    /// The next part continues it.
+    Continued,
+    /// The next part continues it, and the memory of the black box is full after an event.
+    Full,
+}
+
 /// Decides when the black box is written, and why.
 #[derive(Debug)]
 pub(crate) struct Trigger {
@@ -165,21 +176,19 @@ impl Trigger {
         })
     }
 
-    /// Ends a part of the recording, which the next one may continue. Returns its reason, and the treatment
-    /// of the part.
+    /// Ends a part of the recording. Returns its reason, and the treatment of the part.
     pub(crate) fn end_part(
         &mut self,
         stop_reason: String,
-        is_continued: bool,
-        is_full: bool,
+        end: PartEnd,
         now_ns: u64,
     ) -> (String, FileEnd) {
-        let is_written = !is_continued || is_full || self.is_due(now_ns);
+        let is_written = end != PartEnd::Continued || self.is_due(now_ns);
         match self.events.take_if(|_| is_written) {
             Some(events) => (events.reason(), FileEnd::Write),
             None if self.events.is_some() => (stop_reason, FileEnd::KeepAll),
-            None if is_continued => (stop_reason, FileEnd::Keep),
-            None => (stop_reason, FileEnd::Drop),
+            None if end == PartEnd::Last => (stop_reason, FileEnd::Drop),
+            None => (stop_reason, FileEnd::Keep),
         }
     }
 }
@@ -227,14 +236,14 @@ mod tests {
         trigger.poll_signal(0);
         trigger.poll_signal(0);
         assert_eq!(
-            trigger.end_part("split".to_owned(), false, false, 0).0,
+            trigger.end_part("split".to_owned(), PartEnd::Last, 0).0,
             "mark 'slips' at step 7, 2 tears from step 8 on, frozen particle at step 9, SIGUSR1"
         );
         for _ in 0..MARKS_MAX + 3 {
             trigger.watch(&mark(Ok(())), 0);
         }
         trigger.watch(&tear(8), 0);
-        let reason = trigger.end_part("split".to_owned(), false, false, 0).0;
+        let reason = trigger.end_part("split".to_owned(), PartEnd::Last, 0).0;
         assert!(
             reason.ends_with("mark 'slips' at step 7, 3 more marks, tear at step 8"),
             "{reason}"
@@ -245,7 +254,7 @@ mod tests {
     fn a_file_ends_a_second_after_the_last_event_and_within_the_span_of_the_first() {
         let mut trigger = trigger();
         let end = |trigger: &mut Trigger, now_ns| {
-            trigger.end_part("split".to_owned(), true, false, now_ns).1
+            trigger.end_part("split".to_owned(), PartEnd::Continued, now_ns).1
         };
         assert_eq!(end(&mut trigger, SECOND_NS), FileEnd::Keep);
         trigger.watch(&tear(1), SECOND_NS);
@@ -265,7 +274,7 @@ mod tests {
     #[test]
     fn a_part_that_no_other_continues_is_written_only_after_an_event() {
         let mut trigger = trigger();
-        let end = |trigger: &mut Trigger| trigger.end_part("signal".to_owned(), false, false, 0);
+        let end = |trigger: &mut Trigger| trigger.end_part("signal".to_owned(), PartEnd::Last, 0);
         assert_eq!(end(&mut trigger), ("signal".to_owned(), FileEnd::Drop));
         trigger.watch(&tear(4), 0);
         assert_eq!(end(&mut trigger), ("tear at step 4".to_owned(), FileEnd::Write));
