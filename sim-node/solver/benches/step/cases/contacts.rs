@@ -105,11 +105,11 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
 fn measure(case: String, fall: &Fall, rates: (u32, u32)) -> Contacts {
     let mut solvers = ["off", "particles"].map(|mode| Solver::new(&fall.scene(rates, mode)));
     let mut times_ns = [Vec::new(), Vec::new()];
-    let step_at = |seconds: f64| (seconds * f64::from(rates.0)) as u32;
-    for step in 0..step_at(fall.to_s) {
+    let time_s = |step: u32| f64::from(step) / f64::from(rates.0);
+    for step in (0..).take_while(|step| time_s(*step) < fall.to_s) {
         for (solver, times_ns) in solvers.iter_mut().zip(&mut times_ns) {
             let time_ns = wall_ns(|| solver.step());
-            if step >= step_at(fall.from_s) {
+            if time_s(step) >= fall.from_s {
                 times_ns.push(time_ns);
             }
         }
