@@ -36,7 +36,7 @@ pub struct SimulationResult {
     pub applied_count: u64,
     /// Number of rejected commands.
     pub rejected_count: u64,
-    /// The first rejected commands, at most [`REJECTIONS_SHOWN_MAX`].
+    /// The first rejected commands, at most 5.
     pub rejections: Vec<Outcome>,
 }
 
