@@ -122,8 +122,8 @@ fn the_iceoryx2_python_package_reads_particles_tears_and_parameters() {
     assert_eq!(read["new_tears"], 1);
     // Gravity is the first parameter, and a vector has form 2.
     assert_eq!(read["parameters"][0], json!([0, 0, 2, [0.0, -1.5, 0.0]]));
-    // 13 parameters have one value, and two have one for each of the four constraint kinds.
-    assert_eq!(read["parameters"].as_array().map(Vec::len), Some(13 + 2 * 4));
+    // 16 parameters have one value, and two have one for each of the four constraint kinds.
+    assert_eq!(read["parameters"].as_array().map(Vec::len), Some(16 + 2 * 4));
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let snapshot = client.next_snapshot(DEADLINE).unwrap().unwrap();
     for (index, position) in read["first"].as_array().unwrap().iter().enumerate() {
