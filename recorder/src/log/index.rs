@@ -19,7 +19,7 @@ use mcap::records::{Record, op};
 use sim_contract::Stop;
 
 use super::encoding::channel::TopicChannel;
-use super::read::decode::{LoggedMessage, decode_message};
+use super::read::decode::{LoggedMessage, MessageDecoder};
 use super::read::file_source::check_stop;
 use super::read::limits::SizeLimits;
 use super::read::open::open_regular_file;
@@ -234,6 +234,7 @@ impl IndexedLog {
         let (channels, run, limits) = (&mut self.channels, &self.run, &self.limits);
         let memory_max = limits.decoded_size_bytes_max();
         let mut memory = 0;
+        let mut decoder = MessageDecoder { run, limits, spare: &mut Vec::new() };
         let mut messages = Vec::new();
         while let Some(message) = records.next(|record, _| match record {
             Record::Channel(channel) => {
@@ -247,7 +248,7 @@ impl IndexedLog {
                 let (topic, byte) = (channel.topic.name(), offset + size_bytes);
                 let sequence = header.sequence;
                 let malformed = |what| ReadError::Malformed { topic, sequence, byte, what };
-                decode_message(channel, &header, &data, run, limits).map_err(malformed)
+                decoder.decode(channel, &header, &data).map_err(malformed)
             }
             _ => Ok(None),
         })? {

@@ -1,13 +1,12 @@
 //! Writes a recording: append-only, in complete chunks, and nothing after the first error.
 
+mod sink;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::records::{AttachmentHeader, MessageHeader, Metadata};
-use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
 use sim_contract::explain_write_error;
 
@@ -19,6 +18,7 @@ use super::run::{
     header_library,
 };
 use super::topic::{AllCounts, Topic};
+use sink::{ChunkSink, SinkHandle};
 
 /// Bytes of an attachment to copy at a time.
 const COPY_SIZE_BYTES: usize = 1 << 18;
@@ -90,24 +90,6 @@ impl From<serde_json::Error> for WriteError {
     }
 }
 
-/// A sink that counts the bytes that it accepts.
-struct Counted<W> {
-    out: W,
-    size_bytes: Arc<AtomicU64>,
-}
-
-impl<W: Write> Write for Counted<W> {
-    fn write(&mut self, data: &[u8]) -> io::Result<usize> {
-        let count = self.out.write(data)?;
-        self.size_bytes.fetch_add(count as u64, Ordering::Relaxed);
-        Ok(count)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
-    }
-}
-
 /// Writes one recording.
 ///
 /// The first error is final: the file stays readable up to it, while a file that continued after
@@ -115,9 +97,8 @@ impl<W: Write> Write for Counted<W> {
 /// leaves a file without an end, as a killed process does.
 pub struct LogWriter<W: Write> {
     /// `None` after an error.
-    file: Option<Writer<NoSeek<Counted<W>>>>,
-    /// Bytes that the sink has accepted.
-    size_bytes: Arc<AtomicU64>,
+    file: Option<Writer<ChunkSink<W>>>,
+    sink: SinkHandle,
     run: RunDescription,
     /// Channel of each topic, in the order of [`Topic::ALL`].
     channels: [u16; Topic::ALL.len()],
@@ -143,9 +124,9 @@ impl<W: Write> LogWriter<W> {
         scene: &[u8],
         log_time_ns: u64,
     ) -> Result<Self, WriteError> {
-        let size_bytes = Arc::new(AtomicU64::new(0));
-        let out = Counted { out, size_bytes: Arc::clone(&size_bytes) };
-        let mut file = write_options(options).create(NoSeek::new(out))?;
+        let out = ChunkSink::new(out);
+        let sink = out.handle();
+        let mut file = write_options(options).create(out)?;
         let selected = write_selection(&mut file, &options.selection);
         match selected.and_then(|()| write_header(&mut file, run, scene, log_time_ns)) {
             Ok(channels) => {
@@ -153,7 +134,7 @@ impl<W: Write> LogWriter<W> {
                 counts[Topic::Tf].written = 1;
                 Ok(Self {
                     file: Some(file),
-                    size_bytes,
+                    sink,
                     run: run.clone(),
                     channels,
                     encoder: MessageEncoder::default(),
@@ -183,20 +164,29 @@ impl<W: Write> LogWriter<W> {
         self.count_written(message.topic(), result)
     }
 
-    /// Appends the particles of a snapshot, like [`LogWriter::write`], but copies them once less.
+    /// Appends the particles of a snapshot, like [`LogWriter::write`], but copies them at most once.
+    /// [`LogWriter::take_spare`] returns the buffer when it is written.
     ///
     /// # Errors
     /// If this or an earlier call failed.
     pub fn write_particles(
         &mut self,
         step: u64,
-        particles: &mut ParticleBuffer,
+        mut particles: ParticleBuffer,
         log_time_ns: u64,
     ) -> Result<(), WriteError> {
         let header = self.message_header(Topic::Particles, step, log_time_ns);
         let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
-        let result = file.write_to_known_channel(&header, particles.message(header.publish_time));
+        particles.encode_head(header.publish_time);
+        let result = self
+            .sink
+            .write_message(particles, |message| file.write_to_known_channel(&header, message));
         self.count_written(Topic::Particles, result)
+    }
+
+    /// Returns a buffer that is written, for the next particles.
+    pub fn take_spare(&mut self) -> Option<ParticleBuffer> {
+        self.sink.take_spare()
     }
 
     fn message_header(&mut self, topic: Topic, step: u64, log_time_ns: u64) -> MessageHeader {
@@ -259,8 +249,13 @@ impl<W: Write> LogWriter<W> {
             name: name.to_owned(),
             media_type: "application/octet-stream".to_owned(),
         };
+        // The open chunk is passed on whole.
+        self.flush()?;
         let file = self.file.as_mut().ok_or(WriteError::Stopped)?;
-        match copy_attachment(file, size_bytes, header, content) {
+        self.sink.begin_attachment();
+        let copied = copy_attachment(file, size_bytes, header, content);
+        self.sink.end_attachment();
+        match copied {
             Ok(()) => Ok(()),
             Err(error) => {
                 self.abandon();
@@ -269,9 +264,9 @@ impl<W: Write> LogWriter<W> {
         }
     }
 
-    /// Returns the size of the file so far, in bytes. The open chunk is not part of it.
+    /// Returns the size of the file so far, in bytes, with what compression has returned of the open chunk.
     pub fn size_bytes(&self) -> u64 {
-        self.size_bytes.load(Ordering::Relaxed)
+        self.sink.size_bytes()
     }
 
     /// Closes the open chunk and writes everything to the operating system, so that it outlives
@@ -294,7 +289,7 @@ impl<W: Write> LogWriter<W> {
         let result = file.write_metadata(&metadata).and_then(|()| file.finish().map(drop));
         self.stop_on_error(result)?;
         let file = self.file.take().ok_or(WriteError::Stopped)?;
-        let mut out = file.into_inner().into_inner().out;
+        let mut out = file.into_inner().into_inner();
         out.flush()?;
         Ok(out)
     }
@@ -338,8 +333,6 @@ fn write_options(options: LogOptions) -> WriteOptions {
     WriteOptions::new()
         .profile("")
         .library(header_library(env!("CARGO_PKG_VERSION")) + mcap::LIBRARY_IDENTIFIER)
-        // Chunks are written completely or not at all, so every reader understands the file.
-        .disable_seeking(true)
         .chunk_size(Some(options.chunk_size_bytes))
         .compression(compression)
         .compression_level(level)
@@ -349,7 +342,7 @@ fn write_options(options: LogOptions) -> WriteOptions {
 
 /// Declares what is left out. Nothing declares that everything is recorded.
 fn write_selection<W: Write>(
-    file: &mut Writer<NoSeek<Counted<W>>>,
+    file: &mut Writer<ChunkSink<W>>,
     selection: &ContentSelection,
 ) -> Result<(), WriteError> {
     if selection.is_everything() {
@@ -360,7 +353,7 @@ fn write_selection<W: Write>(
 }
 
 fn write_header<W: Write>(
-    file: &mut Writer<NoSeek<Counted<W>>>,
+    file: &mut Writer<ChunkSink<W>>,
     run: &RunDescription,
     scene: &[u8],
     log_time_ns: u64,
@@ -385,7 +378,7 @@ fn write_header<W: Write>(
 }
 
 fn copy_attachment<W: Write>(
-    file: &mut Writer<NoSeek<Counted<W>>>,
+    file: &mut Writer<ChunkSink<W>>,
     size_bytes: u64,
     header: AttachmentHeader,
     mut content: impl Read,
@@ -407,10 +400,7 @@ fn copy_attachment<W: Write>(
     Ok(file.finish_attachment()?)
 }
 
-fn add_channel<W: Write>(
-    file: &mut Writer<NoSeek<Counted<W>>>,
-    topic: Topic,
-) -> mcap::McapResult<u16> {
+fn add_channel<W: Write>(file: &mut Writer<ChunkSink<W>>, topic: Topic) -> mcap::McapResult<u16> {
     let TopicFormat { encoding, schema } = TopicFormat::for_topic(topic);
     let schema_id = file.add_schema(schema.name, schema.encoding, &schema.data)?;
     file.add_channel(schema_id, topic.name(), encoding, &BTreeMap::new())

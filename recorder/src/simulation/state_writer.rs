@@ -3,8 +3,8 @@
 use std::io::Write;
 
 use crate::log::{
-    CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, ParticleBuffer, RunDescription,
-    StepRow, SurfaceRow, TopologyRow, WriteError, constraint_state,
+    CollidersRow, LogWriter, Message, OutcomeRow, ParametersRow, RunDescription, StepRow,
+    SurfaceRow, TopologyRow, WriteError, constraint_state,
 };
 use sim_contract::{LoadHeader, ParameterValues, ParticleState, Triangle};
 use sim_solver::Solver;
@@ -34,7 +34,6 @@ pub(super) struct StateWriter<'a, W: Write> {
     /// The last written values.
     parameters: Option<ParameterValues>,
     frozen: FrozenTracker,
-    particles: ParticleBuffer,
 }
 
 impl<'a, W: Write> StateWriter<'a, W> {
@@ -64,7 +63,6 @@ impl<'a, W: Write> StateWriter<'a, W> {
             colliders: CollidersRow { step: 0, colliders: Vec::new() },
             parameters: None,
             frozen: FrozenTracker::default(),
-            particles: ParticleBuffer::default(),
         })
     }
 
@@ -130,8 +128,9 @@ impl<'a, W: Write> StateWriter<'a, W> {
             self.log.write(&Message::Event(row), time_ns)?;
         }
         self.log.write(&Message::Step(self.row(solver, step)), time_ns)?;
-        self.particles.copy_from(particles);
-        self.log.write_particles(step, &mut self.particles, time_ns)
+        let mut buffer = self.log.take_spare().unwrap_or_default();
+        buffer.copy_from(particles);
+        self.log.write_particles(step, buffer, time_ns)
     }
 
     fn row(&self, solver: &Solver, step: u64) -> StepRow {

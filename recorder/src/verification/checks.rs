@@ -148,14 +148,25 @@ impl Verification {
                 self.coverage.last_step = Some(self.range.last);
                 return Ok(None);
             }
-            let finding = self.check_content(&frame, frozen);
-            if finding != SnapshotFinding::Identical {
-                return Ok(Some((step, finding)));
-            }
-            if let Some(finding) = self.check_state(&frame, stop)? {
+            let finding = self.check(&frame, frozen, stop)?;
+            self.frames.give_back(frame);
+            if let Some(finding) = finding {
                 return Ok(Some((step, finding)));
             }
             self.coverage.skipped_count += 1;
+        }
+    }
+
+    /// Returns the finding for a snapshot, or `None` before the first keyframe.
+    fn check(
+        &mut self,
+        frame: &Frame,
+        frozen: Option<FrozenParticles>,
+        stop: &AtomicBool,
+    ) -> Result<Option<SnapshotFinding>, ResimulationError> {
+        match self.check_content(frame, frozen) {
+            SnapshotFinding::Identical => self.check_state(frame, stop),
+            finding => Ok(Some(finding)),
         }
     }
 

@@ -1,9 +1,11 @@
 //! Reads a recording on a thread of its own, while another thread simulates.
 
 use std::io::{self, Read};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::{Builder, Scope};
 use std::vec;
+
+use sim_contract::ParticleState;
 
 use crate::log::{
     AuditDifference, Closing, Frame, FrameReader, LogEnd, LogReader, ReadError, Topic,
@@ -14,8 +16,8 @@ use crate::simulation::frozen::FrozenParticles;
 /// Size at which a batch is passed on, in bytes. Handing over a batch takes some microseconds, which is
 /// longer than a step of a small scene.
 const BATCH_SIZE_BYTES: usize = 1 << 18;
-/// Most batches that wait. Two cover a chunk of 1 MiB together with those that the threads work on.
-const BATCHES_MAX: usize = 2;
+/// Most batches that wait: enough for the snapshots of a chunk of 1 MiB, which are decompressed at once.
+const BATCHES_MAX: usize = 8;
 
 /// A snapshot and what the reading thread has found in it.
 #[derive(Debug)]
@@ -69,6 +71,8 @@ type Reading = (Result<Option<ReadFrame>, ReadError>, Seen);
 pub(super) struct ReadAhead {
     batches: Receiver<Vec<Reading>>,
     batch: vec::IntoIter<Reading>,
+    /// Takes the memory of particles back. To allocate it for each snapshot would take longer than to read it.
+    spare: Sender<Vec<ParticleState>>,
     /// As of the last snapshot that [`Self::next_frame`] has returned, or of the header.
     pub(super) seen: Seen,
 }
@@ -82,9 +86,10 @@ impl ReadAhead {
         let frames = FrameReader::new(log);
         let seen = Seen::new(&frames);
         let (sender, batches) = sync_channel(BATCHES_MAX);
+        let (spare, spares) = channel();
         let thread = Builder::new().name("read".to_owned());
-        thread.spawn_scoped(threads, move || read_all(frames, &sender))?;
-        Ok(Self { batches, batch: Vec::new().into_iter(), seen })
+        thread.spawn_scoped(threads, move || read_all(frames, &sender, &spares))?;
+        Ok(Self { batches, batch: Vec::new().into_iter(), spare, seen })
     }
 
     /// Returns the next snapshot, or `None` at the end of the readable part.
@@ -100,14 +105,29 @@ impl ReadAhead {
         self.seen = seen;
         result
     }
+
+    /// Takes a snapshot that is no longer needed.
+    pub(super) fn give_back(&self, frame: Frame) {
+        if let Some(particles) = frame.particles {
+            // After the last batch, the thread has ended and needs no memory.
+            let _ended = self.spare.send(particles);
+        }
+    }
 }
 
 /// Reads up to the end of the file, or until nobody receives the batches.
-fn read_all<R: Read>(mut frames: FrameReader<R>, batches: &SyncSender<Vec<Reading>>) {
+fn read_all<R: Read>(
+    mut frames: FrameReader<R>,
+    batches: &SyncSender<Vec<Reading>>,
+    spares: &Receiver<Vec<ParticleState>>,
+) {
     let mut is_at_end = false;
     while !is_at_end {
         let mut batch = Vec::new();
         let mut size_bytes = 0;
+        for particles in spares.try_iter() {
+            frames.add_spare(particles);
+        }
         while size_bytes < BATCH_SIZE_BYTES && !is_at_end {
             let result = frames.next_frame();
             is_at_end = !matches!(result, Ok(Some(_)));

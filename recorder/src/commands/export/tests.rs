@@ -170,12 +170,14 @@ fn the_frames_of_an_animation_are_the_pictures() {
     let expected_ms =
         [20.0, 3.0].map(|steps| 2.0 * 1000.0 * steps / rate_hz).into_iter().chain([20.0]);
     let mut shown = vec![0; reader.output_buffer_size().unwrap()];
+    let mut stored_sizes = Vec::new();
     for (picture, expected_ms) in pictures(&file, &[0, 20, 23], STYLE).into_iter().zip(expected_ms)
     {
         let mut part = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut part).unwrap();
         let delay = reader.info().frame_control().unwrap();
         let (row_bytes, part_bytes) = (3 * STYLE.size.width as usize, 3 * delay.width as usize);
+        stored_sizes.push(delay.width * delay.height);
         let first = delay.y_offset as usize * row_bytes + delay.x_offset as usize * 3;
         for (row, pixels) in part.chunks_exact(part_bytes).take(delay.height as usize).enumerate() {
             shown[first + row * row_bytes..][..part_bytes].copy_from_slice(pixels);
@@ -191,6 +193,8 @@ fn the_frames_of_an_animation_are_the_pictures() {
         let is_near = |(shown, exact): (&u8, &u8)| shown.abs_diff(*exact) <= 7;
         assert!(shown.len() == rgb.len() && shown.iter().zip(&rgb).all(is_near));
     }
+    let [first, later @ ..] = stored_sizes.as_slice() else { panic!("no frame") };
+    assert!(later.iter().all(|size| size < first), "{stored_sizes:?}: only what changes is stored");
 }
 
 /// Four particles in a square, two triangles with the edges 0-1, 1-2, 2-0 and 1-3, 3-2, and a

@@ -9,6 +9,11 @@ use sim_contract::Action;
 
 use super::load::RunHeader;
 
+/// Bytes that wake the writing thread before its time: those of a chunk. To wake it for each snapshot takes
+/// longer than to write a small one.
+const WAKE_SIZE_BYTES: usize = 1 << 20;
+/// The part of the limit that wakes the writing thread, if that is less.
+const WAKE_PART: usize = 4;
 /// Most spare buffers. More are in use only while the disk is slow, and their memory is then given back.
 const SPARE_BUFFERS_MAX: usize = 8;
 
@@ -60,9 +65,14 @@ pub(crate) enum FileEnd {
 /// An entry of the queue: the start of a file, a content, or the end of a file.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "nearly every entry is an item")]
-enum Entry {
-    Begin { header: Box<RunHeader>, log_time_ns: u64 },
+pub(crate) enum Entry {
+    /// A file begins.
+    Begin {
+        header: Box<RunHeader>,
+        log_time_ns: u64,
+    },
     Item(Item),
+    /// The file ends.
     End(Box<Closing>, FileEnd),
 }
 
@@ -93,24 +103,6 @@ struct State {
     /// Messages of the newest file that were dropped.
     lost: AllCounts,
     is_closed: bool,
-}
-
-/// The result of [`Queue::pop`].
-#[derive(Debug, PartialEq)]
-#[allow(clippy::large_enum_variant, reason = "moved once; a box for each item would cost more")]
-pub(crate) enum Popped {
-    /// A file begins.
-    Begin {
-        header: Box<RunHeader>,
-        log_time_ns: u64,
-    },
-    Item(Item),
-    /// The file ends.
-    End(Box<Closing>, FileEnd),
-    /// No item arrived before the timeout.
-    Timeout,
-    /// The queue is closed and empty.
-    Closed,
 }
 
 impl Queue {
@@ -149,9 +141,13 @@ impl Queue {
         }
         state.is_beginning &= item.content.snapshot_step().is_none();
         state.add_to_backlog(&item.content);
+        let was_idle = state.size_bytes < self.wake_size_bytes();
         state.push(Entry::Item(item));
+        let is_due = was_idle && state.size_bytes >= self.wake_size_bytes();
         drop(state);
-        self.changed.notify_one();
+        if is_due {
+            self.changed.notify_one();
+        }
     }
 
     /// Ends the file, and adds the numbers of its dropped messages to its end.
@@ -160,8 +156,6 @@ impl Queue {
         closing.counts.set_lost(&std::mem::take(&mut state.lost));
         state.is_beginning = false;
         state.push(Entry::End(Box::new(closing), end));
-        drop(state);
-        self.changed.notify_one();
     }
 
     /// Returns the numbers of dropped messages of the newest file.
@@ -198,20 +192,27 @@ impl Queue {
         self.lock().is_closed
     }
 
-    /// Returns the next item. Waits for one at most `timeout`.
-    pub(crate) fn pop(&self, timeout: Duration) -> Popped {
-        let is_idle = |state: &mut State| state.entries.is_empty() && !state.is_closed;
+    /// Waits until there is enough to write, at most `timeout`. Returns the number of entries, or `None` when
+    /// the queue is closed and empty.
+    pub(crate) fn wait(&self, timeout: Duration) -> Option<usize> {
+        let is_idle =
+            |state: &mut State| state.size_bytes < self.wake_size_bytes() && !state.is_closed;
         let waited = self.changed.wait_timeout_while(self.lock(), timeout, is_idle);
-        let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        let count = state.entries.len();
+        (count > 0 || !state.is_closed).then_some(count)
+    }
+
+    /// Returns the next entry, if there is one.
+    pub(crate) fn pop(&self) -> Option<Entry> {
+        let mut state = self.lock();
         let entry = state.entries.pop_front();
         state.size_bytes -= entry.as_ref().map_or(0, Entry::size_bytes);
-        match entry {
-            Some(Entry::Begin { header, log_time_ns }) => Popped::Begin { header, log_time_ns },
-            Some(Entry::Item(item)) => Popped::Item(item),
-            Some(Entry::End(closing, end)) => Popped::End(closing, end),
-            None if state.is_closed => Popped::Closed,
-            None => Popped::Timeout,
-        }
+        entry
+    }
+
+    fn wake_size_bytes(&self) -> usize {
+        WAKE_SIZE_BYTES.min(self.limit_bytes / WAKE_PART)
     }
 
     /// Locks the state. A panic of the other thread cannot leave it inconsistent.
@@ -312,8 +313,8 @@ mod tests {
     }
 
     fn pop_steps(queue: &Queue) -> Vec<u64> {
-        let next = || match queue.pop(Duration::ZERO) {
-            Popped::Item(item) => Some(item.log_time_ns),
+        let next = || match queue.pop() {
+            Some(Entry::Item(item)) => Some(item.log_time_ns),
             _ => None,
         };
         std::iter::from_fn(next).collect()
@@ -358,13 +359,27 @@ mod tests {
     }
 
     #[test]
+    fn the_queue_wakes_for_a_chunk_and_for_a_part_of_a_small_limit() {
+        for (limit_bytes, wakes_at) in [(100 << 20, 33), (1 << 20, 9)] {
+            let queue = Queue::new(limit_bytes);
+            for step in 0..wakes_at {
+                queue.push(snapshot(step));
+                let is_due = queue.lock().size_bytes >= queue.wake_size_bytes();
+                assert_eq!(is_due, step + 1 == wakes_at);
+            }
+            assert_eq!(queue.wait(Duration::MAX), usize::try_from(wakes_at).ok());
+        }
+    }
+
+    #[test]
     fn a_closed_queue_returns_its_items_and_accepts_no_more() {
         let queue = Queue::new(100_000);
         queue.push(snapshot(1));
         queue.close();
         queue.push(snapshot(2));
-        assert!(matches!(queue.pop(Duration::ZERO), Popped::Item(_)));
-        assert_eq!(queue.pop(Duration::ZERO), Popped::Closed);
+        assert_eq!(queue.wait(Duration::MAX), Some(1));
+        assert!(matches!(queue.pop(), Some(Entry::Item(_))));
+        assert_eq!((queue.pop(), queue.wait(Duration::MAX)), (None, None));
         assert_eq!(queue.lock().lost[Topic::Particles].lost, 1);
     }
 }

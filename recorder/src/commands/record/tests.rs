@@ -11,7 +11,7 @@ use recorder::{
 use sim_contract::{Action, Command, Outcome, ParticleState};
 
 use super::load::RunHeader;
-use super::queue::{Content, FileEnd, Item, Popped};
+use super::queue::{Content, Entry, FileEnd, Item};
 use super::writing::write_item;
 use super::*;
 
@@ -100,14 +100,16 @@ fn begun_queue(limit_bytes: usize) -> Queue {
 /// Writes one file of the queue. Returns it unfinished, and its end.
 fn write<W: Write>(queue: &Queue, mut log: LogWriter<W>) -> (LogWriter<W>, Closing) {
     loop {
-        match queue.pop(WAIT_MAX) {
-            Popped::Item(item) => _ = write_item(&mut log, item).unwrap(),
-            Popped::End(mut closing, _) => {
-                closing.counts.set_written(log.counts());
-                return (log, *closing);
+        queue.wait(WAIT_MAX).expect("it is closed without an end");
+        while let Some(entry) = queue.pop() {
+            match entry {
+                Entry::Item(item) => write_item(&mut log, item).unwrap(),
+                Entry::End(mut closing, _) => {
+                    closing.counts.set_written(log.counts());
+                    return (log, *closing);
+                }
+                Entry::Begin { .. } => {}
             }
-            Popped::Begin { .. } | Popped::Timeout => {}
-            Popped::Closed => panic!("closed without an end"),
         }
     }
 }

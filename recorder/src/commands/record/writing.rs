@@ -19,7 +19,7 @@ use rustix::fs::statvfs;
 use sim_contract::clock::monotonic_ns;
 
 use super::load::RunHeader;
-use super::queue::{Content, FileEnd, Item, Popped, Queue};
+use super::queue::{Content, Entry, FileEnd, Item, Queue};
 use super::report::Written;
 use super::split::{Ring, WritePosition};
 use crate::cli::file_args::{FileArgs, LogFile};
@@ -28,7 +28,7 @@ use black_box::{BlackBox, KeptFile};
 use extras::Extras;
 use names::FileNames;
 
-/// Longest wait for an item before the next check whether a flush is due.
+/// Longest time that an item waits for others, which are written together.
 const WAIT_MAX: Duration = Duration::from_millis(50);
 
 /// The writing of files.
@@ -119,22 +119,33 @@ impl Files {
         let interval_ns = u64::try_from(interval_ns).unwrap_or(u64::MAX);
         let mut next_flush_ns = monotonic_ns().saturating_add(interval_ns);
         loop {
-            match queue.pop(WAIT_MAX) {
-                Popped::Begin { header, log_time_ns } => self.on_begin(header, log_time_ns)?,
-                Popped::Item(item) => {
-                    if let Some(buffer) = self.on_item(item)? {
-                        queue.add_spare(buffer);
-                    }
-                }
-                Popped::End(closing, end) => self.on_end(*closing, end)?,
-                Popped::Timeout => {}
-                Popped::Closed => return Ok(()),
+            let until_flush = next_flush_ns.saturating_sub(monotonic_ns());
+            let Some(count) = queue.wait(WAIT_MAX.min(Duration::from_nanos(until_flush))) else {
+                return Ok(());
+            };
+            for entry in std::iter::from_fn(|| queue.pop()).take(count) {
+                self.on_entry(entry, queue)?;
             }
+            // After everything that waited, so that all of it is flushed.
             let now_ns = monotonic_ns();
             if now_ns >= next_flush_ns {
                 next_flush_ns = now_ns.saturating_add(interval_ns);
                 self.flush()?;
             }
+        }
+    }
+
+    fn on_entry(&mut self, entry: Entry, queue: &Queue) -> anyhow::Result<()> {
+        match entry {
+            Entry::Begin { header, log_time_ns } => self.on_begin(header, log_time_ns),
+            Entry::Item(item) => {
+                self.on_item(item)?;
+                while let Some(buffer) = self.take_spare() {
+                    queue.add_spare(buffer);
+                }
+                Ok(())
+            }
+            Entry::End(closing, end) => self.on_end(*closing, end),
         }
     }
 
@@ -147,11 +158,15 @@ impl Files {
     }
 
     /// Returns the buffer of a snapshot that is written.
-    fn on_item(&mut self, item: Item) -> anyhow::Result<Option<ParticleBuffer>> {
+    fn take_spare(&mut self) -> Option<ParticleBuffer> {
+        self.open.as_mut().and_then(|open| open.log.take_spare())
+    }
+
+    fn on_item(&mut self, item: Item) -> anyhow::Result<()> {
         let Some(black_box) = &mut self.options.black_box else { return self.write(item) };
         black_box.push(item);
         self.position.set(self.next_number, black_box.size_bytes() as u64);
-        Ok(None)
+        Ok(())
     }
 
     fn on_end(&mut self, closing: Closing, end: FileEnd) -> anyhow::Result<()> {
@@ -162,7 +177,7 @@ impl Files {
     /// Writes a file of the black box.
     fn write_kept(&mut self, file: KeptFile) -> anyhow::Result<()> {
         self.begin(&file.header, file.log_time_ns)?;
-        file.items.into_iter().try_for_each(|item| self.write(item).map(drop))?;
+        file.items.into_iter().try_for_each(|item| self.write(item))?;
         self.finish(file.closing)
     }
 
@@ -215,22 +230,22 @@ impl Files {
         Ok(())
     }
 
-    /// Returns the buffer of a snapshot.
-    fn write(&mut self, item: Item) -> anyhow::Result<Option<ParticleBuffer>> {
-        let Some(open) = &mut self.open else { return Ok(None) };
+    fn write(&mut self, item: Item) -> anyhow::Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
         if let Content::Snapshot(row, _) | Content::Update(Message::Step(row)) = &item.content {
             open.steps = Some((open.steps.map_or(row.step, |(first, _)| first), row.step));
         }
-        let buffer = write_item(&mut open.log, item);
-        let buffer = buffer.with_context(|| incomplete(&open.part_path))?;
+        write_item(&mut open.log, item).with_context(|| incomplete(&open.part_path))?;
         self.position.set(open.number, open.log.size_bytes());
-        Ok(buffer)
+        Ok(())
     }
 
     fn flush(&mut self) -> anyhow::Result<()> {
         self.free_space()?;
         let Some(open) = &mut self.open else { return Ok(()) };
-        open.log.flush().with_context(|| incomplete(&open.part_path))
+        open.log.flush().with_context(|| incomplete(&open.part_path))?;
+        self.position.set(open.number, open.log.size_bytes());
+        Ok(())
     }
 
     /// Writes the end of the file, and gives it its name.
@@ -275,18 +290,14 @@ fn incomplete(part_path: &Path) -> String {
     format!("the recording is incomplete; its readable part is {}", output::path_text(part_path))
 }
 
-/// Writes the messages of an item. Returns the buffer of a snapshot.
-pub(super) fn write_item<W: Write>(
-    log: &mut LogWriter<W>,
-    item: Item,
-) -> Result<Option<ParticleBuffer>, WriteError> {
+/// Writes the messages of an item.
+pub(super) fn write_item<W: Write>(log: &mut LogWriter<W>, item: Item) -> Result<(), WriteError> {
     let Item { content, log_time_ns } = item;
     match content {
-        Content::Update(message) => log.write(&message, log_time_ns).map(|()| None),
-        Content::Snapshot(row, mut buffer) => {
+        Content::Update(message) => log.write(&message, log_time_ns),
+        Content::Snapshot(row, buffer) => {
             log.write(&Message::Step(row), log_time_ns)?;
-            log.write_particles(row.step, &mut buffer, log_time_ns)?;
-            Ok(Some(buffer))
+            log.write_particles(row.step, buffer, log_time_ns)
         }
     }
 }

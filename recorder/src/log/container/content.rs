@@ -12,7 +12,7 @@ use crate::log::encoding::channel::TopicChannel;
 use crate::log::encoding::particle_bytes;
 use crate::log::message::Message;
 use crate::log::read::audit::is_current_format;
-use crate::log::read::decode::decode_message;
+use crate::log::read::decode::MessageDecoder;
 use crate::log::read::gaps::GapCounter;
 use crate::log::read::limits::SizeLimits;
 use crate::log::read::read_error::ReadError;
@@ -197,7 +197,9 @@ impl ContentCheck {
         header: &MessageHeader,
         data: &[u8],
     ) -> Result<Sound, String> {
-        let logged = decode_message(channel, header, data, &self.run, &self.limits)?;
+        let mut decoder =
+            MessageDecoder { run: &self.run, limits: &self.limits, spare: &mut Vec::new() };
+        let logged = decoder.decode(channel, header, data)?;
         let Some(logged) = logged else { return Ok(Sound::Other) };
         let message = logged.message;
         self.check_time(header, message.step())?;

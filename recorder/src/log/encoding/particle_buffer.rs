@@ -29,20 +29,32 @@ impl ParticleBuffer {
         self.states.get(HEAD_ROOM..).unwrap_or_default()
     }
 
-    /// Returns the message on `/particles`. `time_ns` is the time of its step, in nanoseconds since 1970.
-    pub(in crate::log) fn message(&mut self, time_ns: u64) -> &[u8] {
+    /// Puts the head of the message on `/particles` before the particles. `time_ns` is the time of its step,
+    /// in nanoseconds since 1970.
+    pub(in crate::log) fn encode_head(&mut self, time_ns: u64) {
         encode_cloud_head(
             time_ns,
             self.states.get(HEAD_ROOM..).unwrap_or_default(),
             &mut self.head,
         );
+        if !self.particles().is_empty() {
+            let (begin, end) = (self.head_begin(), HEAD_ROOM * size_of::<ParticleState>());
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.states);
+            bytes[begin..end].copy_from_slice(&self.head);
+        }
+    }
+
+    /// Returns the message, after [`ParticleBuffer::encode_head`].
+    pub(in crate::log) fn message(&self) -> &[u8] {
         if self.particles().is_empty() {
             return &self.head;
         }
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.states);
-        let begin = HEAD_ROOM * size_of::<ParticleState>() - self.head.len();
-        bytes[begin..][..self.head.len()].copy_from_slice(&self.head);
-        &bytes[begin..]
+        &bytemuck::cast_slice(&self.states)[self.head_begin()..]
+    }
+
+    /// Returns the place of the head, in bytes.
+    fn head_begin(&self) -> usize {
+        HEAD_ROOM * size_of::<ParticleState>() - self.head.len()
     }
 }
 
@@ -74,7 +86,8 @@ mod tests {
             buffer.copy_from(&particles);
             assert_eq!(buffer.particles(), particles);
             let mut encoder = MessageEncoder::default();
-            assert_eq!(buffer.message(time_ns), encoder.encode_particles(&particles, time_ns));
+            buffer.encode_head(time_ns);
+            assert_eq!(buffer.message(), encoder.encode_particles(&particles, time_ns));
             assert_eq!(buffer.particles(), particles, "the head overwrites none");
         }
     }

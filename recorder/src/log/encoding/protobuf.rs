@@ -159,10 +159,12 @@ pub(super) fn encode_cloud_head(time_ns: u64, particles: &[ParticleState], out: 
     }
 }
 
-/// Decodes the particles of a cloud that [`encode_cloud_head`] has begun.
-pub(crate) fn decode_particles(message: &[u8]) -> Result<Vec<ParticleState>, String> {
+/// Replaces `out` with the particles of a cloud that [`encode_cloud_head`] has begun.
+pub(crate) fn decode_particles(message: &[u8], out: &mut Vec<ParticleState>) -> Result<(), String> {
     let data = particle_bytes(message)?;
-    Ok(data.chunks_exact(size_of::<ParticleState>()).map(bytemuck::pod_read_unaligned).collect())
+    out.resize(data.len() / size_of::<ParticleState>(), ParticleState::default());
+    bytemuck::cast_slice_mut(out).copy_from_slice(data);
+    Ok(())
 }
 
 /// Returns the bytes of the particles of a cloud that [`encode_cloud_head`] has begun: 32 for each.
@@ -348,7 +350,8 @@ mod tests {
         assert_eq!(cloud.timestamp, Some(Timestamp { seconds: 12, nanos: 34 }));
         assert_eq!(cloud.frame_id, "world");
         assert_eq!(cloud.pose.and_then(|pose| pose.orientation).map(|q| q.w), Some(1.0));
-        let read = decode_particles(&message).unwrap();
+        let mut read = vec![ParticleState::default(); 7];
+        decode_particles(&message, &mut read).unwrap();
         assert_eq!(bytemuck::cast_slice::<_, u8>(&read), bytemuck::cast_slice::<_, u8>(&particles));
     }
 
@@ -412,8 +415,8 @@ mod tests {
     #[test]
     fn a_cloud_with_another_point_layout_is_refused() {
         let foreign = PointCloud { point_stride: 16, ..PointCloud::default() };
-        assert!(decode_particles(&foreign.encode_to_vec()).is_err());
+        assert!(decode_particles(&foreign.encode_to_vec(), &mut Vec::new()).is_err());
         let partial = PointCloud { data: vec![0; 33], ..empty_cloud() };
-        assert!(decode_particles(&partial.encode_to_vec()).is_err());
+        assert!(decode_particles(&partial.encode_to_vec(), &mut Vec::new()).is_err());
     }
 }

@@ -2,6 +2,7 @@
 
 use mcap::records::MessageHeader;
 use serde::de::DeserializeOwned;
+use sim_contract::ParticleState;
 
 use super::limits::SizeLimits;
 use crate::log::encoding::channel::{KeyframeForm, TopicChannel};
@@ -30,53 +31,68 @@ impl LoggedMessage {
     }
 }
 
-/// Decodes a message. Returns `None` for `/tf`, which no reader of ours needs. `Err` describes the
-/// error in the content.
-pub(in crate::log) fn decode_message(
-    channel: TopicChannel,
-    header: &MessageHeader,
-    data: &[u8],
-    run: &RunDescription,
-    limits: &SizeLimits,
-) -> Result<Option<LoggedMessage>, String> {
-    let TopicChannel { topic, keyframe_form } = channel;
-    let size_bytes_max = limits.message_size_bytes_max(topic);
-    if data.len() as u64 > size_bytes_max {
-        return Err(format!(
-            "it has {} bytes (allowed: up to {size_bytes_max} for its scene)",
-            data.len()
-        ));
-    }
-    let step =
-        || run.step_at(header.publish_time).ok_or("its time is not the time of a step".to_owned());
-    let message = match topic {
-        Topic::Tf => return Ok(None),
-        Topic::Topology => Message::Topology(row(data)?),
-        Topic::Surface => Message::Surface(row(data)?),
-        Topic::Colliders => Message::Colliders(row(data)?),
-        Topic::Tears => Message::Tears(row(data)?),
-        Topic::Parameters => Message::Parameters(row(data)?),
-        Topic::Outcomes => Message::Outcome(row(data)?),
-        Topic::Status => Message::Status(row(data)?),
-        Topic::Events => Message::Event(row(data)?),
-        Topic::Steps => Message::Step(row(data)?),
-        Topic::Keyframe => match keyframe_form {
-            KeyframeForm::Plain => Message::Keyframe { step: step()?, bytes: data.to_vec() },
-            KeyframeForm::Message => {
-                let (step, bytes) = decode_keyframe(data)?;
-                Message::Keyframe { step, bytes }
-            }
-        },
-        Topic::Particles => {
-            Message::Particles { step: step()?, particles: decode_particles(data)? }
+/// Decodes the messages of a recording.
+#[derive(Debug)]
+pub(in crate::log) struct MessageDecoder<'a> {
+    pub(in crate::log) run: &'a RunDescription,
+    pub(in crate::log) limits: &'a SizeLimits,
+    /// Memory for the particles of the next messages.
+    pub(in crate::log) spare: &'a mut Vec<Vec<ParticleState>>,
+}
+
+impl MessageDecoder<'_> {
+    /// Decodes a message. Returns `None` for `/tf`, which no reader of ours needs. `Err` describes the
+    /// error in the content.
+    pub(in crate::log) fn decode(
+        &mut self,
+        channel: TopicChannel,
+        header: &MessageHeader,
+        data: &[u8],
+    ) -> Result<Option<LoggedMessage>, String> {
+        let TopicChannel { topic, keyframe_form } = channel;
+        let size_bytes_max = self.limits.message_size_bytes_max(topic);
+        if data.len() as u64 > size_bytes_max {
+            return Err(format!(
+                "it has {} bytes (allowed: up to {size_bytes_max} for its scene)",
+                data.len()
+            ));
         }
-    };
-    Ok(Some(LoggedMessage {
-        message,
-        sequence: header.sequence,
-        log_time_ns: header.log_time,
-        publish_time_ns: header.publish_time,
-    }))
+        let step = || {
+            let step = self.run.step_at(header.publish_time);
+            step.ok_or("its time is not the time of a step".to_owned())
+        };
+        let message = match topic {
+            Topic::Tf => return Ok(None),
+            Topic::Topology => Message::Topology(row(data)?),
+            Topic::Surface => Message::Surface(row(data)?),
+            Topic::Colliders => Message::Colliders(row(data)?),
+            Topic::Tears => Message::Tears(row(data)?),
+            Topic::Parameters => Message::Parameters(row(data)?),
+            Topic::Outcomes => Message::Outcome(row(data)?),
+            Topic::Status => Message::Status(row(data)?),
+            Topic::Events => Message::Event(row(data)?),
+            Topic::Steps => Message::Step(row(data)?),
+            Topic::Keyframe => match keyframe_form {
+                KeyframeForm::Plain => Message::Keyframe { step: step()?, bytes: data.to_vec() },
+                KeyframeForm::Message => {
+                    let (step, bytes) = decode_keyframe(data)?;
+                    Message::Keyframe { step, bytes }
+                }
+            },
+            Topic::Particles => {
+                let step = step()?;
+                let mut particles = self.spare.pop().unwrap_or_default();
+                decode_particles(data, &mut particles)?;
+                Message::Particles { step, particles }
+            }
+        };
+        Ok(Some(LoggedMessage {
+            message,
+            sequence: header.sequence,
+            log_time_ns: header.log_time,
+            publish_time_ns: header.publish_time,
+        }))
+    }
 }
 
 fn row<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {

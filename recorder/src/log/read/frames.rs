@@ -118,6 +118,11 @@ impl<R: Read> FrameReader<R> {
         self.log.end()
     }
 
+    /// Takes the memory of particles that are no longer needed, for those of later snapshots.
+    pub(crate) fn add_spare(&mut self, particles: Vec<ParticleState>) {
+        self.log.add_spare(particles);
+    }
+
     /// Returns the next snapshot, or `None` at the end of the readable part.
     ///
     /// # Errors

@@ -5,10 +5,10 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use mcap::records::{AttachmentHeader, Header, MessageHeader, Record, op};
-use sim_contract::Stop;
+use sim_contract::{ParticleState, Stop, part_path};
 
 use super::audit::{Audit, HeaderText, is_current_format};
-use super::decode::{LoggedMessage, decode_message};
+use super::decode::{LoggedMessage, MessageDecoder};
 use super::file_source::FileSource;
 use super::limits::SizeLimits;
 use super::open::open_regular_file;
@@ -21,7 +21,6 @@ use crate::log::run::{
     SCENE_ATTACHMENT,
 };
 use crate::log::topic::Topic;
-use sim_contract::part_path;
 
 /// The entry of the metadata `run` that distinguishes our recordings from other MCAP files.
 const FORMAT_VERSION_KEY: &str = "format_version";
@@ -41,6 +40,8 @@ pub struct LogReader<R> {
     header: HeaderText,
     audit: Option<Box<Audit>>,
     transform_count: u64,
+    /// Memory for particles.
+    spare: Vec<Vec<ParticleState>>,
 }
 
 impl LogReader<FileSource> {
@@ -139,6 +140,7 @@ impl<R: Read> LogReader<R> {
                         header,
                         audit: None,
                         transform_count: 0,
+                        spare: Vec::new(),
                     });
                 }
                 Some(HeaderRecord::Selection(map)) => {
@@ -236,14 +238,21 @@ impl<R: Read> LogReader<R> {
         self.records.end.as_ref()
     }
 
+    /// Takes the memory of particles that are no longer needed, for those of later messages.
+    pub(in crate::log) fn add_spare(&mut self, particles: Vec<ParticleState>) {
+        self.spare.push(particles);
+    }
+
     /// Returns the next message, or `None` at the end of the readable part. Skips `/tf` and foreign
     /// topics.
     ///
     /// # Errors
     /// If the operating system reports an error or the content of a message is invalid.
     pub fn next_message(&mut self) -> Result<Option<LoggedMessage>, ReadError> {
-        let Self { records, limits, channels, run, closing, audit, transform_count, .. } = self;
-        let mut content = Content { limits, channels, run, closing, audit, transform_count };
+        let Self { records, limits, channels, run, closing, audit, transform_count, spare, .. } =
+            self;
+        let decoder = MessageDecoder { run, limits, spare };
+        let mut content = Content { decoder, channels, closing, audit, transform_count };
         loop {
             match records.next(|record, byte| content.read(record, byte))? {
                 Some(Some(logged)) => return Ok(Some(logged)),
@@ -260,9 +269,8 @@ impl<R: Read> LogReader<R> {
 
 /// The records after the header, and the parts of a reader that they change.
 struct Content<'a> {
-    limits: &'a SizeLimits,
+    decoder: MessageDecoder<'a>,
     channels: &'a mut BTreeMap<u16, Option<TopicChannel>>,
-    run: &'a RunDescription,
     closing: &'a mut Option<Closing>,
     audit: &'a mut Option<Box<Audit>>,
     transform_count: &'a mut u64,
@@ -329,13 +337,12 @@ impl Content<'_> {
         };
         let (topic, sequence) = (channel.topic, header.sequence);
         let malformed = |what| ReadError::Malformed { topic: topic.name(), sequence, byte, what };
-        let logged = decode_message(channel, header, data, self.run, self.limits);
-        let logged = logged.map_err(malformed)?;
+        let logged = self.decoder.decode(channel, header, data).map_err(malformed)?;
         *self.transform_count += u64::from(logged.is_none());
         match (&logged, &mut self.audit) {
             (_, None) => {}
-            (Some(logged), Some(audit)) => audit.check_message(logged, data, self.run),
-            (None, Some(audit)) => audit.check_transform(header, data, self.run),
+            (Some(logged), Some(audit)) => audit.check_message(logged, data, self.decoder.run),
+            (None, Some(audit)) => audit.check_transform(header, data, self.decoder.run),
         }
         Ok(logged)
     }

@@ -6,7 +6,7 @@ mod lock;
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, IoSlice, Write};
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{Access, CWD, RenameFlags, access, renameat_with};
@@ -206,6 +206,10 @@ impl<F: DiskFile> PartFile<F> {
 impl<F: DiskFile> Write for PartFile<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.out.write(bytes)
+    }
+
+    fn write_vectored(&mut self, parts: &[IoSlice<'_>]) -> io::Result<usize> {
+        self.out.write_vectored(parts)
     }
 
     fn flush(&mut self) -> io::Result<()> {

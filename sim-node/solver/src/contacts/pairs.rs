@@ -46,8 +46,6 @@ pub(crate) struct ParticleContacts {
     /// Substep for which the candidates were found. None before the first one of a step.
     found_at: Option<Substep>,
     candidates: Vec<Pair>,
-    /// Largest number of candidates.
-    candidate_count_max: usize,
     /// The candidates in the order of contact.
     ordered: Vec<Pair>,
     /// The pairs of the running substep, in the order of contact.
@@ -73,7 +71,6 @@ impl ParticleContacts {
             tree: TileTree::new(count),
             particles,
             found_at: None,
-            candidate_count_max,
             candidates: Vec::with_capacity(candidate_count_max),
             ordered: Vec::with_capacity(candidate_count_max),
             near: Vec::with_capacity(candidate_count_max),
@@ -152,7 +149,7 @@ impl ParticleContacts {
         self.found_at = Some(substep);
         self.paths.copy_from_slice(&self.states);
         let Self { tree, states, particles, load_pairs, candidates, .. } = self;
-        let (thickness, count_max) = (self.thickness, self.candidate_count_max);
+        let (thickness, count_max) = (self.thickness, CANDIDATES_PER_PARTICLE * particles.len());
         for (slot, PackedParticle(state)) in states.iter().enumerate() {
             let [x, y, z, _, dx, dy, dz, _] = *state;
             tree.tiles[slot / TILE].set(slot % TILE, [x, y, z], [dx, dy, dz]);

@@ -54,8 +54,8 @@ impl Known {
     }
 }
 
-/// Records a run in three files, without the snapshots that the options leave out. A move has no keyframe, so
-/// its snapshot is left out.
+/// Records a run in several files, without the snapshots that the options leave out. A move has no keyframe, so
+/// its snapshot is left out, and the last files begin at the node's keyframe of each second.
 fn split(sandbox: &Sandbox, node_args: &[&str], recorder_args: &[&str]) -> Vec<String> {
     let scene = sandbox.write("ball.toml", SCENE);
     let args = [&["run", &scene, "--paused"], node_args].concat();
@@ -71,14 +71,20 @@ fn split(sandbox: &Sandbox, node_args: &[&str], recorder_args: &[&str]) -> Vec<S
     let mut client = Client::attach(&sandbox.endpoint()).unwrap();
     let (particle, target, over_s) = (1275, [0.5, 0.3, 0.5], 0.1);
     client.request(Action::Grab { particle, target, over_s }, DEADLINE).unwrap();
-    let third = sandbox.path("run_0002.mcap.part");
-    wait_for("the third file", || {
+    let path = |number: usize| sandbox.path(&format!("run_{number:04}.mcap"));
+    let has_begun = |number: &usize| {
+        Path::new(&path(*number)).exists()
+            || Path::new(&path(*number)).with_extension("mcap.part").exists()
+    };
+    let file_count = || (0..usize::MAX).take_while(has_begun).count();
+    let count_before = file_count();
+    wait_for("three more files", || {
         client.request(Action::Move { particle, target, over_s }, DEADLINE).unwrap();
-        Path::new(&third).exists().then_some(())
+        (file_count() >= count_before + 3).then_some(())
     });
     recording.interrupt().success();
     node.interrupt().success();
-    (0..3).map(|number| sandbox.path(&format!("run_{number:04}.mcap"))).collect()
+    (0..file_count()).map(path).collect()
 }
 
 /// Reads what a reader knows with each snapshot, and the number of outcomes after the last snapshot of

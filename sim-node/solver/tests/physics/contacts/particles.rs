@@ -290,6 +290,7 @@ fn particles_in_one_point_stay_finite_and_disturb_nobody() {
     step(&mut pile, 3);
     assert!(pile.particles().iter().all(|one| one.position.iter().all(|axis| axis.is_finite())));
     assert_eq!(pile.particle(2000).velocity, healthy.velocity);
+    assert!(pile.contact_overflow_count() > 0, "all pairs fit");
     assert_eq!(pile.frozen_count(), 0);
 }
 
