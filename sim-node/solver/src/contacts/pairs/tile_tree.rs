@@ -40,8 +40,31 @@ impl Tile {
     /// Ends of the paths of one group of lanes, on one axis.
     #[inline(always)]
     fn path<W: Wide>(&self, axis: usize, group: usize, span: W) -> [W; 2] {
-        let x = W::load(&self.x[axis][group], 0);
-        [x, x + span * W::load(&self.d[axis][group], 0)]
+        [W::load(&self.x[axis][group], 0), self.position::<W>(axis, group, span)]
+    }
+
+    /// Positions of one group of lanes after `span` displacements, on one axis.
+    #[inline(always)]
+    fn position<W: Wide>(&self, axis: usize, group: usize, span: W) -> W {
+        W::load(&self.x[axis][group], 0) + span * W::load(&self.d[axis][group], 0)
+    }
+
+    /// Positions after `span` displacements, by group and axis.
+    #[inline(always)]
+    fn positions<W: Wide>(&self, span: f32) -> [[W; 3]; TILE / 8] {
+        let span = W::splat(span);
+        let [x, y, z] = [0, 1, 2];
+        [
+            [self.position(x, 0, span), self.position(y, 0, span), self.position(z, 0, span)],
+            [self.position(x, 1, span), self.position(y, 1, span), self.position(z, 1, span)],
+        ]
+    }
+
+    /// Position and displacement of a particle.
+    #[inline(always)]
+    fn particle(&self, lane: usize) -> [[f32; 3]; 2] {
+        let (group, lane) = (lane / 8, lane % 8);
+        [axes(|axis| self.x[axis][group][lane]), axes(|axis| self.d[axis][group][lane])]
     }
 }
 
@@ -72,6 +95,16 @@ impl Bounds {
                 && other.min[axis] - distance <= self.max[axis]
         })
     }
+
+    /// Largest distance of a point of this box from a point of the other one.
+    #[inline(always)]
+    fn distance_max(&self, other: &Self) -> f32 {
+        let longest = axes(|axis| {
+            let (up, down) = (self.max[axis] - other.min[axis], other.max[axis] - self.min[axis]);
+            if up > down { up } else { down }
+        });
+        (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).sqrt()
+    }
 }
 
 /// The lesser number; `b` if `a` is NaN.
@@ -86,6 +119,8 @@ pub(super) struct TileTree {
     pub(super) tiles: Vec<Tile>,
     /// Boxes of the tiles, of the nodes above them, and so on up to the root.
     levels: Vec<Vec<Bounds>>,
+    /// Boxes of the displacements of the tiles.
+    displacements: Vec<Bounds>,
     /// Pairs of tiles that are near each other, to be examined.
     tile_pairs: Vec<[u32; 2]>,
 }
@@ -106,14 +141,15 @@ impl TileTree {
             levels.push(vec![Bounds::EMPTY; length]);
             length = if length > 1 { length.div_ceil(ARITY) } else { 0 };
         }
-        Self { tiles, levels, tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX) }
+        let displacements = vec![Bounds::EMPTY; tiles.len()];
+        Self { tiles, levels, displacements, tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX) }
     }
 
     /// Recomputes all boxes for paths of `span` displacements.
     pub(super) fn refit(&mut self, span: f32, kernels: Kernels) {
-        let Self { tiles, levels, .. } = self;
+        let Self { tiles, levels, displacements, .. } = self;
         let Some((leaves, nodes)) = levels.split_first_mut() else { return };
-        kernels.run(RefitWork { tiles, leaves, span });
+        kernels.run(RefitWork { tiles, leaves, displacements, span });
         let mut below = &*leaves;
         for level in nodes {
             for (bounds, children) in level.iter_mut().zip(below.chunks(ARITY)) {
@@ -197,6 +233,7 @@ impl TileTree {
 struct RefitWork<'a> {
     tiles: &'a [Tile],
     leaves: &'a mut [Bounds],
+    displacements: &'a mut [Bounds],
     span: f32,
 }
 
@@ -205,25 +242,28 @@ impl LaneWork for RefitWork<'_> {
 
     #[inline(always)]
     fn run<W: Wide>(self) {
-        for (tile, bounds) in self.tiles.iter().zip(self.leaves) {
+        let span = W::splat(self.span);
+        let boxes = self.leaves.iter_mut().zip(self.displacements);
+        for (tile, (paths, displacements)) in self.tiles.iter().zip(boxes) {
             for axis in 0..3 {
-                [bounds.min[axis], bounds.max[axis]] = extent::<W>(tile, axis, self.span);
+                let ends = [0, 1].map(|group| tile.path(axis, group, span));
+                let [[a, b], [c, d]] = ends;
+                [paths.min[axis], paths.max[axis]] = extent::<W, 4>([a, b, c, d]);
+                let groups = [0, 1].map(|group| W::load(&tile.d[axis][group], 0));
+                [displacements.min[axis], displacements.max[axis]] = extent::<W, 2>(groups);
             }
         }
     }
 }
 
-/// The smallest and the largest coordinate of the paths of a tile on an axis.
+/// The smallest and the largest number. NaN is left out.
 #[inline(always)]
-fn extent<W: Wide>(tile: &Tile, axis: usize, span: f32) -> [f32; 2] {
+fn extent<W: Wide, const COUNT: usize>(numbers: [W; COUNT]) -> [f32; 2] {
     let least = W::splat(f32::NEG_INFINITY);
     let (mut low, mut high) = (least, least);
-    for group in 0..TILE / 8 {
-        // NaN leaves them as they are.
-        for end in tile.path(axis, group, W::splat(span)) {
-            low = (-end).max_or_rhs(low);
-            high = end.max_or_rhs(high);
-        }
+    for number in numbers {
+        low = (-number).max_or_rhs(low);
+        high = number.max_or_rhs(high);
     }
     [-greatest(low), greatest(high)]
 }
@@ -259,11 +299,10 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
     fn run<W: Wide>(self) -> Search {
         let Self { tree, pairs, query, except, accept } = self;
         for &[a, b] in pairs {
-            let [left, right] = [a, b].map(|tile| &tree.tiles[tile as usize]);
-            let bounds = &tree.levels[0][b as usize];
-            let mut lanes = query.lanes_near::<W>(left, bounds);
+            let pair = TilePair::<W>::new(tree, [a, b], query);
+            let mut lanes = pair.lanes_near_box(&tree.levels[0][b as usize]);
             while let Some(lane) = take_lowest(&mut lanes) {
-                let mut near = query.lanes_near_lane::<W>(right, (left, lane as usize));
+                let mut near = pair.lanes_near_lane(lane as usize);
                 if a == b {
                     // Each pair once: the particles behind this one.
                     near &= (!0_u32 << lane) << 1;
@@ -272,7 +311,9 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
                     near &= !except(TILE_LENGTH * a + lane, b);
                 }
                 while let Some(other) = take_lowest(&mut near) {
-                    accept([TILE_LENGTH * a + lane, TILE_LENGTH * b + other])?;
+                    if pair.come_near([lane as usize, other as usize]) {
+                        accept([TILE_LENGTH * a + lane, TILE_LENGTH * b + other])?;
+                    }
                 }
             }
         }
@@ -288,57 +329,92 @@ fn take_lowest(bits: &mut u32) -> Option<u32> {
     lowest
 }
 
-impl Query {
-    /// Returns a bit for each particle of a tile whose path comes near a box.
+/// Two tiles that are near each other.
+///
+/// Paths that come nearer than a distance D are, in the middle of the time, nearer than D and half of the way that
+/// the particles move relative to each other. That is tested first, for eight particles at once, with one bound of
+/// this way for all particles of the tiles.
+struct TilePair<'a, W> {
+    tiles: [&'a Tile; 2],
+    query: Query,
+    /// Distance in the middle of the time.
+    distance: f32,
+    /// The particles of the first tile in the middle of the time, on each axis.
+    left: [[f32; TILE]; 3],
+    /// Those of the second one, by group and axis.
+    right: [[W; 3]; TILE / 8],
+}
+
+impl<'a, W: Wide> TilePair<'a, W> {
     #[inline(always)]
-    fn lanes_near<W: Wide>(self, tile: &Tile, bounds: &Bounds) -> u32 {
-        let span = W::splat(self.span);
+    fn new(tree: &'a TileTree, slots: [u32; 2], query: Query) -> Self {
+        let tiles = slots.map(|tile| &tree.tiles[tile as usize]);
+        let [a, b] = slots.map(|tile| &tree.displacements[tile as usize]);
+        let half = 0.5 * query.span;
+        let distance = query.distance + half * a.distance_max(b);
+        let mut left = [[0.0; TILE]; 3];
+        for (group, middle) in tiles[0].positions::<W>(half).into_iter().enumerate() {
+            for axis in 0..3 {
+                let (lanes, _) = left[axis].as_chunks_mut();
+                middle[axis].store(&mut lanes[group], 0);
+            }
+        }
+        Self { tiles, query, distance, left, right: tiles[1].positions(half) }
+    }
+
+    /// Returns a bit for each particle of the first tile that is near a box in the middle of the time.
+    #[inline(always)]
+    fn lanes_near_box(&self, bounds: &Bounds) -> u32 {
         let mut bits = 0;
         for group in 0..TILE / 8 {
             let [x, y, z] = [0, 1, 2];
-            let x = self.is_near_on_axis::<W>(tile.path(x, group, span), x, bounds);
-            let y = self.is_near_on_axis::<W>(tile.path(y, group, span), y, bounds);
-            let z = self.is_near_on_axis::<W>(tile.path(z, group, span), z, bounds);
+            let x = self.is_near_on_axis(x, group, bounds);
+            let y = self.is_near_on_axis(y, group, bounds);
+            let z = self.is_near_on_axis(z, group, bounds);
             bits |= W::bits(W::both(x, W::both(y, z))) << (8 * group);
         }
         bits
     }
 
     #[inline(always)]
-    fn is_near_on_axis<W: Wide>(self, path: [W; 2], axis: usize, bounds: &Bounds) -> W::Mask {
-        let [start, end] = path;
-        let low = -(-start).max_or_rhs(-end);
-        let high = start.max_or_rhs(end);
+    fn is_near_on_axis(&self, axis: usize, group: usize, bounds: &Bounds) -> W::Mask {
+        let (lanes, _) = self.left[axis].as_chunks();
+        let at = W::load(&lanes[group], 0);
         W::both(
-            low.is_at_most(W::splat(bounds.max[axis] + self.distance)),
-            W::splat(bounds.min[axis] - self.distance).is_at_most(high),
+            at.is_at_most(W::splat(bounds.max[axis] + self.distance)),
+            W::splat(bounds.min[axis] - self.distance).is_at_most(at),
         )
     }
 
-    /// Returns a bit for each particle of a tile that comes near one particle of another tile.
+    /// Returns a bit for each particle of the second tile that is near one of the first in the middle of the time.
     #[inline(always)]
-    fn lanes_near_lane<W: Wide>(self, tile: &Tile, (other, lane): (&Tile, usize)) -> u32 {
-        let (other_group, other_lane) = (lane / 8, lane % 8);
-        let x = axes(|axis| W::splat(other.x[axis][other_group][other_lane]));
-        let d = axes(|axis| W::splat(other.d[axis][other_group][other_lane]));
-        let (zero, span) = (W::splat(0.0), W::splat(self.span));
+    fn lanes_near_lane(&self, lane: usize) -> u32 {
         let limit = W::splat(self.distance * self.distance);
         let mut bits = 0;
         for group in 0..TILE / 8 {
-            let r = axes(|axis| W::load(&tile.x[axis][group], 0) - x[axis]);
-            let v = axes(|axis| W::load(&tile.d[axis][group], 0) - d[axis]);
-            // The time at which straight paths are nearest; NaN where the particles move alike.
-            let time = (-dot(r, v) / dot(v, v)).max_or_rhs(zero);
-            let time = W::select(time.is_below(span), time, span);
-            let apart = axes(|axis| r[axis] + time * v[axis]);
-            bits |= W::bits(dot(apart, apart).is_below(limit)) << (8 * group);
+            let apart = axes(|axis| self.right[group][axis] - W::splat(self.left[axis][lane]));
+            let [x, y, z] = axes(|axis| apart[axis] * apart[axis]);
+            bits |= W::bits((x + y + z).is_below(limit)) << (8 * group);
         }
         bits
+    }
+
+    /// Returns true if the paths of two particles come nearer than the query's distance.
+    #[inline(always)]
+    fn come_near(&self, [left, right]: [usize; 2]) -> bool {
+        let [[x_a, d_a], [x_b, d_b]] =
+            [self.tiles[0].particle(left), self.tiles[1].particle(right)];
+        let (r, v) = (axes(|axis| x_b[axis] - x_a[axis]), axes(|axis| d_b[axis] - d_a[axis]));
+        // The time at which straight paths are nearest; NaN where the particles move alike.
+        let time = -dot(r, v) / dot(v, v);
+        let time = if time > 0.0 { time } else { 0.0 };
+        let time = if time < self.query.span { time } else { self.query.span };
+        let apart = axes(|axis| r[axis] + time * v[axis]);
+        dot(apart, apart) < self.query.distance * self.query.distance
     }
 }
 
 #[inline(always)]
-fn dot<W: Wide>(a: [W; 3], b: [W; 3]) -> W {
-    let [x, y, z] = axes(|axis| a[axis] * b[axis]);
-    x + y + z
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
