@@ -7,6 +7,7 @@ mod configure;
 mod graph;
 mod layout;
 mod patch;
+mod paths;
 mod publish;
 mod survey;
 mod workers;
@@ -16,6 +17,7 @@ use graph::Graph;
 use layout::Layout;
 pub(crate) use layout::{Configured, Location, SceneFields};
 use patch::{Patch, SheetFamilies};
+pub(crate) use paths::{Paths, Progress};
 use survey::Survey;
 use workers::Workers;
 

@@ -11,13 +11,13 @@ mod tile_tree;
 
 use load::LoadPairs;
 use pair::Pair;
-use tile_tree::{Query, Search, TILE, TileTree};
+use tile_tree::{Query, Search, TILE, TileTree, take_lowest};
 
 use crate::kernels::Kernels;
-use crate::kernels::lanes::{PackedParticle, axes};
+use crate::kernels::lanes::PackedParticle;
 use crate::scene::model::Model;
 use crate::step::substep::Substep;
-use crate::store::{Location, ParticleStore};
+use crate::store::{Location, ParticleStore, Paths, Progress};
 
 /// Pairs within this number of contact distances at the start of the stage take part in it, because
 /// another contact may push them together.
@@ -41,13 +41,15 @@ pub(crate) struct ParticleContacts {
     states: Vec<PackedParticle>,
     load_pairs: LoadPairs,
     tree: TileTree,
-    /// By slot: position and displacement for which the candidates were found.
-    paths: Vec<PackedParticle>,
+    /// The paths for which the candidates were found.
+    paths: Paths,
     /// Substep for which the candidates were found. None before the first one of a step.
     found_at: Option<Substep>,
     candidates: Vec<Pair>,
     /// The candidates in the order of contact.
     ordered: Vec<Pair>,
+    /// By tile: a bit for each particle that is part of a candidate.
+    involved: Vec<u32>,
     /// The pairs of the running substep, in the order of contact.
     near: Vec<Pair>,
     /// Number of searches that were given up because there were too many candidates.
@@ -66,13 +68,14 @@ impl ParticleContacts {
             margin: 0.2 * thickness,
             locations: vec![Location::default(); count],
             states: vec![PackedParticle::default(); count],
-            paths: vec![PackedParticle::default(); count],
+            paths: Paths::default(),
             load_pairs: LoadPairs::new(model, &particles, thickness, kernels),
             tree: TileTree::new(count),
             particles,
             found_at: None,
             candidates: Vec::with_capacity(candidate_count_max),
             ordered: Vec::with_capacity(candidate_count_max),
+            involved: vec![0; count.div_ceil(TILE)],
             near: Vec::with_capacity(candidate_count_max),
             overflow_count: 0,
         }
@@ -89,6 +92,10 @@ impl ParticleContacts {
 
     /// Updates the locations of the particles.
     pub(crate) fn locate(&mut self, store: &ParticleStore) {
+        if self.are_on() {
+            // Makes room for them.
+            store.save_paths(&mut self.paths);
+        }
         for (location, particle) in self.locations.iter_mut().zip(&self.particles) {
             *location = store.location(*particle);
         }
@@ -106,9 +113,10 @@ impl ParticleContacts {
         substep: Substep,
         friction: f32,
     ) {
-        self.load_states(store);
-        if !self.are_on_their_paths(substep) {
-            self.find_candidates(substep, store.kernels());
+        if self.are_on_their_paths(store, substep) {
+            self.load_involved(store);
+        } else {
+            self.find_candidates(store, substep);
         }
         let Self { states, ordered, near, .. } = self;
         near.clear();
@@ -122,36 +130,34 @@ impl ParticleContacts {
         }
     }
 
-    fn load_states(&mut self, store: &ParticleStore) {
-        for (state, location) in self.states.iter_mut().zip(&self.locations) {
-            *state = store.packed_particle(*location);
+    fn load_involved(&mut self, store: &ParticleStore) {
+        for (tile, mut lanes) in self.involved.iter().copied().enumerate() {
+            while let Some(lane) = take_lowest(&mut lanes) {
+                let slot = TILE * tile + lane as usize;
+                self.states[slot] = store.packed_particle(self.locations[slot]);
+            }
         }
     }
 
     /// True if all particles are where the candidates expect them at the end of the substep.
-    fn are_on_their_paths(&self, substep: Substep) -> bool {
+    fn are_on_their_paths(&self, store: &ParticleStore, substep: Substep) -> bool {
         let Some(found_at) = self.found_at else { return false };
         let count = (substep.index - found_at.index + 1) as f32;
         // Less than half of the margin for each particle, so that rounding loses no pair.
         let limit = 0.24 * self.margin * self.margin;
-        self.states.iter().zip(&self.paths).all(|(PackedParticle(now), PackedParticle(path))| {
-            let off =
-                axes(|axis| (now[axis] - path[axis]) + (now[axis + 4] - count * path[axis + 4]));
-            let squared = off[0] * off[0] + off[1] * off[1] + off[2] * off[2];
-            // NaN is near nothing, and needs no candidates.
-            let has_left = squared > limit;
-            !has_left
-        })
+        !store.is_beside(&self.paths, Progress { count, limit })
     }
 
     /// Finds the candidates for the rest of the step, and orders them.
-    fn find_candidates(&mut self, substep: Substep, kernels: Kernels) {
+    fn find_candidates(&mut self, store: &ParticleStore, substep: Substep) {
         self.found_at = Some(substep);
-        self.paths.copy_from_slice(&self.states);
-        let Self { tree, states, particles, load_pairs, candidates, .. } = self;
+        store.save_paths(&mut self.paths);
+        let kernels = store.kernels();
+        let Self { tree, states, locations, particles, load_pairs, candidates, .. } = self;
         let (thickness, count_max) = (self.thickness, CANDIDATES_PER_PARTICLE * particles.len());
-        for (slot, PackedParticle(state)) in states.iter().enumerate() {
-            let [x, y, z, _, dx, dy, dz, _] = *state;
+        for (slot, (state, location)) in states.iter_mut().zip(locations).enumerate() {
+            *state = store.packed_particle(*location);
+            let PackedParticle([x, y, z, _, dx, dy, dz, _]) = *state;
             tree.tiles[slot / TILE].set(slot % TILE, [x, y, z], [dx, dy, dz]);
         }
         let span = substep.left() as f32;
@@ -194,6 +200,10 @@ impl ParticleContacts {
             let place = &mut places[usize::from(pair.key)];
             self.ordered[*place] = *pair;
             *place += 1;
+        }
+        self.involved.fill(0);
+        for slot in self.candidates.iter().flat_map(|pair| pair.slots) {
+            self.involved[slot as usize / TILE] |= 1 << (slot as usize % TILE);
         }
     }
 }

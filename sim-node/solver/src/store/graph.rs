@@ -312,6 +312,11 @@ impl Graph {
         [x, y, z]
     }
 
+    /// Returns the particles, and the padding behind them.
+    pub(crate) fn packed_particles(&self) -> &[PackedParticle] {
+        &self.particles
+    }
+
     pub(crate) fn packed_particle(&self, index: usize) -> PackedParticle {
         self.particles[index]
     }

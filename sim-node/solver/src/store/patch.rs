@@ -9,6 +9,7 @@ mod band;
 mod bend_layout;
 mod bends;
 mod ends;
+mod paths;
 mod row;
 mod row_layout;
 mod span;

@@ -323,7 +323,7 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
 
 /// Removes the lowest bit that is set, and returns its place.
 #[inline(always)]
-fn take_lowest(bits: &mut u32) -> Option<u32> {
+pub(super) fn take_lowest(bits: &mut u32) -> Option<u32> {
     let lowest = (*bits != 0).then_some(bits.trailing_zeros());
     *bits &= bits.wrapping_sub(1);
     lowest

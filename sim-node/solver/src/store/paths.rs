@@ -1,0 +1,96 @@
+//! The straight paths that the particles take in a step, to tell whether one has left its own.
+
+use super::ParticleStore;
+use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
+
+/// Position and displacement of every particle at one time.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Paths {
+    /// By patch.
+    sheets: Vec<Vec<f32>>,
+    graph: Vec<PackedParticle>,
+}
+
+/// The part of the paths that is over, and how far a particle may be beside its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Progress {
+    /// Number of displacements.
+    pub(crate) count: f32,
+    /// Square of the distance.
+    pub(crate) limit: f32,
+}
+
+impl ParticleStore {
+    /// Replaces the paths with those that the particles are about to take.
+    pub(crate) fn save_paths(&self, paths: &mut Paths) {
+        paths.sheets.resize_with(self.patches.len(), Vec::new);
+        for (patch, saved) in self.patches.iter().zip(&mut paths.sheets) {
+            patch.save_paths(saved);
+        }
+        paths.graph.clear();
+        paths.graph.extend_from_slice(self.graph.packed_particles());
+    }
+
+    /// Returns true if a particle is not where its path leads. NaN is beside no path.
+    pub(crate) fn is_beside(&self, paths: &Paths, progress: Progress) -> bool {
+        let kernels = self.kernels();
+        let (now, saved) = (self.graph.packed_particles(), paths.graph.as_slice());
+        kernels.run(GraphWork { now, saved, progress })
+            || self
+                .patches
+                .iter()
+                .zip(&paths.sheets)
+                .any(|(patch, saved)| kernels.run(patch.beside_work(saved, progress)))
+    }
+}
+
+impl Progress {
+    /// Returns the lanes of the particles that are beside their paths.
+    #[inline(always)]
+    pub(super) fn beside<W: Wide>(
+        self,
+        [x, d]: [[W; 3]; 2],
+        [saved_x, saved_d]: [[W; 3]; 2],
+    ) -> W::Mask {
+        let count = W::splat(self.count);
+        let off = axes(|axis| (x[axis] - saved_x[axis]) + (d[axis] - count * saved_d[axis]));
+        let [x, y, z] = axes(|axis| off[axis] * off[axis]);
+        W::splat(self.limit).is_below(x + y + z)
+    }
+}
+
+/// Compares the particles of the graph with their paths.
+struct GraphWork<'a> {
+    now: &'a [PackedParticle],
+    saved: &'a [PackedParticle],
+    progress: Progress,
+}
+
+impl LaneWork for GraphWork<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> bool {
+        let (now, now_rest) = self.now.as_chunks();
+        let (saved, saved_rest) = self.saved.as_chunks();
+        for (now, saved) in now.iter().zip(saved) {
+            if self.is_beside::<W>(now, saved) {
+                return true;
+            }
+        }
+        let mut last = [[PackedParticle::default(); 8]; 2];
+        last[0][..now_rest.len()].copy_from_slice(now_rest);
+        last[1][..saved_rest.len()].copy_from_slice(saved_rest);
+        self.is_beside::<W>(&last[0], &last[1])
+    }
+}
+
+impl GraphWork<'_> {
+    #[inline(always)]
+    fn is_beside<W: Wide>(&self, now: &[PackedParticle; 8], saved: &[PackedParticle; 8]) -> bool {
+        let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(now);
+        let now = [[x, y, z], [dx, dy, dz]];
+        let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(saved);
+        W::any(self.progress.beside(now, [[x, y, z], [dx, dy, dz]]))
+    }
+}
