@@ -307,13 +307,13 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
                     // Each pair once: the particles behind this one.
                     near &= (!0_u32 << lane) << 1;
                 }
+                let slot = TILE_LENGTH * a + lane;
                 if near != 0 {
-                    near &= !except(TILE_LENGTH * a + lane, b);
+                    near &= !except(slot, b);
                 }
+                let mut near = pair.lanes_coming_near(lane as usize, near);
                 while let Some(other) = take_lowest(&mut near) {
-                    if pair.come_near([lane as usize, other as usize]) {
-                        accept([TILE_LENGTH * a + lane, TILE_LENGTH * b + other])?;
-                    }
+                    accept([slot, TILE_LENGTH * b + other])?;
                 }
             }
         }
@@ -399,7 +399,16 @@ impl<'a, W: Wide> TilePair<'a, W> {
         bits
     }
 
-    /// Returns true if the paths of two particles come nearer than the query's distance.
+    /// Returns the bits of the particles whose paths come nearer than the query's distance.
+    #[inline(always)]
+    fn lanes_coming_near(&self, lane: usize, others: u32) -> u32 {
+        let (mut rest, mut bits) = (others, 0);
+        while let Some(other) = take_lowest(&mut rest) {
+            bits |= u32::from(self.come_near([lane, other as usize])) << other;
+        }
+        bits
+    }
+
     #[inline(always)]
     fn come_near(&self, [left, right]: [usize; 2]) -> bool {
         let [[x_a, d_a], [x_b, d_b]] =
