@@ -1,14 +1,13 @@
 //! The straight paths that the particles take in a step, to tell whether one has left its own.
 
-use super::ParticleStore;
 use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
 
 /// Position and displacement of every particle at one time.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Paths {
     /// By patch.
-    sheets: Vec<Vec<f32>>,
-    graph: Vec<PackedParticle>,
+    pub(super) sheets: Vec<Vec<f32>>,
+    pub(super) graph: Vec<PackedParticle>,
 }
 
 /// The part of the paths that is over, and how far a particle may be beside its own.
@@ -18,30 +17,6 @@ pub(crate) struct Progress {
     pub(crate) count: f32,
     /// Square of the distance.
     pub(crate) limit: f32,
-}
-
-impl ParticleStore {
-    /// Replaces the paths with those that the particles are about to take.
-    pub(crate) fn save_paths(&self, paths: &mut Paths) {
-        paths.sheets.resize_with(self.patches.len(), Vec::new);
-        for (patch, saved) in self.patches.iter().zip(&mut paths.sheets) {
-            patch.save_paths(saved);
-        }
-        paths.graph.clear();
-        paths.graph.extend_from_slice(self.graph.packed_particles());
-    }
-
-    /// Returns true if a particle is not where its path leads. NaN is beside no path.
-    pub(crate) fn is_beside(&self, paths: &Paths, progress: Progress) -> bool {
-        let kernels = self.kernels();
-        let (now, saved) = (self.graph.packed_particles(), paths.graph.as_slice());
-        kernels.run(GraphWork { now, saved, progress })
-            || self
-                .patches
-                .iter()
-                .zip(&paths.sheets)
-                .any(|(patch, saved)| kernels.run(patch.beside_work(saved, progress)))
-    }
 }
 
 impl Progress {
@@ -60,10 +35,10 @@ impl Progress {
 }
 
 /// Compares the particles of the graph with their paths.
-struct GraphWork<'a> {
-    now: &'a [PackedParticle],
-    saved: &'a [PackedParticle],
-    progress: Progress,
+pub(super) struct GraphWork<'a> {
+    pub(super) now: &'a [PackedParticle],
+    pub(super) saved: &'a [PackedParticle],
+    pub(super) progress: Progress,
 }
 
 impl LaneWork for GraphWork<'_> {
