@@ -5,7 +5,7 @@ use std::mem::MaybeUninit;
 
 use sim_contract::{CONTRACT_VERSION, Client, Endpoint};
 
-use crate::attached::{ClientHandle, LOOK_MIN, keep, remove, with_client};
+use crate::attached::{ClientHandle, keep, remove, with_client};
 use crate::outcome::{CatenaryResult, Failure, guard};
 use crate::pointers::{check_place, text, write};
 
@@ -74,9 +74,7 @@ pub extern "C" fn catenary_client_id(
 /// call it a few times per second at most.
 #[unsafe(no_mangle)]
 pub extern "C" fn catenary_check_node(client: *const ClientHandle) -> CatenaryResult {
-    with_client(client, |attached| {
-        if attached.client.is_owner_alive() { Ok(()) } else { Err(attached.nothing(LOOK_MIN)) }
-    })
+    with_client(client, |attached| attached.check_node())
 }
 
 /// Returns the contract version of this library. A program compares it with `CATENARY_CONTRACT_VERSION`

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use sim_contract::{AttachError, LockstepError, ReadError, RequestError};
+use sim_contract::{AttachError, LockstepError, OwnerState, ReadError, RequestError};
 
 /// Result of a call. `catenary_last_error` describes every other result than `CATENARY_OK`.
 #[repr(C)]
@@ -78,6 +78,7 @@ impl From<ReadError> for Failure {
 impl From<RequestError> for Failure {
     fn from(error: RequestError) -> Self {
         let result = match error {
+            RequestError::Read(error) => return error.into(),
             RequestError::Timeout { .. } | RequestError::OutcomesMissed { .. } => {
                 CatenaryResult::Unanswered
             }
@@ -94,7 +95,12 @@ impl From<RequestError> for Failure {
 impl From<LockstepError> for Failure {
     fn from(error: LockstepError) -> Self {
         let result = match error {
+            LockstepError::Attach(error) => return error.into(),
+            LockstepError::Read(error) => return error.into(),
             LockstepError::NotJoined => CatenaryResult::Misuse,
+            LockstepError::NotAdmitted { owner: OwnerState::Gone { .. }, .. } => {
+                CatenaryResult::Gone
+            }
             LockstepError::NotAdmitted { .. } => CatenaryResult::Timeout,
             _ => CatenaryResult::Failed,
         };

@@ -1,75 +1,18 @@
 //! Mistakes of a C program are results and never end the process; what it holds stays valid.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use std::ffi::{CStr, CString, c_char};
+mod support;
+
+use std::ffi::CString;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use std::{slice, thread};
 
 use catenary::*;
+use sim_contract::clock::{SECOND_NS, monotonic_ns};
 use sim_contract::testing::TestDomain;
-use sim_contract::{
-    Command, ConstraintState, Load, LoadHeader, Outcome, Owner, ParameterValues, ParticleState,
-    Reason, SnapshotHeader, Wake,
-};
-
-const RUN_ID: u64 = 77;
-const TIMEOUT_S: f64 = 10.0;
-
-fn owner(domain: &TestDomain) -> Owner {
-    let load = Load {
-        header: LoadHeader { run_id: RUN_ID, particle_count: 2, ..LoadHeader::default() },
-        scene: b"version = 1",
-        constraints: &[ConstraintState { b: 1, rest_length: 0.5, ..ConstraintState::default() }],
-        triangles: &[],
-        collider_count: 0,
-        keyframe_size_bytes_max: 0,
-        parameters: ParameterValues::DEFAULT,
-    };
-    Owner::create(&domain.endpoint(), &load).unwrap()
-}
-
-fn publish(owner: &Owner, step: u64) {
-    let header =
-        SnapshotHeader { run_id: RUN_ID, step, particle_count: 2, ..SnapshotHeader::default() };
-    let particle = |index| ParticleState {
-        position: [step as f32, index as f32, 0.5],
-        ..ParticleState::default()
-    };
-    owner.publish_particles(&header, particle).unwrap();
-    owner.wake(Wake::Frame);
-}
-
-/// Attaches a client that the owner knows as a reader.
-fn attach(domain: &TestDomain, owner: &Owner) -> *mut ClientHandle {
-    let domain = CString::new(domain.name()).unwrap();
-    let mut client = MaybeUninit::uninit();
-    let result = catenary_attach(null(), domain.as_ptr(), Some(&mut client));
-    assert_eq!(result, CatenaryResult::Ok, "{}", last_error());
-    // SAFETY: the call has succeeded.
-    let client = unsafe { client.assume_init() };
-    let polled = catenary_next_snapshot(client, 0.0, Some(&mut MaybeUninit::uninit()));
-    assert_eq!(polled, CatenaryResult::Timeout, "{}", last_error());
-    owner.refresh();
-    client
-}
-
-fn next_snapshot(client: *mut ClientHandle) -> Snapshot {
-    let mut snapshot = MaybeUninit::uninit();
-    let result = catenary_next_snapshot(client, TIMEOUT_S, Some(&mut snapshot));
-    assert_eq!(result, CatenaryResult::Ok, "{}", last_error());
-    // SAFETY: the call has succeeded.
-    unsafe { snapshot.assume_init() }
-}
-
-fn text(pointer: *const c_char) -> String {
-    // SAFETY: the functions of the library return texts that are never null.
-    unsafe { CStr::from_ptr(pointer) }.to_str().unwrap().to_owned()
-}
-
-fn last_error() -> String {
-    text(catenary_last_error())
-}
+use sim_contract::{Command, Outcome, Reason, Wake};
+use support::*;
 
 fn assert_misuse(result: CatenaryResult, part: &str) {
     assert_eq!(result, CatenaryResult::Misuse);
@@ -244,6 +187,11 @@ fn the_end_of_a_node_and_silence_are_two_results() {
     drop(owner);
     assert_eq!(next(TIMEOUT_S), CatenaryResult::Gone);
     assert_eq!(catenary_check_node(client), CatenaryResult::Gone);
+    let begin_ns = monotonic_ns();
+    while next(0.0) != CatenaryResult::Gone {
+        assert!(monotonic_ns() - begin_ns < 10 * SECOND_NS, "a program that polls never learns it");
+        thread::yield_now();
+    }
     assert_eq!(catenary_send(client, catenary_command_pause(), None), CatenaryResult::NotSent);
     assert_eq!(catenary_detach(client), CatenaryResult::Ok);
 }
