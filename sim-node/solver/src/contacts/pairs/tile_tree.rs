@@ -3,6 +3,7 @@
 //! Sixteen particles that are neighbours at load form a tile. Four tiles form a node, and so on. The
 //! tree keeps its form from load to load: only the boxes follow the particles.
 
+use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
 
@@ -43,41 +44,6 @@ impl Tile {
         let x = W::load(&self.x[axis][group], 0);
         [x, x + span * W::load(&self.d[axis][group], 0)]
     }
-}
-
-/// Smallest and largest coordinate on each axis. An empty box has +infinity and -infinity.
-#[derive(Debug, Clone, Copy)]
-struct Bounds {
-    min: [f32; 3],
-    max: [f32; 3],
-}
-
-impl Bounds {
-    const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
-
-    fn union(self, other: &Self) -> Self {
-        let mut union = self;
-        for axis in 0..3 {
-            union.min[axis] = lesser(other.min[axis], union.min[axis]);
-            union.max[axis] = -lesser(-other.max[axis], -union.max[axis]);
-        }
-        union
-    }
-
-    /// Returns true if the boxes are at most `distance` apart on every axis.
-    #[inline(always)]
-    fn are_near(&self, other: &Self, distance: f32) -> bool {
-        (0..3).all(|axis| {
-            self.min[axis] - distance <= other.max[axis]
-                && other.min[axis] - distance <= self.max[axis]
-        })
-    }
-}
-
-/// The lesser number; `b` if `a` is NaN.
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }
 
 /// The tiles and the boxes above them.
