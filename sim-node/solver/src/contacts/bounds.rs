@@ -37,6 +37,10 @@ impl Bounds {
         (0..3).all(|axis| self.min[axis] <= point[axis] && point[axis] <= self.max[axis])
     }
 
+    pub(super) fn contains_box(&self, other: &Self) -> bool {
+        self.contains(other.min) && self.contains(other.max)
+    }
+
     /// Returns true if the boxes are at most `distance` apart on every axis.
     #[inline(always)]
     pub(super) fn are_near(&self, other: &Self, distance: f32) -> bool {

@@ -48,10 +48,11 @@ pub struct PlacedCollider {
 }
 
 impl Collider {
-    pub(crate) fn new(scene: &SceneCollider) -> Self {
+    /// `index` is that of the collider in the scene.
+    pub(crate) fn new(index: usize, scene: &SceneCollider) -> Self {
         Self {
             at_load: PlacedShape::new(&scene.shape),
-            mesh: scene.mesh.as_ref().map(|mesh| Arc::new(CollisionMesh::new(mesh))),
+            mesh: scene.mesh.as_ref().map(|mesh| Arc::new(CollisionMesh::new(mesh, index))),
             restitution: scene.restitution,
             friction: scene.friction,
             velocity: Vec3::from_array(scene.velocity).as_dvec3(),

@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::hit::Hit;
+use super::mesh::near::NearMeshes;
 use super::mesh::{PUSHES_MAX, PlacedMesh, Stop};
 use super::obstacle::{Obstacle, Surface, rounding};
 use super::path::SubstepPath;
@@ -24,6 +25,16 @@ pub(crate) struct Contacts {
     /// By particle: the displacement that its bounces add. Friction ignores it, because the particle
     /// does not make it in this substep.
     bounces: Vec<Vec3>,
+    near_meshes: NearMeshes,
+}
+
+/// Memory that the contacts of a worker need.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ContactRoom {
+    /// Largest number of particles in a block; 0 in a scene without colliders.
+    pub(crate) block_length: usize,
+    /// Number of particles that can be near a mesh; 0 in a scene without meshes.
+    pub(crate) near_mesh_count: usize,
 }
 
 /// A particle inside an obstacle.
@@ -39,13 +50,14 @@ struct Contact<'a> {
 }
 
 impl Contacts {
-    /// Makes room for blocks of up to `count` particles; 0 in a scene without colliders.
-    pub(crate) fn new(count: usize) -> Self {
+    pub(crate) fn new(room: ContactRoom) -> Self {
+        let count = room.block_length;
         Self {
             touched: Vec::with_capacity(count),
             is_touched: vec![false; count],
             displacements: vec![Vec3::ZERO; count],
             bounces: vec![Vec3::ZERO; count],
+            near_meshes: NearMeshes::new(room.near_mesh_count),
         }
     }
 
@@ -65,6 +77,8 @@ impl Contacts {
                     let last = particles.count().min(8 * group + 8);
                     let range = 8 * group..last;
                     match &obstacle.solid {
+                        // A long path through a large mesh takes milliseconds.
+                        Solid::Mesh(_) if inputs.is_given_up() => return,
                         Solid::Mesh(mesh) => self.push_off(particles, range, obstacle, mesh),
                         _ => self.push_out_of(particles, range, obstacle),
                     }
@@ -108,24 +122,27 @@ impl Contacts {
         obstacle: &Obstacle,
         mesh: &PlacedMesh,
     ) {
-        let near = range.clone().map(|index| {
+        for index in range {
             let path = particles.path(index);
             let (start, displacement) = (path.start.to_array(), path.displacement.to_array());
-            let may_touch =
+            let is_near =
                 particles.inverse_mass(index) > 0.0 && obstacle.zone.may_meet(start, displacement);
-            may_touch.then(|| mesh.near(&path))
-        });
-        let mut near_particles = [None; 8];
-        near_particles.iter_mut().zip(near).for_each(|(place, near)| *place = near);
-        let triangles = mesh.list(near_particles.iter().flatten());
-        if triangles.are_none() {
-            return;
-        }
-        for (index, near) in range.zip(&near_particles) {
-            let Some(near) = near else { continue };
+            if !is_near {
+                continue;
+            }
+            let mut room = mesh.room(&path);
+            let number = particles.first() + index;
+            let mut triangles = mesh.list(&mut self.near_meshes, number, &room);
+            if triangles.are_none() {
+                continue;
+            }
             for push_count in 0..=PUSHES_MAX {
                 let path = particles.path(index);
-                match mesh.stop(&path, near, &triangles, push_count) {
+                if !mesh.is_within(&room, &path) {
+                    room = mesh.room(&path);
+                    triangles = mesh.list(&mut self.near_meshes, number, &room);
+                }
+                match mesh.stop(&path, &room, &triangles, push_count) {
                     None => break,
                     Some(Stop::Hold) => {
                         self.hold(particles, (index, &path), &obstacle.surface, mesh);

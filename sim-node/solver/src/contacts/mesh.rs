@@ -5,6 +5,7 @@
 //! thin meshes work like closed ones, and no state is kept between substeps. Where it cannot be pushed
 //! off all triangles, it stays where the path starts, in the frame of the mesh.
 
+pub(crate) mod near;
 mod tree;
 mod triangle;
 
@@ -19,6 +20,7 @@ use super::path::SubstepPath;
 use super::placed_frame::PlacedFrame;
 use super::zone::Zone;
 use crate::scene::definition::collider::ColliderMesh;
+use near::{NearMeshes, NearQuery, NearTriangles};
 use tree::TriangleTree;
 use triangle::{Gap, MeshPath, Touch, Triangle};
 
@@ -30,26 +32,31 @@ const SKIN: f32 = 8.0;
 /// Height up to which a triangle is a sliver, in tolerances. The tolerance of its neighbours closes the
 /// gap that it leaves.
 const SLIVER: f32 = 2.0;
+/// Length of a push for which there is room, relative to that of the path. Most paths run along the mesh and
+/// are pushed less.
+const PUSH_SHARE: f32 = 0.25;
+/// Number of further substeps for which triangles near a particle are listed.
+const SUBSTEPS_AHEAD: f32 = 2.0;
 /// Largest number of pushes of a particle in a substep. A particle in a wedge comes nearer to both sides
 /// with each.
 pub(crate) const PUSHES_MAX: usize = 8;
-/// Largest number of triangles that a group of particles lists. With more, each particle searches.
-const LISTED_MAX: usize = 64;
 
 /// The triangles of a mesh, ready for contacts. Immutable from load to load.
 #[derive(Debug, Default)]
 pub(crate) struct CollisionMesh {
     tree: TriangleTree,
+    /// Index of the collider.
+    collider: usize,
     /// Largest coordinate on each axis.
     extents: Vec3,
 }
 
 impl CollisionMesh {
-    pub(crate) fn new(mesh: &ColliderMesh) -> Self {
+    pub(crate) fn new(mesh: &ColliderMesh, collider: usize) -> Self {
         let height_min = sliver_height(&mesh.vertices);
         let corners = mesh.triangles.iter().map(|one| corners(&mesh.vertices, *one));
         let triangles = corners.filter_map(|one| Triangle::new(one, height_min)).collect();
-        Self { tree: TriangleTree::new(triangles), extents: extents(&mesh.vertices) }
+        Self { tree: TriangleTree::new(triangles), collider, extents: extents(&mesh.vertices) }
     }
 }
 
@@ -119,47 +126,51 @@ impl PlacedMesh {
         self.gap.tolerance
     }
 
-    /// Prepares the contacts of a particle with this path.
-    pub(crate) fn near(&self, path: &SubstepPath) -> NearMesh {
+    /// Returns the room for the pushes of a particle with this path.
+    pub(crate) fn room(&self, path: &SubstepPath) -> Room {
         let path = self.path(path);
         let length = path.motion.dot(path.motion).sqrt();
         let bounds = Bounds::around([path.start.to_array(), path.end().to_array()]);
-        // A push moves the end of the path by at most the length and the distance.
-        let room = bounds.grown(length + self.gap.distance);
-        NearMesh { room }
+        Room { ends: bounds.grown(PUSH_SHARE * length + self.gap.tolerance), length }
     }
 
-    /// Lists the triangles near particles.
-    pub(crate) fn list<'a>(&self, particles: impl Iterator<Item = &'a NearMesh>) -> NearTriangles {
-        let rooms = particles.map(|particle| self.search_box(particle));
-        let bounds = rooms.fold(Bounds::EMPTY, |all, one| all.union(&one));
-        let mut list = NearTriangles { indices: [0; LISTED_MAX], count: Some(0) };
-        let found = self.mesh.tree.search(&bounds, &mut |triangle| list.push(triangle));
-        if found.is_break() {
-            list.count = None;
-        }
-        list
+    /// True if a path after some pushes is still within the room of the first one.
+    pub(crate) fn is_within(&self, room: &Room, path: &SubstepPath) -> bool {
+        room.ends.contains(self.path(path).end().to_array())
+    }
+
+    /// Lists the triangles that a particle can touch, which its number names.
+    pub(crate) fn list(
+        &self,
+        lists: &mut NearMeshes,
+        particle: usize,
+        room: &Room,
+    ) -> NearTriangles {
+        let query = NearQuery {
+            collider: self.mesh.collider,
+            particle,
+            bounds: self.search_box(room),
+            margin: SUBSTEPS_AHEAD * room.length + self.gap.tolerance,
+        };
+        lists.find(&self.mesh.tree, &query)
     }
 
     /// Finds what stops a path after this number of pushes, or `None` if nothing does.
     pub(crate) fn stop(
         &self,
         path: &SubstepPath,
-        particle: &NearMesh,
+        room: &Room,
         triangles: &NearTriangles,
         push_count: usize,
     ) -> Option<Stop> {
         let path = self.path(path);
-        if !particle.room.contains(path.end().to_array()) {
-            return Some(Stop::Hold);
-        }
         let is_resolved = |touch: &Touch| match push_count {
             0 => true,
             PUSHES_MAX => touch.is_passage(),
             _ => touch.is_clear(self.gap),
         };
         let mut first: Option<Touch> = None;
-        self.for_each(particle, triangles, |triangle| {
+        self.for_each(room, triangles, |triangle| {
             if let Some(touch) = triangle.touch(&path, self.gap).filter(&is_resolved)
                 && first.is_none_or(|first| touch.is_before(&first))
             {
@@ -184,22 +195,17 @@ impl PlacedMesh {
     }
 
     /// The box in which the triangles lie that the paths of a particle can touch.
-    fn search_box(&self, particle: &NearMesh) -> Bounds {
-        particle.room.grown(self.gap.distance + self.gap.tolerance)
+    fn search_box(&self, room: &Room) -> Bounds {
+        room.ends.grown(self.gap.distance + self.gap.tolerance)
     }
 
-    fn for_each(
-        &self,
-        particle: &NearMesh,
-        triangles: &NearTriangles,
-        mut visit: impl FnMut(&Triangle),
-    ) {
+    fn for_each(&self, room: &Room, triangles: &NearTriangles, mut visit: impl FnMut(&Triangle)) {
         let tree = &self.mesh.tree;
         let mut visit_index = |index: u32| visit(&tree.triangles[index as usize]);
         match triangles.listed() {
             Some(indices) => indices.iter().copied().for_each(visit_index),
             None => {
-                let _all = tree.search(&self.search_box(particle), &mut |index| {
+                let _all = tree.search(&self.search_box(room), &mut |index| {
                     visit_index(index);
                     ControlFlow::Continue(())
                 });
@@ -217,43 +223,13 @@ pub(crate) enum Stop {
     Hold,
 }
 
-/// A particle near a mesh in a substep.
+/// The box in which a path ends, also after some pushes. So the triangles that the particle can touch are
+/// known before the first one.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct NearMesh {
-    /// The box that the end of its path must not leave. So the triangles that it can touch are known
-    /// before the first push, and do not depend on the particles that are listed with it.
-    room: Bounds,
-}
-
-/// The triangles near some particles: all that their paths can touch, and maybe further ones.
-#[derive(Debug)]
-pub(crate) struct NearTriangles {
-    indices: [u32; LISTED_MAX],
-    /// None if there are too many of them.
-    count: Option<usize>,
-}
-
-impl NearTriangles {
-    fn push(&mut self, triangle: u32) -> ControlFlow<()> {
-        match self.count {
-            Some(count) if count < LISTED_MAX => {
-                self.indices[count] = triangle;
-                self.count = Some(count + 1);
-                ControlFlow::Continue(())
-            }
-            _ => ControlFlow::Break(()),
-        }
-    }
-
-    /// True if no path can touch a triangle.
-    pub(crate) fn are_none(&self) -> bool {
-        self.count == Some(0)
-    }
-
-    /// Returns the triangles, ascending, or `None` if there are too many of them.
-    fn listed(&self) -> Option<&[u32]> {
-        self.count.map(|count| &self.indices[..count])
-    }
+pub(crate) struct Room {
+    ends: Bounds,
+    /// Length of the first path.
+    length: f32,
 }
 
 fn reach(mesh: &CollisionMesh, frame: &PlacedFrame) -> f32 {

@@ -2,6 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::contacts::bounds::Bounds;
+
 /// A triangle, in the frame of its mesh.
 #[derive(Debug, Clone)]
 pub(super) struct Triangle {
@@ -87,6 +89,20 @@ impl Triangle {
             normal: normal.as_vec3(),
             inwards: inwards.map(DVec3::as_vec3),
         })
+    }
+
+    /// False if the plane or an edge separates the triangle from a box. A box beside a corner may count as
+    /// near.
+    pub(super) fn meets(&self, bounds: &Bounds) -> bool {
+        let (min, max) = (Vec3::from_array(bounds.min), Vec3::from_array(bounds.max));
+        let (center, half) = ((min + max) * 0.5, (max - min) * 0.5);
+        let reach = |direction: Vec3| direction.abs().dot(half);
+        let height = self.normal.dot(center - self.corners[0]);
+        let edges = self.inwards.iter().zip(&self.corners);
+        height.abs() <= reach(self.normal)
+            && edges
+                .into_iter()
+                .all(|(inwards, corner)| inwards.dot(center - *corner) >= -reach(*inwards))
     }
 
     /// Finds the contact of a path: where it passes through the triangle, or where its end is nearer
