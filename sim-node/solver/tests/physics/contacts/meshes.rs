@@ -403,3 +403,46 @@ fn a_contact_with_a_mesh_adds_no_energy() {
         }
     }
 }
+
+/// Walls of 5 degrees leave no room at the bottom, whichever of them pushes last.
+#[test]
+fn a_particle_that_is_thrown_into_a_crevice_stays_between_its_walls() {
+    let vertices = vec![
+        [-0.0875, 1.0, -1.0],
+        [0.0, 0.0, -1.0],
+        [0.0875, 1.0, -1.0],
+        [-0.0875, 1.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0875, 1.0, 1.0],
+    ];
+    let crevice = Mesh { vertices, faces: vec![vec![0, 1, 4, 3], vec![1, 2, 5, 4]] };
+    for speed in [1.0, 20.0, 400.0] {
+        let text =
+            rates(240, 4) + &particle([0.02, 0.9, 0.0], [0.3, -speed, 0.0]) + &crevice.text();
+        let mut solver = solver(&text);
+        for _ in 0..480 {
+            step(&mut solver, 1);
+            let [x, y, _] = position(&solver, 0);
+            assert!(x.abs() <= 0.0875 * y, "{speed} m/s: {x} at {y}");
+        }
+        assert_at_most("speed at rest", 1e-3, velocity(&solver, 0)[1].abs());
+    }
+}
+
+#[test]
+fn a_particle_rolls_off_the_border_of_an_open_mesh_at_its_distance() {
+    let distance = 0.004;
+    let text = rates(240, 8)
+        + &particle([0.502, 0.02, 0.011], [0.0; 3])
+        + &Mesh::grid(4, 1.0).text()
+        + &format!("distance = {distance}\n");
+    let mut solver = solver(&text);
+    let mut nearest = f64::INFINITY;
+    for _ in 0..120 {
+        step(&mut solver, 1);
+        let [x, y, _] = position(&solver, 0);
+        nearest = nearest.min((x - 0.5).hypot(y));
+    }
+    assert_close("distance from the edge", distance, nearest, 1e-2);
+    assert_at_most("height", -0.5, position(&solver, 0)[1]);
+}
