@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 
 use prost::Message as _;
 use sim_contract::{ColliderState, ParticleState, TornConstraint};
+use sim_solver::scene::ColliderMeshes;
 
 use crate::log::WORLD_FRAME;
 use crate::log::encoding::protobuf::timestamp;
@@ -30,6 +31,8 @@ pub struct DrawnMesh {
     pub is_structural: Vec<bool>,
     /// Particles of each triangle.
     pub triangles: Vec<[u32; 3]>,
+    /// Triangles of the colliders that are meshes.
+    pub collider_meshes: ColliderMeshes,
     /// Least and greatest coordinates of the first state, which planes extend beyond.
     pub bounds: [[f32; 3]; 2],
 }
@@ -110,7 +113,8 @@ impl SceneDrawing {
             indices: sticks,
         };
         let mut colliders = entity("colliders", time_ns);
-        solids::draw(&self.colliders, self.plane_extent, &mut colliders);
+        let meshes = &self.mesh.collider_meshes;
+        solids::draw(&self.colliders, meshes, self.plane_extent, &mut colliders);
         SceneUpdate {
             entities: vec![
                 SceneEntity { lines: vec![sticks], ..entity("sticks", time_ns) },

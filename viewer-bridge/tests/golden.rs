@@ -13,6 +13,7 @@ use sim_contract::{
     ColliderShape, ColliderState, ConstraintState, ParameterValues, ParticleFlags, ParticleState,
     Reason, Triangle,
 };
+use sim_solver::scene::ColliderMesh;
 use viewer_bridge::message::{
     Choice, FromPage, Hashes, Level, Mark, MarkKind, Mode, Node, NodeState, OutcomeText,
     PageLimits, ParametersText, Playback, Refusal, Status, Timeline, ToPage, Welcome,
@@ -48,12 +49,18 @@ fn scene() -> Scene {
             up: "y".to_owned(),
             run_id: "0123456789abcdef".to_owned(),
         },
+        collider_meshes: [(2, triangle_mesh())].into(),
         ..Scene::default()
     };
     let joins = |a, b, kind| ConstraintState { a, b, rest_length: 0.5, kind, compliance: 0.0 };
     let triangles = [Triangle { corners: [0, 1, 2] }, Triangle { corners: [1, 3, 2] }];
     scene.set_geometry(&particles(), &[joins(0, 1, 0), joins(1, 2, 1), joins(2, 3, 2)], &triangles);
     scene
+}
+
+fn triangle_mesh() -> ColliderMesh {
+    let vertices = vec![[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.25]];
+    ColliderMesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] }
 }
 
 fn head() -> FrameHead {
@@ -113,7 +120,15 @@ fn colliders() -> Colliders {
         normal: [0.0, 1.0, 0.0],
         ..ColliderState::default()
     };
-    Colliders { stamp: STAMP, colliders: vec![ball, floor] }
+    let mesh = ColliderState {
+        shape: ColliderShape::Mesh as u32,
+        radius: 0.125,
+        center: [3.0, 2.0, 1.0],
+        rotation: [0.0, 1.0, 0.0, 0.0],
+        angular_velocity: [0.0, 0.5, 0.0],
+        ..ColliderState::default()
+    };
+    Colliders { stamp: STAMP, colliders: vec![ball, floor, mesh] }
 }
 
 /// All binary messages, by name.
@@ -154,6 +169,9 @@ fn fields(message: &Message) -> Value {
             "positions": scene.positions, "ends": scene.ends,
             "rest_lengths": scene.rest_lengths, "triangles": scene.triangles,
             "kinds": scene.kinds, "text": scene.text,
+            "meshes": scene.collider_meshes.iter().map(|(collider, mesh)| json!({
+                "collider": collider, "vertices": mesh.vertices, "triangles": mesh.triangles,
+            })).collect::<Vec<_>>(),
         }),
         Message::Frame(frame) => json!({
             "kind": if frame.format == Format::F32 { 2 } else { 3 },

@@ -3,12 +3,15 @@
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use recorder::{
-    ColliderRow, CollidersRow, Frame, FrameReader, LogReader, Message, StepRow, TearTracker,
+    ColliderRow, CollidersRow, Frame, FrameReader, LogReader, Message, ShapeRow, StepRow,
+    TearTracker, recorded_scene,
 };
 use sim_contract::{ColliderState, ConstraintKind, ConstraintState, ParticleState, Torn, Triangle};
+use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 
 const STRUCTURAL_KIND: u32 = ConstraintKind::Structural as u32;
 
@@ -23,6 +26,8 @@ pub(crate) struct SceneState {
     pub(crate) triangles: Vec<Triangle>,
     /// In their poses after the step.
     pub(crate) colliders: Vec<ColliderRow>,
+    /// The triangles of the colliders, once one of them is a mesh.
+    pub(crate) collider_meshes: Option<Arc<ColliderMeshes>>,
 }
 
 /// Reads a recording and calls `visit` with its state at each of `steps`, which ascend, until
@@ -39,6 +44,7 @@ pub(crate) fn visit_states<R: Read>(
     while steps.peek().is_some() {
         let Some(frame) = frames.next_frame()? else { break };
         state.apply_frame(frame, &mut tears)?;
+        state.read_meshes(frames.log());
         if steps.next_if_eq(&state.row.step).is_some() {
             state.set_torn(tears.at(state.row.step))?;
             state.check_indices()?;
@@ -80,6 +86,20 @@ impl SceneState {
             _ => {}
         }
         Ok(())
+    }
+
+    /// Reads the triangles from the scene of the recording. Without a readable scene, there are none.
+    fn read_meshes<R: Read>(&mut self, log: &LogReader<R>) {
+        let is_mesh = |one: &ColliderRow| matches!(one.shape, ShapeRow::Mesh { .. });
+        if self.collider_meshes.is_none() && self.colliders.iter().any(is_mesh) {
+            let meshes = recorded_scene(log).map(|scene| scene.collider_meshes());
+            self.collider_meshes = Some(Arc::new(meshes.unwrap_or_default()));
+        }
+    }
+
+    /// Returns the triangles of a collider that is a mesh.
+    pub(crate) fn collider_mesh(&self, collider: usize) -> Option<&ColliderMesh> {
+        self.collider_meshes.as_ref()?.get(&collider)
     }
 
     fn set_torn(&mut self, torn: Option<&Torn>) -> anyhow::Result<()> {

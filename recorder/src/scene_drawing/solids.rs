@@ -1,11 +1,12 @@
-//! The drawing of the colliders: cubes, spheres, cylinders, and the edges of bounds.
+//! The drawing of the colliders: cubes, spheres, cylinders, triangles, and the edges of bounds.
 
 use sim_contract::{ColliderShape, ColliderState};
+use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 
 use crate::log::encoding::protobuf::{Pose, Quaternion, Vector3};
 use crate::log::encoding::scene_messages::{
     Color, CubePrimitive, CylinderPrimitive, LINE_LIST, LinePrimitive, Point3, SceneEntity,
-    SpherePrimitive,
+    SpherePrimitive, TriangleListPrimitive,
 };
 
 /// The origin of the scene.
@@ -57,8 +58,13 @@ impl Default for PlaneExtent {
 
 /// Adds the drawing of the colliders to an entity. Any process of the user can publish colliders, so those
 /// with an unknown shape or a number that is not finite are left out.
-pub(super) fn draw(colliders: &[ColliderState], extent: PlaneExtent, entity: &mut SceneEntity) {
-    for collider in colliders.iter().filter(|one| is_finite(one)) {
+pub(super) fn draw(
+    colliders: &[ColliderState],
+    meshes: &ColliderMeshes,
+    extent: PlaneExtent,
+    entity: &mut SceneEntity,
+) {
+    for (index, collider) in colliders.iter().enumerate().filter(|(_, one)| is_finite(one)) {
         let (center, radius) = (wide(collider.center), f64::from(collider.radius));
         let (a, b) = (wide(collider.a), wide(collider.b));
         match ColliderShape::from_number(collider.shape) {
@@ -70,6 +76,9 @@ pub(super) fn draw(colliders: &[ColliderState], extent: PlaneExtent, entity: &mu
                 entity.cylinders.push(cylinder(a, b, radius));
             }
             Some(ColliderShape::Bounds) => entity.lines.push(edges(a, b)),
+            Some(ColliderShape::Mesh) => {
+                entity.triangles.extend(meshes.get(&index).map(|mesh| triangles(collider, mesh)));
+            }
             None => {}
         }
     }
@@ -96,10 +105,24 @@ fn plane(collider: &ColliderState, extent: PlaneExtent) -> CubePrimitive {
     }
 }
 
-fn cube(collider: &ColliderState) -> CubePrimitive {
+fn turned_pose(collider: &ColliderState) -> Pose {
     let [x, y, z, w] = collider.rotation.map(f64::from);
+    pose(wide(collider.center), Quaternion { x, y, z, w })
+}
+
+fn triangles(collider: &ColliderState, mesh: &ColliderMesh) -> TriangleListPrimitive {
+    let points = mesh.vertices.iter().map(|vertex| wide(*vertex));
+    TriangleListPrimitive {
+        pose: Some(turned_pose(collider)),
+        points: points.map(|[x, y, z]| Point3 { x, y, z }).collect(),
+        color: Some(SOLID_COLOR),
+        indices: mesh.triangles.as_flattened().to_vec(),
+    }
+}
+
+fn cube(collider: &ColliderState) -> CubePrimitive {
     CubePrimitive {
-        pose: Some(pose(wide(collider.center), Quaternion { x, y, z, w })),
+        pose: Some(turned_pose(collider)),
         size: Some(vector(scale(wide(collider.half_extents), 2.0))),
         color: Some(SOLID_COLOR),
     }
@@ -194,7 +217,11 @@ mod tests {
     fn drawn(collider: ColliderState) -> SceneEntity {
         let bounds = [[-1.0, 0.0, -1.0], [1.0, 2.0, 1.0]];
         let mut entity = SceneEntity::default();
-        draw(&[collider], PlaneExtent::around(bounds), &mut entity);
+        let mesh = ColliderMesh {
+            vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+        };
+        draw(&[collider], &[(0, mesh)].into(), PlaneExtent::around(bounds), &mut entity);
         entity
     }
 
@@ -290,6 +317,18 @@ mod tests {
             lengths[axis] += 1;
         }
         assert_eq!(lengths, [4, 4, 4]);
+    }
+
+    #[test]
+    fn the_triangles_of_a_mesh_are_placed_at_its_pose() {
+        let center = [0.5, 1.0, 1.5];
+        let rotation = [0.0, 0.0, 0.6, 0.8];
+        let entity = drawn(ColliderState { center, rotation, ..with(ColliderShape::Mesh) });
+        let mesh = &entity.triangles[0];
+        assert_eq!(mesh.indices, [0, 1, 2]);
+        let Point3 { x, y, z } = mesh.points[1];
+        // A turn by 2 acos(0.8) takes x to (0.28, 0.96, 0).
+        assert_near(placed(mesh.pose, [x, y, z]), [0.78, 1.96, 1.5]);
     }
 
     #[test]

@@ -55,5 +55,8 @@ fn state(collider: &PlacedCollider) -> ColliderState {
         sim_solver::ColliderGeometry::Bounds { min, max } => {
             ColliderState { a: min, b: max, ..with(ColliderShape::Bounds) }
         }
+        sim_solver::ColliderGeometry::Mesh { center, rotation, distance: radius } => {
+            ColliderState { center, rotation, radius, ..with(ColliderShape::Mesh) }
+        }
     }
 }

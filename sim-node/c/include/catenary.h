@@ -109,6 +109,8 @@ enum catenary_collider_shape
   CATENARY_COLLIDER_SHAPE_CAPSULE = 3,
   // A box that particles stay inside.
   CATENARY_COLLIDER_SHAPE_BOUNDS = 4,
+  // Triangles with two sides.
+  CATENARY_COLLIDER_SHAPE_MESH = 5,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -497,17 +499,17 @@ typedef struct {
   float restitution;
   // Coefficient of friction.
   float friction;
-  // Radius of a sphere or capsule.
+  // Radius of a sphere or capsule; distance that particles keep from a mesh.
   float radius;
   // Offset of a plane: the side where `normal` · x >= `offset` is free.
   float offset;
   // Unit normal of a plane; points to the free side.
   float normal[3];
-  // Center of a box or sphere.
+  // Center of a box, sphere or mesh.
   float center[3];
   // Half the edge lengths of a box, along its own axes.
   float half_extents[3];
-  // Rotation of a box, as the quaternion x, y, z, w.
+  // Rotation of a box or mesh, as the quaternion x, y, z, w.
   float rotation[4];
   // First end of a capsule's axis; the lowest corner of bounds.
   float a[3];
@@ -515,7 +517,7 @@ typedef struct {
   float b[3];
   // Velocity of the collider.
   float velocity[3];
-  // Angular velocity of a box about its center, in rad/s.
+  // Angular velocity of a box or mesh about its center, in rad/s.
   float angular_velocity[3];
 } catenary_collider_state;
 

@@ -418,9 +418,11 @@ impl Node {
     }
 }
 
-/// Returns `true` for a snapshot that its node has published just now.
+/// Returns `true` for a snapshot that its node has published just now. One from the future has the clock of
+/// another host, which tells nothing.
 fn is_recent(header: &SnapshotHeader) -> bool {
-    monotonic_ns().saturating_sub(header.publish_monotonic_ns) < SECOND_NS / 2
+    let age_ns = monotonic_ns().checked_sub(header.publish_monotonic_ns);
+    age_ns.is_some_and(|age_ns| age_ns < SECOND_NS / 2)
 }
 
 /// Returns the error of the last part of a wait as that of the whole wait.

@@ -1,6 +1,6 @@
 //! The built-in scenes.
 
-const SCENES: [(&str, &str); 15] = [
+const SCENES: [(&str, &str); 16] = [
     ("curtain", include_str!("../scenes/curtain.toml")),
     ("rope", include_str!("../scenes/rope.toml")),
     ("flag", include_str!("../scenes/flag.toml")),
@@ -12,6 +12,7 @@ const SCENES: [(&str, &str); 15] = [
     ("spring-cloth", include_str!("../scenes/spring-cloth.toml")),
     ("carried-cloth", include_str!("../scenes/carried-cloth.toml")),
     ("folding-cloth", include_str!("../scenes/folding-cloth.toml")),
+    ("covered-bust", include_str!("../scenes/covered-bust.toml")),
     ("drop-box", include_str!("../scenes/drop-box.toml")),
     ("drop-box-braced", include_str!("../scenes/drop-box-braced.toml")),
     ("pendulum", include_str!("../scenes/pendulum.toml")),

@@ -17,7 +17,7 @@ mod warnings;
 
 pub use definition::anchor::{SceneAnchor, Waypoint};
 pub use definition::bending::{BendParticles, Rigidity, SceneBend, SheetBending};
-pub use definition::collider::{ColliderGeometry, SceneCollider};
+pub use definition::collider::{ColliderGeometry, ColliderMesh, ColliderMeshes, SceneCollider};
 pub use definition::element::{SceneConstraint, SceneParticle};
 pub use definition::limits::Limits;
 pub use definition::settings::{ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};

@@ -107,7 +107,10 @@ impl Solver {
             store: ParticleStore::new(&model, &orders, kernels),
             torn: Torn::new(constraint_count),
             tethers: Tethers::default(),
-            colliders: scene.colliders.iter().map(Collider::new).collect(),
+            colliders: (0..)
+                .zip(&scene.colliders)
+                .map(|(at, one)| Collider::new(at, one))
+                .collect(),
             obstacles: Vec::with_capacity(OBSTACLES_PER_COLLIDER * scene.colliders.len()),
             particle_contacts: ParticleContacts::default(),
             anchors: Anchors::new(&scene.anchors, &model.particles),
@@ -128,6 +131,9 @@ impl Solver {
             offered: None,
             model: Arc::new(model),
         };
+        if solver.colliders.iter().any(|collider| collider.mesh.is_some()) {
+            solver.store.reserve_mesh_contacts(particle_count);
+        }
         solver.finish_boundary();
         solver.has_new_tethers = false;
         solver

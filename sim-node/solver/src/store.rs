@@ -29,6 +29,7 @@ use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrders;
 use crate::constraints::parameters::ConstraintParameters;
 use crate::constraints::projection::TearMark;
+use crate::contacts::contact::ContactRoom;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
 use crate::parameters::Parameters;
@@ -55,8 +56,7 @@ pub(crate) struct ParticleStore {
     /// By constraint: where its parameters are.
     locations: Vec<Location>,
     bends: StoredBends,
-    /// Largest number of particles in a block; 0 in scenes without colliders.
-    contact_count: usize,
+    contact_room: ContactRoom,
 }
 
 impl ParticleStore {
@@ -83,7 +83,7 @@ impl ParticleStore {
             is_torn: vec![false; model.constraints.len()],
             locations,
             bends,
-            contact_count: 0,
+            contact_room: ContactRoom::default(),
         };
         store.locate_constraints(model);
         store
@@ -180,6 +180,7 @@ impl ParticleStore {
     pub(crate) fn exchange(&mut self, other: &mut Self) {
         std::mem::swap(self, other);
         std::mem::swap(&mut self.workers, &mut other.workers);
+        std::mem::swap(&mut self.contact_room, &mut other.contact_room);
     }
 
     pub(crate) fn kernels(&self) -> Kernels {
@@ -189,7 +190,13 @@ impl ParticleStore {
     /// Replaces the threads by `count`, or as many as the system grants.
     pub(crate) fn set_threads(&mut self, count: usize) {
         self.workers = Workers::new(self.workers.kernels, count);
-        self.workers.reserve_contacts(self.contact_count);
+        self.workers.reserve_contacts(self.contact_room);
+    }
+
+    /// Makes room for contacts of this number of particles with meshes.
+    pub(crate) fn reserve_mesh_contacts(&mut self, particle_count: usize) {
+        self.contact_room.near_mesh_count = particle_count;
+        self.workers.reserve_contacts(self.contact_room);
     }
 
     pub(crate) fn thread_count(&self) -> usize {

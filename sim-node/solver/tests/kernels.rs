@@ -75,6 +75,7 @@ fn kernels_agree_on_scenes_with_every_mechanism() {
         include_str!("scenes/everything.toml"),
         include_str!("scenes/stiffness.toml"),
         include_str!("scenes/touching.toml"),
+        include_str!("scenes/draped.toml"),
         include_str!("scenes/bends.toml"),
     ] {
         assert_same_bits(text, "test", 300);
@@ -261,6 +262,28 @@ fn threads_give_the_same_bits_on_large_sheets() {
             assert_same_bits_of_threads(&sheet(columns, rows, solver, generator), &name, 10);
         }
     }
+}
+
+/// A sheet and a graph of the same size fall on rough ground, which turns below them.
+#[test]
+fn threads_give_the_same_bits_on_a_mesh() {
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for place in 0..41 * 41 {
+        let (column, row) = (place % 41, place / 41);
+        let height = -0.002 * f64::from((7 * column + 3 * row) % 9);
+        vertices.push([0.25 * f64::from(column) - 0.2, height, 0.25 * f64::from(row) - 0.2]);
+        if column < 40 && row < 40 {
+            faces.push([place, place + 41, place + 42, place + 1]);
+        }
+    }
+    let ground = format!(
+        "[[collider]]\nshape = \"mesh\"\nvertices = {vertices:?}\nfaces = {faces:?}\n\
+         center = [0, -0.001, 0]\nangular_velocity = [0.01, 0.1, 0]\nfriction = 0.4\n"
+    );
+    let text = sheet(180, 180, "substeps = 2", LINKS) + &ground;
+    assert_same_bits_of_threads(&text, "rows", 10);
+    let sewn = format!("{text}[[constraint]]\nparticles = [500, 900]\n");
+    assert_same_bits_of_threads(&sewn, "graph", 10);
 }
 
 #[test]

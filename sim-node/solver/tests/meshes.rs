@@ -1,5 +1,5 @@
-//! Meshes from OBJ text: a plane, a sphere and a tube become cloth; degenerate parts are omitted with a
-//! warning.
+//! Meshes from OBJ text: a plane, a sphere and a tube become cloth, or colliders; degenerate parts are
+//! omitted with a warning.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use sim_solver::scene::Mesh;
@@ -215,4 +215,50 @@ fn errors_in_a_mesh_name_the_line_of_the_scene_and_of_the_mesh() {
         "version = 1\n[[generate]]\nshape = \"obj\"\nvertices = [[0, 0, 0]]\nfaces = [[0, 1, 2]]\n";
     let error = Scene::from_toml(text, "x.toml").unwrap_err().to_string();
     assert!(error.contains("face 0 is [0, 1, 2]"), "{error}");
+}
+
+/// Returns a scene with a collider that is a mesh.
+fn collider_scene(obj: &str, keys: &str) -> Result<Scene, SceneError> {
+    let text =
+        format!("version = 1\n[[collider]]\nshape = \"mesh\"\npath = \"mesh.obj\"\n{keys}\n");
+    Scene::from_toml_with_files(&text, "test.toml", &|_| Ok(obj.to_owned()))
+}
+
+#[test]
+fn the_complete_text_of_a_scene_contains_the_scaled_triangles_of_a_collider() {
+    let keys = "scale = 0.1\ncenter = [1, 2, 3]\nrotation = [0, 1, 0, 1]\ndistance = 0.01\n\
+        velocity = [1, 0, 0]\nangular_velocity = [0, 1, 0]\nfriction = 0.5";
+    let scene = collider_scene(&plane(4, 3, Faces::Quads), keys).unwrap();
+    let mesh = &scene.collider_meshes()[&0];
+    assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (12, 12));
+    assert_eq!(mesh.vertices[11], [0.3 * 0.1, -0.2 * 0.1, 0.0]);
+    assert_eq!(mesh.triangles[..2], [[0, 4, 5], [0, 5, 1]]);
+    let text = scene.to_toml();
+    assert!(!text.contains("scale") && !text.contains("path"), "{text}");
+    let again = Scene::from_toml(&text, "test").unwrap();
+    assert_eq!(again, scene);
+    assert_eq!(again.to_toml(), text);
+}
+
+#[test]
+fn a_collider_names_what_is_wrong_in_its_file_and_omits_what_no_contact_can_use() {
+    let error = collider_scene("v 1 2\n", "").unwrap_err().to_string();
+    let expected = "test.toml:4: collider[0].path: mesh.obj: line 1: a vertex is malformed \
+        (allowed: three finite numbers)";
+    assert_eq!(error, expected);
+    // The second face has no area, the third is a sliver, and the edge of three faces is no fault.
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nv 0.5 1e-7 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n\
+        f 1 2 5\nf 1 2 6\n";
+    let scene = collider_scene(obj, "").unwrap();
+    assert_eq!(scene.collider_meshes()[&0].triangles, [[0, 1, 2], [0, 1, 4]]);
+    let expected = [
+        "mesh.obj: face 2 has no area and is omitted",
+        "mesh.obj: 1 vertex belongs to no face and is omitted",
+        "collider[0]: 1 triangle is too narrow for a contact and omitted",
+    ];
+    assert_eq!(scene.read_warnings, expected);
+    let error = collider_scene("v 0 0 0\nv 1 0 0\nv 0.5 1e-7 0\nf 1 2 3\n", "").unwrap_err();
+    let expected = "test.toml:4: collider[0].path: mesh.obj: its faces have no triangle with an \
+        area (allowed: at least one)";
+    assert_eq!(error.to_string(), expected);
 }

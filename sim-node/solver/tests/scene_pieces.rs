@@ -123,6 +123,23 @@ fn a_mesh_can_be_divided_between_vertices_faces_and_pinned_vertices() {
 }
 
 #[test]
+fn a_mesh_of_a_collider_can_be_divided_between_vertices_and_faces() {
+    let text = "version = 1\n@[[collider]]\nshape = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\n\
+        @[[collider]]\nshape = \"mesh\"\n\
+        vertices = [@ [0, 0, 0], @ [1, 0, 0], @ [1, 1, 0], @@ [0, 1, 0]@]\n\
+        faces = [@ [0, 1, 2], @ [0, 2, 3]]\nfriction = 0.5\n\
+        @[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0\n";
+    let scene = read(text).unwrap();
+    let mesh = &scene.collider_meshes()[&1];
+    assert_eq!((mesh.vertices.len(), scene.colliders.len()), (4, 3));
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(scene.colliders[1].friction, 0.5);
+    let error = error(&text.replace("[0, 2, 3]", "[0, 2, true]"));
+    let expected = "collider[1].faces: is true (allowed: a whole number)";
+    assert_eq!(error.split_once(": ").unwrap().1, expected);
+}
+
+#[test]
 fn errors_in_divided_tables_count_the_elements_of_earlier_pieces() {
     let anchor = |path: &str| format!("{ANCHOR}{path}\n");
     let mesh = |from: &str, to: &str| MESH.replacen(from, to, 1);

@@ -14,11 +14,14 @@ pub enum ColliderShape {
     Capsule = 3,
     /// A box that particles stay inside.
     Bounds = 4,
+    /// Triangles with two sides.
+    Mesh = 5,
 }
 
 impl ColliderShape {
     /// All shapes, by number.
-    pub const ALL: [Self; 5] = [Self::Plane, Self::Box, Self::Sphere, Self::Capsule, Self::Bounds];
+    pub const ALL: [Self; 6] =
+        [Self::Plane, Self::Box, Self::Sphere, Self::Capsule, Self::Bounds, Self::Mesh];
 
     /// Returns the shape with this number.
     pub fn from_number(number: u32) -> Option<Self> {
@@ -38,6 +41,7 @@ impl ColliderShape {
             Self::Sphere => "sphere",
             Self::Capsule => "capsule",
             Self::Bounds => "bounds",
+            Self::Mesh => "mesh",
         }
     }
 }

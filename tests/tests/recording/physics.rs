@@ -1,4 +1,4 @@
-//! Tears, colliders and a load in recordings of a live node: a late recorder records the state before
+//! Tears, colliders, meshes and a load in recordings of a live node: a late recorder records the state before
 //! it attached, the file ends with the load, and a recording of its playback has the same rows.
 
 use std::path::Path;
@@ -120,4 +120,61 @@ fn a_late_recording_with_tears_a_reset_and_a_load_verifies_and_plays_back_row_fo
     assert_eq!(rows(&two), rows(&one));
     assert!((0..).zip(&two).all(|(index, frame)| frame.row.snapshot_index == Some(index)));
     assert_verifies(&sandbox, &second);
+}
+
+/// A grid of particles that falls on a mesh from a file.
+const ON_A_MESH: &str = r#"
+version = 1
+
+[solver]
+substeps = 2
+
+[[collider]]
+shape = "mesh"
+path = "tent.obj"
+scale = 0.5
+friction = 0.3
+
+[[generate]]
+shape = "cloth"
+columns = 6
+rows = 6
+spacing = 0.1
+origin = [-0.25, 0.15, -0.25]
+down = [0, 0, 1]
+pinned = "none"
+"#;
+
+#[test]
+fn a_recording_with_a_mesh_verifies_plays_and_goes_on_without_its_file() {
+    let sandbox = Sandbox::new();
+    let tent =
+        "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv 0 0.3 0\nf 1 5 2\nf 2 5 3\nf 3 5 4\nf 4 5 1\n";
+    let mesh = sandbox.write("tent.obj", tent);
+    let scene = sandbox.write("tent.toml", ON_A_MESH);
+    let file = sandbox.path("tent.mcap");
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", &scene, "--paused"]);
+    let recording = record(&sandbox, &file);
+    ctl(&sandbox, &["step 40", "move-collider 0 0 0.01 0", "step 40"]);
+    assert_eq!(recording.interrupt().code, Some(0));
+    assert_eq!(node.interrupt().code, Some(0));
+    std::fs::remove_file(&mesh).unwrap();
+    std::fs::remove_file(&scene).unwrap();
+    let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
+    assert!(verified.contains("80 steps bit-identical"), "{verified}");
+    let again = sandbox.path("again.mcap");
+    let args = ["simulate", &file, "--steps", "80", "--commands", &file, "-o", &again];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let hash = |file: &str| frames(file).last().unwrap().row.state_hash;
+    assert_eq!(hash(&again), hash(&file));
+    // A cloth that has met no mesh would be 0.5 m lower.
+    let last = frames(&file).pop().unwrap();
+    let heights = last.particles.unwrap().into_iter().map(|one| one.position[1]);
+    assert!(heights.fold(f32::INFINITY, f32::min) > -0.05);
+    // The pictures have the four triangles of the mesh beside the 50 of the cloth.
+    let folder = sandbox.path("pictures");
+    let args = ["export", &file, "--svg", &folder, "--at", "0"];
+    Process::run(Program::Recorder, &sandbox, &args).success();
+    let picture = std::fs::read_dir(&folder).unwrap().next().unwrap().unwrap().path();
+    assert_eq!(std::fs::read_to_string(picture).unwrap().matches("<polygon").count(), 54);
 }

@@ -59,7 +59,12 @@ const SCENE: &str = "
     shape = 'capsule'
     a = [0, -1, 0]
     b = [1, -1, 0]
-    radius = 0.1";
+    radius = 0.1
+    [[collider]]
+    shape = 'mesh'
+    vertices = [[0, -3, 0], [1, -3, 0], [0, -3, 1]]
+    faces = [[0, 1, 2]]
+    angular_velocity = [0, 1, 0]";
 
 /// Returns the schema of each topic with JSON rows.
 fn row_schemas() -> BTreeMap<Topic, Value> {

@@ -371,6 +371,7 @@ fn drawing(scene: &Scene) -> SceneDrawing {
         ends: scene.ends.clone(),
         is_structural: scene.kinds.iter().map(|kind| *kind == STRUCTURAL_KIND).collect(),
         triangles: scene.triangles.clone(),
+        collider_meshes: scene.collider_meshes.clone(),
         bounds: [bounds.min, bounds.max],
     })
 }

@@ -59,6 +59,7 @@ impl Load {
                 up: summary.up.name().to_owned(),
                 run_id: format!("{:016x}", self.header.run_id),
             },
+            collider_meshes: summary.collider_meshes.clone(),
             ..Scene::default()
         };
         scene.set_geometry(particles, &self.constraints, &self.triangles);

@@ -2,7 +2,7 @@
 
 use sim_contract::ParameterValues;
 use sim_solver::Scene;
-use sim_solver::scene::Up;
+use sim_solver::scene::{ColliderMeshes, Up};
 
 /// The part of a scene that a viewer needs.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +19,8 @@ pub struct SceneSummary {
     pub rate_hz: u32,
     /// Values of the parameters.
     pub parameters: ParameterValues,
+    /// Triangles of the colliders that are meshes.
+    pub collider_meshes: ColliderMeshes,
 }
 
 impl SceneSummary {
@@ -28,6 +30,7 @@ impl SceneSummary {
         let scene = Scene::from_toml(text, "").ok()?;
         Some(Self {
             parameters: parameters(&scene),
+            collider_meshes: scene.collider_meshes(),
             name: scene.name,
             unit: scene.unit,
             up: scene.up,
@@ -47,6 +50,7 @@ impl Default for SceneSummary {
             is_planar: false,
             rate_hz: 0,
             parameters: ParameterValues::default(),
+            collider_meshes: ColliderMeshes::new(),
         }
     }
 }

@@ -3,6 +3,7 @@
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use sim_contract::{ConstraintState, ParticleState, Triangle};
+use sim_solver::scene::{ColliderMesh, ColliderMeshes};
 
 use super::cursor::Cursor;
 use super::decode_error::DecodeError;
@@ -39,6 +40,8 @@ pub struct Scene {
     pub kinds: Vec<u8>,
     /// Names.
     pub text: SceneText,
+    /// Triangles of the colliders that are meshes.
+    pub collider_meshes: ColliderMeshes,
 }
 
 /// The JSON of a scene.
@@ -83,11 +86,12 @@ impl Scene {
     pub fn encode(&self) -> Bytes {
         #[allow(clippy::expect_used, reason = "a miss is a fault of the type")]
         let json = serde_json::to_vec(&self.text).expect("strings have a JSON form");
-        let size = 96
+        let size = 100
             + 12 * self.positions.len()
             + 13 * self.ends.len()
             + 12 * self.triangles.len()
-            + json.len();
+            + json.len()
+            + self.collider_meshes.values().map(mesh_size_bytes).sum::<usize>();
         let Bounds { min, max } = self.bounds();
         let mut writer = Writer::new(Kind::Scene, self.stamp, size);
         writer.count(&self.positions);
@@ -107,6 +111,14 @@ impl Scene {
         writer.pad();
         writer.bytes(&json);
         writer.pad();
+        writer.u32(index(self.collider_meshes.len()));
+        for (collider, mesh) in &self.collider_meshes {
+            writer.u32(index(*collider));
+            writer.count(&mesh.vertices);
+            writer.count(&mesh.triangles);
+            mesh.vertices.iter().for_each(|vertex| writer.vector(*vertex));
+            mesh.triangles.iter().flatten().for_each(|corner| writer.u32(*corner));
+        }
         writer.finish()
     }
 
@@ -129,6 +141,30 @@ impl Scene {
             kinds: cursor.padded(constraints)?,
             text: serde_json::from_slice(&cursor.padded(json_size)?)
                 .map_err(|error| DecodeError::Json { detail: error.to_string() })?,
+            collider_meshes: decode_meshes(cursor)?,
         })
     }
+}
+
+fn decode_meshes(cursor: &mut Cursor<'_>) -> Result<ColliderMeshes, DecodeError> {
+    let mut meshes = ColliderMeshes::new();
+    for _ in 0..cursor.u32()? {
+        let (collider, vertices, triangles) = (cursor.u32()?, cursor.u32()?, cursor.u32()?);
+        let mesh = ColliderMesh {
+            vertices: cursor.list(vertices, 12, Cursor::vector)?,
+            triangles: cursor
+                .list(triangles, 12, |cursor| Ok([cursor.u32()?, cursor.u32()?, cursor.u32()?]))?,
+        };
+        meshes.insert(collider as usize, mesh);
+    }
+    Ok(meshes)
+}
+
+fn mesh_size_bytes(mesh: &ColliderMesh) -> usize {
+    12 + 12 * mesh.vertices.len() + 12 * mesh.triangles.len()
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "a scene has at most 65,536 colliders")]
+fn index(number: usize) -> u32 {
+    number as u32
 }

@@ -5,6 +5,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Camera } from "../js/geometry/camera.js";
 import { Renderer } from "../js/gl/renderer.js";
+import { facets } from "../js/gl/solids.js";
 import { Simulation } from "../js/state/simulation.js";
 
 /** A context that draws nothing. Constants are their names, and `live` counts the objects of each kind. */
@@ -18,6 +19,10 @@ function countingContext() {
     getProgramParameter: (_, name) => (name === "ACTIVE_UNIFORMS" ? 0 : true),
     bindBuffer: (_, buffer) => { bound = buffer; },
     bufferData: (_, data) => sizes.set(bound, data.byteLength),
+    deleteBuffer: (buffer) => {
+      live.Buffer--;
+      sizes.delete(buffer);
+    },
   };
   const gl = new Proxy(own, {
     get(target, name) {
@@ -41,6 +46,7 @@ const scene = (epoch) => ({
   kind: "scene", epoch, step: 0, particleCount: 3, constraintCount: 3, triangleCount: 1, isPlanar: false, up: "y",
   positions: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0), ends: Uint32Array.of(0, 1, 1, 2, 2, 0), restLengths: Float32Array.of(1, 1, 1),
   triangles: Uint32Array.of(0, 1, 2), constraintKinds: new Uint8Array(3), min: [0, 0, 0], max: [1, 1, 0], name: "one",
+  meshes: new Map([[1, { vertices: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 0, 1), triangles: Uint32Array.of(0, 1, 2, 2, 1, 0) }]]),
 });
 
 const frame = (epoch, number, isQuantised) => ({
@@ -62,6 +68,24 @@ test("scenes of alternating formats use no more memory than the first two", () =
   assert.equal(kept[1].Texture, 3);
   assert.equal(kept[1].bytes, kept[0].bytes, "the lists of the old scene are freed");
   assert.deepEqual(kept.slice(2), [kept[1], kept[1], kept[1], kept[1]]);
+});
+
+test("a mesh is drawn at the pose of its collider, each triangle with its normal", () => {
+  const simulation = new Simulation();
+  const { renderer } = rendererOf(simulation);
+  const half = Math.SQRT1_2;
+  simulation.receive(scene(1));
+  simulation.receive({ kind: "colliders", epoch: 1, step: 0, colliders: [{ index: 1, shape: "mesh", center: [1, 2, 3], rotation: [0, half, 0, half], radius: 0 }] });
+  simulation.receive(frame(1, 1, false));
+  renderer.upload();
+  const [placed] = renderer.colliders.placed;
+  assert.deepEqual([placed.solid, placed.a], [1, [1, 2, 3]]);
+  // The quarter turn about y takes x to -z.
+  assert.ok(Math.abs(placed.shape[2] + 1) < 1e-6);
+  assert.equal(renderer.colliders.loadedMeshes.get(1).count, 6);
+  const corners = facets(simulation.scene.meshes.get(1));
+  assert.deepEqual([...corners.subarray(3, 6)].map(Math.abs), [0, 1, 0]);
+  assert.equal(corners[4], -corners[4 + 3 * 7], "the second triangle faces the other way");
 });
 
 test("a scene of another bridge with the same epoch is uploaded", () => {

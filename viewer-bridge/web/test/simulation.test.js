@@ -8,7 +8,7 @@ import { Simulation } from "../js/state/simulation.js";
 const scene = (epoch, rest = {}) => ({
   kind: "scene", epoch, step: 0, particleCount: 2, constraintCount: 1, triangleCount: 0, isPlanar: false, up: "y",
   positions: Float32Array.from([0, 1, 0, 0, 0, 0]), ends: Uint32Array.from([0, 1]), restLengths: Float32Array.from([1]),
-  triangles: new Uint32Array(0), constraintKinds: new Uint8Array(1), min: [0, 0, 0], max: [0, 1, 0], name: "two", ...rest,
+  triangles: new Uint32Array(0), constraintKinds: new Uint8Array(1), min: [0, 0, 0], max: [0, 1, 0], name: "two", meshes: new Map(), ...rest,
 });
 const frame = (epoch, number, rest = {}) => ({
   kind: "frame", epoch, step: number, number, particleCount: 2, lo: [0, 0, 0], scale: [1, 1, 1],

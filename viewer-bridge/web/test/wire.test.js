@@ -7,7 +7,7 @@ import { test } from "node:test";
 import { decode } from "../js/net/wire.js";
 
 const golden = JSON.parse(readFileSync(new URL("../../tests/golden/messages.json", import.meta.url), "utf8"));
-const SHAPES = ["plane", "box", "sphere", "capsule", "bounds"];
+const SHAPES = ["plane", "box", "sphere", "capsule", "bounds", "mesh"];
 const KINDS = ["", "scene", "frame", "frame", "tear", "pins", "stats", "colliders"];
 
 /** Decodes hex into an array buffer that starts at offset 0. */
@@ -23,6 +23,7 @@ const readers = {
     min: m.min, max: m.max, origin: m.origin, rate_hz: m.rateHz,
     flags: m.isPlanar ? 1 : 0,
     text: { name: m.name, unit: m.unit, up: m.up, run_id: m.runId },
+    meshes: [...m.meshes].map(([collider, mesh]) => ({ collider, vertices: triples(mesh.vertices), triangles: triples(mesh.triangles) })),
   }),
   frame: (m) => ({
     sim_time_s: m.simTime, number: m.number, torn_count: m.tornCount, solve_us: m.solveUs, wake_late_us: m.wakeLateUs,
@@ -69,7 +70,7 @@ function compareColliders(read, written) {
   assert.equal(read.length, written.length);
   read.forEach((one, i) => {
     const other = written[i];
-    assert.deepEqual([one.shape, one.restitution, one.friction], [SHAPES[other.shape], other.restitution, other.friction]);
+    assert.deepEqual([one.index, one.shape, one.restitution, one.friction], [i, SHAPES[other.shape], other.restitution, other.friction]);
     assert.deepEqual([one.radius, one.offset, one.normal, one.center, one.a, one.b], [other.radius, other.offset, other.normal, other.center, other.a, other.b]);
     assert.deepEqual([one.halfExtents, one.rotation], [other.half_extents, other.rotation]);
     assert.deepEqual([one.velocity, one.angularVelocity], [other.velocity, other.angular_velocity]);
@@ -99,4 +100,4 @@ test("a truncated message is refused at every length", () => {
   }
 });
 
-const endsInPadding = (fields) => fields.kind === 3 || fields.kind === 4 || fields.kind === 1 || fields.kind === 6;
+const endsInPadding = (fields) => fields.kind === 3 || fields.kind === 4 || fields.kind === 6;

@@ -52,6 +52,7 @@ fn mesh(state: &SceneState) -> DrawnMesh {
         ends: constraints.iter().map(|one| [one.a, one.b]).collect(),
         is_structural: constraints.iter().map(|one| one.kind == STRUCTURAL_KIND).collect(),
         triangles: state.triangles.iter().map(|one| one.corners).collect(),
+        collider_meshes: state.collider_meshes.as_deref().cloned().unwrap_or_default(),
         bounds: bounds(state),
     }
 }

@@ -4,6 +4,7 @@
 use glam::{DQuat, DVec3};
 use recorder::ShapeRow;
 use sim_contract::{ParticleState, PlainF32};
+use sim_solver::scene::ColliderMesh;
 
 use crate::export::scene_state::SceneState;
 
@@ -78,8 +79,13 @@ impl ExtentTracker {
         if self.colliders.len() < state.colliders.len() {
             self.colliders.resize(state.colliders.len(), None);
         }
-        for (known, collider) in self.colliders.iter_mut().zip(&state.colliders) {
-            *known = union(*known, extent_of_collider(&collider.shape));
+        let colliders = self.colliders.iter_mut().zip(&state.colliders);
+        for (index, (known, collider)) in colliders.enumerate() {
+            let extent = match state.collider_mesh(index) {
+                Some(mesh) => Extent::around(mesh_corners(&collider.shape, mesh)),
+                None => extent_of_collider(&collider.shape),
+            };
+            *known = union(*known, extent);
         }
     }
 
@@ -122,14 +128,14 @@ fn extent_of_particles(particles: &[ParticleState]) -> Option<Extent> {
     Extent::around(points.into_iter().filter(|point| reach.contains(*point)))
 }
 
-/// Returns `None` for a plane, which is infinite.
+/// Returns `None` for a plane, which is infinite, and for a mesh, whose triangles the shape lacks.
 fn extent_of_collider(shape: &ShapeRow) -> Option<Extent> {
     let sphere_extent = |center: DVec3, radius: PlainF32| {
         let radius = DVec3::splat(radius.0.into());
         Extent { min: center - radius, max: center + radius }
     };
     let extent = match shape {
-        ShapeRow::Plane { .. } => return None,
+        ShapeRow::Plane { .. } | ShapeRow::Mesh { .. } => return None,
         ShapeRow::Box { center, half_extents, rotation } => {
             Extent::around(box_corners(*center, *half_extents, *rotation))?
         }
@@ -152,6 +158,17 @@ pub(crate) fn box_corners(
     let half = plain(half_extents);
     let own = Extent { min: -half, max: half };
     own.corners().map(|corner| plain(center) + rotation * corner)
+}
+
+/// Returns the vertices of a mesh in its pose; none if the shape is no mesh or its pose not finite.
+pub(crate) fn mesh_corners(shape: &ShapeRow, mesh: &ColliderMesh) -> Vec<DVec3> {
+    let ShapeRow::Mesh { center, rotation, .. } = shape else { return Vec::new() };
+    let rotation = DQuat::from_array(rotation.map(|one| one.0.into()));
+    let center = plain(*center);
+    if !(center.is_finite() && rotation.is_finite()) {
+        return Vec::new();
+    }
+    mesh.vertices.iter().map(|vertex| center + rotation * position(*vertex)).collect()
 }
 
 pub(crate) fn position(vector: [f32; 3]) -> DVec3 {

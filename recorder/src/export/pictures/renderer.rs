@@ -28,7 +28,7 @@ impl Renderer {
     /// Draws a state. `time_s` is the simulated time since the first snapshot of the recording.
     pub(crate) fn draw(&self, state: &SceneState, time_s: f64) -> Picture {
         let room = self.extent.grown(PLANE_MARGIN);
-        let mut shapes = solids::shapes(&state.colliders, &self.camera, &room);
+        let mut shapes = solids::shapes(state, &self.camera, &room);
         shapes.extend(MeshDrawing { state, camera: &self.camera, bend: self.bend }.shapes());
         shapes.push(Shape::Text(self.caption(state, time_s)));
         shapes.retain(Shape::is_drawable);

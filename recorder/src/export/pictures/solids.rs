@@ -1,11 +1,13 @@
 //! Colliders as shapes, from back to front.
 
 use glam::{DQuat, DVec3};
-use recorder::{ColliderRow, ShapeRow};
+use recorder::ShapeRow;
+use sim_solver::scene::ColliderMesh;
 
 use super::camera::Camera;
-use super::extent::{Extent, box_corners, plain};
+use super::extent::{Extent, box_corners, mesh_corners, plain};
 use super::shape::{Color, Shape, Stroke};
+use crate::export::scene_state::SceneState;
 
 const FILL: Color = Color([0xd9, 0xde, 0xe4]);
 const OUTLINE: Color = Color([0x8d, 0x98, 0xa5]);
@@ -33,14 +35,18 @@ const EDGES: [[usize; 2]; 12] = [
 ];
 
 /// Returns the shapes of all colliders. Planes are clipped to `room`.
-pub(crate) fn shapes(colliders: &[ColliderRow], camera: &Camera, room: &Extent) -> Vec<Shape> {
-    let mut order: Vec<_> = colliders.iter().collect();
+pub(crate) fn shapes(state: &SceneState, camera: &Camera, room: &Extent) -> Vec<Shape> {
+    let mut order: Vec<_> = state.colliders.iter().map(|one| &one.shape).enumerate().collect();
     // The sort is stable, so ties keep the order of their index.
-    order.sort_by(|one, other| {
-        let [one, other] = [one, other].map(|collider| depth(&collider.shape, camera));
+    order.sort_by(|(_, one), (_, other)| {
+        let [one, other] = [one, other].map(|shape| depth(shape, camera));
         one.0.cmp(&other.0).then(one.1.total_cmp(&other.1))
     });
-    order.into_iter().flat_map(|collider| shapes_of(&collider.shape, camera, room)).collect()
+    let shapes = order.into_iter().flat_map(|(index, shape)| match state.collider_mesh(index) {
+        Some(mesh) => mesh_triangles(shape, mesh, camera),
+        None => shapes_of(shape, camera, room),
+    });
+    shapes.collect()
 }
 
 /// Returns the sort key of a collider: planes are behind bounds, and both are behind solid shapes,
@@ -49,9 +55,9 @@ fn depth(shape: &ShapeRow, camera: &Camera) -> (u8, f64) {
     match shape {
         ShapeRow::Plane { .. } => (0, 0.0),
         ShapeRow::Bounds { .. } => (1, 0.0),
-        ShapeRow::Box { center, .. } | ShapeRow::Sphere { center, .. } => {
-            (2, camera.nearness(plain(*center)))
-        }
+        ShapeRow::Box { center, .. }
+        | ShapeRow::Sphere { center, .. }
+        | ShapeRow::Mesh { center, .. } => (2, camera.nearness(plain(*center))),
         ShapeRow::Capsule { a, b, .. } => (2, camera.nearness((plain(*a) + plain(*b)) * 0.5)),
     }
 }
@@ -83,7 +89,28 @@ fn shapes_of(shape: &ShapeRow, camera: &Camera, room: &Extent) -> Vec<Shape> {
             };
             EDGES.into_iter().map(segment).collect()
         }
+        // Its triangles are in the scene.
+        ShapeRow::Mesh { .. } => Vec::new(),
     }
+}
+
+/// Returns the triangles of a mesh at its pose, from back to front.
+fn mesh_triangles(shape: &ShapeRow, mesh: &ColliderMesh, camera: &Camera) -> Vec<Shape> {
+    let vertices = mesh_corners(shape, mesh);
+    if vertices.is_empty() {
+        return Vec::new();
+    }
+    let corners = |triangle: &[u32; 3]| triangle.map(|corner| vertices[corner as usize]);
+    let mut triangles: Vec<_> = mesh.triangles.iter().map(corners).collect();
+    let nearness = |corners: &[DVec3; 3]| camera.nearness(corners.iter().sum());
+    triangles.sort_by(|one, other| nearness(one).total_cmp(&nearness(other)));
+    let polygon = |[a, b, c]: [DVec3; 3]| {
+        let fill = FILL.times(camera.brightness((b - a).cross(c - a).normalize_or_zero()));
+        // The outline closes the seams between neighbors.
+        let outline = Some(Stroke::solid(fill, 0.7));
+        Shape::Polygon { corners: [a, b, c].map(|at| camera.project(at)).into(), fill, outline }
+    };
+    triangles.into_iter().map(polygon).collect()
 }
 
 fn outline(camera: &Camera) -> Stroke {
@@ -156,6 +183,7 @@ fn clip(corners: &[DVec3], axis: DVec3, limit: f64) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use glam::DVec2;
+    use recorder::ColliderRow;
     use sim_contract::PlainF32;
     use sim_solver::scene::Up;
 
@@ -254,7 +282,8 @@ mod tests {
             angular_velocity: None,
         };
         let colliders = [near, cube(), bounds, plane_at([0.0, 1.0, 0.0], 0.0)].map(collider);
-        let drawn = shapes(&colliders, &camera(View::Front), &ROOM);
+        let state = SceneState { colliders: colliders.into(), ..SceneState::default() };
+        let drawn = shapes(&state, &camera(View::Front), &ROOM);
         assert_eq!(drawn.len(), 1 + EDGES.len() + 1 + 1);
         assert!(matches!(drawn[0], Shape::Polygon { fill: PLANE_FILL, .. }));
         assert!(matches!(drawn[1], Shape::Segment { .. }));

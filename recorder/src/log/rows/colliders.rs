@@ -32,7 +32,7 @@ pub struct ColliderRow {
     /// In m/s.
     #[schemars(with = "[f32; 3]")]
     pub velocity: Vector,
-    /// Boxes only: about the center, in rad/s.
+    /// Boxes and meshes only: about the center, in rad/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<[f32; 3]>")]
     pub angular_velocity: Option<Vector>,
@@ -81,6 +81,15 @@ pub enum ShapeRow {
         /// Highest coordinates.
         max: Vector,
     },
+    /// The triangles of the collider with this index in the scene.
+    Mesh {
+        /// Center.
+        center: Vector,
+        /// Quaternion x, y, z, w.
+        rotation: [PlainF32; 4],
+        /// Distance that particles keep from the triangles.
+        distance: PlainF32,
+    },
 }
 
 /// The schema of a shape: the keys of all shapes, because viewers accept no alternatives.
@@ -108,6 +117,8 @@ struct ShapeSchema {
     min: Option<[f32; 3]>,
     #[schemars(skip_serializing_if = "Option::is_none")]
     max: Option<[f32; 3]>,
+    #[schemars(skip_serializing_if = "Option::is_none")]
+    distance: Option<f32>,
 }
 
 /// The names of the shapes.
@@ -120,6 +131,7 @@ enum ShapeName {
     Sphere,
     Capsule,
     Bounds,
+    Mesh,
 }
 
 impl CollidersRow {
@@ -139,12 +151,13 @@ impl ColliderRow {
     fn new(state: &ColliderState) -> Option<Self> {
         let shape = ColliderShape::from_number(state.shape)?;
         let angular_velocity = plain(state.angular_velocity);
+        let turns = matches!(shape, ColliderShape::Box | ColliderShape::Mesh);
         Some(Self {
             shape: ShapeRow::new(shape, state),
             restitution: PlainF32(state.restitution),
             friction: PlainF32(state.friction),
             velocity: plain(state.velocity),
-            angular_velocity: matches!(shape, ColliderShape::Box).then_some(angular_velocity),
+            angular_velocity: turns.then_some(angular_velocity),
         })
     }
 
@@ -163,18 +176,18 @@ impl ShapeRow {
     fn new(shape: ColliderShape, state: &ColliderState) -> Self {
         let (center, radius) = (plain(state.center), PlainF32(state.radius));
         let (a, b) = (plain(state.a), plain(state.b));
+        let rotation = state.rotation.map(PlainF32);
         match shape {
             ColliderShape::Plane => {
                 Self::Plane { normal: plain(state.normal), offset: PlainF32(state.offset) }
             }
-            ColliderShape::Box => Self::Box {
-                center,
-                half_extents: plain(state.half_extents),
-                rotation: state.rotation.map(PlainF32),
-            },
+            ColliderShape::Box => {
+                Self::Box { center, half_extents: plain(state.half_extents), rotation }
+            }
             ColliderShape::Sphere => Self::Sphere { center, radius },
             ColliderShape::Capsule => Self::Capsule { a, b, radius },
             ColliderShape::Bounds => Self::Bounds { min: a, max: b },
+            ColliderShape::Mesh => Self::Mesh { center, rotation, distance: radius },
         }
     }
 
@@ -207,6 +220,12 @@ impl ShapeRow {
             Self::Bounds { min, max } => {
                 ColliderState { a: raw(min), b: raw(max), ..with(ColliderShape::Bounds) }
             }
+            Self::Mesh { center, rotation, distance } => ColliderState {
+                center: raw(center),
+                rotation: rotation.map(|number| number.0),
+                radius: distance.0,
+                ..with(ColliderShape::Mesh)
+            },
         }
     }
 }
@@ -244,6 +263,13 @@ mod tests {
             ColliderState { center: [0.1; 3], radius: 0.3, ..with(ColliderShape::Sphere) },
             ColliderState { a: [0.1; 3], b: [0.2; 3], radius: 0.3, ..with(ColliderShape::Capsule) },
             ColliderState { a: [-1.0; 3], b: [1.0; 3], ..with(ColliderShape::Bounds) },
+            ColliderState {
+                center: [1.0, 2.0, 3.0],
+                rotation: [0.0, 0.6, 0.0, 0.8],
+                radius: 0.005,
+                angular_velocity: [0.0, 0.0, 2.0],
+                ..with(ColliderShape::Mesh)
+            },
         ]
     }
 
@@ -258,6 +284,7 @@ mod tests {
         {"shape":"sphere","center":[0.1,0.1,0.1],"radius":0.3,"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40]}
         {"shape":"capsule","a":[0.1,0.1,0.1],"b":[0.2,0.2,0.2],"radius":0.3,"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40]}
         {"shape":"bounds","min":[-1.0,-1.0,-1.0],"max":[1.0,1.0,1.0],"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40]}
+        {"shape":"mesh","center":[1.0,2.0,3.0],"rotation":[0.0,0.6,0.0,0.8],"distance":0.005,"restitution":0.5,"friction":"inf","velocity":[0.1,-0.0,1e-40],"angular_velocity":[0.0,0.0,2.0]}
         "#);
     }
 
@@ -275,7 +302,7 @@ mod tests {
 
     #[test]
     fn an_unknown_shape_makes_no_row() {
-        let state = ColliderState { shape: 5, ..ColliderState::default() };
+        let state = ColliderState { shape: 6, ..ColliderState::default() };
         assert_eq!(CollidersRow::new(7, &[state]), None);
     }
 }

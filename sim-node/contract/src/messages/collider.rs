@@ -16,17 +16,17 @@ pub struct ColliderState {
     pub restitution: f32,
     /// Coefficient of friction.
     pub friction: f32,
-    /// Radius of a sphere or capsule.
+    /// Radius of a sphere or capsule; distance that particles keep from a mesh.
     pub radius: f32,
     /// Offset of a plane: the side where `normal` · x >= `offset` is free.
     pub offset: f32,
     /// Unit normal of a plane; points to the free side.
     pub normal: [f32; 3],
-    /// Center of a box or sphere.
+    /// Center of a box, sphere or mesh.
     pub center: [f32; 3],
     /// Half the edge lengths of a box, along its own axes.
     pub half_extents: [f32; 3],
-    /// Rotation of a box, as the quaternion x, y, z, w.
+    /// Rotation of a box or mesh, as the quaternion x, y, z, w.
     pub rotation: [f32; 4],
     /// First end of a capsule's axis; the lowest corner of bounds.
     pub a: [f32; 3],
@@ -34,7 +34,7 @@ pub struct ColliderState {
     pub b: [f32; 3],
     /// Velocity of the collider.
     pub velocity: [f32; 3],
-    /// Angular velocity of a box about its center, in rad/s.
+    /// Angular velocity of a box or mesh about its center, in rad/s.
     pub angular_velocity: [f32; 3],
 }
 

@@ -1,8 +1,11 @@
 //! Colliders and their motion.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Quat, Vec3};
 use sim_types::Reason;
 
+use super::mesh::CollisionMesh;
 use super::placed_shape::PlacedShape;
 use crate::frame::{Frame, angular_velocity, rotation_about};
 use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
@@ -11,6 +14,8 @@ use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
 #[derive(Debug, Clone)]
 pub(crate) struct Collider {
     at_load: PlacedShape,
+    /// The triangles of a mesh.
+    pub(crate) mesh: Option<Arc<CollisionMesh>>,
     pub(crate) restitution: f32,
     pub(crate) friction: f32,
     velocity: DVec3,
@@ -30,7 +35,7 @@ pub(crate) struct Collider {
 /// A collider at its current pose, for drawing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedCollider {
-    /// Shape and pose; a plane's normal and a box's rotation are normalised.
+    /// Shape and pose; a plane's normal and the rotation of a box or mesh are normalised.
     pub shape: ColliderGeometry,
     /// Fraction of the approach speed with which a particle bounces.
     pub restitution: f32,
@@ -43,9 +48,11 @@ pub struct PlacedCollider {
 }
 
 impl Collider {
-    pub(crate) fn new(scene: &SceneCollider) -> Self {
+    /// `index` is that of the collider in the scene.
+    pub(crate) fn new(index: usize, scene: &SceneCollider) -> Self {
         Self {
             at_load: PlacedShape::new(&scene.shape),
+            mesh: scene.mesh.as_ref().map(|mesh| Arc::new(CollisionMesh::new(mesh, index))),
             restitution: scene.restitution,
             friction: scene.friction,
             velocity: Vec3::from_array(scene.velocity).as_dvec3(),

@@ -57,10 +57,14 @@ pub(crate) fn depth_at_load(
     position: [f32; 3],
     is_planar: bool,
 ) -> Option<f32> {
+    if scene.mesh.is_some() {
+        // A mesh has no inside.
+        return None;
+    }
     let interval = Interval { start: 0.0, end: 0.0 };
     let substep = ContactSubstep { h: 1.0, rest_speed: 0.0, interval, is_planar };
     let path = SubstepPath { start: Vec3::from_array(position), displacement: Vec3::ZERO };
-    let solids = solids(&Collider::new(scene), &substep);
+    let solids = solids(&Collider::new(0, scene), &substep);
     let mut hits = solids.iter().flatten().filter_map(|solid| Some((solid, solid.hit(&path)?)));
     let (_, hit) = hits.find(|(solid, hit)| hit.depth > rounding(&path, solid))?;
     Some(hit.depth)

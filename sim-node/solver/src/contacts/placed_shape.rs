@@ -32,6 +32,12 @@ pub(crate) enum PlacedShape {
         min: Vec3,
         max: Vec3,
     },
+    /// The triangles are those of the collider.
+    Mesh {
+        center: Vec3,
+        rotation: Quat,
+        distance: f32,
+    },
 }
 
 impl PlacedShape {
@@ -45,10 +51,8 @@ impl PlacedShape {
                 Self::Plane { normal: (normal * (1.0 / length)).as_vec3(), offset }
             }
             ColliderGeometry::Box { center, half_extents, rotation } => {
-                let pose = Pose { translation: [0.0; 3], rotation };
-                let rotation = Frame::from_pose(&pose).rotation;
                 let (center, half_extents) = (vector(center), vector(half_extents));
-                Self::Box { center, half_extents, rotation }
+                Self::Box { center, half_extents, rotation: unit(rotation) }
             }
             ColliderGeometry::Sphere { center, radius } => {
                 Self::Sphere { center: vector(center), radius }
@@ -58,6 +62,9 @@ impl PlacedShape {
             }
             ColliderGeometry::Bounds { min, max } => {
                 Self::Bounds { min: vector(min), max: vector(max) }
+            }
+            ColliderGeometry::Mesh { center, rotation, distance } => {
+                Self::Mesh { center: vector(center), rotation: unit(rotation), distance }
             }
         }
     }
@@ -81,6 +88,11 @@ impl PlacedShape {
             Self::Bounds { min, max } => {
                 ColliderGeometry::Bounds { min: min.to_array(), max: max.to_array() }
             }
+            Self::Mesh { center, rotation, distance } => ColliderGeometry::Mesh {
+                center: center.to_array(),
+                rotation: rotation.to_array(),
+                distance,
+            },
         }
     }
 
@@ -96,8 +108,7 @@ impl PlacedShape {
                 Self::Plane { normal, offset: if is_moved { normal.dot(foot) } else { offset } }
             }
             Self::Box { center, half_extents, rotation } => {
-                let is_turned = turn != Quat::IDENTITY;
-                let rotation = if is_turned { (turn * rotation).normalize() } else { rotation };
+                let rotation = turned(rotation, turn);
                 Self::Box { center: center + translation, half_extents, rotation }
             }
             Self::Sphere { center, radius } => {
@@ -112,6 +123,10 @@ impl PlacedShape {
             Self::Bounds { min, max } => {
                 Self::Bounds { min: min + translation, max: max + translation }
             }
+            Self::Mesh { center, rotation, distance } => {
+                let rotation = turned(rotation, turn);
+                Self::Mesh { center: center + translation, rotation, distance }
+            }
         }
     }
 
@@ -119,9 +134,21 @@ impl PlacedShape {
     pub(crate) fn center(&self) -> Vec3 {
         match *self {
             Self::Plane { normal, offset } => normal * offset,
-            Self::Box { center, .. } | Self::Sphere { center, .. } => center,
+            Self::Box { center, .. } | Self::Sphere { center, .. } | Self::Mesh { center, .. } => {
+                center
+            }
             Self::Capsule { a, b, .. } => (a + b) * 0.5,
             Self::Bounds { min, max } => (min + max) * 0.5,
         }
     }
+}
+
+/// Normalises a quaternion x, y, z, w other than 0.
+fn unit(rotation: [f32; 4]) -> Quat {
+    Frame::from_pose(&Pose { translation: [0.0; 3], rotation }).rotation
+}
+
+/// Turns a rotation. One that does not turn keeps every bit.
+fn turned(rotation: Quat, turn: Quat) -> Quat {
+    if turn == Quat::IDENTITY { rotation } else { (turn * rotation).normalize() }
 }

@@ -1,24 +1,20 @@
 //! Solids: where a path through a collider leaves it.
 
-use glam::Vec3;
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
 
 use super::colliders::Collider;
 use super::contact_substep::ContactSubstep;
+use super::hit::Hit;
+use super::mesh::{CollisionMesh, PlacedMesh};
 use super::path::SubstepPath;
+use super::placed_frame::PlacedFrame;
 use super::placed_shape::PlacedShape;
-use super::solid_box::{BoxPose, FaceHit, SolidBox};
+use super::solid_box::{FaceHit, SolidBox};
 use super::zone::Zone;
 
-/// The point at which a particle leaves a collider.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Hit {
-    /// Unit vector out of the collider.
-    pub(crate) normal: Vec3,
-    /// Depth of the particle inside the collider, along the normal, > 0.
-    pub(crate) depth: f32,
-}
-
-/// A convex solid, or a half-space, at its pose at the end of a substep.
+/// A convex solid, a half-space or a mesh, at its pose at the end of a substep.
 #[derive(Debug, Clone)]
 pub(crate) enum Solid {
     /// The solid lies where normal x < offset.
@@ -37,27 +33,39 @@ pub(crate) enum Solid {
     /// `before` is the pose at the start of the substep.
     Box {
         solid: SolidBox,
-        now: BoxPose,
-        before: BoxPose,
+        now: PlacedFrame,
+        before: PlacedFrame,
     },
+    Mesh(PlacedMesh),
 }
 
 /// Returns the solids of a collider: one half-space for each face of bounds, one solid for any
 /// other shape.
 pub(crate) fn solids(collider: &Collider, substep: &ContactSubstep) -> [Option<Solid>; 6] {
     let one = |solid| [Some(solid), None, None, None, None, None];
+    let before = || match collider.shape_at(substep.interval.start) {
+        PlacedShape::Box { center, rotation, .. } | PlacedShape::Mesh { center, rotation, .. } => {
+            PlacedFrame::new(center, rotation)
+        }
+        other => PlacedFrame::new(other.center(), Quat::IDENTITY),
+    };
     match collider.shape_at(substep.interval.end) {
         PlacedShape::Plane { normal, offset } => one(Solid::HalfSpace { normal, offset }),
         PlacedShape::Sphere { center, radius } => one(Solid::Sphere { center, radius }),
         PlacedShape::Capsule { a, b, radius } => one(Solid::Capsule { ends: [a, b], radius }),
         PlacedShape::Box { center, half_extents, rotation } => one(Solid::Box {
             solid: SolidBox::new(half_extents.to_array(), substep.axis_count(), center),
-            now: BoxPose::new(center, rotation),
-            before: match collider.shape_at(substep.interval.start) {
-                PlacedShape::Box { center, rotation, .. } => BoxPose::new(center, rotation),
-                _ => BoxPose::new(center, rotation),
-            },
+            now: PlacedFrame::new(center, rotation),
+            before: before(),
         }),
+        PlacedShape::Mesh { center, rotation, distance } => {
+            let now = PlacedFrame::new(center, rotation);
+            let place = |mesh: &Arc<CollisionMesh>| {
+                PlacedMesh::new(mesh.clone(), [before(), now], distance)
+            };
+            let mesh = collider.mesh.as_ref().map(|mesh| Solid::Mesh(place(mesh)));
+            [mesh, None, None, None, None, None]
+        }
         PlacedShape::Bounds { min, max } => {
             let faces = |axis: usize, normal: Vec3| {
                 let low = Solid::HalfSpace { normal, offset: min[axis] };
@@ -74,7 +82,7 @@ pub(crate) fn solids(collider: &Collider, substep: &ContactSubstep) -> [Option<S
 
 impl Solid {
     /// Finds where a particle leaves the solid, if its path ends inside or, for a box, passes
-    /// through.
+    /// through. Meshes have no inside; see [`PlacedMesh`] for their contacts.
     #[inline(always)]
     pub(crate) fn hit(&self, path: &SubstepPath) -> Option<Hit> {
         match self {
@@ -84,8 +92,9 @@ impl Solid {
             Self::Box { solid, now, before } => {
                 let (start, end) = (before.local(path.start), now.local_end(path));
                 let FaceHit { face, depth } = solid.hit(start.to_array(), end.to_array())?;
-                Some(Hit { normal: now.face_normal(face), depth })
+                Some(Hit { normal: now.unit_to_scene(face.normal()), depth })
             }
+            Self::Mesh(_) => None,
         }
     }
 
@@ -108,6 +117,7 @@ impl Solid {
                 }
                 Zone::around([now.center, before.center], distance, reach)
             }
+            Self::Mesh(mesh) => mesh.zone(),
         }
     }
 
@@ -120,6 +130,7 @@ impl Solid {
                 a.abs().element_sum() + b.abs().element_sum() + radius
             }
             Self::Box { solid, .. } => solid.reach,
+            Self::Mesh(mesh) => mesh.reach(),
         }
     }
 }

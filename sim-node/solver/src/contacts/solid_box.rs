@@ -1,8 +1,6 @@
 //! Solid boxes: where a path leaves one, and by which face.
 
-use glam::{Quat, Vec3};
-
-use super::path::SubstepPath;
+use glam::Vec3;
 
 /// A face of a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,6 +8,15 @@ pub(crate) struct Face {
     axis: usize,
     /// 1 or -1: the side.
     sign: f32,
+}
+
+impl Face {
+    /// Unit normal in the axes of the box.
+    pub(crate) fn normal(self) -> Vec3 {
+        let mut normal = Vec3::ZERO;
+        normal[self.axis] = self.sign;
+        normal
+    }
 }
 
 /// The faces of a box. On ties, the first one wins.
@@ -127,42 +134,5 @@ impl SolidBox {
             }
         }
         Some(exit)
-    }
-}
-
-/// Position and rotation of a box.
-#[derive(Debug, Clone)]
-pub(crate) struct BoxPose {
-    pub(crate) center: Vec3,
-    rotation: Quat,
-    inverse: Quat,
-    pub(crate) is_turned: bool,
-}
-
-impl BoxPose {
-    pub(crate) fn new(center: Vec3, rotation: Quat) -> Self {
-        let (inverse, is_turned) = (rotation.conjugate(), rotation != Quat::IDENTITY);
-        Self { center, rotation, inverse, is_turned }
-    }
-
-    fn to_local(&self, vector: Vec3) -> Vec3 {
-        if self.is_turned { self.inverse * vector } else { vector }
-    }
-
-    /// A point in the axes of the box.
-    pub(crate) fn local(&self, point: Vec3) -> Vec3 {
-        self.to_local(point - self.center)
-    }
-
-    /// The end of a path in the axes of the box. The displacement is added last: near the surface
-    /// the rest is exact, so the displacement keeps its digits.
-    pub(crate) fn local_end(&self, path: &SubstepPath) -> Vec3 {
-        self.local(path.start) + self.to_local(path.displacement)
-    }
-
-    pub(crate) fn face_normal(&self, face: Face) -> Vec3 {
-        let mut normal = Vec3::ZERO;
-        normal[face.axis] = face.sign;
-        if self.is_turned { (self.rotation * normal).normalize() } else { normal }
     }
 }

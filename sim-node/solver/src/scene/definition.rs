@@ -19,7 +19,7 @@ use super::model::{Model, Positions};
 use crate::checks::StepSize;
 use anchor::SceneAnchor;
 use bending::SceneBend;
-use collider::SceneCollider;
+use collider::{ColliderMeshes, SceneCollider};
 use contact::ContactSettings;
 use element::{SceneConstraint, SceneParticle};
 use settings::{PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
@@ -138,6 +138,12 @@ impl Scene {
             constraints: explicit + generated.sum::<u64>(),
             colliders: self.colliders.len() as u64,
         }
+    }
+
+    /// Returns the triangles of the colliders that are meshes, for drawing.
+    pub fn collider_meshes(&self) -> ColliderMeshes {
+        let colliders = self.colliders.iter().enumerate();
+        colliders.filter_map(|(index, one)| Some((index, one.mesh.clone()?))).collect()
     }
 
     /// Counts particles, constraints and pinned particles, including the generated ones.

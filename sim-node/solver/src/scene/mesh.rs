@@ -31,6 +31,18 @@ impl Mesh {
     /// # Errors
     /// A vertex or face is malformed, or the text has no face with an area. The text names the line.
     pub fn from_obj(text: &str) -> Result<ParsedMesh, String> {
+        let mut parsed = Self::surface_from_obj(text)?;
+        let crowded = crowded_edges(parsed.mesh.faces.iter().map(Vec::as_slice));
+        parsed.warnings.extend(match crowded {
+            0 => None,
+            1 => Some("1 edge has more than two faces and gets no bends".to_owned()),
+            n => Some(format!("{n} edges have more than two faces and get no bends")),
+        });
+        Ok(parsed)
+    }
+
+    /// Like [`Self::from_obj`], for a mesh whose edges do not matter.
+    pub(crate) fn surface_from_obj(text: &str) -> Result<ParsedMesh, String> {
         let mut raw = RawMesh::default();
         for (number, line) in (1..).zip(text.lines()) {
             raw.read_line(line).map_err(|problem| format!("line {number}: {problem}"))?;
@@ -111,7 +123,6 @@ impl RawMesh {
         }
         let used: BTreeSet<u32> = kept.iter().flat_map(|(face, _)| face.iter().copied()).collect();
         omitted.unused = self.vertices.len() - used.len();
-        omitted.crowded = crowded_edges(kept.iter().map(|(face, _)| face.as_slice()));
         let new_index: BTreeMap<u32, u32> = used.iter().copied().zip(0..).collect();
         let mut mesh = Mesh::default();
         mesh.vertices.extend(used.iter().map(|index| self.vertices[*index as usize]));
@@ -171,7 +182,7 @@ fn crowded_edges<'a>(faces: impl Iterator<Item = &'a [u32]>) -> usize {
     counts.values().filter(|count| **count > 2).count()
 }
 
-/// Omitted and doubtful parts of a mesh.
+/// Omitted parts of a mesh.
 #[derive(Debug, Default)]
 struct Omissions {
     /// Faces without area, numbered from 1.
@@ -180,8 +191,6 @@ struct Omissions {
     duplicate: Vec<usize>,
     /// Number of vertices without a face.
     unused: usize,
-    /// Number of edges with more than two faces.
-    crowded: usize,
 }
 
 impl Omissions {
@@ -207,11 +216,6 @@ impl Omissions {
                 0 => None,
                 1 => Some("1 vertex belongs to no face and is omitted".to_owned()),
                 n => Some(format!("{n} vertices belong to no face and are omitted")),
-            },
-            match self.crowded {
-                0 => None,
-                1 => Some("1 edge has more than two faces and gets no bends".to_owned()),
-                n => Some(format!("{n} edges have more than two faces and get no bends")),
             },
         ];
         sentences.into_iter().flatten().collect()

@@ -7,6 +7,7 @@ mod element;
 mod file_scene;
 mod generator;
 mod limits;
+mod mesh;
 mod reader;
 mod settings;
 mod syntax;

@@ -133,8 +133,8 @@ impl ParticleStore {
         self.locate_constraints(model);
         let widest = self.sheets.iter().map(|sheet| sheet.columns as usize).max();
         let largest = BLOCK_PARTICLES.min(self.graph.particle_count()).max(widest.unwrap_or(0));
-        self.contact_count = if scene.colliders { largest } else { 0 };
-        self.workers.reserve_contacts(self.contact_count);
+        self.contact_room.block_length = if scene.colliders { largest } else { 0 };
+        self.workers.reserve_contacts(self.contact_room);
         self.is_allocated = true;
         Configured::Moved
     }

@@ -252,6 +252,7 @@ impl Graph {
         let length =
             count.div_ceil(part_count(count, workers.count())).next_multiple_of(BLOCK_PARTICLES);
         let all = GraphBlock {
+            first: 0,
             particles: &mut self.particles[..count],
             predicted: &mut self.predicted,
             gains: if self.layout.is_wind_used { &self.gains } else { &[] },

@@ -1,7 +1,7 @@
 //! The threads of a solver, with their kernels and scratch memory.
 
 use crate::constraints::projection_block::ProjectionBlock;
-use crate::contacts::contact::Contacts;
+use crate::contacts::contact::{ContactRoom, Contacts};
 use crate::kernels::Kernels;
 use crate::kernels::worker_pool::{WORKERS_MAX, WorkerPool};
 
@@ -31,10 +31,10 @@ impl Workers {
         self.pool.worker_count()
     }
 
-    /// Makes room for contacts of blocks of up to `particle_count` particles.
-    pub(crate) fn reserve_contacts(&mut self, particle_count: usize) {
+    /// Makes room for contacts.
+    pub(crate) fn reserve_contacts(&mut self, room: ContactRoom) {
         for scratch in &mut self.scratches {
-            scratch.contacts = Contacts::new(particle_count);
+            scratch.contacts = Contacts::new(room);
         }
     }
 

@@ -1,5 +1,6 @@
 //! Velocities after contacts: bounces, friction, moving surfaces, corners.
 
+mod meshes;
 mod particles;
 
 use proptest::prelude::*;

@@ -115,6 +115,9 @@ pub(super) fn to_collider_state(collider: &PlacedCollider) -> ColliderState {
         scene::ColliderGeometry::Bounds { min, max } => {
             ColliderState { a: min, b: max, ..with_shape(ColliderShape::Bounds) }
         }
+        scene::ColliderGeometry::Mesh { center, rotation, distance: radius } => {
+            ColliderState { center, rotation, radius, ..with_shape(ColliderShape::Mesh) }
+        }
     }
 }
 

@@ -3,13 +3,15 @@
 import { add, addScaled, frameOf, length, normalize, rotate, scale, subtract, tangents } from "../geometry/math.js";
 import { Program } from "./context.js";
 import { HEADER, LIGHT, SCREEN, SHADOW } from "./shaders.js";
-import { VERTEX_FLOATS, ball, cube, cubeEdges } from "./solids.js";
+import { VERTEX_FLOATS, ball, cube, cubeEdges, facets } from "./solids.js";
 
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../net/wire.js").Collider} Collider */
 /** @typedef {Record<string, number | number[]>} Uniforms */
-/** A solid in the scene: `shape` has its axes scaled by its size, `turn` its unit axes for normals, `a` and `b` are the ends of its axis.
- * @typedef {{ solid: "ball" | "cube" | "edges", shape: number[], turn: number[], a: Vec3, b: Vec3 }} Placed */
+/** A solid in the scene: `solid` is a number for the mesh of that collider, `shape` has its axes scaled by its size, `turn` its unit axes for normals, `a` and `b` are the ends of its axis.
+ * @typedef {{ solid: "ball" | "cube" | "edges" | number, shape: number[], turn: number[], a: Vec3, b: Vec3 }} Placed */
+
+/** @typedef {{ vao: WebGLVertexArrayObject | null, buffers: (WebGLBuffer | null)[], count: number }} Loaded */
 
 /** Extent of half planes in 2-D, in radii of the scene. */
 const HALF_PLANE_RADII = 200;
@@ -49,7 +51,10 @@ void main() {
   } else if (u_flat.a > 0.0) {
     o_color = screen(u_flat.rgb, u_flat.a);
   } else {
-    o_color = screen(lit(u_collider, v_position, normalize(v_normal), normalize(u_eye - v_position), 0.3), 1.0);
+    vec3 to_eye = normalize(u_eye - v_position);
+    // A mesh has two sides.
+    vec3 normal = normalize(v_normal) * (dot(v_normal, to_eye) < 0.0 ? -1.0 : 1.0);
+    o_color = screen(lit(u_collider, v_position, normal, to_eye, 0.3), 1.0);
   }
 }
 `;
@@ -88,6 +93,7 @@ export function placeCollider(one, isPlanar, near, radius) {
   const size = radius * HALF_PLANE_RADII;
   if (one.shape === "box") return [placeBox(one.center, one.halfExtents, one.rotation)];
   if (one.shape === "sphere") return [placeCapsule(one.center, one.center, one.radius)];
+  if (one.shape === "mesh") return [{ ...placeBox(one.center, [1, 1, 1], one.rotation), solid: one.index }];
   if (one.shape === "capsule") return [placeCapsule(one.a, one.b, one.radius)];
   if (one.shape === "plane") return isPlanar ? [placeHalfPlane(one.normal, one.offset, near, size)] : [];
   if (!isPlanar) return [{ ...placeBox(scale(add(one.a, one.b), 0.5), scale(subtract(one.b, one.a), 0.5), NO_ROTATION), solid: "edges" }];
@@ -108,27 +114,44 @@ export class Colliders {
       cube: this.load(aCube.vertices, aCube.indices),
       edges: this.load(cubeEdges(), null),
     };
+    /** The meshes of the scene. @type {Map<number, import("../net/wire.js").ColliderMesh>} */
+    this.meshes = new Map();
+    /** The same, loaded. @type {Map<number, Loaded>} */
+    this.loadedMeshes = new Map();
     /** @type {Placed[]} */
     this.placed = [];
   }
 
-  /** @param {Float32Array} vertices @param {Uint16Array | null} indices */
+  /** Replaces the meshes by those of a scene. @param {Map<number, import("../net/wire.js").ColliderMesh>} meshes */
+  loadMeshes(meshes) {
+    if (meshes === this.meshes) return;
+    for (const { vao, buffers } of this.loadedMeshes.values()) {
+      this.gl.deleteVertexArray(vao);
+      buffers.forEach((buffer) => this.gl.deleteBuffer(buffer));
+    }
+    this.meshes = meshes;
+    this.loadedMeshes = new Map([...meshes].map(([index, mesh]) => [index, this.load(facets(mesh), null)]));
+  }
+
+  /** @param {Float32Array} vertices @param {Uint16Array | null} indices @returns {Loaded} */
   load(vertices, indices) {
     const { gl } = this;
     const vao = gl.createVertexArray();
+    const buffers = [gl.createBuffer()];
     gl.bindVertexArray(vao);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
     gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.STATIC_DRAW);
     for (const [location, size, at] of [[0, 3, 0], [1, 3, 3], [2, 1, 6]]) {
       gl.enableVertexAttribArray(location);
       gl.vertexAttribPointer(location, size, gl.FLOAT, false, VERTEX_FLOATS * 4, at * 4);
     }
     if (indices !== null) {
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+      buffers.push(gl.createBuffer());
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[1]);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
     }
     gl.bindVertexArray(null);
-    return { vao, count: indices === null ? vertices.length / VERTEX_FLOATS : indices.length };
+    return { vao, buffers, count: indices === null ? vertices.length / VERTEX_FLOATS : indices.length };
   }
 
   /** @param {Uniforms} uniforms */
@@ -139,11 +162,14 @@ export class Colliders {
     this.program.set(uniforms);
     for (const { solid, shape, turn, a, b } of this.placed) {
       const isEdges = solid === "edges";
+      const loaded = typeof solid === "number" ? this.loadedMeshes.get(solid) : this.solids[solid];
+      if (loaded === undefined) continue;
       if (isEdges && /** @type {number} */ (uniforms.u_shadow) > 0) continue;
       this.program.set({ u_shape: shape, u_turn: turn, u_a: a, u_b: b, ...(isEdges ? { u_flat: [.../** @type {number[]} */ (uniforms.u_collider), 1] } : { u_flat: uniforms.u_flat }) });
-      gl.bindVertexArray(this.solids[solid].vao);
-      if (isEdges) gl.drawArrays(gl.LINES, 0, this.solids[solid].count);
-      else gl.drawElements(gl.TRIANGLES, this.solids[solid].count, gl.UNSIGNED_SHORT, 0);
+      gl.bindVertexArray(loaded.vao);
+      if (isEdges) gl.drawArrays(gl.LINES, 0, loaded.count);
+      else if (typeof solid === "number") gl.drawArrays(gl.TRIANGLES, 0, loaded.count);
+      else gl.drawElements(gl.TRIANGLES, loaded.count, gl.UNSIGNED_SHORT, 0);
     }
     gl.bindVertexArray(null);
   }

@@ -160,7 +160,9 @@ export class Renderer {
   /** @param {boolean} isPlanar */
   placeColliders(isPlanar) {
     const { simulation, colliders } = this;
-    if (colliders) colliders.placed = simulation.colliders.flatMap((one) => placeCollider(one, isPlanar, this.camera.target, simulation.radius()));
+    if (!colliders) return;
+    colliders.loadMeshes(simulation.scene?.meshes ?? new Map());
+    colliders.placed = simulation.colliders.flatMap((one) => placeCollider(one, isPlanar, this.camera.target, simulation.radius()));
   }
 
   /** The uniforms of all programs. @returns {Uniforms} */

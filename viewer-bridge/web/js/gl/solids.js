@@ -1,10 +1,13 @@
-// The meshes of colliders: a ball in two halves, which the shader separates into a capsule, and a cube.
+// The meshes of colliders: a ball in two halves, which the shader separates into a capsule, a cube, and those of a scene.
+
+import { cross, normalize, subtract } from "../geometry/math.js";
 
 /** Floats per vertex: position 3, normal 3, and the end of the axis that the vertex belongs to, 0 or 1. */
 export const VERTEX_FLOATS = 7;
 const SECTORS = 40;
 const RINGS_OF_HALF = 10;
 
+/** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {{ vertices: Float32Array, indices: Uint16Array }} Solid */
 
 /** The unit ball with its axis along y. The equator occurs twice, once per half. @returns {Solid} */
@@ -55,6 +58,17 @@ export function cube() {
     indices.push(first, first + 1, first + 2, first, first + 2, first + 3);
   }
   return { vertices: new Float32Array(vertices), indices: new Uint16Array(indices) };
+}
+
+/** The triangles of a mesh, each with its own normal. @param {import("../net/wire.js").ColliderMesh} mesh */
+export function facets({ vertices, triangles }) {
+  const facet = new Float32Array(triangles.length * VERTEX_FLOATS);
+  for (let at = 0; at < triangles.length; at += 3) {
+    const corners = [0, 1, 2].map((corner) => /** @type {Vec3} */ ([...vertices.subarray(3 * triangles[at + corner], 3 * triangles[at + corner] + 3)]));
+    const normal = normalize(cross(subtract(corners[1], corners[0]), subtract(corners[2], corners[0])));
+    corners.forEach((corner, index) => facet.set([...corner, ...normal, 0], (at + index) * VERTEX_FLOATS));
+  }
+  return facet;
 }
 
 /** The edges of the cube from -1 to 1, as pairs of corners. */

@@ -13,6 +13,7 @@
  *   min: Vec3, max: Vec3, rateHz: number, origin: Vec3,
  *   positions: Float32Array, ends: Uint32Array, restLengths: Float32Array, triangles: Uint32Array,
  *   constraintKinds: Uint8Array, name: string, unit: string, up: string, runId: string,
+ *   meshes: Map<number, ColliderMesh>,
  * }} Scene  array lengths for n particles, s constraints and t triangles: 3 n, 2 s, s, 3 t, s
  *
  * @typedef {Header & {
@@ -36,8 +37,9 @@
  *   isPaused: boolean, isReplay: boolean,
  * }} Stats
  *
+ * @typedef {{ vertices: Float32Array, triangles: Uint32Array }} ColliderMesh  by the index of its collider
  * @typedef {{
- *   shape: "plane" | "box" | "sphere" | "capsule" | "bounds", restitution: number, friction: number,
+ *   index: number, shape: "plane" | "box" | "sphere" | "capsule" | "bounds" | "mesh", restitution: number, friction: number,
  *   radius: number, offset: number, normal: Vec3, center: Vec3, halfExtents: Vec3, rotation: number[],
  *   a: Vec3, b: Vec3, velocity: Vec3, angularVelocity: Vec3,
  * }} Collider
@@ -51,7 +53,7 @@ export const PIN = Object.freeze({ pinned: 1, grabbed: 2, anchored: 4, frozen: 8
 export const CONSTRAINT = Object.freeze({ structural: 0, shear: 1, bend: 2, tether: 3 });
 
 const VERSION = 1;
-const SHAPES = /** @type {const} */ (["plane", "box", "sphere", "capsule", "bounds"]);
+const SHAPES = /** @type {const} */ (["plane", "box", "sphere", "capsule", "bounds", "mesh"]);
 const COLLIDER_BYTES = 120;
 
 /** Reads consecutive fields of a message. Throws a RangeError beyond its end. */
@@ -150,7 +152,20 @@ function decodeScene(reader, header) {
     isPlanar: (flags & 1) !== 0,
     min, max, rateHz, origin, positions, ends, restLengths, triangles, constraintKinds,
     name: json.name ?? "", unit: json.unit ?? "m", up: json.up ?? "y", runId: json.run_id ?? "",
+    meshes: decodeMeshes(reader),
   };
+}
+
+/** @param {Reader} reader @returns {Map<number, ColliderMesh>} */
+function decodeMeshes(reader) {
+  const meshes = new Map();
+  for (let left = reader.u32(); left > 0; left--) {
+    const collider = reader.u32();
+    const vertexCount = reader.u32();
+    const triangleCount = reader.u32();
+    meshes.set(collider, { vertices: reader.array(Float32Array, 3 * vertexCount), triangles: reader.array(Uint32Array, 3 * triangleCount) });
+  }
+  return meshes;
 }
 
 /** @param {Reader} reader @param {Header} header @param {boolean} isQuantised @returns {Frame} */
@@ -223,14 +238,14 @@ function decodeColliders(reader, header) {
   /** @type {Collider[]} */
   const colliders = [];
   for (let index = 0; index < count; index++) {
-    const collider = decodeCollider(reader);
+    const collider = decodeCollider(reader, index);
     if (collider !== null) colliders.push(collider);
   }
   return { kind: "colliders", ...header, colliders };
 }
 
-/** Skips a shape of a later version. @param {Reader} reader @returns {Collider | null} */
-function decodeCollider(reader) {
+/** Skips a shape of a later version. @param {Reader} reader @param {number} index @returns {Collider | null} */
+function decodeCollider(reader, index) {
   const shape = SHAPES[reader.u32()];
   const restitution = reader.f32();
   const friction = reader.f32();
@@ -245,5 +260,5 @@ function decodeCollider(reader) {
   const velocity = reader.f32x3();
   const angularVelocity = reader.f32x3();
   if (shape === undefined) return null;
-  return { shape, restitution, friction, radius, offset, normal, center, halfExtents, rotation, a, b, velocity, angularVelocity };
+  return { index, shape, restitution, friction, radius, offset, normal, center, halfExtents, rotation, a, b, velocity, angularVelocity };
 }

@@ -6,6 +6,7 @@ import { PIN } from "../net/wire.js";
 /** @typedef {import("../geometry/math.js").Vec3} Vec3 */
 /** @typedef {import("../geometry/math.js").Box} Box */
 /** @typedef {import("../net/wire.js").Collider} Collider */
+/** @typedef {import("../net/wire.js").ColliderMesh} ColliderMesh */
 
 /** Half the size of the box around a scene that is a single point, in the unit of the scene. */
 const POINT_ROOM = 0.5;
@@ -34,13 +35,12 @@ export function firstViewBox(simulation) {
     if (pivot !== null) for (const axis of [0, 1, 2]) if (up[axis] === 0) mirror(box, pivot, axis);
   }
   if ([...simulation.pins.values()].some((flags) => (flags & PIN.anchored) !== 0)) grow(box, CARRIED_ROOM * size);
-  for (const one of simulation.colliders) includeSolid(box, one, middle, size);
+  for (const one of simulation.colliders) includeSolid(box, boundingSphere(one, simulation.scene?.meshes.get(one.index)), middle, size);
   return box;
 }
 
-/** Includes a solid that is close enough, and no bigger than the scene. @param {Box} box @param {Collider} one @param {Vec3} middle @param {number} size */
-function includeSolid(box, one, middle, size) {
-  const [center, reach] = boundingSphere(one);
+/** Includes a solid that is close enough, and no bigger than the scene. @param {Box} box @param {[Vec3, number]} sphere @param {Vec3} middle @param {number} size */
+function includeSolid(box, [center, reach], middle, size) {
   if (reach > size || length(subtract(center, middle)) > SOLID_SIZES * size + reach) return;
   for (const axis of [0, 1, 2]) {
     box.min[axis] = Math.min(box.min[axis], center[axis] - reach);
@@ -48,12 +48,20 @@ function includeSolid(box, one, middle, size) {
   }
 }
 
-/** Center and radius of a bounding sphere of a solid; infinite for a plane. @param {Collider} one @returns {[Vec3, number]} */
-function boundingSphere(one) {
+/** Center and radius of a bounding sphere of a solid; infinite for a plane. @param {Collider} one @param {ColliderMesh | undefined} mesh @returns {[Vec3, number]} */
+function boundingSphere(one, mesh) {
+  if (one.shape === "mesh" && mesh) return [one.center, reachOf(mesh)];
   if (one.shape === "sphere") return [one.center, one.radius];
   if (one.shape === "box") return [one.center, length(one.halfExtents)];
   if (one.shape === "capsule") return [scale(add(one.a, one.b), 0.5), length(subtract(one.b, one.a)) / 2 + one.radius];
   return [[0, 0, 0], Infinity];
+}
+
+/** The greatest distance of a vertex from the center. @param {ColliderMesh} mesh */
+function reachOf({ vertices }) {
+  let square = 0;
+  for (let at = 0; at < vertices.length; at += 3) square = Math.max(square, vertices[at] ** 2 + vertices[at + 1] ** 2 + vertices[at + 2] ** 2);
+  return Math.sqrt(square);
 }
 
 /** @param {Box} box @param {number} room */

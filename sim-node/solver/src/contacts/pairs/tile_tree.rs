@@ -3,6 +3,7 @@
 //! Sixteen particles that are neighbours at load form a tile. Four tiles form a node, and so on. The
 //! tree keeps its form from load to load: only the boxes follow the particles.
 
+use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
 
@@ -66,51 +67,6 @@ impl Tile {
         let (group, lane) = (lane / 8, lane % 8);
         [axes(|axis| self.x[axis][group][lane]), axes(|axis| self.d[axis][group][lane])]
     }
-}
-
-/// Smallest and largest coordinate on each axis. An empty box has +infinity and -infinity.
-#[derive(Debug, Clone, Copy)]
-struct Bounds {
-    min: [f32; 3],
-    max: [f32; 3],
-}
-
-impl Bounds {
-    const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
-
-    fn union(self, other: &Self) -> Self {
-        let mut union = self;
-        for axis in 0..3 {
-            union.min[axis] = lesser(other.min[axis], union.min[axis]);
-            union.max[axis] = -lesser(-other.max[axis], -union.max[axis]);
-        }
-        union
-    }
-
-    /// Returns true if the boxes are at most `distance` apart on every axis.
-    #[inline(always)]
-    fn are_near(&self, other: &Self, distance: f32) -> bool {
-        (0..3).all(|axis| {
-            self.min[axis] - distance <= other.max[axis]
-                && other.min[axis] - distance <= self.max[axis]
-        })
-    }
-
-    /// Largest distance of a point of this box from a point of the other one.
-    #[inline(always)]
-    fn distance_max(&self, other: &Self) -> f32 {
-        let longest = axes(|axis| {
-            let (up, down) = (self.max[axis] - other.min[axis], other.max[axis] - self.min[axis]);
-            if up > down { up } else { down }
-        });
-        (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).sqrt()
-    }
-}
-
-/// The lesser number; `b` if `a` is NaN.
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }
 
 /// The tiles and the boxes above them.

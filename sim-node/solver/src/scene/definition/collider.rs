@@ -1,11 +1,13 @@
-//! Colliders: solids that particles bounce off and slide along.
+//! Colliders: solids and meshes that particles bounce off and slide along.
+
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::decimal;
 
-/// A solid that particles bounce off and slide along.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// A solid or mesh that particles bounce off and slide along.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SceneCollider {
     /// Shape, size and pose at load.
     #[serde(flatten)]
@@ -19,12 +21,29 @@ pub struct SceneCollider {
     /// In unit/s.
     #[serde(with = "decimal::vector")]
     pub velocity: [f32; 3],
-    /// About the center of a box, in rad/s; 0 for all other shapes.
+    /// About the center of a box or mesh, in rad/s; 0 for all other shapes.
     #[serde(with = "decimal::vector", skip_serializing_if = "is_zero")]
     pub angular_velocity: [f32; 3],
+    /// The triangles of a mesh. All other shapes have none.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<ColliderMesh>,
 }
 
-/// Decides whether to write the key, which only boxes accept.
+/// The triangles of a mesh, relative to its center and before its rotation.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct ColliderMesh {
+    /// Positions, with the scale of the scene file applied.
+    #[serde(serialize_with = "decimal::vectors::serialize")]
+    pub vertices: Vec<[f32; 3]>,
+    /// Corners of each triangle, as indices of vertices. Either side can be touched.
+    #[serde(rename = "faces")]
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Meshes by the index of their collider.
+pub type ColliderMeshes = BTreeMap<usize, ColliderMesh>;
+
+/// Decides whether to write the key, which only boxes and meshes accept.
 fn is_zero(vector: &[f32; 3]) -> bool {
     *vector == [0.0; 3]
 }
@@ -83,5 +102,17 @@ pub enum ColliderGeometry {
         /// Highest coordinates, above the lowest on each axis except z in 2-D.
         #[serde(with = "decimal::vector")]
         max: [f32; 3],
+    },
+    /// Triangles with two sides, open or closed. A particle stays on the side on which it is.
+    Mesh {
+        /// Position of the mesh's own origin, about which it rotates.
+        #[serde(with = "decimal::vector")]
+        center: [f32; 3],
+        /// Quaternion x, y, z, w. It is normalised on use.
+        #[serde(with = "decimal::quaternion")]
+        rotation: [f32; 4],
+        /// Distance that particles keep from the triangles, >= 0.
+        #[serde(with = "decimal::number")]
+        distance: f32,
     },
 }

@@ -5,10 +5,16 @@ use std::ops::Range;
 use serde::Deserialize;
 use sim_types::{ColliderShape, NumberRange};
 
+use super::mesh::MeshKeys;
 use super::reader::{ANGULAR_VELOCITY, Reader, SIZE};
-use super::value::{Number, Quaternion, Spanned, Table, TableKeys, Vector, Word};
-use crate::scene::definition::collider::{ColliderGeometry, SceneCollider};
+use super::value::{
+    Number, Quaternion, Spanned, Table, TableKeys, Vector, Word, append_elements, element_count,
+};
+use crate::checks::is_near;
+use crate::contacts::mesh::remove_slivers;
+use crate::scene::definition::collider::{ColliderGeometry, ColliderMesh, SceneCollider};
 use crate::scene::error::SceneError;
+use crate::scene::mesh::{Mesh, fan};
 
 /// The keys of all shapes. The keys of each shape are checked later.
 #[derive(Debug, Deserialize)]
@@ -29,9 +35,18 @@ pub(super) struct FileCollider {
     b: Option<Vector>,
     min: Option<Vector>,
     max: Option<Vector>,
+    path: Option<Word>,
+    vertices: Option<Spanned<Vec<Vector>>>,
+    faces: Option<Spanned<Vec<Vec<i64>>>>,
+    scale: Option<Number>,
+    distance: Option<Number>,
+    solid: Option<Spanned<bool>>,
 }
 
 impl TableKeys for FileCollider {}
+
+/// Range of the distance that particles keep from a mesh.
+const DISTANCE: NumberRange = NumberRange { min: 0.0, text: "0 to 1e7", ..NumberRange::COORDINATE };
 
 /// Returns the keys of a shape beside those of all shapes.
 fn keys(shape: ColliderShape) -> &'static [&'static str] {
@@ -41,26 +56,60 @@ fn keys(shape: ColliderShape) -> &'static [&'static str] {
         ColliderShape::Sphere => &["center", "radius"],
         ColliderShape::Capsule => &["a", "b", "radius"],
         ColliderShape::Bounds => &["min", "max"],
+        ColliderShape::Mesh => &[
+            "path",
+            "vertices",
+            "faces",
+            "scale",
+            "center",
+            "rotation",
+            "distance",
+            "solid",
+            "angular_velocity",
+        ],
     }
 }
 
 impl FileCollider {
+    /// The lists that a text can give in parts.
+    pub(super) const LISTS: [&str; 2] = ["vertices", "faces"];
+
+    /// Appends the lists of a part of the table.
+    pub(super) fn append(&mut self, part: Self) {
+        append_elements(self.vertices.as_mut(), part.vertices);
+        append_elements(self.faces.as_mut(), part.faces);
+    }
+
+    /// Returns the size of the lists in memory.
+    pub(super) fn lists_size_bytes(&self) -> usize {
+        let faces = self.faces.iter().flat_map(Spanned::get_ref);
+        element_count(self.vertices.as_ref()) * size_of::<Vector>()
+            + faces.map(|face| size_of_val(face) + size_of_val(face.as_slice())).sum::<usize>()
+    }
+
     /// Returns the places of the keys that belong to single shapes.
-    fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 11] {
-        let vector = |vector: &Option<Vector>| vector.as_ref().map(Spanned::span);
-        let number = |number: &Option<Number>| number.as_ref().map(Spanned::span);
+    fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 17] {
+        fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
+            value.map(Spanned::span)
+        }
         [
-            ("angular_velocity", vector(&self.angular_velocity)),
-            ("normal", vector(&self.normal)),
-            ("offset", number(&self.offset)),
-            ("center", vector(&self.center)),
-            ("half_extents", vector(&self.half_extents)),
-            ("rotation", self.rotation.as_ref().map(Spanned::span)),
-            ("radius", number(&self.radius)),
-            ("a", vector(&self.a)),
-            ("b", vector(&self.b)),
-            ("min", vector(&self.min)),
-            ("max", vector(&self.max)),
+            ("angular_velocity", span(self.angular_velocity.as_ref())),
+            ("normal", span(self.normal.as_ref())),
+            ("offset", span(self.offset.as_ref())),
+            ("center", span(self.center.as_ref())),
+            ("half_extents", span(self.half_extents.as_ref())),
+            ("rotation", span(self.rotation.as_ref())),
+            ("radius", span(self.radius.as_ref())),
+            ("a", span(self.a.as_ref())),
+            ("b", span(self.b.as_ref())),
+            ("min", span(self.min.as_ref())),
+            ("max", span(self.max.as_ref())),
+            ("path", span(self.path.as_ref())),
+            ("vertices", span(self.vertices.as_ref())),
+            ("faces", span(self.faces.as_ref())),
+            ("scale", span(self.scale.as_ref())),
+            ("distance", span(self.distance.as_ref())),
+            ("solid", span(self.solid.as_ref())),
         ]
     }
 }
@@ -78,12 +127,15 @@ impl Reader<'_> {
         let number_or_zero = |key: &str, number: &Option<Number>, range| {
             number.as_ref().map_or(Ok(0.0), |number| self.ranged(&field(key), number, range))
         };
+        let shape = fields.geometry()?;
+        let is_mesh = matches!(shape, ColliderGeometry::Mesh { .. });
         Ok(SceneCollider {
-            shape: fields.geometry()?,
+            shape,
             restitution: number_or_zero("restitution", &file.restitution, NumberRange::SHARE)?,
             friction: number_or_zero("friction", &file.friction, NumberRange::AT_LEAST_ZERO)?,
             velocity: self.vector_or(&field("velocity"), file.velocity.as_ref(), [0.0; 3])?,
             angular_velocity: self.angular_velocity(&field, file.angular_velocity.as_ref())?,
+            mesh: is_mesh.then(|| fields.mesh()).transpose()?,
         })
     }
 
@@ -145,7 +197,83 @@ impl<F: Fn(&str) -> String> ColliderFields<'_, '_, F> {
                 radius: self.number("radius", file.radius.as_ref(), SIZE)?,
             }),
             ColliderShape::Bounds => self.bounds(),
+            ColliderShape::Mesh => self.mesh_geometry(),
         }
+    }
+
+    fn mesh_geometry(&self) -> Result<ColliderGeometry, SceneError> {
+        let (file, reader) = (self.file, self.reader);
+        if reader.is_planar {
+            let problem = "a mesh needs 3 dimensions (allowed: all other shapes)";
+            return reader.error(self.span.clone(), &(self.field)("shape"), problem);
+        }
+        if let Some(solid) = file.solid.as_ref().filter(|solid| *solid.get_ref()) {
+            let problem = "a mesh cannot be solid: particles stay on the side of its triangles \
+                           on which they are (allowed: false)";
+            return reader.error(solid.span(), &(self.field)("solid"), problem);
+        }
+        let distance = file
+            .distance
+            .as_ref()
+            .map(|number| reader.ranged(&(self.field)("distance"), number, DISTANCE));
+        Ok(ColliderGeometry::Mesh {
+            center: reader.vector_or(&(self.field)("center"), file.center.as_ref(), [0.0; 3])?,
+            rotation: reader.rotation(&(self.field)("rotation"), file.rotation.as_ref())?,
+            distance: distance.transpose()?.unwrap_or(0.0),
+        })
+    }
+
+    /// Returns the triangles of a mesh, scaled and without slivers.
+    fn mesh(&self) -> Result<ColliderMesh, SceneError> {
+        let (file, reader) = (self.file, self.reader);
+        let mesh = reader.mesh(&MeshKeys {
+            path: file.path.as_ref(),
+            vertices: file.vertices.as_ref(),
+            faces: file.faces.as_ref(),
+            span: self.span.clone(),
+            field: &|key| (self.field)(key),
+            parse: Mesh::surface_from_obj,
+        })?;
+        let scale = file.scale.as_ref();
+        let scale = scale.map(|number| reader.ranged(&(self.field)("scale"), number, SIZE));
+        let scale = scale.transpose()?.unwrap_or(1.0);
+        let scaled = mesh.vertices.iter().map(|vertex| vertex.map(|axis| axis * scale));
+        let mut mesh = ColliderMesh {
+            vertices: scaled.collect(),
+            triangles: mesh.faces.iter().flat_map(|face| fan(face)).collect(),
+        };
+        let sliver_count = remove_slivers(&mut mesh);
+        if let Some(far) = mesh.vertices.iter().find(|vertex| !is_near(*vertex)) {
+            let problem = format!("reach {far:?} (allowed: -1e7 to 1e7)");
+            return self.wrong_mesh("vertices", problem);
+        }
+        if mesh.triangles.is_empty() {
+            let problem = "have no triangle with an area (allowed: at least one)";
+            return self.wrong_mesh("faces", problem.to_owned());
+        }
+        if sliver_count > 0 {
+            let triangles = if sliver_count == 1 { "triangle is" } else { "triangles are" };
+            let field = (self.field)("mesh");
+            let field = field.trim_end_matches(".mesh");
+            reader.warnings.borrow_mut().push(format!(
+                "{field}: {sliver_count} {triangles} too narrow for a contact and omitted"
+            ));
+        }
+        Ok(mesh)
+    }
+
+    /// Reports a wrong mesh at its path, or at a key of a mesh that is written out.
+    fn wrong_mesh<T>(&self, key: &str, problem: String) -> Result<T, SceneError> {
+        let file = self.file;
+        if let Some(path) = &file.path {
+            let problem = format!("{}: its {key} {problem}", path.get_ref());
+            return self.reader.error(path.span(), &(self.field)("path"), problem);
+        }
+        let place = match key {
+            "vertices" => file.vertices.as_ref().map(Spanned::span),
+            _ => file.faces.as_ref().map(Spanned::span),
+        };
+        self.reader.error(place.unwrap_or(self.span.clone()), &(self.field)(key), problem)
     }
 
     /// Refuses the keys of other shapes.

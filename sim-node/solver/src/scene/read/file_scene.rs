@@ -75,6 +75,13 @@ impl FileScene {
         }
     }
 
+    /// Moves the elements of the first collider of a later part to the lists of the last one.
+    pub(super) fn continue_collider(&mut self, part: &mut Self) {
+        if let Some(last) = self.collider.last_mut() {
+            last.get_mut().0.append(part.collider.remove(0).into_inner().0);
+        }
+    }
+
     /// Returns the number of tables in a list of tables.
     pub(super) fn table_count(&self, list: &str) -> usize {
         match list {
@@ -96,6 +103,7 @@ impl FileScene {
     /// Returns the size of all tables and lists in memory.
     pub(super) fn size_bytes(&self) -> usize {
         let anchors = self.anchor.iter().map(|anchor| anchor.get_ref().lists_size_bytes());
+        let colliders = self.collider.iter().map(|one| one.get_ref().lists_size_bytes());
         let generators = self.generate.iter().map(|shape| shape.get_ref().lists_size_bytes());
         size_of_val(self.particle.as_slice())
             + size_of_val(self.constraint.as_slice())
@@ -104,6 +112,7 @@ impl FileScene {
             + size_of_val(self.anchor.as_slice())
             + size_of_val(self.generate.as_slice())
             + anchors.sum::<usize>()
+            + colliders.sum::<usize>()
             + generators.sum::<usize>()
     }
 }

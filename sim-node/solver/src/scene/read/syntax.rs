@@ -44,6 +44,7 @@ pub(super) fn parse(place: &Place<'_>) -> Result<FileScene, SceneError> {
         kept_size_bytes += part.size_bytes();
         match piece.continued {
             Some("anchor") => file.continue_anchor(&mut part),
+            Some("collider") => file.continue_collider(&mut part),
             Some(_) => file.continue_generator(&mut part),
             None => {}
         }

@@ -31,6 +31,8 @@ pub(crate) struct PackedTether {
 /// in other scenes.
 #[derive(Debug)]
 pub(crate) struct GraphBlock<'a> {
+    /// Index of the first particle in the graph.
+    pub(crate) first: usize,
     pub(crate) particles: &'a mut [PackedParticle],
     pub(crate) predicted: &'a mut [[f32; 3]],
     pub(crate) gains: &'a [[f32; 3]],
@@ -51,19 +53,21 @@ impl<'a> GraphBlock<'a> {
 
     /// Splits after `count` particles, or at the end if there are fewer.
     fn split_at(self, count: usize) -> (GraphBlock<'a>, GraphBlock<'a>) {
-        let Self { particles, predicted, gains, tethers } = self;
+        let Self { first, particles, predicted, gains, tethers } = self;
         let end = |length: usize| count.min(length);
         let (first_particles, particles) = particles.split_at_mut(end(particles.len()));
         let (first_predicted, predicted) = predicted.split_at_mut(end(predicted.len()));
         let (first_gains, gains) = gains.split_at(end(gains.len()));
         let (first_tethers, tethers) = tethers.split_at(end(tethers.len()));
+        let second = first + first_particles.len();
         let first = GraphBlock {
+            first,
             particles: first_particles,
             predicted: first_predicted,
             gains: first_gains,
             tethers: first_tethers,
         };
-        (first, GraphBlock { particles, predicted, gains, tethers })
+        (first, GraphBlock { first: second, particles, predicted, gains, tethers })
     }
 }
 
@@ -89,6 +93,10 @@ impl LaneWork for BlockWork<'_, '_> {
 impl ParticleBlock for GraphBlock<'_> {
     fn count(&self) -> usize {
         self.particles.len()
+    }
+
+    fn first(&self) -> usize {
+        self.first
     }
 
     fn inverse_mass(&self, index: usize) -> f32 {

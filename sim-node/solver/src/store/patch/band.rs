@@ -108,7 +108,7 @@ impl Band<'_> {
         }
         let (layout, length) = (self.layout, self.layout.row_length);
         let numbers = &mut self.numbers[(row - self.first) * length..][..length];
-        let mut row = SheetRow::new(numbers, layout);
+        let mut row = SheetRow::new(numbers, layout, row);
         run_stage::<W>(scheduled.stage, &mut row, sweep.inputs, &mut sweep.scratch.contacts);
         false
     }

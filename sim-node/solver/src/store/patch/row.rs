@@ -23,15 +23,17 @@ pub(crate) struct SheetRow<'a> {
     root: Option<[&'a [Lanes8]; 3]>,
     /// Largest distance to the root, and its square.
     tether: Option<[&'a [Lanes8]; 2]>,
+    /// Index of the first particle.
+    first: usize,
     /// Number of particles. The rest of the last lane group is padding.
     count: usize,
 }
 
 impl<'a> SheetRow<'a> {
     #[inline(always)]
-    pub(crate) fn new(row: &'a mut [f32], layout: &RowLayout) -> Self {
+    pub(crate) fn new(numbers: &'a mut [f32], layout: &RowLayout, row: usize) -> Self {
         let count = layout.columns.div_ceil(8);
-        let mut rest = row;
+        let mut rest = numbers;
         let mut next = || {
             let (field, others) = std::mem::take(&mut rest).split_at_mut(layout.stride);
             rest = others;
@@ -45,7 +47,8 @@ impl<'a> SheetRow<'a> {
         let wind = wind.filter(|_| layout.fields.is_wind_used);
         let root = tethers.then(|| [&*next(), &*next(), &*next()]);
         let tether = tethers.then(|| [&*next(), &*next()]);
-        Self { x, w, d, predicted, wind, root, tether, count: layout.columns }
+        let first = layout.first + row * layout.columns;
+        Self { x, w, d, predicted, wind, root, tether, first, count: layout.columns }
     }
 }
 
@@ -63,6 +66,10 @@ fn set_vector(axes: &mut [&mut [Lanes8]; 3], index: usize, vector: Vec3) {
 impl ParticleBlock for SheetRow<'_> {
     fn count(&self) -> usize {
         self.count
+    }
+
+    fn first(&self) -> usize {
+        self.first
     }
 
     fn inverse_mass(&self, index: usize) -> f32 {

@@ -18,6 +18,8 @@ const SHARED_MIN: usize = 4000;
 /// The layout of a row. All rows of a sheet have the same.
 #[derive(Debug, Clone)]
 pub(crate) struct RowLayout {
+    /// Index of the first particle.
+    pub(crate) first: usize,
     pub(crate) columns: usize,
     pub(crate) rows: usize,
     /// Length of a field in numbers.
@@ -55,6 +57,7 @@ impl RowLayout {
         let softness = PassSoftness::RIGID;
         let block = |family: &Family| FamilyBlock { family: *family, softness, is_rigid: false };
         Self {
+            first: sheet.first as usize,
             columns,
             rows,
             stride: length.next_multiple_of(LINE_LENGTH),

@@ -10,6 +10,7 @@ use toml_parser::Source;
 use toml_parser::lexer::{Token, TokenKind};
 
 use crate::scene::read::anchor::FileAnchor;
+use crate::scene::read::collider::FileCollider;
 use crate::scene::read::generator::file::FileGenerator;
 
 /// Size from which on a piece ends at the next opportunity, in bytes. A shorter text is one piece.
@@ -230,6 +231,7 @@ impl<'t> Header<'t> {
     fn lists(&self) -> &'static [&'static str] {
         match self.path {
             "anchor" if self.is_list => &FileAnchor::LISTS,
+            "collider" if self.is_list => &FileCollider::LISTS,
             "generate" if self.is_list => &FileGenerator::LISTS,
             _ => &[],
         }

@@ -1,0 +1,70 @@
+//! Axis-aligned boxes.
+
+use crate::kernels::lanes::axes;
+
+/// Smallest and largest coordinate on each axis. An empty box has +infinity and -infinity.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    pub(super) min: [f32; 3],
+    pub(super) max: [f32; 3],
+}
+
+impl Bounds {
+    pub(super) const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+
+    pub(super) fn union(self, other: &Self) -> Self {
+        let mut union = self;
+        for axis in 0..3 {
+            union.min[axis] = lesser(other.min[axis], union.min[axis]);
+            union.max[axis] = -lesser(-other.max[axis], -union.max[axis]);
+        }
+        union
+    }
+
+    /// The box around points. NaN leaves it as it is.
+    pub(super) fn around(points: impl IntoIterator<Item = [f32; 3]>) -> Self {
+        let point = |at| Self { min: at, max: at };
+        points.into_iter().fold(Self::EMPTY, |all, at| all.union(&point(at)))
+    }
+
+    /// The box, larger by `distance` on each side.
+    pub(super) fn grown(self, distance: f32) -> Self {
+        Self {
+            min: self.min.map(|axis| axis - distance),
+            max: self.max.map(|axis| axis + distance),
+        }
+    }
+
+    pub(super) fn contains(&self, point: [f32; 3]) -> bool {
+        (0..3).all(|axis| self.min[axis] <= point[axis] && point[axis] <= self.max[axis])
+    }
+
+    pub(super) fn contains_box(&self, other: &Self) -> bool {
+        self.contains(other.min) && self.contains(other.max)
+    }
+
+    /// Largest distance of a point of this box from a point of the other one.
+    #[inline(always)]
+    pub(super) fn distance_max(&self, other: &Self) -> f32 {
+        let longest = axes(|axis| {
+            let (up, down) = (self.max[axis] - other.min[axis], other.max[axis] - self.min[axis]);
+            if up > down { up } else { down }
+        });
+        (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).sqrt()
+    }
+
+    /// Returns true if the boxes are at most `distance` apart on every axis.
+    #[inline(always)]
+    pub(super) fn are_near(&self, other: &Self, distance: f32) -> bool {
+        (0..3).all(|axis| {
+            self.min[axis] - distance <= other.max[axis]
+                && other.min[axis] - distance <= self.max[axis]
+        })
+    }
+}
+
+/// The lesser number; `b` if `a` is NaN.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}

@@ -1,0 +1,237 @@
+//! Contacts with meshes.
+//!
+//! A particle never passes a triangle: in each substep, its path in the moving frame of the mesh is
+//! tested against the triangles near it. It stays on the side on which the path starts, so open and
+//! thin meshes work like closed ones, and no state is kept between substeps. Where it cannot be pushed
+//! off all triangles, it stays where the path starts, in the frame of the mesh.
+
+pub(crate) mod near;
+mod tree;
+mod triangle;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::bounds::Bounds;
+use super::hit::Hit;
+use super::path::SubstepPath;
+use super::placed_frame::PlacedFrame;
+use super::zone::Zone;
+use crate::scene::definition::collider::ColliderMesh;
+use near::{NearMeshes, NearQuery, NearTriangles};
+use tree::TriangleTree;
+use triangle::{Gap, MeshPath, Touch, Triangle};
+
+/// Rounding of a position in the frame of a mesh, relative to the coordinates.
+const TOLERANCE: f32 = 4.0 * f32::EPSILON;
+/// Least distance that particles keep from a mesh, in tolerances. It exceeds the rounding of a
+/// particle on the surface, so that its side is certain.
+const SKIN: f32 = 8.0;
+/// Height up to which a triangle is a sliver, in tolerances. The tolerance of its neighbours closes the
+/// gap that it leaves.
+const SLIVER: f32 = 2.0;
+/// Length of a push for which there is room, relative to that of the path. Most paths run along the mesh and
+/// are pushed less.
+const PUSH_SHARE: f32 = 0.25;
+/// Number of further substeps for which triangles near a particle are listed.
+const SUBSTEPS_AHEAD: f32 = 2.0;
+/// Largest number of pushes of a particle in a substep. A particle in a wedge comes nearer to both sides
+/// with each.
+pub(crate) const PUSHES_MAX: usize = 8;
+
+/// The triangles of a mesh, ready for contacts. Immutable from load to load.
+#[derive(Debug, Default)]
+pub(crate) struct CollisionMesh {
+    tree: TriangleTree,
+    /// Index of the collider.
+    collider: usize,
+    /// Largest coordinate on each axis.
+    extents: Vec3,
+}
+
+impl CollisionMesh {
+    pub(crate) fn new(mesh: &ColliderMesh, collider: usize) -> Self {
+        let height_min = sliver_height(&mesh.vertices);
+        let corners = mesh.triangles.iter().map(|one| corners(&mesh.vertices, *one));
+        let triangles = corners.filter_map(|one| Triangle::new(one, height_min)).collect();
+        Self { tree: TriangleTree::new(triangles), collider, extents: extents(&mesh.vertices) }
+    }
+}
+
+/// Removes the triangles that are slivers: they have no normal, or none that f32 can tell. Returns
+/// their number.
+pub(crate) fn remove_slivers(mesh: &mut ColliderMesh) -> usize {
+    let ColliderMesh { vertices, triangles } = mesh;
+    let (height_min, count) = (sliver_height(vertices), triangles.len());
+    triangles.retain(|one| Triangle::new(corners(vertices, *one), height_min).is_some());
+    count - triangles.len()
+}
+
+fn corners(vertices: &[[f32; 3]], triangle: [u32; 3]) -> [[f32; 3]; 3] {
+    triangle.map(|corner| vertices[corner as usize])
+}
+
+fn extents(vertices: &[[f32; 3]]) -> Vec3 {
+    let Bounds { min, max } = Bounds::around(vertices.iter().copied());
+    let extent = |axis: usize| if -min[axis] > max[axis] { -min[axis] } else { max[axis] };
+    Vec3::new(extent(0), extent(1), extent(2))
+}
+
+/// Height over the longest edge up to which a triangle is a sliver.
+fn sliver_height(vertices: &[[f32; 3]]) -> f64 {
+    f64::from(SLIVER * TOLERANCE * extents(vertices).element_sum())
+}
+
+/// A mesh in a substep.
+#[derive(Debug, Clone)]
+pub(crate) struct PlacedMesh {
+    mesh: Arc<CollisionMesh>,
+    before: PlacedFrame,
+    now: PlacedFrame,
+    gap: Gap,
+}
+
+impl PlacedMesh {
+    /// Places a mesh at its frames at the start and the end of a substep. Particles keep `distance`,
+    /// but at least the skin.
+    pub(crate) fn new(
+        mesh: Arc<CollisionMesh>,
+        [before, now]: [PlacedFrame; 2],
+        distance: f32,
+    ) -> Self {
+        let tolerance = TOLERANCE * reach(&mesh, &now);
+        let skin = SKIN * tolerance;
+        let distance = if distance > skin { distance } else { skin };
+        Self { mesh, before, now, gap: Gap { distance, tolerance } }
+    }
+
+    /// Zone outside of which no path comes near a triangle.
+    pub(crate) fn zone(&self) -> Zone {
+        let Self { mesh, before, now, gap } = self;
+        let is_turned = now.is_turned || before.is_turned;
+        let extents = if is_turned { Vec3::splat(mesh.extents.length()) } else { mesh.extents };
+        let distance = extents + Vec3::splat(gap.distance + gap.tolerance);
+        Zone::around([now.center, before.center], distance, self.reach())
+    }
+
+    /// Magnitude of its coordinates, which bounds their rounding.
+    pub(crate) fn reach(&self) -> f32 {
+        reach(&self.mesh, &self.now)
+    }
+
+    /// Bound on the rounding of a depth.
+    pub(crate) fn rounding(&self) -> f32 {
+        self.gap.tolerance
+    }
+
+    /// Returns the room for the pushes of a particle with this path.
+    pub(crate) fn room(&self, path: &SubstepPath) -> Room {
+        let path = self.path(path);
+        let length = path.motion.dot(path.motion).sqrt();
+        let bounds = Bounds::around([path.start.to_array(), path.end().to_array()]);
+        Room { ends: bounds.grown(PUSH_SHARE * length + self.gap.tolerance), length }
+    }
+
+    /// True if a path after some pushes is still within the room of the first one.
+    pub(crate) fn is_within(&self, room: &Room, path: &SubstepPath) -> bool {
+        room.ends.contains(self.path(path).end().to_array())
+    }
+
+    /// Lists the triangles that a particle can touch, which its number names.
+    pub(crate) fn list(
+        &self,
+        lists: &mut NearMeshes,
+        particle: usize,
+        room: &Room,
+    ) -> NearTriangles {
+        let query = NearQuery {
+            collider: self.mesh.collider,
+            particle,
+            bounds: self.search_box(room),
+            margin: SUBSTEPS_AHEAD * room.length + self.gap.tolerance,
+        };
+        lists.find(&self.mesh.tree, &query)
+    }
+
+    /// Finds what stops a path after this number of pushes, or `None` if nothing does.
+    pub(crate) fn stop(
+        &self,
+        path: &SubstepPath,
+        room: &Room,
+        triangles: &NearTriangles,
+        push_count: usize,
+    ) -> Option<Stop> {
+        let path = self.path(path);
+        let is_resolved = |touch: &Touch| match push_count {
+            0 => true,
+            PUSHES_MAX => touch.is_passage(),
+            _ => touch.is_clear(self.gap),
+        };
+        let mut first: Option<Touch> = None;
+        self.for_each(room, triangles, |triangle| {
+            if let Some(touch) = triangle.touch(&path, self.gap).filter(&is_resolved)
+                && first.is_none_or(|first| touch.is_before(&first))
+            {
+                first = Some(touch);
+            }
+        });
+        let Touch { normal, depth, .. } = first?;
+        let hit = Hit { normal: self.now.unit_to_scene(normal), depth };
+        Some(if push_count == PUSHES_MAX { Stop::Hold } else { Stop::Push(hit) })
+    }
+
+    /// Displacement of a particle that stays where its path starts, in the frame of the mesh.
+    pub(crate) fn held_displacement(&self, start: Vec3) -> Vec3 {
+        self.now.to_scene(self.before.local(start) - self.now.local(start))
+    }
+
+    fn path(&self, path: &SubstepPath) -> MeshPath {
+        let start = self.before.local(path.start);
+        // Exactly 0 for a mesh at rest.
+        let shift = self.now.local(path.start) - start;
+        MeshPath { start, motion: shift + self.now.to_local(path.displacement) }
+    }
+
+    /// The box in which the triangles lie that the paths of a particle can touch.
+    fn search_box(&self, room: &Room) -> Bounds {
+        room.ends.grown(self.gap.distance + self.gap.tolerance)
+    }
+
+    fn for_each(&self, room: &Room, triangles: &NearTriangles, mut visit: impl FnMut(&Triangle)) {
+        let tree = &self.mesh.tree;
+        let mut visit_index = |index: u32| visit(&tree.triangles[index as usize]);
+        match triangles.listed() {
+            Some(indices) => indices.iter().copied().for_each(visit_index),
+            None => {
+                let _all = tree.search(&self.search_box(room), &mut |index| {
+                    visit_index(index);
+                    ControlFlow::Continue(())
+                });
+            }
+        }
+    }
+}
+
+/// An obstacle in a path.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Stop {
+    /// A triangle, off which the particle is pushed.
+    Push(Hit),
+    /// Triangles that leave it no room to go on.
+    Hold,
+}
+
+/// The box in which a path ends, also after some pushes. So the triangles that the particle can touch are
+/// known before the first one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Room {
+    ends: Bounds,
+    /// Length of the first path.
+    length: f32,
+}
+
+fn reach(mesh: &CollisionMesh, frame: &PlacedFrame) -> f32 {
+    frame.center.abs().element_sum() + mesh.extents.element_sum()
+}

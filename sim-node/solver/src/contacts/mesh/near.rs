@@ -1,0 +1,101 @@
+//! Memory of the triangles near particles, so that they are not searched in every substep.
+//!
+//! It is no state: a list holds all triangles that its particle can touch, and further ones change no contact.
+
+use std::ops::ControlFlow;
+
+use super::tree::TriangleTree;
+use crate::contacts::bounds::Bounds;
+
+/// Largest number of triangles in a list. With more, each contact searches the tree.
+const LISTED_MAX: usize = 32;
+/// Largest number of lists of a worker: 22 MiB.
+const LISTS_MAX: usize = 1 << 17;
+
+/// The triangles in a box, or more.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NearTriangles {
+    indices: [u32; LISTED_MAX],
+    /// None if there are too many of them.
+    count: Option<u32>,
+}
+
+impl NearTriangles {
+    const NONE: Self = Self { indices: [0; LISTED_MAX], count: Some(0) };
+
+    fn push(&mut self, triangle: u32) -> ControlFlow<()> {
+        match self.count {
+            Some(count) if (count as usize) < LISTED_MAX => {
+                self.indices[count as usize] = triangle;
+                self.count = Some(count + 1);
+                ControlFlow::Continue(())
+            }
+            _ => ControlFlow::Break(()),
+        }
+    }
+
+    /// True if no path in the box can touch a triangle.
+    pub(crate) fn are_none(&self) -> bool {
+        self.count == Some(0)
+    }
+
+    /// Returns the triangles, ascending, or `None` if there are too many of them.
+    pub(super) fn listed(&self) -> Option<&[u32]> {
+        self.count.map(|count| &self.indices[..count as usize])
+    }
+}
+
+/// The lists of a worker, each in a place that the number of the particle gives.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NearMeshes {
+    /// A power of two.
+    lists: Vec<List>,
+}
+
+#[derive(Debug, Clone)]
+struct List {
+    collider: usize,
+    /// Box in the frame of the mesh.
+    bounds: Bounds,
+    triangles: NearTriangles,
+}
+
+impl NearMeshes {
+    /// Makes room for a number of particles; 0 in a scene without meshes.
+    pub(crate) fn new(particle_count: usize) -> Self {
+        let empty = List { collider: 0, bounds: Bounds::EMPTY, triangles: NearTriangles::NONE };
+        let count = if particle_count > 0 { particle_count.next_power_of_two() } else { 0 };
+        Self { lists: vec![empty; count.min(LISTS_MAX)] }
+    }
+
+    /// Returns the triangles that the particle of a query can touch.
+    pub(super) fn find(&mut self, tree: &TriangleTree, query: &NearQuery) -> NearTriangles {
+        let NearQuery { collider, particle, bounds, margin } = *query;
+        // Meshes that a particle is near have different places.
+        let place = (particle + collider * 0x9e37_79b1) & (self.lists.len() - 1);
+        let list = &mut self.lists[place];
+        if list.collider != collider || !list.bounds.contains_box(&bounds) {
+            *list = List { collider, bounds: bounds.grown(margin), triangles: NearTriangles::NONE };
+            let triangles = &mut list.triangles;
+            let found = tree.search(&list.bounds, &mut |index| {
+                let is_near = tree.triangles[index as usize].meets(&list.bounds);
+                if is_near { triangles.push(index) } else { ControlFlow::Continue(()) }
+            });
+            if found.is_break() {
+                triangles.count = None;
+            }
+        }
+        list.triangles
+    }
+}
+
+/// The place of a particle near a mesh.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NearQuery {
+    pub(super) collider: usize,
+    pub(super) particle: usize,
+    /// Box in which the triangles lie that it can touch, in the frame of the mesh.
+    pub(super) bounds: Bounds,
+    /// Distance by which a new list exceeds the box.
+    pub(super) margin: f32,
+}

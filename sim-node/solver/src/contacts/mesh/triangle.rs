@@ -1,0 +1,177 @@
+//! Contact of a path with one triangle.
+
+use glam::{DVec3, Vec3};
+
+use crate::contacts::bounds::Bounds;
+
+/// A triangle, in the frame of its mesh.
+#[derive(Debug, Clone)]
+pub(super) struct Triangle {
+    pub(super) corners: [Vec3; 3],
+    /// Unit vector.
+    normal: Vec3,
+    /// By edge, from each corner to the next: unit vector across it, in the plane, to the inside.
+    inwards: [Vec3; 3],
+}
+
+// One triangle and a half to a cache line of 128 bytes.
+const _: () = assert!(size_of::<Triangle>() == 84);
+
+/// The path of a particle in a substep, in the moving frame of a mesh.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MeshPath {
+    pub(super) start: Vec3,
+    pub(super) motion: Vec3,
+}
+
+impl MeshPath {
+    pub(super) fn end(&self) -> Vec3 {
+        self.start + self.motion
+    }
+}
+
+/// Distances in a contact with a mesh.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gap {
+    /// Distance that particles keep from the triangles, at least 8 times the tolerance.
+    pub(super) distance: f32,
+    /// Bound on the rounding of a position in the frame of the mesh.
+    pub(super) tolerance: f32,
+}
+
+/// A contact with a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Touch {
+    /// Unit vector to the side of the particle, in the frame of the mesh.
+    pub(super) normal: Vec3,
+    /// Length of the push along the normal, > 0.
+    pub(super) depth: f32,
+    /// Fraction of the path before it passes through the triangle; 1 if it only comes too near.
+    time: f32,
+}
+
+impl Touch {
+    /// The contact that is resolved first: a passage before mere nearness, and then the earlier or
+    /// deeper one.
+    pub(super) fn is_before(&self, other: &Self) -> bool {
+        self.time < other.time || (self.time == other.time && self.depth > other.depth)
+    }
+
+    /// True if it is more than the rounding that an earlier contact leaves.
+    pub(super) fn is_clear(&self, gap: Gap) -> bool {
+        self.time < 1.0 || self.depth > gap.tolerance
+    }
+
+    /// True if the path passes through the triangle.
+    pub(super) fn is_passage(&self) -> bool {
+        self.time < 1.0
+    }
+}
+
+impl Triangle {
+    /// Creates a triangle, or `None` for a sliver: one whose height over its longest edge is at most
+    /// `height_min`.
+    pub(super) fn new(corners: [[f32; 3]; 3], height_min: f64) -> Option<Self> {
+        let corner = corners.map(|corner| Vec3::from_array(corner).as_dvec3());
+        let edges = [corner[1] - corner[0], corner[2] - corner[1], corner[0] - corner[2]];
+        let cross = edges[0].cross(edges[1]);
+        let area = cross.dot(cross).sqrt();
+        let longest = edges.iter().map(|edge| edge.dot(*edge)).fold(0.0, f64::max).sqrt();
+        // NaN compares false: a triangle without an extent has no height.
+        let has_height = area > height_min * longest;
+        if !has_height {
+            return None;
+        }
+        let normal = cross * (1.0 / area);
+        let inwards = edges.map(|edge| unit(normal.cross(edge)));
+        Some(Self {
+            corners: corners.map(Vec3::from_array),
+            normal: normal.as_vec3(),
+            inwards: inwards.map(DVec3::as_vec3),
+        })
+    }
+
+    /// False if the plane or an edge separates the triangle from a box. A box beside a corner may count as
+    /// near.
+    pub(super) fn meets(&self, bounds: &Bounds) -> bool {
+        let (min, max) = (Vec3::from_array(bounds.min), Vec3::from_array(bounds.max));
+        let (center, half) = ((min + max) * 0.5, (max - min) * 0.5);
+        let reach = |direction: Vec3| direction.abs().dot(half);
+        let height = self.normal.dot(center - self.corners[0]);
+        let edges = self.inwards.iter().zip(&self.corners);
+        height.abs() <= reach(self.normal)
+            && edges
+                .into_iter()
+                .all(|(inwards, corner)| inwards.dot(center - *corner) >= -reach(*inwards))
+    }
+
+    /// Finds the contact of a path: where it passes through the triangle, or where its end is nearer
+    /// than the distance. The particle stays on the side on which the path starts.
+    pub(super) fn touch(&self, path: &MeshPath, gap: Gap) -> Option<Touch> {
+        let above = self.normal.dot(path.start - self.corners[0]);
+        let (height, normal) =
+            if above < 0.0 { (-above, -self.normal) } else { (above, self.normal) };
+        // The motion is added last, so that it keeps its digits.
+        let height_at_end = height + normal.dot(path.motion);
+        let may_touch = height_at_end < gap.distance;
+        if !may_touch {
+            return None;
+        }
+        if height_at_end < 0.0 {
+            let time = height / (height - height_at_end);
+            if time < 1.0 && self.has_beside(path.start + path.motion * time, gap.tolerance) {
+                return Some(Touch { normal, depth: gap.distance - height_at_end, time });
+            }
+        }
+        let near = |normal, height: f32| {
+            let depth = gap.distance - height;
+            (depth > 0.0).then_some(Touch { normal, depth, time: 1.0 })
+        };
+        let end = path.end();
+        if !self.has_beside(end, gap.distance) {
+            return None;
+        }
+        if !self.has_beside(end, 0.0) {
+            let arm = end - self.nearest_on_edges(end);
+            let square = arm.dot(arm);
+            if square >= f32::MIN_POSITIVE {
+                let length = square.sqrt();
+                return near(arm / length, length);
+            }
+        }
+        // A path around the edge ends on the other side.
+        if height_at_end < 0.0 {
+            near(-normal, -height_at_end)
+        } else {
+            near(normal, height_at_end)
+        }
+    }
+
+    /// True if the foot of a point on the plane is inside, or beside an edge by at most `distance`.
+    fn has_beside(&self, point: Vec3, distance: f32) -> bool {
+        let edges = self.inwards.iter().zip(&self.corners);
+        edges.fold(true, |is_beside, (inwards, corner)| {
+            is_beside & (inwards.dot(point - *corner) >= -distance)
+        })
+    }
+
+    fn nearest_on_edges(&self, point: Vec3) -> Vec3 {
+        let [a, b, c] = self.corners;
+        let [first, second, third] =
+            [[a, b], [b, c], [c, a]].map(|edge| nearest_on_segment(edge, point));
+        let square = |one: Vec3| (point - one).dot(point - one);
+        let nearer = |one, other| if square(other) < square(one) { other } else { one };
+        nearer(nearer(first, second), third)
+    }
+}
+
+fn unit(vector: DVec3) -> DVec3 {
+    vector * (1.0 / vector.dot(vector).sqrt())
+}
+
+fn nearest_on_segment([a, b]: [Vec3; 2], point: Vec3) -> Vec3 {
+    let edge = b - a;
+    let along = edge.dot(point - a) / edge.dot(edge);
+    let share = if along > 0.0 { along } else { 0.0 };
+    a + edge * if share < 1.0 { share } else { 1.0 }
+}
