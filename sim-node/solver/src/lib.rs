@@ -43,7 +43,7 @@ pub use commands::cut::{Sphere, Sweep};
 pub use commands::preparation::{Plan, Prepared, Spare};
 pub use commands::{Grab, Push};
 pub use constraints::Constraint;
-pub use constraints::bends::Bend;
+pub use constraints::bends::{Bend, BendShape, RestShape};
 pub use contacts::colliders::PlacedCollider;
 pub use frame::Pose;
 pub use kernels::Kernels;

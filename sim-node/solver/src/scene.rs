@@ -16,7 +16,7 @@ mod source;
 mod warnings;
 
 pub use definition::anchor::{SceneAnchor, Waypoint};
-pub use definition::bending::{BendParticles, Rigidity, SceneBend, SheetBending};
+pub use definition::bending::{BendParticles, MeshBending, Rigidity, SceneBend, SheetBending};
 pub use definition::collider::{ColliderGeometry, SceneCollider};
 pub use definition::element::{SceneConstraint, SceneParticle};
 pub use definition::limits::Limits;

@@ -173,6 +173,13 @@ const EVERY_KEY: &str = r#"
         to = [3, 0, 0]
         bending = 0.3
 
+        [[generate]]
+        shape = "obj"
+        vertices = [[3, 0, 0], [3, 1, 0], [4, 0, 0], [4, 1, 0.5]]
+        faces = [[0, 1, 2], [1, 3, 2]]
+        bending = 0.6
+        rest = "loaded"
+
         [[bend]]
         particles = [0, 1, 2]
         rigidity = 0.7
