@@ -1,5 +1,6 @@
 //! Bends: resistance of ropes, sheets and meshes to curvature.
 
+pub(crate) mod block;
 pub(crate) mod families;
 pub(crate) mod hinge;
 pub(crate) mod paths;
