@@ -20,7 +20,9 @@ pub use definition::bending::{BendParticles, MeshBending, Rigidity, SceneBend, S
 pub use definition::collider::{ColliderGeometry, SceneCollider};
 pub use definition::element::{SceneConstraint, SceneParticle};
 pub use definition::limits::Limits;
-pub use definition::settings::{ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
+pub use definition::settings::{
+    ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, TETHERS_MAX, Up,
+};
 pub use definition::softness::{KindSoftness, Softness, SoftnessValues};
 pub use definition::wind::Wind;
 pub use definition::{SCENE_VERSION, Scene, SceneCounts};

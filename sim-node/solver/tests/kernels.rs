@@ -95,10 +95,11 @@ fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
 const LINKS: &str = "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"corners\"";
 
 /// Settings and generator keys that affect constraints.
-const VARIANTS: [(&str, &str, &str); 11] = [
+const VARIANTS: [(&str, &str, &str); 12] = [
     ("rigid", "substeps = 3", LINKS),
     ("passes", "substeps = 2\niterations = 3\nrelaxation = 1.2", LINKS),
     ("tethers", "substeps = 2\ntethers = true", LINKS),
+    ("tethers to several roots", "substeps = 2\ntethers = 3", LINKS),
     (
         "soft",
         "substeps = 2\niterations = 2",

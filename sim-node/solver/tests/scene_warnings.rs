@@ -49,7 +49,10 @@ fn constraints_without_direction_and_duplicates_cause_a_warning() {
 
 #[test]
 fn settings_without_effect_cause_a_warning() {
-    assert_warns(&format!("[solver]\ntethers = true\n{PAIR}"), "tethers = true has no effect");
+    assert_warns(
+        &format!("[solver]\ntethers = true\n{PAIR}"),
+        "tethers have no effect: no particle is pinned or anchored",
+    );
     assert_warns(&format!("[wind]\nvelocity = [1, 0, 0]\n{PAIR}"), "the wind has no effect");
     assert_warns(&format!("up = \"-y\"\n{PAIR}"), "up is \"-y\", but gravity points up, too");
     assert_warns(

@@ -35,6 +35,8 @@ pub(crate) struct GraphBlock<'a> {
     pub(crate) predicted: &'a mut [[f32; 3]],
     pub(crate) gains: &'a [[f32; 3]],
     pub(crate) tethers: &'a [PackedTether],
+    /// Tethers of each particle.
+    pub(crate) tether_count: usize,
 }
 
 impl<'a> GraphBlock<'a> {
@@ -51,19 +53,21 @@ impl<'a> GraphBlock<'a> {
 
     /// Splits after `count` particles, or at the end if there are fewer.
     fn split_at(self, count: usize) -> (GraphBlock<'a>, GraphBlock<'a>) {
-        let Self { particles, predicted, gains, tethers } = self;
+        let Self { particles, predicted, gains, tethers, tether_count } = self;
         let end = |length: usize| count.min(length);
         let (first_particles, particles) = particles.split_at_mut(end(particles.len()));
         let (first_predicted, predicted) = predicted.split_at_mut(end(predicted.len()));
         let (first_gains, gains) = gains.split_at(end(gains.len()));
-        let (first_tethers, tethers) = tethers.split_at(end(tethers.len()));
+        let tethers_end = tethers.len().min(tether_count * count);
+        let (first_tethers, tethers) = tethers.split_at(tethers_end);
         let first = GraphBlock {
             particles: first_particles,
             predicted: first_predicted,
             gains: first_gains,
             tethers: first_tethers,
+            tether_count,
         };
-        (first, GraphBlock { particles, predicted, gains, tethers })
+        (first, GraphBlock { particles, predicted, gains, tethers, tether_count })
     }
 }
 
@@ -151,8 +155,9 @@ impl ParticleBlock for GraphBlock<'_> {
 
     #[inline(always)]
     fn pull_to_roots<W: Wide>(&mut self) {
-        for (particle, tether) in self.particles.iter_mut().zip(self.tethers) {
-            if tether.length < f32::INFINITY {
+        let of_particles = self.tethers.chunks_exact(self.tether_count);
+        for (particle, tethers) in self.particles.iter_mut().zip(of_particles) {
+            for tether in tethers.iter().filter(|tether| tether.length < f32::INFINITY) {
                 pull_to_root(particle, tether);
             }
         }
@@ -180,7 +185,7 @@ fn pull_to_root(particle: &mut PackedParticle, tether: &PackedTether) {
         limit: RestLength::new(tether.length),
         inverse_mass: w,
     });
-    for (number, excess) in particle.0[4..7].iter_mut().zip(excess) {
+    for (number, excess) in particle.0[4..7].iter_mut().zip(excess.unwrap_or([0.0; 3])) {
         *number -= excess;
     }
 }
