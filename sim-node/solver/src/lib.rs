@@ -43,7 +43,7 @@ pub use commands::cut::{Sphere, Sweep};
 pub use commands::preparation::{Plan, Prepared, Spare};
 pub use commands::{Grab, Push};
 pub use constraints::Constraint;
-pub use constraints::bends::Bend;
+pub use constraints::bends::{Bend, BendShape, RestShape};
 pub use contacts::colliders::PlacedCollider;
 pub use frame::Pose;
 pub use kernels::Kernels;
@@ -62,4 +62,4 @@ pub use step::drive::GRAB_OVER_S_MAX;
 
 /// Version of the arithmetic. It changes whenever a step produces other bits. Only the version that
 /// made a recording can re-simulate it.
-pub const SOLVER_VERSION: u32 = 3;
+pub const SOLVER_VERSION: u32 = 4;

@@ -16,11 +16,13 @@ mod source;
 mod warnings;
 
 pub use definition::anchor::{SceneAnchor, Waypoint};
-pub use definition::bending::{BendParticles, Rigidity, SceneBend, SheetBending};
+pub use definition::bending::{BendParticles, MeshBending, Rigidity, SceneBend, SheetBending};
 pub use definition::collider::{ColliderGeometry, ColliderMesh, ColliderMeshes, SceneCollider};
 pub use definition::element::{SceneConstraint, SceneParticle};
 pub use definition::limits::Limits;
-pub use definition::settings::{ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, Up};
+pub use definition::settings::{
+    ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, TETHERS_MAX, Up,
+};
 pub use definition::softness::{KindSoftness, Softness, SoftnessValues};
 pub use definition::wind::Wind;
 pub use definition::{SCENE_VERSION, Scene, SceneCounts};

@@ -210,7 +210,7 @@ impl Solver {
             colliders: !self.colliders.is_empty(),
             wind: self.air.has_surface() && parameters.wind_drag > 0.0,
             bend_multipliers: !self.model.bends.is_empty() && parameters.iterations > 1,
-            tethers: self.settings.tethers,
+            tethers: self.settings.tethers as usize,
             particle_contacts: parameters.contact_thickness.is_some(),
         }
     }
@@ -241,7 +241,7 @@ impl Solver {
 
     /// Derives the tethers from the current state, if the scene has any.
     fn derive_tethers(&mut self) {
-        if self.settings.tethers {
+        if self.settings.has_tethers() {
             self.replace_tethers(self.tether_basis());
             self.tethers.attach(&mut self.store, &self.particles);
         }
@@ -253,7 +253,8 @@ impl Solver {
         if self.tethers.are_derived_from(&self.parameters, &basis) {
             self.tethers.restore_dropped();
         } else if !self.accept_tethers(&basis) {
-            self.tethers = Tethers::new(&self.model, &self.parameters, basis);
+            self.tethers =
+                Tethers::new(&self.model, &self.parameters, basis, self.settings.tethers as usize);
         }
     }
 

@@ -13,6 +13,7 @@ pub(crate) mod wind;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::Vec3;
 use sim_types::ParticleFlags;
 
 use drive::{count_step, drive_grabbed};
@@ -177,6 +178,7 @@ impl Solver {
         ContactSubstep {
             h,
             rest_speed: 2.0 * (x * x + y * y + z * z).sqrt() * h,
+            gain: Vec3::new(h * x, h * y, h * z),
             interval: Interval {
                 start: substep.index as f32 / count,
                 end: (substep.index + 1) as f32 / count,

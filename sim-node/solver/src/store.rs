@@ -15,7 +15,7 @@ mod workers;
 use bends::StoredBends;
 use graph::Graph;
 use layout::Layout;
-pub(crate) use layout::{Configured, Location, SceneFields};
+pub(crate) use layout::{Configured, Location, SceneFields, TetherPlace};
 use patch::{Patch, SheetFamilies};
 use paths::GraphWork;
 pub(crate) use paths::{Paths, Progress};
@@ -302,24 +302,31 @@ impl ParticleStore {
 
     /// Removes the tethers of all particles, of which there are `particle_count`.
     pub(crate) fn detach_tethers(&mut self, particle_count: u32) {
-        for particle in 0..particle_count {
-            self.set_tether_length(self.location(particle), f32::INFINITY);
+        for slot in 0..self.layout.scene.tethers {
+            for particle in 0..particle_count {
+                let place = TetherPlace { particle: self.location(particle), slot };
+                self.set_tether_length(place, f32::INFINITY);
+            }
         }
     }
 
-    /// Sets where the root of a particle's tether is at the end of the substep.
-    pub(crate) fn set_root(&mut self, location: Location, root: [f32; 3]) {
-        match location.sheet() {
-            None => self.graph.tether_mut(location.index()).root = root,
-            Some(sheet) => self.patches[sheet].set_root(location.index(), root),
+    /// Sets where the root of a tether is at the end of the substep.
+    pub(crate) fn set_root(&mut self, TetherPlace { particle, slot }: TetherPlace, root: [f32; 3]) {
+        match particle.sheet() {
+            None => self.graph.tether_mut(particle.index(), slot).root = root,
+            Some(sheet) => self.patches[sheet].set_root(particle.index(), slot, root),
         }
     }
 
     /// Sets the largest distance of a particle from its root; infinite for no tether.
-    pub(crate) fn set_tether_length(&mut self, location: Location, length: f32) {
-        match location.sheet() {
-            None => self.graph.tether_mut(location.index()).length = length,
-            Some(sheet) => self.patches[sheet].set_tether_length(location.index(), length),
+    pub(crate) fn set_tether_length(
+        &mut self,
+        TetherPlace { particle, slot }: TetherPlace,
+        length: f32,
+    ) {
+        match particle.sheet() {
+            None => self.graph.tether_mut(particle.index(), slot).length = length,
+            Some(sheet) => self.patches[sheet].set_tether_length(particle.index(), slot, length),
         }
     }
 }
@@ -339,7 +346,7 @@ fn find_sheet(sheets: &[Sheet], particle: u32) -> Option<Found> {
 }
 
 /// Number of columns below which the padding of a row is a multiple of its particles.
-const COLUMNS_MIN: u32 = 16;
+const COLUMNS_MIN: u32 = 24;
 /// Number of rows from which that padding matters. A sheet of 16 million rows with one column would
 /// occupy 19 GB; the graph holds it in 2.
 const ROWS_OF_NARROW_MAX: u32 = 1 << 16;
@@ -421,8 +428,8 @@ mod tests {
 
     #[test]
     fn a_long_sheet_whose_rows_would_be_mostly_padding_is_part_of_the_graph() {
-        assert_eq!([count_in_rows(1, 65_537), count_in_rows(15, 65_537)], [0, 0]);
-        assert_eq!([count_in_rows(16, 65_537), count_in_rows(1, 65_536)], [1, 1]);
+        assert_eq!([count_in_rows(1, 65_537), count_in_rows(23, 65_537)], [0, 0]);
+        assert_eq!([count_in_rows(24, 65_537), count_in_rows(1, 65_536)], [1, 1]);
         assert_eq!(count_in_rows(65_537, 1), 1);
     }
 

@@ -96,10 +96,11 @@ fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
 const LINKS: &str = "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"corners\"";
 
 /// Settings and generator keys that affect constraints.
-const VARIANTS: [(&str, &str, &str); 11] = [
+const VARIANTS: [(&str, &str, &str); 12] = [
     ("rigid", "substeps = 3", LINKS),
     ("passes", "substeps = 2\niterations = 3\nrelaxation = 1.2", LINKS),
     ("tethers", "substeps = 2\ntethers = true", LINKS),
+    ("tethers to several roots", "substeps = 2\ntethers = 3", LINKS),
     (
         "soft",
         "substeps = 2\niterations = 2",
@@ -194,6 +195,33 @@ fn kernels_agree_on_bends_of_ropes_and_graphs() {
     }
     assert_same_bits(&text, "bends", 120);
     assert_same_bits_of_threads(&text, "bends", 20);
+}
+
+/// Returns a curved mesh of columns x rows vertices, whose triangles have one diagonal.
+fn mesh(columns: usize, rows: usize, rest: &str) -> String {
+    let places =
+        (0..rows).flat_map(|row| (0..columns).map(move |column| (column as f64, row as f64)));
+    let vertex = |(x, y): (f64, f64)| [0.1 * x, 0.1 * y, 0.001 * x * (x - y)];
+    let vertices: Vec<_> = places.map(vertex).collect();
+    let cells =
+        (0..rows - 1).flat_map(|row| (1..columns).map(move |column| row * columns + column));
+    let triangles = |b: usize| [[b - 1, b, b + columns], [b - 1, b + columns, b + columns - 1]];
+    let faces: Vec<_> = cells.flat_map(triangles).collect();
+    format!(
+        "version = 1\n[[generate]]\nshape = \"obj\"\nvertices = {vertices:?}\nfaces = {faces:?}\n\
+         bending = 2\nrest = \"{rest}\"\n"
+    )
+}
+
+#[test]
+fn kernels_agree_on_hinges() {
+    for rest in ["flat", "loaded"] {
+        assert_same_bits(&mesh(13, 9, rest), rest, 100);
+        // Groups of more than 4,096 hinges are divided among threads.
+        let large = mesh(230, 150, rest);
+        assert_same_bits(&large, rest, 3);
+        assert_same_bits_of_threads(&large, rest, 3);
+    }
 }
 
 #[test]

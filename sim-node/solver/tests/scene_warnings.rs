@@ -49,7 +49,10 @@ fn constraints_without_direction_and_duplicates_cause_a_warning() {
 
 #[test]
 fn settings_without_effect_cause_a_warning() {
-    assert_warns(&format!("[solver]\ntethers = true\n{PAIR}"), "tethers = true has no effect");
+    assert_warns(
+        &format!("[solver]\ntethers = true\n{PAIR}"),
+        "tethers have no effect: no particle is pinned or anchored",
+    );
     assert_warns(&format!("[wind]\nvelocity = [1, 0, 0]\n{PAIR}"), "the wind has no effect");
     assert_warns(&format!("up = \"-y\"\n{PAIR}"), "up is \"-y\", but gravity points up, too");
     assert_warns(
@@ -138,7 +141,8 @@ fn pins_that_match_no_particle_cause_a_warning() {
 }
 
 /// The law is verified in `physics/bending.rs`: the rigidity sinks by the factor 1 + k h^2 / (m alpha), with
-/// k = 3 in the middle of a long strip.
+/// k = 3 in the middle of a long strip. The coefficients of a hinge between two right triangles are 2, so its
+/// factor is 1 + 8 h^2 B / (m s^2).
 #[test]
 fn a_rigidity_that_the_substeps_do_not_reach_causes_a_warning_that_names_enough_of_them() {
     let cases = [
@@ -154,6 +158,12 @@ fn a_rigidity_that_the_substeps_do_not_reach_causes_a_warning_that_names_enough_
             "generate[0].bending: 4 substeps at 240 Hz reach a rigidity of 0.277 N m² instead of \
              1: 20 substeps suffice",
         ),
+        (
+            "[[generate]]\nshape = \"obj\"\nvertices = [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], \
+             [0, 0.1, 0]]\nfaces = [[0, 1, 2], [0, 2, 3]]\nmass = 0.01\nbending = 4\n",
+            "generate[0].bending: 4 substeps at 240 Hz reach a rigidity of 2.97 N m instead of 4: \
+             8 substeps suffice",
+        ),
     ];
     for (text, expected) in cases {
         assert_warns(text, expected);
@@ -162,4 +172,18 @@ fn a_rigidity_that_the_substeps_do_not_reach_causes_a_warning_that_names_enough_
             |substeps: u32| warnings(&format!("[solver]\nsubsteps = {substeps}\n{text}")).len();
         assert_eq!([with(count), with(count - 1)], [0, 1], "{expected}");
     }
+}
+
+#[test]
+fn an_edge_without_a_hinge_causes_a_warning() {
+    let mesh = |height: f64| {
+        warnings(&format!(
+            "[[generate]]\nshape = \"obj\"\nvertices = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0], \
+             [0.5, -{height}, 0]]\nfaces = [[0, 1, 2], [0, 3, 1]]\nbending = 1e-6\n"
+        ))
+    };
+    assert_eq!(mesh(0.002), Vec::<String>::new());
+    let expected = "generate[0].bending: 1 edge has no hinge, because a triangle beside is a line: \
+         merge its corners, or divide its longest side";
+    assert_eq!(mesh(0.0005), [expected]);
 }

@@ -86,7 +86,7 @@ const EVERY_KEY: &str = r#"
         damping = 0.7
         max_speed = 1e4
         relaxation = 1.3
-        tethers = true
+        tethers = 3
         max_stretch = 1.1
         tear_stretch = 1.25
         tear_distance = 0
@@ -172,6 +172,13 @@ const EVERY_KEY: &str = r#"
         from = [2, 0, 0]
         to = [3, 0, 0]
         bending = 0.3
+
+        [[generate]]
+        shape = "obj"
+        vertices = [[3, 0, 0], [3, 1, 0], [4, 0, 0], [4, 1, 0.5]]
+        faces = [[0, 1, 2], [1, 3, 2]]
+        bending = 0.6
+        rest = "loaded"
 
         [[bend]]
         particles = [0, 1, 2]

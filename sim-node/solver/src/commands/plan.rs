@@ -22,7 +22,7 @@ impl Solver {
         for action in actions {
             match action {
                 Action::Reset => {
-                    let basis = self.settings.tethers.then(|| self.initial_tether_basis());
+                    let basis = self.settings.has_tethers().then(|| self.initial_tether_basis());
                     return self.plan_for(&self.initial_parameters, &[], basis);
                 }
                 Action::Set { parameter, value, constraint_kind } => {
@@ -38,7 +38,7 @@ impl Solver {
                 _ => {}
             }
         }
-        let has_new_tethers = self.settings.tethers && affected == Affected::RigidPaths;
+        let has_new_tethers = self.settings.has_tethers() && affected == Affected::RigidPaths;
         let tether_basis = has_new_tethers.then(|| self.tether_basis());
         match affected {
             Affected::Nothing => None,
@@ -50,7 +50,7 @@ impl Solver {
     /// cheap already, and for a keyframe that they reject.
     pub fn plan_state(&self, keyframe: &Keyframe) -> Option<Plan> {
         self.check_keyframe(keyframe).ok()?;
-        let tether_basis = self.settings.tethers.then(|| keyframe.tethers.clone());
+        let tether_basis = self.settings.has_tethers().then(|| keyframe.tethers.clone());
         self.plan_for(&keyframe.parameters, &keyframe.torn, tether_basis)
     }
 

@@ -59,11 +59,12 @@ impl Plan {
         let builder = ConstraintBuilder::new(&self.model, &self.parameters, self.setup);
         // Nothing has a location that could move.
         let _moved = store.configure(&builder, self.fields, &is_torn);
-        if self.fields.tethers {
+        if self.fields.tethers > 0 {
             // Those of the spare.
             store.detach_tethers(self.model.particle_count());
         }
-        let new_tethers = |basis| Tethers::new(&self.model, &self.parameters, basis);
+        let new_tethers =
+            |basis| Tethers::new(&self.model, &self.parameters, basis, self.fields.tethers);
         let tethers = self.tether_basis.map(new_tethers);
         Prepared { store, tethers: tethers.unwrap_or_default(), model: self.model }
     }

@@ -1,10 +1,13 @@
 //! Bends: resistance of ropes, sheets and meshes to curvature.
 
+pub(crate) mod block;
 pub(crate) mod families;
+pub(crate) mod hinge;
 pub(crate) mod paths;
 pub(crate) mod projection;
 
 use glam::Vec3;
+use serde::Serialize;
 
 /// A bend of three or four particles.
 ///
@@ -16,6 +19,7 @@ use glam::Vec3;
 ///   alpha = `s_x`^3 / (`s_y` B). On a rope alpha = s^3 / EI.
 /// - Twist of a cell: C = `x_a` - `x_b` - `x_c` + `x_d`, alpha = `s_x` `s_y` / (2 B). With it, the energy
 ///   of a cylinder is the same in every direction.
+/// - Hinge of two triangles: see [`BendShape::Hinge`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bend {
     /// Indices of the particles. The fourth of a bend of three is its second one again.
@@ -26,6 +30,38 @@ pub struct Bend {
     pub geometry: f32,
     /// Bending rigidity >= 0: B in N m on a surface, EI in N m^2 on a line.
     pub rigidity: f32,
+    /// Arrangement of the particles.
+    pub shape: BendShape,
+}
+
+/// Arrangement of the particles of a bend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BendShape {
+    /// Three neighbours on a line.
+    Line,
+    /// The corners of a cell: two above, two below.
+    Cell,
+    /// A third corner, the ends of an edge, and the other third corner of two triangles with that edge.
+    ///
+    /// For every fold by an angle t that keeps the triangles, C lies along the sum n of their unit normals
+    /// and has the size |e| 2 sin(t / 2), where |e| is the length of the edge. With a rest value, C - rest
+    /// n / |n| takes the place of C.
+    Hinge {
+        /// C along n at rest, in m; 0 for a flat hinge. Its sign is that of the fold.
+        rest: f32,
+        /// Area of the first triangle / area of the second.
+        area_ratio: f32,
+    },
+}
+
+/// Shape in which hinges are at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RestShape {
+    /// Both triangles in a plane.
+    Flat,
+    /// The shape at load.
+    Loaded,
 }
 
 /// Coefficients of a second difference.
@@ -53,6 +89,7 @@ impl Bend {
             coefficients: [c_a, -sum, c_c, 0.0],
             geometry: round(mean * mean * mean),
             rigidity,
+            shape: BendShape::Line,
         }
     }
 
@@ -60,16 +97,17 @@ impl Bend {
     pub(crate) fn of_cell(particles: [u32; 4], positions: [[f32; 3]; 4], rigidity: f32) -> Self {
         let [a, b, c, _] = positions.map(|one| Vec3::from_array(one).as_dvec3());
         let area = (b - a).cross(c - a).length();
-        Self { particles, coefficients: TWIST, geometry: round(area / 2.0), rigidity }
+        let geometry = round(area / 2.0);
+        Self { particles, coefficients: TWIST, geometry, rigidity, shape: BendShape::Cell }
     }
 
     /// Pairs of particles, as positions in [`Self::particles`], whose constraints form the path of a
-    /// bend: neighbours on a line, or the sides of a cell.
+    /// bend: neighbours on a line, the sides of a cell, or those of two triangles.
     pub(crate) fn path(&self) -> &'static [[usize; 2]] {
-        if self.particles[3] == self.particles[1] {
-            &[[0, 1], [1, 2]]
-        } else {
-            &[[0, 1], [0, 2], [1, 3], [2, 3]]
+        match self.shape {
+            BendShape::Line => &[[0, 1], [1, 2]],
+            BendShape::Cell => &[[0, 1], [0, 2], [1, 3], [2, 3]],
+            BendShape::Hinge { .. } => &[[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]],
         }
     }
 

@@ -1,5 +1,5 @@
-//! Generated tethers: each keeps a free particle within the length of the shortest rigid path to a
-//! fixed one (Long Range Attachments: Kim, Chentanez, Mueller 2012).
+//! Generated tethers: each keeps a free particle within the length of the shortest rigid path to one of its
+//! nearest fixed ones (Long Range Attachments: Kim, Chentanez, Mueller 2012).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,7 +11,7 @@ use crate::scene::definition::softness::Softness;
 use crate::scene::model::Model;
 use crate::state::particles::Particles;
 use crate::state::tear::Torn;
-use crate::store::{Location, ParticleStore};
+use crate::store::{Location, ParticleStore, TetherPlace};
 
 /// The tethers of a scene; empty if it has none.
 #[derive(Debug, Clone, Default)]
@@ -25,10 +25,10 @@ pub(crate) struct Tethers {
     moving_roots: Vec<MovingRoot>,
 }
 
-/// Locations of both ends of a tether whose root moves.
+/// A tether whose root moves.
 #[derive(Debug, Clone, Copy)]
 struct MovingRoot {
-    particle: Location,
+    tether: TetherPlace,
     root: Location,
 }
 
@@ -63,6 +63,8 @@ impl TetherBasis {
 struct Tether {
     particle: u32,
     root: u32,
+    /// Number of roots of the particle that are nearer.
+    slot: usize,
     length: f32,
     /// Tether of the previous particle on the path. None if that particle is the root.
     parent: Option<u32>,
@@ -102,13 +104,18 @@ pub(crate) fn is_root(flags: u32) -> bool {
 
 impl Tethers {
     /// Derives the tethers from their basis, by Dijkstra's algorithm over rigid constraints that are
-    /// neither torn nor bends.
-    pub(crate) fn new(model: &Model, parameters: &Parameters, basis: TetherBasis) -> Self {
+    /// neither torn nor bends. Each particle keeps the paths to its `root_count` nearest roots.
+    pub(crate) fn new(
+        model: &Model,
+        parameters: &Parameters,
+        basis: TetherBasis,
+        root_count: usize,
+    ) -> Self {
         let links = Links::new(model, parameters, &basis.torn);
-        let mut is_reached = vec![false; model.particles.len()];
+        let mut roots = RootsOfParticles::new(model.particles.len(), root_count);
         let mut paths = BinaryHeap::new();
         for root in &basis.roots {
-            is_reached[*root as usize] = true;
+            roots.complete(*root);
         }
         for root in &basis.roots {
             let reached = Reached { particle: *root, root: *root, length: 0.0, tether: None };
@@ -116,9 +123,7 @@ impl Tethers {
         }
         let mut all: Vec<Tether> = Vec::new();
         while let Some(Reverse(path)) = paths.pop() {
-            if std::mem::replace(&mut is_reached[path.particle as usize], true) {
-                continue;
-            }
+            let Some(slot) = roots.add(path.particle, path.root) else { continue };
             let length = f64::from_bits(path.length_bits);
             #[allow(
                 clippy::cast_possible_truncation,
@@ -128,6 +133,7 @@ impl Tethers {
             all.push(Tether {
                 particle: path.particle,
                 root: path.root,
+                slot,
                 length: rounded,
                 parent: path.parent,
                 constraint: path.constraint,
@@ -154,11 +160,11 @@ impl Tethers {
     /// Drops every tether whose path contains a torn constraint.
     pub(crate) fn drop_torn(&mut self, torn: &Torn, store: &mut ParticleStore) {
         for place in 0..self.all.len() {
-            let Tether { particle, parent, constraint, is_dropped, .. } = self.all[place];
+            let Tether { parent, constraint, is_dropped, .. } = self.all[place];
             let is_cut_off = parent.is_some_and(|parent| self.all[parent as usize].is_dropped);
             if !is_dropped && (is_cut_off || torn.is_torn(constraint)) {
                 self.all[place].is_dropped = true;
-                store.set_tether_length(store.location(particle), f32::INFINITY);
+                store.set_tether_length(self.all[place].place(store), f32::INFINITY);
             }
         }
     }
@@ -170,12 +176,13 @@ impl Tethers {
         }
         self.moving_roots.clear();
         for tether in self.all.iter().filter(|tether| !tether.is_dropped) {
-            let [particle, root] = [tether.particle, tether.root].map(|one| store.location(one));
-            store.set_tether_length(particle, tether.length);
+            let place = tether.place(store);
+            store.set_tether_length(place, tether.length);
             let state = &particles.states[tether.root as usize];
-            store.set_root(particle, state.position);
+            store.set_root(place, state.position);
             if state.flags & ParticleFlags::ANCHORED != 0 {
-                self.moving_roots.push(MovingRoot { particle, root });
+                let root = store.location(tether.root);
+                self.moving_roots.push(MovingRoot { tether: place, root });
             }
         }
     }
@@ -183,16 +190,56 @@ impl Tethers {
     /// Detaches the tethers from the particles of a store.
     pub(crate) fn detach(&self, store: &mut ParticleStore) {
         for tether in &self.all {
-            store.set_tether_length(store.location(tether.particle), f32::INFINITY);
+            store.set_tether_length(tether.place(store), f32::INFINITY);
         }
     }
 
     /// Updates the positions of moving roots to the end of the substep.
     pub(crate) fn update_roots(&self, store: &mut ParticleStore) {
-        for MovingRoot { particle, root } in &self.moving_roots {
+        for MovingRoot { tether, root } in &self.moving_roots {
             let (position, displacement) = (store.position(*root), store.displacement(*root));
-            store.set_root(*particle, [0, 1, 2].map(|axis| position[axis] + displacement[axis]));
+            store.set_root(*tether, [0, 1, 2].map(|axis| position[axis] + displacement[axis]));
         }
+    }
+}
+
+impl Tether {
+    fn place(&self, store: &ParticleStore) -> TetherPlace {
+        TetherPlace { particle: store.location(self.particle), slot: self.slot }
+    }
+}
+
+/// The roots that each particle has found, the nearest first.
+struct RootsOfParticles {
+    /// By particle: room for `count_max` roots.
+    roots: Vec<u32>,
+    /// By particle: how many it has.
+    counts: Vec<usize>,
+    count_max: usize,
+}
+
+impl RootsOfParticles {
+    fn new(particle_count: usize, count_max: usize) -> Self {
+        let roots = vec![0; particle_count * count_max];
+        Self { roots, counts: vec![0; particle_count], count_max }
+    }
+
+    /// Lets a particle find no more roots.
+    fn complete(&mut self, particle: u32) {
+        self.counts[particle as usize] = self.count_max;
+    }
+
+    /// Adds a root of a particle. Returns the number of those before, or None if the particle has this one or
+    /// needs no more.
+    fn add(&mut self, particle: u32, root: u32) -> Option<usize> {
+        let count = &mut self.counts[particle as usize];
+        let roots = &mut self.roots[particle as usize * self.count_max..][..self.count_max];
+        if *count == self.count_max || roots[..*count].contains(&root) {
+            return None;
+        }
+        roots[*count] = root;
+        *count += 1;
+        Some(*count - 1)
     }
 }
 

@@ -197,7 +197,11 @@ impl Contacts {
         let kept = if slide > friction { sliding * (1.0 - friction / slide) } else { Vec3::ZERO };
         let approach = (carried - particles.predicted(index)).dot(normal);
         let is_bouncing = approach > surface.rest_distance;
-        let bounce = if is_bouncing { surface.restitution * approach - bounced } else { 0.0 };
+        let bounce = if is_bouncing {
+            surface.restitution * surface.rebound(approach, depth, normal) - bounced
+        } else {
+            0.0
+        };
         let displacement = path.displacement + normal * depth - (sliding - kept);
         particles.set_displacement(index, displacement);
         self.displacements[index] = carried + kept;

@@ -1,5 +1,7 @@
 //! Values that all contacts of a substep share.
 
+use glam::Vec3;
+
 /// Values that all contacts of a substep share.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ContactSubstep {
@@ -7,6 +9,8 @@ pub(crate) struct ContactSubstep {
     pub(crate) h: f32,
     /// Approaches up to this speed do not bounce: 2 |g| h, twice what gravity adds in a substep.
     pub(crate) rest_speed: f32,
+    /// Gain of velocity by gravity in the substep: h g.
+    pub(crate) gain: Vec3,
     pub(crate) interval: Interval,
     /// Solids have no extent along z.
     pub(crate) is_planar: bool,

@@ -4,6 +4,7 @@ mod bending;
 pub(super) mod bridge;
 mod builder;
 pub(super) mod cloth;
+mod hinges;
 pub(super) mod obj;
 pub(super) mod pinned;
 pub(super) mod ragdoll;
@@ -107,7 +108,8 @@ impl Shape {
         match self {
             Self::Cloth(cloth) | Self::Mesh(cloth) => cloth.bend_count(),
             Self::Rope(rope) => rope.bend_count(),
-            Self::Web(_) | Self::Bridge(_) | Self::Ragdoll(_) | Self::Obj(_) => 0,
+            Self::Obj(obj) => obj.bend_count(),
+            Self::Web(_) | Self::Bridge(_) | Self::Ragdoll(_) => 0,
         }
     }
 }
@@ -144,7 +146,8 @@ impl Generator {
         match shape {
             Shape::Cloth(cloth) | Shape::Mesh(cloth) => cloth.build_bends(&mut builder),
             Shape::Rope(rope) => rope.build_bends(&mut builder),
-            Shape::Web(_) | Shape::Bridge(_) | Shape::Ragdoll(_) | Shape::Obj(_) => {}
+            Shape::Obj(obj) => obj.build_bends(&mut builder),
+            Shape::Web(_) | Shape::Bridge(_) | Shape::Ragdoll(_) => {}
         }
     }
 }

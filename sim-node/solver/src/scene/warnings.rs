@@ -31,6 +31,7 @@ impl Scene {
         ];
         let mut warnings: Vec<_> = all.into_iter().flatten().collect();
         warnings.extend(bending::unreached(self, &model));
+        warnings.extend(bending::missing_hinges(self));
         warnings.extend(shapes::without_length(self));
         warnings.extend(shapes::without_pins(self));
         warnings.extend(self.read_warnings.iter().cloned());

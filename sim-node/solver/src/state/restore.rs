@@ -73,7 +73,7 @@ impl Solver {
     fn restore_constraints(&mut self, keyframe: &Keyframe) {
         self.torn.restore(&keyframe.torn, &keyframe.tear_causes);
         (self.due, self.has_new_tethers) = (Due::default(), false);
-        if self.settings.tethers {
+        if self.settings.has_tethers() {
             self.replace_tethers(keyframe.tethers.clone());
         }
         self.configure();

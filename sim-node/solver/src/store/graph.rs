@@ -40,7 +40,7 @@ pub(crate) struct Graph {
     predicted: Vec<[f32; 3]>,
     /// By particle: the velocity that the wind adds in a substep; empty in scenes without wind.
     gains: Vec<[f32; 3]>,
-    /// By particle: its tether; empty in scenes without tethers.
+    /// By particle: its tethers; empty in scenes without tethers.
     tethers: Vec<PackedTether>,
     groups: Vec<ConstraintGroup>,
     /// By lane group: the two particles of each constraint.
@@ -152,7 +152,7 @@ impl Graph {
         self.predicted = vec![[0.0; 3]; count(colliders)];
         self.gains = vec![[0.0; 3]; count(wind)];
         let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
-        self.tethers = vec![none; count(tethers)];
+        self.tethers = vec![none; tethers * self.indices.len()];
         self.bends.allocate(bend_multipliers);
         let length = 8 * self.ends.len();
         refill(&mut self.columns, constraints.column_count() * length, 0.0);
@@ -257,6 +257,7 @@ impl Graph {
             predicted: &mut self.predicted,
             gains: if self.layout.is_wind_used { &self.gains } else { &[] },
             tethers: &self.tethers,
+            tether_count: self.layout.scene.tethers,
         };
         let parts = all.chunks(length).map(Some);
         let work = |part: &mut Option<GraphBlock<'_>>, scratch: &mut WorkerScratch| {
@@ -335,7 +336,7 @@ impl Graph {
         self.gains[index] = gain;
     }
 
-    pub(crate) fn tether_mut(&mut self, index: usize) -> &mut PackedTether {
-        &mut self.tethers[index]
+    pub(crate) fn tether_mut(&mut self, index: usize, slot: usize) -> &mut PackedTether {
+        &mut self.tethers[index * self.layout.scene.tethers + slot]
     }
 }

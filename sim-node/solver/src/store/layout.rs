@@ -13,8 +13,8 @@ pub(crate) struct SceneFields {
     pub(crate) wind: bool,
     /// For bends in several passes: their multipliers.
     pub(crate) bend_multipliers: bool,
-    /// For tethers: the position of the root, and the length with its square.
-    pub(crate) tethers: bool,
+    /// For each tether of a particle: the position of the root, and the length with its square.
+    pub(crate) tethers: usize,
     /// Particles touch each other. It takes no memory in the store.
     pub(crate) particle_contacts: bool,
 }
@@ -68,7 +68,7 @@ impl Layout {
     pub(crate) fn optional_stages(&self) -> OptionalStages {
         OptionalStages {
             limit_stretch: self.used.max_lengths,
-            tether: self.scene.tethers,
+            tether: self.scene.tethers > 0,
             particle_contact: self.has_particle_contacts,
             contact: self.scene.colliders,
         }
@@ -102,7 +102,7 @@ impl Location {
         Self::new(sheet + 1, index)
     }
 
-    /// A sheet has at most 2^24 particles. With at most 78 fields in columns of up to 48 numbers for 16
+    /// A sheet has at most 2^24 particles. With at most 93 fields in columns of up to 64 numbers for 25
     /// particles, its indices stay below 2^32.
     fn new(part: usize, index: usize) -> Self {
         let (Ok(part), Ok(index)) = (u32::try_from(part), u32::try_from(index)) else {
@@ -119,4 +119,12 @@ impl Location {
     pub(crate) fn sheet(self) -> Option<usize> {
         (self.part as usize).checked_sub(1)
     }
+}
+
+/// One of the tethers of a particle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TetherPlace {
+    pub(crate) particle: Location,
+    /// Number of nearer roots.
+    pub(crate) slot: usize,
 }

@@ -126,10 +126,11 @@ impl Patch {
                 }
             }
         }
-        if self.layout.fields.scene.tethers {
+        for slot in 0..self.layout.fields.scene.tethers {
             for row in 0..rows {
                 for column in 0..stride {
-                    self.set_tether_length(self.particle_index([row, column]), f32::INFINITY);
+                    let index = self.particle_index([row, column]);
+                    self.set_tether_length(index, slot, f32::INFINITY);
                 }
             }
         }
@@ -311,13 +312,13 @@ impl Patch {
     }
 
     /// Sets the position of a tether's root at the end of the substep.
-    pub(crate) fn set_root(&mut self, index: usize, root: [f32; 3]) {
-        self.set_vector(index, self.layout.root_at(), root);
+    pub(crate) fn set_root(&mut self, index: usize, slot: usize, root: [f32; 3]) {
+        self.set_vector(index, self.layout.root_at(slot), root);
     }
 
     /// Sets the length of a tether; infinite for no tether.
-    pub(crate) fn set_tether_length(&mut self, index: usize, length: f32) {
-        let at = index + (self.layout.root_at() + 3) * self.layout.stride;
+    pub(crate) fn set_tether_length(&mut self, index: usize, slot: usize, length: f32) {
+        let at = index + (self.layout.root_at(slot) + 3) * self.layout.stride;
         let stride = self.layout.stride;
         let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
         (numbers[at], numbers[at + stride]) = (length, length * length);

@@ -1,5 +1,6 @@
 //! The threads of a solver, with their kernels and scratch memory.
 
+use crate::constraints::bends::block::BendBlock;
 use crate::constraints::projection_block::ProjectionBlock;
 use crate::contacts::contact::{ContactRoom, Contacts};
 use crate::kernels::Kernels;
@@ -18,6 +19,7 @@ pub(crate) struct Workers {
 pub(crate) struct WorkerScratch {
     pub(crate) contacts: Contacts,
     pub(crate) block: Box<ProjectionBlock>,
+    pub(crate) bends: Box<BendBlock>,
 }
 
 impl Workers {

@@ -138,8 +138,14 @@ fn bends_and_compliant_or_torn_constraints_form_no_path() {
 
 #[test]
 fn a_tethered_state_continues_bit_for_bit_from_a_keyframe() {
-    let scene = format!("version = 1\n{}", rope(30, true));
-    let scene = sim_solver::Scene::from_toml(&scene, "test").unwrap();
+    for tethers in ["true", "2"] {
+        let text = rope(30, true).replace("tethers = true", &format!("tethers = {tethers}"));
+        assert_continues(&format!("version = 1\n{text}"));
+    }
+}
+
+fn assert_continues(text: &str) {
+    let scene = sim_solver::Scene::from_toml(text, "test").unwrap();
     let mut solver = Solver::new(&scene);
     solver.cut(12).unwrap();
     step(&mut solver, 20);
@@ -155,4 +161,52 @@ fn a_tethered_state_continues_bit_for_bit_from_a_keyframe() {
         step(&mut again, 1);
         assert_eq!(solver.state_hash(), again.state_hash());
     }
+}
+
+/// The path to the first root is cut. Half of the rope has a tether to the other end only if particles keep the
+/// paths to two roots.
+#[test]
+fn a_rope_between_two_roots_keeps_its_length_after_a_cut_at_one_of_them() {
+    let length = |tethers: u32| {
+        let text = format!(
+            "[solver]\nrate_hz = 60\nsubsteps = 4\ndamping = 1\ntethers = {tethers}\n[[generate]]\n\
+             shape = \"rope\"\ncount = 101\nfrom = [0, 0, 0]\nto = [5, 0, 0]\npinned = [0, 100]\n"
+        );
+        let mut solver = solver(&text);
+        solver.cut(0).unwrap();
+        let mut longest: f64 = 0.0;
+        for _ in 0..600 {
+            step(&mut solver, 1);
+            longest = longest.max(distance(&solver, 100, 1));
+        }
+        longest
+    };
+    assert_at_most("length", 4.95 * 1.001, length(2));
+    assert!(length(1) > 4.95 * 1.02, "half of the rope stretches");
+}
+
+/// The whole weight hangs on two particles, and most particles pull at both.
+#[test]
+fn a_sheet_held_by_two_corners_stretches_little_with_tethers_to_both() {
+    let stretch = |tethers: u32| {
+        let text = format!(
+            "[solver]\nrate_hz = 60\nsubsteps = 14\ntethers = {tethers}\n[[generate]]\nshape = \"cloth\"\n\
+             columns = 50\nrows = 50\nspacing = 0.04\ndown = [0, 0, 1]\npinned = \"corners\"\n"
+        );
+        let mut sheet = solver(&text);
+        step(&mut sheet, 60);
+        let mut largest: f64 = 0.0;
+        for _ in 0..40 {
+            step(&mut sheet, 1);
+            for one in sheet.constraints() {
+                let length = distance(&sheet, one.a as usize, one.b as usize);
+                largest = largest.max(length / f64::from(one.rest_length) - 1.0);
+            }
+        }
+        largest
+    };
+    assert!(stretch(1) > 0.2, "half of the sheet pulls at the other root");
+    assert_at_most("stretch", 0.06, stretch(2));
+    // There are no more than two roots.
+    assert_near("with room for four", stretch(2), stretch(4), 0.0);
 }

@@ -9,9 +9,9 @@ use crate::options::Options;
 use crate::report::{self, Report};
 use crate::scenes::sheet::{Sheet, Start};
 
-/// Side and start of the sheet, and the time budget of a frame in ms.
-const BUDGETS: [(u32, Start, f64); 3] =
-    [(100, Start::Swing, 2.0), (100, Start::Corners, 2.0), (316, Start::Swing, 8.0)];
+/// Side, start and tethers of the sheet, and the time budget of a frame in ms.
+const BUDGETS: [(u32, Start, u32, f64); 3] =
+    [(100, Start::Swing, 1, 2.0), (100, Start::Corners, 2, 2.0), (316, Start::Swing, 1, 8.0)];
 /// Range in which the largest number of substeps within the budget is searched.
 const SUBSTEPS_MIN: u32 = 8;
 const SUBSTEPS_MAX: u32 = 64;
@@ -40,12 +40,12 @@ impl report::Row for Budget {
 }
 
 pub(crate) fn run(options: &Options, report: &mut Report) {
-    for (columns, start, budget_ms) in BUDGETS {
+    for (columns, start, tethers, budget_ms) in BUDGETS {
         let case = format!("quality-{columns}-{}", start.name());
         if !options.wants(&case) {
             continue;
         }
-        let sheet = Sheet { columns, substeps: SUBSTEPS_MIN, start, has_tethers: true };
+        let sheet = Sheet { columns, substeps: SUBSTEPS_MIN, start, tethers };
         let (sheet, ms_per_frame) = finest_within(budget_ms, &sheet, options);
         let row = quality::Row::measure(&case, &sheet, ms_per_frame, options);
         report.push(&Budget { budget_ms, row });

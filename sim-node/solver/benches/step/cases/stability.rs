@@ -57,7 +57,7 @@ pub(crate) fn run(options: &Options, report: &mut Report) -> bool {
     for (start, columns, substeps) in combinations() {
         let case = format!("stability-{}-{columns}-{substeps}", start.name());
         if options.wants_long(&case) {
-            let sheet = Sheet { columns, substeps, start, has_tethers: false };
+            let sheet = Sheet { columns, substeps, start, tethers: 0 };
             let result = watch(case, &sheet, options.stability_frames());
             are_stable &= result.is_stable();
             report.push(&result);

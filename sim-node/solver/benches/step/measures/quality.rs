@@ -37,7 +37,7 @@ pub(crate) struct Quality {
 pub(crate) struct Row {
     case: String,
     substeps: u32,
-    has_tethers: bool,
+    tethers: u32,
     ms_per_frame: f64,
     #[serde(flatten)]
     pub(crate) quality: Quality,
@@ -50,7 +50,7 @@ impl Row {
         Self {
             case: case.to_owned(),
             substeps: sheet.substeps,
-            has_tethers: sheet.has_tethers,
+            tethers: sheet.tethers,
             ms_per_frame,
             quality: Quality::measure(sheet, has_reference),
         }
@@ -77,7 +77,7 @@ impl report::Row for Row {
         let quality = &self.quality;
         vec![
             self.substeps.to_string(),
-            if self.has_tethers { "yes" } else { "no" }.to_owned(),
+            self.tethers.to_string(),
             format!("{:.2}", self.ms_per_frame),
             format!("{:.2}", quality.slowest_frame_ms),
             format!("{:.3}", quality.stretch_mean_percent),

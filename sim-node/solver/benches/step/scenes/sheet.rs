@@ -53,19 +53,20 @@ pub(crate) struct Sheet {
     pub(crate) columns: u32,
     pub(crate) substeps: u32,
     pub(crate) start: Start,
-    pub(crate) has_tethers: bool,
+    /// Roots of each particle.
+    pub(crate) tethers: u32,
 }
 
 impl Sheet {
     /// Creates a swinging sheet without tethers.
     pub(crate) fn swing(columns: u32, substeps: u32) -> Self {
-        Self { columns, substeps, start: Start::Swing, has_tethers: false }
+        Self { columns, substeps, start: Start::Swing, tethers: 0 }
     }
 
     pub(crate) fn scene(&self) -> Scene {
-        let Self { columns, substeps, start, has_tethers } = *self;
+        let Self { columns, substeps, start, tethers } = *self;
         let text = format!(
-            "version = 1\n[solver]\nrate_hz = {RATE_HZ}\nsubsteps = {substeps}\ntethers = {has_tethers}\n\
+            "version = 1\n[solver]\nrate_hz = {RATE_HZ}\nsubsteps = {substeps}\ntethers = {tethers}\n\
              [[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = -9\n\
              [[generate]]\nshape = \"cloth\"\ncolumns = {columns}\nrows = {columns}\n\
              spacing = {}\ndown = {:?}\npinned = \"{}\"\n",

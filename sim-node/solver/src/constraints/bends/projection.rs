@@ -29,6 +29,39 @@ pub(crate) fn bend_value<L: Lanes, const N: usize>(arms: &[Arm<L>; N]) -> [L; 3]
     })
 }
 
+/// Shape in which a hinge is at rest.
+#[derive(Clone, Copy)]
+pub(crate) struct HingeRest<L> {
+    /// C along the normal.
+    pub(crate) rest: L,
+    /// Area of the first triangle / area of the second.
+    pub(crate) area_ratio: L,
+}
+
+/// C - rest n / |n|, where n is the sum of the unit normals of the triangles.
+///
+/// The gradient of n is left out: it is across n, and so across C, as long as the triangles keep their shape.
+#[inline(always)]
+pub(crate) fn subtract_rest<L: Lanes>(
+    value: [L; 3],
+    arms: &[Arm<L>; 3],
+    hinge: HingeRest<L>,
+) -> [L; 3] {
+    let side = |arm: &Arm<L>| axes(|axis| arm.start[axis] + arm.change[axis]);
+    let [corner, edge, other] = [side(&arms[0]), side(&arms[1]), side(&arms[2])];
+    let (first, second) = (cross(edge, corner), cross(other, edge));
+    let normal = axes(|axis| first[axis] + hinge.area_ratio * second[axis]);
+    let square = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+    // Triangles that lie on each other have no normal.
+    let scale = (hinge.rest / square.sqrt()).masked(L::splat(0.0).is_below(square));
+    axes(|axis| value[axis] - scale * normal[axis])
+}
+
+#[inline(always)]
+fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// The sum of w c^2 over the particles.
 #[inline(always)]
 pub(crate) fn bend_weight<L: Lanes, const N: usize>(

@@ -1,8 +1,9 @@
-//! Bending rigidity of sheets, and explicit bends.
+//! Bending rigidity of sheets and meshes, and explicit bends.
 
 use serde::Serialize;
 
 use super::decimal;
+use crate::constraints::bends::RestShape;
 
 /// Bending of a sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -31,6 +32,16 @@ impl Rigidity {
             Self::Threads(threads) => threads,
         }
     }
+}
+
+/// Bending of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MeshBending {
+    /// Bending rigidity B in N m, >= 0.
+    #[serde(with = "decimal::number")]
+    pub bending: f32,
+    /// Shape in which the hinges are at rest.
+    pub rest: RestShape,
 }
 
 /// An explicit bend.

@@ -1,6 +1,6 @@
 //! Settings of the solver, and other choices that hold for a whole scene.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::decimal;
 use super::limits::Limits;
@@ -10,6 +10,8 @@ use sim_types::{Method, ParameterValues};
 pub const RATE_HZ_MAX: u32 = 100_000;
 /// Largest [`SolverSettings::substeps`] and [`SolverSettings::iterations`].
 pub const PASSES_MAX: u32 = 1000;
+/// Largest [`SolverSettings::tethers`].
+pub const TETHERS_MAX: u32 = 4;
 
 /// Axis that points up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -85,9 +87,10 @@ pub struct SolverSettings {
     /// successive over-relaxation, which pays only with hundreds of iterations.
     #[serde(with = "decimal::number")]
     pub relaxation: f32,
-    /// Keeps free particles within the length of the shortest rigid path to a fixed one; default
-    /// false.
-    pub tethers: bool,
+    /// Keeps free particles within the lengths of the shortest rigid paths to their nearest fixed ones:
+    /// the number of these, 0..=4; default 0.
+    #[serde(serialize_with = "serialize_tethers")]
+    pub tethers: u32,
     /// Largest speed of a particle in unit/s, > 0; default 10000.
     #[serde(with = "decimal::number")]
     pub max_speed: f32,
@@ -108,7 +111,7 @@ impl Default for SolverSettings {
             order: ConstraintOrder::Grouped,
             damping,
             relaxation,
-            tethers: false,
+            tethers: 0,
             max_speed,
             limits: Limits::default(),
         }
@@ -119,6 +122,20 @@ impl SolverSettings {
     /// Returns the length of a substep in seconds: 1 / (`rate_hz` `substeps`), rounded once.
     pub fn h(&self) -> f32 {
         substep_length(self.rate_hz, self.substeps)
+    }
+
+    /// Returns `true` if free particles have tethers.
+    pub fn has_tethers(&self) -> bool {
+        self.tethers > 0
+    }
+}
+
+/// Writes 0 and 1 as the words that also mean them.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
+fn serialize_tethers<S: Serializer>(count: &u32, serializer: S) -> Result<S::Ok, S::Error> {
+    match count {
+        0 | 1 => serializer.serialize_bool(*count == 1),
+        _ => serializer.serialize_u32(*count),
     }
 }
 

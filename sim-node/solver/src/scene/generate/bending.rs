@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::builder::{ConstraintBuilder, round};
 use super::cloth::Cloth;
-use crate::constraints::bends::Bend;
 use crate::constraints::bends::families::BendFamily;
+use crate::constraints::bends::{Bend, BendShape};
 
 /// Bends of one family: those that begin in the first rows and columns.
 struct BendRange {
@@ -83,6 +83,10 @@ impl Cloth {
             BendFamily::Down => of_warp / width_share(column, self.columns),
             BendFamily::Twist => across * down / 2.0,
         };
+        let shape = match family {
+            BendFamily::Across | BendFamily::Down => BendShape::Line,
+            BendFamily::Twist => BendShape::Cell,
+        };
         let [warp, weft] = self.bending.map_or([0.0; 2], |bending| bending.bending.threads());
         let rigidity = match family {
             BendFamily::Across => weft,
@@ -96,6 +100,7 @@ impl Cloth {
             coefficients: family.coefficients(),
             geometry: round(geometry),
             rigidity,
+            shape,
         };
         builder.model.push_bend(bend, Some(family.group(row, column)));
     }

@@ -5,6 +5,7 @@ use sim_types::ConstraintKind;
 
 use super::pinned::Pinned;
 use crate::constraints::Constraint;
+use crate::constraints::bends::Bend;
 use crate::constraints::families::Sheet;
 use crate::scene::definition::element::SceneParticle;
 use crate::scene::definition::settings::Up;
@@ -72,6 +73,12 @@ impl ConstraintBuilder<'_> {
     /// Declares the shape a sheet. All of its links must be family links.
     pub(super) fn sheet(&mut self, columns: u32, rows: u32) {
         self.model.sheets.push(Sheet { first: self.first, columns, rows });
+    }
+
+    /// Appends a bend.
+    pub(super) fn bend(&mut self, bend: Bend) {
+        let particles = bend.particles.map(|index| self.first + index);
+        self.model.push_bend(Bend { particles, ..bend }, None);
     }
 
     /// Appends a triangle of the surface.

@@ -6,12 +6,15 @@ use serde::Serialize;
 use sim_types::ConstraintKind;
 
 use super::builder::{ConstraintBuilder, ParticleBuilder, round};
+use super::hinges::Hinges;
+use crate::scene::definition::bending::MeshBending;
 use crate::scene::definition::decimal;
 use crate::scene::mesh::{Mesh, area, edges, fan};
 
 /// A mesh of polygons. Vertices become particles, and edges become structural constraints. The
 /// diagonals of quads, and those of larger faces from their first corner, become shear
-/// constraints. Across each edge of exactly two faces, bends join the neighbouring corners.
+/// constraints. Across each edge of exactly two faces, bends join the neighbouring corners; with a bending
+/// rigidity, hinges take their place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Obj {
     /// Positions of the particles.
@@ -22,12 +25,15 @@ pub struct Obj {
     /// Mass per area in kg/unit^2. Without it, each particle has the generator's mass.
     #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
     pub density: Option<f32>,
+    /// Bending rigidity, if it has any.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub bending: Option<MeshBending>,
 }
 
 impl Obj {
     /// Creates the shape of a mesh.
-    pub fn new(mesh: Mesh, density: Option<f32>) -> Self {
-        Self { vertices: mesh.vertices, faces: mesh.faces, density }
+    pub fn new(mesh: Mesh, density: Option<f32>, bending: Option<MeshBending>) -> Self {
+        Self { vertices: mesh.vertices, faces: mesh.faces, density, bending }
     }
 
     pub(super) fn particle_count(&self) -> u64 {
@@ -52,15 +58,34 @@ impl Obj {
 
     pub(super) fn build_constraints(&self, builder: &mut ConstraintBuilder<'_>) {
         self.for_each_link(|pair, kind| builder.link(pair, kind));
-        for triangle in self.faces.iter().flat_map(|face| fan(face)) {
+        for triangle in self.triangles() {
             builder.triangle(triangle);
         }
+    }
+
+    pub(super) fn bend_count(&self) -> u64 {
+        if self.bending.is_some() { self.hinges().count() } else { 0 }
+    }
+
+    pub(super) fn build_bends(&self, builder: &mut ConstraintBuilder<'_>) {
+        if let Some(bending) = self.bending {
+            self.hinges().build(bending, builder);
+        }
+    }
+
+    /// Returns the hinges between the triangles of the mesh.
+    pub(crate) fn hinges(&self) -> Hinges {
+        Hinges::new(&self.vertices, self.triangles())
+    }
+
+    fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.faces.iter().flat_map(|face| fan(face))
     }
 
     /// Returns the masses of the particles. Each triangle gives a third of its mass to each corner.
     fn masses(&self, density: f64) -> Vec<f32> {
         let mut masses = vec![0.0; self.vertices.len()];
-        for triangle in self.faces.iter().flat_map(|face| fan(face)) {
+        for triangle in self.triangles() {
             let corners = triangle.map(|corner| self.vertices[corner as usize].map(f64::from));
             for corner in triangle {
                 masses[corner as usize] += density * area(corners) / 3.0;
@@ -73,8 +98,8 @@ impl Obj {
             .collect()
     }
 
-    /// Visits edges face by face, then diagonals, then bends. A pair occurs once, with the kind that
-    /// comes first.
+    /// Visits edges face by face, then diagonals, then bends, unless hinges take their place. A pair occurs
+    /// once, with the kind that comes first.
     fn for_each_link(&self, mut visit: impl FnMut([u32; 2], ConstraintKind)) {
         let mut seen = BTreeSet::new();
         let mut push = |[a, b]: [u32; 2], kind| {
@@ -94,6 +119,9 @@ impl Obj {
             if let [_, second, _, fourth] = face.as_slice() {
                 push([*second, *fourth], ConstraintKind::Shear);
             }
+        }
+        if self.bending.is_some() {
+            return;
         }
         let sides = self.sides();
         for sides_of_edge in sides.chunk_by(|one, next| one.edge == next.edge) {
@@ -150,7 +178,7 @@ mod tests {
         let corners: Vec<u32> = (0..count).collect();
         let backwards: Vec<u32> = corners.iter().rev().copied().collect();
         let vertices = vec![[0.0; 3]; corners.len()];
-        let obj = Obj { vertices, faces: vec![corners, backwards], density: None };
+        let obj = Obj { vertices, faces: vec![corners, backwards], density: None, bending: None };
         // n edges, n - 3 diagonals from the first corner of each face, of which the one between the two
         // first corners is an edge; no bends, because both faces have the same neighbours.
         let diagonals = 2 * (u64::from(count) - 3);

@@ -7,7 +7,7 @@ use sim_types::ConstraintKind;
 use super::builder::{ConstraintBuilder, ParticleBuilder, interpolate, round};
 use super::pinned::is_pinned_end;
 use crate::constraints::bends::families::BendFamily;
-use crate::constraints::bends::{Bend, SECOND_DIFFERENCE};
+use crate::constraints::bends::{Bend, BendShape, SECOND_DIFFERENCE};
 use crate::constraints::families::Family;
 use crate::scene::definition::decimal;
 
@@ -51,6 +51,7 @@ impl Rope {
             builder.family_link([index, index + 1], ConstraintKind::Structural, family);
         }
     }
+
     /// Returns the distance of neighbours.
     pub(crate) fn spacing(&self) -> f64 {
         let [from, to] = [self.from, self.to].map(|end| Vec3::from_array(end).as_dvec3());
@@ -71,6 +72,7 @@ impl Rope {
                 coefficients: SECOND_DIFFERENCE,
                 geometry,
                 rigidity,
+                shape: BendShape::Line,
             };
             let family = BendFamily::Across.group(0, (index - builder.first) as usize);
             builder.model.push_bend(bend, Some(family));

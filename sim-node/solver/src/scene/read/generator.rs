@@ -55,7 +55,11 @@ static SHAPES: [ShapeKeys; 7] = [
         pins: &["both", "first", "last", "none"],
     },
     ShapeKeys { name: "ragdoll", keys: &["origin", "height"], pins: &ragdoll::PIN_WORDS },
-    ShapeKeys { name: "obj", keys: &["path", "density", "vertices", "faces"], pins: &["none"] },
+    ShapeKeys {
+        name: "obj",
+        keys: &["path", "density", "vertices", "faces", "bending", "rest"],
+        pins: &["none"],
+    },
 ];
 
 impl Reader<'_> {

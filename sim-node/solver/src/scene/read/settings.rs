@@ -7,9 +7,9 @@ use sim_types::{Method, Parameter};
 
 use super::limits::FileLimits;
 use super::reader::Reader;
-use super::value::{Number, TableKeys, Whole, Word};
+use super::value::{Number, Spanned, TableKeys, Whole, Word};
 use crate::scene::definition::settings::{
-    ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings,
+    ConstraintOrder, PASSES_MAX, RATE_HZ_MAX, SolverSettings, TETHERS_MAX,
 };
 use crate::scene::error::SceneError;
 
@@ -23,8 +23,7 @@ pub(super) struct FileSolver {
     order: Option<Word>,
     damping: Option<Number>,
     relaxation: Option<Number>,
-    #[serde(default)]
-    tethers: bool,
+    tethers: Option<Spanned<FileTethers>>,
     max_speed: Option<Number>,
     max_stretch: Option<Number>,
     tear_stretch: Option<Number>,
@@ -33,6 +32,17 @@ pub(super) struct FileSolver {
 }
 
 impl TableKeys for FileSolver {}
+
+/// The tethers of each particle: whether it has one, or their number.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "is neither true, false nor a whole number (allowed: true, false, 0 to 4)"
+)]
+enum FileTethers {
+    Word(bool),
+    Count(i64),
+}
 
 impl FileSolver {
     /// Place of the counts of passes, for an error about the work of a step; the start of the text if
@@ -49,6 +59,16 @@ impl Reader<'_> {
         let names = Method::ALL.map(|method| (method.name(), method));
         let method = file.method.as_ref().map(|word| self.word("solver.method", word, &names));
         Ok(method.transpose()?.unwrap_or_default())
+    }
+
+    fn tethers(&self, file: Option<&Spanned<FileTethers>>) -> Result<u32, SceneError> {
+        let Some(tethers) = file else { return Ok(0) };
+        match tethers.get_ref() {
+            FileTethers::Word(has_tether) => Ok(u32::from(*has_tether)),
+            FileTethers::Count(count) => {
+                self.whole("solver.tethers", &tethers.with(*count), 0..=TETHERS_MAX)
+            }
+        }
     }
 
     /// Checks the table `[solver]`.
@@ -88,7 +108,7 @@ impl Reader<'_> {
                 Parameter::Relaxation,
                 default.relaxation,
             )?,
-            tethers: file.tethers,
+            tethers: self.tethers(file.tethers.as_ref())?,
             max_speed: number(file.max_speed.as_ref(), Parameter::MaxSpeed, default.max_speed)?,
             limits: self.limits(|key| format!("solver.{key}"), &limits)?,
         })

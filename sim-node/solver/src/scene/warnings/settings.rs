@@ -13,8 +13,8 @@ pub(super) fn listed_order(scene: &Scene) -> Option<String> {
 pub(super) fn no_tether_root(scene: &Scene, model: &Model) -> Option<String> {
     let has_root = scene.anchors.iter().any(|anchor| !anchor.particles.is_empty())
         || model.particles.iter().any(|particle| particle.pinned);
-    (scene.solver.tethers && !has_root)
-        .then(|| "tethers = true has no effect: no particle is pinned or anchored".to_owned())
+    (scene.solver.has_tethers() && !has_root)
+        .then(|| "tethers have no effect: no particle is pinned or anchored".to_owned())
 }
 
 pub(super) fn upside_down(scene: &Scene) -> Option<String> {

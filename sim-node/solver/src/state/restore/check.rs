@@ -102,7 +102,7 @@ impl Solver {
         let TetherBasis { roots, torn } = &keyframe.tethers;
         let is_torn = |index: &u32| all_torn.binary_search(index).is_ok();
         let has_tethers = !roots.is_empty() || !torn.is_empty();
-        if (has_tethers && !self.settings.tethers)
+        if (has_tethers && !self.settings.has_tethers())
             || !is_ascending_below(roots, particles)
             || !is_ascending_below(torn, constraints)
             || !torn.iter().all(is_torn)

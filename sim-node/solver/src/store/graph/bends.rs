@@ -2,8 +2,9 @@
 
 use super::group::{ConstraintGroup, part_count};
 use super::indices::find_particle;
+use crate::constraints::bends::BendShape;
 use crate::constraints::bends::projection::{
-    Arm, BendPass, BendProjection, bend_value, bend_weight,
+    Arm, BendPass, BendProjection, HingeRest, bend_value, bend_weight, subtract_rest,
 };
 use crate::constraints::order::ProjectionOrder;
 use crate::constraints::projection::LaneIndex;
@@ -28,6 +29,8 @@ pub(crate) struct GraphBends {
     inverse_masses: Vec<[Lanes8; 4]>,
     /// Infinite for a bend without effect, and for padding.
     scaled_compliances: Vec<Lanes8>,
+    /// Rest value and ratio of areas of hinges. Empty if C is 0 for all bends at rest.
+    rests: Vec<[Lanes8; 2]>,
     /// Empty if every substep has a single pass.
     multipliers: [Vec<Lanes8>; 3],
 }
@@ -63,6 +66,9 @@ impl GraphBends {
         let count = bends.particles.len();
         refill(&mut bends.inverse_masses, count, [[0.0; 8]; 4]);
         refill(&mut bends.scaled_compliances, count, [f32::INFINITY; 8]);
+        if bends.rests.iter().all(|[values, _]| *values == [0.0; 8]) {
+            bends.rests = Vec::new();
+        }
         bends
     }
 
@@ -70,6 +76,7 @@ impl GraphBends {
         #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
         let padding = indices.len() as u32;
         let (mut particles, mut coefficients) = ([[padding; 8]; 4], [[0.0; 8]; 4]);
+        let mut rests = [[0.0; 8]; 2];
         for (lane, bend) in bends.iter().enumerate() {
             locations[*bend as usize] = Location::in_graph(8 * self.particles.len() + lane);
             let bend = &model.bends[*bend as usize];
@@ -81,8 +88,12 @@ impl GraphBends {
                 particles[place][lane] = particle;
                 coefficients[place][lane] = bend.coefficients[place];
             }
+            if let BendShape::Hinge { rest, area_ratio } = bend.shape {
+                (rests[0][lane], rests[1][lane]) = (rest, area_ratio);
+            }
         }
         self.particles.push(particles);
+        self.rests.push(rests);
         self.coefficients.push(coefficients);
     }
 
@@ -132,6 +143,7 @@ impl GraphBends {
             particles: &self.particles[range.clone()],
             coefficients: &self.coefficients[range.clone()],
             inverse_masses: &self.inverse_masses[range.clone()],
+            rests: self.rests.get(range.clone()),
             projection: BendProjection {
                 scaled_compliances: &self.scaled_compliances[range],
                 multipliers,
@@ -155,6 +167,7 @@ struct BendRun<'a> {
     particles: &'a [[[u32; 8]; 4]],
     coefficients: &'a [[Lanes8; 4]],
     inverse_masses: &'a [[Lanes8; 4]],
+    rests: Option<&'a [[Lanes8; 2]]>,
     projection: BendProjection<'a>,
 }
 
@@ -174,7 +187,12 @@ impl BendRun<'_> {
                     change: axes(|axis| to[4 + axis] - from[4 + axis]),
                 }
             };
-            let value = bend_value(&[arm(0), arm(2), arm(3)]);
+            let arms = [arm(0), arm(2), arm(3)];
+            let mut value = bend_value(&arms);
+            if let Some(rests) = self.rests {
+                let [rest, area_ratio] = rests[index.group].map(|lanes| lanes[index.lane]);
+                value = subtract_rest(value, &arms, HingeRest { rest, area_ratio });
+            }
             let weight = bend_weight(&coefficients, &inverse_masses);
             let change = self.projection.change(index, value, weight);
             for end in 0..4 {
@@ -218,14 +236,16 @@ impl BendRun<'_> {
         let (particles, other_particles) = self.particles.split_at(count);
         let (coefficients, other_coefficients) = self.coefficients.split_at(count);
         let (inverse_masses, other_inverse_masses) = self.inverse_masses.split_at(count);
+        let (rests, other_rests) = self.rests.map(|rests| rests.split_at(count)).unzip();
         let (projection, other_projection) = self.projection.split(count);
         let other = Self {
             particles: other_particles,
             coefficients: other_coefficients,
             inverse_masses: other_inverse_masses,
+            rests: other_rests,
             projection: other_projection,
         };
-        (Self { particles, coefficients, inverse_masses, projection }, other)
+        (Self { particles, coefficients, inverse_masses, rests, projection }, other)
     }
 }
 
@@ -241,7 +261,8 @@ impl LaneWork for BendWork<'_, '_> {
     #[allow(unsafe_code, reason = "bounds checks would cost a third of the time")]
     fn run<W: Wide>(self) {
         let Self { run, particles } = self;
-        let BendRun { particles: indices, coefficients, inverse_masses, mut projection } = run;
+        let BendRun { particles: indices, coefficients, inverse_masses, rests, mut projection } =
+            run;
         let particles = particles.cells();
         for (group, indices) in indices.iter().enumerate() {
             let load = |numbers: &[Lanes8; 4]| {
@@ -255,7 +276,13 @@ impl LaneWork for BendWork<'_, '_> {
                     unsafe { W::differences(particles, &indices[1], &indices[end]) };
                 Arm { coefficient: coefficients[end], start, change }
             };
-            let value = bend_value(&[arm(0), arm(2), arm(3)]);
+            let arms = [arm(0), arm(2), arm(3)];
+            let mut value = bend_value(&arms);
+            if let Some(rests) = rests {
+                let [rest, area_ratio] = &rests[group];
+                let rest = HingeRest { rest: W::load(rest, 0), area_ratio: W::load(area_ratio, 0) };
+                value = subtract_rest(value, &arms, rest);
+            }
             let weight = bend_weight(&coefficients, &inverse_masses);
             let index = LaneIndex { group, lane: 0 };
             let change = projection.change(index, value, weight);

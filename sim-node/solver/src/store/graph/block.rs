@@ -37,6 +37,8 @@ pub(crate) struct GraphBlock<'a> {
     pub(crate) predicted: &'a mut [[f32; 3]],
     pub(crate) gains: &'a [[f32; 3]],
     pub(crate) tethers: &'a [PackedTether],
+    /// Tethers of each particle.
+    pub(crate) tether_count: usize,
 }
 
 impl<'a> GraphBlock<'a> {
@@ -53,12 +55,13 @@ impl<'a> GraphBlock<'a> {
 
     /// Splits after `count` particles, or at the end if there are fewer.
     fn split_at(self, count: usize) -> (GraphBlock<'a>, GraphBlock<'a>) {
-        let Self { first, particles, predicted, gains, tethers } = self;
+        let Self { first, particles, predicted, gains, tethers, tether_count } = self;
         let end = |length: usize| count.min(length);
         let (first_particles, particles) = particles.split_at_mut(end(particles.len()));
         let (first_predicted, predicted) = predicted.split_at_mut(end(predicted.len()));
         let (first_gains, gains) = gains.split_at(end(gains.len()));
-        let (first_tethers, tethers) = tethers.split_at(end(tethers.len()));
+        let tethers_end = tethers.len().min(tether_count * count);
+        let (first_tethers, tethers) = tethers.split_at(tethers_end);
         let second = first + first_particles.len();
         let first = GraphBlock {
             first,
@@ -66,8 +69,9 @@ impl<'a> GraphBlock<'a> {
             predicted: first_predicted,
             gains: first_gains,
             tethers: first_tethers,
+            tether_count,
         };
-        (first, GraphBlock { first: second, particles, predicted, gains, tethers })
+        (first, GraphBlock { first: second, particles, predicted, gains, tethers, tether_count })
     }
 }
 
@@ -159,8 +163,9 @@ impl ParticleBlock for GraphBlock<'_> {
 
     #[inline(always)]
     fn pull_to_roots<W: Wide>(&mut self) {
-        for (particle, tether) in self.particles.iter_mut().zip(self.tethers) {
-            if tether.length < f32::INFINITY {
+        let of_particles = self.tethers.chunks_exact(self.tether_count);
+        for (particle, tethers) in self.particles.iter_mut().zip(of_particles) {
+            for tether in tethers.iter().filter(|tether| tether.length < f32::INFINITY) {
                 pull_to_root(particle, tether);
             }
         }
@@ -188,7 +193,7 @@ fn pull_to_root(particle: &mut PackedParticle, tether: &PackedTether) {
         limit: RestLength::new(tether.length),
         inverse_mass: w,
     });
-    for (number, excess) in particle.0[4..7].iter_mut().zip(excess) {
+    for (number, excess) in particle.0[4..7].iter_mut().zip(excess.unwrap_or([0.0; 3])) {
         *number -= excess;
     }
 }

@@ -125,7 +125,7 @@ impl Band<'_> {
         if group.begins_in(row) {
             let rows = &mut self.numbers[(row - self.first) * self.layout.row_length..];
             let pass = BendPass::new(sweep.pass, sweep.inputs.relaxation);
-            project_bends::<W>(rows, self.layout, group, pass);
+            project_bends::<W>(rows, self.layout, group, pass, &mut sweep.scratch.bends);
         }
     }
 

@@ -3,6 +3,7 @@
 use super::bend_layout::BendGroup;
 use super::ends::{ColumnUnit, Ends, pairs, pairs_mut, unzip, zip};
 use super::row_layout::{RowLayout, STATE_FIELDS};
+use crate::constraints::bends::block::{BEND_BLOCK_LENGTH, BendBlock};
 use crate::constraints::bends::families::BendFamily;
 use crate::constraints::bends::projection::{
     Arm, BendPass, BendProjection, bend_value, bend_weight,
@@ -18,6 +19,7 @@ pub(crate) fn project_bends<W: Wide>(
     layout: &RowLayout,
     group: BendGroup,
     pass: BendPass,
+    block: &mut BendBlock,
 ) {
     let RowLayout { stride, row_length, columns, ref bends, .. } = *layout;
     let (row, below) = rows.split_at_mut(row_length);
@@ -40,11 +42,11 @@ pub(crate) fn project_bends<W: Wide>(
             bend_down::<W>([ends(state), ends(second), ends(third)], &mut projection);
         }
         BendFamily::Across => {
-            bend_across::<W>(Ends::new(state, stride, from, 3 * count), &mut projection);
+            bend_across::<W>(Ends::new(state, stride, from, 3 * count), &mut projection, block);
         }
         BendFamily::Twist => {
             let ends = |row| Ends::new(row, stride, from, 2 * count);
-            bend_cells::<W>(ends(state), ends(below), &mut projection);
+            bend_cells::<W>([ends(state), ends(below)], &mut projection, block);
         }
     }
 }
@@ -64,7 +66,8 @@ fn multiplier_columns(
     Some([x, y, z])
 }
 
-/// Projects bends of three rows.
+/// Projects bends of three rows. Without columns to separate, the chain of a group is so short that blocks of
+/// them would only cost time.
 #[inline(always)]
 fn bend_down<W: Wide>([a, b, c]: [Ends<'_>; 3], projection: &mut BendProjection<'_>) {
     let count = projection.scaled_compliances.len();
@@ -93,32 +96,43 @@ fn bend_down<W: Wide>([a, b, c]: [Ends<'_>; 3], projection: &mut BendProjection<
 
 /// Projects bends within a row, 24 columns at a time.
 #[inline(always)]
-fn bend_across<W: Wide>(row: Ends<'_>, projection: &mut BendProjection<'_>) {
+fn bend_across<W: Wide>(row: Ends<'_>, projection: &mut BendProjection<'_>, block: &mut BendBlock) {
     let count = projection.scaled_compliances.len();
     let x = map_axes(row.x, |x| triples(x, count));
     let w = triples(row.w, count);
     let d = map_axes(row.d, |d| triples_mut(d, count));
     let [c_a, c_b, c_c, _] = SECOND_DIFFERENCE.map(W::splat);
-    for group in 0..count {
-        let (mut starts, mut changes) = ([[W::splat(0.0); 3]; 2], [[W::splat(0.0); 3]; 2]);
-        for axis in 0..3 {
-            let [x_a, x_b, x_c]: [W; 3] = unzip_thirds(&x[axis][group]);
-            let [d_a, d_b, d_c]: [W; 3] = unzip_thirds(&d[axis][group]);
-            (starts[0][axis], starts[1][axis]) = (x_a - x_b, x_c - x_b);
-            (changes[0][axis], changes[1][axis]) = (d_a - d_b, d_c - d_b);
+    let coefficients = W::zip_thirds([c_a, c_b, c_c]);
+    for first in (0..count).step_by(BEND_BLOCK_LENGTH) {
+        let length = BEND_BLOCK_LENGTH.min(count - first);
+        for group in 0..length {
+            let at = first + group;
+            let (mut starts, mut changes) = ([[W::splat(0.0); 3]; 2], [[W::splat(0.0); 3]; 2]);
+            for axis in 0..3 {
+                let [x_a, x_b, x_c]: [W; 3] = unzip_thirds(&x[axis][at]);
+                let [d_a, d_b, d_c]: [W; 3] = unzip_thirds(&d[axis][at]);
+                (starts[0][axis], starts[1][axis]) = (x_a - x_b, x_c - x_b);
+                (changes[0][axis], changes[1][axis]) = (d_a - d_b, d_c - d_b);
+            }
+            let value = bend_value(&[
+                Arm { coefficient: c_a, start: starts[0], change: changes[0] },
+                Arm { coefficient: c_c, start: starts[1], change: changes[1] },
+            ]);
+            let weight = bend_weight(&[c_a, c_b, c_c], &unzip_thirds(&w[at]));
+            block.set(group, value, weight);
         }
-        let value = bend_value(&[
-            Arm { coefficient: c_a, start: starts[0], change: changes[0] },
-            Arm { coefficient: c_c, start: starts[1], change: changes[1] },
-        ]);
-        let w: [W; 3] = unzip_thirds(&w[group]);
-        let weight = bend_weight(&[c_a, c_b, c_c], &w);
-        let change = projection.change(LaneIndex { group, lane: 0 }, value, weight);
-        let shares = [c_a * w[0], c_b * w[1], c_c * w[2]];
-        for (axis, along) in change.into_iter().enumerate() {
-            let amounts = W::zip_thirds([shares[0] * along, shares[1] * along, shares[2] * along]);
-            for (d, amount) in d[axis][group].iter_mut().zip(amounts) {
-                (W::load(d, 0) + amount).store(d, 0);
+        block.solve::<W>(projection, first, length);
+        for group in 0..length {
+            let at = first + group;
+            let change = block.vector::<W>(group);
+            let shares = axes(|part| coefficients[part] * W::load(&w[at][part], 0));
+            for (axis, along) in change.into_iter().enumerate() {
+                // Each column of a bend gets its change.
+                let along = W::zip_thirds([along; 3]);
+                for part in 0..3 {
+                    let d = &mut d[axis][at][part];
+                    (W::load(d, 0) + shares[part] * along[part]).store(d, 0);
+                }
             }
         }
     }
@@ -126,7 +140,11 @@ fn bend_across<W: Wide>(row: Ends<'_>, projection: &mut BendProjection<'_>) {
 
 /// Projects twists between two rows, 16 columns at a time.
 #[inline(always)]
-fn bend_cells<W: Wide>(upper: Ends<'_>, lower: Ends<'_>, projection: &mut BendProjection<'_>) {
+fn bend_cells<W: Wide>(
+    [upper, lower]: [Ends<'_>; 2],
+    projection: &mut BendProjection<'_>,
+    block: &mut BendBlock,
+) {
     let count = projection.scaled_compliances.len();
     let (x_upper, x_lower) =
         (map_axes(upper.x, |x| pairs(x, count)), map_axes(lower.x, |x| pairs(x, count)));
@@ -135,34 +153,46 @@ fn bend_cells<W: Wide>(upper: Ends<'_>, lower: Ends<'_>, projection: &mut BendPr
         (map_axes(upper.d, |d| pairs_mut(d, count)), map_axes(lower.d, |d| pairs_mut(d, count)));
     let separated = |pair: &[Lanes8; 2]| -> [W; 2] { unzip(pair, ColumnUnit::Single) };
     let coefficients = TWIST.map(W::splat);
-    for group in 0..count {
-        let (mut starts, mut changes) = ([[W::splat(0.0); 3]; 3], [[W::splat(0.0); 3]; 3]);
-        for axis in 0..3 {
-            let ([a, b], [c, d]) =
-                (separated(&x_upper[axis][group]), separated(&x_lower[axis][group]));
-            (starts[0][axis], starts[1][axis], starts[2][axis]) = (a - b, c - b, d - b);
-            let ([a, b], [c, d]) =
-                (separated(&d_upper[axis][group]), separated(&d_lower[axis][group]));
-            (changes[0][axis], changes[1][axis], changes[2][axis]) = (a - b, c - b, d - b);
+    let [c_a, c_b, c_c, c_d] = coefficients;
+    let above: [W; 2] = zip([c_a, c_b], ColumnUnit::Single);
+    let below: [W; 2] = zip([c_c, c_d], ColumnUnit::Single);
+    for first in (0..count).step_by(BEND_BLOCK_LENGTH) {
+        let length = BEND_BLOCK_LENGTH.min(count - first);
+        for group in 0..length {
+            let at = first + group;
+            let (mut starts, mut changes) = ([[W::splat(0.0); 3]; 3], [[W::splat(0.0); 3]; 3]);
+            for axis in 0..3 {
+                let ([a, b], [c, d]) =
+                    (separated(&x_upper[axis][at]), separated(&x_lower[axis][at]));
+                (starts[0][axis], starts[1][axis], starts[2][axis]) = (a - b, c - b, d - b);
+                let ([a, b], [c, d]) =
+                    (separated(&d_upper[axis][at]), separated(&d_lower[axis][at]));
+                (changes[0][axis], changes[1][axis], changes[2][axis]) = (a - b, c - b, d - b);
+            }
+            let arm = |index: usize, end: usize| Arm {
+                coefficient: coefficients[end],
+                start: starts[index],
+                change: changes[index],
+            };
+            let value = bend_value(&[arm(0, 0), arm(1, 2), arm(2, 3)]);
+            let ([w_a, w_b], [w_c, w_d]) = (separated(&w_upper[at]), separated(&w_lower[at]));
+            block.set(group, value, bend_weight(&coefficients, &[w_a, w_b, w_c, w_d]));
         }
-        let arm = |index: usize, end: usize| Arm {
-            coefficient: coefficients[end],
-            start: starts[index],
-            change: changes[index],
-        };
-        let value = bend_value(&[arm(0, 0), arm(1, 2), arm(2, 3)]);
-        let ([w_a, w_b], [w_c, w_d]) = (separated(&w_upper[group]), separated(&w_lower[group]));
-        let weight = bend_weight(&coefficients, &[w_a, w_b, w_c, w_d]);
-        let change = projection.change(LaneIndex { group, lane: 0 }, value, weight);
-        let [c_a, c_b, c_c, c_d] = coefficients;
-        let (upper, lower) = ([c_a * w_a, c_b * w_b], [c_c * w_c, c_d * w_d]);
-        for (axis, along) in change.into_iter().enumerate() {
-            for (d, shares) in
-                [(&mut d_upper[axis][group], upper), (&mut d_lower[axis][group], lower)]
-            {
-                let amounts = zip([shares[0] * along, shares[1] * along], ColumnUnit::Single);
-                for (d, amount) in d.iter_mut().zip(amounts) {
-                    (W::load(d, 0) + amount).store(d, 0);
+        block.solve::<W>(projection, first, length);
+        for group in 0..length {
+            let at = first + group;
+            let change = block.vector::<W>(group);
+            for (axis, along) in change.into_iter().enumerate() {
+                // Each column of a cell gets its change.
+                let along: [W; 2] = zip([along; 2], ColumnUnit::Single);
+                for part in 0..2 {
+                    let (upper, lower) =
+                        (&mut d_upper[axis][at][part], &mut d_lower[axis][at][part]);
+                    let (w_upper, w_lower) = (&w_upper[at][part], &w_lower[at][part]);
+                    let share = above[part] * W::load(w_upper, 0);
+                    (W::load(upper, 0) + share * along[part]).store(upper, 0);
+                    let share = below[part] * W::load(w_lower, 0);
+                    (W::load(lower, 0) + share * along[part]).store(lower, 0);
                 }
             }
         }

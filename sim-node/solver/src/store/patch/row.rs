@@ -8,6 +8,7 @@ use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::path::SubstepPath;
 use crate::contacts::zone::Zone;
 use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups_mut};
+use crate::scene::definition::settings::TETHERS_MAX;
 use crate::step::particle_block::ParticleBlock;
 use crate::step::prediction::Prediction;
 use crate::store::layout::SceneFields;
@@ -19,14 +20,21 @@ pub(crate) struct SheetRow<'a> {
     d: [&'a mut [Lanes8]; 3],
     predicted: Option<[&'a mut [Lanes8]; 3]>,
     wind: Option<[&'a [Lanes8]; 3]>,
-    /// Position of the root at the end of the substep.
-    root: Option<[&'a [Lanes8]; 3]>,
-    /// Largest distance to the root, and its square.
-    tether: Option<[&'a [Lanes8]; 2]>,
+    /// By tether of a particle.
+    tethers: [Option<RowTethers<'a>>; TETHERS_MAX as usize],
     /// Index of the first particle.
     first: usize,
     /// Number of particles. The rest of the last lane group is padding.
     count: usize,
+}
+
+/// A tether of each particle.
+struct RowTethers<'a> {
+    /// Position of the root at the end of the substep.
+    root: [&'a [Lanes8]; 3],
+    /// Largest distance to the root.
+    length: &'a [Lanes8],
+    square: &'a [Lanes8],
 }
 
 impl<'a> SheetRow<'a> {
@@ -45,10 +53,13 @@ impl<'a> SheetRow<'a> {
         let predicted = colliders.then(|| [next(), next(), next()]);
         let wind = wind.then(|| [&*next(), &*next(), &*next()]);
         let wind = wind.filter(|_| layout.fields.is_wind_used);
-        let root = tethers.then(|| [&*next(), &*next(), &*next()]);
-        let tether = tethers.then(|| [&*next(), &*next()]);
+        let mut of_row = [const { None }; TETHERS_MAX as usize];
+        for one in of_row.iter_mut().take(tethers) {
+            let root = [&*next(), &*next(), &*next()];
+            *one = Some(RowTethers { root, length: next(), square: next() });
+        }
         let first = layout.first + row * layout.columns;
-        Self { x, w, d, predicted, wind, root, tether, first, count: layout.columns }
+        Self { x, w, d, predicted, wind, tethers: of_row, first, count: layout.columns }
     }
 }
 
@@ -124,19 +135,21 @@ impl ParticleBlock for SheetRow<'_> {
 
     #[inline(always)]
     fn pull_to_roots<W: Wide>(&mut self) {
-        let (Some(root), Some([length, square])) = (&self.root, &self.tether) else { return };
-        for group in 0..self.w.len() {
-            let load = |field: &[Lanes8]| W::load(&field[group], 0);
-            let start = axes(|axis| load(self.x[axis]) - load(root[axis]));
-            let before = axes(|axis| load(self.d[axis]));
-            let excess = tether_excess(Tethered {
-                start,
-                displacement: before,
-                limit: RestLength { length: load(length), square: load(square) },
-                inverse_mass: load(self.w),
-            });
-            for axis in 0..3 {
-                (before[axis] - excess[axis]).store(&mut self.d[axis][group], 0);
+        for RowTethers { root, length, square } in self.tethers.iter().flatten() {
+            for group in 0..self.w.len() {
+                let load = |field: &[Lanes8]| W::load(&field[group], 0);
+                let start = axes(|axis| load(self.x[axis]) - load(root[axis]));
+                let before = axes(|axis| load(self.d[axis]));
+                let excess = tether_excess(Tethered {
+                    start,
+                    displacement: before,
+                    limit: RestLength { length: load(length), square: load(square) },
+                    inverse_mass: load(self.w),
+                });
+                let Some(excess) = excess else { continue };
+                for axis in 0..3 {
+                    (before[axis] - excess[axis]).store(&mut self.d[axis][group], 0);
+                }
             }
         }
     }

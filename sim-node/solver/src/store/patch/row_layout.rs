@@ -73,8 +73,8 @@ impl RowLayout {
     /// Sets the fields. The results are stored, because every row needs them.
     pub(crate) fn set_fields(&mut self, fields: Layout) {
         self.fields = fields;
-        let SceneFields { wind, tethers, bend_multipliers, .. } = fields.scene;
-        self.constraints_at = self.wind_at() + 3 * usize::from(wind) + 5 * usize::from(tethers);
+        let SceneFields { tethers, bend_multipliers, .. } = fields.scene;
+        self.constraints_at = self.root_at(tethers);
         self.family_length = fields.constraints.column_count() * self.stride;
         let constraints_end =
             self.constraints_at * self.stride + self.families.len() * self.family_length;
@@ -89,9 +89,9 @@ impl RowLayout {
         STATE_FIELDS + 3 * usize::from(self.fields.scene.colliders)
     }
 
-    /// Number of fields before the root of the tether.
-    pub(crate) fn root_at(&self) -> usize {
-        self.wind_at() + 3 * usize::from(self.fields.scene.wind)
+    /// Number of fields before the root of a tether. Each tether has five.
+    pub(crate) fn root_at(&self, slot: usize) -> usize {
+        self.wind_at() + 3 * usize::from(self.fields.scene.wind) + 5 * slot
     }
 
     /// Number of bands into which the sheet is divided, each high enough that its seams are a small

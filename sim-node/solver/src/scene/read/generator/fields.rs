@@ -7,7 +7,8 @@ use sim_types::{ELEMENTS_MAX, NumberRange, Parameter};
 use super::super::reader::{RIGIDITY, Reader, SIZE};
 use super::super::value::{Number, NumberOrPair, Vector, Whole};
 use super::file::{FileGenerator, FilePinned, FileSoftness};
-use crate::scene::definition::bending::{Rigidity, SheetBending};
+use crate::constraints::bends::RestShape;
+use crate::scene::definition::bending::{MeshBending, Rigidity, SheetBending};
 use crate::scene::definition::softness::{KindSoftness, Softness, SoftnessValues};
 use crate::scene::error::SceneError;
 use crate::scene::generate::pinned::Pinned;
@@ -123,6 +124,19 @@ impl GeneratorFields<'_, '_> {
         let is_equal = matches!(rigidity, Rigidity::Equal(_));
         let twist = self.file.twist.as_ref().map_or(is_equal, |twist| *twist.get_ref());
         Ok(Some(SheetBending { bending: rigidity, twist }))
+    }
+
+    /// Returns the bending rigidity of a mesh, if it has any.
+    pub(super) fn mesh_bending(&self) -> Result<Option<MeshBending>, SceneError> {
+        let rest = self.file.rest.as_ref();
+        let Some(bending) = self.single_bending()? else {
+            let Some(rest) = rest else { return Ok(None) };
+            let problem = "has no effect without bending (allowed: together with bending)";
+            return self.reader.error(rest.span(), &self.name("rest"), problem);
+        };
+        let words = [("flat", RestShape::Flat), ("loaded", RestShape::Loaded)];
+        let rest = rest.map(|word| self.reader.word(&self.name("rest"), word, &words));
+        Ok(Some(MeshBending { bending, rest: rest.transpose()?.unwrap_or(RestShape::Flat) }))
     }
 
     /// Returns the bending rigidity of a shape without directions, if it has any.

@@ -30,6 +30,7 @@ pub(in crate::scene::read) struct FileGenerator {
     pub(in crate::scene::read) diagonals: Option<Whole>,
     pub(in crate::scene::read) bending: Option<Spanned<NumberOrPair>>,
     pub(in crate::scene::read) twist: Option<Spanned<bool>>,
+    pub(in crate::scene::read) rest: Option<Word>,
     pub(in crate::scene::read) count: Option<Whole>,
     pub(in crate::scene::read) from: Option<Vector>,
     pub(in crate::scene::read) to: Option<Vector>,
@@ -109,7 +110,7 @@ impl FileGenerator {
     }
 
     /// Returns the places of the keys that belong to single shapes.
-    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 25] {
+    pub(in crate::scene::read) fn shape_keys(&self) -> [(&'static str, Option<Range<usize>>); 26] {
         fn span<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -124,6 +125,7 @@ impl FileGenerator {
             ("diagonals", span(self.diagonals.as_ref())),
             ("bending", span(self.bending.as_ref())),
             ("twist", span(self.twist.as_ref())),
+            ("rest", span(self.rest.as_ref())),
             ("count", span(self.count.as_ref())),
             ("from", span(self.from.as_ref())),
             ("to", span(self.to.as_ref())),

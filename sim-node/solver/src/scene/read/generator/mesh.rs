@@ -32,7 +32,7 @@ impl GeneratorFields<'_, '_> {
         Ok(Generator {
             mass: self.mass()?,
             pinned: self.pinned_vertices(&mesh)?,
-            shape: Shape::Obj(Obj::new(mesh, density)),
+            shape: Shape::Obj(Obj::new(mesh, density, self.mesh_bending()?)),
             tear_stretch: self.tear_stretch()?,
             contact: self.file.contact.unwrap_or(true),
             softness: self.softness()?,
