@@ -37,7 +37,7 @@ static ALLOCATOR: Counting = Counting;
 #[test]
 fn neither_steps_nor_commands_allocate() {
     // A pin recomputes the tethers at its boundary, which may allocate.
-    let text = builtin::text("curtain").unwrap().replace("tethers = true", "tethers = false");
+    let text = builtin::text("curtain").unwrap().replace("tethers = 1", "tethers = false");
     let scene = Scene::from_toml(&text, "curtain").unwrap();
     let mut solver = Solver::new(&scene);
     let before = allocations();

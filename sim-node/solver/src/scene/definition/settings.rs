@@ -130,11 +130,11 @@ impl SolverSettings {
     }
 }
 
-/// Writes 0 and 1 as the words that also mean them.
+/// Writes none and the most as the words that also mean them.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
 fn serialize_tethers<S: Serializer>(count: &u32, serializer: S) -> Result<S::Ok, S::Error> {
-    match count {
-        0 | 1 => serializer.serialize_bool(*count == 1),
+    match *count {
+        0 | TETHERS_MAX => serializer.serialize_bool(*count > 0),
         _ => serializer.serialize_u32(*count),
     }
 }

@@ -64,7 +64,7 @@ impl Reader<'_> {
     fn tethers(&self, file: Option<&Spanned<FileTethers>>) -> Result<u32, SceneError> {
         let Some(tethers) = file else { return Ok(0) };
         match tethers.get_ref() {
-            FileTethers::Word(has_tether) => Ok(u32::from(*has_tether)),
+            FileTethers::Word(has_tethers) => Ok(if *has_tethers { TETHERS_MAX } else { 0 }),
             FileTethers::Count(count) => {
                 self.whole("solver.tethers", &tethers.with(*count), 0..=TETHERS_MAX)
             }
