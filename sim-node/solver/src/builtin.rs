@@ -1,6 +1,6 @@
 //! The built-in scenes.
 
-const SCENES: [(&str, &str); 16] = [
+const SCENES: [(&str, &str); 19] = [
     ("curtain", include_str!("../scenes/curtain.toml")),
     ("rope", include_str!("../scenes/rope.toml")),
     ("flag", include_str!("../scenes/flag.toml")),
@@ -13,6 +13,9 @@ const SCENES: [(&str, &str); 16] = [
     ("carried-cloth", include_str!("../scenes/carried-cloth.toml")),
     ("folding-cloth", include_str!("../scenes/folding-cloth.toml")),
     ("covered-bust", include_str!("../scenes/covered-bust.toml")),
+    ("coiled-rope", include_str!("../scenes/coiled-rope.toml")),
+    ("two-flags", include_str!("../scenes/two-flags.toml")),
+    ("ragdolls-in-net", include_str!("../scenes/ragdolls-in-net.toml")),
     ("drop-box", include_str!("../scenes/drop-box.toml")),
     ("drop-box-braced", include_str!("../scenes/drop-box-braced.toml")),
     ("pendulum", include_str!("../scenes/pendulum.toml")),

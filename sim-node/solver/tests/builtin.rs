@@ -64,6 +64,9 @@ fn every_scene_has_the_counts_of_the_tutorials() {
         ("carried-cloth", [121, 320, 0]),
         ("folding-cloth", [1600, 9202, 0]),
         ("covered-bust", [2025, 7832, 0]),
+        ("coiled-rope", [121, 120, 0]),
+        ("two-flags", [930, 3448, 30]),
+        ("ragdolls-in-net", [421, 764, 4]),
         ("pendulum", [2, 1, 1]),
         ("free-fall", [1, 0, 0]),
         ("flag", [651, 3648, 21]),
@@ -73,7 +76,7 @@ fn every_scene_has_the_counts_of_the_tutorials() {
         assert_eq!([found.particles, found.constraints, found.pins], counts, "{name}");
     }
     assert_eq!(scene("carried-cloth").anchors[0].particles.len(), 11);
-    assert_eq!(builtin::names().count(), 16);
+    assert_eq!(builtin::names().count(), 19);
 }
 
 /// Runs a scene for a number of steps and asserts that it stays finite.
