@@ -419,7 +419,7 @@ impl Node {
 }
 
 /// Returns `true` for a snapshot that its node has published just now. One from the future has the clock of
-/// another host, which tells nothing.
+/// another host, so its age is unknown.
 fn is_recent(header: &SnapshotHeader) -> bool {
     let age_ns = monotonic_ns().checked_sub(header.publish_monotonic_ns);
     age_ns.is_some_and(|age_ns| age_ns < SECOND_NS / 2)

@@ -183,7 +183,7 @@ fn an_edge_without_a_hinge_causes_a_warning() {
         ))
     };
     assert_eq!(mesh(0.002), Vec::<String>::new());
-    let expected = "generate[0].bending: 1 edge has no hinge, because a triangle beside is a line: \
+    let expected = "generate[0].bending: 1 edge has no hinge, because an adjacent triangle has no height: \
          merge its corners, or divide its longest side";
     assert_eq!(mesh(0.0005), [expected]);
 }

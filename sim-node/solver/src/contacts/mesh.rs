@@ -101,7 +101,7 @@ impl PlacedMesh {
         [before, now]: [PlacedFrame; 2],
         distance: f32,
     ) -> Self {
-        let tolerance = TOLERANCE * reach(&mesh, &now);
+        let tolerance = TOLERANCE * reach(&mesh, [&before, &now]);
         let skin = SKIN * tolerance;
         let distance = if distance > skin { distance } else { skin };
         Self { mesh, before, now, gap: Gap { distance, tolerance } }
@@ -118,7 +118,7 @@ impl PlacedMesh {
 
     /// Magnitude of its coordinates, which bounds their rounding.
     pub(crate) fn reach(&self) -> f32 {
-        reach(&self.mesh, &self.now)
+        reach(&self.mesh, [&self.before, &self.now])
     }
 
     /// Bound on the rounding of a depth.
@@ -131,7 +131,8 @@ impl PlacedMesh {
         let path = self.path(path);
         let length = path.motion.dot(path.motion).sqrt();
         let bounds = Bounds::around([path.start.to_array(), path.end().to_array()]);
-        Room { ends: bounds.grown(PUSH_SHARE * length + self.gap.tolerance), length }
+        let rounding = self.gap.tolerance + 2.0 * path.rounding;
+        Room { ends: bounds.grown(PUSH_SHARE * length + rounding), length }
     }
 
     /// True if a path after some pushes is still within the room of the first one.
@@ -191,7 +192,9 @@ impl PlacedMesh {
         let start = self.before.local(path.start);
         // Exactly 0 for a mesh at rest.
         let shift = self.now.local(path.start) - start;
-        MeshPath { start, motion: shift + self.now.to_local(path.displacement) }
+        let motion = shift + self.now.to_local(path.displacement);
+        let rounding = TOLERANCE * (start.abs().element_sum() + motion.abs().element_sum());
+        MeshPath { start, motion, rounding }
     }
 
     /// The box in which the triangles lie that the paths of a particle can touch.
@@ -232,6 +235,8 @@ pub(crate) struct Room {
     length: f32,
 }
 
-fn reach(mesh: &CollisionMesh, frame: &PlacedFrame) -> f32 {
-    frame.center.abs().element_sum() + mesh.extents.element_sum()
+fn reach(mesh: &CollisionMesh, frames: [&PlacedFrame; 2]) -> f32 {
+    let [before, now] = frames.map(|frame| frame.center.abs().element_sum());
+    let farther = if before > now { before } else { now };
+    farther + mesh.extents.element_sum()
 }

@@ -10,7 +10,8 @@ use crate::kernels::lanes::Wide;
 /// Particles side by side: a row of a sheet, or a block of the graph.
 pub(crate) trait ParticleBlock {
     fn count(&self) -> usize;
-    /// Number of the first particle. Particles of other blocks have other numbers, as far as possible.
+    /// Number of the first particle. Two blocks may share numbers, which costs
+    /// only time.
     fn first(&self) -> usize;
     fn inverse_mass(&self, index: usize) -> f32;
     fn path(&self, index: usize) -> SubstepPath;

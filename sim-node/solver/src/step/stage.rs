@@ -16,16 +16,17 @@ pub(crate) enum Stage {
     /// (`w_a` + `w_b` + a) with a = compliance / h^2 (xpbd), or the share k' of C (pbd).
     Project,
     /// Bends, group by group, in the same passes: `delta_Lambda` = -(C + a Lambda) / (sum of w c^2 + a)
-    /// with C = sum of c x.
+    /// with C = sum of c x, less the rest value along its own direction for a hinge with a curved rest shape.
     Bend,
     /// Constraints longer than `max_stretch` times their rest length: back to it, pulling only.
     LimitStretch,
-    /// Free particles beyond the length of their tether: d is shortened to it, pulling only.
+    /// Free particles beyond the length of a tether: d is shortened to it, one tether after the other, pulling only.
     Tether,
     /// Particles nearer to each other than the contact distance: pushed apart along the line between them,
     /// pair by pair in the order of a hash; friction on the tangential d.
     ParticleContact,
-    /// Free particles inside a collider: pushed out along its normal; friction on the tangential d.
+    /// Free particles inside a collider, or on a path through a mesh: pushed out along its normal; friction on the
+    /// tangential d.
     Contact,
     /// x = x + d; v = d / h; particles in contact take the velocity that their contacts leave them.
     Advance,

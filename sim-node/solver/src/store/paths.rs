@@ -10,7 +10,7 @@ pub(crate) struct Paths {
     pub(super) graph: Vec<PackedParticle>,
 }
 
-/// The part of the paths that is over, and how far a particle may be beside its own.
+/// The elapsed part of the paths, and how far a particle may be beside its own.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Progress {
     /// Number of displacements.

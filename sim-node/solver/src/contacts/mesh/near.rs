@@ -1,6 +1,6 @@
 //! Memory of the triangles near particles, so that they are not searched in every substep.
 //!
-//! It is no state: a list holds all triangles that its particle can touch, and further ones change no contact.
+//! It is no state: a list holds all triangles that its particle can touch, and the others are not touched.
 
 use std::ops::ControlFlow;
 

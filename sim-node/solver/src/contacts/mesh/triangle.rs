@@ -14,7 +14,7 @@ pub(super) struct Triangle {
     inwards: [Vec3; 3],
 }
 
-// One triangle and a half to a cache line of 128 bytes.
+// Small, because a search reads many of them.
 const _: () = assert!(size_of::<Triangle>() == 84);
 
 /// The path of a particle in a substep, in the moving frame of a mesh.
@@ -22,6 +22,8 @@ const _: () = assert!(size_of::<Triangle>() == 84);
 pub(super) struct MeshPath {
     pub(super) start: Vec3,
     pub(super) motion: Vec3,
+    /// Bound on the rounding of a point of the path.
+    pub(super) rounding: f32,
 }
 
 impl MeshPath {
@@ -119,7 +121,7 @@ impl Triangle {
         }
         if height_at_end < 0.0 {
             let time = height / (height - height_at_end);
-            if time < 1.0 && self.has_beside(path.start + path.motion * time, gap.tolerance) {
+            if time < 1.0 && self.is_at(path.start + path.motion * time, gap.tolerance) {
                 return Some(Touch { normal, depth: gap.distance - height_at_end, time });
             }
         }
@@ -145,6 +147,19 @@ impl Triangle {
         } else {
             near(normal, height_at_end)
         }
+    }
+
+    /// True if a point on the plane is inside, or at most `distance` away from the triangle. The edges alone would
+    /// accept points far beyond a sharp corner, which are not in the search box.
+    fn is_at(&self, point: Vec3, distance: f32) -> bool {
+        if self.has_beside(point, 0.0) {
+            return true;
+        }
+        if !self.has_beside(point, distance) {
+            return false;
+        }
+        let arm = point - self.nearest_on_edges(point);
+        arm.dot(arm) <= distance * distance
     }
 
     /// True if the foot of a point on the plane is inside, or beside an edge by at most `distance`.
@@ -174,4 +189,25 @@ fn nearest_on_segment([a, b]: [Vec3; 2], point: Vec3) -> Vec3 {
     let along = edge.dot(point - a) / edge.dot(edge);
     let share = if along > 0.0 { along } else { 0.0 };
     a + edge * if share < 1.0 { share } else { 1.0 }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_beyond_a_sharp_corner_passes() {
+        let corners = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.01, 0.0, 1e-5]];
+        let triangle = Triangle::new(corners, 1e-9).unwrap();
+        let gap = Gap { distance: 8e-7, tolerance: 1e-7 };
+        let crosses = |x: f32| {
+            let start = Vec3::new(x, 1e-3, 0.0);
+            let path = MeshPath { start, motion: Vec3::new(0.0, -2e-3, 0.0), rounding: 0.0 };
+            triangle.touch(&path, gap).is_some()
+        };
+        assert!(crosses(5e-3) && crosses(0.0));
+        // Beyond the corner, both edges are nearer than the tolerance, but the triangle is not.
+        assert!(!crosses(-2e-5));
+    }
 }

@@ -130,7 +130,7 @@ impl SolverSettings {
     }
 }
 
-/// Writes none and the most as the words that also mean them.
+/// Serializes 0 as `false` and the maximum as `true`.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde requires")]
 fn serialize_tethers<S: Serializer>(count: &u32, serializer: S) -> Result<S::Ok, S::Error> {
     match *count {

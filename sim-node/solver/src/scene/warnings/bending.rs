@@ -59,7 +59,7 @@ pub(super) fn missing_hinges(scene: &Scene) -> Vec<String> {
         let edges = if count == 1 { "edge has no hinge" } else { "edges have no hinges" };
         (count > 0).then(|| {
             format!(
-                "generate[{index}].bending: {count} {edges}, because a triangle beside is a line: merge \
+                "generate[{index}].bending: {count} {edges}, because an adjacent triangle has no height: merge \
                  its corners, or divide its longest side"
             )
         })
