@@ -14,7 +14,7 @@ use super::load::RunHeader;
 const WAKE_SIZE_BYTES: usize = 1 << 20;
 /// The part of the limit that wakes the writing thread, if that is less.
 const WAKE_PART: usize = 4;
-/// Most spare buffers. More are in use only while the disk is slow, and their memory is then given back.
+/// Most spare buffers. A chunk of small snapshots returns more of them, whose memory is freed.
 const SPARE_BUFFERS_MAX: usize = 8;
 
 /// One or two messages to write.

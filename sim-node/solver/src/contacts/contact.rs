@@ -45,7 +45,7 @@ struct Contact<'a> {
     /// Bound on the rounding of the depth.
     rounding: f32,
     surface: &'a Surface,
-    /// Part of the bounce along the normal that earlier contacts with the same collider give.
+    /// Part of the bounce along the normal that earlier contacts with the same mesh give.
     bounced: f32,
 }
 
@@ -130,6 +130,7 @@ impl Contacts {
             if !is_near {
                 continue;
             }
+            let before = self.bounces[index];
             let mut room = mesh.room(&path);
             let number = particles.first() + index;
             let mut triangles = mesh.list(&mut self.near_meshes, number, &room);
@@ -150,7 +151,7 @@ impl Contacts {
                     }
                     Some(Stop::Push(hit)) => {
                         let (rounding, surface) = (mesh.rounding(), &obstacle.surface);
-                        let bounced = self.bounces[index].dot(hit.normal);
+                        let bounced = (self.bounces[index] - before).dot(hit.normal);
                         let contact = Contact { index, path, hit, rounding, surface, bounced };
                         self.resolve(particles, &contact);
                     }

@@ -1,7 +1,7 @@
 //! Contacts with meshes.
 //!
-//! A particle never passes a triangle: in each substep, its path in the moving frame of the mesh is
-//! tested against the triangles near it. It stays on the side on which the path starts, so open and
+//! In each substep, the path of a particle in the moving frame of the mesh is tested against the triangles near
+//! it. The particle stays on the side on which the path starts, so open and
 //! thin meshes work like closed ones, and no state is kept between substeps. Where it cannot be pushed
 //! off all triangles, it stays where the path starts, in the frame of the mesh.
 

@@ -23,10 +23,10 @@ pub(super) struct MeshKeys<'f> {
 impl Reader<'_> {
     /// Reads a mesh from the file that a path names, or from its lists.
     pub(super) fn mesh(&self, keys: &MeshKeys<'_>) -> Result<Mesh, SceneError> {
-        match (keys.path, keys.vertices) {
-            (Some(path), None) => self.mesh_of_file(keys, path),
-            (None, Some(vertices)) => self.written_mesh(keys, vertices),
-            (path, _) => {
+        match (keys.path, keys.vertices, keys.faces) {
+            (Some(path), None, None) => self.mesh_of_file(keys, path),
+            (None, Some(vertices), _) => self.written_mesh(keys, vertices),
+            (path, ..) => {
                 let span = path.map_or(keys.span.clone(), Spanned::span);
                 let problem = "a mesh needs a path, or vertices and faces (allowed: either one)";
                 self.error(span, &(keys.field)("path"), problem)

@@ -197,6 +197,25 @@ fn nothing_passes_through_a_thin_plate_from_either_side() {
 }
 
 #[test]
+fn a_mesh_behind_a_slope_bounces_like_a_plane_behind_it() {
+    // The particle falls into the corner of the slope and the ground, and hits both in one substep.
+    let slope =
+        "[[collider]]\nshape = \"plane\"\nnormal = [0.6, 0.8, 0]\noffset = 0\nrestitution = 0.5\n";
+    let plane =
+        "[[collider]]\nshape = \"plane\"\nnormal = [0, 1, 0]\noffset = 0.001\nrestitution = 0.5\n";
+    let mesh = Mesh::grid(3, 1.0).text() + "distance = 0.001\nrestitution = 0.5\n";
+    let falling = "gravity = [0, 0, 0]\n".to_owned()
+        + &rates(100, 1)
+        + &particle([0.02, 0.02, 0.0], [-2.0, -4.0, 0.0])
+        + slope;
+    let [on_plane, on_mesh] =
+        [plane, mesh.as_str()].map(|ground| velocity(&stepped(&(falling.clone() + ground), 1), 0));
+    for axis in 0..3 {
+        assert_near("velocity", on_plane[axis], on_mesh[axis], 1e-4);
+    }
+}
+
+#[test]
 fn a_particle_in_a_closed_mesh_stays_inside_and_one_outside_stays_outside() {
     let mut text = rates(240, 4);
     for number in 0..40 {
