@@ -5,13 +5,15 @@
 //! the particles are about to take, and again when one of them leaves its path. No list outlives its step,
 //! so a snapshot with its keyframe is still the complete state.
 
+mod box_tree;
 mod load;
 mod pair;
 mod tile_tree;
 
+use box_tree::Search;
 use load::LoadPairs;
 use pair::Pair;
-use tile_tree::{Query, Search, TILE, TileTree, take_lowest};
+use tile_tree::{Query, TILE, TileTree, take_lowest};
 
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;

@@ -1,6 +1,7 @@
 //! Pairs of particles that are near each other at load, and so have another contact distance, or none.
 
-use super::tile_tree::{Query, Search, TILE, TILE_LENGTH, TileTree};
+use super::box_tree::Search;
+use super::tile_tree::{Query, TILE, TILE_LENGTH, TileTree};
 use crate::kernels::Kernels;
 use crate::scene::model::Model;
 

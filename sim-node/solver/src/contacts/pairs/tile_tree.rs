@@ -1,8 +1,9 @@
 //! A tree of boxes over the paths of particles, to find those that come near each other.
 //!
-//! Sixteen particles that are neighbours at load form a tile. Four tiles form a node, and so on. The
-//! tree keeps its form from load to load: only the boxes follow the particles.
+//! Sixteen particles that are neighbours at load form a tile. The tree above the tiles keeps its form from load
+//! to load: only the boxes follow the particles.
 
+use super::box_tree::{BoxTree, Search};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
@@ -11,8 +12,6 @@ use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
 pub(super) const TILE: usize = TILE_LENGTH as usize;
 /// The same number for slots.
 pub(super) const TILE_LENGTH: u32 = 16;
-/// Number of children of a node.
-const ARITY: usize = 4;
 /// Number of pairs of tiles that are examined together.
 const TILE_PAIRS_MAX: usize = 4096;
 
@@ -73,8 +72,8 @@ impl Tile {
 #[derive(Debug, Clone, Default)]
 pub(super) struct TileTree {
     pub(super) tiles: Vec<Tile>,
-    /// Boxes of the tiles, of the nodes above them, and so on up to the root.
-    levels: Vec<Vec<Bounds>>,
+    /// Boxes of the paths of the tiles.
+    pub(super) boxes: BoxTree,
     /// Boxes of the displacements of the tiles.
     displacements: Vec<Bounds>,
     /// Pairs of tiles that are near each other, to be examined.
@@ -84,35 +83,19 @@ pub(super) struct TileTree {
 /// Leaves nothing out of a search.
 const NONE: fn(u32, u32) -> u32 = |_, _| 0;
 
-/// Order to go on, or to give the search up.
-pub(super) type Search = std::ops::ControlFlow<()>;
-
 impl TileTree {
     /// Makes a tree of empty tiles for `count` particles.
     pub(super) fn new(count: usize) -> Self {
         let tiles = vec![Tile::EMPTY; count.div_ceil(TILE)];
-        let mut levels = Vec::new();
-        let mut length = tiles.len();
-        while length > 0 {
-            levels.push(vec![Bounds::EMPTY; length]);
-            length = if length > 1 { length.div_ceil(ARITY) } else { 0 };
-        }
         let displacements = vec![Bounds::EMPTY; tiles.len()];
-        Self { tiles, levels, displacements, tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX) }
+        let boxes = BoxTree::new(tiles.len());
+        Self { tiles, boxes, displacements, tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX) }
     }
 
     /// Recomputes all boxes for paths of `span` displacements.
     pub(super) fn refit(&mut self, span: f32, kernels: Kernels) {
-        let Self { tiles, levels, displacements, .. } = self;
-        let Some((leaves, nodes)) = levels.split_first_mut() else { return };
-        kernels.run(RefitWork { tiles, leaves, displacements, span });
-        let mut below = &*leaves;
-        for level in nodes {
-            for (bounds, children) in level.iter_mut().zip(below.chunks(ARITY)) {
-                *bounds = children.iter().fold(Bounds::EMPTY, Bounds::union);
-            }
-            below = level;
-        }
+        let Self { tiles, boxes, displacements, .. } = self;
+        boxes.refit(|leaves| kernels.run(RefitWork { tiles, leaves, displacements, span }));
     }
 
     /// Passes every pair of particles whose straight paths come nearer than the query's distance to
@@ -136,7 +119,6 @@ impl TileTree {
         except: &impl Fn(u32, u32) -> u32,
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
-        let Some(root) = self.levels.len().checked_sub(1) else { return Search::Continue(()) };
         let mut pairs = std::mem::take(&mut self.tile_pairs);
         let tree = &*self;
         let mut examine = |pairs: &mut Vec<[u32; 2]>| {
@@ -145,7 +127,7 @@ impl TileTree {
             pairs.clear();
             search
         };
-        let mut found = tree.search_nodes(root, [0, 0], query.distance, &mut |pair| {
+        let mut found = tree.boxes.search(query.distance, &mut |pair| {
             pairs.push(pair);
             if pairs.len() < TILE_PAIRS_MAX { Search::Continue(()) } else { examine(&mut pairs) }
         });
@@ -155,33 +137,6 @@ impl TileTree {
         pairs.clear();
         self.tile_pairs = pairs;
         found
-    }
-
-    /// Passes pairs of tiles that are near each other to `accept`.
-    fn search_nodes(
-        &self,
-        level: usize,
-        [a, b]: [usize; 2],
-        distance: f32,
-        accept: &mut impl FnMut([u32; 2]) -> Search,
-    ) -> Search {
-        let bounds = &self.levels[level];
-        if !bounds[a].are_near(&bounds[b], distance) {
-            return Search::Continue(());
-        }
-        if level == 0 {
-            #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
-            return accept([a as u32, b as u32]);
-        }
-        let count = self.levels[level - 1].len();
-        let children = |node: usize| ARITY * node..count.min(ARITY * (node + 1));
-        for left in children(a) {
-            let first = if a == b { left } else { ARITY * b };
-            for right in first..children(b).end {
-                self.search_nodes(level - 1, [left, right], distance, accept)?;
-            }
-        }
-        Search::Continue(())
     }
 }
 
@@ -256,7 +211,7 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
         let Self { tree, pairs, query, except, accept } = self;
         for &[a, b] in pairs {
             let pair = TilePair::<W>::new(tree, [a, b], query);
-            let mut lanes = pair.lanes_near_box(&tree.levels[0][b as usize]);
+            let mut lanes = pair.lanes_near_box(&tree.boxes.leaves()[b as usize]);
             while let Some(lane) = take_lowest(&mut lanes) {
                 let mut near = pair.lanes_near_lane(lane as usize);
                 if a == b {
