@@ -14,9 +14,10 @@ use sim_solver::{
 };
 
 /// The test scenes.
-const SCENES: [(&str, &str); 4] = [
+const SCENES: [(&str, &str); 5] = [
     ("everything", include_str!("../tests/scenes/everything.toml")),
     ("touching", include_str!("../tests/scenes/touching.toml")),
+    ("surfaces", include_str!("../tests/scenes/surfaces.toml")),
     ("draped", include_str!("../tests/scenes/draped.toml")),
     ("stiffness", include_str!("../tests/scenes/stiffness.toml")),
 ];

@@ -18,6 +18,7 @@ use crate::kernels::Kernels;
 use crate::parameters::Parameters;
 use crate::scene::definition::Scene;
 use crate::scene::definition::anchor::SceneAnchor;
+use crate::scene::definition::contact::ContactMode;
 use crate::scene::definition::settings::{SolverSettings, substep_length};
 use crate::scene::model::Model;
 use crate::state::hash::state_hash;
@@ -53,6 +54,7 @@ pub struct Solver {
     pub(crate) colliders: Vec<Collider>,
     /// The colliders in the running substep.
     pub(crate) obstacles: Vec<Obstacle>,
+    pub(crate) contact_mode: ContactMode,
     pub(crate) particle_contacts: ParticleContacts,
     pub(crate) anchors: Anchors,
     scene_anchors: Vec<SceneAnchor>,
@@ -112,6 +114,7 @@ impl Solver {
                 .map(|(at, one)| Collider::new(at, one))
                 .collect(),
             obstacles: Vec::with_capacity(OBSTACLES_PER_COLLIDER * scene.colliders.len()),
+            contact_mode: scene.contact.mode,
             particle_contacts: ParticleContacts::default(),
             anchors: Anchors::new(&scene.anchors, &model.particles),
             scene_anchors: scene.anchors.clone(),
@@ -220,7 +223,8 @@ impl Solver {
         let thickness = self.parameters.contact_thickness;
         if !self.particle_contacts.are_derived_from(thickness) {
             let kernels = self.store.kernels();
-            self.particle_contacts = ParticleContacts::new(&self.model, thickness, kernels);
+            self.particle_contacts =
+                ParticleContacts::new(&self.model, self.contact_mode, thickness, kernels);
             self.particle_contacts.locate(&self.store);
         }
     }

@@ -113,7 +113,7 @@ impl Solver {
     /// Unpacks the state, and computes the targets of anchors and colliders for the end of the step.
     fn begin_step(&mut self) {
         self.store.unpack(&self.particles.states);
-        self.particle_contacts.begin_step();
+        self.particle_contacts.begin_step(&self.torn);
         self.scene_step += 1;
         let (time_s, dt) = (self.scene_time_s(), self.step_length());
         self.anchors.begin_step(time_s);

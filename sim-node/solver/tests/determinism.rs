@@ -182,11 +182,12 @@ fn keyframes_with_impossible_numbers_are_refused() {
 }
 
 /// A built-in scene, and the scenes that use every mechanism.
-const TEXTS: [&str; 6] = [
+const TEXTS: [&str; 7] = [
     include_str!("../scenes/curtain.toml"),
     include_str!("scenes/everything.toml"),
     include_str!("scenes/stiffness.toml"),
     include_str!("scenes/touching.toml"),
+    include_str!("scenes/surfaces.toml"),
     include_str!("scenes/draped.toml"),
     include_str!("scenes/bends.toml"),
 ];

@@ -75,6 +75,7 @@ fn kernels_agree_on_scenes_with_every_mechanism() {
         include_str!("scenes/everything.toml"),
         include_str!("scenes/stiffness.toml"),
         include_str!("scenes/touching.toml"),
+        include_str!("scenes/surfaces.toml"),
         include_str!("scenes/draped.toml"),
         include_str!("scenes/bends.toml"),
     ] {

@@ -58,6 +58,7 @@ fn neither_steps_nor_commands_allocate() {
         include_str!("scenes/stiffness.toml"),
         include_str!("scenes/bends.toml"),
         include_str!("scenes/touching.toml"),
+        include_str!("scenes/surfaces.toml"),
         include_str!("scenes/draped.toml"),
     ] {
         let mut solver = Solver::new(&Scene::from_toml(text, "test").unwrap());

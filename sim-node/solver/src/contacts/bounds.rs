@@ -29,9 +29,15 @@ impl Bounds {
 
     /// The box, larger by `distance` on each side.
     pub(super) fn grown(self, distance: f32) -> Self {
+        self.grown_by([distance; 3])
+    }
+
+    /// The box, larger by a distance for each axis.
+    #[inline(always)]
+    pub(super) fn grown_by(self, distance: [f32; 3]) -> Self {
         Self {
-            min: self.min.map(|axis| axis - distance),
-            max: self.max.map(|axis| axis + distance),
+            min: axes(|axis| self.min[axis] - distance[axis]),
+            max: axes(|axis| self.max[axis] + distance[axis]),
         }
     }
 
@@ -43,13 +49,19 @@ impl Bounds {
         self.contains(other.min) && self.contains(other.max)
     }
 
+    /// Largest distance of a point of this box from a point of the other one, on each axis.
+    #[inline(always)]
+    pub(super) fn distances_max(&self, other: &Self) -> [f32; 3] {
+        axes(|axis| {
+            let (up, down) = (self.max[axis] - other.min[axis], other.max[axis] - self.min[axis]);
+            if up > down { up } else { down }
+        })
+    }
+
     /// Largest distance of a point of this box from a point of the other one.
     #[inline(always)]
     pub(super) fn distance_max(&self, other: &Self) -> f32 {
-        let longest = axes(|axis| {
-            let (up, down) = (self.max[axis] - other.min[axis], other.max[axis] - self.min[axis]);
-            if up > down { up } else { down }
-        });
+        let longest = self.distances_max(other);
         (longest[0] * longest[0] + longest[1] * longest[1] + longest[2] * longest[2]).sqrt()
     }
 

@@ -4,20 +4,29 @@
 //! that a hash of the pair gives. Which pairs are near is exact: candidates are found for the paths that
 //! the particles are about to take, and again when one of them leaves its path. No list outlives its step,
 //! so a snapshot with its keyframe is still the complete state.
+//!
+//! Where cloths touch as surfaces, a particle and a triangle take the place of most pairs.
 
 mod box_tree;
 mod load;
+mod order;
 mod pair;
+mod push;
+mod surfaces;
 mod tile_tree;
 
 use box_tree::Search;
 use load::LoadPairs;
+use order::{order_by_key, order_key};
 use pair::Pair;
+use surfaces::{SurfaceContacts, SurfaceSearch};
 use tile_tree::{Query, TILE, TileTree, take_lowest};
 
 use crate::kernels::Kernels;
 use crate::kernels::lanes::PackedParticle;
+use crate::scene::definition::contact::ContactMode;
 use crate::scene::model::Model;
+use crate::state::tear::Torn;
 use crate::step::substep::Substep;
 use crate::store::{Location, ParticleStore, Paths, Progress};
 
@@ -42,6 +51,10 @@ pub(crate) struct ParticleContacts {
     /// By slot: the state in the running substep.
     states: Vec<PackedParticle>,
     load_pairs: LoadPairs,
+    /// By tile, where cloths touch as surfaces: a bit for each particle without triangles. Only these touch
+    /// particles. Empty in other modes.
+    loose: Vec<u16>,
+    surfaces: SurfaceContacts,
     tree: TileTree,
     /// The paths for which the candidates were found.
     paths: Paths,
@@ -60,11 +73,20 @@ pub(crate) struct ParticleContacts {
 
 impl ParticleContacts {
     /// Derives what depends on the scene and the contact distance. `None` turns contacts off.
-    pub(crate) fn new(model: &Model, thickness: Option<f32>, kernels: Kernels) -> Self {
+    pub(crate) fn new(
+        model: &Model,
+        mode: ContactMode,
+        thickness: Option<f32>,
+        kernels: Kernels,
+    ) -> Self {
         let Some(thickness) = thickness else { return Self::default() };
         let particles = load::slots(model);
         let count = particles.len();
         let candidate_count_max = CANDIDATES_PER_PARTICLE * count;
+        let has_surfaces = mode == ContactMode::Surfaces;
+        let surfaces = has_surfaces.then(|| {
+            SurfaceContacts::new(model, &particles, (thickness, kernels), candidate_count_max)
+        });
         Self {
             thickness,
             margin: 0.2 * thickness,
@@ -72,6 +94,8 @@ impl ParticleContacts {
             states: vec![PackedParticle::default(); count],
             paths: Paths::default(),
             load_pairs: LoadPairs::new(model, &particles, thickness, kernels),
+            loose: if has_surfaces { load::loose(model, &particles) } else { Vec::new() },
+            surfaces: surfaces.unwrap_or_default(),
             tree: TileTree::new(count),
             particles,
             found_at: None,
@@ -103,9 +127,10 @@ impl ParticleContacts {
         }
     }
 
-    /// Forgets the candidates of the step before.
-    pub(crate) fn begin_step(&mut self) {
+    /// Forgets the candidates of the step before, and takes torn triangles out.
+    pub(crate) fn begin_step(&mut self, torn: &Torn) {
         self.found_at = None;
+        self.surfaces.begin_step(torn);
     }
 
     /// Pushes particles apart that are too near each other at the end of the substep.
@@ -115,20 +140,31 @@ impl ParticleContacts {
         substep: Substep,
         friction: f32,
     ) {
-        if self.are_on_their_paths(store, substep) {
-            self.load_involved(store);
-        } else {
+        if !self.are_on_their_paths(store, substep) {
             self.find_candidates(store, substep);
+        } else if self.surfaces.has_candidates() {
+            // They may come to other triangles.
+            self.load_all(store);
+        } else {
+            self.load_involved(store);
         }
-        let Self { states, ordered, near, .. } = self;
+        let Self { states, ordered, near, surfaces, thickness, .. } = self;
         near.clear();
         near.extend(ordered.iter().filter(|pair| pair.is_near(states, REACH)));
         for pair in &*near {
             pair.push_apart(states, friction);
         }
-        for slot in near.iter().flat_map(|pair| pair.slots) {
+        surfaces.push_apart(states, (*thickness, REACH), friction);
+        let slots = near.iter().flat_map(|pair| pair.slots);
+        for slot in slots.chain(surfaces.touched()) {
             let PackedParticle([x, y, z, _, dx, dy, dz, _]) = states[slot as usize];
             store.set_path(self.locations[slot as usize], [x, y, z], [dx, dy, dz]);
+        }
+    }
+
+    fn load_all(&mut self, store: &ParticleStore) {
+        for (state, location) in self.states.iter_mut().zip(&self.locations) {
+            *state = store.packed_particle(*location);
         }
     }
 
@@ -155,10 +191,10 @@ impl ParticleContacts {
         self.found_at = Some(substep);
         store.save_paths(&mut self.paths);
         let kernels = store.kernels();
-        let Self { tree, states, locations, particles, load_pairs, candidates, .. } = self;
+        self.load_all(store);
+        let Self { tree, states, particles, load_pairs, loose, candidates, .. } = self;
         let (thickness, count_max) = (self.thickness, CANDIDATES_PER_PARTICLE * particles.len());
-        for (slot, (state, location)) in states.iter_mut().zip(locations).enumerate() {
-            *state = store.packed_particle(*location);
+        for (slot, state) in states.iter().enumerate() {
             let PackedParticle([x, y, z, _, dx, dy, dz, _]) = *state;
             tree.tiles[slot / TILE].set(slot % TILE, [x, y, z], [dx, dy, dz]);
         }
@@ -175,48 +211,44 @@ impl ParticleContacts {
             if candidates.len() == count_max {
                 return Search::Break(());
             }
-            let key = order_key([particles[a], particles[b]]);
+            let (a, b) = (particles[a], particles[b]);
+            let key = order_key(a.min(b), a.max(b));
             candidates.push(Pair { slots, distance, key });
             Search::Continue(())
         };
-        let query = Query { span, distance: REACH * thickness + self.margin };
-        let except = |slot, tile| load_pairs.untouchable(slot, tile);
-        if tree.search_except(query, kernels, &except, &mut accept).is_break() {
-            self.overflow_count += 1;
+        let distance = REACH * thickness + self.margin;
+        let query = Query { span, distance };
+        let mut found = if loose.is_empty() {
+            let except = |tiles| load_pairs.untouchable(tiles);
+            tree.search_except(query, kernels, &except, &mut accept)
+        } else if loose.iter().any(|lanes| *lanes != 0) {
+            let except = |tiles: [u32; 2]| {
+                let [lanes, others] = tiles.map(|tile| loose[tile as usize]);
+                let mut masks = load_pairs.untouchable(tiles);
+                for (lane, mask) in masks.iter_mut().enumerate() {
+                    *mask |= if lanes & (1 << lane) != 0 { !others } else { !0 };
+                }
+                masks
+            };
+            tree.search_except(query, kernels, &except, &mut accept)
+        } else {
+            Search::Continue(())
+        };
+        if found.is_continue() && self.surfaces.are_on() {
+            let search = SurfaceSearch { tree, states, particles, span, distance, kernels };
+            found = self.surfaces.find(&search);
         }
+        self.overflow_count += u64::from(found.is_break());
         self.order_candidates();
     }
 
-    /// Sorts the candidates by their keys. Those of one key keep the order of the search.
     fn order_candidates(&mut self) {
-        let mut places = [0_usize; 257];
-        for pair in &self.candidates {
-            places[usize::from(pair.key) + 1] += 1;
-        }
-        for key in 0..256 {
-            places[key + 1] += places[key];
-        }
-        self.ordered.clear();
-        self.ordered.extend_from_slice(&self.candidates);
-        for pair in &self.candidates {
-            let place = &mut places[usize::from(pair.key)];
-            self.ordered[*place] = *pair;
-            *place += 1;
-        }
+        order_by_key(&self.candidates, &mut self.ordered, |pair| pair.key);
         self.involved.fill(0);
         for slot in self.candidates.iter().flat_map(|pair| pair.slots) {
             self.involved[slot as usize / TILE] |= 1 << (slot as usize % TILE);
         }
     }
-}
-
-/// Returns 8 bits that look random, so that neighbouring pairs are far from each other in the order of
-/// contact. In the order of the particles, a push would run through a stack in one direction.
-fn order_key([a, b]: [u32; 2]) -> u8 {
-    let (low, high) = (a.min(b), a.max(b));
-    let mixed = low.wrapping_mul(0x9e37_79b1) ^ high.wrapping_mul(0x85eb_ca6b);
-    let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);
-    (mixed >> 24) as u8
 }
 
 #[cfg(test)]

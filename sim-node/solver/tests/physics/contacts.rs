@@ -1,7 +1,9 @@
 //! Velocities after contacts: bounces, friction, moving surfaces, corners.
 
+mod cloths;
 mod meshes;
 mod particles;
+mod surfaces;
 
 use proptest::prelude::*;
 use sim_solver::{Pose, Solver};

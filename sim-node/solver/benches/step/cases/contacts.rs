@@ -1,4 +1,4 @@
-//! Cost of the contacts of particles: the same sheet with them and without.
+//! Cost of contacts: the same sheet without them, with those of particles, and with those of surfaces.
 
 use std::fmt::Write;
 
@@ -14,20 +14,25 @@ const SPACING: f64 = 0.02;
 /// Rates and numbers of substeps: 960 substeps per second each.
 const RATES: [(u32, u32); 2] = [(240, 4), (60, 16)];
 
+/// Modes of contact that are compared.
+const MODES: [&str; 3] = ["off", "particles", "surfaces"];
+
 /// A sheet with contacts and without.
 #[derive(Debug, Serialize)]
 struct Contacts {
     case: String,
     /// Median over the steps, for each particle and substep.
     off_ns: f64,
-    on_ns: f64,
+    particles_ns: f64,
+    surfaces_ns: f64,
     /// Time with contacts relative to the time without.
-    ratio: f64,
+    particles_ratio: f64,
+    surfaces_ratio: f64,
 }
 
 impl Row for Contacts {
     const HEADINGS: &'static [&'static str] =
-        &["off: ns a particle and substep", "contacts on", "ratio"];
+        &["off: ns a particle and substep", "particles", "ratio", "surfaces", "ratio"];
 
     fn case(&self) -> &str {
         &self.case
@@ -36,8 +41,10 @@ impl Row for Contacts {
     fn cells(&self) -> Vec<String> {
         vec![
             format!("{:.1}", self.off_ns),
-            format!("{:.1}", self.on_ns),
-            format!("{:.2}", self.ratio),
+            format!("{:.1}", self.particles_ns),
+            format!("{:.2}", self.particles_ratio),
+            format!("{:.1}", self.surfaces_ns),
+            format!("{:.2}", self.surfaces_ratio),
         ]
     }
 }
@@ -101,10 +108,10 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
     }
 }
 
-/// Steps both in turns, so that disturbances affect both alike.
+/// Steps all modes in turns, so that disturbances affect them alike.
 fn measure(case: String, fall: &Fall, rates: (u32, u32)) -> Contacts {
-    let mut solvers = ["off", "particles"].map(|mode| Solver::new(&fall.scene(rates, mode)));
-    let mut times_ns = [Vec::new(), Vec::new()];
+    let mut solvers = MODES.map(|mode| Solver::new(&fall.scene(rates, mode)));
+    let mut times_ns = MODES.map(|_| Vec::new());
     let time_s = |step: u32| f64::from(step) / f64::from(rates.0);
     for step in (0..).take_while(|step| time_s(*step) < fall.to_s) {
         for (solver, times_ns) in solvers.iter_mut().zip(&mut times_ns) {
@@ -115,9 +122,17 @@ fn measure(case: String, fall: &Fall, rates: (u32, u32)) -> Contacts {
         }
     }
     let work = f64::from(rates.1) * f64::from(fall.side * fall.side);
-    let [off_ns, on_ns] = times_ns.map(|mut times_ns| {
+    let medians = times_ns.map(|mut times_ns| {
         times_ns.sort_by(f64::total_cmp);
         times_ns[times_ns.len() / 2] / work
     });
-    Contacts { case, off_ns, on_ns, ratio: on_ns / off_ns }
+    let [off_ns, particles_ns, surfaces_ns] = medians;
+    Contacts {
+        case,
+        off_ns,
+        particles_ns,
+        surfaces_ns,
+        particles_ratio: particles_ns / off_ns,
+        surfaces_ratio: surfaces_ns / off_ns,
+    }
 }

@@ -7,7 +7,7 @@ use crate::scene::model::Model;
 
 /// Particles of one connected body never touch if they are nearer than this at load, in contact
 /// distances: a fold of two layers is a half circle of pi / 2 = 1.57.
-const CONNECTED_REACH: f32 = 1.6;
+pub(super) const CONNECTED_REACH: f32 = 1.6;
 /// Largest number of near pairs at load for each particle, on average. Further pairs touch as all others.
 const PAIRS_PER_PARTICLE: usize = 32;
 
@@ -18,12 +18,51 @@ pub(super) fn slots(model: &Model) -> Vec<u32> {
     let particles = (0_u32..).zip(&model.is_without_contact);
     let mut slots: Vec<_> =
         particles.filter(|(_, is_without)| !**is_without).map(|(index, _)| index).collect();
+    in_tiles(&mut slots, &|particle, axis| model.particles[particle as usize].position[axis]);
+    slots
+}
+
+/// Returns the triangles whose corners all have slots, with these slots as corners, in the order of their tiles.
+pub(super) fn triangles(model: &Model, slots: &[u32]) -> Vec<[u32; 3]> {
+    let mut slot_of = vec![None; model.particles.len()];
+    for (slot, particle) in (0_u32..).zip(slots) {
+        slot_of[*particle as usize] = Some(slot);
+    }
+    let corners = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|particle| slot_of[particle as usize]);
+        Some([a?, b?, c?])
+    };
+    let triangles: Vec<_> = model.triangles.iter().filter_map(corners).collect();
+    #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 triangles")]
+    let mut order: Vec<_> = (0..triangles.len() as u32).collect();
+    in_tiles(&mut order, &|triangle, axis| {
+        let at = |slot: u32| model.particles[slots[slot as usize] as usize].position[axis];
+        let [a, b, c] = triangles[triangle as usize].map(at);
+        a + b + c
+    });
+    order.into_iter().map(|triangle| triangles[triangle as usize]).collect()
+}
+
+/// Returns, by tile, a bit for each particle that is a corner of no triangle.
+pub(super) fn loose(model: &Model, slots: &[u32]) -> Vec<u16> {
+    let mut is_corner = vec![false; model.particles.len()];
+    for particle in model.triangles.iter().flatten() {
+        is_corner[*particle as usize] = true;
+    }
+    let lanes = |tile: &[u32]| {
+        let lanes = (0..).zip(tile).filter(|(_, particle)| !is_corner[**particle as usize]);
+        lanes.fold(0, |lanes, (lane, _)| lanes | 1 << lane)
+    };
+    slots.chunks(TILE).map(lanes).collect()
+}
+
+/// Orders items so that each tile, and each node of the tree above, holds neighbours.
+fn in_tiles(items: &mut [u32], coordinate: &dyn Fn(u32, usize) -> f32) {
     let mut size = TILE;
-    while size < slots.len() {
+    while size < items.len() {
         size *= 2;
     }
-    divide(&mut slots, size, &|particle, axis| model.particles[particle as usize].position[axis]);
-    slots
+    divide(items, size, coordinate);
 }
 
 /// Orders the particles of a node with room for `size` particles, a tile times a power of 2. Only the last
@@ -61,35 +100,32 @@ fn divide(slots: &mut [u32], size: usize, coordinate: &dyn Fn(u32, usize) -> f32
     divide(second, half, coordinate);
 }
 
-/// The pairs of slots that are near each other at load.
+/// A bit for each entry of a tile, for each slot of another one.
+pub(super) type LaneMasks = [u16; TILE];
+
+/// The pairs of a slot and an entry of a tile, such as another slot, that are near each other at load.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LoadPairs {
-    /// First entry of each slot in `tiles`, and the end of the last one.
+    /// First entry in `tiles` of each tile of slots, and the end of the last one.
     starts: Vec<u32>,
-    /// By slot: the particles of its own and later tiles that it never touches.
+    /// By tile of slots: the tiles with entries that its slots never touch.
     tiles: Vec<Untouchable>,
-    /// Pairs that touch at another distance: ascending slots, and the distance.
+    /// Pairs that touch at another distance, ascending, and the distance.
     closer: Vec<([u32; 2], f32)>,
 }
 
-/// Particles of a tile that a particle never touches.
+/// Entries of a tile that the slots of another one never touch.
 #[derive(Debug, Clone, Copy)]
 struct Untouchable {
     tile: u32,
-    /// A bit for each particle.
-    lanes: u32,
+    lanes: LaneMasks,
 }
 
 impl LoadPairs {
     /// Finds the pairs of particles that are near each other at load.
     pub(super) fn new(model: &Model, slots: &[u32], thickness: f32, kernels: Kernels) -> Self {
         let bodies = bodies(model);
-        let mut tree = TileTree::new(slots.len());
-        for (slot, particle) in slots.iter().enumerate() {
-            let position = model.particles[*particle as usize].position;
-            tree.tiles[slot / TILE].set(slot % TILE, position, [0.0; 3]);
-        }
-        tree.refit(0.0, kernels);
+        let mut tree = TileTree::at_load(model, slots, kernels);
         let query = Query { span: 0.0, distance: CONNECTED_REACH * thickness };
         let count_max = PAIRS_PER_PARTICLE * slots.len();
         let (mut never, mut closer) = (Vec::new(), Vec::new());
@@ -104,40 +140,60 @@ impl LoadPairs {
             let is_full = never.len() + closer.len() >= count_max;
             if is_full { Search::Break(()) } else { Search::Continue(()) }
         });
-        never.sort_unstable();
+        Self::from_pairs(never, closer, slots.len())
+    }
+
+    /// Enters pairs of a slot and an entry of a tile: those that never touch, and those that touch at
+    /// another distance.
+    pub(super) fn from_pairs(
+        mut never: Vec<[u32; 2]>,
+        mut closer: Vec<([u32; 2], f32)>,
+        slot_count: usize,
+    ) -> Self {
+        never.sort_unstable_by_key(|pair| (pair.map(|one| one / TILE_LENGTH), *pair));
         closer.sort_unstable_by_key(|(pair, _)| *pair);
         let mut load_pairs = Self { starts: Vec::new(), tiles: Vec::new(), closer };
-        load_pairs.enter(&never, slots.len());
+        load_pairs.enter(&never, slot_count.div_ceil(TILE));
         load_pairs
     }
 
-    /// Enters the pairs that never touch, which ascend.
-    #[allow(clippy::cast_possible_truncation, reason = "at most 32 for each of 2^24 particles")]
-    fn enter(&mut self, never: &[[u32; 2]], slot_count: usize) {
+    /// Enters the pairs that never touch, which ascend by their tiles.
+    #[allow(clippy::cast_possible_truncation, reason = "at most 128 for each of 2^24 particles")]
+    fn enter(&mut self, never: &[[u32; 2]], tile_count: usize) {
         let mut rest = never.iter().peekable();
-        for slot in 0..slot_count {
+        for slot_tile in 0..tile_count as u32 {
             let first = self.tiles.len();
             self.starts.push(first as u32);
-            while let Some([_, other]) = rest.next_if(|[one, _]| *one as usize == slot) {
-                let (tile, lane) = (other / TILE_LENGTH, other % TILE_LENGTH);
-                match self.tiles[first..].last_mut() {
-                    Some(last) if last.tile == tile => last.lanes |= 1 << lane,
-                    _ => self.tiles.push(Untouchable { tile, lanes: 1 << lane }),
+            while let Some([slot, entry]) =
+                rest.next_if(|[slot, _]| slot / TILE_LENGTH == slot_tile)
+            {
+                let tile = entry / TILE_LENGTH;
+                if self.tiles[first..].last().is_none_or(|last| last.tile != tile) {
+                    self.tiles.push(Untouchable { tile, lanes: [0; TILE] });
                 }
+                let last = self.tiles.len() - 1;
+                self.tiles[last].lanes[(slot % TILE_LENGTH) as usize] |= 1 << (entry % TILE_LENGTH);
             }
         }
         self.starts.push(self.tiles.len() as u32);
     }
 
-    /// Returns a bit for each particle of a tile, its own or a later one, that a particle never touches.
+    /// Returns a bit for each entry of a tile that a slot never touches, for each slot of a tile.
     #[inline(always)]
-    pub(super) fn untouchable(&self, slot: u32, tile: u32) -> u32 {
-        let range = self.starts[slot as usize] as usize..self.starts[slot as usize + 1] as usize;
-        let known = self.tiles[range].iter().find(|one| one.tile == tile);
-        known.map_or(0, |one| one.lanes)
+    pub(super) fn untouchable(&self, [slots, entries]: [u32; 2]) -> LaneMasks {
+        let [first, end] = [slots, slots + 1].map(|tile| self.starts[tile as usize] as usize);
+        let known = self.tiles[first..end].iter().find(|one| one.tile == entries);
+        known.map_or([0; TILE], |one| one.lanes)
     }
 
-    /// Contact distance of two slots in ascending order.
+    /// True if a slot and an entry of a tile never touch.
+    #[inline(always)]
+    pub(super) fn never_touch(&self, slot: u32, entry: u32) -> bool {
+        let masks = self.untouchable([slot, entry].map(|one| one / TILE_LENGTH));
+        masks[(slot % TILE_LENGTH) as usize] & (1 << (entry % TILE_LENGTH)) != 0
+    }
+
+    /// Contact distance of a pair. Two slots ascend.
     #[inline(always)]
     pub(super) fn distance(&self, pair: [u32; 2], thickness: f32) -> f32 {
         if self.closer.is_empty() {
@@ -149,7 +205,7 @@ impl LoadPairs {
 }
 
 /// Returns a number for each particle, the same for particles that constraints connect.
-fn bodies(model: &Model) -> Vec<u32> {
+pub(super) fn bodies(model: &Model) -> Vec<u32> {
     let mut parents: Vec<_> = (0..model.particle_count()).collect();
     for constraint in &model.constraints {
         let [a, b] = [constraint.a, constraint.b].map(|end| root(&mut parents, end));

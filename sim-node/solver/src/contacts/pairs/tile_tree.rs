@@ -7,6 +7,7 @@ use super::box_tree::{BoxTree, Search};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
+use crate::scene::model::Model;
 
 /// Number of particles in a tile: two groups of eight lanes.
 pub(super) const TILE: usize = TILE_LENGTH as usize;
@@ -60,12 +61,31 @@ impl Tile {
         ]
     }
 
+    /// Returns a bit for each particle that is in a box after `time` displacements.
+    #[inline(always)]
+    pub(super) fn lanes_in_box<W: Wide>(&self, time: f32, bounds: &Bounds) -> u32 {
+        let mut bits = 0;
+        for (group, at) in self.positions::<W>(time).into_iter().enumerate() {
+            let [x, y, z] = at;
+            let x = is_within(x, bounds.min[0], bounds.max[0]);
+            let y = is_within(y, bounds.min[1], bounds.max[1]);
+            let z = is_within(z, bounds.min[2], bounds.max[2]);
+            bits |= W::bits(W::both(x, W::both(y, z))) << (8 * group);
+        }
+        bits
+    }
+
     /// Position and displacement of a particle.
     #[inline(always)]
-    fn particle(&self, lane: usize) -> [[f32; 3]; 2] {
+    pub(super) fn particle(&self, lane: usize) -> [[f32; 3]; 2] {
         let (group, lane) = (lane / 8, lane % 8);
         [axes(|axis| self.x[axis][group][lane]), axes(|axis| self.d[axis][group][lane])]
     }
+}
+
+#[inline(always)]
+fn is_within<W: Wide>(at: W, min: f32, max: f32) -> W::Mask {
+    W::both(at.is_at_most(W::splat(max)), W::splat(min).is_at_most(at))
 }
 
 /// The tiles and the boxes above them.
@@ -75,13 +95,13 @@ pub(super) struct TileTree {
     /// Boxes of the paths of the tiles.
     pub(super) boxes: BoxTree,
     /// Boxes of the displacements of the tiles.
-    displacements: Vec<Bounds>,
+    pub(super) displacements: Vec<Bounds>,
     /// Pairs of tiles that are near each other, to be examined.
     tile_pairs: Vec<[u32; 2]>,
 }
 
 /// Leaves nothing out of a search.
-const NONE: fn(u32, u32) -> u32 = |_, _| 0;
+const NONE: fn([u32; 2]) -> [u16; TILE] = |_| [0; TILE];
 
 impl TileTree {
     /// Makes a tree of empty tiles for `count` particles.
@@ -90,6 +110,17 @@ impl TileTree {
         let displacements = vec![Bounds::EMPTY; tiles.len()];
         let boxes = BoxTree::new(tiles.len());
         Self { tiles, boxes, displacements, tile_pairs: Vec::with_capacity(TILE_PAIRS_MAX) }
+    }
+
+    /// Makes a tree of particles at rest where they are at load.
+    pub(super) fn at_load(model: &Model, particles: &[u32], kernels: Kernels) -> Self {
+        let mut tree = Self::new(particles.len());
+        for (slot, particle) in particles.iter().enumerate() {
+            let position = model.particles[*particle as usize].position;
+            tree.tiles[slot / TILE].set(slot % TILE, position, [0.0; 3]);
+        }
+        tree.refit(0.0, kernels);
+        tree
     }
 
     /// Recomputes all boxes for paths of `span` displacements.
@@ -110,13 +141,13 @@ impl TileTree {
         self.search_except(query, kernels, &NONE, accept)
     }
 
-    /// Like [`Self::search`], without the pairs that `except` returns: it has a bit for each particle of a
-    /// tile that a slot of this or an earlier tile leaves out.
+    /// Like [`Self::search`], without the pairs that `except` returns: for two tiles, it has a bit for each particle of
+    /// the second one that a particle of the first one leaves out.
     pub(super) fn search_except(
         &mut self,
         query: Query,
         kernels: Kernels,
-        except: &impl Fn(u32, u32) -> u32,
+        except: &impl Fn([u32; 2]) -> [u16; TILE],
         accept: &mut impl FnMut([u32; 2]) -> Search,
     ) -> Search {
         let mut pairs = std::mem::take(&mut self.tile_pairs);
@@ -203,7 +234,9 @@ struct SearchWork<'a, E, F> {
     accept: &'a mut F,
 }
 
-impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWork<'_, E, F> {
+impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
+    for SearchWork<'_, E, F>
+{
     type Output = Search;
 
     #[inline(always)]
@@ -212,16 +245,18 @@ impl<E: Fn(u32, u32) -> u32, F: FnMut([u32; 2]) -> Search> LaneWork for SearchWo
         for &[a, b] in pairs {
             let pair = TilePair::<W>::new(tree, [a, b], query);
             let mut lanes = pair.lanes_near_box(&tree.boxes.leaves()[b as usize]);
+            if lanes == 0 {
+                continue;
+            }
+            let left_out = except([a, b]);
             while let Some(lane) = take_lowest(&mut lanes) {
                 let mut near = pair.lanes_near_lane(lane as usize);
                 if a == b {
                     // Each pair once: the particles behind this one.
                     near &= (!0_u32 << lane) << 1;
                 }
+                near &= !u32::from(left_out[lane as usize]);
                 let slot = TILE_LENGTH * a + lane;
-                if near != 0 {
-                    near &= !except(slot, b);
-                }
                 let mut near = pair.lanes_coming_near(lane as usize, near);
                 while let Some(other) = take_lowest(&mut near) {
                     accept([slot, TILE_LENGTH * b + other])?;

@@ -14,12 +14,14 @@ pub enum ContactMode {
     Off,
     /// Particles touch particles.
     Particles,
+    /// Particles touch the triangles of cloths, and particles without triangles touch each other.
+    Surfaces,
 }
 
 impl ContactMode {
     /// The names in a scene.
-    pub(crate) const NAMES: [(&'static str, Self); 2] =
-        [("off", Self::Off), ("particles", Self::Particles)];
+    pub(crate) const NAMES: [(&'static str, Self); 3] =
+        [("off", Self::Off), ("particles", Self::Particles), ("surfaces", Self::Surfaces)];
 }
 
 /// Contacts of particles with each other.
@@ -27,7 +29,7 @@ impl ContactMode {
 pub struct ContactSettings {
     /// Default off.
     pub mode: ContactMode,
-    /// Smallest distance of the centres of two particles in the scene's unit, > 0; default the smallest
+    /// Smallest distance of the centres of two particles, or of a particle and a triangle, in the scene's unit, > 0; default the smallest
     /// rest length of a structural constraint. `None` while the mode is off and the scene gives none.
     #[serde(with = "decimal::optional", skip_serializing_if = "Option::is_none")]
     pub thickness: Option<f32>,
@@ -46,6 +48,6 @@ impl Default for ContactSettings {
 impl ContactSettings {
     /// Returns the contact distance, or `None` if particles do not touch each other.
     pub fn distance(&self) -> Option<f32> {
-        self.thickness.filter(|_| self.mode == ContactMode::Particles)
+        self.thickness.filter(|_| self.mode != ContactMode::Off)
     }
 }

@@ -1,0 +1,255 @@
+//! Contacts of particles with the triangles of cloths.
+//!
+//! A particle touches each layer of cloth at the point that is nearest to it: a local minimum of its distance from
+//! the triangles. These points are found for the paths that the particles are about to take. In each substep they
+//! move on across edges and around corners, so that a particle slides over the triangles without feeling them.
+
+mod contact;
+mod nearest;
+mod placed_tile;
+mod surface;
+mod triangle_tiles;
+
+use glam::Vec3;
+
+use super::box_tree::Search;
+use super::load::{self, LoadPairs};
+use super::order::{order_by_key, order_key};
+use super::tile_tree::TileTree;
+use crate::kernels::Kernels;
+use crate::kernels::lanes::PackedParticle;
+use crate::scene::model::Model;
+use crate::state::tear::Torn;
+use contact::SurfaceContact;
+use nearest::{Feature, Nearest};
+use surface::{Surface, View};
+pub(super) use triangle_tiles::SurfaceSearch;
+use triangle_tiles::TriangleTiles;
+
+/// Largest number of triangles that a particle never touches, on average. Further ones touch it as all others.
+const NEVER_PER_PARTICLE: usize = 128;
+
+/// Finds and resolves the contacts of particles with triangles. Empty in other modes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SurfaceContacts {
+    surface: Surface,
+    tiles: TriangleTiles,
+    /// Slots and triangles that are near each other at load.
+    load_pairs: LoadPairs,
+    candidate_count_max: usize,
+    candidates: Vec<Candidate>,
+    /// The candidates in the order of contact.
+    ordered: Vec<Candidate>,
+    /// The contacts of the running substep, in the order of contact.
+    near: Vec<SurfaceContact>,
+    /// Number of torn constraints and their hash, for which the torn triangles were looked up.
+    torn: (usize, u64),
+}
+
+/// A particle that can touch a layer of cloth within the step.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    slot: u32,
+    /// The triangle at the nearest point in the last substep.
+    triangle: u32,
+    key: u8,
+}
+
+impl SurfaceContacts {
+    /// Derives what depends on the scene and the contact distance. `candidate_count_max` limits the memory.
+    pub(super) fn new(
+        model: &Model,
+        particles: &[u32],
+        (thickness, kernels): (f32, Kernels),
+        candidate_count_max: usize,
+    ) -> Self {
+        let surface = Surface::new(model, particles, load::triangles(model, particles));
+        let mut tiles = TriangleTiles::new(surface.corners.len());
+        let tree = TileTree::at_load(model, particles, kernels);
+        let states: Vec<_> = particles.iter().map(|one| at_load(model, *one)).collect();
+        let search = SurfaceSearch {
+            tree: &tree,
+            states: &states,
+            particles,
+            span: 0.0,
+            distance: load::CONNECTED_REACH * thickness,
+            kernels,
+        };
+        let load_pairs = near_at_load(model, &surface, &mut tiles, (&search, thickness));
+        Self {
+            surface,
+            tiles,
+            load_pairs,
+            candidate_count_max,
+            candidates: Vec::with_capacity(candidate_count_max),
+            ordered: Vec::with_capacity(candidate_count_max),
+            near: Vec::with_capacity(candidate_count_max),
+            torn: (0, 0),
+        }
+    }
+
+    pub(super) fn are_on(&self) -> bool {
+        !self.surface.corners.is_empty()
+    }
+
+    /// Takes torn triangles out.
+    pub(super) fn begin_step(&mut self, torn: &Torn) {
+        let now = (torn.order().len(), torn.hash_seed());
+        if self.torn != now {
+            self.torn = now;
+            self.surface.follow_tears(torn.all());
+        }
+    }
+
+    pub(super) fn has_candidates(&self) -> bool {
+        !self.ordered.is_empty()
+    }
+
+    /// Slots of the particles that the running substep may have pushed.
+    pub(super) fn touched(&self) -> impl Iterator<Item = u32> + '_ {
+        self.near.iter().flat_map(|contact| contact.slots)
+    }
+
+    /// Finds the candidates, and orders them. Breaks if there are too many.
+    pub(super) fn find(&mut self, search: &SurfaceSearch<'_>) -> Search {
+        let Self { surface, tiles, load_pairs, candidates, candidate_count_max, .. } = self;
+        let particles = search.particles;
+        candidates.clear();
+        tiles.refit(surface, search);
+        let mut accept = |[slot, triangle]: [u32; 2]| {
+            if !comes_near(surface, search, [slot, triangle]) {
+                return Search::Continue(());
+            }
+            if candidates.len() == *candidate_count_max {
+                return Search::Break(());
+            }
+            let first = surface.corners[triangle as usize][0];
+            let key = order_key(particles[slot as usize], particles[first as usize]);
+            candidates.push(Candidate { slot, triangle, key });
+            Search::Continue(())
+        };
+        let except = |tiles| load_pairs.untouchable(tiles);
+        let found = tiles.search_nearest(search, surface, &except, &mut accept);
+        order_by_key(&self.candidates, &mut self.ordered, |candidate| candidate.key);
+        found
+    }
+
+    /// Pushes particles and triangles apart that are nearer than `thickness` at the end of the substep.
+    pub(super) fn push_apart(
+        &mut self,
+        states: &mut [PackedParticle],
+        (thickness, reach): (f32, f32),
+        friction: f32,
+    ) {
+        let Self { surface, load_pairs, ordered, near, .. } = self;
+        near.clear();
+        for Candidate { slot, triangle, .. } in ordered {
+            let view = View { particles: states, slot: *slot, time: 1.0 };
+            let nearest;
+            (*triangle, nearest) = surface.descend(*triangle, view);
+            if load_pairs.never_touch(*slot, *triangle) {
+                continue;
+            }
+            let distance = load_pairs.distance([*slot, *triangle], thickness);
+            if let Some((normal, height)) = separation(surface, *triangle, &nearest, view)
+                && height < reach * distance
+            {
+                let [a, b, c] = surface.corners[*triangle as usize];
+                let weights = nearest.weights;
+                near.push(SurfaceContact { slots: [*slot, a, b, c], weights, normal, distance });
+            }
+        }
+        for contact in &*near {
+            contact.push_apart(states, friction);
+        }
+    }
+}
+
+/// Returns the direction from the nearest point to the side on which the path of the viewer starts, and its distance along
+/// it. `None` if the particle is on the point.
+#[inline(always)]
+fn separation(
+    surface: &Surface,
+    triangle: u32,
+    nearest: &Nearest,
+    view: View<'_>,
+) -> Option<(Vec3, f32)> {
+    let corners = surface.place(triangle, view);
+    let apart = -nearest.mean(corners);
+    let direction = if nearest.feature == Feature::Face {
+        let before = surface.place(triangle, View { time: 0.0, ..view });
+        let is_below = across(before).dot(-nearest.mean(before)) < 0.0;
+        if is_below { -across(corners) } else { across(corners) }
+    } else {
+        apart
+    };
+    let normal = direction / direction.dot(direction).sqrt();
+    let height = normal.dot(apart);
+    // NaN if the direction is 0.
+    (height == height).then_some((normal, height))
+}
+
+/// A vector across a triangle.
+#[inline(always)]
+fn across([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a)
+}
+
+/// True if the nearest point of a triangle is a local minimum of the distance and comes near the particle.
+#[inline(always)]
+fn comes_near(surface: &Surface, search: &SurfaceSearch<'_>, [slot, triangle]: [u32; 2]) -> bool {
+    let SurfaceSearch { states, span, distance, .. } = *search;
+    let view = View { particles: states, slot, time: 0.0 };
+    let corners = surface.place(triangle, view);
+    let nearest = Nearest::new(corners);
+    let is_separate = surface.is_whole(triangle) && !surface.has_corner(triangle, slot);
+    if !is_separate
+        || surface.nearer(triangle, &nearest, view).is_some()
+        || !surface.is_first(triangle, nearest.feature)
+    {
+        return false;
+    }
+    let later = surface.place(triangle, View { time: span, ..view });
+    let apart = -nearest.mean(corners);
+    let length = apart.dot(apart).sqrt();
+    // The distance along the direction in which they are apart now.
+    let at_end = apart.dot(-nearest.mean(later)) / length;
+    let least = if at_end < length { at_end } else { length };
+    let is_free = states[slot as usize].0[3] > 0.0
+        || surface.corners[triangle as usize].iter().any(|one| states[*one as usize].0[3] > 0.0);
+    is_free && least < distance
+}
+
+fn at_load(model: &Model, particle: u32) -> PackedParticle {
+    let [x, y, z] = model.particles[particle as usize].position;
+    PackedParticle([x, y, z, 1.0, 0.0, 0.0, 0.0, 0.0])
+}
+
+/// Finds the particles and triangles that are near each other at load.
+fn near_at_load(
+    model: &Model,
+    surface: &Surface,
+    tiles: &mut TriangleTiles,
+    (search, thickness): (&SurfaceSearch<'_>, f32),
+) -> LoadPairs {
+    let SurfaceSearch { states, particles, distance, .. } = *search;
+    let bodies = load::bodies(model);
+    let body = |slot: u32| bodies[particles[slot as usize] as usize];
+    let count_max = NEVER_PER_PARTICLE * particles.len();
+    let (mut never, mut closer) = (Vec::new(), Vec::new());
+    tiles.refit(surface, search);
+    let _is_complete = tiles.search(search, &mut |pair| {
+        let [slot, triangle] = pair;
+        let corners = surface.place(triangle, View { particles: states, slot, time: 0.0 });
+        let apart = Nearest::new(corners).mean(corners).length();
+        let is_of_body = body(slot) == body(surface.corners[triangle as usize][0]);
+        if (is_of_body && apart < distance) || apart == 0.0 {
+            never.push(pair);
+        } else if apart < thickness {
+            closer.push((pair, apart));
+        }
+        let is_full = never.len() + closer.len() >= count_max;
+        if is_full { Search::Break(()) } else { Search::Continue(()) }
+    });
+    LoadPairs::from_pairs(never, closer, particles.len())
+}

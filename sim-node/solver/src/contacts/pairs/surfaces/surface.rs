@@ -1,0 +1,225 @@
+//! The triangles that particles touch, and what they share.
+
+use glam::Vec3;
+
+use super::nearest::{Feature, Nearest, SIDE_TOLERANCE, is_on_side_of, next};
+use crate::kernels::lanes::PackedParticle;
+use crate::scene::model::Model;
+
+/// Largest number of edges that a contact crosses in a substep. A particle that crosses more has left the contact
+/// anyway.
+const CROSSINGS_MAX: usize = 8;
+
+/// The triangles whose corners all take part in contacts, and their neighbours.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Surface {
+    /// By triangle: the slots of its corners. Neighbours at load are near each other in the list.
+    pub(super) corners: Vec<[u32; 3]>,
+    /// By triangle and edge: the other triangle at the edge. None at a border, and where more than two meet.
+    across: Vec<[Option<u32>; 3]>,
+    /// By slot: first entry in `fans`, and the end of the last one.
+    fan_starts: Vec<u32>,
+    /// The triangles around each slot, ascending.
+    fans: Vec<u32>,
+    /// By triangle and edge: the constraint between its ends.
+    sides: Vec<[Option<u32>; 3]>,
+    /// By triangle: true if a side is torn. Such a triangle touches nothing.
+    is_torn: Vec<bool>,
+}
+
+/// Where particles are, relative to one of them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a> {
+    pub(super) particles: &'a [PackedParticle],
+    pub(super) slot: u32,
+    /// Number of displacements after which it is.
+    pub(super) time: f32,
+}
+
+impl View<'_> {
+    #[inline(always)]
+    pub(super) fn at(&self, slot: u32) -> Vec3 {
+        let [PackedParticle(one), PackedParticle(origin)] =
+            [slot, self.slot].map(|slot| self.particles[slot as usize]);
+        let axis =
+            |axis| (one[axis] - origin[axis]) + self.time * (one[axis + 4] - origin[axis + 4]);
+        Vec3::new(axis(0), axis(1), axis(2))
+    }
+}
+
+impl Surface {
+    /// `triangles` have slots as corners. They are in the order of the tiles.
+    pub(super) fn new(model: &Model, particles: &[u32], triangles: Vec<[u32; 3]>) -> Self {
+        let sides = sides(model, particles, &triangles);
+        let mut surface = Self {
+            across: across(&triangles),
+            sides,
+            is_torn: vec![false; triangles.len()],
+            corners: triangles,
+            ..Self::default()
+        };
+        surface.set_fans(particles.len());
+        surface
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 triangles")]
+    fn set_fans(&mut self, slot_count: usize) {
+        let mut starts = vec![0_u32; slot_count + 1];
+        for slot in self.corners.iter().flatten() {
+            starts[*slot as usize + 1] += 1;
+        }
+        for slot in 0..slot_count {
+            starts[slot + 1] += starts[slot];
+        }
+        self.fans = vec![0; 3 * self.corners.len()];
+        let mut places = starts.clone();
+        for (triangle, corners) in (0_u32..).zip(&self.corners) {
+            for slot in corners {
+                let place = &mut places[*slot as usize];
+                self.fans[*place as usize] = triangle;
+                *place += 1;
+            }
+        }
+        self.fan_starts = starts;
+    }
+
+    /// Takes the triangles with torn sides out.
+    pub(super) fn follow_tears(&mut self, is_torn: &[bool]) {
+        for (is_triangle_torn, sides) in self.is_torn.iter_mut().zip(&self.sides) {
+            *is_triangle_torn =
+                sides.iter().flatten().any(|constraint| is_torn[*constraint as usize]);
+        }
+    }
+
+    pub(super) fn is_whole(&self, triangle: u32) -> bool {
+        !self.is_torn[triangle as usize]
+    }
+
+    pub(super) fn has_corner(&self, triangle: u32, slot: u32) -> bool {
+        self.corners[triangle as usize].contains(&slot)
+    }
+
+    /// The corners of a triangle in a view.
+    #[inline(always)]
+    pub(super) fn place(&self, triangle: u32, view: View<'_>) -> [Vec3; 3] {
+        self.corners[triangle as usize].map(|slot| view.at(slot))
+    }
+
+    /// Returns the whole triangles around a slot.
+    fn fan(&self, slot: u32) -> impl Iterator<Item = u32> + '_ {
+        let [first, end] = [slot, slot + 1].map(|slot| self.fan_starts[slot as usize] as usize);
+        self.fans[first..end].iter().copied().filter(|triangle| self.is_whole(*triangle))
+    }
+
+    /// Returns the other triangle at an edge, if it is whole.
+    fn neighbor(&self, triangle: u32, edge: usize) -> Option<u32> {
+        self.across[triangle as usize][edge].filter(|other| self.is_whole(*other))
+    }
+
+    /// Returns the third corner of the other triangle at an edge, if it is whole.
+    pub(super) fn opposite(&self, triangle: u32, edge: usize) -> Option<u32> {
+        let neighbor = self.neighbor(triangle, edge)?;
+        let corners = self.corners[triangle as usize];
+        let ends = [corners[edge], corners[next(edge)]];
+        self.corners[neighbor as usize].into_iter().find(|slot| !ends.contains(slot))
+    }
+
+    /// Returns a triangle around the nearest point of this one that leads nearer to the viewer, or `None` if the
+    /// point is a local minimum of the distance.
+    pub(super) fn nearer(&self, triangle: u32, nearest: &Nearest, view: View<'_>) -> Option<u32> {
+        let corners = self.corners[triangle as usize];
+        match nearest.feature {
+            Feature::Face => None,
+            Feature::Edge(edge) => {
+                let neighbor = self.neighbor(triangle, edge)?;
+                let ends = [corners[edge], corners[next(edge)]];
+                let opposite = self.corners[neighbor as usize]
+                    .into_iter()
+                    .find(|slot| !ends.contains(slot))?;
+                is_on_side_of(ends.map(|slot| view.at(slot)), view.at(opposite)).then_some(neighbor)
+            }
+            Feature::Corner(corner) => {
+                let slot = corners[corner];
+                let at = view.at(slot);
+                self.fan(slot).find(|triangle| {
+                    let others = self.corners[*triangle as usize].into_iter();
+                    others.filter(|other| *other != slot).any(|other| {
+                        let edge = view.at(other) - at;
+                        -edge.dot(at) > SIDE_TOLERANCE * edge.dot(edge)
+                    })
+                })
+            }
+        }
+    }
+
+    /// True if no earlier triangle has the same nearest point.
+    pub(super) fn is_first(&self, triangle: u32, feature: Feature) -> bool {
+        match feature {
+            Feature::Face => true,
+            Feature::Edge(edge) => self.neighbor(triangle, edge).is_none_or(|one| triangle < one),
+            Feature::Corner(corner) => {
+                self.fan(self.corners[triangle as usize][corner]).next() == Some(triangle)
+            }
+        }
+    }
+
+    /// Goes from a triangle to the one that is nearest to the viewer, across edges and around corners, as long as each is
+    /// nearer than the one before.
+    #[inline(always)]
+    pub(super) fn descend(&self, mut triangle: u32, view: View<'_>) -> (u32, Nearest) {
+        let mut nearest = Nearest::new(self.place(triangle, view));
+        for _ in 0..CROSSINGS_MAX {
+            let Some(nearer) = self.nearer(triangle, &nearest, view) else { break };
+            triangle = nearer;
+            nearest = Nearest::new(self.place(triangle, view));
+        }
+        (triangle, nearest)
+    }
+}
+
+/// An edge of a triangle.
+struct TriangleEdge {
+    /// Ascending.
+    ends: [u32; 2],
+    triangle: u32,
+    edge: usize,
+}
+
+fn edges(triangles: &[[u32; 3]]) -> impl Iterator<Item = TriangleEdge> + '_ {
+    (0_u32..).zip(triangles).flat_map(|(triangle, corners)| {
+        [0, 1, 2].map(|edge| {
+            let [a, b] = [corners[edge], corners[next(edge)]];
+            TriangleEdge { ends: [a.min(b), a.max(b)], triangle, edge }
+        })
+    })
+}
+
+/// By triangle and edge: the other triangle at an edge of exactly two.
+fn across(triangles: &[[u32; 3]]) -> Vec<[Option<u32>; 3]> {
+    let mut across = vec![[None; 3]; triangles.len()];
+    let mut edges: Vec<_> = edges(triangles).collect();
+    edges.sort_unstable_by_key(|one| (one.ends, one.triangle));
+    for group in edges.chunk_by(|a, b| a.ends == b.ends) {
+        if let [a, b] = group {
+            across[a.triangle as usize][a.edge] = Some(b.triangle);
+            across[b.triangle as usize][b.edge] = Some(a.triangle);
+        }
+    }
+    across
+}
+
+/// By triangle and edge: the first constraint between its ends.
+fn sides(model: &Model, particles: &[u32], triangles: &[[u32; 3]]) -> Vec<[Option<u32>; 3]> {
+    let ascending = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
+    let pairs = (0_u32..).zip(&model.constraints);
+    let mut pairs: Vec<_> = pairs.map(|(at, one)| (ascending([one.a, one.b]), at)).collect();
+    pairs.sort_unstable();
+    let mut sides = vec![[None; 3]; triangles.len()];
+    for TriangleEdge { ends, triangle, edge } in edges(triangles) {
+        let ends = ascending(ends.map(|slot| particles[slot as usize]));
+        let first = pairs.partition_point(|(pair, _)| *pair < ends);
+        let found = pairs.get(first).filter(|(pair, _)| *pair == ends);
+        sides[triangle as usize][edge] = found.map(|(_, constraint)| *constraint);
+    }
+    sides
+}
