@@ -54,6 +54,10 @@ fn settings_without_effect_cause_a_warning() {
         "tethers have no effect: no particle is pinned or anchored",
     );
     assert_warns(&format!("[wind]\nvelocity = [1, 0, 0]\n{PAIR}"), "the wind has no effect");
+    assert_warns(
+        &format!("[contact]\nmode = \"surfaces\"\nthickness = 0.1\n{PAIR}"),
+        "contact.mode = \"surfaces\" acts as \"particles\"",
+    );
     assert_warns(&format!("up = \"-y\"\n{PAIR}"), "up is \"-y\", but gravity points up, too");
     assert_warns(
         &format!("[solver]\norder = \"listed\"\n{PAIR}"),

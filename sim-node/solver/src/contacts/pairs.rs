@@ -16,7 +16,7 @@ mod surfaces;
 mod tile_tree;
 
 use box_tree::Search;
-use load::LoadPairs;
+use load::{LaneMasks, LoadPairs};
 use order::{order_by_key, order_key};
 use pair::Pair;
 use surfaces::{SurfaceContacts, SurfaceSearch};
@@ -224,11 +224,7 @@ impl ParticleContacts {
         } else if loose.iter().any(|lanes| *lanes != 0) {
             let except = |tiles: [u32; 2]| {
                 let [lanes, others] = tiles.map(|tile| loose[tile as usize]);
-                let mut masks = load_pairs.untouchable(tiles);
-                for (lane, mask) in masks.iter_mut().enumerate() {
-                    *mask |= if lanes & (1 << lane) != 0 { !others } else { !0 };
-                }
-                masks
+                without_corners(load_pairs.untouchable(tiles), lanes, others)
             };
             tree.search_except(query, kernels, &except, &mut accept)
         } else {
@@ -249,6 +245,15 @@ impl ParticleContacts {
             self.involved[slot as usize / TILE] |= 1 << (slot as usize % TILE);
         }
     }
+}
+
+/// Leaves all pairs out but those of particles without triangles, for which `lanes` and `others` have a bit.
+fn without_corners(left_out: LaneMasks, lanes: u16, others: u16) -> LaneMasks {
+    let mut left_out = left_out;
+    for (lane, mask) in left_out.iter_mut().enumerate() {
+        *mask |= if lanes & (1 << lane) != 0 { !others } else { !0 };
+    }
+    left_out
 }
 
 #[cfg(test)]

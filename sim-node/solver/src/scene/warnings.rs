@@ -23,6 +23,7 @@ impl Scene {
             settings::upside_down(self),
             settings::wind_without_surface(self, &model),
             settings::fast_contacts(self, &model),
+            settings::contact_without_surface(self, &model),
             constraints::tear_of_rigid(self, &model),
             constraints::tear_beyond_limit(self, &model),
             constraints::tear_by_rounding(self, &model),

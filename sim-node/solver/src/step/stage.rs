@@ -22,8 +22,8 @@ pub(crate) enum Stage {
     LimitStretch,
     /// Free particles beyond the length of a tether: d is shortened to it, one tether after the other, pulling only.
     Tether,
-    /// Particles nearer to each other than the contact distance: pushed apart along the line between them,
-    /// pair by pair in the order of a hash; friction on the tangential d.
+    /// Particles nearer to each other, or to a triangle, than the contact distance: pushed apart along the line between
+    /// them, one after the other in the order of a hash; friction on the tangential d.
     ParticleContact,
     /// Free particles inside a collider, or on a path through a mesh: pushed out along its normal; friction on the
     /// tangential d.

@@ -22,7 +22,7 @@ use crate::scene::model::Model;
 use crate::state::tear::Torn;
 use contact::SurfaceContact;
 use nearest::{Feature, Nearest};
-use surface::{Surface, View};
+use surface::{Found, Surface, View};
 pub(super) use triangle_tiles::SurfaceSearch;
 use triangle_tiles::TriangleTiles;
 
@@ -145,17 +145,17 @@ impl SurfaceContacts {
         near.clear();
         for Candidate { slot, triangle, .. } in ordered {
             let view = View { particles: states, slot: *slot, time: 1.0 };
-            let nearest;
-            (*triangle, nearest) = surface.descend(*triangle, view);
+            let found = surface.descend(*triangle, view);
+            *triangle = found.triangle;
             if load_pairs.never_touch(*slot, *triangle) {
                 continue;
             }
             let distance = load_pairs.distance([*slot, *triangle], thickness);
-            if let Some((normal, height)) = separation(surface, *triangle, &nearest, view)
-                && height < reach * distance
-            {
+            let (normal, height) = separation(surface, &found, view);
+            // False for NaN.
+            if height < reach * distance {
                 let [a, b, c] = surface.corners[*triangle as usize];
-                let weights = nearest.weights;
+                let weights = found.nearest.weights;
                 near.push(SurfaceContact { slots: [*slot, a, b, c], weights, normal, distance });
             }
         }
@@ -165,16 +165,11 @@ impl SurfaceContacts {
     }
 }
 
-/// Returns the direction from the nearest point to the side on which the path of the viewer starts, and its distance along
-/// it. `None` if the particle is on the point.
+/// Returns the direction from the nearest point to the side on which the path of the viewer starts, and its distance
+/// along it. NaN if the particle is on the point.
 #[inline(always)]
-fn separation(
-    surface: &Surface,
-    triangle: u32,
-    nearest: &Nearest,
-    view: View<'_>,
-) -> Option<(Vec3, f32)> {
-    let corners = surface.place(triangle, view);
+fn separation(surface: &Surface, found: &Found, view: View<'_>) -> (Vec3, f32) {
+    let Found { triangle, ref nearest, corners } = *found;
     let apart = -nearest.mean(corners);
     let direction = if nearest.feature == Feature::Face {
         let before = surface.place(triangle, View { time: 0.0, ..view });
@@ -184,9 +179,7 @@ fn separation(
         apart
     };
     let normal = direction / direction.dot(direction).sqrt();
-    let height = normal.dot(apart);
-    // NaN if the direction is 0.
-    (height == height).then_some((normal, height))
+    (normal, normal.dot(apart))
 }
 
 /// A vector across a triangle.

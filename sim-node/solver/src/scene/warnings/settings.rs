@@ -1,6 +1,7 @@
 //! Warnings about settings that do nothing, or the opposite of what they say.
 
 use crate::scene::definition::Scene;
+use crate::scene::definition::contact::ContactMode;
 use crate::scene::definition::settings::{ConstraintOrder, Up};
 use crate::scene::model::Model;
 
@@ -30,6 +31,12 @@ pub(super) fn upside_down(scene: &Scene) -> Option<String> {
 pub(super) fn wind_without_surface(scene: &Scene, model: &Model) -> Option<String> {
     (scene.wind.is_some() && model.triangles.is_empty())
         .then(|| "the wind has no effect: it acts on triangles, and the scene has none".to_owned())
+}
+
+pub(super) fn contact_without_surface(scene: &Scene, model: &Model) -> Option<String> {
+    (scene.contact.mode == ContactMode::Surfaces && model.triangles.is_empty()).then(|| {
+        "contact.mode = \"surfaces\" acts as \"particles\": the scene has no triangles".to_owned()
+    })
 }
 
 /// Largest fall in a substep, in contact distances, at which cloth does not pass through itself.

@@ -110,8 +110,8 @@ impl Edges {
     #[inline(always)]
     fn sides<W: Wide>(&self, group: usize, point: [f32; 3]) -> Sides {
         let (mut inside, mut neighbor_side) = (W::splat(0.0), W::splat(0.0));
-        for axis in 0..3 {
-            let arm = W::splat(point[axis]) - W::load(&self.from[axis][group], 0);
+        for (axis, at) in point.into_iter().enumerate() {
+            let arm = W::splat(at) - W::load(&self.from[axis][group], 0);
             inside = inside + arm * W::load(&self.inwards[axis][group], 0);
             neighbor_side = neighbor_side + arm * W::load(&self.neighbor_inwards[axis][group], 0);
         }

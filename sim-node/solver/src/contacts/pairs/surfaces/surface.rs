@@ -47,6 +47,14 @@ impl View<'_> {
     }
 }
 
+/// A triangle, and its nearest point.
+pub(super) struct Found {
+    pub(super) triangle: u32,
+    pub(super) nearest: Nearest,
+    /// Relative to the viewer.
+    pub(super) corners: [Vec3; 3],
+}
+
 impl Surface {
     /// `triangles` have slots as corners. They are in the order of the tiles.
     pub(super) fn new(model: &Model, particles: &[u32], triangles: Vec<[u32; 3]>) -> Self {
@@ -166,14 +174,19 @@ impl Surface {
     /// Goes from a triangle to the one that is nearest to the viewer, across edges and around corners, as long as each is
     /// nearer than the one before.
     #[inline(always)]
-    pub(super) fn descend(&self, mut triangle: u32, view: View<'_>) -> (u32, Nearest) {
-        let mut nearest = Nearest::new(self.place(triangle, view));
+    pub(super) fn descend(&self, triangle: u32, view: View<'_>) -> Found {
+        let mut found = self.find(triangle, view);
         for _ in 0..CROSSINGS_MAX {
-            let Some(nearer) = self.nearer(triangle, &nearest, view) else { break };
-            triangle = nearer;
-            nearest = Nearest::new(self.place(triangle, view));
+            let Some(nearer) = self.nearer(found.triangle, &found.nearest, view) else { break };
+            found = self.find(nearer, view);
         }
-        (triangle, nearest)
+        found
+    }
+
+    #[inline(always)]
+    fn find(&self, triangle: u32, view: View<'_>) -> Found {
+        let corners = self.place(triangle, view);
+        Found { triangle, nearest: Nearest::new(corners), corners }
     }
 }
 
