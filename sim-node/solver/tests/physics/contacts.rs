@@ -1,8 +1,10 @@
 //! Velocities after contacts: bounces, friction, moving surfaces, corners.
 
 mod cloths;
+mod crossings;
 mod meshes;
 mod particles;
+mod scenes;
 mod surfaces;
 
 use proptest::prelude::*;

@@ -2,30 +2,9 @@
 
 use sim_solver::Solver;
 
+use super::crossings::{dot, minus};
+
 pub(super) const SPACING: f64 = 0.02;
-
-pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|axis| a[axis] - b[axis])
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|axis| a[axis] * b[axis]).sum()
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// Returns true if a segment pierces a triangle (Moeller, Trumbore 1997).
-pub(super) fn pierces([from, to]: [[f64; 3]; 2], [u, v, w]: [[f64; 3]; 3]) -> bool {
-    let (along, first, second) = (minus(to, from), minus(v, u), minus(w, u));
-    let normal = cross(along, second);
-    let scale = dot(first, normal);
-    let start = minus(from, u);
-    let (b, c) = (dot(start, normal) / scale, dot(along, cross(start, first)) / scale);
-    let at = dot(second, cross(start, first)) / scale;
-    b >= 0.0 && c >= 0.0 && b + c <= 1.0 && at > 0.0 && at < 1.0
-}
 
 pub(super) fn positions(solver: &Solver) -> Vec<[f64; 3]> {
     solver.particles().iter().map(|one| one.position.map(f64::from)).collect()
@@ -34,28 +13,9 @@ pub(super) fn positions(solver: &Solver) -> Vec<[f64; 3]> {
 /// Returns the number of structural constraints that pierce a triangle without sharing a vertex with it: a
 /// measure of tangling.
 pub(super) fn crossings(solver: &Solver) -> usize {
-    let at = positions(solver);
-    let corners = |indices: [u32; 3]| indices.map(|index| at[index as usize]);
-    let bounds = |points: &[[f64; 3]]| {
-        let side = |pick: fn(f64, f64) -> f64| {
-            [0, 1, 2].map(|axis| points.iter().map(|point| point[axis]).reduce(pick).unwrap())
-        };
-        [side(f64::min), side(f64::max)]
-    };
-    let triangles: Vec<_> =
-        solver.triangles().iter().map(|one| (*one, bounds(&corners(*one)))).collect();
     let structural = solver.constraints().filter(|one| one.kind as u32 == 0);
-    let pierced = structural.map(|one| {
-        let ends = [one.a, one.b].map(|end| at[end as usize]);
-        let [min, max] = bounds(&ends);
-        let near = triangles.iter().filter(|(indices, [low, high])| {
-            (0..3).all(|axis| low[axis] <= max[axis] && min[axis] <= high[axis])
-                && !indices.contains(&one.a)
-                && !indices.contains(&one.b)
-        });
-        near.filter(|(indices, _)| pierces(ends, corners(*indices))).count()
-    });
-    pierced.sum()
+    let edges: Vec<_> = structural.map(|one| [one.a, one.b]).collect();
+    super::crossings::count(&positions(solver), &edges, solver.triangles())
 }
 
 /// Returns the smallest distance of two particles that no constraint of their body keeps close: those that

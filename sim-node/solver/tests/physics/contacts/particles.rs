@@ -6,9 +6,9 @@ use sim_solver::{ParameterValue, Scene, Solver};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{
-    GROUND, SPACING, crossings, dot, energy, heap, minus, nearest, on_a_ball, positions, rms_speed,
-    sheet,
+    GROUND, SPACING, crossings, energy, heap, nearest, on_a_ball, positions, rms_speed, sheet,
 };
+use super::crossings::{dot, minus};
 
 const CONTACT: &str = "[contact]\nmode = \"particles\"\n";
 
