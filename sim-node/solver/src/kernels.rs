@@ -9,6 +9,7 @@ pub(crate) mod lanes;
 mod portable;
 mod scalar;
 pub(crate) mod stream;
+pub(crate) mod vectors;
 pub(crate) mod worker_pool;
 
 use lanes::LaneWork;

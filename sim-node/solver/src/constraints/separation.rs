@@ -1,6 +1,7 @@
 //! The vector between two particles, its length without cancellation, and the correction along it.
 
 use crate::kernels::lanes::{Lanes, map_axes};
+use crate::kernels::vectors::{dot, sum};
 
 /// The vector r from particle a to particle b at the current point of a substep.
 #[derive(Clone, Copy)]
@@ -108,14 +109,4 @@ impl RestLength<f32> {
     pub(crate) fn new(length: f32) -> Self {
         Self { length, square: length * length }
     }
-}
-
-#[inline(always)]
-fn sum<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-#[inline(always)]
-fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -1,31 +1,43 @@
 //! Contacts: particles inside an obstacle are pushed out, slowed by friction, and bounced.
 
-use std::ops::Range;
+mod correction;
+mod response;
 
+use correction::{Advanced, corrected};
 use glam::Vec3;
+use response::{Contact, respond};
 
-use super::hit::Hit;
+use super::hit::{Hit, LaneHit};
 use super::mesh::near::NearMeshes;
 use super::mesh::{PUSHES_MAX, PlacedMesh, Stop};
 use super::obstacle::{Obstacle, Surface, rounding};
-use super::path::SubstepPath;
+use super::path::{LanePath, SubstepPath};
 use super::solid::Solid;
-use crate::kernels::lanes::Wide;
+use super::solid::lane_solid::LaneSolid;
+use crate::kernels::lanes::{Lanes8, Wide};
+use crate::kernels::vectors::{lane_of, load, masked, select, set_lane, store, sum};
 use crate::step::particle_block::ParticleBlock;
 use crate::step::substep::SubstepInputs;
 
 /// Contacts of a block of particles in one substep.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Contacts {
-    /// Particles in contact, in the order of their first contact.
-    touched: Vec<u32>,
-    is_touched: Vec<bool>,
-    /// By particle: the displacement that its contacts leave it, without bounces.
-    displacements: Vec<Vec3>,
-    /// By particle: the displacement that its bounces add. Friction ignores it, because the particle
-    /// does not make it in this substep.
-    bounces: Vec<Vec3>,
+    /// Groups of eight with a particle in contact, in the order of their first contact.
+    touched: Vec<usize>,
+    groups: Vec<GroupContacts>,
     near_meshes: NearMeshes,
+}
+
+/// Contacts of eight particles.
+#[derive(Debug, Clone, Default)]
+struct GroupContacts {
+    /// 1 for a particle in contact, else 0.
+    touched: Lanes8,
+    /// The displacement that the contacts of a particle leave it, without bounces.
+    displacements: [Lanes8; 3],
+    /// The displacement that its bounces add. Friction ignores it, because the particle does not make
+    /// it in this substep.
+    bounces: [Lanes8; 3],
 }
 
 /// Memory that the contacts of a worker need.
@@ -38,7 +50,7 @@ pub(crate) struct ContactRoom {
 }
 
 /// A particle inside an obstacle.
-struct Contact<'a> {
+struct SingleContact<'a> {
     index: usize,
     path: SubstepPath,
     hit: Hit,
@@ -51,12 +63,10 @@ struct Contact<'a> {
 
 impl Contacts {
     pub(crate) fn new(room: ContactRoom) -> Self {
-        let count = room.block_length;
+        let count = room.block_length.div_ceil(8);
         Self {
             touched: Vec::with_capacity(count),
-            is_touched: vec![false; count],
-            displacements: vec![Vec3::ZERO; count],
-            bounces: vec![Vec3::ZERO; count],
+            groups: vec![GroupContacts::default(); count],
             near_meshes: NearMeshes::new(room.near_mesh_count),
         }
     }
@@ -72,43 +82,116 @@ impl Contacts {
             if inputs.is_given_up() {
                 return;
             }
-            for group in 0..particles.count().div_ceil(8) {
-                if particles.may_touch::<W>(group, &obstacle.zone) {
-                    let last = particles.count().min(8 * group + 8);
-                    let range = 8 * group..last;
-                    match &obstacle.solid {
-                        // A long path through a large mesh takes milliseconds.
-                        Solid::Mesh(_) if inputs.is_given_up() => return,
-                        Solid::Mesh(mesh) => self.push_off(particles, range, obstacle, mesh),
-                        _ => self.push_out_of(particles, range, obstacle),
-                    }
+            match &obstacle.solid {
+                Solid::HalfSpace(half_space) => {
+                    self.push_groups_out::<W>(particles, obstacle, half_space);
                 }
+                Solid::Sphere(sphere) => self.push_groups_out::<W>(particles, obstacle, sphere),
+                Solid::Capsule { .. } | Solid::Box { .. } => {
+                    self.push_each_out::<W>(particles, obstacle);
+                }
+                Solid::Mesh(mesh) => self.push_each_off::<W>(particles, (obstacle, mesh), inputs),
             }
         }
     }
 
-    #[inline(never)]
-    fn push_out_of(
+    /// Pushes particles out of a solid, eight at a time.
+    #[inline(always)]
+    fn push_groups_out<W: Wide>(
         &mut self,
         particles: &mut impl ParticleBlock,
-        range: Range<usize>,
+        obstacle: &Obstacle,
+        solid: &impl LaneSolid,
+    ) {
+        let Obstacle { surface, zone, .. } = obstacle;
+        let (zero, reach) = (W::splat(0.0), obstacle.solid.reach());
+        for group in 0..particles.group_count() {
+            let path = particles.paths::<W>(group);
+            let is_free = zero.is_below(particles.inverse_masses::<W>(group));
+            if !W::any(W::both(solid.is_inside(&path), is_free)) {
+                continue;
+            }
+            let LaneHit { is_hit, normal, depth } = solid.hit(&path);
+            // Very far away, the rounding of a path can be larger than the margin of the zone. So each
+            // particle is tested alone, or the result would depend on the others of its group.
+            let may_meet = zone.may_meet(path.start, path.displacement);
+            let is_hit = W::both(W::both(is_hit, may_meet), is_free);
+            if !W::any(is_hit) {
+                continue;
+            }
+            let eight = &mut self.groups[group];
+            let touched = W::load(&eight.touched, 0);
+            let is_touched = zero.is_below(touched);
+            if !W::any(is_touched) {
+                self.touched.push(group);
+            }
+            let left = load(&eight.displacements);
+            let before = select::<W>(is_touched, left, path.displacement);
+            let (rounding, bounced) = (rounding(&path, reach), zero);
+            let predicted = particles.predicted_lanes::<W>(group);
+            let contact = Contact { path, normal, depth, rounding, before, predicted, bounced };
+            let response = respond(surface, &contact);
+            let displacement = select::<W>(is_hit, response.displacement, path.displacement);
+            particles.set_displacements(group, displacement);
+            store(select::<W>(is_hit, response.left, left), &mut eight.displacements);
+            let bounce = masked(response.bounce, is_hit);
+            store(sum(load::<W>(&eight.bounces), bounce), &mut eight.bounces);
+            W::select(is_hit, W::splat(1.0), touched).store(&mut eight.touched, 0);
+        }
+    }
+
+    /// Pushes particles out of a box or capsule, one by one.
+    #[inline(always)]
+    fn push_each_out<W: Wide>(&mut self, particles: &mut impl ParticleBlock, obstacle: &Obstacle) {
+        for group in 0..particles.group_count() {
+            if may_touch::<W>(particles, group, obstacle) {
+                self.push_group_out(particles, group, obstacle);
+            }
+        }
+    }
+
+    /// Pushes particles off a mesh, one by one.
+    #[inline(always)]
+    fn push_each_off<W: Wide>(
+        &mut self,
+        particles: &mut impl ParticleBlock,
+        (obstacle, mesh): (&Obstacle, &PlacedMesh),
+        inputs: &SubstepInputs<'_>,
+    ) {
+        for group in 0..particles.group_count() {
+            if !may_touch::<W>(particles, group, obstacle) {
+                continue;
+            }
+            // A long path through a large mesh takes milliseconds.
+            if inputs.is_given_up() {
+                return;
+            }
+            self.push_off(particles, group, obstacle, mesh);
+        }
+    }
+
+    /// Pushes the particles of a group out of a box or capsule, one by one.
+    #[inline(never)]
+    fn push_group_out(
+        &mut self,
+        particles: &mut impl ParticleBlock,
+        group: usize,
         obstacle: &Obstacle,
     ) {
-        for index in range {
+        for index in 8 * group..8 * group + 8 {
             if particles.inverse_mass(index) == 0.0 {
                 continue;
             }
             let path = particles.path(index);
             let (start, displacement) = (path.start.to_array(), path.displacement.to_array());
-            // Very far away, the rounding of a path can be larger than the margin of the zone. So each
-            // particle is tested alone, or the result would depend on the others of its group.
+            // As in `push_groups_out`.
             if obstacle.zone.may_meet(start, displacement)
                 && let Some(hit) = obstacle.solid.hit(&path)
             {
-                let rounding = rounding(&path, &obstacle.solid);
-                let surface = &obstacle.surface;
-                let bounced = 0.0;
-                self.resolve(particles, &Contact { index, path, hit, rounding, surface, bounced });
+                let rounding = rounding(&LanePath::from(&path), obstacle.solid.reach());
+                let (surface, bounced) = (&obstacle.surface, 0.0);
+                let contact = SingleContact { index, path, hit, rounding, surface, bounced };
+                self.resolve(particles, &contact);
             }
         }
     }
@@ -118,11 +201,11 @@ impl Contacts {
     fn push_off(
         &mut self,
         particles: &mut impl ParticleBlock,
-        range: Range<usize>,
+        group: usize,
         obstacle: &Obstacle,
         mesh: &PlacedMesh,
     ) {
-        for index in range {
+        for index in 8 * group..8 * group + 8 {
             let path = particles.path(index);
             let (start, displacement) = (path.start.to_array(), path.displacement.to_array());
             let is_near =
@@ -130,7 +213,7 @@ impl Contacts {
             if !is_near {
                 continue;
             }
-            let before = self.bounces[index];
+            let before = self.bounce(index);
             let mut room = mesh.room(&path);
             let number = particles.first() + index;
             let mut triangles = mesh.list(&mut self.near_meshes, number, &room);
@@ -151,8 +234,9 @@ impl Contacts {
                     }
                     Some(Stop::Push(hit)) => {
                         let (rounding, surface) = (mesh.rounding(), &obstacle.surface);
-                        let bounced = (self.bounces[index] - before).dot(hit.normal);
-                        let contact = Contact { index, path, hit, rounding, surface, bounced };
+                        let bounced = (self.bounce(index) - before).dot(hit.normal);
+                        let contact =
+                            SingleContact { index, path, hit, rounding, surface, bounced };
                         self.resolve(particles, &contact);
                     }
                 }
@@ -170,91 +254,81 @@ impl Contacts {
     ) {
         let displacement = mesh.held_displacement(path.start);
         particles.set_displacement(index, displacement);
-        self.displacements[index] = surface.displacement_at(path.start + displacement);
+        let left = surface.displacement_at((path.start + displacement).to_array());
+        set_lane(&mut self.groups[index / 8].displacements, index % 8, left);
         self.touch(index);
     }
 
-    /// Pushes one particle out, and computes the displacement with which it continues.
-    ///
-    /// Friction acts on the displacement: the tangential part is shortened by at most friction times
-    /// the depth gained in this substep, so that a particle on a slope stays at rest instead of
-    /// creeping (Unified Particle Physics: Macklin et al. 2014, section 6.1). Restitution acts on
-    /// the predicted approach (Detailed Rigid Body Simulation: Mueller et al. 2020, section 3.6).
-    /// The push itself adds no speed.
-    fn resolve(&mut self, particles: &mut impl ParticleBlock, contact: &Contact<'_>) {
-        let Contact { index, path, hit: Hit { normal, depth }, rounding, surface, bounced } =
+    /// Pushes one particle out.
+    fn resolve(&mut self, particles: &mut impl ParticleBlock, contact: &SingleContact<'_>) {
+        let SingleContact { index, path, hit: Hit { normal, depth }, rounding, surface, bounced } =
             *contact;
-        let carried = surface.displacement_at(path.start + path.displacement + normal * depth);
-        let before =
-            if self.is_touched[index] { self.displacements[index] } else { path.displacement };
-        let relative = before - carried;
-        let out = relative.dot(normal);
-        let sliding = relative - normal * out;
-        // A particle that rests above the surface by a rounding gains as much depth as one on it.
-        let depth_max = depth + rounding;
-        let gained = if -out < depth_max { -out } else { depth_max };
-        let friction = surface.friction * if gained > 0.0 { gained } else { 0.0 };
-        let slide = sliding.length();
-        let kept = if slide > friction { sliding * (1.0 - friction / slide) } else { Vec3::ZERO };
-        let approach = (carried - particles.predicted(index)).dot(normal);
-        let is_bouncing = approach > surface.rest_distance;
-        let bounce = if is_bouncing {
-            surface.restitution * surface.rebound(approach, depth, normal) - bounced
-        } else {
-            0.0
-        };
-        let displacement = path.displacement + normal * depth - (sliding - kept);
-        particles.set_displacement(index, displacement);
-        self.displacements[index] = carried + kept;
-        self.bounces[index] += normal * if bounce > 0.0 { bounce } else { 0.0 };
+        let (group, lane) = (index / 8, index % 8);
+        let eight = &mut self.groups[group];
+        let displacement = path.displacement.to_array();
+        let is_touched = eight.touched[lane] > 0.0;
+        let before = if is_touched { lane_of(&eight.displacements, lane) } else { displacement };
+        let response = respond(
+            surface,
+            &Contact {
+                path: LanePath::from(&path),
+                normal: normal.to_array(),
+                depth,
+                rounding,
+                before,
+                predicted: particles.predicted(index).to_array(),
+                bounced,
+            },
+        );
+        particles.set_displacement(index, Vec3::from_array(response.displacement));
+        set_lane(&mut eight.displacements, lane, response.left);
+        let bounce = sum(lane_of(&eight.bounces, lane), response.bounce);
+        set_lane(&mut eight.bounces, lane, bounce);
         self.touch(index);
+    }
+
+    /// Displacement that the bounces of a particle add.
+    fn bounce(&self, index: usize) -> Vec3 {
+        Vec3::from_array(lane_of(&self.groups[index / 8].bounces, index % 8))
     }
 
     fn touch(&mut self, index: usize) {
-        if !std::mem::replace(&mut self.is_touched[index], true) {
-            #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
-            self.touched.push(index as u32);
+        let (group, lane) = (index / 8, index % 8);
+        if self.groups[group].touched == [0.0; 8] {
+            self.touched.push(group);
         }
+        self.groups[group].touched[lane] = 1.0;
     }
 
     /// After the particles have advanced: moves those in contact out of the obstacles by the
     /// rounding that is left, and gives them the displacements with which they continue.
     #[inline(always)]
-    pub(crate) fn correct_touched(
+    pub(crate) fn correct_touched<W: Wide>(
         &mut self,
         particles: &mut impl ParticleBlock,
         inputs: &SubstepInputs<'_>,
     ) {
-        if !self.touched.is_empty() {
-            self.correct_all_touched(particles, inputs);
-        }
-    }
-
-    #[inline(never)]
-    fn correct_all_touched(
-        &mut self,
-        particles: &mut impl ParticleBlock,
-        inputs: &SubstepInputs<'_>,
-    ) {
-        for Obstacle { solid, .. } in inputs.obstacles {
+        for group in self.touched.drain(..) {
             if inputs.is_given_up() {
                 return;
             }
-            for index in self.touched.iter().map(|index| *index as usize) {
-                let path = particles.path(index);
-                let at_end = SubstepPath { displacement: Vec3::ZERO, ..path };
-                let Some(hit) = solid.hit(&at_end) else {
-                    continue;
-                };
-                if hit.depth <= rounding(&path, solid) {
-                    particles.set_position(index, path.start + hit.normal * hit.depth);
-                }
+            let eight = std::mem::take(&mut self.groups[group]);
+            let touched = W::splat(0.0).is_below(W::load(&eight.touched, 0));
+            let mut path = particles.paths::<W>(group);
+            for Obstacle { solid, .. } in inputs.obstacles {
+                path.start = corrected(solid, &Advanced { path, touched: &eight.touched });
             }
-        }
-        for index in self.touched.drain(..).map(|index| index as usize) {
-            let displacement = self.displacements[index] + std::mem::take(&mut self.bounces[index]);
-            particles.set_displacement(index, displacement);
-            self.is_touched[index] = false;
+            let after = sum(load(&eight.displacements), load(&eight.bounces));
+            path.displacement = select::<W>(touched, after, path.displacement);
+            particles.set_paths(group, &path);
         }
     }
+}
+
+/// True if a free particle of a group may enter the zone of an obstacle.
+#[inline(always)]
+fn may_touch<W: Wide>(particles: &impl ParticleBlock, group: usize, obstacle: &Obstacle) -> bool {
+    let LanePath { start, displacement } = particles.paths::<W>(group);
+    let is_free = W::splat(0.0).is_below(particles.inverse_masses(group));
+    W::any(W::both(obstacle.zone.may_meet(start, displacement), is_free))
 }

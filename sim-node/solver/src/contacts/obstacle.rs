@@ -4,9 +4,11 @@ use glam::Vec3;
 
 use super::colliders::Collider;
 use super::contact_substep::{ContactSubstep, Interval};
-use super::path::SubstepPath;
+use super::path::{LanePath, SubstepPath};
 use super::solid::{Solid, solids};
 use super::zone::Zone;
+use crate::kernels::lanes::Lanes;
+use crate::kernels::vectors::{cross, difference, dot, scaled, splat, sum, sum_of_magnitudes};
 use crate::scene::definition::collider::SceneCollider;
 
 /// A collider in one substep, or one face of bounds.
@@ -68,14 +70,17 @@ pub(crate) fn depth_at_load(
     let path = SubstepPath { start: Vec3::from_array(position), displacement: Vec3::ZERO };
     let solids = solids(&Collider::new(0, scene), &substep);
     let mut hits = solids.iter().flatten().filter_map(|solid| Some((solid, solid.hit(&path)?)));
-    let (_, hit) = hits.find(|(solid, hit)| hit.depth > rounding(&path, solid))?;
+    let (_, hit) =
+        hits.find(|(solid, hit)| hit.depth > rounding(&(&path).into(), solid.reach()))?;
     Some(hit.depth)
 }
 
 /// Bound on the rounding of a depth after a few operations on the coordinates of a path and a solid.
-pub(crate) fn rounding(path: &SubstepPath, solid: &Solid) -> f32 {
-    let size = path.start.abs().element_sum() + path.displacement.abs().element_sum();
-    4.0 * f32::EPSILON * (size + solid.reach())
+/// `reach` is that of the solid.
+#[inline(always)]
+pub(crate) fn rounding<L: Lanes>(path: &LanePath<L>, reach: f32) -> L {
+    let size = sum_of_magnitudes(path.start) + sum_of_magnitudes(path.displacement);
+    L::splat(4.0 * f32::EPSILON) * (size + L::splat(reach))
 }
 
 impl Surface {
@@ -99,16 +104,21 @@ impl Surface {
     /// the displacement along n and x the height: the energy that semi-implicit Euler keeps. From
     /// y = -A at the depth p to y on the surface, y = G / 2 + sqrt((A + G / 2)^2 - 2 G p), which is written
     /// here without cancellation. With y = A, each bounce loses G A / 2 on average.
-    pub(crate) fn rebound(&self, approach: f32, depth: f32, normal: Vec3) -> f32 {
-        let fall = -self.fall.dot(normal);
-        let depth = if depth < approach { depth } else { approach };
-        let at_depth = approach + fall / 2.0;
-        let at_surface = (at_depth * at_depth - 2.0 * fall * depth).sqrt();
-        approach + fall * (1.0 - 2.0 * depth / (at_depth + at_surface))
+    #[inline(always)]
+    pub(crate) fn rebound<L: Lanes>(&self, approach: L, depth: L, normal: [L; 3]) -> L {
+        let (one, two) = (L::splat(1.0), L::splat(2.0));
+        let fall = -dot(splat(self.fall.to_array()), normal);
+        let depth = L::select(depth.is_below(approach), depth, approach);
+        let at_depth = approach + fall / two;
+        let at_surface = (at_depth * at_depth - two * fall * depth).sqrt();
+        approach + fall * (one - two * depth / (at_depth + at_surface))
     }
 
     /// Displacement of the collider's material at a point in the substep.
-    pub(crate) fn displacement_at(&self, point: Vec3) -> Vec3 {
-        (self.linear + self.angular.cross(point - self.pivot)) * self.h
+    #[inline(always)]
+    pub(crate) fn displacement_at<L: Lanes>(&self, point: [L; 3]) -> [L; 3] {
+        let arm = difference(point, splat(self.pivot.to_array()));
+        let turning = cross(splat(self.angular.to_array()), arm);
+        scaled(sum(splat(self.linear.to_array()), turning), L::splat(self.h))
     }
 }

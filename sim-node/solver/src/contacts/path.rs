@@ -10,3 +10,18 @@ pub(crate) struct SubstepPath {
     /// d.
     pub(crate) displacement: Vec3,
 }
+
+/// The paths of one particle or eight.
+#[derive(Clone, Copy)]
+pub(crate) struct LanePath<L> {
+    /// x.
+    pub(crate) start: [L; 3],
+    /// d.
+    pub(crate) displacement: [L; 3],
+}
+
+impl From<&SubstepPath> for LanePath<f32> {
+    fn from(path: &SubstepPath) -> Self {
+        Self { start: path.start.to_array(), displacement: path.displacement.to_array() }
+    }
+}

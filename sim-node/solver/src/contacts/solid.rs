@@ -1,8 +1,11 @@
 //! Solids: where a path through a collider leaves it.
 
+pub(crate) mod lane_solid;
+
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
+use lane_solid::{HalfSpace, LaneSolid, SolidSphere};
 
 use super::colliders::Collider;
 use super::contact_substep::ContactSubstep;
@@ -17,15 +20,8 @@ use super::zone::Zone;
 /// A convex solid, a half-space or a mesh, at its pose at the end of a substep.
 #[derive(Debug, Clone)]
 pub(crate) enum Solid {
-    /// The solid lies where normal x < offset.
-    HalfSpace {
-        normal: Vec3,
-        offset: f32,
-    },
-    Sphere {
-        center: Vec3,
-        radius: f32,
-    },
+    HalfSpace(HalfSpace),
+    Sphere(SolidSphere),
     Capsule {
         ends: [Vec3; 2],
         radius: f32,
@@ -50,8 +46,12 @@ pub(crate) fn solids(collider: &Collider, substep: &ContactSubstep) -> [Option<S
         other => PlacedFrame::new(other.center(), Quat::IDENTITY),
     };
     match collider.shape_at(substep.interval.end) {
-        PlacedShape::Plane { normal, offset } => one(Solid::HalfSpace { normal, offset }),
-        PlacedShape::Sphere { center, radius } => one(Solid::Sphere { center, radius }),
+        PlacedShape::Plane { normal, offset } => {
+            one(Solid::HalfSpace(HalfSpace { normal, offset }))
+        }
+        PlacedShape::Sphere { center, radius } => {
+            one(Solid::Sphere(SolidSphere { center, radius, pole: Vec3::Y }))
+        }
         PlacedShape::Capsule { a, b, radius } => one(Solid::Capsule { ends: [a, b], radius }),
         PlacedShape::Box { center, half_extents, rotation } => one(Solid::Box {
             solid: SolidBox::new(half_extents.to_array(), substep.axis_count(), center),
@@ -68,8 +68,8 @@ pub(crate) fn solids(collider: &Collider, substep: &ContactSubstep) -> [Option<S
         }
         PlacedShape::Bounds { min, max } => {
             let faces = |axis: usize, normal: Vec3| {
-                let low = Solid::HalfSpace { normal, offset: min[axis] };
-                let high = Solid::HalfSpace { normal: -normal, offset: -max[axis] };
+                let face = |normal, offset| Solid::HalfSpace(HalfSpace { normal, offset });
+                let (low, high) = (face(normal, min[axis]), face(-normal, -max[axis]));
                 if axis < substep.axis_count() { [Some(low), Some(high)] } else { [None, None] }
             };
             let [a, b] = faces(0, Vec3::X);
@@ -86,8 +86,8 @@ impl Solid {
     #[inline(always)]
     pub(crate) fn hit(&self, path: &SubstepPath) -> Option<Hit> {
         match self {
-            Self::HalfSpace { normal, offset } => hit_half_space(path, *normal, *offset),
-            Self::Sphere { center, radius } => hit_sphere(path, *center, *radius, Vec3::Y),
+            Self::HalfSpace(half_space) => half_space.hit(&path.into()).to_hit(),
+            Self::Sphere(sphere) => sphere.hit(&path.into()).to_hit(),
             Self::Capsule { ends, radius } => hit_capsule(path, *ends, *radius),
             Self::Box { solid, now, before } => {
                 let (start, end) = (before.local(path.start), now.local_end(path));
@@ -102,8 +102,10 @@ impl Solid {
     pub(crate) fn zone(&self) -> Zone {
         let reach = self.reach();
         match self {
-            Self::HalfSpace { normal, offset } => Zone::Below { normal: *normal, offset: *offset },
-            Self::Sphere { center, radius } => {
+            Self::HalfSpace(HalfSpace { normal, offset }) => {
+                Zone::Below { normal: *normal, offset: *offset }
+            }
+            Self::Sphere(SolidSphere { center, radius, .. }) => {
                 Zone::around([*center; 2], Vec3::splat(*radius), reach)
             }
             Self::Capsule { ends, radius } => Zone::around(*ends, Vec3::splat(*radius), reach),
@@ -124,8 +126,8 @@ impl Solid {
     /// Magnitude of its coordinates, which bounds their rounding.
     pub(crate) fn reach(&self) -> f32 {
         match self {
-            Self::HalfSpace { offset, .. } => offset.abs(),
-            Self::Sphere { center, radius } => center.abs().element_sum() + radius,
+            Self::HalfSpace(HalfSpace { offset, .. }) => offset.abs(),
+            Self::Sphere(SolidSphere { center, radius, .. }) => center.abs().element_sum() + radius,
             Self::Capsule { ends: [a, b], radius } => {
                 a.abs().element_sum() + b.abs().element_sum() + radius
             }
@@ -133,28 +135,6 @@ impl Solid {
             Self::Mesh(mesh) => mesh.reach(),
         }
     }
-}
-
-/// The displacement is added last: near the surface the rest is exact, so the displacement keeps
-/// its digits.
-#[inline(always)]
-fn hit_half_space(path: &SubstepPath, normal: Vec3, offset: f32) -> Option<Hit> {
-    let height = (normal.dot(path.start) - offset) + normal.dot(path.displacement);
-    (height < 0.0).then_some(Hit { normal, depth: -height })
-}
-
-/// `fallback` is the normal at the exact center.
-fn hit_sphere(path: &SubstepPath, center: Vec3, radius: f32, fallback: Vec3) -> Option<Hit> {
-    let arm = (path.start - center) + path.displacement;
-    let square = arm.dot(arm);
-    // NaN compares false and touches nothing.
-    let is_inside = square < radius * radius;
-    if !is_inside {
-        return None;
-    }
-    let distance = square.sqrt();
-    let normal = if square < f32::MIN_POSITIVE { fallback } else { arm / distance };
-    (distance < radius).then_some(Hit { normal, depth: radius - distance })
 }
 
 #[inline(never)]
@@ -167,6 +147,6 @@ fn hit_capsule(path: &SubstepPath, [a, b]: [Vec3; 2], radius: f32) -> Option<Hit
     // Perpendicular to the axis, and within the plane of a 2-D scene.
     let across = Vec3::new(-axis.y, axis.x, 0.0);
     let has_side = across.dot(across) >= f32::MIN_POSITIVE;
-    let fallback = if has_side { across.normalize() } else { Vec3::X };
-    hit_sphere(path, a + axis * share, radius, fallback)
+    let pole = if has_side { across.normalize() } else { Vec3::X };
+    SolidSphere { center: a + axis * share, radius, pole }.hit(&path.into()).to_hit()
 }

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use crate::kernels::lanes::{Lanes, map_axes};
+use crate::kernels::lanes::Lanes;
+use crate::kernels::vectors::{dot, splat};
 
 /// Conservative bound of a solid: a path that misses the zone cannot hit the solid.
 #[derive(Debug, Clone, Copy)]
@@ -30,25 +31,27 @@ impl Zone {
     #[inline(always)]
     pub(crate) fn may_meet<L: Lanes>(&self, x: [L; 3], d: [L; 3]) -> L::Mask {
         match self {
-            // The same arithmetic as in `hit_half_space`.
+            // The same arithmetic as in `HalfSpace::height`.
             Self::Below { normal, offset } => {
-                let normal = map_axes(normal.to_array(), L::splat);
-                let along = |vector: [L; 3]| {
-                    normal[0] * vector[0] + normal[1] * vector[1] + normal[2] * vector[2]
-                };
-                ((along(x) - L::splat(*offset)) + along(d)).is_below(L::splat(0.0))
+                let normal = splat(normal.to_array());
+                ((dot(normal, x) - L::splat(*offset)) + dot(normal, d)).is_below(L::splat(0.0))
             }
             Self::Around { min, max } => {
-                let meets = |axis: usize| {
-                    let (start, end) = (x[axis], x[axis] + d[axis]);
-                    let is_down = end.is_below(start);
-                    let low = L::select(is_down, end, start);
-                    let high = L::select(is_down, start, end);
-                    let (min, max) = (L::splat(min[axis]), L::splat(max[axis]));
-                    L::both(low.is_at_most(max), min.is_at_most(high))
-                };
-                L::both(L::both(meets(0), meets(1)), meets(2))
+                let meets_x = meets(x[0], d[0], [min.x, max.x]);
+                let meets_y = meets(x[1], d[1], [min.y, max.y]);
+                let meets_z = meets(x[2], d[2], [min.z, max.z]);
+                L::both(L::both(meets_x, meets_y), meets_z)
             }
         }
     }
+}
+
+/// True if the path from `start` by `displacement` may enter a range, on one axis. (As a closure it would
+/// compile to a call.)
+#[inline(always)]
+fn meets<L: Lanes>(start: L, displacement: L, [min, max]: [f32; 2]) -> L::Mask {
+    let end = start + displacement;
+    let is_down = end.is_below(start);
+    let (low, high) = (L::select(is_down, end, start), L::select(is_down, start, end));
+    L::both(low.is_at_most(L::splat(max)), L::splat(min).is_at_most(high))
 }

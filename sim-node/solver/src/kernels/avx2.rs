@@ -295,6 +295,16 @@ impl Wide for Avx2 {
     }
 
     #[inline(always)]
+    fn set_positions(particles: &mut [PackedParticle; 8], positions: [Self; 3]) {
+        let rows = Self::rows(positions);
+        let [a, b, c, d, e, f, g, h] = particles;
+        for (row, [low, high]) in rows.into_iter().zip([[a, e], [b, f], [c, g], [d, h]]) {
+            row.set_position(low);
+            Self::high_halves(row, row).set_position(high);
+        }
+    }
+
+    #[inline(always)]
     unsafe fn differences(
         particles: &[Cell<PackedParticle>],
         a: &[u32; 8],
@@ -395,6 +405,13 @@ impl Avx2 {
     fn set_second(self, particle: &mut PackedParticle) {
         let before = Self::load(&particle.0, 0);
         Self(avx2!(_mm256_blend_ps::<0xF0>(before.0, self.0))).store(&mut particle.0, 0);
+    }
+
+    /// Stores the first three lanes.
+    #[inline(always)]
+    fn set_position(self, particle: &mut PackedParticle) {
+        let before = Self::load(&particle.0, 0);
+        Self(avx2!(_mm256_blend_ps::<0b0111>(before.0, self.0))).store(&mut particle.0, 0);
     }
 
     #[inline(always)]

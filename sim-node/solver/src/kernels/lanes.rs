@@ -71,6 +71,7 @@ pub(crate) trait Wide: Lanes {
     /// Transposes eight particles to columns: x, y, z and inverse mass, then the second half.
     fn columns(particles: &[PackedParticle; 8]) -> [[Self; 4]; 2];
     fn set_displacements(particles: &mut [PackedParticle; 8], displacements: [Self; 3]);
+    fn set_positions(particles: &mut [PackedParticle; 8], positions: [Self; 3]);
     /// Component-wise `b - a` for eight pairs: x, y, z of the positions, then of the displacements.
     ///
     /// # Safety

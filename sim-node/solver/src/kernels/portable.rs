@@ -228,6 +228,15 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
+    fn set_positions(particles: &mut [PackedParticle; 8], positions: [Self; 3]) {
+        for (lane, particle) in particles.iter_mut().enumerate() {
+            for (axis, along) in positions.iter().enumerate() {
+                particle.0[axis] = along.0[lane];
+            }
+        }
+    }
+
+    #[inline(always)]
     unsafe fn differences(
         particles: &[Cell<PackedParticle>],
         a: &[u32; 8],

@@ -21,7 +21,7 @@ pub(crate) fn run_stage<W: Wide>(
         Stage::Contact => contacts.push_out::<W>(particles, inputs),
         Stage::Advance => {
             particles.advance::<W>();
-            contacts.correct_touched(particles, inputs);
+            contacts.correct_touched::<W>(particles, inputs);
         }
         Stage::Drive
         | Stage::Wind

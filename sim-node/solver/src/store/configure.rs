@@ -1,6 +1,6 @@
 //! Derives the constraints of a store from the scene, the parameters and the tears.
 
-use super::graph::block::BLOCK_PARTICLES;
+use super::graph::block::BLOCK_GROUPS;
 use super::layout::{Configured, Location, SceneFields};
 use super::{ParticleStore, find_sheet};
 use crate::constraints::bends::families::BendFamily;
@@ -132,7 +132,7 @@ impl ParticleStore {
         }
         self.locate_constraints(model);
         let widest = self.sheets.iter().map(|sheet| sheet.columns as usize).max();
-        let largest = BLOCK_PARTICLES.min(self.graph.particle_count()).max(widest.unwrap_or(0));
+        let largest = (8 * BLOCK_GROUPS).min(self.graph.particle_count()).max(widest.unwrap_or(0));
         self.contact_room.block_length = if scene.colliders { largest } else { 0 };
         self.workers.reserve_contacts(self.contact_room);
         self.is_allocated = true;

@@ -8,7 +8,7 @@ mod indices;
 
 use batch::Batch;
 use bends::GraphBends;
-use block::{BLOCK_PARTICLES, BlockWork, GraphBlock, PackedTether};
+use block::{BLOCK_GROUPS, BlockWork, GraphBlock, PackedTether};
 use group::{ConstraintGroup, part_count};
 use indices::find_particle;
 
@@ -23,6 +23,7 @@ use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::{ConstraintParameters, PassSoftness};
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{Lanes8, PackedParticle};
+use crate::kernels::vectors::set_lane;
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
@@ -32,14 +33,16 @@ use crate::step::substep::SubstepInputs;
 /// Every particle and constraint outside of sheets.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Graph {
-    /// The particles, and one more for the padding of lane groups, which nothing moves.
+    /// The particles in groups of eight, with at least one more for the padding of lane groups. Nothing moves
+    /// the padding.
     particles: Vec<PackedParticle>,
     /// By particle: its index in the scene, ascending.
     indices: Vec<u32>,
-    /// By particle: the predicted displacement; empty in scenes without colliders.
-    predicted: Vec<[f32; 3]>,
-    /// By particle: the velocity that the wind adds in a substep; empty in scenes without wind.
-    gains: Vec<[f32; 3]>,
+    /// By group of eight particles: the predicted displacements; empty in scenes without colliders.
+    predicted: Vec<[Lanes8; 3]>,
+    /// By group of eight particles: the velocities that the wind adds in a substep; empty in scenes without
+    /// wind.
+    gains: Vec<[Lanes8; 3]>,
     /// By particle: its tethers; empty in scenes without tethers.
     tethers: Vec<PackedTether>,
     groups: Vec<ConstraintGroup>,
@@ -75,7 +78,8 @@ impl Graph {
         locations: &mut [Location],
     ) -> Self {
         let mut graph = Self { indices, ..Self::default() };
-        refill(&mut graph.particles, graph.indices.len() + 1, PackedParticle::default());
+        let length = (graph.indices.len() + 1).next_multiple_of(8);
+        refill(&mut graph.particles, length, PackedParticle::default());
         for (group, range) in order.groups.iter().enumerate() {
             let links: Vec<_> = order.indices[range.clone()]
                 .iter()
@@ -136,6 +140,11 @@ impl Graph {
         self.indices.len()
     }
 
+    /// Number of groups of eight that contain particles.
+    fn group_count(&self) -> usize {
+        self.particle_count().div_ceil(8)
+    }
+
     /// Sets the fields in use, and the softness of constraints that have none of their own.
     pub(crate) fn use_fields(&mut self, layout: Layout, softness: PassSoftness) {
         (self.layout, self.softness) = (layout, softness);
@@ -147,10 +156,10 @@ impl Graph {
     /// Allocates the fields of the layout. Every constraint and bend is inactive afterwards.
     pub(crate) fn allocate(&mut self) {
         let Layout { constraints, scene, .. } = self.layout;
-        let count = |is_there: bool| if is_there { self.indices.len() } else { 0 };
         let SceneFields { colliders, wind, tethers, bend_multipliers, .. } = scene;
-        self.predicted = vec![[0.0; 3]; count(colliders)];
-        self.gains = vec![[0.0; 3]; count(wind)];
+        let of_groups =
+            |is_there: bool| vec![[[0.0; 8]; 3]; if is_there { self.group_count() } else { 0 }];
+        (self.predicted, self.gains) = (of_groups(colliders), of_groups(wind));
         let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
         self.tethers = vec![none; tethers * self.indices.len()];
         self.bends.allocate(bend_multipliers);
@@ -248,12 +257,13 @@ impl Graph {
         stages: &[ScheduledStage],
         inputs: &SubstepInputs<'_>,
     ) {
-        let (count, kernels) = (self.particle_count(), workers.kernels);
-        let length =
-            count.div_ceil(part_count(count, workers.count())).next_multiple_of(BLOCK_PARTICLES);
+        let (count, kernels) = (self.group_count(), workers.kernels);
+        let part_count = part_count(self.particle_count(), workers.count());
+        let length = count.div_ceil(part_count).next_multiple_of(BLOCK_GROUPS);
+        let (groups, _) = self.particles.as_chunks_mut();
         let all = GraphBlock {
             first: 0,
-            particles: &mut self.particles[..count],
+            particles: &mut groups[..count],
             predicted: &mut self.predicted,
             gains: if self.layout.is_wind_used { &self.gains } else { &[] },
             tethers: &self.tethers,
@@ -261,7 +271,7 @@ impl Graph {
         };
         let parts = all.chunks(length).map(Some);
         let work = |part: &mut Option<GraphBlock<'_>>, scratch: &mut WorkerScratch| {
-            for block in part.take().into_iter().flat_map(|part| part.chunks(BLOCK_PARTICLES)) {
+            for block in part.take().into_iter().flat_map(|part| part.chunks(BLOCK_GROUPS)) {
                 if inputs.is_given_up() {
                     return;
                 }
@@ -333,7 +343,7 @@ impl Graph {
 
     /// Sets the velocity that the wind adds in the running substep.
     pub(crate) fn set_wind(&mut self, index: usize, gain: [f32; 3]) {
-        self.gains[index] = gain;
+        set_lane(&mut self.gains[index / 8], index % 8, gain);
     }
 
     pub(crate) fn tether_mut(&mut self, index: usize, slot: usize) -> &mut PackedTether {

@@ -5,18 +5,17 @@ use glam::Vec3;
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::contact::Contacts;
-use crate::contacts::path::SubstepPath;
-use crate::contacts::zone::Zone;
-use crate::kernels::lanes::{LaneWork, PackedParticle, Wide, axes};
+use crate::contacts::path::{LanePath, SubstepPath};
+use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide};
+use crate::kernels::vectors::{lane_of, load, store};
 use crate::step::particle_block::ParticleBlock;
 use crate::step::particle_stages::run_stage;
 use crate::step::prediction::Prediction;
 use crate::step::schedule::ScheduledStage;
 use crate::step::substep::SubstepInputs;
 
-/// Particles of a block: few enough to stay in the cache from stage to stage, and a multiple of
-/// eight.
-pub(crate) const BLOCK_PARTICLES: usize = 256;
+/// Groups of eight particles of a block: few enough to stay in the cache from stage to stage.
+pub(crate) const BLOCK_GROUPS: usize = 32;
 
 /// The tether of a packed particle.
 #[derive(Debug, Clone, Copy)]
@@ -27,22 +26,23 @@ pub(crate) struct PackedTether {
     pub(crate) length: f32,
 }
 
-/// Consecutive particles of the graph, with the arrays that only some scenes have; those are empty
-/// in other scenes.
+/// Consecutive particles of the graph in groups of eight, with the arrays that only some scenes have;
+/// those are empty in other scenes. The last group may have padding.
 #[derive(Debug)]
 pub(crate) struct GraphBlock<'a> {
     /// Index of the first particle in the graph.
     pub(crate) first: usize,
-    pub(crate) particles: &'a mut [PackedParticle],
-    pub(crate) predicted: &'a mut [[f32; 3]],
-    pub(crate) gains: &'a [[f32; 3]],
+    pub(crate) particles: &'a mut [[PackedParticle; 8]],
+    pub(crate) predicted: &'a mut [[Lanes8; 3]],
+    pub(crate) gains: &'a [[Lanes8; 3]],
+    /// By particle, without padding.
     pub(crate) tethers: &'a [PackedTether],
     /// Tethers of each particle.
     pub(crate) tether_count: usize,
 }
 
 impl<'a> GraphBlock<'a> {
-    /// Divides the particles into blocks of `count`, the last one shorter.
+    /// Divides the particles into blocks of `count` groups, the last one shorter.
     pub(crate) fn chunks(self, count: usize) -> impl Iterator<Item = GraphBlock<'a>> {
         let mut rest = Some(self);
         std::iter::from_fn(move || {
@@ -53,16 +53,16 @@ impl<'a> GraphBlock<'a> {
         .filter(|block| !block.particles.is_empty())
     }
 
-    /// Splits after `count` particles, or at the end if there are fewer.
+    /// Splits after `count` groups, or at the end if there are fewer.
     fn split_at(self, count: usize) -> (GraphBlock<'a>, GraphBlock<'a>) {
         let Self { first, particles, predicted, gains, tethers, tether_count } = self;
         let end = |length: usize| count.min(length);
         let (first_particles, particles) = particles.split_at_mut(end(particles.len()));
         let (first_predicted, predicted) = predicted.split_at_mut(end(predicted.len()));
         let (first_gains, gains) = gains.split_at(end(gains.len()));
-        let tethers_end = tethers.len().min(tether_count * count);
+        let tethers_end = tethers.len().min(8 * tether_count * count);
         let (first_tethers, tethers) = tethers.split_at(tethers_end);
-        let second = first + first_particles.len();
+        let second = first + 8 * first_particles.len();
         let first = GraphBlock {
             first,
             particles: first_particles,
@@ -95,7 +95,7 @@ impl LaneWork for BlockWork<'_, '_> {
 }
 
 impl ParticleBlock for GraphBlock<'_> {
-    fn count(&self) -> usize {
+    fn group_count(&self) -> usize {
         self.particles.len()
     }
 
@@ -104,67 +104,72 @@ impl ParticleBlock for GraphBlock<'_> {
     }
 
     fn inverse_mass(&self, index: usize) -> f32 {
-        self.particles[index].0[3]
+        self.particles[index / 8][index % 8].0[3]
     }
 
     fn path(&self, index: usize) -> SubstepPath {
-        let PackedParticle([x, y, z, _, dx, dy, dz, _]) = self.particles[index];
+        let PackedParticle([x, y, z, _, dx, dy, dz, _]) = self.particles[index / 8][index % 8];
         SubstepPath { start: Vec3::new(x, y, z), displacement: Vec3::new(dx, dy, dz) }
     }
 
     fn predicted(&self, index: usize) -> Vec3 {
-        Vec3::from_array(self.predicted[index])
+        Vec3::from_array(lane_of(&self.predicted[index / 8], index % 8))
     }
 
     fn set_displacement(&mut self, index: usize, displacement: Vec3) {
-        self.particles[index].0[4..7].copy_from_slice(&displacement.to_array());
-    }
-
-    fn set_position(&mut self, index: usize, position: Vec3) {
-        self.particles[index].0[..3].copy_from_slice(&position.to_array());
+        let particle = &mut self.particles[index / 8][index % 8];
+        particle.0[4..7].copy_from_slice(&displacement.to_array());
     }
 
     #[inline(always)]
-    fn may_touch<W: Wide>(&self, group: usize, zone: &Zone) -> bool {
-        if let Some(particles) = self.particles[8 * group..].first_chunk::<8>() {
-            let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(particles);
-            return W::any(zone.may_meet([x, y, z], [dx, dy, dz]));
-        }
-        self.particles[8 * group..].iter().any(|PackedParticle([x, y, z, _, dx, dy, dz, _])| {
-            zone.may_meet([*x, *y, *z], [*dx, *dy, *dz])
-        })
+    fn paths<W: Wide>(&self, group: usize) -> LanePath<W> {
+        let [[x, y, z, _], [dx, dy, dz, _]] = W::columns(&self.particles[group]);
+        LanePath { start: [x, y, z], displacement: [dx, dy, dz] }
+    }
+
+    #[inline(always)]
+    fn inverse_masses<W: Wide>(&self, group: usize) -> W {
+        let [[_, _, _, w], _] = W::columns(&self.particles[group]);
+        w
+    }
+
+    #[inline(always)]
+    fn predicted_lanes<W: Wide>(&self, group: usize) -> [W; 3] {
+        load(&self.predicted[group])
+    }
+
+    #[inline(always)]
+    fn set_displacements<W: Wide>(&mut self, group: usize, displacements: [W; 3]) {
+        W::set_displacements(&mut self.particles[group], displacements);
+    }
+
+    #[inline(always)]
+    fn set_paths<W: Wide>(&mut self, group: usize, paths: &LanePath<W>) {
+        let particles = &mut self.particles[group];
+        W::set_displacements(particles, paths.displacement);
+        W::set_positions(particles, paths.start);
     }
 
     #[inline(always)]
     fn predict<W: Wide>(&mut self, prediction: &Prediction) {
-        let gains = self.gains;
-        let (groups, rest) = self.particles.as_chunks_mut::<8>();
-        let grouped_count = 8 * groups.len();
-        for (group, particles) in groups.iter_mut().enumerate() {
+        for (group, particles) in self.particles.iter_mut().enumerate() {
             let [[_, _, _, w], [x, y, z, _]] = W::columns(particles);
-            let wind = match gains.get(8 * group..8 * group + 8) {
+            let wind = match self.gains.get(group) {
                 None => [W::splat(0.0); 3],
-                Some(gains) => {
-                    axes(|axis| W::load(&std::array::from_fn(|lane| gains[lane][axis]), 0))
-                }
+                Some(gains) => load(gains),
             };
-            W::set_displacements(particles, prediction.predict([x, y, z], wind, w));
-        }
-        for (index, particle) in rest.iter_mut().enumerate() {
-            let PackedParticle([_, _, _, w, x, y, z, _]) = *particle;
-            let wind = gains.get(grouped_count + index).copied().unwrap_or([0.0; 3]);
-            particle.0[4..7].copy_from_slice(&prediction.predict([x, y, z], wind, w));
-        }
-        for (predicted, particle) in self.predicted.iter_mut().zip(self.particles.iter()) {
-            let PackedParticle([_, _, _, _, x, y, z, _]) = *particle;
-            *predicted = [x, y, z];
+            let after = prediction.predict([x, y, z], wind, w);
+            W::set_displacements(particles, after);
+            if let Some(predicted) = self.predicted.get_mut(group) {
+                store(after, predicted);
+            }
         }
     }
 
     #[inline(always)]
     fn pull_to_roots<W: Wide>(&mut self) {
-        let of_particles = self.tethers.chunks_exact(self.tether_count);
-        for (particle, tethers) in self.particles.iter_mut().zip(of_particles) {
+        let particles = self.particles.as_flattened_mut().iter_mut();
+        for (particle, tethers) in particles.zip(self.tethers.chunks_exact(self.tether_count)) {
             for tether in tethers.iter().filter(|tether| tether.length < f32::INFINITY) {
                 pull_to_root(particle, tether);
             }
@@ -173,7 +178,7 @@ impl ParticleBlock for GraphBlock<'_> {
 
     #[inline(always)]
     fn advance<W: Wide>(&mut self) {
-        for PackedParticle(numbers) in self.particles.iter_mut() {
+        for PackedParticle(numbers) in self.particles.as_flattened_mut() {
             let (x, d) = numbers.split_at_mut(4);
             // All four at once: 0 is added to the inverse mass.
             for (x, d) in x.iter_mut().zip(d) {

@@ -5,8 +5,7 @@ use glam::Vec3;
 use super::row_layout::RowLayout;
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
-use crate::contacts::path::SubstepPath;
-use crate::contacts::zone::Zone;
+use crate::contacts::path::{LanePath, SubstepPath};
 use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups_mut};
 use crate::scene::definition::settings::TETHERS_MAX;
 use crate::step::particle_block::ParticleBlock;
@@ -24,8 +23,6 @@ pub(crate) struct SheetRow<'a> {
     tethers: [Option<RowTethers<'a>>; TETHERS_MAX as usize],
     /// Index of the first particle.
     first: usize,
-    /// Number of particles. The rest of the last lane group is padding.
-    count: usize,
 }
 
 /// A tether of each particle.
@@ -59,8 +56,32 @@ impl<'a> SheetRow<'a> {
             *one = Some(RowTethers { root, length: next(), square: next() });
         }
         let first = layout.first + row * layout.columns;
-        Self { x, w, d, predicted, wind, tethers: of_row, first, count: layout.columns }
+        Self { x, w, d, predicted, wind, tethers: of_row, first }
     }
+}
+
+impl SheetRow<'_> {
+    #[inline(always)]
+    fn predicted_fields(&self) -> &[&mut [Lanes8]; 3] {
+        let Some(predicted) = &self.predicted else {
+            unreachable!("a particle touches a collider in a scene that has none")
+        };
+        predicted
+    }
+}
+
+#[inline(always)]
+fn load<W: Wide>(fields: &[&mut [Lanes8]; 3], group: usize) -> [W; 3] {
+    let [x, y, z] = fields;
+    [W::load(&x[group], 0), W::load(&y[group], 0), W::load(&z[group], 0)]
+}
+
+#[inline(always)]
+fn store<W: Wide>(vectors: [W; 3], fields: &mut [&mut [Lanes8]; 3], group: usize) {
+    let ([x, y, z], [to_x, to_y, to_z]) = (vectors, fields);
+    x.store(&mut to_x[group], 0);
+    y.store(&mut to_y[group], 0);
+    z.store(&mut to_z[group], 0);
 }
 
 fn vector(axes: &[&mut [Lanes8]; 3], index: usize) -> Vec3 {
@@ -75,8 +96,8 @@ fn set_vector(axes: &mut [&mut [Lanes8]; 3], index: usize, vector: Vec3) {
 }
 
 impl ParticleBlock for SheetRow<'_> {
-    fn count(&self) -> usize {
-        self.count
+    fn group_count(&self) -> usize {
+        self.w.len()
     }
 
     fn first(&self) -> usize {
@@ -92,26 +113,37 @@ impl ParticleBlock for SheetRow<'_> {
     }
 
     fn predicted(&self, index: usize) -> Vec3 {
-        let Some(predicted) = &self.predicted else {
-            unreachable!("a particle touches a collider in a scene that has none")
-        };
-        vector(predicted, index)
+        vector(self.predicted_fields(), index)
     }
 
     fn set_displacement(&mut self, index: usize, displacement: Vec3) {
         set_vector(&mut self.d, index, displacement);
     }
 
-    fn set_position(&mut self, index: usize, position: Vec3) {
-        set_vector(&mut self.x, index, position);
+    #[inline(always)]
+    fn paths<W: Wide>(&self, group: usize) -> LanePath<W> {
+        LanePath { start: load(&self.x, group), displacement: load(&self.d, group) }
     }
 
     #[inline(always)]
-    fn may_touch<W: Wide>(&self, group: usize, zone: &Zone) -> bool {
-        let load = |field: &[Lanes8]| W::load(&field[group], 0);
-        let (x, d) = (axes(|axis| load(self.x[axis])), axes(|axis| load(self.d[axis])));
-        let is_free = W::splat(0.0).is_below(load(self.w));
-        W::any(W::both(zone.may_meet(x, d), is_free))
+    fn inverse_masses<W: Wide>(&self, group: usize) -> W {
+        W::load(&self.w[group], 0)
+    }
+
+    #[inline(always)]
+    fn predicted_lanes<W: Wide>(&self, group: usize) -> [W; 3] {
+        load(self.predicted_fields(), group)
+    }
+
+    #[inline(always)]
+    fn set_displacements<W: Wide>(&mut self, group: usize, displacements: [W; 3]) {
+        store(displacements, &mut self.d, group);
+    }
+
+    #[inline(always)]
+    fn set_paths<W: Wide>(&mut self, group: usize, paths: &LanePath<W>) {
+        store(paths.start, &mut self.x, group);
+        store(paths.displacement, &mut self.d, group);
     }
 
     #[inline(always)]
