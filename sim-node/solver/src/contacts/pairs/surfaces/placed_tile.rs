@@ -68,7 +68,7 @@ impl PlacedTile {
                     let side = corner - from;
                     side * square - along * side.dot(along)
                 };
-                let opposite = surface.opposite(triangle, edge).map(at);
+                let opposite = surface.neighbor(triangle, edge).map(|other| at(other.opposite));
                 let edges = &mut self.edges[edge];
                 set(&mut edges.from, lane, from);
                 set(&mut edges.inwards, lane, across(corners[next(next(edge))]));
@@ -78,23 +78,26 @@ impl PlacedTile {
         }
     }
 
-    /// Returns a bit for each triangle whose nearest point to a particle may be a local minimum of the distance.
+    /// Returns those of the triangles in `lanes` whose nearest point to a particle may be a local minimum of the
+    /// distance.
     ///
     /// The nearest point is on the face if the particle is inside of all edges. Beyond an edge, the other triangle
     /// there is nearer if the particle is on its side.
     #[inline(always)]
-    pub(super) fn lanes_nearest<W: Wide>(&self, point: [f32; 3]) -> u32 {
+    pub(super) fn lanes_nearest<W: Wide>(&self, lanes: u32, point: [f32; 3]) -> u32 {
         let mut bits = 0;
         for group in 0..TILE / 8 {
-            let [first, second, third] = &self.edges;
-            let first = first.sides::<W>(group, point);
-            let second = second.sides::<W>(group, point);
-            let third = third.sides::<W>(group, point);
-            let beyond = first.beyond | second.beyond | third.beyond;
-            let bent = first.bent | second.bent | third.bent;
-            bits |= (!beyond & 0xff | bent) << (8 * group);
+            if (lanes >> (8 * group)) & 0xff != 0 {
+                let [first, second, third] = &self.edges;
+                let first = first.sides::<W>(group, point);
+                let second = second.sides::<W>(group, point);
+                let third = third.sides::<W>(group, point);
+                let beyond = first.beyond | second.beyond | third.beyond;
+                let bent = first.bent | second.bent | third.bent;
+                bits |= (!beyond & 0xff | bent) << (8 * group);
+            }
         }
-        bits
+        bits & lanes
     }
 }
 

@@ -16,7 +16,7 @@ pub(super) struct Surface {
     /// By triangle: the slots of its corners. Neighbours at load are near each other in the list.
     pub(super) corners: Vec<[u32; 3]>,
     /// By triangle and edge: the other triangle at the edge. None at a border, and where more than two meet.
-    across: Vec<[Option<u32>; 3]>,
+    across: Vec<[Option<Neighbor>; 3]>,
     /// By slot: first entry in `fans`, and the end of the last one.
     fan_starts: Vec<u32>,
     /// The triangles around each slot, ascending.
@@ -25,6 +25,14 @@ pub(super) struct Surface {
     sides: Vec<[Option<u32>; 3]>,
     /// By triangle: true if a side is torn. Such a triangle touches nothing.
     is_torn: Vec<bool>,
+}
+
+/// Another triangle at an edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Neighbor {
+    pub(super) triangle: u32,
+    /// Slot of its corner that is not on the edge.
+    pub(super) opposite: u32,
 }
 
 /// Where particles are, relative to one of them.
@@ -120,16 +128,9 @@ impl Surface {
     }
 
     /// Returns the other triangle at an edge, if it is whole.
-    fn neighbor(&self, triangle: u32, edge: usize) -> Option<u32> {
-        self.across[triangle as usize][edge].filter(|other| self.is_whole(*other))
-    }
-
-    /// Returns the third corner of the other triangle at an edge, if it is whole.
-    pub(super) fn opposite(&self, triangle: u32, edge: usize) -> Option<u32> {
-        let neighbor = self.neighbor(triangle, edge)?;
-        let corners = self.corners[triangle as usize];
-        let ends = [corners[edge], corners[next(edge)]];
-        self.corners[neighbor as usize].into_iter().find(|slot| !ends.contains(slot))
+    #[inline(always)]
+    pub(super) fn neighbor(&self, triangle: u32, edge: usize) -> Option<Neighbor> {
+        self.across[triangle as usize][edge].filter(|other| self.is_whole(other.triangle))
     }
 
     /// Returns a triangle around the nearest point of this one that leads nearer to the viewer, or `None` if the
@@ -140,11 +141,8 @@ impl Surface {
             Feature::Face => None,
             Feature::Edge(edge) => {
                 let neighbor = self.neighbor(triangle, edge)?;
-                let ends = [corners[edge], corners[next(edge)]];
-                let opposite = self.corners[neighbor as usize]
-                    .into_iter()
-                    .find(|slot| !ends.contains(slot))?;
-                is_on_side_of(ends.map(|slot| view.at(slot)), view.at(opposite)).then_some(neighbor)
+                let ends = [corners[edge], corners[next(edge)]].map(|slot| view.at(slot));
+                is_on_side_of(ends, view.at(neighbor.opposite)).then_some(neighbor.triangle)
             }
             Feature::Corner(corner) => {
                 let slot = corners[corner];
@@ -164,7 +162,9 @@ impl Surface {
     pub(super) fn is_first(&self, triangle: u32, feature: Feature) -> bool {
         match feature {
             Feature::Face => true,
-            Feature::Edge(edge) => self.neighbor(triangle, edge).is_none_or(|one| triangle < one),
+            Feature::Edge(edge) => {
+                self.neighbor(triangle, edge).is_none_or(|one| triangle < one.triangle)
+            }
             Feature::Corner(corner) => {
                 self.fan(self.corners[triangle as usize][corner]).next() == Some(triangle)
             }
@@ -208,14 +208,17 @@ fn edges(triangles: &[[u32; 3]]) -> impl Iterator<Item = TriangleEdge> + '_ {
 }
 
 /// By triangle and edge: the other triangle at an edge of exactly two.
-fn across(triangles: &[[u32; 3]]) -> Vec<[Option<u32>; 3]> {
+fn across(triangles: &[[u32; 3]]) -> Vec<[Option<Neighbor>; 3]> {
     let mut across = vec![[None; 3]; triangles.len()];
     let mut edges: Vec<_> = edges(triangles).collect();
     edges.sort_unstable_by_key(|one| (one.ends, one.triangle));
     for group in edges.chunk_by(|a, b| a.ends == b.ends) {
         if let [a, b] = group {
-            across[a.triangle as usize][a.edge] = Some(b.triangle);
-            across[b.triangle as usize][b.edge] = Some(a.triangle);
+            for (one, other) in [(a, b), (b, a)] {
+                let opposite = triangles[other.triangle as usize][next(next(other.edge))];
+                across[one.triangle as usize][one.edge] =
+                    Some(Neighbor { triangle: other.triangle, opposite });
+            }
         }
     }
     across

@@ -221,7 +221,7 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
                 {
                     let placed = &mut placed[right as usize];
                     placed.place_if_clear(surface, TILE_LENGTH * right, states);
-                    near &= placed.lanes_nearest::<W>(start);
+                    near = placed.lanes_nearest::<W>(near, start);
                 }
                 while let Some(other) = take_lowest(&mut near) {
                     accept([slot, TILE_LENGTH * right + other])?;
