@@ -28,16 +28,14 @@ const OPPOSITE: f32 = -0.9;
 pub(super) fn across_mesh(scene: &Scene, model: &Model) -> Vec<String> {
     let is_free = free(scene, model);
     let has_free_ends = |one: &Constraint| [one.a, one.b].iter().all(|end| is_free[*end as usize]);
-    let constraints: Vec<_> = (0_usize..)
-        .zip(&model.constraints)
-        .filter(|(_, one)| one.kind == ConstraintKind::Structural && has_free_ends(one))
-        .collect();
     let sentence = |(index, collider): (usize, &SceneCollider)| {
         let mut mesh = MeshAtLoad::new(index, collider)?;
         let position = |index: u32| Vec3::from_array(model.particles[index as usize].position);
-        let mut across = constraints.iter().filter(|(_, one)| {
+        let mut across = (0_usize..).zip(&model.constraints).filter(|(_, one)| {
             let [from, to] = [one.a, one.b].map(position);
-            mesh.is_between(from, to)
+            one.kind == ConstraintKind::Structural
+                && has_free_ends(one)
+                && mesh.is_between(from, to)
         });
         let (first, Constraint { a, b, .. }) = across.next()?;
         let count = match 1 + across.count() {
