@@ -45,6 +45,8 @@ pub struct SceneDrawing {
     /// A triangle is gone once any structural constraint along one of its edges is torn.
     is_gone: Vec<bool>,
     colliders: Vec<ColliderState>,
+    /// The last encoded message had the meshes where they are.
+    are_meshes_known: bool,
     plane_extent: PlaneExtent,
 }
 
@@ -55,6 +57,7 @@ impl SceneDrawing {
             is_torn: vec![false; mesh.ends.len()],
             is_gone: vec![false; mesh.triangles.len()],
             colliders: Vec::new(),
+            are_meshes_known: false,
             plane_extent: PlaneExtent::around(mesh.bounds),
             mesh,
         }
@@ -62,6 +65,7 @@ impl SceneDrawing {
 
     /// Replaces the colliders.
     pub fn set_colliders(&mut self, colliders: &[ColliderState]) {
+        self.are_meshes_known &= solids::have_same_meshes(&self.colliders, colliders);
         self.colliders = colliders.to_vec();
     }
 
@@ -85,8 +89,27 @@ impl SceneDrawing {
 
     /// Draws a state as a message on `/scene`. The entities have the same ids each time, so each replaces
     /// its predecessor. `time_ns` is the time of the step, in nanoseconds since 1970.
-    pub fn encode(&self, time_ns: u64, particles: &[ParticleState]) -> Vec<u8> {
-        self.draw(time_ns, particles).encode_to_vec()
+    pub fn encode(&mut self, time_ns: u64, particles: &[ParticleState]) -> Vec<u8> {
+        self.are_meshes_known = true;
+        let mut update = self.draw(time_ns, particles);
+        update.entities.push(self.draw_meshes(time_ns));
+        update.encode_to_vec()
+    }
+
+    /// Draws a state like [`Self::encode`], for a viewer that has received the messages before. It leaves out
+    /// the meshes unless they have moved: an entity without a lifetime stays until another one of its id
+    /// replaces it.
+    pub fn encode_changes(&mut self, time_ns: u64, particles: &[ParticleState]) -> Vec<u8> {
+        if self.are_meshes_known {
+            self.draw(time_ns, particles).encode_to_vec()
+        } else {
+            self.encode(time_ns, particles)
+        }
+    }
+
+    fn draw_meshes(&self, time_ns: u64) -> SceneEntity {
+        let triangles = solids::draw_meshes(&self.colliders, &self.mesh.collider_meshes);
+        SceneEntity { triangles, ..entity("meshes", time_ns) }
     }
 
     fn draw(&self, time_ns: u64, particles: &[ParticleState]) -> SceneUpdate {
@@ -113,8 +136,7 @@ impl SceneDrawing {
             indices: sticks,
         };
         let mut colliders = entity("colliders", time_ns);
-        let meshes = &self.mesh.collider_meshes;
-        solids::draw(&self.colliders, meshes, self.plane_extent, &mut colliders);
+        solids::draw(&self.colliders, self.plane_extent, &mut colliders);
         SceneUpdate {
             entities: vec![
                 SceneEntity { lines: vec![sticks], ..entity("sticks", time_ns) },
@@ -158,6 +180,9 @@ fn entity(id: &str, time_ns: u64) -> SceneEntity {
 
 #[cfg(test)]
 mod tests {
+    use sim_contract::ColliderShape;
+    use sim_solver::scene::ColliderMesh;
+
     use super::*;
 
     fn particles() -> Vec<ParticleState> {
@@ -205,6 +230,41 @@ mod tests {
         assert_eq!(indices(&drawing.draw(0, &particles())), (&[0, 1, 2, 3][..], all));
         drawing.set_torn(&[]);
         assert_eq!(indices(&drawing.draw(0, &particles())).1.len(), 6);
+    }
+
+    #[test]
+    fn changes_have_the_meshes_only_after_a_motion() {
+        let mesh = ColliderMesh {
+            vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+        };
+        let collider_meshes = [(1, mesh)].into();
+        let mut drawing = SceneDrawing::new(DrawnMesh { collider_meshes, ..DrawnMesh::default() });
+        let rotation = [0.0, 0.0, 0.0, 1.0];
+        let with = |shape: ColliderShape, x: f32| {
+            let center = [x, 0.0, 0.0];
+            ColliderState { shape: shape as u32, center, rotation, ..ColliderState::default() }
+        };
+        let colliders =
+            |ball, mesh| [with(ColliderShape::Sphere, ball), with(ColliderShape::Mesh, mesh)];
+        let meshes = |message: Vec<u8>| {
+            let entities = SceneUpdate::decode(message.as_slice()).unwrap().entities;
+            assert_eq!(entities.iter().filter(|one| one.id == "colliders").count(), 1);
+            let found = entities.into_iter().find(|one| one.id == "meshes");
+            found.map(|entity| entity.triangles[0].pose.unwrap().position.unwrap().x)
+        };
+        drawing.set_colliders(&colliders(0.0, 5.0));
+        assert_eq!(meshes(drawing.encode_changes(0, &[])), Some(5.0));
+        assert_eq!(meshes(drawing.encode_changes(1, &[])), None);
+        drawing.set_colliders(&colliders(1.0, 5.0));
+        assert_eq!(meshes(drawing.encode_changes(2, &[])), None, "only the ball has moved");
+        assert_eq!(meshes(drawing.encode(3, &[])), Some(5.0), "whole messages have everything");
+        drawing.set_colliders(&colliders(1.0, 6.0));
+        assert_eq!(meshes(drawing.encode_changes(4, &[])), Some(6.0));
+        // The next load has no mesh, so it replaces the entity by an empty one.
+        let message = SceneDrawing::default().encode_changes(5, &[]);
+        let entities = SceneUpdate::decode(message.as_slice()).unwrap().entities;
+        assert!(entities.iter().any(|one| one.id == "meshes" && one.triangles.is_empty()));
     }
 
     #[test]

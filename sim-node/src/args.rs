@@ -6,6 +6,7 @@ mod ctl;
 mod domain;
 mod endpoint;
 mod lesson;
+mod parameter;
 mod real_time;
 mod refusal;
 mod run;
@@ -26,6 +27,7 @@ pub(crate) use ctl::{CtlArgs, CtlVerb, QueryVerb, WatchArgs};
 pub(crate) use domain::{DoctorArgs, PsArgs};
 use endpoint::EndpointArgs;
 pub(crate) use lesson::LessonArgs;
+pub(crate) use parameter::allowed_values_of;
 pub(crate) use run::RunArgs;
 pub(crate) use scene::{CheckArgs, ImportArgs, ScenesArgs, ShowArgs};
 

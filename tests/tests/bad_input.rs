@@ -87,7 +87,7 @@ fn a_missing_node_is_reported_with_its_domain_and_how_to_start_one() {
     let sandbox = Sandbox::new();
     for args in [&["ctl", "status"][..], &["ctl", "pin", "3"], &["ctl", "hash"]] {
         let finished = run(&sandbox, args);
-        assert_refused(&finished, 1, &["sim/status", sandbox.domain(), "sim-node run"]);
+        assert_refused(&finished, 1, &["no node runs as 'sim'", sandbox.domain(), "sim-node run"]);
     }
 }
 

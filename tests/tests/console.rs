@@ -46,6 +46,16 @@ fn a_rejection_names_the_remedy() {
             "non_finite: a number is not finite (allowed: finite numbers, or off for no limit)",
         ),
         ("grab 90 nan 0 0", "non_finite: a number is not finite (allowed: finite numbers)"),
+        (
+            "set bending 1",
+            "no_effect_here: the command has no effect here (the scene has no bends; a scene has them with \
+             the key bending of a generated cloth, rope or mesh, or with [[bend]])",
+        ),
+        (
+            "rewind 2s",
+            "unknown_step: no state at or before that step is kept (the run is only 0.00 s old; `ctl \
+             rewind --to-step 0` goes to its start)",
+        ),
     ] {
         let rejected = run(&sandbox, &format!("ctl {command}"));
         assert_eq!(rejected.stdout, format!("rejected at step 1: {expected}\n"));
@@ -133,6 +143,39 @@ fn wind_without_drag_is_applied_with_a_hint() {
     assert!(without.stderr.starts_with("hint: this has no effect while wind_drag is 0"));
     run(&sandbox, "ctl set wind_drag 0.5").success();
     assert_eq!(run(&sandbox, "ctl set wind_velocity 4 0 0").stderr, "");
+}
+
+#[test]
+fn friction_without_contacts_is_applied_with_a_hint() {
+    let sandbox = Sandbox::new();
+    let _node = node(&sandbox, &["run", "curtain", "--paused"]);
+    let without = run(&sandbox, "ctl set contact_friction 0.5");
+    assert_eq!((without.code, without.stdout.as_str()), (Some(0), "applied at step 1\n"));
+    let hint = "hint: this has no effect while contact is off (see `ctl set contact`)\n";
+    assert_eq!(without.stderr, hint);
+    run(&sandbox, "ctl set contact 0.02").success();
+    assert_eq!(run(&sandbox, "ctl set contact_friction 0.4").stderr, "");
+}
+
+#[test]
+fn a_value_behind_an_equals_sign_is_refused_with_the_cure() {
+    let refused = run(&Sandbox::new(), "ctl set damping=3");
+    assert_eq!((refused.code, refused.stdout.as_str()), (Some(2), ""));
+    let cure = "as in `ctl set damping 3` (allowed: a number >= 0, or off for 0)";
+    assert!(refused.stderr.contains(cure), "{}", refused.stderr);
+}
+
+#[test]
+fn a_query_of_an_unused_domain_leaves_it_without_files() {
+    let sandbox = Sandbox::new();
+    let refused = run(&sandbox, "ctl status");
+    let expected = format!(
+        "error: no node runs as 'sim' in domain '{0}': no program uses this domain; start one with \
+         `sim-node run --domain {0}`, or name a running one with --domain and --name\n",
+        sandbox.domain()
+    );
+    assert_eq!((refused.code, refused.stderr), (Some(1), expected));
+    assert!(!sandbox.root().exists());
 }
 
 #[test]

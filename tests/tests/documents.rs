@@ -7,12 +7,15 @@ use std::path::Path;
 
 use integration_tests::{Process, Program, Sandbox};
 use recorder::Topic;
+use sim_contract::PARAMETERS;
 
 const README: &str = include_str!("../../README.md");
 const SCENES: &str = include_str!("../../sim-node/scenes/README.md");
 const SOLVER: &str = include_str!("../../sim-node/solver/README.md");
 const CONTRACT: &str = include_str!("../../sim-node/contract/README.md");
 const RECORDER: &str = include_str!("../../recorder/README.md");
+const DICTIONARY: &str = include_str!("../fuzz/dictionaries/scene.dict");
+const JSON_DICTIONARY: &str = include_str!("../fuzz/dictionaries/json.dict");
 const VIEWER: &str = include_str!("../../viewer-bridge/README.md");
 
 /// Returns the fenced blocks of a language, each with the number of its first line.
@@ -65,18 +68,20 @@ fn every_scene_in_a_document_is_accepted_without_a_warning_and_runs() {
 }
 
 #[test]
-fn the_scene_reference_names_every_key() {
+fn the_scene_reference_and_the_dictionary_of_the_fuzzer_name_every_key() {
     let sandbox = Sandbox::new();
     for table in [
         "",
         "[solver]",
         "[wind]",
+        "[contact]",
         "[[particle]]\nposition = [0, 0, 0]",
         "[[constraint]]\nparticles = [0, 1]",
         "[[bend]]\nparticles = [0, 1, 2]",
         "[[collider]]\nshape = \"plane\"",
         "[[anchor]]\nparticles = []",
         "[[anchor]]\nparticles = []\n[[anchor.path]]\ntime = 0",
+        "[[generate]]\nshape = \"cloth\"",
         "[[generate]]\nshape = \"obj\"",
         "[[generate]]\nshape = \"obj\"\n[generate.compliance]",
     ] {
@@ -85,7 +90,17 @@ fn the_scene_reference_names_every_key() {
         assert_eq!(checked.code, Some(1), "{table}");
         for key in allowed(&checked.stderr) {
             assert!(SCENES.contains(&format!("`{key}`")), "{table}: {key} is not documented");
+            let is_known = DICTIONARY.contains(&format!("\"{key}\"\n"));
+            assert!(is_known, "{table}: {key} is not in the dictionary of the fuzzer");
         }
+    }
+}
+
+#[test]
+fn the_dictionary_of_the_fuzzer_names_every_parameter() {
+    for parameter in PARAMETERS.map(|info| info.name) {
+        let entry = format!(r#""\"{parameter}\"""#);
+        assert!(JSON_DICTIONARY.contains(&entry), "{parameter} is not in the dictionary");
     }
 }
 

@@ -130,8 +130,8 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<Exit> {
         return Err(lacks(&args.file, "has no snapshot to export", Some(&survey.end)))
             .context(path);
     }
-    if let Err(reason) = &survey.scene {
-        output::note(&format!("warning: {reason}; exported with y up"));
+    if let Some(warning) = survey.warning() {
+        output::note(&warning);
     }
     export(args, &survey, &steps, &format, open)?;
     if survey.end == LogEnd::Complete {

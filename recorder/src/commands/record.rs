@@ -30,6 +30,7 @@ use crate::cli::file_args::default_path;
 use crate::cli::output;
 pub(crate) use args::{RecordArgs, SingleStateArgs};
 use feed::Feed;
+use feed::time_limit::TimeLimit;
 use feed::trigger::{Trigger, UserSignal};
 use intake::Intake;
 use live::LiveLine;
@@ -59,7 +60,6 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
     let stop = Stop::install()?;
     report_bus_errors()?;
     let endpoint = args.endpoint.endpoint()?;
-    let begin_ns = monotonic_ns();
     let names = args.names(default_path(endpoint.name(), realtime_ns()));
     let extras = Extras::open(&args.extras)?;
     let (names, earlier_count) = match args.black_box {
@@ -111,12 +111,12 @@ pub(crate) fn run(args: &RecordArgs) -> anyhow::Result<Exit> {
         tap,
         feed: feed
             .following(args.follows())
+            .limited_to(args.duration.map(|duration| TimeLimit::new(duration, monotonic_ns())))
             .selecting(selection)
             .triggered_by(trigger, args.queue_bytes),
         live,
         queue,
         writing,
-        begin_ns,
         next_owner_check_ns: 0,
         is_owner_alive: true,
         ended_run: None,
@@ -179,7 +179,6 @@ struct Recording {
     live: LiveLine,
     queue: Arc<Queue>,
     writing: JoinHandle<anyhow::Result<Written>>,
-    begin_ns: u64,
     next_owner_check_ns: u64,
     is_owner_alive: bool,
     /// The run in the file when the owner was last found dead.
@@ -192,7 +191,7 @@ impl Recording {
     fn run(&mut self, args: &RecordArgs, stop: &Stop) -> anyhow::Result<StopReason> {
         loop {
             // Checked before reading, so that messages from before the end are read.
-            let reason = self.reason_to_stop(args, stop);
+            let reason = self.reason_to_stop(stop);
             let end = self.read()?.map(StopReason::Run);
             match end.or(reason) {
                 Some(StopReason::OwnerGone) if args.follows() => self.end_file_of_owner(),
@@ -211,19 +210,18 @@ impl Recording {
         }
     }
 
-    fn reason_to_stop(&mut self, args: &RecordArgs, stop: &Stop) -> Option<StopReason> {
+    fn reason_to_stop(&mut self, stop: &Stop) -> Option<StopReason> {
         let now_ns = monotonic_ns();
         if now_ns >= self.next_owner_check_ns {
             self.next_owner_check_ns = now_ns + OWNER_CHECK_NS;
             self.is_owner_alive = self.tap.is_owner_alive();
             self.ended_run = self.feed.run_id().filter(|_| !self.is_owner_alive);
         }
-        let passed = Duration::from_nanos(now_ns - self.begin_ns);
         if stop.is_requested() {
             Some(StopReason::Signal)
         } else if self.queue.is_closed() {
             Some(StopReason::WriteError)
-        } else if args.duration.is_some_and(|duration| passed >= duration) {
+        } else if self.feed.is_time_over(now_ns) {
             Some(StopReason::Duration)
         } else {
             (!self.is_owner_alive).then_some(StopReason::OwnerGone)
@@ -283,7 +281,8 @@ impl Recording {
         let report = Report::new(&written, self.feed.skipped_count(), stop_reason.clone());
         if !report.has_files() && args.black_box.is_none() {
             bail!(
-                "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe"
+                "nothing was recorded ({stop_reason}): {endpoint} published no snapshot with a keyframe, as a \
+                 paused node does at its next step"
             );
         }
         Ok(report)

@@ -56,15 +56,10 @@ impl Default for PlaneExtent {
     }
 }
 
-/// Adds the drawing of the colliders to an entity. Any process of the user can publish colliders, so those
-/// with an unknown shape or a number that is not finite are left out.
-pub(super) fn draw(
-    colliders: &[ColliderState],
-    meshes: &ColliderMeshes,
-    extent: PlaneExtent,
-    entity: &mut SceneEntity,
-) {
-    for (index, collider) in colliders.iter().enumerate().filter(|(_, one)| is_finite(one)) {
+/// Adds the drawing of the colliders, except meshes, to an entity. Any process of the user can publish
+/// colliders, so those with an unknown shape or a number that is not finite are left out.
+pub(super) fn draw(colliders: &[ColliderState], extent: PlaneExtent, entity: &mut SceneEntity) {
+    for collider in colliders.iter().filter(|one| is_finite(one)) {
         let (center, radius) = (wide(collider.center), f64::from(collider.radius));
         let (a, b) = (wide(collider.a), wide(collider.b));
         match ColliderShape::from_number(collider.shape) {
@@ -76,12 +71,29 @@ pub(super) fn draw(
                 entity.cylinders.push(cylinder(a, b, radius));
             }
             Some(ColliderShape::Bounds) => entity.lines.push(edges(a, b)),
-            Some(ColliderShape::Mesh) => {
-                entity.triangles.extend(meshes.get(&index).map(|mesh| triangles(collider, mesh)));
-            }
-            None => {}
+            Some(ColliderShape::Mesh) | None => {}
         }
     }
+}
+
+/// Draws the colliders that are meshes.
+pub(super) fn draw_meshes(
+    colliders: &[ColliderState],
+    meshes: &ColliderMeshes,
+) -> Vec<TriangleListPrimitive> {
+    let placed = of_meshes(colliders).filter(|(_, collider)| is_finite(collider));
+    placed.filter_map(|(index, one)| Some(triangles(one, meshes.get(&index)?))).collect()
+}
+
+/// Returns `true` if the meshes of two lists are the same colliders in the same poses.
+pub(super) fn have_same_meshes(before: &[ColliderState], now: &[ColliderState]) -> bool {
+    let pose = |(index, one): (usize, &ColliderState)| (index, one.center, one.rotation);
+    of_meshes(before).map(pose).eq(of_meshes(now).map(pose))
+}
+
+fn of_meshes(colliders: &[ColliderState]) -> impl Iterator<Item = (usize, &ColliderState)> {
+    let is_mesh = |(_, one): &(usize, &ColliderState)| one.shape == ColliderShape::Mesh as u32;
+    colliders.iter().enumerate().filter(is_mesh)
 }
 
 fn is_finite(collider: &ColliderState) -> bool {
@@ -221,7 +233,8 @@ mod tests {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             triangles: vec![[0, 1, 2]],
         };
-        draw(&[collider], &[(0, mesh)].into(), PlaneExtent::around(bounds), &mut entity);
+        draw(&[collider], PlaneExtent::around(bounds), &mut entity);
+        entity.triangles = draw_meshes(&[collider], &[(0, mesh)].into());
         entity
     }
 

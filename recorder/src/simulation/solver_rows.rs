@@ -1,7 +1,7 @@
 //! Rows of `/colliders` and `/tears`, from the state of a solver.
 
 use crate::log::{CollidersRow, TearsRow};
-use sim_contract::{ColliderShape, ColliderState};
+use sim_contract::ColliderState;
 use sim_solver::{PlacedCollider, Solver};
 
 /// Returns the colliders after `step`.
@@ -29,34 +29,8 @@ pub(crate) fn newest_tears_row(solver: &Solver, step: u64, count: usize) -> Tear
     }
 }
 
+/// Returns a collider as a node publishes it.
 fn state(collider: &PlacedCollider) -> ColliderState {
     let PlacedCollider { shape, restitution, friction, velocity, angular_velocity } = *collider;
-    let any = ColliderState {
-        restitution,
-        friction,
-        velocity,
-        angular_velocity,
-        ..ColliderState::default()
-    };
-    let with = |shape: ColliderShape| ColliderState { shape: shape as u32, ..any };
-    match shape {
-        sim_solver::ColliderGeometry::Plane { normal, offset } => {
-            ColliderState { normal, offset, ..with(ColliderShape::Plane) }
-        }
-        sim_solver::ColliderGeometry::Box { center, half_extents, rotation } => {
-            ColliderState { center, half_extents, rotation, ..with(ColliderShape::Box) }
-        }
-        sim_solver::ColliderGeometry::Sphere { center, radius } => {
-            ColliderState { center, radius, ..with(ColliderShape::Sphere) }
-        }
-        sim_solver::ColliderGeometry::Capsule { a, b, radius } => {
-            ColliderState { a, b, radius, ..with(ColliderShape::Capsule) }
-        }
-        sim_solver::ColliderGeometry::Bounds { min, max } => {
-            ColliderState { a: min, b: max, ..with(ColliderShape::Bounds) }
-        }
-        sim_solver::ColliderGeometry::Mesh { center, rotation, distance: radius } => {
-            ColliderState { center, rotation, radius, ..with(ColliderShape::Mesh) }
-        }
-    }
+    ColliderState { restitution, friction, velocity, angular_velocity, ..shape.fields().into() }
 }

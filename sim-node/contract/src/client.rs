@@ -36,7 +36,6 @@ use crate::ports::service::{
     COLLIDERS, PARAMETERS, PARTICLES, SCENE, STATUS, SURFACE, ServiceError, TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
-use crate::ports::session::Session;
 use sim_types::{Action, CLIENT_ID_END};
 
 /// A program's connection to a simulation: reads snapshots, sends commands.
@@ -87,7 +86,7 @@ impl Client {
         if client_id >= CLIENT_ID_END {
             return Err(AttachError::ClientId { client_id });
         }
-        let attachment = Attachment::open(Session::join(endpoint)?)?;
+        let attachment = Attachment::to(endpoint)?;
         Ok(Self {
             id: client_id,
             watch: Watch::default(),

@@ -1,4 +1,4 @@
-//! Prints a state hash of every built-in scene and of two test scenes that use every mechanism:
+//! Prints a state hash of every built-in scene and of test scenes that use every mechanism:
 //! `cargo run --release -p sim-solver --example state_hashes`
 //!
 //! Each scene makes 10,000 steps (a larger one 4,000 or 1,000) with commands of every kind. Two builds that
@@ -14,7 +14,8 @@ use sim_solver::{
 };
 
 /// The test scenes.
-const SCENES: [(&str, &str); 5] = [
+const SCENES: [(&str, &str); 6] = [
+    ("bends", include_str!("../tests/scenes/bends.toml")),
     ("everything", include_str!("../tests/scenes/everything.toml")),
     ("touching", include_str!("../tests/scenes/touching.toml")),
     ("surfaces", include_str!("../tests/scenes/surfaces.toml")),

@@ -191,3 +191,73 @@ fn an_edge_without_a_hinge_causes_a_warning() {
          merge its corners, or divide its longest side";
     assert_eq!(mesh(0.0005), [expected]);
 }
+
+/// A sheet of 5 x 5 particles, 0.1 m apart, in the plane z = 0 from y = 0.4 down to y = 0.
+const SHEET: &str = "[[generate]]\nshape = \"cloth\"\ncolumns = 5\nrows = 5\nspacing = 0.1\n\
+     origin = [0, 0.4, 0]\nmass = 0.01\npinned = \"none\"\n";
+
+/// A plate of 2 m x 2 m at a height, of two triangles, with another 1 cm below it where it is closed.
+fn plate(height: f32, is_closed: bool) -> String {
+    let corners = |y: f32| format!("[-1, {y}, -1], [1, {y}, -1], [1, {y}, 1], [-1, {y}, 1]");
+    let lower = if is_closed { format!(", {}", corners(height - 0.01)) } else { String::new() };
+    let faces = if is_closed { "[0, 1, 2, 3], [7, 6, 5, 4]" } else { "[0, 1, 2, 3]" };
+    format!(
+        "[[collider]]\nshape = \"mesh\"\nvertices = [{}{lower}]\nfaces = [{faces}]\n\
+         distance = 0.02\n",
+        corners(height)
+    )
+}
+
+#[test]
+fn a_shape_that_starts_across_a_mesh_causes_a_warning_that_names_the_place() {
+    // Five vertical constraints pass through the plate, from the second row to the third.
+    let expected = "5 constraints, the first of them 18, start across collider 0, a mesh: particles 5 and 10 are on \
+                    different sides of it, and each stays on its side; move the mesh or the shape";
+    assert_eq!(warnings(&format!("{SHEET}{}", plate(0.25, false))), [expected]);
+    // The same plate, 1 cm thick.
+    assert_eq!(warnings(&format!("{SHEET}{}", plate(0.255, true))), [expected]);
+    // Turned by a half turn about x it is at -0.25 m, and 0.5 m higher it is where it was.
+    let turned = format!("{}center = [0, 0.5, 0]\nrotation = [1, 0, 0, 0]\n", plate(0.25, false));
+    assert_warns(&format!("{SHEET}{turned}"), "5 constraints");
+    assert_warns(
+        &format!(
+            "{}{}",
+            PAIR.replace("[0, 0, 0]", "[0, 1, 0]").replace("[1, 0, 0]", "[0.1, 0, 0.2]"),
+            plate(0.25, false)
+        ),
+        "constraint 0 starts across collider 0, a mesh: particles 0 and 1 are on different",
+    );
+}
+
+#[test]
+fn a_shape_beside_a_mesh_or_fixed_across_it_causes_no_warning() {
+    for height in [-0.1, 0.45] {
+        assert_eq!(warnings(&format!("{SHEET}{}", plate(height, false))), Vec::<String>::new());
+    }
+    // The ridge of a roof of 90 degrees is between two particles of a coarse sheet, and cuts nothing off.
+    let roof = "[[collider]]\nshape = \"mesh\"\nvertices = [[-1, -1, -1], [0, 0, -1], [1, -1, -1], \
+                [-1, -1, 1], [0, 0, 1], [1, -1, 1]]\nfaces = [[0, 1, 4, 3], [1, 2, 5, 4]]\n";
+    let over =
+        PAIR.replace("[0, 0, 0]", "[-0.1, -0.05, 0]").replace("[1, 0, 0]", "[0.1, -0.05, 0]");
+    assert_eq!(warnings(&format!("{over}{roof}")), Vec::<String>::new());
+    // Fixed particles touch nothing: a cape may hang on a point inside a body.
+    let row = SHEET.replace("\"none\"", "\"top\"");
+    assert_eq!(warnings(&format!("{row}{}", plate(0.35, false))), Vec::<String>::new());
+}
+
+#[test]
+fn a_thickness_that_reaches_second_neighbours_causes_a_warning() {
+    let contact = |thickness: f32| {
+        format!(
+            "gravity = [0, 0, 0]\n[contact]\nmode = \"particles\"\nthickness = {thickness}\n{SHEET}"
+        )
+    };
+    assert_warns(
+        &contact(0.2),
+        "contact.thickness: 0.2 m is 2.0 times the spacing of generate[0], 0.1 m: its particles that are \
+         nearer than 0.32 m at load never touch, so small folds pass through themselves; use at most the \
+         spacing",
+    );
+    assert_eq!(warnings(&contact(0.12)), Vec::<String>::new());
+    assert_eq!(warnings(&format!("{}contact = false\n", contact(0.2))), Vec::<String>::new());
+}

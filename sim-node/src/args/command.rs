@@ -4,11 +4,10 @@ use std::time::Duration;
 
 use clap::builder::{NonEmptyStringValueParser, PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args as ClapArgs, Subcommand};
-use sim_contract::{
-    ConstraintKind, GRAB_OVER_S_DEFAULT, PARAMETERS, ParameterInfo, ParameterValue,
-};
+use sim_contract::{ConstraintKind, GRAB_OVER_S_DEFAULT, ParameterValue};
 use sim_solver::GRAB_OVER_S_MAX;
 
+use super::parameter::{parameter_name, parameters_help};
 use super::value::{index, number, number_in, time, whole};
 
 #[derive(Debug, Subcommand)]
@@ -254,7 +253,7 @@ pub(crate) struct PoseArgs {
         sim-node ctl set compliance 1e-4 --kind bend"
 )]
 pub(crate) struct SetArgs {
-    #[arg(help = parameters_help())]
+    #[arg(help = parameters_help(), value_parser = parameter_name)]
     pub(crate) parameter: String,
     /// A number, three numbers for a vector, or "off"
     #[arg(num_args = 1..=3, required = true, value_name = "VALUE", value_parser = setting_word)]
@@ -268,15 +267,6 @@ pub(crate) struct SetArgs {
 fn constraint_kind() -> impl TypedValueParser<Value = ConstraintKind> {
     PossibleValuesParser::new(ConstraintKind::ALL.map(ConstraintKind::name))
         .try_map(|name| ConstraintKind::from_name(&name).ok_or("there is no such kind"))
-}
-
-/// Names of the parameters, with their units.
-fn parameters_help() -> String {
-    let name = |info: &ParameterInfo| match info.unit {
-        "" => info.name.to_owned(),
-        unit => format!("{} ({unit})", info.name),
-    };
-    PARAMETERS.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
 /// One word of the value of a parameter.

@@ -44,9 +44,11 @@ pub(crate) struct CheckArgs {
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "Vertices become particles. Edges become structural constraints and diagonals of faces become\n\
-        shear constraints. Bend constraints join the corners on both sides of an edge. Faces without\n\
+        shear constraints. Bend constraints join the corners on both sides of an edge; with --bending,\n\
+        hinges take their place, so the stiffness does not depend on the mesh. Faces without\n\
         area, duplicate faces and vertices without a face are left out with a warning.\n\nExamples:\n  \
         sim-node import shirt.obj --pin 'y > 1.45' -o shirt.toml && sim-node run ./shirt.toml\n  \
+        sim-node import hat.obj --bending 1e-4 --rest loaded -o hat.toml\n  \
         sim-node import net.obj --density 0.05 --pin 'group rim' --bend 0.01 > net.toml"
 )]
 pub(crate) struct ImportArgs {
@@ -77,6 +79,13 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "M/N", default_value_t = 1e-2, allow_negative_numbers = true,
         value_parser = number_in(0.0..=NumberRange::COMPLIANCE.max))]
     pub(crate) bend: f32,
+    /// Bending rigidity of hinges in place of bend constraints, in N m, >= 0: 1e-6 for silk, 1e-4 for denim
+    #[arg(long, value_name = "N M", allow_negative_numbers = true, conflicts_with = "bend",
+        value_parser = number_within(NumberRange::AT_LEAST_ZERO))]
+    pub(crate) bending: Option<f32>,
+    /// Shape without bending forces: each edge flat, or folded as in the mesh [default: flat]
+    #[arg(long, value_name = "SHAPE", requires = "bending", value_parser = ["flat", "loaded"])]
+    pub(crate) rest: Option<String>,
 }
 
 /// Parses the choice of pinned vertices.

@@ -64,9 +64,7 @@ pub(super) fn send(client: &mut Client, args: &CtlArgs, action: Action) -> anyho
         };
         output::line(&format!("applied at step {step}{what}"))?;
     } else {
-        let explanation = outcome
-            .reason()
-            .map(|reason| rejection::explain(client, args.timeout(), &row.action, reason))
+        let explanation = rejection::explain(client, args.timeout(), &outcome)
             .map_or_else(String::new, |explanation| format!(": {explanation}"));
         output::line(&format!("rejected at step {step}: {reason}{explanation}"))?;
     }

@@ -11,10 +11,18 @@ pub(super) fn for_applied(
     action: &Action,
 ) -> Option<&'static str> {
     let Action::Set { parameter, .. } = action else { return None };
-    if parameter.as_str() != Parameter::WindVelocity.name() {
-        return None;
+    match Parameter::from_name(parameter.as_str())? {
+        Parameter::WindVelocity => for_wind(client, timeout),
+        Parameter::ContactFriction => {
+            let is_off = client.parameters(timeout).ok()??.values.contact.is_none();
+            is_off.then_some("this has no effect while contact is off (see `ctl set contact`)")
+        }
+        _ => None,
     }
-    // Without an answer there is no hint; the command was applied all the same.
+}
+
+/// Without an answer of the node there is no hint; the command was applied all the same.
+fn for_wind(client: &mut Client, timeout: Duration) -> Option<&'static str> {
     if client.surface(timeout).ok()??.triangles.is_empty() {
         return Some("this has no effect: the scene has no surface");
     }

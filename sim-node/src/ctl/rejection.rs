@@ -3,37 +3,39 @@
 use std::time::Duration;
 
 use sim_contract::{
-    Action, Client, OffMeaning, PARAMETERS, Parameter, ParameterInfo, Reason, STEP_WORK_MAX,
-    ValueForm,
+    Action, Client, OffMeaning, Outcome, PARAMETERS, Parameter, Reason, STEP_WORK_MAX,
 };
 use sim_solver::Scene;
 
+use crate::args::allowed_values_of;
+
 /// Explains a rejection: the meaning of its reason, and the remedy in parentheses where one is known.
-pub(super) fn explain(
-    client: &mut Client,
-    timeout: Duration,
-    action: &Action,
-    reason: Reason,
-) -> String {
-    match remedy(client, timeout, action, reason) {
+/// Returns `None` if the reason is unknown.
+pub(super) fn explain(client: &mut Client, timeout: Duration, outcome: &Outcome) -> Option<String> {
+    let reason = outcome.reason()?;
+    Some(match remedy(client, timeout, outcome, reason) {
         Some(remedy) => format!("{reason} ({remedy})"),
         None => reason.to_string(),
-    }
+    })
 }
 
 /// Remedy of a rejection. Without an answer of the node, only a remedy that needs none.
 fn remedy(
     client: &mut Client,
     timeout: Duration,
-    action: &Action,
+    outcome: &Outcome,
     reason: Reason,
 ) -> Option<String> {
+    let action = &outcome.command.action();
     let mut status = || client.status(timeout).ok().flatten();
     let count = match reason {
         Reason::UnknownParticle => status()?.particle_count as usize,
         Reason::UnknownConstraint => status()?.constraint_count as usize,
         Reason::UnknownAnchor => anchor_count(client, timeout)?,
         Reason::UnknownCollider => client.colliders(timeout).ok()?.colliders.len(),
+        Reason::UnknownStep if is_before_run(action, outcome.step) => {
+            return Some(age_of_run(outcome.step, status()?.rate_hz));
+        }
         _ => {
             let of_replay = remedy_of_replay(action, reason);
             let mut is_replay = || status().is_some_and(|status| status.is_replay());
@@ -41,6 +43,20 @@ fn remedy(
         }
     };
     Some(allowed_indices(count))
+}
+
+/// Returns `true` if a rewind, rejected before `step` was made, asks for a time before the run.
+fn is_before_run(action: &Action, step: u64) -> bool {
+    let Action::Rewind { to_step: None, back_steps: Some(back_steps) } = action else {
+        return false;
+    };
+    u64::from(*back_steps) >= step
+}
+
+/// Remedy of a rewind to a time before the run.
+fn age_of_run(step: u64, rate_hz: u32) -> String {
+    let seconds = step.saturating_sub(1) as f64 / f64::from(rate_hz);
+    format!("the run is only {seconds:.2} s old; `ctl rewind --to-step 0` goes to its start")
 }
 
 /// Remedy of a rejection by a replay, where it is not that of a node.
@@ -110,6 +126,10 @@ fn has_no_limit(action: &Action) -> bool {
 /// Condition under which a command has an effect.
 fn missing_condition(action: &Action) -> Option<&'static str> {
     Some(match action {
+        Action::Set { parameter, .. } if parameter.as_str() == Parameter::Bending.name() => {
+            "the scene has no bends; a scene has them with the key bending of a generated cloth, rope or \
+             mesh, or with [[bend]]"
+        }
         Action::Set { .. } => "method \"xpbd\" has compliance, method \"pbd\" has stiffness",
         Action::Step { .. } => "the node is not paused",
         Action::Load { .. } => "it needs more memory than is available; see the node's messages",
@@ -137,7 +157,7 @@ fn allowed_values(action: &Action) -> Option<String> {
                 ),
                 _ => String::new(),
             };
-            return Some(format!("{}{work}{kind}", allowed_parameter(info)));
+            return Some(format!("{}{work}{kind}", allowed_values_of(info)));
         }
         Action::Grab { .. } | Action::Move { .. } => {
             "coordinates within 1e7, z 0 in 2-D, --over 0 to 0.25"
@@ -165,37 +185,11 @@ fn allowed_values(action: &Action) -> Option<String> {
     Some(values.to_owned())
 }
 
-/// Allowed values of a parameter, in words.
-fn allowed_parameter(info: &ParameterInfo) -> String {
-    let values = match info.form {
-        ValueForm::Vector => format!("three numbers, each {}, z 0 in 2-D", info.range.text),
-        ValueForm::Number | ValueForm::Whole => info.range.text.to_owned(),
-    };
-    let off = match info.off {
-        OffMeaning::Zero => ", or off for 0",
-        OffMeaning::NoLimit => ", or off for no limit",
-        OffMeaning::Absent => ", or off for none",
-        OffMeaning::NotAllowed | OffMeaning::OwnOfEach => "",
-    };
-    let kind = if info.is_per_kind { ", for one --kind or all" } else { "" };
-    format!("{values}{off}{kind}")
-}
-
 #[cfg(test)]
 mod tests {
     use sim_contract::{ConstraintKind, KindFilter, ParameterValue, Text};
 
     use super::*;
-
-    #[test]
-    fn the_allowed_values_name_range_off_and_kind() {
-        let text = |parameter: Parameter| allowed_parameter(parameter.info());
-        assert_eq!(text(Parameter::Substeps), "a whole number from 1 to 1000");
-        assert_eq!(text(Parameter::TearForce), "a number > 0, or off for no limit");
-        assert_eq!(text(Parameter::Stiffness), "0 to 1, for one --kind or all");
-        let gravity = "three numbers, each -1e7 to 1e7, z 0 in 2-D, or off for 0";
-        assert_eq!(text(Parameter::Gravity), gravity);
-    }
 
     #[test]
     fn a_kind_for_a_parameter_without_kinds_is_named() {
@@ -206,6 +200,15 @@ mod tests {
         };
         let remedy = fixed_remedy(&action, Reason::OutOfRange).unwrap();
         assert_eq!(remedy, "allowed: a number >= 0, or off for 0, no --kind");
+    }
+
+    #[test]
+    fn a_rewind_before_the_run_is_told_from_one_to_a_state_that_is_gone() {
+        let back = |back_steps| Action::Rewind { to_step: None, back_steps: Some(back_steps) };
+        // Before step 240 the newest state is that of step 239.
+        assert!(is_before_run(&back(240), 240) && !is_before_run(&back(239), 240));
+        assert!(!is_before_run(&Action::Rewind { to_step: Some(500), back_steps: None }, 240));
+        assert!(age_of_run(241, 240).starts_with("the run is only 1.00 s old; "));
     }
 
     #[test]

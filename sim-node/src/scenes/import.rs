@@ -20,6 +20,7 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
     for warning in scene.warnings() {
         // The user knows the only generator by the options.
         let warning = warning.replace("generate[0].pinned", "--pin");
+        let warning = warning.replace("generate[0].bending", "--bending");
         output::note(&format!("warning: {warning}"));
     }
     let result = format!(
@@ -46,10 +47,17 @@ pub(crate) fn import(args: &ImportArgs) -> anyhow::Result<()> {
 /// TOML of a scene with one generator, which reads the mesh.
 fn scene_text(args: &ImportArgs) -> String {
     let ImportArgs { density, structural, shear, bend, .. } = args;
+    let (of_bends, bending) = match args.bending {
+        Some(bending) => {
+            let rest = quoted_text(args.rest.as_deref().unwrap_or("flat"));
+            (String::new(), format!("bending = {bending}\nrest = {rest}\n"))
+        }
+        None => (format!(", bend = {bend}"), String::new()),
+    };
     format!(
         "version = 1\nname = {name}\n[solver]\nsubsteps = 8\n[[generate]]\nshape = \"obj\"\n\
          path = {path}\ndensity = {density}\npinned = {pin}\n\
-         compliance = {{ structural = {structural}, shear = {shear}, bend = {bend} }}\n",
+         compliance = {{ structural = {structural}, shear = {shear}{of_bends} }}\n{bending}",
         name =
             quoted_text(&Path::new(&args.mesh).file_stem().unwrap_or_default().to_string_lossy()),
         path = quoted_text(&args.mesh),
@@ -63,7 +71,9 @@ fn import_error(error: SceneError) -> anyhow::Error {
     match field.rsplit('.').next() {
         Some("path") => anyhow!("{problem}"),
         Some("pinned") => anyhow!("--pin: {problem}"),
-        Some(key @ ("density" | "structural" | "shear" | "bend")) => anyhow!("--{key}: {problem}"),
+        Some(key @ ("density" | "structural" | "shear" | "bend" | "bending" | "rest")) => {
+            anyhow!("--{key}: {problem}")
+        }
         _ => error.into(),
     }
 }
@@ -80,19 +90,58 @@ fn file_name(path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use sim_solver::RestShape;
+    use sim_solver::scene::MeshBending;
 
     use super::*;
     use crate::args::{Args, Verb};
 
-    /// Returns the error of an import, given the text of the mesh.
-    fn error(mesh: &str, options: &[&str]) -> String {
+    /// Returns the scene of an import, given the text of the mesh.
+    fn scene(mesh: &str, options: &[&str]) -> Result<Scene, SceneError> {
         let arguments = ["sim-node", "import", "a.obj"].iter().chain(options);
         let Some(Verb::Import(args)) = Args::try_parse_from(arguments).unwrap().verb else {
             panic!("not an import");
         };
         let read = |_: &str| Ok(mesh.to_owned());
-        let scene = Scene::from_toml_with_files(&scene_text(&args), "a.obj", &read);
-        import_error(scene.unwrap_err()).to_string()
+        Scene::from_toml_with_files(&scene_text(&args), "a.obj", &read)
+    }
+
+    fn error(mesh: &str, options: &[&str]) -> String {
+        import_error(scene(mesh, options).unwrap_err()).to_string()
+    }
+
+    /// Two triangles with a fold along their common edge.
+    const FOLD: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nf 1 2 3\nf 4 3 2\n";
+
+    #[test]
+    fn a_bending_rigidity_makes_hinges_in_place_of_bend_constraints() {
+        let bending = |options| {
+            let scene = scene(FOLD, options).unwrap();
+            let sim_solver::scene::Shape::Obj(obj) = &scene.generators[0].shape else {
+                panic!("not a mesh");
+            };
+            (scene.counts().constraints, obj.bending)
+        };
+        let with = |rest| Some(MeshBending { bending: 1e-4, rest });
+        assert_eq!(bending(&[]), (6, None));
+        assert_eq!(bending(&["--bending", "1e-4"]), (5, with(RestShape::Flat)));
+        let loaded = ["--bending", "1e-4", "--rest", "loaded"];
+        assert_eq!(bending(&loaded), (5, with(RestShape::Loaded)));
+    }
+
+    #[test]
+    fn options_of_bending_that_contradict_each_other_are_refused() {
+        let refused = |options: &[&str]| {
+            let arguments = ["sim-node", "import", "a.obj"].iter().chain(options);
+            Args::try_parse_from(arguments).unwrap_err().to_string()
+        };
+        assert!(refused(&["--bending", "-1"]).contains("(allowed: a number >= 0)"));
+        let both = refused(&["--bending", "1e-4", "--bend", "0.1"]);
+        assert!(both.contains("'--bending <N M>' cannot be used with '--bend <M/N>'"), "{both}");
+        let rest = refused(&["--rest", "loaded"]);
+        assert!(rest.contains("--bending <N M>"), "{rest}");
+        let word = refused(&["--bending", "1", "--rest", "bent"]);
+        assert!(word.contains("[possible values: flat, loaded]"), "{word}");
     }
 
     #[test]

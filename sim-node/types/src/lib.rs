@@ -31,7 +31,7 @@ mod tear_cause;
 mod text;
 
 pub use action::{Action, ActionFields, GRAB_OVER_S_DEFAULT, KindFilter, RestoreContents};
-pub use collider_shape::ColliderShape;
+pub use collider_shape::{ColliderFields, ColliderShape};
 pub use constraint_kind::ConstraintKind;
 pub use json::hash as json_hash;
 pub use json::non_finite::PlainF32;

@@ -1,4 +1,5 @@
-//! The commands of the README's ten-minute paths work as printed, one after the other, in one folder.
+//! The commands of the README's ten-minute paths work as printed, one after the other, in one folder,
+//! beside a node as another path leaves it.
 
 use integration_tests::{Finished, Process, Program, Sandbox};
 
@@ -22,7 +23,7 @@ impl TenMinutes {
         let (_, text) = README.split_once(&format!("\n## Ten minutes for {heading}\n")).unwrap();
         let text = text.split("\n## ").next().unwrap();
         let sandbox = Sandbox::new();
-        let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+        let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "pendulum"]);
         Self { text, sandbox, _node: node }
     }
 
@@ -35,22 +36,30 @@ impl TenMinutes {
     /// Runs all commands, except those in Python, which its own tests run. Returns what they printed.
     fn run(&self) -> Vec<(&'static str, String)> {
         let lines = self.blocks("sh").flat_map(str::lines);
-        let commands = lines.map(|line| line.split("  #").next().unwrap().trim_end());
-        let commands = commands.filter(|command| !command.starts_with("python"));
-        let done = commands.map(|command| match command.strip_prefix("viewer-bridge ") {
-            Some(args) => (command, self.run_viewer(args)),
-            None => (command, self.run_command(command)),
+        let lines = lines.map(|line| line.split_once("  # ").unwrap_or((line, "")));
+        let lines = lines.filter(|(command, _)| !command.starts_with("python"));
+        let mut recorder = None;
+        let done = lines.map(|(command, comment)| {
+            let command = command.trim_end();
+            if comment.contains("in a terminal of its own, until Ctrl-C") {
+                recorder = Some(self.start(command, "recording from step "));
+                return (command, String::new());
+            }
+            if comment.contains("after that Ctrl-C") {
+                recorder.take().map(Process::interrupt).unwrap().success();
+            }
+            if command.starts_with("viewer-bridge ") {
+                // Another program of this host may have the port.
+                let command = command.replace(":8081", ":0");
+                return ("viewer-bridge", self.start(&command, "ready").interrupt().success());
+            }
+            (command, self.run_command(command))
         });
         done.collect()
     }
 
     fn run_command(&self, command: &str) -> String {
-        let program = Program::SimNode.path();
-        let programs = program.parent().unwrap().display();
-        let folder = self.sandbox.path("");
-        let script = format!(
-            "PROGRAMS='{programs}'; PATH=\"$PROGRAMS:$PATH\"; cd '{folder}'; {CARGO}\n{command}"
-        );
+        let script = self.script(command);
         let Finished { code, stdout, stderr, .. } =
             Process::run(Program::Bash, &self.sandbox, &["-e", "-c", &script]);
         let expected = if command.starts_with("recorder diff") { 3 } else { 0 };
@@ -58,11 +67,21 @@ impl TenMinutes {
         stdout
     }
 
-    /// Starts the viewer, and ends it with Ctrl-C when it serves its page.
-    fn run_viewer(&self, args: &str) -> String {
-        let (option, file) = args.split_once(' ').unwrap();
-        let args = [option, &self.sandbox.path(file), "--listen", "127.0.0.1:0"];
-        Process::start_ready(Program::ViewerBridge, &self.sandbox, &args).interrupt().success()
+    /// Starts a program, and waits for its line.
+    fn start(&self, command: &str, line: &str) -> Process {
+        let script = self.script(&format!("exec {command}"));
+        let mut process = Process::start(Program::Bash, &self.sandbox, &["-e", "-c", &script]);
+        process.wait_for_line(line);
+        process
+    }
+
+    fn script(&self, command: &str) -> String {
+        let program = Program::SimNode.path();
+        let programs = program.parent().unwrap().display();
+        let folder = self.sandbox.path("");
+        format!(
+            "PROGRAMS='{programs}'; PATH=\"$PROGRAMS:$PATH\"; cd '{folder}'; {CARGO}\n{command}"
+        )
     }
 }
 
@@ -78,8 +97,13 @@ fn the_path_for_robotics_grabs_records_proves_and_compares() {
     let path = TenMinutes::new("robotics and simulation");
     let done = path.run();
     assert!(printed(&done, "sim-node ctl nearest").starts_with("particle 91 "));
+    assert!(printed(&done, "recorder info run.mcap").contains("\n/outcomes            3 "));
     assert!(printed(&done, "recorder verify run.mcap").contains("bit-identical"));
-    assert!(printed(&done, "recorder diff").contains("states      differ from step 600 on"));
+    let difference = printed(&done, "recorder diff");
+    assert!(difference.contains("states      differ from step 600 on"));
+    let (_, greatest) = difference.split_once("greatest distance: ").unwrap();
+    let greatest: f64 = greatest.split(' ').next().unwrap().parse().unwrap();
+    assert!(greatest > 2.0, "{greatest} m");
 }
 
 #[test]

@@ -50,6 +50,28 @@ fn a_client_finds_no_node_after_one_was_killed_in_any_phase_of_its_start() {
     }
 }
 
+#[test]
+fn a_client_names_the_killed_node_and_the_command_that_starts_one() {
+    let sandbox = Sandbox::new();
+    let node = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    let id = node.id();
+    node.signal(Signal::KILL);
+    node.wait();
+    let (domain, killed) = (sandbox.domain(), format!("the last one, process {id}, was killed"));
+    for args in [["ctl", "status"], ["ctl", "watch"]] {
+        let finished = Process::run(Program::SimNode, &sandbox, &args);
+        let expected = format!(
+            "error: no node runs as 'sim' in domain '{domain}': {killed}; start one with `sim-node run \
+             --domain {domain}`, or name a running one with --domain and --name\n"
+        );
+        assert_eq!((finished.code, finished.stderr), (Some(1), expected));
+    }
+    let next = Process::start_ready(Program::SimNode, &sandbox, &["run", "curtain"]);
+    next.interrupt().success();
+    let finished = Process::run(Program::SimNode, &sandbox, &["ctl", "status"]);
+    assert!(!finished.stderr.contains("killed"), "{}", finished.stderr);
+}
+
 /// Replaces a connection of a killed client by one that it was killed in the middle of creating: an
 /// empty file that nobody may read.
 fn unfinish_a_connection(sandbox: &Sandbox) {

@@ -170,7 +170,7 @@ fn a_missing_node_is_reported_with_its_domain_and_how_to_start_one() {
     let sandbox = Sandbox::new();
     let file = sandbox.path("run.mcap");
     let finished = recorder(&sandbox, &["record", "-o", &file]);
-    assert_refused(&finished, &["sim/status", sandbox.domain(), "sim-node run"]);
+    assert_refused(&finished, &["no node runs as 'sim'", sandbox.domain(), "sim-node run"]);
     assert!(!std::path::Path::new(&file).exists());
     assert!(!std::path::Path::new(&format!("{file}.part")).exists());
 }

@@ -1,4 +1,5 @@
-//! Ctrl-C ends every program while it reads a large recording, and SIGUSR1 ends no recorder.
+//! Ctrl-C ends every program while it reads a large recording, SIGUSR1 ends no recorder, and a time ends one
+//! that holds the steps of that time.
 
 use integration_tests::{Process, Program, Sandbox, Signal, ctl, record, wait_for};
 
@@ -32,6 +33,29 @@ fn sigusr1_does_not_end_a_recording_without_a_black_box() {
     assert_eq!(recording.interrupt().code, Some(0));
     let verified = Process::run(Program::Recorder, &sandbox, &["verify", &file]).success();
     assert!(verified.contains("20 steps bit-identical"), "{verified}");
+}
+
+#[test]
+fn a_recording_of_a_time_has_the_steps_that_a_node_makes_in_that_time() {
+    let sandbox = Sandbox::new();
+    let _node = Process::start_ready(Program::SimNode, &sandbox, &["run", "rope"]);
+    let skipped = || ctl(&sandbox, &["status"])["skipped_periods"].as_u64().unwrap();
+    let before = skipped();
+    let file = sandbox.path("run.mcap");
+    let args = ["record", "-o", &file, "--duration", "1s", "--json"];
+    let report = Process::run(Program::Recorder, &sandbox, &args).json();
+    let step = |name: &str| report[name].as_u64().unwrap();
+    // A node that does not get enough of the processor gives steps up.
+    let steps = step("last_step") - step("first_step") + skipped() - before;
+    assert!(steps >= 240, "{steps} steps of 240: {report}");
+    assert_eq!(report["stop_reason"], "duration reached");
+    // A paused node makes no more steps, and the recording ends all the same.
+    let paused = sandbox.path("paused.mcap");
+    let args = ["record", "-o", &paused, "--duration", "1s"];
+    let mut recording = Process::start(Program::Recorder, &sandbox, &args);
+    recording.wait_for_line("recording from step ");
+    ctl(&sandbox, &["pause"]);
+    assert!(recording.wait().success().ends_with("stopped     duration reached\n"));
 }
 
 #[test]

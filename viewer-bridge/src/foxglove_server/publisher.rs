@@ -34,6 +34,8 @@ const TOPICS: [Topic; 7] = [
 const STRUCTURAL_KIND: u8 = ConstraintKind::Structural as u8;
 /// Time between two messages on `/scene`. Each is twice as large as the particles and encoded anew.
 const SCENE_PERIOD_NS: u64 = SECOND_NS / 10;
+/// Time after which `/scene` has everything again. A slow client may have missed the message with the meshes.
+const WHOLE_SCENE_PERIOD_NS: u64 = 2 * SECOND_NS;
 /// New subscriptions that wait for the source: more than all topics of all clients.
 const NEW_SUBSCRIPTIONS_MAX: usize = 256;
 
@@ -51,6 +53,8 @@ pub(super) struct Publisher {
     is_state_due: AtomicBool,
     /// The next state must be drawn on `/scene`, whenever the last one was.
     is_scene_due: AtomicBool,
+    /// A new client needs everything on `/scene`.
+    is_whole_scene_due: AtomicBool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +70,7 @@ struct PublisherState {
     /// The state that was sent last.
     shown: Option<StateId>,
     next_scene_ns: u64,
+    next_whole_scene_ns: u64,
     /// Number of messages that were encoded on `/particles` and `/scene`.
     encoded_count: u64,
     /// Earlier messages for late subscribers.
@@ -132,6 +137,7 @@ impl Publisher {
             new_subscriptions: Mutex::default(),
             is_state_due: AtomicBool::new(false),
             is_scene_due: AtomicBool::new(false),
+            is_whole_scene_due: AtomicBool::new(false),
         })
     }
 
@@ -169,6 +175,7 @@ impl Publisher {
     /// Notes a new subscription. The client receives the earlier messages with the next state.
     pub(super) fn add_subscription(&self, topic: &str, sink: Option<SinkId>) {
         if topic == SCENE_TOPIC {
+            self.is_whole_scene_due.store(true, Ordering::Relaxed);
             self.is_scene_due.store(true, Ordering::Relaxed);
         }
         self.is_state_due.store(true, Ordering::Relaxed);
@@ -308,10 +315,11 @@ impl Publisher {
         let state = &mut *state;
         self.publish_step(state, shown.row);
         self.serve_new_subscriptions(state, shown.row.step);
-        let Some(load) = &state.load else { return };
+        let Some(load) = &mut state.load else { return };
         let time_ns = load.time_ns(shown.row.step);
         let id = StateId { epoch: shown.epoch, step: shown.row.step };
-        let is_new = state.shown.replace(id) != Some(id);
+        let before = state.shown.replace(id);
+        let is_new = before != Some(id);
         let is_state_due = self.is_state_due.swap(false, Ordering::Relaxed);
         if (is_new || is_state_due) && self.has_subscribers(Topic::Particles) {
             let bytes = state.encoder.encode_particles(shown.particles, time_ns);
@@ -323,7 +331,17 @@ impl Publisher {
         }
         let is_scene_due = self.is_scene_due.swap(false, Ordering::Relaxed);
         if is_scene_due || (is_new && now_ns >= state.next_scene_ns) {
-            let message = load.drawing.encode(time_ns, shown.particles);
+            // Viewers forget their entities when a recording is sought.
+            let is_sought = before.is_some_and(|before| id.step < before.step);
+            let is_whole = self.is_whole_scene_due.swap(false, Ordering::Relaxed)
+                || is_sought
+                || now_ns >= state.next_whole_scene_ns;
+            let message = if is_whole {
+                state.next_whole_scene_ns = now_ns + WHOLE_SCENE_PERIOD_NS;
+                load.drawing.encode(time_ns, shown.particles)
+            } else {
+                load.drawing.encode_changes(time_ns, shown.particles)
+            };
             self.scene.log_with_meta(&message, self.metadata(time_ns));
             state.next_scene_ns = now_ns + SCENE_PERIOD_NS;
             state.encoded_count += 1;

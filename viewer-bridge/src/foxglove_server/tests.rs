@@ -13,6 +13,7 @@ use recorder::{StepRow, Topic, TopicFormat, scene_format};
 use serde_json::{Value, json};
 use sim_contract::clock::SECOND_NS;
 use sim_contract::{ColliderShape, ColliderState, ParticleState, TornConstraint};
+use sim_solver::scene::ColliderMesh;
 
 use super::publisher::Publisher;
 use crate::sink::{State, Torn};
@@ -255,6 +256,38 @@ fn colliders_are_drawn_where_they_are_and_late_subscribers_receive_them() {
     let later = bench.listen(&["/colliders"]);
     bench.show(6 * SECOND_NS, 0);
     assert_eq!(later.topics(), Vec::<String>::new());
+}
+
+#[test]
+fn the_triangles_of_a_mesh_are_sent_again_only_if_it_moves_or_a_client_may_lack_them() {
+    let bench = Bench::new(None);
+    let listener = bench.listen(&["/scene"]);
+    let mesh = ColliderMesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]] };
+    let collider_meshes = [(0, mesh)].into();
+    let scene = Scene { rate_hz: 100, collider_meshes, ..Scene::default() };
+    bench.publisher.begin_load(&scene);
+    let move_to = |step: u64, x: f32| {
+        let (shape, rotation) = (ColliderShape::Mesh as u32, [0.0, 0.0, 0.0, 1.0]);
+        let mesh =
+            ColliderState { shape, center: [x, 0.0, 0.0], rotation, ..ColliderState::default() };
+        let stamp = Stamp { epoch: 1, step };
+        bench.publisher.publish_colliders(&Colliders { stamp, colliders: vec![mesh] });
+    };
+    let has_mesh = |tenths: u64, step: u64| {
+        bench.show(tenths * SECOND_NS / 10, step);
+        let picture = SceneUpdate::decode(listener.newest("/scene").as_slice()).unwrap();
+        picture.entities.iter().any(|one| one.id == "meshes" && one.triangles.len() == 1)
+    };
+    move_to(0, 0.0);
+    assert!(has_mesh(0, 0) && !has_mesh(1, 10) && !has_mesh(2, 20));
+    move_to(30, 1.0);
+    assert!(has_mesh(3, 30));
+    bench.set_torn(40, &[]);
+    assert!(!has_mesh(4, 40), "a tear changes no mesh");
+    let _late = bench.listen(&["/scene"]);
+    assert!(has_mesh(5, 50) && !has_mesh(6, 60));
+    assert!(has_mesh(7, 20) && !has_mesh(8, 30), "a seek goes back");
+    assert!(!has_mesh(26, 190) && has_mesh(27, 200), "it is repeated after two seconds");
 }
 
 /// Returns the files of a set of descriptors by name, with their imports sorted. Options of generators and

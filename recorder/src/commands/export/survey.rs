@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use anyhow::{Context, bail};
-use recorder::{FrameReader, LogEnd, LogReader, RunDescription, recorded_scene};
+use recorder::{FrameReader, LogEnd, LogReader, Message, RunDescription, ShapeRow, recorded_scene};
 use sim_solver::Scene;
 use sim_solver::scene::Up;
 
@@ -22,6 +22,8 @@ pub(super) struct Survey {
     pub(super) scene: Result<Scene, String>,
     /// Steps of all snapshots, ascending.
     pub(super) steps: Vec<u64>,
+    /// A collider is a mesh, whose triangles are in the scene.
+    has_mesh: bool,
     /// Number of particles of the first snapshot.
     pub(super) particle_count: usize,
     pub(super) end: LogEnd,
@@ -40,7 +42,7 @@ impl Survey {
         let scene = recorded_scene(&log).map_err(|error| format!("{path}: {error:#}"));
         let run = log.run().clone();
         let mut frames = FrameReader::new(log);
-        let (mut steps, mut particle_count) = (Vec::new(), 0);
+        let (mut steps, mut particle_count, mut has_mesh) = (Vec::new(), 0, false);
         while let Some(frame) = frames.next_frame().with_context(|| path.to_owned())? {
             if steps.len() == SNAPSHOTS_MAX {
                 bail!("{path}: has more than {SNAPSHOTS_MAX} snapshots");
@@ -49,13 +51,21 @@ impl Survey {
                 particle_count = frame.payload().len();
             }
             steps.push(frame.row.step);
+            has_mesh |= frame.updates.iter().any(has_mesh_collider);
             if steps.len().is_multiple_of(SNAPSHOTS_PER_UPDATE) {
                 on_progress(frames.log().intact_count());
             }
         }
         let end = frames.end().cloned().unwrap_or(LogEnd::Complete);
         let intact_count = frames.log().intact_count();
-        Ok(Self { run, scene, steps, particle_count, end, intact_count })
+        Ok(Self { run, scene, steps, has_mesh, particle_count, end, intact_count })
+    }
+
+    /// Returns a warning of what an export lacks without a readable scene.
+    pub(super) fn warning(&self) -> Option<String> {
+        let reason = self.scene.as_ref().err()?;
+        let meshes = if self.has_mesh { ", and without the colliders that are meshes" } else { "" };
+        Some(format!("warning: {reason}; exported with y up{meshes}"))
     }
 
     /// Returns the snapshots of `steps`, which `visit` visits, of a file that `open_bytes` opens. Without a
@@ -78,4 +88,9 @@ impl Survey {
             open_bytes,
         }
     }
+}
+
+fn has_mesh_collider(message: &Message) -> bool {
+    let Message::Colliders(row) = message else { return false };
+    row.colliders.iter().any(|one| matches!(one.shape, ShapeRow::Mesh { .. }))
 }

@@ -70,11 +70,17 @@ fn run_at(rate_hz: u32) -> RunDescription {
 }
 
 fn record(scene: &str, steps: u64) -> Vec<u8> {
+    let text = Scene::from_toml(scene, "test").unwrap().to_toml();
+    record_with_text(scene, steps, &text)
+}
+
+/// Records a scene, with another text in its place.
+fn record_with_text(scene: &str, steps: u64, text: &str) -> Vec<u8> {
     let job = Job::new(Scene::from_toml(scene, "test").unwrap(), Vec::new(), steps);
-    let (solver, toml) = (Solver::new(&job.scene), job.scene.to_toml());
+    let solver = Solver::new(&job.scene);
     let run = job.description(&solver);
     let options = LogOptions { chunk_size_bytes: 2000, ..LogOptions::default() };
-    let mut log = LogWriter::create(Vec::new(), options, &run, toml.as_bytes(), 0).unwrap();
+    let mut log = LogWriter::create(Vec::new(), options, &run, text.as_bytes(), 0).unwrap();
     simulate(&job, States::first(solver), Some(&mut log), &AtomicBool::new(false), |_| {}).unwrap();
     log.finish(&Closing::default()).unwrap()
 }
@@ -431,6 +437,18 @@ fn options_select_the_snapshots_and_the_style() {
     let style = args.style();
     assert_eq!((style.size, style.view), (Size { width: 20, height: 30 }, Some(View::Top)));
     assert_eq!(style.bend, Bend::Hide);
+}
+
+#[test]
+fn a_warning_about_the_scene_names_the_meshes_that_are_in_it_alone() {
+    let mesh = "version = 1\n[[collider]]\nshape = \"mesh\"\nfaces = [[0, 1, 2]]\n\
+         vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n[[particle]]\nposition = [0, 0, 1]\n";
+    let warning = |file: &[u8]| survey_of(file, "test.mcap").warning();
+    assert_eq!(warning(&record(mesh, 0)), None);
+    let reason = "warning: test.mcap: has no scene (attachment scene.toml); exported with y up";
+    assert_eq!(warning(&record_with_text(TINY, 0, "")).unwrap(), reason);
+    let expected = format!("{reason}, and without the colliders that are meshes");
+    assert_eq!(warning(&record_with_text(mesh, 0, "")).unwrap(), expected);
 }
 
 #[test]

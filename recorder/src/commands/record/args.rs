@@ -73,8 +73,9 @@ pub(crate) struct RecordArgs {
     pub(super) black_box: Option<Duration>,
     #[command(flatten)]
     pub(super) selection: SelectionArgs,
-    /// End after this time, such as 10s or 500ms. It counts from the start of the program, so it
-    /// includes the wait for the first step that can be recorded [default: no limit]
+    /// End this time after the first recorded step, such as 10s or 500ms. A node at real time has then
+    /// made the steps of that time; one that is paused or slowed has made fewer. It is also the longest wait
+    /// for a node, and for a first step [default: no limit]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true,
         value_parser = parse::duration)]
     pub(super) duration: Option<Duration>,

@@ -1,11 +1,12 @@
 //! The way from the states of a tap into the queue: one file after the other.
 
 pub(crate) mod selector;
+pub(crate) mod time_limit;
 pub(crate) mod trigger;
 
 use std::sync::Arc;
 
-use recorder::{Closing, ContentSelection};
+use recorder::{Closing, ContentSelection, RunDescription};
 use sim_contract::clock::{SECOND_NS, monotonic_ns, realtime_ns};
 use sim_contract::{LostChanges, ReadError, State, StatusFlags};
 
@@ -19,6 +20,7 @@ use super::split::{FileBegin, SplitArgs, WritePosition};
 use super::stop_reason::StopReason;
 use crate::cli::output;
 use selector::Selector;
+use time_limit::{FirstStep, TimeLimit};
 use trigger::{PartEnd, Trigger};
 
 /// Shortest part of a black box. A part repeats the scene and the constraints.
@@ -34,6 +36,7 @@ pub(crate) struct Feed {
     /// Another load and another run begin the next file.
     is_following: bool,
     selector: Selector,
+    time_limit: Option<TimeLimit>,
     /// Decides when the black box is written, if this is one.
     trigger: Option<Trigger>,
     /// Memory of the black box.
@@ -61,6 +64,7 @@ impl Feed {
             split,
             is_following: false,
             selector,
+            time_limit: None,
             trigger: None,
             limit_bytes: u64::MAX,
             is_paused: false,
@@ -77,6 +81,11 @@ impl Feed {
     /// Goes on in the next file with another load or run.
     pub(crate) fn following(self, is_following: bool) -> Self {
         Self { is_following, ..self }
+    }
+
+    /// Ends after a time.
+    pub(crate) fn limited_to(self, time_limit: Option<TimeLimit>) -> Self {
+        Self { time_limit, ..self }
     }
 
     /// Leaves out what is not selected.
@@ -133,6 +142,12 @@ impl Feed {
         self.enqueue();
         self.end_part_early();
         self.accepted.end.take()
+    }
+
+    /// Returns `true` if the time of the recording is over.
+    pub(crate) fn is_time_over(&self, now_ns: u64) -> bool {
+        let limit = self.time_limit.as_ref();
+        limit.is_some_and(|limit| limit.is_reached(self.intake.last(), now_ns))
     }
 
     /// Returns `true` if the recording ends.
@@ -208,11 +223,7 @@ impl Feed {
         if let Some(header) = self.accepted.header.take() {
             let number = self.file.map_or(0, |file| file.number + 1);
             self.file = Some(FileBegin { number, monotonic_ns: monotonic_ns() });
-            if let Some(step) = self.intake.first_step()
-                && self.trigger.is_none()
-            {
-                output::note(&format!("recording from step {step}"));
-            }
+            self.begin_file(&header.run);
             self.warn_of_skipped();
             self.queue.begin(header, log_time_ns);
         }
@@ -223,6 +234,18 @@ impl Feed {
             }
             let Some(content) = self.selector.select(content) else { continue };
             self.queue.push(Item { content, log_time_ns });
+        }
+    }
+
+    /// Begins the time of the recording with its first file, and reports the first step.
+    fn begin_file(&mut self, run: &RunDescription) {
+        let Some(step) = self.intake.first_step() else { return };
+        if let Some(limit) = &mut self.time_limit {
+            let (run_id, rate_hz) = (run.run_id, run.rate_hz);
+            limit.begin(FirstStep { run_id, step, rate_hz }, monotonic_ns());
+        }
+        if self.trigger.is_none() {
+            output::note(&format!("recording from step {step}"));
         }
     }
 

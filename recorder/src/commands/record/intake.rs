@@ -244,9 +244,14 @@ impl Intake {
         self.started.as_ref().map(|started| started.first_step)
     }
 
+    /// Returns the last recorded state of the file, once it has begun.
+    pub(crate) fn last(&self) -> Option<&SnapshotHeader> {
+        self.started.as_ref().map(Started::last)
+    }
+
     /// Returns the last step of the file so far, once it has begun.
     pub(crate) fn last_step(&self) -> Option<u64> {
-        self.started.as_ref().map(Started::last_step)
+        self.last().map(|last| last.step)
     }
 
     /// Returns the run in the file, once it has begun.

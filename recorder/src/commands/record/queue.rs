@@ -294,9 +294,16 @@ impl Content {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+    use std::sync::mpsc::{RecvTimeoutError, channel};
+    use std::thread;
+
     use sim_contract::ParticleState;
 
     use super::*;
+
+    /// Longest wait for another thread.
+    const DEADLINE: Duration = Duration::from_secs(30);
 
     fn row(step: u64) -> StepRow {
         StepRow { step, scene_step: step, ..StepRow::default() }
@@ -359,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn the_queue_wakes_for_a_chunk_and_for_a_part_of_a_small_limit() {
+    fn a_chunk_is_due_and_so_is_a_part_of_a_small_limit() {
         for (limit_bytes, wakes_at) in [(100 << 20, 33), (1 << 20, 9)] {
             let queue = Queue::new(limit_bytes);
             for step in 0..wakes_at {
@@ -369,6 +376,28 @@ mod tests {
             }
             assert_eq!(queue.wait(Duration::MAX), usize::try_from(wakes_at).ok());
         }
+    }
+
+    /// In nearly every round, the thread waits before the chunk is due.
+    #[test]
+    fn the_waiting_thread_wakes_for_a_chunk_and_for_the_end() {
+        let queue = Arc::new(Queue::new(1 << 20));
+        let waiting = Arc::clone(&queue);
+        let (woken, wakes) = channel();
+        thread::spawn(move || {
+            while waiting.wait(Duration::MAX).is_some() {
+                while waiting.pop().is_some() {}
+                woken.send(()).unwrap();
+            }
+        });
+        for round in 0..100 {
+            for step in 0..9 {
+                queue.push(snapshot(step));
+            }
+            assert_eq!(wakes.recv_timeout(DEADLINE), Ok(()), "round {round}");
+        }
+        queue.close();
+        assert_eq!(wakes.recv_timeout(DEADLINE), Err(RecvTimeoutError::Disconnected));
     }
 
     #[test]

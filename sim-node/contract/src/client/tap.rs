@@ -29,7 +29,6 @@ use crate::ports::service::{
     TEARS, TOPOLOGY,
 };
 use crate::ports::services::{AttachError, Attachment};
-use crate::ports::session::Session;
 use crate::ports::source::Source;
 use crate::ports::wake::WakeListener;
 
@@ -112,7 +111,7 @@ impl Tap {
     /// No simulation runs there, it has another version of the contract, a service has no place for
     /// another reader, or `/dev/shm` is full.
     pub fn attach(endpoint: &Endpoint) -> Result<Self, AttachError> {
-        let attachment = Attachment::open(Session::join(endpoint)?)?;
+        let attachment = Attachment::to(endpoint)?;
         Ok(Self::subscribe(attachment, None)?)
     }
 
@@ -125,7 +124,7 @@ impl Tap {
     /// # Errors
     /// Same as [`Tap::attach`], or the lockstep has no place for another member.
     pub fn attach_in_lockstep(endpoint: &Endpoint) -> Result<Self, LockstepError> {
-        let attachment = Attachment::open(Session::join(endpoint)?)?;
+        let attachment = Attachment::to(endpoint)?;
         let member = Member::create(&attachment, random_client_id()?, Self::LOCKSTEP_EVERY)?;
         member.join()?;
         Ok(Self::subscribe(attachment, Some(member))?)
@@ -349,7 +348,7 @@ mod tests {
     use super::*;
     use crate::owner::Owner;
     use crate::owner::load::Load;
-    use crate::ports::session::{Access, Slices};
+    use crate::ports::session::{Access, Session, Slices};
     use crate::testing::TestDomain;
 
     fn create_owner(endpoint: &Endpoint, run_id: u64) -> Owner {

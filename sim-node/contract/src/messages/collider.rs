@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use sim_types::ColliderFields;
 
 /// A collider in its pose at the end of a step: 120 bytes, alignment 4. Its position in `colliders`
 /// is its index everywhere. Fields that a shape does not use are 0. Lengths are in m, relative to
@@ -39,6 +40,27 @@ pub struct ColliderState {
 }
 
 const _: () = assert!(size_of::<ColliderState>() == 120 && align_of::<ColliderState>() == 4);
+
+impl From<ColliderFields> for ColliderState {
+    /// At rest, without restitution and friction.
+    fn from(fields: ColliderFields) -> Self {
+        let ColliderFields { shape, radius, offset, normal, center, half_extents, rotation, a, b } =
+            fields;
+        let shape = shape as u32;
+        Self {
+            shape,
+            radius,
+            offset,
+            normal,
+            center,
+            half_extents,
+            rotation,
+            a,
+            b,
+            ..Self::default()
+        }
+    }
+}
 
 /// Header of `colliders`: 24 bytes, alignment 8. Written per load, on a change, and each step while
 /// a collider moves.

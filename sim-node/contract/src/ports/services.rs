@@ -19,6 +19,7 @@ use crate::messages::status::NodeStatus;
 use crate::messages::tears::{TearsHeader, TornConstraint};
 use crate::messages::topology::{ConstraintState, KeyframeHeader, LoadHeader, Triangle};
 use crate::ports::domain::orphans::{self, Port};
+use crate::ports::domain::owner_lock::OwnerLock;
 use crate::ports::mirror::Mirror;
 use crate::ports::service::{
     COLLIDERS, COMMANDS, KEYFRAME, OUTCOMES, PARAMETERS, PARTICLES, READY, RESTORE, SCENE, STATUS,
@@ -103,7 +104,7 @@ pub enum AttachError {
     NoNode {
         /// Address without a simulation.
         endpoint: Endpoint,
-        /// The missing service or publisher.
+        /// The end of the last node, or the missing service or publisher.
         detail: String,
         /// Options that start a node at this address.
         options: String,
@@ -177,11 +178,23 @@ pub(crate) struct Attachment {
 const ATTEMPTS_MAX: usize = 100;
 
 impl Attachment {
+    /// Joins the domain of an endpoint, and opens all services of its living owner. A domain that no program
+    /// uses stays without files.
+    pub(crate) fn to(endpoint: &Endpoint) -> Result<Self, AttachError> {
+        let config = Session::configuration(endpoint)?;
+        if Session::has_root(endpoint, &config)? {
+            Self::open(Session::join(endpoint)?)
+        } else {
+            Err(no_node(&config, endpoint, "no program uses this domain".to_owned()))
+        }
+    }
+
     /// Opens all services of a living owner.
     pub(crate) fn open(session: Session) -> Result<Self, AttachError> {
         let status = match session.values(&STATUS, Access::Open) {
             Err(ServiceError::Missing { service, .. }) => {
-                return Err(no_node(&session, format!("service '{service}' does not exist")));
+                let detail = format!("service '{service}' does not exist");
+                return Err(no_node(session.config(), &session.endpoint, detail));
             }
             result => Arc::new(result?),
         };
@@ -199,7 +212,8 @@ impl Attachment {
             }
         }
         let service = session.service_name(&STATUS);
-        Err(no_node(&session, format!("service '{service}' has no live publisher")))
+        let detail = format!("service '{service}' has no live publisher");
+        Err(no_node(session.config(), &session.endpoint, detail))
     }
 
     /// Connects to an owner on another host.
@@ -216,7 +230,7 @@ impl Attachment {
         let detail = format!(
             "service '{service}' is the mirror of a tunnel, through which no status arrives"
         );
-        Err(no_node(&session, detail))
+        Err(no_node(session.config(), &session.endpoint, detail))
     }
 
     pub(crate) fn owner(&self) -> Option<OwnerProcess> {
@@ -246,11 +260,17 @@ impl Attachment {
     }
 }
 
-fn no_node(session: &Session, detail: String) -> AttachError {
-    let endpoint = session.endpoint.clone();
-    if let Some(process_id) = session.lock_holder() {
+/// Returns the error for a name without services. The locks of the name tell more than what is missing.
+fn no_node(config: &Config, endpoint: &Endpoint, missing: String) -> AttachError {
+    let endpoint = endpoint.clone();
+    if let Some(process_id) = OwnerLock::holder(config, endpoint.name()) {
         return AttachError::NoServices { endpoint, process_id };
     }
+    let detail = match OwnerLock::killed_holder(config, endpoint.name()) {
+        Some(Some(process_id)) => format!("the last one, process {process_id}, was killed"),
+        Some(None) => "the last one was killed".to_owned(),
+        None => missing,
+    };
     let options = endpoint.options();
     AttachError::NoNode { endpoint, detail, options }
 }

@@ -73,6 +73,21 @@ impl Session {
         Self::join_with_version(endpoint, CONTRACT_VERSION)
     }
 
+    /// Returns the configuration of the domain of an endpoint.
+    pub(crate) fn configuration(endpoint: &Endpoint) -> Result<Config, ServiceError> {
+        domain::configuration(endpoint.domain()).map_err(|error| ServiceError::Domain {
+            endpoint: endpoint.clone(),
+            cause: format!("{error:?}"),
+        })
+    }
+
+    /// Returns `false` if no process has joined the domain yet. Checks its root as a process does that joins, and
+    /// creates nothing.
+    pub(crate) fn has_root(endpoint: &Endpoint, config: &Config) -> Result<bool, ServiceError> {
+        root::exists(&root::path(config))
+            .map_err(|cause| ServiceError::Root { endpoint: endpoint.clone(), cause })
+    }
+
     /// Joins as a program of any version of the contract.
     pub(crate) fn join_with_version(
         endpoint: &Endpoint,
@@ -82,7 +97,7 @@ impl Session {
             endpoint: endpoint.clone(),
             cause: format!("{cause:?}"),
         };
-        let config = domain::configuration(endpoint.domain()).map_err(|error| refused(&error))?;
+        let config = Self::configuration(endpoint)?;
         let private = |cause| ServiceError::Root { endpoint: endpoint.clone(), cause };
         let root = root::prepare(&root::path(&config)).map_err(private)?;
         unfinished::remove_segments(&config);

@@ -37,6 +37,7 @@ fn a_second_owner_is_refused_and_the_error_names_the_first() {
 #[test]
 fn a_client_without_a_node_gets_an_error_that_names_the_service_and_the_remedy() {
     let domain = TestDomain::new();
+    let _other = create_owner(&domain.endpoint()).unwrap();
     let endpoint = Endpoint::new(Some(domain.name()), "left").unwrap();
     let error = Client::attach(&endpoint).unwrap_err();
     assert!(matches!(error, AttachError::NoNode { .. }));
@@ -50,6 +51,22 @@ fn a_client_without_a_node_gets_an_error_that_names_the_service_and_the_remedy()
         )
     );
     assert!(matches!(Tap::attach(&endpoint).unwrap_err(), AttachError::NoNode { .. }));
+}
+
+#[test]
+fn a_client_of_an_unused_domain_leaves_it_without_files() {
+    let domain = TestDomain::new();
+    let (endpoint, name) = (domain.endpoint(), domain.name());
+    for error in [Client::attach(&endpoint).unwrap_err(), Tap::attach(&endpoint).unwrap_err()] {
+        let expected =
+            format!("no node runs as 'sim' in domain '{name}': no program uses this domain; ");
+        assert!(error.to_string().starts_with(&expected), "{error}");
+    }
+    assert!(!domain.root().exists());
+    let shared_memory = std::fs::read_dir("/dev/shm").unwrap().flatten();
+    let names = shared_memory.map(|entry| entry.file_name().into_string().unwrap());
+    let left: Vec<_> = names.filter(|one| one.starts_with(&format!("{name}_"))).collect();
+    assert_eq!(left, Vec::<String>::new());
 }
 
 #[test]

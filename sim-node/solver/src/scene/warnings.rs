@@ -2,7 +2,9 @@
 
 mod bending;
 mod constraints;
+mod contacts;
 mod particles;
+mod rounded;
 mod settings;
 mod shapes;
 
@@ -31,6 +33,8 @@ impl Scene {
             constraints::duplicates(&model),
         ];
         let mut warnings: Vec<_> = all.into_iter().flatten().collect();
+        warnings.extend(contacts::across_mesh(self, &model));
+        warnings.extend(contacts::thick(self, &model));
         warnings.extend(bending::unreached(self, &model));
         warnings.extend(bending::missing_hinges(self));
         warnings.extend(shapes::without_length(self));

@@ -1,10 +1,9 @@
 //! Messages that are published once per load.
 
 use sim_contract::{
-    ColliderShape, ColliderState, ConstraintState, Load, LoadHeader, ParameterValues, Triangle,
-    scene_hash,
+    ColliderState, ConstraintState, Load, LoadHeader, ParameterValues, Triangle, scene_hash,
 };
-use sim_solver::{PlacedCollider, Scene, Solver, scene};
+use sim_solver::{PlacedCollider, Scene, Solver};
 
 /// Run and step of a load.
 #[derive(Debug, Clone, Copy)]
@@ -91,34 +90,8 @@ fn to_constraint_state(constraint: sim_solver::Constraint) -> ConstraintState {
 
 /// Converts a collider to its published form.
 pub(super) fn to_collider_state(collider: &PlacedCollider) -> ColliderState {
-    let common = ColliderState {
-        restitution: collider.restitution,
-        friction: collider.friction,
-        velocity: collider.velocity,
-        angular_velocity: collider.angular_velocity,
-        ..ColliderState::default()
-    };
-    let with_shape = |shape: ColliderShape| ColliderState { shape: shape as u32, ..common };
-    match collider.shape {
-        scene::ColliderGeometry::Plane { normal, offset } => {
-            ColliderState { normal, offset, ..with_shape(ColliderShape::Plane) }
-        }
-        scene::ColliderGeometry::Box { center, half_extents, rotation } => {
-            ColliderState { center, half_extents, rotation, ..with_shape(ColliderShape::Box) }
-        }
-        scene::ColliderGeometry::Sphere { center, radius } => {
-            ColliderState { center, radius, ..with_shape(ColliderShape::Sphere) }
-        }
-        scene::ColliderGeometry::Capsule { a, b, radius } => {
-            ColliderState { a, b, radius, ..with_shape(ColliderShape::Capsule) }
-        }
-        scene::ColliderGeometry::Bounds { min, max } => {
-            ColliderState { a: min, b: max, ..with_shape(ColliderShape::Bounds) }
-        }
-        scene::ColliderGeometry::Mesh { center, rotation, distance: radius } => {
-            ColliderState { center, rotation, radius, ..with_shape(ColliderShape::Mesh) }
-        }
-    }
+    let PlacedCollider { shape, restitution, friction, velocity, angular_velocity } = *collider;
+    ColliderState { restitution, friction, velocity, angular_velocity, ..shape.fields().into() }
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "a scene has at most 2^24 of anything")]

@@ -122,9 +122,9 @@ impl Started {
         }
     }
 
-    /// Returns the last recorded step.
-    pub(super) fn last_step(&self) -> u64 {
-        self.last.step
+    /// Returns the last recorded state.
+    pub(super) fn last(&self) -> &SnapshotHeader {
+        &self.last
     }
 
     /// Adds snapshots that are missing before the first one.

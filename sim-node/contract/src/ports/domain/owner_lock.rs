@@ -71,6 +71,16 @@ impl OwnerLock {
         paths(config, name)
     }
 
+    /// Returns the killed process that has left the lock of a name, which no other has taken: its id, if the
+    /// file tells.
+    #[allow(clippy::option_option, reason = "the id of a holder may be unknown")]
+    pub(crate) fn killed_holder(config: &Config, name: &str) -> Option<Option<u32>> {
+        paths(config, name).iter().find_map(|path| {
+            let mut file = File::open(path).ok()?;
+            (!is_locked(&file)).then(|| read_id(&mut file))
+        })
+    }
+
     /// Returns the files of the lock of a name that a killed owner has left, and no other has taken.
     pub(crate) fn left_files(config: &Config, name: &str) -> Vec<PathBuf> {
         let is_left = |path: &PathBuf| File::open(path).is_ok_and(|file| !is_locked(&file));

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use sim_types::{ColliderFields, ColliderShape};
 
 use super::decimal;
 
@@ -115,4 +116,31 @@ pub enum ColliderGeometry {
         #[serde(with = "decimal::number")]
         distance: f32,
     },
+}
+
+impl ColliderGeometry {
+    /// Returns the shape, size and pose as plain numbers, as programs publish and record them.
+    pub fn fields(&self) -> ColliderFields {
+        let new = ColliderFields::new;
+        match *self {
+            Self::Plane { normal, offset } => {
+                ColliderFields { normal, offset, ..new(ColliderShape::Plane) }
+            }
+            Self::Box { center, half_extents, rotation } => {
+                ColliderFields { center, half_extents, rotation, ..new(ColliderShape::Box) }
+            }
+            Self::Sphere { center, radius } => {
+                ColliderFields { center, radius, ..new(ColliderShape::Sphere) }
+            }
+            Self::Capsule { a, b, radius } => {
+                ColliderFields { a, b, radius, ..new(ColliderShape::Capsule) }
+            }
+            Self::Bounds { min, max } => {
+                ColliderFields { a: min, b: max, ..new(ColliderShape::Bounds) }
+            }
+            Self::Mesh { center, rotation, distance: radius } => {
+                ColliderFields { center, rotation, radius, ..new(ColliderShape::Mesh) }
+            }
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Warnings about bends that the substeps do not reach, and about missing ones.
 
+use super::rounded::three_digits;
 use crate::constraints::bends::Bend;
 use crate::scene::definition::Scene;
 use crate::scene::definition::bending::SheetBending;
@@ -137,9 +138,4 @@ fn sentence(place: &Place, scene: &Scene) -> Option<String> {
         three_digits(reached),
         three_digits(*rigidity)
     ))
-}
-
-/// Rounds to three significant digits.
-fn three_digits(number: f64) -> f64 {
-    format!("{number:.2e}").parse().unwrap_or(number)
 }

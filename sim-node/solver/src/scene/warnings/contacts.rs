@@ -1,0 +1,139 @@
+//! Warnings about contacts that cannot work as the scene starts: shapes across meshes, and a thickness that is
+//! large for a shape.
+
+use glam::Vec3;
+use sim_types::ConstraintKind;
+
+use super::rounded::three_digits;
+use crate::constraints::Constraint;
+use crate::contacts::colliders::Collider;
+use crate::contacts::contact_substep::{ContactSubstep, Interval};
+use crate::contacts::mesh::near::NearMeshes;
+use crate::contacts::mesh::{PUSHES_MAX, PlacedMesh, Stop};
+use crate::contacts::path::SubstepPath;
+use crate::contacts::solid::{Solid, solids};
+use crate::scene::definition::Scene;
+use crate::scene::definition::collider::SceneCollider;
+use crate::scene::generate::Generator;
+use crate::scene::model::Model;
+
+/// Distance at load up to which particles of one body never touch, in thicknesses: see `contacts/pairs/load.rs`.
+const CONNECTED_REACH: f64 = 1.6;
+/// Largest reach, in spacings, that is without effect: that of the second neighbours begins.
+const REACH_MAX: f64 = 2.0;
+/// Cosine of the angle between the normals of opposite sides. An edge of 25 degrees is no corner to cut off.
+const OPPOSITE: f32 = -0.9;
+
+/// Warns of meshes that a shape starts on both sides of: one sentence for each mesh.
+pub(super) fn across_mesh(scene: &Scene, model: &Model) -> Vec<String> {
+    let is_free = free(scene, model);
+    let has_free_ends = |one: &Constraint| [one.a, one.b].iter().all(|end| is_free[*end as usize]);
+    let sentence = |(index, collider): (usize, &SceneCollider)| {
+        let mut mesh = MeshAtLoad::new(index, collider)?;
+        let position = |index: u32| Vec3::from_array(model.particles[index as usize].position);
+        let mut across = (0_usize..).zip(&model.constraints).filter(|(_, one)| {
+            let [from, to] = [one.a, one.b].map(position);
+            one.kind == ConstraintKind::Structural
+                && has_free_ends(one)
+                && mesh.is_between(from, to)
+        });
+        let (first, Constraint { a, b, .. }) = across.next()?;
+        let count = match 1 + across.count() {
+            1 => format!("constraint {first} starts"),
+            count => format!("{count} constraints, the first of them {first}, start"),
+        };
+        Some(format!(
+            "{count} across collider {index}, a mesh: particles {a} and {b} are on different sides of it, and each \
+             stays on its side; move the mesh or the shape"
+        ))
+    };
+    scene.colliders.iter().enumerate().filter_map(sentence).collect()
+}
+
+/// Returns for each particle whether it can touch a collider.
+fn free(scene: &Scene, model: &Model) -> Vec<bool> {
+    let mut is_free: Vec<_> = model.particles.iter().map(|particle| !particle.pinned).collect();
+    for particle in scene.anchors.iter().flat_map(|anchor| &anchor.particles) {
+        is_free[*particle as usize] = false;
+    }
+    is_free
+}
+
+/// A mesh in its pose at load.
+struct MeshAtLoad {
+    placed: PlacedMesh,
+    near: NearMeshes,
+}
+
+impl MeshAtLoad {
+    fn new(index: usize, collider: &SceneCollider) -> Option<Self> {
+        collider.mesh.as_ref()?;
+        let interval = Interval { start: 0.0, end: 0.0 };
+        let substep = ContactSubstep {
+            h: 1.0,
+            rest_speed: 0.0,
+            gain: Vec3::ZERO,
+            interval,
+            is_planar: false,
+        };
+        let solids = solids(&Collider::new(index, collider), &substep);
+        let placed = solids.into_iter().flatten().find_map(|solid| match solid {
+            Solid::Mesh(placed) => Some(placed),
+            _ => None,
+        })?;
+        Some(Self { placed, near: NearMeshes::new(1) })
+    }
+
+    /// Returns `true` if the mesh separates two points: a segment between them meets it first from opposite sides.
+    /// One that cuts a corner off meets it from two sides that are at an angle.
+    fn is_between(&mut self, from: Vec3, to: Vec3) -> bool {
+        let Some(there) = self.first_normal(from, to) else { return false };
+        let Some(back) = self.first_normal(to, from) else { return false };
+        there.dot(back) < OPPOSITE
+    }
+
+    /// Returns the normal of the first triangle that a segment passes through, on the side of `from`.
+    fn first_normal(&mut self, from: Vec3, to: Vec3) -> Option<Vec3> {
+        let path = SubstepPath { start: from, displacement: to - from };
+        let room = self.placed.room(&path);
+        let triangles = self.placed.list(&mut self.near, 0, &room);
+        // After the last push, only passages count.
+        self.placed.stop(&path, &room, &triangles, PUSHES_MAX)?;
+        match self.placed.stop(&path, &room, &triangles, 0)? {
+            Stop::Push(hit) => Some(hit.normal),
+            Stop::Hold => None,
+        }
+    }
+}
+
+/// Warns of a thickness with which neighbours in a shape never touch: one sentence for each generator.
+pub(super) fn thick(scene: &Scene, model: &Model) -> Vec<String> {
+    let Some(thickness) = scene.contact.distance() else { return Vec::new() };
+    let mut rest = &model.constraints[scene.constraints.len()..];
+    let sentence = |(index, generator): (usize, &Generator)| {
+        #[allow(clippy::cast_possible_truncation, reason = "at most the constraints of the model")]
+        let (own, others) = rest.split_at(generator.shape.constraint_count() as usize);
+        rest = others;
+        let spacing = mean_spacing(own).filter(|_| generator.contact)?;
+        let ratio = f64::from(thickness) / spacing;
+        (CONNECTED_REACH * ratio >= REACH_MAX).then(|| {
+            format!(
+                "contact.thickness: {thickness} {unit} is {ratio:.1} times the spacing of generate[{index}], {} \
+                 {unit}: its particles that are nearer than {} {unit} at load never touch, so small folds pass \
+                 through themselves; use at most the spacing",
+                three_digits(spacing),
+                three_digits(CONNECTED_REACH * f64::from(thickness)),
+                unit = scene.unit,
+            )
+        })
+    };
+    scene.generators.iter().enumerate().filter_map(sentence).collect()
+}
+
+/// Mean rest length of the structural constraints.
+fn mean_spacing(constraints: &[Constraint]) -> Option<f64> {
+    let structural = constraints.iter().filter(|one| one.kind == ConstraintKind::Structural);
+    let (sum, count) = structural
+        .fold((0.0, 0_u32), |(sum, count), one| (sum + f64::from(one.rest_length), count + 1));
+    (sum > 0.0).then(|| sum / f64::from(count))
+}
