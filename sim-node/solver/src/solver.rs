@@ -24,9 +24,9 @@ use crate::scene::model::Model;
 use crate::state::hash::state_hash;
 use crate::state::particles::{Particle, Particles};
 use crate::state::tear::Torn;
+use crate::step::air::Air;
 use crate::step::anchors::Anchors;
 use crate::step::drive::ActiveGrab;
-use crate::step::wind::Air;
 use crate::store::{Configured, ParticleStore, SceneFields};
 
 /// A running scene.
@@ -118,7 +118,7 @@ impl Solver {
             particle_contacts: ParticleContacts::default(),
             anchors: Anchors::new(&scene.anchors, &model.particles),
             scene_anchors: scene.anchors.clone(),
-            air: Air::new(scene.wind, settings.rate_hz, particle_count, &model.triangles),
+            air: Air::new(scene.wind, settings.rate_hz),
             is_planar: scene.dimensions == 2,
             settings,
             parameters,
@@ -211,7 +211,7 @@ impl Solver {
     pub(crate) fn scene_fields(&self, parameters: &Parameters) -> SceneFields {
         SceneFields {
             colliders: !self.colliders.is_empty(),
-            wind: self.air.has_surface() && parameters.wind_drag > 0.0,
+            wind: !self.model.triangles.is_empty() && parameters.wind_drag > 0.0,
             bend_multipliers: !self.model.bends.is_empty() && parameters.iterations > 1,
             tethers: self.settings.tethers as usize,
             particle_contacts: parameters.contact_thickness.is_some(),
@@ -231,9 +231,6 @@ impl Solver {
 
     /// Updates the locations of particles after a change of the layout.
     fn follow_particles(&mut self) {
-        if self.scene_fields(&self.parameters).wind || self.air.is_located() {
-            self.air.locate_corners(&self.store);
-        }
         self.particle_contacts.locate(&self.store);
         self.tethers.attach(&mut self.store, &self.particles);
     }

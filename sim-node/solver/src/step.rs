@@ -1,6 +1,7 @@
 //! One step, as the list of its stages. The arithmetic is + - * / and sqrt in a fixed order. A step
 //! allocates nothing, takes no lock, reads no clock and prints nothing.
 
+pub(crate) mod air;
 pub(crate) mod anchors;
 pub(crate) mod drive;
 pub(crate) mod particle_block;
@@ -134,13 +135,13 @@ impl Solver {
     /// [`Stage::Wind`].
     fn blow(&mut self, substep: Substep) {
         let drag = self.parameters.wind_drag;
-        if !self.air.has_surface() || drag == 0.0 {
+        if self.model.triangles.is_empty() || drag == 0.0 {
             return;
         }
         let strength = self.air.strength(self.scene_step);
         let velocity = self.parameters.wind_velocity.map(|axis| strength * axis);
         let wind = WindStep { velocity, drag, h: self.h(), is_first: substep.is_first() };
-        self.air.blow(&mut self.store, &self.model.triangles, &wind);
+        self.store.blow(&wind);
     }
 
     /// [`Stage::Predict`] to [`Stage::Advance`]. Each sheet and the graph run them on their own

@@ -36,6 +36,7 @@ use crate::parameters::Parameters;
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::substep::SubstepInputs;
+use crate::step::wind::WindStep;
 
 /// Everything that a substep moves.
 #[derive(Debug, Clone)]
@@ -223,14 +224,6 @@ impl ParticleStore {
     }
 
     #[inline(always)]
-    pub(crate) fn inverse_mass(&self, location: Location) -> f32 {
-        match location.sheet() {
-            None => self.graph.inverse_mass(location.index()),
-            Some(sheet) => self.patches[sheet].inverse_mass(location.index()),
-        }
-    }
-
-    #[inline(always)]
     pub(crate) fn displacement(&self, location: Location) -> [f32; 3] {
         match location.sheet() {
             None => self.graph.displacement(location.index()),
@@ -292,11 +285,12 @@ impl ParticleStore {
             || sheets.any(|(patch, saved)| kernels.run(patch.beside_work(saved, progress)))
     }
 
-    /// Sets the velocity that the wind adds to a particle in the running substep.
-    pub(crate) fn set_wind(&mut self, location: Location, gain: [f32; 3]) {
-        match location.sheet() {
-            None => self.graph.set_wind(location.index(), gain),
-            Some(sheet) => self.patches[sheet].set_wind(location.index(), gain),
+    /// Computes the velocities that the wind adds in the running substep.
+    pub(crate) fn blow(&mut self, wind: &WindStep) {
+        let kernels = self.kernels();
+        self.graph.blow(kernels, wind);
+        for patch in &mut self.patches {
+            patch.blow(kernels, wind);
         }
     }
 

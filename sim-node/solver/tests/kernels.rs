@@ -97,7 +97,7 @@ fn sheet(columns: u32, rows: u32, solver: &str, generator: &str) -> String {
 const LINKS: &str = "links = [\"structural\", \"shear\", \"bend\"]\npinned = \"corners\"";
 
 /// Settings and generator keys that affect constraints.
-const VARIANTS: [(&str, &str, &str); 12] = [
+const VARIANTS: [(&str, &str, &str); 13] = [
     ("rigid", "substeps = 3", LINKS),
     ("passes", "substeps = 2\niterations = 3\nrelaxation = 1.2", LINKS),
     ("tethers", "substeps = 2\ntethers = true", LINKS),
@@ -120,6 +120,11 @@ const VARIANTS: [(&str, &str, &str); 12] = [
         "woven",
         "substeps = 2\niterations = 3\nrelaxation = 1.2\nmax_stretch = 1.1",
         "pinned = \"top-even\"\nbending = [40, 1e3]\ntwist = true",
+    ),
+    (
+        "wind",
+        "substeps = 2\ntethers = 1\n[wind]\nvelocity = [3, 9, 2]\ndrag = 0.6\ngust = 0.4\ngust_period = 0.1",
+        LINKS,
     ),
     ("torn bends", "substeps = 2\ntear_stretch = 1.05\ntear_force = 40", "bending = [40, 5]"),
 ];

@@ -33,7 +33,8 @@ pub(crate) struct Contacts {
 struct GroupContacts {
     /// 1 for a particle in contact, else 0.
     touched: Lanes8,
-    /// The displacement that the contacts of a particle leave it, without bounces.
+    /// The displacement that the contacts of a particle leave it, without bounces. Any numbers for particles
+    /// that are not in contact.
     displacements: [Lanes8; 3],
     /// The displacement that its bounces add. Friction ignores it, because the particle does not make
     /// it in this substep.
@@ -312,7 +313,7 @@ impl Contacts {
             if inputs.is_given_up() {
                 return;
             }
-            let eight = std::mem::take(&mut self.groups[group]);
+            let eight = &mut self.groups[group];
             let touched = W::splat(0.0).is_below(W::load(&eight.touched, 0));
             let mut path = particles.paths::<W>(group);
             for Obstacle { solid, .. } in inputs.obstacles {
@@ -321,6 +322,7 @@ impl Contacts {
             let after = sum(load(&eight.displacements), load(&eight.bounces));
             path.displacement = select::<W>(touched, after, path.displacement);
             particles.set_paths(group, &path);
+            (eight.touched, eight.bounces) = ([0.0; 8], [[0.0; 8]; 3]);
         }
     }
 }

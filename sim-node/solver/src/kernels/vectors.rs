@@ -72,11 +72,13 @@ pub(crate) fn store<W: Wide>([x, y, z]: [W; 3], [to_x, to_y, to_z]: &mut [Lanes8
 }
 
 /// The vector in one of eight lanes.
+#[inline(always)]
 pub(crate) fn lane_of([x, y, z]: &[Lanes8; 3], lane: usize) -> [f32; 3] {
     [x[lane], y[lane], z[lane]]
 }
 
 /// Sets the vector in one of eight lanes.
+#[inline(always)]
 pub(crate) fn set_lane(vectors: &mut [Lanes8; 3], lane: usize, [x, y, z]: [f32; 3]) {
     (vectors[0][lane], vectors[1][lane], vectors[2][lane]) = (x, y, z);
 }

@@ -126,7 +126,7 @@ impl ParticleStore {
         if self.is_allocated && self.layout.fits(&before) {
             return Configured::InPlace;
         }
-        self.graph.allocate();
+        self.graph.allocate(model);
         for patch in &mut self.patches {
             patch.allocate();
         }

@@ -5,12 +5,14 @@ mod bends;
 pub(crate) mod block;
 mod group;
 mod indices;
+mod wind;
 
 use batch::Batch;
 use bends::GraphBends;
 use block::{BLOCK_GROUPS, BlockWork, GraphBlock, PackedTether};
 use group::{ConstraintGroup, part_count};
 use indices::find_particle;
+use wind::{GraphWindWork, TriangleGroup, triangle_groups};
 
 use super::layout::{Layout, Location, SceneFields};
 use super::publish::{PublishedMotion, publish};
@@ -21,14 +23,15 @@ use crate::constraints::columns::{ConstraintColumns, FullPass};
 use crate::constraints::fields::Pass;
 use crate::constraints::order::ProjectionOrder;
 use crate::constraints::parameters::{ConstraintParameters, PassSoftness};
+use crate::kernels::Kernels;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::{Lanes8, PackedParticle};
-use crate::kernels::vectors::set_lane;
 use crate::scene::model::Model;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
 use crate::step::stage::Stage;
 use crate::step::substep::SubstepInputs;
+use crate::step::wind::WindStep;
 
 /// Every particle and constraint outside of sheets.
 #[derive(Debug, Clone, Default)]
@@ -38,11 +41,14 @@ pub(crate) struct Graph {
     particles: Vec<PackedParticle>,
     /// By particle: its index in the scene, ascending.
     indices: Vec<u32>,
-    /// By group of eight particles: the predicted displacements; empty in scenes without colliders.
+    /// By group of eight particles, padding included: the predicted displacements; empty in scenes without
+    /// colliders.
     predicted: Vec<[Lanes8; 3]>,
-    /// By group of eight particles: the velocities that the wind adds in a substep; empty in scenes without
-    /// wind.
+    /// By group of eight particles, padding included: the velocities that the wind adds in a substep; empty
+    /// in scenes without wind.
     gains: Vec<[Lanes8; 3]>,
+    /// Empty in scenes without wind.
+    triangles: Vec<TriangleGroup>,
     /// By particle: its tethers; empty in scenes without tethers.
     tethers: Vec<PackedTether>,
     groups: Vec<ConstraintGroup>,
@@ -154,12 +160,13 @@ impl Graph {
     }
 
     /// Allocates the fields of the layout. Every constraint and bend is inactive afterwards.
-    pub(crate) fn allocate(&mut self) {
+    pub(crate) fn allocate(&mut self, model: &Model) {
         let Layout { constraints, scene, .. } = self.layout;
         let SceneFields { colliders, wind, tethers, bend_multipliers, .. } = scene;
-        let of_groups =
-            |is_there: bool| vec![[[0.0; 8]; 3]; if is_there { self.group_count() } else { 0 }];
-        (self.predicted, self.gains) = (of_groups(colliders), of_groups(wind));
+        let group_count = self.particles.len() / 8;
+        self.predicted = vec![[[0.0; 8]; 3]; if colliders { group_count } else { 0 }];
+        self.gains = vec![[[0.0; 8]; 3]; if wind { group_count } else { 0 }];
+        self.triangles = if wind { triangle_groups(model, &self.indices) } else { Vec::new() };
         let none = PackedTether { root: [0.0; 3], length: f32::INFINITY };
         self.tethers = vec![none; tethers * self.indices.len()];
         self.bends.allocate(bend_multipliers);
@@ -315,10 +322,6 @@ impl Graph {
         [x, y, z]
     }
 
-    pub(crate) fn inverse_mass(&self, index: usize) -> f32 {
-        self.particles[index].0[3]
-    }
-
     pub(crate) fn displacement(&self, index: usize) -> [f32; 3] {
         let [_, _, _, _, x, y, z, _] = self.particles[index].0;
         [x, y, z]
@@ -341,9 +344,10 @@ impl Graph {
         self.particles[index].0[4..7].copy_from_slice(&displacement);
     }
 
-    /// Sets the velocity that the wind adds in the running substep.
-    pub(crate) fn set_wind(&mut self, index: usize, gain: [f32; 3]) {
-        set_lane(&mut self.gains[index / 8], index % 8, gain);
+    /// Computes the velocities that the wind adds in the running substep.
+    pub(crate) fn blow(&mut self, kernels: Kernels, wind: &WindStep) {
+        let Self { particles, triangles, gains, .. } = self;
+        kernels.run(GraphWindWork { particles, triangles, gains, wind });
     }
 
     pub(crate) fn tether_mut(&mut self, index: usize, slot: usize) -> &mut PackedTether {

@@ -13,6 +13,7 @@ mod paths;
 mod row;
 mod row_layout;
 mod span;
+mod wind;
 
 use std::ops::Range;
 
@@ -20,6 +21,7 @@ use band::{Band, PassSweep, SweepWork};
 use bend_layout::BendLayout;
 use row_layout::{LINE_LENGTH, RowLayout};
 use span::Span;
+use wind::SheetWindWork;
 
 use super::layout::Layout;
 use super::publish::{PublishedMotion, publish};
@@ -30,11 +32,13 @@ use crate::constraints::column_writer::{ColumnOrder, ColumnWriter};
 use crate::constraints::families::{Family, Sheet};
 use crate::constraints::fields::Pass;
 use crate::constraints::parameters::ConstraintParameters;
+use crate::kernels::Kernels;
 use crate::kernels::huge_pages::refill;
 use crate::kernels::lanes::axes;
 use crate::state::particles::Particle;
 use crate::step::schedule::{Schedule, ScheduledStage};
 use crate::step::substep::SubstepInputs;
+use crate::step::wind::WindStep;
 
 /// Memory in whole cache lines.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -306,9 +310,10 @@ impl Patch {
         self.set_vector(index, 4, displacement);
     }
 
-    /// Sets the velocity that the wind adds in the running substep.
-    pub(crate) fn set_wind(&mut self, index: usize, gain: [f32; 3]) {
-        self.set_vector(index, self.layout.wind_at(), gain);
+    /// Computes the velocities that the wind adds in the running substep.
+    pub(crate) fn blow(&mut self, kernels: Kernels, wind: &WindStep) {
+        let numbers: &mut [f32] = bytemuck::cast_slice_mut(&mut self.lines);
+        kernels.run(SheetWindWork { numbers, layout: &self.layout, wind });
     }
 
     /// Sets the position of a tether's root at the end of the substep.

@@ -1,4 +1,5 @@
-//! Cost of colliders that are meshes: a sheet on a ball of triangles, and on the same ball as a sphere.
+//! Cost of colliders that are meshes: a sheet on a ball of triangles, on the same ball as a sphere, and without
+//! a collider.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -29,6 +30,7 @@ struct Meshes {
     /// Median over the steps, for each particle and substep.
     mesh_ns: f64,
     sphere_ns: f64,
+    free_ns: f64,
     /// Particles within 1 mm of their distance from the ball.
     touching: usize,
 }
@@ -39,6 +41,7 @@ impl Row for Meshes {
         "load: ms",
         "mesh: ns a particle and substep",
         "sphere",
+        "no collider",
         "touching of 10,000",
     ];
 
@@ -52,6 +55,7 @@ impl Row for Meshes {
             format!("{:.0}", self.load_ms),
             format!("{:.1}", self.mesh_ns),
             format!("{:.1}", self.sphere_ns),
+            format!("{:.1}", self.free_ns),
             self.touching.to_string(),
         ]
     }
@@ -69,14 +73,18 @@ pub(crate) fn run(options: &Options, report: &mut Report) {
 
 fn measure(case: String, cells: usize) -> Meshes {
     let obj = ball(cells);
-    let mesh = scene_text("shape = \"mesh\"\npath = \"ball.obj\"\ndistance = 0.002\n");
+    let mesh =
+        "[[collider]]\nfriction = 0.5\nshape = \"mesh\"\npath = \"ball.obj\"\ndistance = 0.002\n";
+    let mesh = scene_text(mesh);
     let load = || Scene::from_toml_with_files(&mesh, "bench", &|_| Ok(obj.clone())).unwrap();
     let mut solver = None;
     let load_ns = cpu_ns(|| solver = Some(Solver::new(&load())));
     let mut solver = solver.unwrap();
-    let sphere = scene_text("shape = \"sphere\"\nradius = 0.302\ncenter = [0, 0, 0]\n");
-    let mut other = Solver::new(&Scene::from_toml(&sphere, "bench").unwrap());
-    let [mesh_ns, sphere_ns] = [&mut solver, &mut other].map(|solver| {
+    let sphere =
+        "[[collider]]\nfriction = 0.5\nshape = \"sphere\"\nradius = 0.302\ncenter = [0, 0, 0]\n";
+    let [mut on_sphere, mut free] = [sphere, ""]
+        .map(|collider| Solver::new(&Scene::from_toml(&scene_text(collider), "bench").unwrap()));
+    let [mesh_ns, sphere_ns, free_ns] = [&mut solver, &mut on_sphere, &mut free].map(|solver| {
         (0..STEPS_BEFORE).for_each(|_| solver.step());
         let times = (0..STEPS).map(|_| cpu_ns(|| solver.step())).collect();
         median(times) / f64::from(SUBSTEPS * SIDE * SIDE)
@@ -88,6 +96,7 @@ fn measure(case: String, cells: usize) -> Meshes {
         load_ms: load_ns / 1e6,
         mesh_ns,
         sphere_ns,
+        free_ns,
         touching: solver.particles().iter().filter(|one| is_touching(one.position)).count(),
     }
 }
@@ -97,7 +106,7 @@ fn scene_text(collider: &str) -> String {
     format!(
         "version = 1\n[solver]\nrate_hz = 240\nsubsteps = {SUBSTEPS}\n[[generate]]\nshape = \"cloth\"\n\
          columns = {SIDE}\nrows = {SIDE}\nspacing = {SPACING}\norigin = [{corner}, 0.31, {corner}]\n\
-         down = [0, 0, 1]\nmass = 0.0001\npinned = \"none\"\n[[collider]]\nfriction = 0.5\n{collider}"
+         down = [0, 0, 1]\nmass = 0.0001\npinned = \"none\"\n{collider}"
     )
 }
 

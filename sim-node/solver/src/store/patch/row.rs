@@ -2,12 +2,11 @@
 
 use glam::Vec3;
 
-use super::row_layout::RowLayout;
+use super::row_layout::{RowLayout, TETHER_FIELDS};
 use crate::constraints::separation::RestLength;
 use crate::constraints::tether_pull::{Tethered, tether_excess};
 use crate::contacts::path::{LanePath, SubstepPath};
-use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups_mut};
-use crate::scene::definition::settings::TETHERS_MAX;
+use crate::kernels::lanes::{Lanes8, Wide, axes, lane_groups, lane_groups_mut};
 use crate::step::particle_block::ParticleBlock;
 use crate::step::prediction::Prediction;
 use crate::store::layout::SceneFields;
@@ -19,19 +18,13 @@ pub(crate) struct SheetRow<'a> {
     d: [&'a mut [Lanes8]; 3],
     predicted: Option<[&'a mut [Lanes8]; 3]>,
     wind: Option<[&'a [Lanes8]; 3]>,
-    /// By tether of a particle.
-    tethers: [Option<RowTethers<'a>>; TETHERS_MAX as usize],
+    /// For each tether of a particle: the position of the root at the end of the substep, the largest
+    /// distance to it, and its square.
+    tethers: &'a [f32],
+    /// Length of a field in numbers.
+    stride: usize,
     /// Index of the first particle.
     first: usize,
-}
-
-/// A tether of each particle.
-struct RowTethers<'a> {
-    /// Position of the root at the end of the substep.
-    root: [&'a [Lanes8]; 3],
-    /// Largest distance to the root.
-    length: &'a [Lanes8],
-    square: &'a [Lanes8],
 }
 
 impl<'a> SheetRow<'a> {
@@ -50,13 +43,9 @@ impl<'a> SheetRow<'a> {
         let predicted = colliders.then(|| [next(), next(), next()]);
         let wind = wind.then(|| [&*next(), &*next(), &*next()]);
         let wind = wind.filter(|_| layout.fields.is_wind_used);
-        let mut of_row = [const { None }; TETHERS_MAX as usize];
-        for one in of_row.iter_mut().take(tethers) {
-            let root = [&*next(), &*next(), &*next()];
-            *one = Some(RowTethers { root, length: next(), square: next() });
-        }
+        let (tethers, stride) = (&rest[..TETHER_FIELDS * tethers * layout.stride], layout.stride);
         let first = layout.first + row * layout.columns;
-        Self { x, w, d, predicted, wind, tethers: of_row, first }
+        Self { x, w, d, predicted, wind, tethers, stride, first }
     }
 }
 
@@ -167,8 +156,12 @@ impl ParticleBlock for SheetRow<'_> {
 
     #[inline(always)]
     fn pull_to_roots<W: Wide>(&mut self) {
-        for RowTethers { root, length, square } in self.tethers.iter().flatten() {
-            for group in 0..self.w.len() {
+        let count = self.w.len();
+        for tether in self.tethers.chunks_exact(TETHER_FIELDS * self.stride) {
+            let field = |index: usize| lane_groups(tether, index * self.stride, count);
+            let root = [field(0), field(1), field(2)];
+            let (length, square) = (field(3), field(4));
+            for group in 0..count {
                 let load = |field: &[Lanes8]| W::load(&field[group], 0);
                 let start = axes(|axis| load(self.x[axis]) - load(root[axis]));
                 let before = axes(|axis| load(self.d[axis]));

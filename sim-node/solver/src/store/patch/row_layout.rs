@@ -12,6 +12,9 @@ pub(crate) const LINE_LENGTH: usize = 16;
 /// Number of fields at the beginning of every row: position, inverse mass, displacement.
 pub(crate) const STATE_FIELDS: usize = 7;
 
+/// Number of fields of each tether of a particle.
+pub(crate) const TETHER_FIELDS: usize = 5;
+
 /// Number of particles in a sheet from which on several threads are faster than one.
 const SHARED_MIN: usize = 4000;
 
@@ -89,9 +92,9 @@ impl RowLayout {
         STATE_FIELDS + 3 * usize::from(self.fields.scene.colliders)
     }
 
-    /// Number of fields before the root of a tether. Each tether has five.
+    /// Number of fields before the root of a tether.
     pub(crate) fn root_at(&self, slot: usize) -> usize {
-        self.wind_at() + 3 * usize::from(self.fields.scene.wind) + 5 * slot
+        self.wind_at() + 3 * usize::from(self.fields.scene.wind) + TETHER_FIELDS * slot
     }
 
     /// Number of bands into which the sheet is divided, each high enough that its seams are a small

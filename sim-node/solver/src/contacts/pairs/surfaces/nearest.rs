@@ -122,7 +122,7 @@ mod tests {
     fn no_point_of_a_triangle_is_nearer_than_the_nearest() {
         let mut features = Vec::new();
         for index in 0..1000 {
-            let axis = |step: i32| ((index * step) % 41) as f32 / 10.0 - 2.0;
+            let axis = |step: i32| ((index * step) % 41) as f32 / 20.0 - 0.5;
             let point = Vec3::new(axis(7), axis(13), axis(29));
             let corners = CORNERS.map(|corner| Vec3::from_array(corner) - point);
             let nearest = Nearest::new(corners);

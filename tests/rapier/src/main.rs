@@ -1,8 +1,8 @@
 //! The same falling cloths in this solver and in rapier3d: cost, and how often a cloth crosses itself.
 //!
-//! `cargo run --release --manifest-path sim-node/solver/benches/rapier/Cargo.toml`
+//! `cargo run --release --manifest-path tests/rapier/Cargo.toml`
 
-#[path = "../../../tests/physics/contacts/crossings.rs"]
+#[path = "../../../sim-node/solver/tests/physics/contacts/crossings.rs"]
 mod crossings;
 
 use std::time::Instant;

@@ -1,0 +1,93 @@
+//! The wind on the triangles of the graph.
+
+use super::indices::find_particle;
+use crate::kernels::lanes::{LaneWork, Lanes8, PackedParticle, Wide};
+use crate::kernels::vectors::{lane_of, set_lane, store, sum};
+use crate::scene::model::Model;
+use crate::step::wind::{Corner, WindStep};
+
+/// Eight triangles. The corners of padding are the particle behind the last one, which nothing moves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TriangleGroup {
+    /// By corner: the particles.
+    particles: [[u32; 8]; 3],
+    /// By corner: the fractions of the particles' masses that belong to the triangles.
+    shares_max: [Lanes8; 3],
+}
+
+/// The triangles between particles of the graph, in the order of the scene. `indices` are those of the
+/// particles in the scene.
+pub(crate) fn triangle_groups(model: &Model, indices: &[u32]) -> Vec<TriangleGroup> {
+    let find = |particle: u32| find_particle(indices, particle);
+    let triangles: Vec<[u32; 3]> = model
+        .triangles
+        .iter()
+        .filter_map(|[a, b, c]| Some([find(*a)?, find(*b)?, find(*c)?]))
+        .collect();
+    let mut counts = vec![0.0; indices.len()];
+    for corner in triangles.iter().flatten() {
+        counts[*corner as usize] += 1.0;
+    }
+    #[allow(clippy::cast_possible_truncation, reason = "at most 2^24 particles")]
+    let padding = indices.len() as u32;
+    let group = |triangles: &[[u32; 3]]| {
+        let mut group = TriangleGroup { particles: [[padding; 8]; 3], shares_max: [[0.0; 8]; 3] };
+        for (lane, triangle) in triangles.iter().enumerate() {
+            for (corner, particle) in triangle.iter().enumerate() {
+                group.particles[corner][lane] = *particle;
+                group.shares_max[corner][lane] = 1.0 / counts[*particle as usize];
+            }
+        }
+        group
+    };
+    triangles.chunks(8).map(group).collect()
+}
+
+/// Computes the velocities that the wind adds to the particles of the graph.
+pub(crate) struct GraphWindWork<'a> {
+    pub(crate) particles: &'a [PackedParticle],
+    pub(crate) triangles: &'a [TriangleGroup],
+    /// By group of eight particles.
+    pub(crate) gains: &'a mut [[Lanes8; 3]],
+    pub(crate) wind: &'a WindStep,
+}
+
+impl LaneWork for GraphWindWork<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        self.gains.fill([[0.0; 8]; 3]);
+        for TriangleGroup { particles, shares_max } in self.triangles {
+            let [a, b, c] = particles;
+            let (a, a_mass) = corner::<W>(self.particles, a);
+            let (b, b_mass) = corner::<W>(self.particles, b);
+            let (c, c_mass) = corner::<W>(self.particles, c);
+            let wind = self.wind.on_triangle([a, b, c]);
+            let mut gains = [[[0.0; 8]; 3]; 3];
+            store(wind.gain(a_mass, W::load(&shares_max[0], 0)), &mut gains[0]);
+            store(wind.gain(b_mass, W::load(&shares_max[1], 0)), &mut gains[1]);
+            store(wind.gain(c_mass, W::load(&shares_max[2], 0)), &mut gains[2]);
+            // One triangle after the other, because they can have common corners.
+            for lane in 0..8 {
+                for (particles, gains) in particles.iter().zip(&gains) {
+                    let index = particles[lane] as usize;
+                    let sums = &mut self.gains[index / 8];
+                    let gained = sum(lane_of(sums, index % 8), lane_of(gains, lane));
+                    set_lane(sums, index % 8, gained);
+                }
+            }
+        }
+    }
+}
+
+/// A corner of eight triangles, and the inverse masses of its particles.
+#[inline(always)]
+fn corner<W: Wide>(particles: &[PackedParticle], indices: &[u32; 8]) -> (Corner<W>, W) {
+    let mut packed = [PackedParticle::default(); 8];
+    for (packed, index) in packed.iter_mut().zip(indices) {
+        *packed = particles[*index as usize];
+    }
+    let [[x, y, z, w], [dx, dy, dz, _]] = W::columns(&packed);
+    (Corner { position: [x, y, z], displacement: [dx, dy, dz] }, w)
+}

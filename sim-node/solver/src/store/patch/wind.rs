@@ -1,0 +1,196 @@
+//! The wind on a sheet.
+//!
+//! Each cell has two triangles: upper left, lower left, lower right; and upper left, lower right, upper
+//! right. The wind on eight cells is computed at once. Then eight particles sum it, each over its six
+//! triangles in their order in the scene. At the border, triangles that are not there add 0.
+
+use super::row_layout::RowLayout;
+use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes, lane_groups, lane_groups_mut};
+use crate::kernels::vectors::sum;
+use crate::step::wind::{Corner, TriangleWind, WindStep};
+
+/// Groups of eight columns in a strip, whose wind stays in a near cache.
+const STRIP_GROUPS: usize = 16;
+
+/// Computes the velocities that the wind adds to the particles of a sheet.
+pub(crate) struct SheetWindWork<'a> {
+    pub(crate) numbers: &'a mut [f32],
+    pub(crate) layout: &'a RowLayout,
+    pub(crate) wind: &'a WindStep,
+}
+
+/// Consecutive columns of a sheet.
+#[derive(Clone, Copy)]
+struct Strip {
+    first: usize,
+    /// Number of groups of eight columns.
+    groups: usize,
+}
+
+/// The wind on a row of cells of a strip, behind a group of cells left of it.
+#[derive(Debug, Clone, Copy)]
+struct CellRow {
+    lower: TriangleRow,
+    upper: TriangleRow,
+}
+
+/// u along x, y and z, and the pressure.
+type TriangleRow = [[Lanes8; 1 + STRIP_GROUPS]; 4];
+
+impl CellRow {
+    const CALM: Self = {
+        let calm = [[[0.0; 8]; 1 + STRIP_GROUPS]; 4];
+        Self { lower: calm, upper: calm }
+    };
+}
+
+impl LaneWork for SheetWindWork<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(mut self) {
+        let RowLayout { columns, rows, .. } = *self.layout;
+        for first in (0..columns).step_by(8 * STRIP_GROUPS) {
+            let groups = (columns - first).div_ceil(8).min(STRIP_GROUPS);
+            let strip = Strip { first, groups };
+            let [mut even, mut odd] = [CellRow::CALM; 2];
+            for row in 0..rows {
+                let (above, below) =
+                    if row % 2 == 0 { (&odd, &mut even) } else { (&even, &mut odd) };
+                if row + 1 < rows {
+                    self.blow_at_cells::<W>(row, strip, below);
+                } else {
+                    *below = CellRow::CALM;
+                }
+                self.add_up::<W>(row, strip, [above, below]);
+            }
+        }
+    }
+}
+
+impl SheetWindWork<'_> {
+    /// Computes the wind on the cells between a row and the next one.
+    #[inline(always)]
+    fn blow_at_cells<W: Wide>(&self, row: usize, strip: Strip, cells: &mut CellRow) {
+        // The first strip has no cells left of it.
+        let skipped = usize::from(strip.first == 0);
+        let from = strip.first + 8 * skipped - 8;
+        let count = 1 + strip.groups - skipped;
+        let [above_left, above_right] = self.corners(row, from, count);
+        let [below_left, below_right] = self.corners(row + 1, from, count);
+        for group in 0..count {
+            let [a, b] = [above_left.load::<W>(group), below_left.load(group)];
+            let [c, d] = [below_right.load(group), above_right.load(group)];
+            let is_cell = column::<W>(from + 8 * group).is_below(self.last_column());
+            store(self.wind.on_triangle([a, b, c]), is_cell, (&mut cells.lower, skipped + group));
+            store(self.wind.on_triangle([a, c, d]), is_cell, (&mut cells.upper, skipped + group));
+        }
+    }
+
+    /// Adds up the velocities that the particles of a row gain from the cells above and below.
+    #[inline(always)]
+    fn add_up<W: Wide>(&mut self, row: usize, strip: Strip, [above, below]: [&CellRow; 2]) {
+        let RowLayout { rows, row_length, stride, .. } = *self.layout;
+        let last_column = self.last_column::<W>();
+        let one_if = |is_there| W::splat(if is_there { 1.0 } else { 0.0 });
+        let (is_above, is_below) = (one_if(row > 0), one_if(row + 1 < rows));
+        let numbers = &mut self.numbers[row * row_length..][..row_length];
+        let (state, others) = numbers.split_at_mut(self.layout.wind_at() * stride);
+        let inverse_masses = lane_groups(state, 3 * stride + strip.first, strip.groups);
+        let (x, others) = others.split_at_mut(stride);
+        let (y, z) = others.split_at_mut(stride);
+        let x = lane_groups_mut(x, strip.first, strip.groups);
+        let y = lane_groups_mut(y, strip.first, strip.groups);
+        let z = lane_groups_mut(z, strip.first, strip.groups);
+        let (zero, one, two) = (W::splat(0.0), W::splat(1.0), W::splat(2.0));
+        for group in 0..strip.groups {
+            let inverse_mass = W::load(&inverse_masses[group], 0);
+            let column = column::<W>(strip.first + 8 * group);
+            let left = one.masked(zero.is_below(column));
+            let right = one.masked(column.is_below(last_column));
+            let count = is_above * (two * left + right) + is_below * (left + two * right);
+            let share_max = one / count;
+            // The cell left of a particle, and the one that begins at it.
+            let (left, right) = (8 * group + 7, 8 * group + 8);
+            let mut sums = [zero; 3];
+            for (cells, at) in [
+                (&above.lower, left),
+                (&above.upper, left),
+                (&above.lower, right),
+                (&below.upper, left),
+                (&below.lower, right),
+                (&below.upper, right),
+            ] {
+                sums = sum(sums, load::<W>(cells, at).gain(inverse_mass, share_max));
+            }
+            sums[0].store(&mut x[group], 0);
+            sums[1].store(&mut y[group], 0);
+            sums[2].store(&mut z[group], 0);
+        }
+    }
+
+    /// The particles of a row from a column on, and their right neighbours, as corners.
+    #[inline(always)]
+    fn corners(&self, row: usize, from: usize, count: usize) -> [CornerGroups<'_>; 2] {
+        let RowLayout { row_length, stride, .. } = *self.layout;
+        let numbers = &self.numbers[row * row_length..][..row_length];
+        let field = |index: usize, column| lane_groups(numbers, index * stride + column, count);
+        let fields = |column| CornerGroups {
+            position: axes(|axis| field(axis, column)),
+            displacement: axes(|axis| field(4 + axis, column)),
+        };
+        [fields(from), fields(from + 1)]
+    }
+
+    #[inline(always)]
+    fn last_column<W: Wide>(&self) -> W {
+        W::splat((self.layout.columns - 1) as f32)
+    }
+}
+
+/// Consecutive particles of a row.
+struct CornerGroups<'a> {
+    position: [&'a [Lanes8]; 3],
+    displacement: [&'a [Lanes8]; 3],
+}
+
+impl CornerGroups<'_> {
+    #[inline(always)]
+    fn load<W: Wide>(&self, group: usize) -> Corner<W> {
+        Corner {
+            position: axes(|axis| W::load(&self.position[axis][group], 0)),
+            displacement: axes(|axis| W::load(&self.displacement[axis][group], 0)),
+        }
+    }
+}
+
+/// The columns from `first` on.
+#[inline(always)]
+fn column<W: Wide>(first: usize) -> W {
+    W::splat(first as f32) + W::load(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], 0)
+}
+
+/// Stores the wind on the triangles of a group, without pressure where there is no cell.
+#[inline(always)]
+fn store<W: Wide>(
+    TriangleWind { relative: [x, y, z], pressure }: TriangleWind<W>,
+    is_cell: W::Mask,
+    (row, group): (&mut TriangleRow, usize),
+) {
+    x.store(&mut row[0][group], 0);
+    y.store(&mut row[1][group], 0);
+    z.store(&mut row[2][group], 0);
+    pressure.masked(is_cell).store(&mut row[3][group], 0);
+}
+
+/// The wind on eight triangles from an index on.
+#[inline(always)]
+fn load<W: Wide>(row: &TriangleRow, at: usize) -> TriangleWind<W> {
+    let relative = axes(|axis| load_numbers(&row[axis], at));
+    TriangleWind { relative, pressure: load_numbers(&row[3], at) }
+}
+
+#[inline(always)]
+fn load_numbers<W: Wide>(numbers: &[Lanes8], at: usize) -> W {
+    W::load(&lane_groups(numbers.as_flattened(), at, 1)[0], 0)
+}
