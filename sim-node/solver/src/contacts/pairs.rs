@@ -60,6 +60,7 @@ pub(crate) struct ParticleContacts {
     paths: Paths,
     /// Substep for which the candidates were found. None before the first one of a step.
     found_at: Option<Substep>,
+    pair_count_max: usize,
     candidates: Vec<Pair>,
     /// The candidates in the order of contact.
     ordered: Vec<Pair>,
@@ -87,22 +88,32 @@ impl ParticleContacts {
         let surfaces = has_surfaces.then(|| {
             SurfaceContacts::new(model, &particles, (thickness, kernels), candidate_count_max)
         });
+        let loose = if has_surfaces { load::loose(model, &particles) } else { Vec::new() };
+        let loose_count: u32 = loose.iter().map(|lanes| lanes.count_ones()).sum();
+        let pair_count_max = if has_surfaces {
+            CANDIDATES_PER_PARTICLE * loose_count as usize
+        } else {
+            candidate_count_max
+        };
         Self {
             thickness,
             margin: 0.2 * thickness,
             locations: vec![Location::default(); count],
             states: vec![PackedParticle::default(); count],
             paths: Paths::default(),
-            load_pairs: LoadPairs::new(model, &particles, thickness, kernels),
-            loose: if has_surfaces { load::loose(model, &particles) } else { Vec::new() },
+            load_pairs: LoadPairs::new(model, &particles, (thickness, kernels), &|tiles| {
+                if has_surfaces { without_corners([0; TILE], &loose, tiles) } else { [0; TILE] }
+            }),
+            loose,
+            pair_count_max,
             surfaces: surfaces.unwrap_or_default(),
             tree: TileTree::new(count),
             particles,
             found_at: None,
-            candidates: Vec::with_capacity(candidate_count_max),
-            ordered: Vec::with_capacity(candidate_count_max),
+            candidates: Vec::with_capacity(pair_count_max),
+            ordered: Vec::with_capacity(pair_count_max),
             involved: vec![0; count.div_ceil(TILE)],
-            near: Vec::with_capacity(candidate_count_max),
+            near: Vec::with_capacity(pair_count_max),
             overflow_count: 0,
         }
     }
@@ -193,7 +204,7 @@ impl ParticleContacts {
         let kernels = store.kernels();
         self.load_all(store);
         let Self { tree, states, particles, load_pairs, loose, candidates, .. } = self;
-        let (thickness, count_max) = (self.thickness, CANDIDATES_PER_PARTICLE * particles.len());
+        let (thickness, count_max) = (self.thickness, self.pair_count_max);
         for (slot, state) in states.iter().enumerate() {
             let PackedParticle([x, y, z, _, dx, dy, dz, _]) = *state;
             tree.tiles[slot / TILE].set(slot % TILE, [x, y, z], [dx, dy, dz]);
@@ -218,23 +229,21 @@ impl ParticleContacts {
         };
         let distance = REACH * thickness + self.margin;
         let query = Query { span, distance };
-        let mut found = if loose.is_empty() {
+        let found = if loose.is_empty() {
             let except = |tiles| load_pairs.untouchable(tiles);
-            tree.search_except(query, kernels, &except, &mut accept)
+            tree.search(query, kernels, &except, &mut accept)
         } else if loose.iter().any(|lanes| *lanes != 0) {
-            let except = |tiles: [u32; 2]| {
-                let [lanes, others] = tiles.map(|tile| loose[tile as usize]);
-                without_corners(load_pairs.untouchable(tiles), lanes, others)
-            };
-            tree.search_except(query, kernels, &except, &mut accept)
+            let except = |tiles| without_corners(load_pairs.untouchable(tiles), loose, tiles);
+            tree.search(query, kernels, &except, &mut accept)
         } else {
             Search::Continue(())
         };
-        if found.is_continue() && self.surfaces.are_on() {
+        let mut is_complete = found.is_continue();
+        if self.surfaces.are_on() {
             let search = SurfaceSearch { tree, states, particles, span, distance, kernels };
-            found = self.surfaces.find(&search);
+            is_complete &= self.surfaces.find(&search).is_continue();
         }
-        self.overflow_count += u64::from(found.is_break());
+        self.overflow_count += u64::from(!is_complete);
         self.order_candidates();
     }
 
@@ -247,8 +256,9 @@ impl ParticleContacts {
     }
 }
 
-/// Leaves all pairs out but those of particles without triangles, for which `lanes` and `others` have a bit.
-fn without_corners(left_out: LaneMasks, lanes: u16, others: u16) -> LaneMasks {
+/// Leaves all pairs out but those of particles without triangles, for which `loose` has a bit by tile.
+fn without_corners(left_out: LaneMasks, loose: &[u16], tiles: [u32; 2]) -> LaneMasks {
+    let [lanes, others] = tiles.map(|tile| loose[tile as usize]);
     let mut left_out = left_out;
     for (lane, mask) in left_out.iter_mut().enumerate() {
         *mask |= if lanes & (1 << lane) != 0 { !others } else { !0 };

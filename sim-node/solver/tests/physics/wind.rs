@@ -134,7 +134,7 @@ fn every_kernel_adds_the_triangles_up_in_their_order_to_the_last_bit() {
                 }
             }
             solver.restore(&particles, &solver.keyframe()).unwrap();
-            // Publishes the restored state.
+            // The first step starts from the restored state, and the second one is compared.
             step(&mut solver, 1);
             let expected = velocities_in_wind(solver.triangles(), solver.particles());
             step(&mut solver, 1);

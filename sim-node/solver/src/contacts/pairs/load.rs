@@ -122,14 +122,20 @@ struct Untouchable {
 }
 
 impl LoadPairs {
-    /// Finds the pairs of particles that are near each other at load.
-    pub(super) fn new(model: &Model, slots: &[u32], thickness: f32, kernels: Kernels) -> Self {
+    /// Finds the pairs of particles that are near each other at load. For two tiles, `except` has a bit for each
+    /// particle of the second one that one of the first leaves out.
+    pub(super) fn new(
+        model: &Model,
+        slots: &[u32],
+        (thickness, kernels): (f32, Kernels),
+        except: &impl Fn([u32; 2]) -> LaneMasks,
+    ) -> Self {
         let bodies = bodies(model);
         let mut tree = TileTree::at_load(model, slots, kernels);
         let query = Query { span: 0.0, distance: CONNECTED_REACH * thickness };
         let count_max = PAIRS_PER_PARTICLE * slots.len();
         let (mut never, mut closer) = (Vec::new(), Vec::new());
-        let _is_complete = tree.search(query, kernels, &mut |pair| {
+        let _is_complete = tree.search(query, kernels, except, &mut |pair| {
             let [a, b] = pair.map(|slot| slots[slot as usize]);
             let apart = model.distance(a, b);
             if bodies[a as usize] == bodies[b as usize] || apart == 0.0 {

@@ -38,6 +38,8 @@ pub(super) struct SurfaceContacts {
     load_pairs: LoadPairs,
     candidate_count_max: usize,
     candidates: Vec<Candidate>,
+    /// By slot: the candidate that was found last.
+    newest: Vec<Option<u32>>,
     /// The candidates in the order of contact.
     ordered: Vec<Candidate>,
     /// The contacts of the running substep, in the order of contact.
@@ -52,6 +54,8 @@ struct Candidate {
     slot: u32,
     /// The triangle at the nearest point in the last substep.
     triangle: u32,
+    /// The candidate of this particle that was found before.
+    previous: Option<u32>,
     key: u8,
 }
 
@@ -81,6 +85,7 @@ impl SurfaceContacts {
             tiles,
             load_pairs,
             candidate_count_max,
+            newest: vec![None; particles.len()],
             candidates: Vec::with_capacity(candidate_count_max),
             ordered: Vec::with_capacity(candidate_count_max),
             near: Vec::with_capacity(candidate_count_max),
@@ -95,7 +100,8 @@ impl SurfaceContacts {
     /// Takes torn triangles out.
     pub(super) fn begin_step(&mut self, torn: &Torn) {
         let now = (torn.order().len(), torn.hash_seed());
-        if self.torn != now {
+        // Cuts since the last step are in no hash yet.
+        if self.torn != now || !torn.new_tears().is_empty() {
             self.torn = now;
             self.surface.follow_tears(torn.all());
         }
@@ -112,20 +118,30 @@ impl SurfaceContacts {
 
     /// Finds the candidates, and orders them. Breaks if there are too many.
     pub(super) fn find(&mut self, search: &SurfaceSearch<'_>) -> Search {
-        let Self { surface, tiles, load_pairs, candidates, candidate_count_max, .. } = self;
-        let particles = search.particles;
+        let Self { surface, tiles, load_pairs, candidates, newest, .. } = self;
+        let (particles, count_max) = (search.particles, self.candidate_count_max);
         candidates.clear();
+        newest.fill(None);
         tiles.refit(surface, search);
         let mut accept = |[slot, triangle]: [u32; 2]| {
-            if !comes_near(surface, search, [slot, triangle]) {
+            let Some(feature) = near_feature(surface, search, [slot, triangle]) else {
+                return Search::Continue(());
+            };
+            // Triangles that share the nearest point are one candidate.
+            let triangle = surface.first_sharing(triangle, feature, |one| {
+                !surface.has_corner(one, slot) && !load_pairs.never_touch(slot, one)
+            });
+            if has_candidate(candidates, newest[slot as usize], triangle) {
                 return Search::Continue(());
             }
-            if candidates.len() == *candidate_count_max {
+            if candidates.len() == count_max {
                 return Search::Break(());
             }
             let first = surface.corners[triangle as usize][0];
             let key = order_key(particles[slot as usize], particles[first as usize]);
-            candidates.push(Candidate { slot, triangle, key });
+            #[allow(clippy::cast_possible_truncation, reason = "at most 8 for each particle")]
+            let previous = newest[slot as usize].replace(candidates.len() as u32);
+            candidates.push(Candidate { slot, triangle, previous, key });
             Search::Continue(())
         };
         let except = |tiles| load_pairs.untouchable(tiles);
@@ -188,19 +204,33 @@ fn across([a, b, c]: [Vec3; 3]) -> Vec3 {
     (b - a).cross(c - a)
 }
 
-/// True if the nearest point of a triangle is a local minimum of the distance and comes near the particle.
+/// True if a triangle is one of the candidates of a particle, of which the newest is given.
+fn has_candidate(candidates: &[Candidate], newest: Option<u32>, triangle: u32) -> bool {
+    let mut at = newest;
+    while let Some(candidate) = at.map(|index| &candidates[index as usize]) {
+        if candidate.triangle == triangle {
+            return true;
+        }
+        at = candidate.previous;
+    }
+    false
+}
+
+/// Returns the part of a triangle with the nearest point, if that is a local minimum of the distance and comes near
+/// the particle.
 #[inline(always)]
-fn comes_near(surface: &Surface, search: &SurfaceSearch<'_>, [slot, triangle]: [u32; 2]) -> bool {
+fn near_feature(
+    surface: &Surface,
+    search: &SurfaceSearch<'_>,
+    [slot, triangle]: [u32; 2],
+) -> Option<Feature> {
     let SurfaceSearch { states, span, distance, .. } = *search;
     let view = View { particles: states, slot, time: 0.0 };
     let corners = surface.place(triangle, view);
     let nearest = Nearest::new(corners);
     let is_separate = surface.is_whole(triangle) && !surface.has_corner(triangle, slot);
-    if !is_separate
-        || surface.nearer(triangle, &nearest, view).is_some()
-        || !surface.is_first(triangle, nearest.feature)
-    {
-        return false;
+    if !is_separate || surface.nearer(triangle, &nearest, view).is_some() {
+        return None;
     }
     let later = surface.place(triangle, View { time: span, ..view });
     let apart = -nearest.mean(corners);
@@ -210,7 +240,7 @@ fn comes_near(surface: &Surface, search: &SurfaceSearch<'_>, [slot, triangle]: [
     let least = if at_end < length { at_end } else { length };
     let is_free = states[slot as usize].0[3] > 0.0
         || surface.corners[triangle as usize].iter().any(|one| states[*one as usize].0[3] > 0.0);
-    is_free && least < distance
+    (is_free && least < distance).then_some(nearest.feature)
 }
 
 fn at_load(model: &Model, particle: u32) -> PackedParticle {

@@ -100,9 +100,6 @@ pub(super) struct TileTree {
     tile_pairs: Vec<[u32; 2]>,
 }
 
-/// Leaves nothing out of a search.
-const NONE: fn([u32; 2]) -> [u16; TILE] = |_| [0; TILE];
-
 impl TileTree {
     /// Makes a tree of empty tiles for `count` particles.
     pub(super) fn new(count: usize) -> Self {
@@ -131,19 +128,9 @@ impl TileTree {
 
     /// Passes every pair of particles whose straight paths come nearer than the query's distance to
     /// `accept`, as slots in ascending order. The order of two pairs depends only on the tree, not on the
-    /// other pairs.
+    /// other pairs. `except` leaves pairs out: for two tiles, it has a bit for each particle of the second one that a
+    /// particle of the first one leaves out.
     pub(super) fn search(
-        &mut self,
-        query: Query,
-        kernels: Kernels,
-        accept: &mut impl FnMut([u32; 2]) -> Search,
-    ) -> Search {
-        self.search_except(query, kernels, &NONE, accept)
-    }
-
-    /// Like [`Self::search`], without the pairs that `except` returns: for two tiles, it has a bit for each particle of
-    /// the second one that a particle of the first one leaves out.
-    pub(super) fn search_except(
         &mut self,
         query: Query,
         kernels: Kernels,

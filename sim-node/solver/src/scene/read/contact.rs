@@ -48,13 +48,18 @@ impl Reader<'_> {
         })
     }
 
-    /// Takes the smallest rest length of a structural constraint for a thickness that the scene needs and
-    /// does not give.
+    /// Refuses surfaces in two dimensions, where a triangle has no side. Takes the smallest rest length of a structural
+    /// constraint for a thickness that the scene needs and does not give.
     pub(super) fn complete_contact(
         &self,
         scene: &mut Scene,
         place: Option<Range<usize>>,
     ) -> Result<(), SceneError> {
+        let place = place.unwrap_or(0..0);
+        if scene.contact.mode == ContactMode::Surfaces && scene.dimensions == 2 {
+            let problem = "\"surfaces\" needs three dimensions (allowed in two: off, particles)";
+            return self.error(place, "contact.mode", problem);
+        }
         if scene.contact.mode == ContactMode::Off || scene.contact.thickness.is_some() {
             return Ok(());
         }
@@ -68,6 +73,6 @@ impl Reader<'_> {
         }
         let problem = "is missing, and the scene has no structural constraint with a length to take it \
                        from (allowed: > 0)";
-        self.error(place.unwrap_or(0..0), "contact.thickness", problem)
+        self.error(place, "contact.thickness", problem)
     }
 }

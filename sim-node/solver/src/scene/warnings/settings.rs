@@ -39,8 +39,14 @@ pub(super) fn contact_without_surface(scene: &Scene, model: &Model) -> Option<St
     })
 }
 
-/// Largest fall in a substep, in contact distances, at which cloth does not pass through itself.
-const CONTACT_FALL_MAX: f32 = 0.25;
+/// Returns the largest fall in a substep, in contact distances, at which cloth does not pass through itself.
+fn fall_max(mode: ContactMode) -> f32 {
+    match mode {
+        ContactMode::Off | ContactMode::Particles => 0.25,
+        // The heap in `tests/physics/contacts/surfaces.rs`.
+        ContactMode::Surfaces => 0.8,
+    }
+}
 
 /// Particles that fall through the height of the scene move too far in a substep to touch each other
 /// reliably.
@@ -57,13 +63,14 @@ pub(super) fn fast_contacts(scene: &Scene, model: &Model) -> Option<String> {
     });
     let speed = (2.0 * gravity * (max - min)).sqrt();
     let distance = speed * scene.solver.h();
+    let fall_max = fall_max(scene.contact.mode);
     // NaN without gravity.
-    if distance > CONTACT_FALL_MAX * thickness {
-        let substeps = distance / (CONTACT_FALL_MAX * thickness) * scene.solver.substeps as f32;
+    if distance > fall_max * thickness {
+        let substeps = distance / (fall_max * thickness) * scene.solver.substeps as f32;
         return Some(format!(
             "particles that fall through the height of the scene, at {speed:.1} {unit}/s, move {share:.2} \
              of the contact thickness in a substep, and can pass through each other beyond \
-             {CONTACT_FALL_MAX}; {} substeps suffice",
+             {fall_max}; {} substeps suffice",
             substeps.ceil(),
             unit = scene.unit,
             share = distance / thickness,

@@ -1,6 +1,6 @@
 //! Particles that touch triangles: the laws of friction, cloths that fold, and torn cloths.
 
-use sim_solver::{Particle, Scene, Solver};
+use sim_solver::{ParameterValue, Particle, Scene, Solver};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{GROUND, SPACING, crossings, energy, heap, on_a_ball, rms_speed, sheet};
@@ -202,12 +202,124 @@ fn a_keyframe_at_any_step_continues_bit_for_bit() {
 }
 
 #[test]
+fn contacts_can_be_switched_off_and_on_while_the_scene_runs() {
+    let start = || solver(&(rates(240, 4) + CONTACT + &heap(16)));
+    let touching = {
+        let mut heap = start();
+        step(&mut heap, 100);
+        heap.state_hash()
+    };
+    let mut heap = start();
+    let thickness = heap.parameter_values().contact.unwrap();
+    heap.set("contact", ParameterValue::Off, None).unwrap();
+    step(&mut heap, 1);
+    heap.reset();
+    heap.set("contact", ParameterValue::Off, None).unwrap();
+    heap.set("contact", ParameterValue::Number(thickness), None).unwrap();
+    step(&mut heap, 101);
+    assert_eq!(heap.state_hash(), touching);
+}
+
+#[test]
+fn other_cuts_after_a_restore_take_out_their_own_triangles() {
+    let scene = rates(240, 4) + CONTACT + &heap(16);
+    let cut = |solver: &mut Solver, first: u32| {
+        for constraint in first..first + 200 {
+            solver.cut(constraint).unwrap();
+        }
+        step(solver, 1);
+        solver.state_hash()
+    };
+    // It folds.
+    let mut restored = stepped(&scene, 150);
+    let (particles, keyframe) = (restored.particles().to_vec(), restored.keyframe());
+    cut(&mut restored, 0);
+    restored.restore(&particles, &keyframe).unwrap();
+    let mut fresh = solver(&scene);
+    fresh.restore(&particles, &keyframe).unwrap();
+    assert_eq!(cut(&mut restored, 250), cut(&mut fresh, 250));
+}
+
+#[test]
+fn a_keyframe_continues_bit_for_bit_where_particles_meet_in_too_many_pairs() {
+    // A sheet lies on a held one.
+    let mut text = format!(
+        "{}{CONTACT}[[generate]]\nshape = \"cloth\"\ncolumns = 12\nrows = 12\nspacing = {SPACING}\n\
+         pinned = {:?}\ndown = [0, 0, 1]\n{}",
+        rates(240, 4),
+        (0..144).collect::<Vec<_>>(),
+        sheet(8, [0.045, 0.02, 0.047], ["[1, 0, 0]", "[0, 0, 1]"])
+    );
+    for index in 0..600 {
+        let place = |step: i32| f64::from((index * step) % 97) / 48.0 - 1.0;
+        let aside = [place(7), place(13), place(29)];
+        // All of them come to one point in 0.3 s.
+        let [x, y, z] = aside.map(|axis| 6.0 * axis);
+        let velocity = aside.map(|axis| -20.0 * axis);
+        text += &format!(
+            "[[particle]]\nposition = [{}, {y}, {z}]\nvelocity = {velocity:?}\n",
+            50.0 + x
+        );
+    }
+    let scene = Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap();
+    let mut solver = Solver::new(&scene);
+    step(&mut solver, 62);
+    for _ in 0..16 {
+        step(&mut solver, 1);
+        let mut copy = Solver::new(&scene);
+        copy.restore(solver.particles(), &solver.keyframe()).unwrap();
+        let mut original = solver.clone();
+        step(&mut original, 1);
+        step(&mut copy, 1);
+        assert_eq!(copy.state_hash(), original.state_hash());
+    }
+    assert!(solver.contact_overflow_count() > 0, "all pairs fit");
+}
+
+/// Particles that fall on the tips and the sides of spikes, where the nearest points are corners and edges.
+#[test]
+fn particles_do_not_fall_through_the_tips_of_spikes() {
+    let pinned: Vec<_> = (0..18 * 18).collect();
+    let mut text = format!(
+        "{}{CONTACT}[[generate]]\nshape = \"cloth\"\ncolumns = 18\nrows = 18\nspacing = {SPACING}\n\
+         pinned = {pinned:?}\norigin = [0, 0, 0]\ndown = [0, 0, 1]\n",
+        rates(240, 4)
+    );
+    for index in 0..200 {
+        let at = |step: i32| 0.06 + f64::from((index * step) % 89) / 89.0 * 0.22;
+        text += &format!(
+            "[[particle]]\nposition = [{}, {}, {}]\nmass = 0.001\n",
+            at(17),
+            0.1 + 0.03 * f64::from(index),
+            at(29)
+        );
+    }
+    let mut spikes = solver(&text);
+    let (mut particles, keyframe) = (spikes.particles().to_vec(), spikes.keyframe());
+    for (index, particle) in particles[..18 * 18].iter_mut().enumerate() {
+        let is_tip = index / 18 % 3 == 1 && index % 18 % 3 == 1;
+        particle.position[1] = if is_tip { 0.05 } else { 0.0 };
+    }
+    spikes.restore(&particles, &keyframe).unwrap();
+    step(&mut spikes, 400);
+    let fallen = spikes.particles()[18 * 18..].iter().filter(|one| {
+        let [x, y, z] = one.position;
+        y < 0.0 && (0.0..0.34).contains(&x) && (0.0..0.34).contains(&z)
+    });
+    assert_eq!(fallen.count(), 0);
+}
+
+#[test]
 fn particles_in_one_point_and_triangles_without_an_area_stay_finite() {
-    // A mesh folded into a line, and a sheet in it.
-    let line = "[[generate]]\nshape = \"cloth\"\ncolumns = 12\nrows = 12\nspacing = 0.02\nmass = 0.001\n\
-        pinned = \"none\"\norigin = [0, 0.1, 0]\nright = [1, 0, 0]\ndown = [1, 0, 0.001]\n";
-    let text = rates(240, 4) + CONTACT + line + &heap(12);
-    let done = stepped(&text, 240);
+    let mut done = solver(&(rates(240, 4) + CONTACT + &heap(12)));
+    let (mut particles, keyframe) = (done.particles().to_vec(), done.keyframe());
+    for (index, particle) in particles.iter_mut().enumerate() {
+        // The upper rows in one point, the others on a line.
+        let place = if index < 72 { 0.0 } else { 0.02 * index as f32 };
+        particle.position = [place, 0.5, 0.0];
+    }
+    done.restore(&particles, &keyframe).unwrap();
+    step(&mut done, 240);
     assert!(done.particles().iter().all(|one| one.position.iter().all(|axis| axis.is_finite())));
     assert_eq!(done.frozen_count(), 0);
 }

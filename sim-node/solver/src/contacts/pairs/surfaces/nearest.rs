@@ -93,11 +93,17 @@ pub(super) const SIDE_TOLERANCE: f32 = 1e-5;
 /// True if the origin is on the side of an edge on which a corner lies, in the plane of the three.
 #[inline(always)]
 pub(super) fn is_on_side_of([from, to]: [Vec3; 2], corner: Vec3) -> bool {
+    let inwards = inwards([from, to], corner);
+    let square = (to - from).dot(to - from);
+    -from.dot(inwards) > SIDE_TOLERANCE * square * square
+}
+
+/// A vector across an edge to the side of a corner, in the plane of the three: the part of the line to the corner
+/// across the edge, times the square of the edge's length.
+#[inline(always)]
+pub(super) fn inwards([from, to]: [Vec3; 2], corner: Vec3) -> Vec3 {
     let (edge, side) = (to - from, corner - from);
-    let square = edge.dot(edge);
-    // The part of `side` across the edge, times the square of the edge's length.
-    let across = side * square - edge * side.dot(edge);
-    -from.dot(across) > SIDE_TOLERANCE * square * square
+    side * edge.dot(edge) - edge * side.dot(edge)
 }
 
 #[cfg(test)]

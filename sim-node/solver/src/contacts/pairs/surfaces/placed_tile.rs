@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::super::tile_tree::TILE;
-use super::nearest::{SIDE_TOLERANCE, next};
+use super::nearest::{SIDE_TOLERANCE, inwards, next};
 use super::surface::Surface;
 use crate::kernels::lanes::{Lanes8, PackedParticle, Wide};
 
@@ -61,16 +61,12 @@ impl PlacedTile {
         for (lane, (triangle, slots)) in (first..).zip(rest).enumerate() {
             let corners = slots.map(at);
             for edge in 0..3 {
-                let (from, to) = (corners[edge], corners[next(edge)]);
-                let along = to - from;
-                let square = along.dot(along);
-                let across = |corner: Vec3| {
-                    let side = corner - from;
-                    side * square - along * side.dot(along)
-                };
+                let ends = [corners[edge], corners[next(edge)]];
+                let square = (ends[1] - ends[0]).length_squared();
+                let across = |corner: Vec3| inwards(ends, corner);
                 let opposite = surface.neighbor(triangle, edge).map(|other| at(other.opposite));
                 let edges = &mut self.edges[edge];
-                set(&mut edges.from, lane, from);
+                set(&mut edges.from, lane, ends[0]);
                 set(&mut edges.inwards, lane, across(corners[next(next(edge))]));
                 set(&mut edges.neighbor_inwards, lane, opposite.map_or(Vec3::ZERO, across));
                 edges.tolerance[lane / 8][lane % 8] = SIDE_TOLERANCE * square * square;

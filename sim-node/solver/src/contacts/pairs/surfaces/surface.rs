@@ -158,17 +158,26 @@ impl Surface {
         }
     }
 
-    /// True if no earlier triangle has the same nearest point.
-    pub(super) fn is_first(&self, triangle: u32, feature: Feature) -> bool {
-        match feature {
-            Feature::Face => true,
-            Feature::Edge(edge) => {
-                self.neighbor(triangle, edge).is_none_or(|one| triangle < one.triangle)
-            }
+    /// Returns the first whole triangle with the same nearest point as this one that fulfils a condition, as this one
+    /// does.
+    pub(super) fn first_sharing(
+        &self,
+        triangle: u32,
+        feature: Feature,
+        condition: impl Fn(u32) -> bool,
+    ) -> u32 {
+        let first = match feature {
+            Feature::Face => None,
+            Feature::Edge(edge) => self
+                .neighbor(triangle, edge)
+                .map(|other| other.triangle)
+                .filter(|other| *other < triangle && condition(*other)),
             Feature::Corner(corner) => {
-                self.fan(self.corners[triangle as usize][corner]).next() == Some(triangle)
+                let slot = self.corners[triangle as usize][corner];
+                self.fan(slot).find(|other| condition(*other))
             }
-        }
+        };
+        first.unwrap_or(triangle)
     }
 
     /// Goes from a triangle to the one that is nearest to the viewer, across edges and around corners, as long as each is
