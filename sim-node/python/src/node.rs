@@ -84,6 +84,16 @@ impl Node {
         self.call(py, |client| Ok(client.is_owner_alive()))
     }
 
+    /// Returns `true` if the node has reported no step after the one of the kept snapshot.
+    fn is_kept_newest(&self, py: Python<'_>) -> PyResult<bool> {
+        let status = self.latched(py, Client::status)?;
+        let kept = self.newest();
+        Ok(kept.as_ref().is_some_and(|snapshot| {
+            let header = snapshot.get().header();
+            status.run_id == header.run_id && status.step <= header.step
+        }))
+    }
+
     /// Reads what the node has published once.
     fn latched<T: Send>(
         &self,
@@ -237,14 +247,25 @@ impl Node {
     }
 
     /// Returns the newest snapshot. Waits only for the first one.
+    ///
+    /// Raises `TooManySnapshots` if the program holds too many to read a newer one.
     #[pyo3(signature = (timeout=5.0))]
     fn latest(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Py<Snapshot>> {
         let patience = Patience::new(timeout)?;
-        let newer = self.call(py, |client| {
+        let read = |client: &mut Client| {
             client.latest_snapshot(Duration::ZERO).map_err(|error| read_error(&error))
-        });
-        let newer = match newer {
-            Err(error) if error.is_instance_of::<TooManySnapshots>(py) => None,
+        };
+        let newer = match self.call(py, read) {
+            Err(error) if error.is_instance_of::<TooManySnapshots>(py) => {
+                if self.is_kept_newest(py)? {
+                    None
+                } else {
+                    // The kept one makes room, unless the program holds it, too.
+                    let kept = self.newest().take();
+                    drop(kept);
+                    self.call(py, read)?
+                }
+            }
             newer => newer?,
         };
         if let Some(snapshot) = newer {

@@ -58,6 +58,18 @@ def test_arrays_are_views_that_cannot_be_written_and_outlive_their_snapshot(
     assert np.array_equal(positions, before), "the memory stays mapped"
 
 
+def test_a_program_that_keeps_the_newest_snapshots_is_told_so(start_node: StartNode) -> None:
+    node = start_node("curtain")
+    held = []
+    deadline = time.monotonic() + DEADLINE
+    with pytest.raises(catenary.TooManySnapshots, match="holds 4 snapshots.*copy"):
+        while time.monotonic() < deadline:
+            held.append(node.latest().positions)
+    step = node.status()["step"]
+    held.clear()
+    assert node.latest().step >= step
+
+
 def test_a_program_that_holds_too_many_snapshots_is_told_so(start_node: StartNode) -> None:
     node = start_node("curtain")
     held = []

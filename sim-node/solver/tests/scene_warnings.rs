@@ -58,6 +58,10 @@ fn settings_without_effect_cause_a_warning() {
         &format!("[contact]\nmode = \"surfaces\"\nthickness = 0.1\n{PAIR}"),
         "contact.mode = \"surfaces\" acts as \"particles\"",
     );
+    assert_warns(
+        &format!("[contact]\nthickness = 0.1\n{PAIR}"),
+        "contact.thickness has no effect: contact.mode is \"off\"",
+    );
     assert_warns(&format!("up = \"-y\"\n{PAIR}"), "up is \"-y\", but gravity points up, too");
     assert_warns(
         &format!("[solver]\norder = \"listed\"\n{PAIR}"),

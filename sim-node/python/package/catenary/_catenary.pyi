@@ -275,7 +275,10 @@ class Node:
         Raises `Timeout` if none comes in time, and `TooManySnapshots` if the program holds too many.
         """
     def latest(self, timeout: float | None = 5.0) -> Snapshot:
-        """Returns the newest snapshot. Waits only for the first one."""
+        """Returns the newest snapshot. Waits only for the first one.
+
+        Raises `TooManySnapshots` if the program holds too many to read a newer one.
+        """
     def state(self) -> State:
         """Returns the newest complete state, which `restore` puts in place again."""
     def topology(self) -> Topology:

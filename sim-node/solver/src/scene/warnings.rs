@@ -26,6 +26,7 @@ impl Scene {
             settings::wind_without_surface(self, &model),
             settings::fast_contacts(self, &model),
             settings::contact_without_surface(self, &model),
+            settings::contact_without_mode(self),
             constraints::tear_of_rigid(self, &model),
             constraints::tear_beyond_limit(self, &model),
             constraints::tear_by_rounding(self, &model),

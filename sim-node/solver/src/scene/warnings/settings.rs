@@ -39,6 +39,12 @@ pub(super) fn contact_without_surface(scene: &Scene, model: &Model) -> Option<St
     })
 }
 
+pub(super) fn contact_without_mode(scene: &Scene) -> Option<String> {
+    (scene.contact.mode == ContactMode::Off && scene.contact.thickness.is_some()).then(|| {
+        "contact.thickness has no effect: contact.mode is \"off\"; add mode = \"particles\" or \"surfaces\"".to_owned()
+    })
+}
+
 /// Returns the largest fall in a substep, in contact distances, at which cloth does not pass through itself.
 fn fall_max(mode: ContactMode) -> f32 {
     match mode {
