@@ -16,6 +16,7 @@ mod surfaces;
 mod tile_tree;
 
 use box_tree::Search;
+pub(crate) use load::CONNECTED_REACH;
 use load::{LaneMasks, LoadPairs};
 use order::{order_by_key, order_key};
 use pair::Pair;

@@ -7,7 +7,7 @@ use crate::scene::model::Model;
 
 /// Particles of one connected body never touch if they are nearer than this at load, in contact
 /// distances: a fold of two layers is a half circle of pi / 2 = 1.57.
-pub(super) const CONNECTED_REACH: f32 = 1.6;
+pub(crate) const CONNECTED_REACH: f32 = 1.6;
 /// Largest number of near pairs at load for each particle, on average. Further pairs touch as all others.
 const PAIRS_PER_PARTICLE: usize = 32;
 

@@ -2,6 +2,7 @@
 
 use super::push::Push;
 use crate::kernels::lanes::{PackedParticle, axes, map_axes};
+use crate::kernels::vectors::dot;
 
 /// A pair of particles that must stay a distance apart.
 #[derive(Debug, Clone, Copy)]
@@ -66,9 +67,4 @@ impl Pair {
             }
         }
     }
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -7,6 +7,7 @@ use super::box_tree::{BoxTree, Search};
 use crate::contacts::bounds::Bounds;
 use crate::kernels::Kernels;
 use crate::kernels::lanes::{LaneWork, Lanes8, Wide, axes};
+use crate::kernels::vectors::dot;
 use crate::scene::model::Model;
 
 /// Number of particles in a tile: two groups of eight lanes.
@@ -354,9 +355,4 @@ impl<'a, W: Wide> TilePair<'a, W> {
         let apart = axes(|axis| r[axis] + time * v[axis]);
         dot(apart, apart) < self.query.distance * self.query.distance
     }
-}
-
-#[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -10,6 +10,7 @@ use crate::contacts::colliders::Collider;
 use crate::contacts::contact_substep::{ContactSubstep, Interval};
 use crate::contacts::mesh::near::NearMeshes;
 use crate::contacts::mesh::{PUSHES_MAX, PlacedMesh, Stop};
+use crate::contacts::pairs::CONNECTED_REACH;
 use crate::contacts::path::SubstepPath;
 use crate::contacts::solid::{Solid, solids};
 use crate::scene::definition::Scene;
@@ -17,8 +18,6 @@ use crate::scene::definition::collider::SceneCollider;
 use crate::scene::generate::Generator;
 use crate::scene::model::Model;
 
-/// Distance at load up to which particles of one body never touch, in thicknesses: see `contacts/pairs/load.rs`.
-const CONNECTED_REACH: f64 = 1.6;
 /// Largest reach, in spacings, that is without effect: that of the second neighbours begins.
 const REACH_MAX: f64 = 2.0;
 /// Cosine of the angle between the normals of opposite sides. An edge of 25 degrees is no corner to cut off.
@@ -116,13 +115,13 @@ pub(super) fn thick(scene: &Scene, model: &Model) -> Vec<String> {
         rest = others;
         let spacing = mean_spacing(own).filter(|_| generator.contact)?;
         let ratio = f64::from(thickness) / spacing;
-        (CONNECTED_REACH * ratio >= REACH_MAX).then(|| {
+        (f64::from(CONNECTED_REACH) * ratio >= REACH_MAX).then(|| {
             format!(
                 "contact.thickness: {thickness} {unit} is {ratio:.1} times the spacing of generate[{index}], {} \
                  {unit}: its particles that are nearer than {} {unit} at load never touch, so small folds pass \
                  through themselves; use at most the spacing",
                 three_digits(spacing),
-                three_digits(CONNECTED_REACH * f64::from(thickness)),
+                three_digits(f64::from(CONNECTED_REACH * thickness)),
                 unit = scene.unit,
             )
         })

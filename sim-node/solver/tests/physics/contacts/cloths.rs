@@ -1,7 +1,8 @@
 //! Cloths that fall on themselves, and measures of how well they hold.
 
-use sim_solver::Solver;
+use sim_solver::{Scene, Solver};
 
+use super::super::step;
 use super::crossings::{dot, minus};
 
 pub(super) const SPACING: f64 = 0.02;
@@ -79,4 +80,19 @@ pub(super) fn on_a_ball(count: u32) -> String {
     sheet(count, [-half, 0.5, -half], ["[1, 0, 0]", "[0, 0, 1]"])
         + "[[collider]]\nshape = \"sphere\"\ncenter = [0, 0.15, 0]\nradius = 0.16\nfriction = 0.3\n"
         + GROUND
+}
+
+/// Restores every seventeenth step of a scene from its keyframe, and checks that the copy continues with the same bits.
+pub(super) fn assert_continues_from_keyframes(text: &str) {
+    let scene = Scene::from_toml(&format!("version = 1\n{text}"), "test").unwrap();
+    let mut solver = Solver::new(&scene);
+    for _ in 0..12 {
+        step(&mut solver, 17);
+        let mut copy = Solver::new(&scene);
+        copy.restore(solver.particles(), &solver.keyframe()).unwrap();
+        let mut original = solver.clone();
+        step(&mut original, 20);
+        step(&mut copy, 20);
+        assert_eq!(copy.state_hash(), original.state_hash());
+    }
 }

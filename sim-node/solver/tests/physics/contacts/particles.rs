@@ -2,11 +2,12 @@
 
 use std::fmt::Write;
 
-use sim_solver::{ParameterValue, Scene, Solver};
+use sim_solver::{ParameterValue, Solver};
 
 use super::super::{assert_at_most, assert_near, rates, solver, step, stepped};
 use super::cloths::{
-    GROUND, SPACING, crossings, energy, heap, nearest, on_a_ball, positions, rms_speed, sheet,
+    GROUND, SPACING, assert_continues_from_keyframes, crossings, energy, heap, nearest, on_a_ball,
+    positions, rms_speed, sheet,
 };
 use super::crossings::{dot, minus};
 
@@ -241,17 +242,5 @@ fn contacts_can_be_switched_off_and_on_while_the_scene_runs() {
 
 #[test]
 fn a_keyframe_at_any_step_continues_bit_for_bit() {
-    let text = format!("version = 1\n{}{CONTACT}{}", rates(240, 4), heap(16));
-    let scene = Scene::from_toml(&text, "test").unwrap();
-    let mut solver = Solver::new(&scene);
-    for _ in 0..12 {
-        step(&mut solver, 17);
-        let (states, keyframe) = (solver.particles().to_vec(), solver.keyframe());
-        let mut copy = Solver::new(&scene);
-        copy.restore(&states, &keyframe).unwrap();
-        let mut original = solver.clone();
-        step(&mut original, 20);
-        step(&mut copy, 20);
-        assert_eq!(copy.state_hash(), original.state_hash());
-    }
+    assert_continues_from_keyframes(&(rates(240, 4) + CONTACT + &heap(16)));
 }

@@ -200,7 +200,7 @@ impl<E: Fn([u32; 2]) -> [u16; TILE], F: FnMut([u32; 2]) -> Search> LaneWork
         let half = 0.5 * span;
         for &[left, right] in pairs {
             let (tile, triangles) = (&tree.tiles[left as usize], &tiles[right as usize]);
-            // What comes near at any time is this near in the middle of the time.
+            // A particle and a triangle that meet at any time are at most this far apart in the middle of the time.
             let relative =
                 tree.displacements[left as usize].distances_max(&triangles.displacements);
             let reach = axes(|axis| distance + half * relative[axis]);
